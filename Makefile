@@ -46,7 +46,7 @@ NUMERIC := $(FROZEN) tests/estimation tests/notebook tests/history/test_store.py
 system:
 	requirements/system.sh test
 
-# The type checker works while tests wait for their laboratories.
+# Lint runs beside the tests, and ends before them.
 check: system $(VENV)/dev.installed
 	$(MAKE) --jobs=2 lint fast
 
@@ -81,7 +81,7 @@ proof: system $(VENV)/dev.installed
 lint: $(VENV)/dev.installed
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy
+	$(BIN)/pyrefly check
 	$(BIN)/lint-imports
 
 bench: $(VENV)/dev.installed

@@ -134,7 +134,10 @@ def flash_by_probe(image: bytes, probe: Any) -> None:
         options = {"target_override": TARGET, "hide_programming_progress": True, "connect_mode": mode}
         try:
             # pyocd executes a pyocd_user.py in the working folder, whatever its origin.
-            with contextlib.chdir(PACKAGE), Session(probe, options=options) as session:
+            with (
+                contextlib.chdir(PACKAGE),
+                Session(probe, options=options) as session,  # pyrefly: ignore[bad-context-manager]  # __exit__(None, …)
+            ):
                 _program(session, image)
             return
         except (Error, OSError) as error:

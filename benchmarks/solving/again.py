@@ -55,8 +55,8 @@ def solve_on_cluster(tasks_to_solve: list[Task], workers: int) -> tuple[Duration
     from distributed import Client, LocalCluster
 
     with (
-        LocalCluster(n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None) as local,  # type: ignore[no-untyped-call]
-        Client(local) as client,  # type: ignore[no-untyped-call]
+        LocalCluster(n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None) as local,
+        Client(local) as client,
     ):
         for task in tasks_to_solve[: len(KINDS)]:
             client.run(solve_task, task)

@@ -106,7 +106,7 @@ class Registers:
         return self._values[:]
 
     def write(self, values: Sequence[int]) -> None:
-        self._values[:] = values  # type: ignore[call-overload]  # any sequence will do
+        self._values[:] = values  # any sequence will do
         _write_registers(self._handle, self._ids, self._pointers, self._count)
 
 

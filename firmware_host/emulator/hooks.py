@@ -152,7 +152,7 @@ def address_of(function: str) -> int:
 def _translate() -> llvm.ExecutionEngine:
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
-    module = llvm.parse_assembly((resources.files(__package__) / "hooks.ll").read_text("utf-8"))
+    module = llvm.parse_assembly((resources.files("firmware_host.emulator") / "hooks.ll").read_text("utf-8"))
     module.verify()
     engine = llvm.create_mcjit_compiler(module, llvm.Target.from_default_triple().create_target_machine())
     engine.finalize_object()

@@ -166,4 +166,7 @@ def after(now: Now, event: RunEvent) -> Now:
             changed = {"state": state, "doing": f"{error.name}: {error.what}"}
         case Interrupted(text):
             changed = {"state": "stopped", "doing": text}
-    return now if changed is None else replace(now, **{"left_s": None, "fraction": None, "turn_deg_s": None, **changed})
+    if changed is None:
+        return now
+    values: dict[str, Any] = {"left_s": None, "fraction": None, "turn_deg_s": None, **changed}
+    return replace(now, **values)

@@ -36,7 +36,7 @@ def add_run(
     """Add an argument that names a run; `latest` is this user's last one."""
     text += "; latest: your last one"
     action = parser.add_argument(name, type=_parse_run, metavar=metavar, nargs=nargs, help=text, **more)
-    action.completer = _complete_runs  # type: ignore[attr-defined]  # as argcomplete asks for it
+    action.completer = _complete_runs  # pyrefly: ignore[missing-attribute]  # as argcomplete asks for it
 
 
 def _parse_run(text: str) -> Path:

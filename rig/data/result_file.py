@@ -5,7 +5,7 @@ SI units, the unit in every name; vectors and matrices are lists, rows first. Ke
 
 import json
 from pathlib import Path
-from typing import Annotated, Final, Literal, Self
+from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import AfterValidator, ConfigDict, Field, JsonValue, model_validator
 
@@ -142,7 +142,8 @@ class ProvenanceEntry(Entry):
     """
 
     model_config = ConfigDict(frozen=True, extra="allow", defer_build=True)
-    __pydantic_extra__: dict[str, JsonValue] = Field(init=False)
+    # Pydantic's own way to type the extra keys; it is None in models without any.
+    __pydantic_extra__: dict[str, JsonValue] = Field(init=False)  # pyrefly: ignore[bad-override]
 
     started_utc: Utc
     rig_version: str
@@ -466,7 +467,10 @@ class ResultDocument(Entry):
 
 def schema_text() -> str:
     """Return the JSON schema of `result.json`, as in docs/result.schema.json."""
-    schema = {"$schema": "https://json-schema.org/draft/2020-12/schema", **ResultDocument.model_json_schema()}
+    schema: dict[str, Any] = {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        **ResultDocument.model_json_schema(),
+    }
     for name, entry in {"ResultDocument": schema, **schema["$defs"]}.items():
         for key, described in entry.get("properties", {}).items():
             described["description"] = meaning_of(name.removesuffix("Entry"), key)

@@ -267,11 +267,11 @@ class History:
         )
         return number
 
-    def _pasts(self, question: Select[Any]) -> list[Past]:
+    def _pasts(self, question: Select[*tuple[Any, ...]]) -> list[Past]:
         with self.engine.connect() as connection:
             rows = connection.execute(question).all()
             parameters = _parameters(connection, [row.id for row in rows])
-        return [Past(**row._mapping, parameters=parameters.get(row.id, {})) for row in rows]
+        return [Past(**row._asdict(), parameters=parameters.get(row.id, {})) for row in rows]
 
 
 _RUN, _CALIBRATION = schema.run.c, schema.calibration.c
@@ -326,7 +326,7 @@ def replaced() -> Any:
     return exists(select(later.c.id).where(later.c.measurement_sha256 == _RUN.measurement_sha256, newer))
 
 
-def chosen(question: Select[Any], selection: Selection) -> Select[Any]:
+def chosen(question: Select[*tuple[Any, ...]], selection: Selection) -> Select[*tuple[Any, ...]]:
     """Return a query for the selected runs, or for their calibrations."""
     if selection.serial_number is not None:
         question = question.where(_CALIBRATION.serial_number == selection.serial_number)

@@ -193,7 +193,8 @@ def lengths_m(arm: DenavitHartenberg) -> Array:
     shoulder, elbow, wrist_1 = _find_bends(frames)
     offset_axes = [(base, shoulder, 0), (wrist_1, wrist_2, 3), (wrist_2, wrist_3, 4), (wrist_3, flange, 5)]
     height, *offsets = ((end - start) @ frames[joint][:3, 2] for start, end, joint in offset_axes)
-    return np.array([height, np.linalg.norm(elbow - shoulder), np.linalg.norm(wrist_1 - elbow), *offsets])
+    lengths = [height, np.linalg.norm(elbow - shoulder), np.linalg.norm(wrist_1 - elbow), *offsets]
+    return np.array(lengths, dtype=np.float64)
 
 
 def _find_bends(frames: list[Array]) -> tuple[Array, Array, Array]:

@@ -173,8 +173,8 @@ def fit_response(stream: Stream, turns: Sequence[Observation]) -> Array:
     design = np.array([(*(turn.speed_rad_s * turn.axis_flange), 1.0) for turn in turns]).reshape(-1, 4)
     if np.linalg.matrix_rank(design, tol=ABOUT_ALL_AXES * np.linalg.norm(design)) < 4:
         return np.array(stream.sensor.mounting)
-    coefficients: Array = np.linalg.lstsq(design, np.array([turn.average.mean_rad_s for turn in turns]), rcond=None)[0]
-    return coefficients[:3].T
+    coefficients, *_ = np.linalg.lstsq(design, np.array([turn.average.mean_rad_s for turn in turns]), rcond=None)
+    return np.asarray(coefficients[:3].T, dtype=np.float64)
 
 
 def _add_drift(average: Average, drift: Array) -> Average:

@@ -7,6 +7,7 @@ run's process an estimator would delay the threads that take samples; this proce
 import json
 import os
 import sys
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
@@ -20,7 +21,7 @@ from rig.page.rows import look_of
 NICENESS = 10  # the run comes first
 
 
-def look(folder: Path) -> dict[str, object]:
+def look(folder: Path) -> Mapping[str, object]:
     """Return the page's rows for the recordings of raw readings in a run folder."""
     return asdict(look_of(so_far([read_run(path) for path in recordings(folder, "raw")])))
 

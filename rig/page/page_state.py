@@ -315,7 +315,7 @@ def _turn(sweep: Sweep) -> dict[str, Any]:
 
 
 def _kind(step: Step) -> str:
-    return {Sweep: "measuring", Dwell: "measuring", Rest: "resting"}.get(type(step), "moving")
+    return "measuring" if isinstance(step, Sweep | Dwell) else "resting" if isinstance(step, Rest) else "moving"
 
 
 def _step_fields(number: int, count: int, step: Step) -> dict[str, Any]:

@@ -158,7 +158,7 @@ def _progress(done: _Done, count: int, state: State, *, time_s: float, start_s: 
 def _state(row: Any) -> State:
     """Return a recorded state: an arm's state if it has all its fields, else one of joints only."""
     values: dict[str, Any] = {name: row[name].tolist() for name in row.dtype.names}
-    joints = {name: tuple(values.get(name, ())) for name in ("q_rad", "qd_rad_s")}
+    joints: dict[str, Any] = {name: tuple(values.get(name, ())) for name in ("q_rad", "qd_rad_s")}
     if row.dtype == ARM_STATE_DTYPE:
         return ArmState(**{**values, **joints})
     return JointState(values["time_s"], values["host_time_s"], **joints)

@@ -152,7 +152,8 @@ def plan_of(config: RigConfig, procedure: ProcedureSection) -> Plan:
 
 def _change(section: SectionT, **keys: object) -> SectionT:
     """Return the section with changed values. Raise ValidationError for values that a file may not have."""
-    return type(section).model_validate({**dict(section), **keys})
+    kind: type[SectionT] = type(section)
+    return kind.model_validate({**dict(section), **keys})
 
 
 def _add_target(planned: Planned, keys: Mapping[str, float]) -> Planned:

@@ -27,9 +27,12 @@ def entry(kind: type[EntryT], /, *sources: object, **more: Any) -> EntryT:
 
 
 def counted(dof: Array | None) -> list[Any] | None:
-    """Return degrees of freedom of any shape as lists, with infinity as null, or None if unknown."""
-    if dof is None:
-        return None
+    """Return degrees of freedom as `list_dof` does, or None if unknown."""
+    return None if dof is None else list_dof(dof)
+
+
+def list_dof(dof: Array) -> list[Any]:
+    """Return degrees of freedom of any shape as lists, with infinity as null."""
     numbers = dof.astype(object)
     numbers[~np.isfinite(dof)] = None
     return list(numbers.tolist())

@@ -123,7 +123,7 @@ class Run:
                 phase, moved = replace(phase, agreed=True), True
         with self.report_end(self._advice_to_repeat, moved=True):
             files = recordings(self.folder, readings)
-            if path not in files:
+            if path not in files:  # pyrefly: ignore[unbound-name]  # one stage at least
                 raise Fault(
                     "run_folder_removed",
                     f"{path} does not exist any more",

@@ -37,7 +37,7 @@ def test_parameters_come_when_the_sweeps_tell_them(run: RunData) -> None:
             assert found.bias_rad_s is not None
             bias, std = found.bias_rad_s
             assert np.all(np.abs(bias - BIAS_RAD_S) < 5 * std)
-    assert isinstance(found.solution, VectorSolution)
+    assert isinstance(found.solution, VectorSolution)  # pyrefly: ignore[unbound-name]  # of six sweeps
     assert np.allclose(found.solution.scale, SCALE, rtol=1e-3)
 
 

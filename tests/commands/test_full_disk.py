@@ -79,10 +79,10 @@ def test_a_history_is_made_whole_or_not_at_all(tmp_path: Path, monkeypatch: pyte
     file = tmp_path / "history.sqlite"
     made = engine._bring_up_to_date
 
-    def made_in_the_last_room(*given: object) -> None:
+    def made_in_the_last_room(*given: Any) -> None:
         import resource
 
-        made(*given)  # type: ignore[arg-type]
+        made(*given)
         resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, resource.RLIM_INFINITY))
 
     monkeypatch.setattr(engine, "_bring_up_to_date", made_in_the_last_room)

@@ -260,9 +260,9 @@ def test_a_killed_run_opens_and_holds_all_but_the_last_second(tmp_path: Path, th
             check_killed(path, handed_over)
             process.close()
             pipe.close()
-    make_plain(path)
+    make_plain(path)  # pyrefly: ignore[unbound-name]  # of the last writer
     with h5py.File(path, "r") as file:
-        assert len(file["states"]) >= 5 * handed_over
+        assert len(file["states"]) >= 5 * handed_over  # pyrefly: ignore[unbound-name]  # of the last writer
 
 
 def check_killed(path: Path, ticks: int) -> None:

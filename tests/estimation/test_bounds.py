@@ -35,7 +35,7 @@ MOUNTING = Rotation.from_rotvec([0.06, -0.05, 0.07]).as_matrix()  # 10 % of misa
 
 def minute(speed: float) -> tuple[Array, Array, Array]:
     """Rates in the flange frame (12, 3), variances (12, 3) and RUNS noisy means: six turns and six rests of 3 s."""
-    rates = np.concatenate([speed * np.kron(np.eye(3), [[1.0], [-1.0]]), np.zeros((6, 3))])
+    rates = np.concatenate([speed * np.kron(np.eye(3), [[1.0], [-1.0]]).astype(np.float64), np.zeros((6, 3))])
     samples = 200 * np.repeat([2 * np.pi / speed, 3.0], 6)
     variances = np.tile(0.035**2 / samples[:, None], (1, 3))
     return rates, variances, noisy(rates @ MOUNTING.T / SCALE - BIAS, variances, runs=RUNS)
@@ -77,7 +77,7 @@ def test_the_vector_models_covariance_is_its_bound() -> None:
 
 def test_the_bound_of_six_observations_is_the_theory_of_one_axis() -> None:
     speed, sigma, samples = 3.0, 0.035, 419
-    rates = speed * np.kron(np.eye(3), [[1.0], [-1.0]])
+    rates = speed * np.kron(np.eye(3), [[1.0], [-1.0]]).astype(np.float64)
     bound = six_observation_bound(SCALE, rates, np.full((6, 3), sigma**2 / samples))
     bias = sigma / np.sqrt(2 * samples)
     np.testing.assert_allclose(np.sqrt(np.diag(bound)), [*SCALE**2 * bias / speed, *[bias] * 3], rtol=1e-12)

@@ -15,7 +15,7 @@ def session(rng: np.random.Generator, walk_rad_s_sqrt_s: float = 0.0) -> Explain
     """Six sweeps, some noisier than others and of a speed that is not exact, and six rests; a bias that walks."""
     turns = SPEED_RAD_S * np.concatenate([np.eye(3), -np.eye(3), np.zeros((6, 3))])
     std = NOISE_RAD_S * np.linspace(0.5, 1.5, 12)[:, None] * np.ones((1, 3))
-    windows_s = 10.0 * np.arange(12)[:, None] + [0.0, 6.0]
+    windows_s = 10.0 * np.arange(12, dtype=np.float64)[:, None] + [0.0, 6.0]
     speed_std = np.where(turns.any(axis=1), SPEED_STD_RAD_S, 0.0)
     swept = turns * (1 + speed_std * rng.normal(size=12) / SPEED_RAD_S)[:, None]
     bias = walk_rad_s_sqrt_s * np.sqrt(10.0) * np.cumsum(rng.normal(size=(12, 3)), axis=0)

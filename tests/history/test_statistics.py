@@ -178,7 +178,8 @@ def test_two_rigs_whose_clocks_differ_by_40_ppm_are_told_apart_from_four_shared_
 def test_the_two_way_fit_is_not_misled_by_who_calibrated_what() -> None:
     """B got the sensor that reads high more often: the mean of its results is no effect of B."""
     rigs, sensors = ["A", "A", "A", "B", "B", "B", "B"], ["low", "low", "high", "low", "high", "high", "high"]
-    values = np.array([{"low": 0.0, "high": 0.05}[sensor] for sensor in sensors]) + 1e-6 * np.arange(7)
+    values = np.array([{"low": 0.0, "high": 0.05}[sensor] for sensor in sensors])
+    values += 1e-6 * np.arange(7)
     (effect,) = rig_effects(rigs, sensors, values, np.full(7, 1e-5))
     assert abs(effect.value) < 1e-5
 

@@ -157,8 +157,8 @@ def test_payload_beyond_the_arm_is_refused() -> None:
         ({"q_rad": (math.radians(170), *HOME[1:])}, "far_from_home"),
     ],
 )
-def test_an_arm_that_is_not_ready_is_refused_by_name(change: dict[str, object], name: str) -> None:
-    state = replace(READY, **change)  # type: ignore[arg-type]
+def test_an_arm_that_is_not_ready_is_refused_by_name(change: dict[str, Any], name: str) -> None:
+    state = replace(READY, **change)
     assert names(arm_problems(plan(), replace(REPORT, state=state))) == [name]
 
 

@@ -65,7 +65,7 @@ def failing(*_: object) -> Plan:
 
 
 def giving_nothing(*_: object) -> Plan:
-    return None  # type: ignore[return-value]
+    return None  # pyrefly: ignore[bad-return]
 
 
 def ending(*_: object) -> Plan:

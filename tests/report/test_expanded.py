@@ -62,7 +62,8 @@ def test_u_of_angles_is_the_same_wherever_it_is_told() -> None:
     (kept,) = (each for each in followed(document) if each.quantity == "rate")
     parameters = {parameter.name: parameter.expanded for parameter in kept.parameters}
     assert [parameters[f"nonorth_{each}"] for each in ("yz", "zx", "xy")] == pytest.approx(widths)
-    assert parameters["gxx"] == pytest.approx(factors[0] * vector.g_sensitivity_std_rad_s_per_m_s2[0][0])  # type: ignore[index]
+    assert vector.g_sensitivity_std_rad_s_per_m_s2 is not None
+    assert parameters["gxx"] == pytest.approx(factors[0] * vector.g_sensitivity_std_rad_s_per_m_s2[0][0])
     xml = fromstring(digital_certificate(certificate(document, GERMAN)))
     (skew, *_) = (
         each
@@ -149,6 +150,7 @@ def test_what_a_run_finds_beside_scale_and_bias_has_freedom_between_the_scarcest
         vector.mounting_degrees_of_freedom,
         *(vector.g_sensitivity_degrees_of_freedom or ()),
     ):
-        assert dof is not None and all(each is not None and each >= fewest for each in dof)
-        factors = expanded([1.0] * 3, dof).factors
-        assert covered(factors, dof) == pytest.approx([PROBABILITY] * 3)
+        counted = [each for each in dof or () if each is not None and each >= fewest]
+        assert len(counted) == 3
+        factors = expanded([1.0] * 3, counted).factors
+        assert covered(factors, counted) == pytest.approx([PROBABILITY] * 3)

@@ -88,7 +88,9 @@ def test_imucal_takes_readings_to_the_true_rate_and_force(sensed: ResultDocument
     rate, up = motion()
     reading, acceleration = felt(sensed, rate, up)
     force, turned = found.calibrate(acceleration[None], reading[None], "m/s^2", "rad/s")
-    mounting = np.array(sensed.gyroscopes["gyro"].vector_model.mounting)  # type: ignore[union-attr]
+    model = sensed.gyroscopes["gyro"].vector_model
+    assert isinstance(model, VectorEntry)
+    mounting = np.array(model.mounting)
     np.testing.assert_allclose(turned[0], mounting @ rate, rtol=1e-12, atol=1e-15)
     np.testing.assert_allclose(force[0], GRAVITY_M_S2 * mounting @ up, rtol=1e-12, atol=1e-15)
     assert "b_g = -b" in found.comment and "Left out" in found.comment
@@ -112,7 +114,9 @@ def test_kalibr_s_intrinsics_say_the_same_of_the_same_motion(sensed: ResultDocum
     for lower in (scaled, of_force):
         assert np.array_equal(lower, np.tril(lower))
     np.testing.assert_allclose(turned @ turned.T, np.eye(3), atol=1e-12)
-    mounting = np.array(sensed.gyroscopes["gyro"].vector_model.mounting)  # type: ignore[union-attr]
+    model = sensed.gyroscopes["gyro"].vector_model
+    assert isinstance(model, VectorEntry)
+    mounting = np.array(model.mounting)
     beside = sensed.accelerometers["gyro"]
     _, body = triangular(np.linalg.inv(np.array(beside.correction_matrix)))
     rate, up = motion()
@@ -294,7 +298,7 @@ def test_a_ros_2_bag_holds_the_readings(recordings: tuple[WithMotion, ...], tmp_
     (path,) = writer_of_readings("ros2")(recordings, tmp_path)
     store = get_typestore(Stores.ROS2_JAZZY)
     stream = recordings[0].observed.stream("gyro")
-    with Reader(path) as bag:
+    with Reader(str(path)) as bag:
         (connection,) = bag.connections
         assert connection.topic == "/gyro/imu"
         messages: list[Any] = [store.deserialize_cdr(data, connection.msgtype) for _, _, data in bag.messages()]
@@ -338,7 +342,7 @@ def test_accelerations_are_exported_beside_the_rates(recordings: tuple[WithMotio
     assert header == "time_s,x_m_s2,y_m_s2,z_m_s2" and first.endswith(",0.25,0.5,0.75")
     (path,) = writer_of_readings("ros2")(felt, tmp_path)
     store = get_typestore(Stores.ROS2_JAZZY)
-    with Reader(path) as bag:
+    with Reader(str(path)) as bag:
         connection, _, data = next(iter(bag.messages()))
         message: Any = store.deserialize_cdr(data, connection.msgtype)
     force = message.linear_acceleration
@@ -397,7 +401,7 @@ def test_readings_of_a_file_are_a_ros_2_bag_where_a_gyroscope_is_among_them(
 
     run = read_run(ELSEWHERE / "sweeps" / "run.h5")
     (path,) = writer_of_readings("ros2")(exported([run]), tmp_path)
-    with Reader(path) as bag:
+    with Reader(str(path)) as bag:
         assert bag.message_count == len(run.samples["imu"])
         assert bag.duration * 1e-9 == pytest.approx(np.ptp(run.samples["imu"]["host_time_s"]))
     still = ["export", str(ELSEWHERE / "attitudes"), "--format", "ros2", "--out", str(tmp_path / "still")]

@@ -45,7 +45,7 @@ def test_each_value_is_compared_with_its_truth_in_units_of_u(run: Path) -> None:
     entry = result.gyroscopes["gyro"]
     assert entry.budget is not None
     values = np.array(entry.scale + entry.bias_rad_s)
-    true = np.array(TRUE["gyroscopes"]["gyro"]["scale"] + TRUE["gyroscopes"]["gyro"]["bias_rad_s"])  # type: ignore[index]
+    true = np.array(TRUE["gyroscopes"]["gyro"]["scale"] + TRUE["gyroscopes"]["gyro"]["bias_rad_s"])
     expected = (values - true) / np.array(entry.budget.expanded)
     assert row.scale.deviations + row.bias.deviations == pytest.approx(expected)
     (line,) = truth_lines([row])
@@ -74,9 +74,9 @@ def test_the_page_has_it_once_it_is_written(run: Path) -> None:
 
 
 def test_a_scale_factor_without_a_defined_truth_has_none(run: Path) -> None:
-    del TRUE["gyroscopes"]["gyro"]["scale"]  # type: ignore[index]
+    del TRUE["gyroscopes"]["gyro"]["scale"]
     (run / "truth.json").write_text(json.dumps(TRUE), encoding="utf-8")
-    TRUE["gyroscopes"]["gyro"]["scale"] = [1.18, 1.15, 1.14]  # type: ignore[index]
+    TRUE["gyroscopes"]["gyro"]["scale"] = [1.18, 1.15, 1.14]
     (row,) = truth_rows(run, read_result(run))
     assert row.scale is None
     assert "of 3 values within U" in next(truth_lines([row]))

@@ -51,7 +51,7 @@ def test_mavlink_1_has_no_temperature_of_an_imu(message: str) -> None:
     extension = (0, 2531) if message == "RAW_IMU" else (2531,)
     for mavlink, more, celsius in ((second_version, extension, 25.31), (first_version, (), np.nan)):
         kind = mavlink.mavlink_map[getattr(mavlink, f"MAVLINK_MSG_ID_{message}")]
-        sent = kind(1000, *SIX, 0, 0, 0, *more).pack(mavlink.MAVLink(None))
+        sent = kind(1000, *SIX, 0, 0, 0, *more).pack(mavlink.MAVLink(None))  # pyrefly: ignore[bad-argument-type, bad-argument-count]  # a kind by its number
         (heard,) = second_version.MAVLink(None).parse_buffer(sent)
         reading = decode_reading(heard)
         assert reading.temperature_c == pytest.approx(celsius, nan_ok=True)

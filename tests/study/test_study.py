@@ -189,7 +189,7 @@ def test_results_do_not_depend_on_a_dask_cluster(tmp_path: Path) -> None:
     local = {"n_workers": 1, "threads_per_worker": 2, "processes": False, "dashboard_address": None}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # distributed's own, about the loop it closes
-        with LocalCluster(**local) as cluster:  # type: ignore[no-untyped-call]
+        with LocalCluster(**local) as cluster:
             address = cluster.scheduler_address
             assert main([*arguments, "--dask", address, "--out", str(tmp_path / "cluster")]) == 0
     assert main([*arguments, "--out", str(tmp_path / "here")]) == 0

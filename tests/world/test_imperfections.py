@@ -4,6 +4,7 @@ import json
 import math
 import struct
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pytest
@@ -38,9 +39,9 @@ D_M = (0.1807, 0.0, 0.0, 0.17415, 0.11985, 0.11655)
 ALPHA = (math.pi / 2, 0.0, 0.0, math.pi / 2, -math.pi / 2, 0.0)
 
 
-def laboratory(gyro: Mapping[str, object] | None = None, **world: object) -> Host:
+def laboratory(gyro: Mapping[str, object] | None = None, **world: Any) -> Host:
     """demo.yaml's board, streaming, with an ideal arm and gyroscope but for what is asked for."""
-    arm = {"joints": "ideal", **(world.pop("arm", None) or {})}  # type: ignore[dict-item]
+    arm = {"joints": "ideal", **(world.pop("arm", None) or {})}
     ideal = {"scale": [1, 1, 1], "bias_rad_s": [0, 0, 0], "noise_rad_s": 0}
     section = {"arm": arm, "sensors": {"gyro": {**ideal, **(gyro or {})}}, **world}
     return host(load(DEMO, [f"world={json.dumps(section)}"]))

@@ -1,5 +1,7 @@
 """The simulated laboratory's magnetic field, and what a magnetometer on the flange feels of it."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -75,7 +77,7 @@ def test_iron_is_a_dipole_that_moves_with_its_link() -> None:
         pose = list(frames(angles))
         rotation, origin = np.array(pose[5][0]), np.array(pose[5][1])
 
-        def at(*place_m: float, pose=pose, rotation=rotation, origin=origin) -> np.ndarray:  # type: ignore[no-untyped-def]
+        def at(*place_m: float, pose: Any = pose, rotation: Any = rotation, origin: Any = origin) -> np.ndarray:
             """In the link's axes, µT, so far from the dipole."""
             here = origin + rotation @ np.add(place_m, (0, 0, 0.06))
             felt: np.ndarray = 1e6 * rotation.T @ np.array(field.flux_density_at(tuple(here), pose, 0.0))

@@ -173,14 +173,15 @@ def _inflate_transfers(segments_only: _Tested, matrix: Array, allowance: ErrorPa
     Their χ² is that of all segments minus that of the segments without transfers. The factor is at most `MOST`.
     """
     transfers, (segments_chi_square, segments_dof) = allowance.transfers, _residual_chi_square(segments_only)
-    for ratio in np.geomspace(1.0, MOST, TRIED):
+    with_transfers = _whiten_with_transfers(matrix, allowance, bias)
+    for ratio in np.geomspace(1.0, MOST, TRIED)[1:]:
+        chi_square, dof = _residual_chi_square(with_transfers)
+        if chi_square - segments_chi_square <= dof - segments_dof:
+            break
         variances = transfers.variances_rad2_s2 + (ratio - 1) * transfers.unexplained_rad2_s2
         with_transfers = _whiten_with_transfers(
             matrix, replace(allowance, transfers=replace(transfers, variances_rad2_s2=variances)), bias
         )
-        chi_square, dof = _residual_chi_square(with_transfers)
-        if chi_square - segments_chi_square <= dof - segments_dof:
-            break
     return with_transfers
 
 

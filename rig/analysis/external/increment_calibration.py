@@ -80,7 +80,8 @@ def _solve(turning: Turning, window_s: float | None) -> InIncrements:
         if _are_equal(gathered, regathered):
             break
         gathered = regathered
-    return InIncrements(solution, gathered.window_s, gathered.left_out, gathered.increments)
+    left_out, increments = gathered.left_out, gathered.increments
+    return InIncrements(solution, gathered.window_s, left_out, increments)  # pyrefly: ignore[unbound-name]  # PASSES > 0
 
 
 def _are_equal(one: Gathered, other: Gathered) -> bool:

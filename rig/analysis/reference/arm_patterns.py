@@ -71,7 +71,7 @@ def _rotations(posture: Posture, arm: DenavitHartenberg, mounting: Array) -> Arr
     sizes[posture.wrist, 0, :TURNS] = [*in_flange[posture.wrist, 0], 0.0, 0.0, 0.0]  # the twist is distal to its joint
     sizes[posture.wrist, STEADY:] = 0.0
     sizes[posture.wrist, STEADY:, TURNS:] = _shift_harmonics(float(posture.q_rad[WRIST_1 + posture.wrist]))
-    return sizes.reshape(-1, SHARED_ERRORS) / SHARE
+    return np.asarray(sizes.reshape(-1, SHARED_ERRORS) / SHARE)
 
 
 def _shift_harmonics(angle_rad: float) -> Array:

@@ -205,8 +205,8 @@ def _combine(
     *,
     earth_rate_known: bool,
 ) -> BiasDrift:
-    times = np.array([np.mean([mean.time_s for mean in repeat]) for repeat in repeats])
-    temperatures = np.array([np.mean([mean.temperature_c for mean in repeat]) for repeat in repeats])
+    times = np.array([np.mean([mean.time_s for mean in repeat]) for repeat in repeats], dtype=np.float64)
+    temperatures = np.array([np.mean([mean.temperature_c for mean in repeat]) for repeat in repeats], dtype=np.float64)
     faults = dict[str, Fault]()
     slope = attempt(faults, SLOPE, partial(bias_over_temperature, by_repeat.bias, by_repeat.std, temperatures, times))
     dof = np.minimum(by_repeat.dof, np.min([_repeat_dof(repeat) for repeat in repeats], axis=0))

@@ -4,7 +4,7 @@ import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rig.commands.devices.configuration_writing import refuse_existing, write_checked
 from rig.commands.devices.lines import SECONDS, add_stated, ask_stated, look_at_device, positive_number
@@ -13,14 +13,14 @@ from rig.errors import RigError
 from rig.station.plain_text import say
 
 if TYPE_CHECKING:
-    from rig.config.first_configuration import Answers
+    from rig.config.first_configuration import Answers, Source, Turner
 
-TURNERS = {
+TURNERS: "Mapping[Turner, str]" = {
     "hand": "your hand, on a flat table; nothing else is needed",
     "arm": "a robot arm of Universal Robots",
     "servo": "a Dynamixel servomotor",
 }
-SOURCES = {
+SOURCES: "Mapping[Source, str]" = {
     "lines": "a microcontroller that prints an IMU's readings (Arduino, ESP32, any)",
     "board": "a sensor on the rig's board, a Nucleo-L432KC",
     "autopilot": "the IMU of an autopilot (ArduPilot, PX4)",
@@ -65,19 +65,20 @@ def _read_answers(options: Namespace) -> "Answers":
     turner = ask_choice("What turns the sensors?", "--turner", TURNERS, options.turner)
     sources = {key: words for key, words in SOURCES.items() if key != "kvh1775" or turner == "arm"}
     source = ask_choice("What measures?", "--sensor", sources, options.sensor)
-    arm = _turner_answers(turner, options)
+    more = _turner_answers(turner, options)
     port = _port("Where does it answer?", "--port", options.port)
     if source == "lines":
-        return Answers(turner, source, port, **_lines_answers(options, port, by_hand=turner == "hand"), **arm)  # type: ignore[arg-type]
+        return Answers(turner, source, port, **_lines_answers(options, port, by_hand=turner == "hand"), **more)
     parts = {name: name for name, part in PARTS.items() if not part.own_port and name != "mavlink"}
-    part = {"part": ask_choice("Which sensor is it?", "--part", parts, options.part)} if source == "board" else {}
+    if source == "board":
+        more["part"] = ask_choice("Which sensor is it?", "--part", parts, options.part)
     serial_number = ask(
         "serial number of this specimen", "--serial-number", check_serial_number, value=options.serial_number
     )
-    return Answers(turner, source, port, serial_number, **part, **arm)  # type: ignore[arg-type]
+    return Answers(turner, source, port, serial_number, **more)
 
 
-def _turner_answers(turner: str, options: Namespace) -> dict[str, object]:
+def _turner_answers(turner: "Turner", options: Namespace) -> dict[str, Any]:
     from rig.config.models import ArmSection
     from rig.config.procedures.servo_section import ServoSection
     from rig.config.section import check_host
@@ -108,7 +109,7 @@ def _turner_answers(turner: str, options: Namespace) -> dict[str, object]:
     return {}
 
 
-def _lines_answers(options: Namespace, port: str, *, by_hand: bool) -> dict[str, object]:
+def _lines_answers(options: Namespace, port: str, *, by_hand: bool) -> dict[str, Any]:
     """Return the values that the device shows; if it is not read or does not answer, those that the user gives."""
     choices = {"yes": "yes: ten seconds, and nothing is left to look up", "no": "no: write an example, to be edited"}
     user_values = ask_stated(options, by_hand=by_hand)

@@ -2,10 +2,13 @@
 
 import sys
 from collections.abc import Callable, Mapping
+from typing import TypeVar
 
 from rig.errors import Refused
 from rig.errors.quoting import printable
 from rig.station.plain_text import say
+
+KeyT = TypeVar("KeyT", bound=str)
 
 
 def ask(
@@ -33,7 +36,7 @@ def ask(
             say(f"  {error}", sys.stderr)
 
 
-def ask_choice(question: str, option: str, choices: Mapping[str, str], value: str | None = None) -> str:
+def ask_choice(question: str, option: str, choices: Mapping[KeyT, str], value: str | None = None) -> KeyT:
     """Return the key of a choice, given by its number or itself; Enter selects the first. Raise as `ask` does."""
     keys = [*choices]
 
@@ -49,7 +52,8 @@ def ask_choice(question: str, option: str, choices: Mapping[str, str], value: st
         say(question, sys.stderr)
         for number, words in enumerate(choices.values(), 1):
             say(f"  {number}  {words}", sys.stderr)
-    return ask("  number", option, key_of, usual="1", value=value)
+    answer = ask("  number", option, key_of, usual="1", value=value)
+    return next(key for key in keys if key == answer)
 
 
 def _refuse_without_terminal(question: str, option: str) -> None:

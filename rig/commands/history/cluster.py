@@ -19,7 +19,7 @@ def connect_client(address: str) -> Iterator["Client"]:
     with requiring("dask"):
         from distributed import Client
     try:
-        client = Client(address, timeout="5s")  # type: ignore[no-untyped-call]
+        client = Client(address, timeout="5s")
     except (OSError, ValueError) as error:
         raise Refused(
             "no_cluster", f"no Dask scheduler answers at {address} ({error})", "Start one with `dask scheduler`"

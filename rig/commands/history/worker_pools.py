@@ -124,7 +124,7 @@ class Cluster:
         """Return the number of threads of each worker by its address. Raise Fault `cluster_lost`."""
         if self._client.status == "running":
             with suppress(OSError, RuntimeError):
-                threads: dict[str, int] = self._client.nthreads()  # type: ignore[no-untyped-call]
+                threads: dict[str, int] = self._client.nthreads()
                 return threads
         raise _cluster_lost("the scheduler does not answer any more")
 

@@ -95,7 +95,7 @@ def _describe_holder(address: str) -> str:
             )
         program, *arguments = Path(f"/proc/{process}/cmdline").read_text("utf-8", "replace").split("\0")[1:-1]
     except (OSError, ValueError):  # it has ended meanwhile, or belongs to another user
-        return f"process {process}" if process else "whose process cannot be seen"
+        return f"process {process}" if process != 0 else "whose process cannot be seen"
     return f"process {process}: {shorten(shlex.join([Path(program).name, *arguments]))}"
 
 

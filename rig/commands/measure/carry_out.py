@@ -50,6 +50,7 @@ def carry_out(
         with log(folder / LOG) as logged, view() as terminal, ExitStack() as stack:
             station = Stations((logged, terminal, *page_of_run.listeners), answer, attended=answer is not always_yes)
             memory = recall_sensors(configured.loaded.config, moved)
+            control, resumed = None, False
             run = Run(folder, configured.loaded, configured.script, station, memory)
             with run.report_end():
                 stack.enter_context(claim_devices(configured.loaded.config))
@@ -63,7 +64,7 @@ def carry_out(
                     station.mount = make_mounter(control)
                     station.listeners = (*station.listeners, OperatorListener(control))
             outcome = run.carry_out(configured.phase)
-            if configured.loaded.simulated and not resumed:
+            if control is not None and not resumed:
                 for event in write_truth(control, folder / TRUTH, folder, configured.loaded, outcome):
                     station.event(event)
             try:

@@ -184,7 +184,7 @@ class RigBench:
                     if not (repeats_left and listener.repeats):
                         raise
                 phase = replace(phase, agreed=True)
-            truth = self._compare_with_truth(folder, configured, outcome, station)
+            truth = self._compare_with_truth(folder, configured, outcome, station)  # pyrefly: ignore[unbound-name]  # the last run has one, or raises
             entered, _ = remember(folder, config.history)
             if entered is not None:
                 station.event(entered)

@@ -107,7 +107,7 @@ class _Loader(yaml.SafeLoader):
         self._size_of: dict[str, int] = {}  # nodes that an alias stands for, once all of them are known
 
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
-        event: Any = self.peek_event()  # type: ignore[no-untyped-call]
+        event: Any = self.peek_event()
         if isinstance(event, yaml.AliasEvent):
             anchor = str(event.anchor)
             if anchor in self.anchors and anchor not in self._size_of:

@@ -96,8 +96,7 @@ class Channel:
         counts = self.counts(samples)
         wide = counts.astype(np.int64) if counts.dtype.kind == "i" else counts  # the least i4 has no positive
         beyond = np.abs(wide) >= self.full_scale_counts
-        mask: NDArray[np.bool_] = beyond.reshape(len(samples), -1).any(axis=1)
-        return mask
+        return np.asarray(beyond.reshape(len(samples), -1).any(axis=1))
 
 
 def triad_channel(

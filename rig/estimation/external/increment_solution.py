@@ -170,7 +170,7 @@ def _settle(recorded: AttitudeSamples, state: DriftState) -> _Settled:
         u = np.sqrt(np.diag(solved.covariance))[: CLOCK + 1]
         if iteration > 2 and (np.abs(solved.theta[: CLOCK + 1]) < SETTLED * u).all():
             break
-    return settled
+    return settled  # pyrefly: ignore[unbound-name]  # PASSES > 0
 
 
 def _find_outliers(settled: _Settled) -> NDArray[np.bool_]:

@@ -75,15 +75,22 @@ def solve_with_common_errors(
 
     design = design_matrix(rates, gravity_m_s2)
     shared = np.zeros((len(means), len(means))) if shared_covariance_rad2_s2 is None else shared_covariance_rad2_s2
-    solution = solve(np.zeros_like(means))
-    for _ in range(PASSES):
-        speed_noise = propagate_speed_std(rates, speed_std_rad_s, solution.matrix)
+
+    def estimate(matrix: Array) -> tuple[Array, Array, Array, CommonErrors]:
+        speed_noise = propagate_speed_std(rates, speed_std_rad_s, matrix)
         noise = np.array([np.diag(axis) for axis in (variances + speed_noise**2).T]) + shared  # (3, N, N)
-        error_patterns = effects(solution.matrix)
+        error_patterns = effects(matrix)
         gain, covariance = _gain(design, error_patterns, noise)
         sizes = np.einsum("pni,ni->p", gain, means)
         errors = CommonErrors(sizes, covariance, np.einsum("p,pni->ni", sizes, error_patterns))
+        return speed_noise, error_patterns, gain, errors
+
+    solution = solve(np.zeros_like(means))
+    speed_noise, error_patterns, gain, errors = estimate(solution.matrix)
+    for _ in range(1, PASSES):
         solution = solve(errors.readings_rad_s)
+        speed_noise, error_patterns, gain, errors = estimate(solution.matrix)
+    solution = solve(errors.readings_rad_s)
     noise = np.array([np.diag(axis) for axis in variances.T]) + shared
     _, inverse = regress(design, means, variances + speed_noise**2, shared_covariance_rad2_s2)
     shifts = np.einsum("ipn,kni->ipk", inverse, error_patterns)  # of the coefficients, per standard deviation

@@ -241,7 +241,8 @@ def _condition(inputs: VectorInputs, directions: Array, gravity: Array | None) -
     sweeps = inputs.turns_rad_s / (np.linalg.norm(inputs.turns_rad_s) / len(inputs.turns_rad_s) ** 0.5 or 1.0)
     scaled_gravity = None if gravity is None else gravity / (np.linalg.norm(gravity) / len(gravity) ** 0.5)
     sensor_columns = np.kron(design_matrix(sweeps, scaled_gravity), np.eye(3))
-    design = np.column_stack([sensor_columns, (inputs.attitudes @ directions.T).reshape(len(sensor_columns), -1)])
+    earth_columns = (inputs.attitudes @ directions.T).reshape(len(sensor_columns), -1)
+    design = np.asarray(np.column_stack([sensor_columns, earth_columns]), dtype=np.float64)
     parameters = design.shape[1]
     return refusals.condition_of(design, parameters), parameters
 

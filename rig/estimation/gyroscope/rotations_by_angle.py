@@ -148,7 +148,7 @@ def solve_turned(
         state, iterations = state.after_step(step), iterations + 1
         settled = bool((np.abs(step) < SETTLED * np.sqrt(np.diag(covariance))).all())
     equations = _equate(gyroscope, turns, means, state)
-    ratio, dof = _find_birge_ratio(equations[len(means) :], covariance)
+    ratio, dof = _find_birge_ratio(equations[len(means) :], covariance)  # pyrefly: ignore[unbound-name]  # PASSES > 0
     _check_closed(turns, equations[len(means) :], ratio)
     equations = [equation.inflate(ratio) for equation in equations]
     step, covariance = _solve(equations)
@@ -234,7 +234,7 @@ def _equate_rotation(
 
 def _derive(rate: Array, rows: Array) -> Array:
     """Return the derivative (r, 12) of `rows` (r, 3) of F ω + c by F and c."""
-    return np.hstack([np.kron(rows, rate), rows])
+    return np.asarray(np.hstack([np.kron(rows, rate), rows]), dtype=np.float64)
 
 
 def _perpendicular_axes(axis: Array) -> Array:

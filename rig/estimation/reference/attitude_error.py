@@ -94,11 +94,12 @@ def solve_attitude_weighted(start: Array, placed: Placed) -> AttitudeWeighted:
         if abs(delta - last) <= SETTLED * delta:
             break
         last, delta = delta, _estimate_std(theta, placed)
-    fit = weighted_jacobian(theta, r, v_bar, whiteners, norm_known=norm_known)
+    fit = weighted_jacobian(theta, r, v_bar, whiteners, norm_known=norm_known)  # pyrefly: ignore[unbound-name]  # PASSES > 0
+    whitened = whiteners @ rotations  # pyrefly: ignore[unbound-name]  # as above
     return AttitudeWeighted(
         theta,
         covariance_bound(theta, r, v_bar, whiteners, norm_known=norm_known),
-        AttitudeError(delta, _find_uncertainty(delta, fit, whiteners @ rotations)),
+        AttitudeError(delta, _find_uncertainty(delta, fit, whitened)),
         whiteners,
         steps,
     )

@@ -28,7 +28,7 @@ class Decorrelation:
 
 def decorrelate(noise: Array, effects: Array) -> Decorrelation:
     """Return decorrelated readings of noise V (n, n) and errors E (n, P). Raise LinAlgError for an invalid V."""
-    whitener = np.linalg.inv(np.linalg.cholesky(noise))
+    whitener = np.asarray(np.linalg.inv(np.linalg.cholesky(noise)), dtype=np.float64)
     scaled = whitener @ effects
     growth, directions = np.linalg.eigh(scaled @ scaled.T)
     return Decorrelation(directions.T @ whitener, np.maximum(growth, 0.0))

@@ -7,6 +7,7 @@ Frisch–Waugh–Lovell theorem).
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig.estimation.arrays import Array
 
@@ -31,7 +32,7 @@ def mean_weights(groups: Array, nuisance: Array) -> Array:
     return weights
 
 
-def even_groups(part: Array, parts: int) -> Array:
+def even_groups(part: NDArray[np.intp], parts: int) -> Array:
     """Return the groups (n, p) for `mean_weights` from the number (n,) of each sample's part, −1 for none."""
     groups: Array = (part[:, None] == np.arange(parts)).astype(np.float64)
     return groups

@@ -230,8 +230,8 @@ def sample_adaptively(log_density: Callable[[Array], float], middle: Array, curv
         middle = tempered @ points
         deviations = points - middle
         spread = (deviations * tempered[:, None]).T @ deviations + FLOOR * np.eye(size)
-        root = np.linalg.cholesky(spread)
-    return _temper(weights, size)
+        root = np.asarray(np.linalg.cholesky(spread), dtype=np.float64)
+    return _temper(weights, size)  # pyrefly: ignore[unbound-name]  # ROUNDS > 0
 
 
 def _find_weights(points: Array, logs: Array, proposals: Sequence[tuple[Array, Array]]) -> Array:

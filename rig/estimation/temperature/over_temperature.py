@@ -300,8 +300,7 @@ class _ParameterFits:
         """Return the matrix (N − P, N) that whitens noise and removes the poses' offsets."""
         whitened = np.linalg.solve(np.linalg.cholesky(covariance), np.column_stack([poses, np.eye(len(poses))]))
         basis, _ = np.linalg.qr(whitened[:, : poses.shape[1]], mode="complete")
-        free: Array = basis[:, poses.shape[1] :].T @ whitened[:, poses.shape[1] :]
-        return free
+        return np.asarray(basis[:, poses.shape[1] :].T @ whitened[:, poses.shape[1] :], dtype=np.float64)
 
     def _process(self, readings: RepeatedMeans, poses: Array) -> BiasProcess:
         some = self.powers[:, 1 : self.highest + 1]
@@ -324,6 +323,8 @@ class _ParameterFits:
         loops = 2 if self.both_ways else 0
         per_axis = of_scale + of_bias + loops
         values = np.zeros(3 * per_axis + 1)  # by axis, then the lag
+        prior = np.zeros((1, len(values)))
+        prior[0, -1] = 1 / LAG_STD_S
         for _ in range(STEPS):
             rows, rests = zip(*(self._rows(axis, orders, values) for axis in range(3)), strict=True)
             design = np.vstack(
@@ -333,17 +334,16 @@ class _ParameterFits:
                 ]
             )
             design = np.column_stack([design, np.concatenate([row[:, -1] for row in rows])])
-            prior = np.zeros((1, len(values)))
-            prior[0, -1] = 1 / LAG_STD_S
             right_side = np.concatenate([*rests, -prior @ values])
             step, *_ = np.linalg.lstsq(np.vstack([design, prior]), right_side)
             values = values + step
         residuals = [self._rows(axis, orders, values)[1] for axis in range(3)]
         square = float(sum(rest @ rest for rest in residuals) + (values[-1] / LAG_STD_S) ** 2)
-        covariance = np.linalg.inv(design.T @ design + prior.T @ prior)
+        information = design.T @ design  # pyrefly: ignore[unbound-name]  # STEPS > 0
+        covariance = np.asarray(np.linalg.inv(information + prior.T @ prior), dtype=np.float64)
         fixed = np.zeros_like(covariance)
         if len(values) > 1:
-            fixed[:-1, :-1] = np.linalg.inv((design.T @ design)[:-1, :-1])
+            fixed[:-1, :-1] = np.linalg.inv(information[:-1, :-1])
         free = 3 * (of_scale + of_bias)
         aicc = square + 2 * free + 2 * free * (free + 1) / (self.count - free - 3 * loops - 2)
         return self._fit(orders, values, covariance, fixed, aicc)

@@ -79,7 +79,7 @@ def _certificates(connection: Connection) -> Mapping[int, tuple[Issued, ...]]:
     )
 
 
-def _rows(connection: Connection, query: Select[Any]) -> list[Row[Any]]:
+def _rows(connection: Connection, query: Select[*tuple[Any, ...]]) -> list[Row[Any]]:
     return list(connection.execute(query).all())
 
 

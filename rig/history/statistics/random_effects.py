@@ -67,7 +67,7 @@ def fit(design: Array, values: Array, std: Array) -> Fitted:
     coefficients = _solve(design, values, weights)
     residuals = values - design @ coefficients
     scatter = max(1.0, float(weights @ residuals**2) / (n - p))
-    covariance = scatter * np.linalg.inv((design.T * weights) @ design)
+    covariance = np.asarray(scatter * np.linalg.inv((design.T * weights) @ design), dtype=np.float64)
     return Fitted(coefficients, covariance, float(np.sqrt(between_variance)), n - p)
 
 

@@ -147,5 +147,5 @@ def _rows(connection: Connection, table: Table, key: tuple[int | str, ...]) -> I
         query = select(schema.parameter).select_from(joined).where(schema.calibration.c.run_id == number)
         questions.append((schema.parameter.name, query.order_by(*schema.parameter.primary_key)))
     for name, question in questions:
-        for row in connection.execute(question).mappings():
-            yield name, {column: value for column, value in row.items() if value is not None}
+        for row in connection.execute(question):
+            yield name, {column: value for column, value in row._asdict().items() if value is not None}

@@ -42,7 +42,7 @@ def change_in_short(change: Change) -> str:
 def name_in_words(name: str) -> str:
     """Return a parameter of the history in words within a sentence; an unknown name is unchanged."""
     if name in SCALES:
-        return f"the scale factor of {name[1]}" if name[1:] else "the mean scale factor"
+        return f"the scale factor of {name[1]}" if len(name) > 1 else "the mean scale factor"
     if name in BIASES:
         return f"the bias of {name[1]}"
     return next((row.parameters[name] for row in every_characteristic() if name in row.parameters), name)

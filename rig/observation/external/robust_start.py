@@ -109,4 +109,5 @@ def _fit(design: Array, turned: Array) -> tuple[float, Array]:
         weight = 1 / np.maximum(residuals, 0.1 * max(float(np.median(residuals)), 1e-9))
         weight /= weight.max()
     centred = np.linalg.norm(turned - design[:, 3:] @ solution[3:], axis=1).sum()
-    return float(residuals.sum() / max(centred, 1e-12)), np.asarray(solution, dtype=np.float64)
+    unexplained = residuals.sum()  # pyrefly: ignore[unbound-name]  # REWEIGHTINGS > 0
+    return float(unexplained / max(centred, 1e-12)), np.asarray(solution, dtype=np.float64)

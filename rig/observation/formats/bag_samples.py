@@ -121,7 +121,7 @@ def _open_bag(path: Path) -> Iterator[Any]:
         raise missing_extra(error, "ros2") from error
     if path.is_dir():
         _check_metadata(path / METADATA)
-    with (rosbag1 if _is_ros_1(path) else rosbag2).Reader(path) as reader:
+    with (rosbag1 if _is_ros_1(path) else rosbag2).Reader(str(path)) as reader:
         yield reader
 
 

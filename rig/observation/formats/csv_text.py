@@ -64,14 +64,14 @@ def _raise_no_file(path: Path) -> Iterator[None]:
         raise Refused("no_file", f"{path} cannot be read: {error}", "Give a CSV file") from error
 
 
-def _text(file: BinaryIO) -> TextIOWrapper:
+def _text(file: BinaryIO | GzipFile) -> TextIOWrapper:
     """Return a file's text, unpacked, in the encoding that its beginning shows.
 
     Raise UnfitFile if it is not text. Loggers' headings such as "°/s" and "µT", if not in UTF-8, are mostly in the
     encoding of Windows.
     """
     if _read_beginning(file).startswith(GZIP):
-        file = GzipFile(fileobj=file)  # type: ignore[assignment]
+        file = GzipFile(fileobj=file)
     begin = _read_beginning(file)
     if begin.startswith(UTF_16):
         return TextIOWrapper(file, encoding="utf-16", newline="")
@@ -84,7 +84,7 @@ def _text(file: BinaryIO) -> TextIOWrapper:
     return TextIOWrapper(file, encoding="utf-8-sig", newline="")
 
 
-def _read_beginning(file: BinaryIO) -> bytes:
+def _read_beginning(file: BinaryIO | GzipFile) -> bytes:
     begin = file.read(LONGEST_LINE)
     file.seek(0)
     return begin

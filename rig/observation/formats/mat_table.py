@@ -145,7 +145,7 @@ def _walk_group(group: Any, prefix: str, objects: list[str], depth: int = 0) -> 
             isinstance(member, h5py.Dataset)
             and member.dtype.kind in "fiub"
             and member.ndim == 2
-            and member.size > 1
+            and (member.size or 0) > 1
             and not member.external
             and not member.is_virtual
             and member.attrs.get("MATLAB_class", b"double") not in (b"char", b"cell")

@@ -46,7 +46,7 @@ def ulog_readings(path: Path, inside: str | None = None) -> Iterator[Part]:
     Raise Refused `missing_extra` or `ulog_topic`, and any error of the parser for a damaged log.
     """
     try:
-        from pyulog import ULog
+        from pyulog.core import ULog
     except ImportError as error:
         raise missing_extra(error, "ulog") from error
     with path.open("rb") as file:

@@ -12,6 +12,14 @@ MIN_RATE_RAD_S = 0.01  # a turner that never exceeds it stood still
 MAX_SPAN_S = 48 * 3600.0  # of a recording; times farther apart are damage, and would fill the memory
 
 
+class RateFunction(Protocol):
+    """Rates (n, 3), rad/s, at times (n,); their derivative if `derivative` is 1."""
+
+    def __call__(self, time_s: Array, derivative: int = 0, /) -> Array:
+        """Return the rates or their derivative."""
+        ...
+
+
 class KnownMotion(Protocol):
     """A body's rotation as a function of its turner's time, in axes fixed to the body.
 
@@ -23,8 +31,9 @@ class KnownMotion(Protocol):
         """The rising times (m,) of the recorded states."""
         ...
 
-    def rate(self, time_s: Array, derivative: int = 0, /) -> Array:
-        """Return rates (n, 3), rad/s, at times (n,) within `time_s`; their derivative if `derivative` is 1."""
+    @property
+    def rate(self) -> RateFunction:
+        """The rates at times within `time_s`."""
         ...
 
     def covered(self, time_s: Array) -> NDArray[np.bool_]:

@@ -200,4 +200,4 @@ def _finite(value: Any) -> Any:
         return value if abs(value) < float("inf") else None
     if isinstance(value, dict):
         return {key: _finite(item) for key, item in value.items()}
-    return [_finite(item) for item in value] if isinstance(value, list | tuple) else value
+    return [_finite(item) for item in value] if isinstance(value, (list, tuple)) else value

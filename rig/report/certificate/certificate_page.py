@@ -1,7 +1,7 @@
 """The certificate as one HTML page: self-contained, for screens light and dark, for paper and for screen readers."""
 
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rig.config.sensors.sensor_catalogue import has_own_port
 from rig.data.absent import NO_BOARD
@@ -47,8 +47,13 @@ def _template() -> "Template":
     environment = Environment(
         loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    environment.globals |= {"has_own_port": has_own_port, "no_board": NO_BOARD, "quantities": quantities()}
-    environment.globals["characteristics"] = characteristics
+    constants: dict[str, Any] = {
+        "has_own_port": has_own_port,
+        "no_board": NO_BOARD,
+        "quantities": quantities(),
+        "characteristics": characteristics,
+    }
+    environment.globals |= constants
     for module in MODULES:
         environment.globals |= {name: value for name, value in vars(module).items() if callable(value)}
     return environment.get_template(TEMPLATE)

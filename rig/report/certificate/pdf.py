@@ -26,5 +26,6 @@ def pdf_of(page: str, attachments: Mapping[str, bytes]) -> bytes:
         Attachment(string=content, name=name, description=DESCRIBED[name], relationship="Source")
         for name, content in attachments.items()
     ]
-    content: bytes = HTML(string=page).write_pdf(pdf_variant="pdf/a-3b", attachments=enclosed)
+    content = HTML(string=page).write_pdf(pdf_variant="pdf/a-3b", attachments=enclosed)
+    assert content is not None, "only with a target it returns nothing"
     return content

@@ -7,7 +7,7 @@ from rig.data.quantity import Quantity
 from rig.data.recording.motion_file import Item
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.estimation.temperature.over_temperature import COEFFICIENTS, OverTemperature, powers_at
-from rig.report.entry import counted, entry
+from rig.report.entry import entry, list_dof
 
 ROWS = 17  # of the table; a certificate shows every fourth
 
@@ -29,7 +29,7 @@ def temperature_entry(
         covariance=np.outer(of_coefficients, of_coefficients) * polynomials.covariance,
         contributors=[
             entry(TemperatureContributorEntry, line,
-                  degrees_of_freedom=counted(np.array([line.dof]))[0],  # type: ignore[index]  # of an array there are some
+                  degrees_of_freedom=list_dof(np.array([line.dof]))[0],
                   std=np.sqrt(np.diag(powers @ line.covariance @ powers.T).clip(min=0.0)))
             for line in polynomials.lines
         ],

@@ -62,7 +62,7 @@ def write_mat(recordings: Sequence[Exported], folder: Path) -> list[Path]:
     structs = {names[table.name]: {**_columns(table), "convention": table.meaning} for table in tables}
     path = folder / "run.mat"
     with new_file(path) as file:
-        savemat(file, structs, do_compression=True, long_field_names=True)  # type: ignore[arg-type]  # says scipy-stubs
+        savemat(file, structs, do_compression=True, long_field_names=True)  # pyrefly: ignore[bad-argument-type]  # of scipy-stubs
     return [path]
 
 

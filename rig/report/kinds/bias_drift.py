@@ -14,7 +14,7 @@ from rig.data.quantity import RATE, Quantity
 from rig.data.result_file import ResultDocument
 from rig.estimation.arrays import Array
 from rig.report.entries.error import error_entry
-from rig.report.entry import counted
+from rig.report.entry import list_dof
 from rig.report.findings.characteristics import DRIFT_SLOPE, DRIFTS, LARGEST_CHANGE
 from rig.report.findings.finding import Finding
 from rig.report.findings.history_records import HistoryRecord
@@ -46,6 +46,8 @@ def drift_entry(quantity: Quantity, drift: "BiasDrift", sensor: "RecordedSensor"
     from rig.estimation.temperature.bias_by_repeat import FALSE_ALARM
 
     scale_fixed, slope = drift.scale_fixed, drift.over_temperature
+    full_scale = sensor.channel(quantity).range
+    assert full_scale is not None, "a gyroscope and an accelerometer state it"
     scale_free = drift.scale_free.by_key(_bias_entry, error_entry)
     return DriftEntry(
         unit=quantity.unit,
@@ -75,13 +77,13 @@ def drift_entry(quantity: Quantity, drift: "BiasDrift", sensor: "RecordedSensor"
             std=_vector(slope.std),
             range_c=slope.range_c,
             correlation_with_time=slope.correlation,
-            degrees_of_freedom=counted(drift.slope_dof),
+            degrees_of_freedom=list_dof(drift.slope_dof),
         ),
         earth_rate_known=drift.earth_rate_known,
-        degrees_of_freedom=counted(drift.dof),
+        degrees_of_freedom=list_dof(drift.dof),
         part=sensor.part,
         serial_number=sensor.serial_number,
-        full_scale=sensor.channel(quantity).range,
+        full_scale=full_scale,
         temperature_stated=sensor.temperature_stated,
     )
 

@@ -201,7 +201,8 @@ def _crc(backwards: bytes | memoryview) -> bytes:
 
 def _gather_messages(data: bytes, starts: Mapping[bytes, list[int]]) -> NDArray[Any]:
     """Decode the messages and return them in stream order; `starts` maps each header to its byte positions."""
-    parts, part_positions = [], []
+    parts: list[NDArray[Any]] = []
+    part_positions: list[NDArray[np.intp]] = []
     for name, header in _HEADERS.items():
         if not starts[header]:
             continue

@@ -136,7 +136,8 @@ def _find_time(shape: Shape, guess: Guess) -> None:
         unit = _unit_of_time(steps[steps >= 0], duration_s / (len(column) - 1))
         ambiguous = by_ones and unit is not None
         if name == "-" and ambiguous:
-            guess.columns[index], guess.time = "time", {"unit": "?", "wrap": 2**32}
+            guess.columns[index] = "time"
+            guess.time = {"unit": "?", "wrap": 2**32}
             guess.gaps.append(f"whether column {index + 1} counts samples or {unit}: both go on by one")
         elif name == "sequence" or (name == "-" and by_ones):
             guess.columns[index] = "sequence"

@@ -12,11 +12,11 @@ from rig.turners.servo.servo_port import Port
 from rig.turners.servo.servo_registers import RETURN_LEVEL, Register
 
 # The errors of an unplugged port: pyserial's own is an OSError; a port closed meanwhile raises TypeError.
-FAILURES: tuple[type[Exception], ...] = (OSError, TypeError)
+FAILURES: list[type[Exception]] = [OSError, TypeError]
 with suppress(ImportError):  # on Windows
     import termios
 
-    FAILURES = (*FAILURES, termios.error)
+    FAILURES.append(termios.error)
 SLACK_S = 0.020  # return delay (0.5 ms as delivered), latency of the adapter, and a busy host
 SETTLE_MOST_S = 0.1  # the longest wait for a line to fall silent
 ATTEMPTS = 4  # a write without acknowledgement is read back, and repeated if it did not take effect
@@ -174,7 +174,7 @@ class Bus:
         except IndexError as error:  # it reads on in a reply that is too short
             self._port.is_using = False
             raise ReplyLost(damaged=True) from error
-        except FAILURES as error:
+        except tuple(FAILURES) as error:
             self._gone = True
             raise PortGone(str(error)) from error
 

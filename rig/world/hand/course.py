@@ -127,7 +127,7 @@ def _rock(time_s: Array, begins_s: float, lasting_s: float, rng: np.random.Gener
     part = np.where(is_rocking, elapsed_s / lasting_s, 0.0)
     phase = 2 * np.pi * rng.uniform(*ROCK_HZ) * elapsed_s.clip(0)
     angle = 20 * part**2 * np.exp(-4 * part) * (1 - part) ** 2 * np.sin(phase)
-    return np.outer(np.gradient(angle, time_s), rng.normal(0, 1, 2))
+    return np.outer(np.asarray(np.gradient(angle, time_s)), rng.normal(0, 1, 2))
 
 
 def tilt(vector: Array) -> Array:

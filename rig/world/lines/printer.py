@@ -73,7 +73,7 @@ class Printer:
         self._began_s, self._samples, self._format_value = time_s, 0, 0
         gyroscope = Gyroscope(motion_at, truth.gyro, seed, truth.temperature_c)
         self._gyroscope, self._repeats = FrozenGyroscope(gyroscope, faulty), Repeats(faulty, seed)
-        self._accelerometer = None
+        self._accelerometer: Accelerometer | None = None
         if truth.accelerometer is not None:
             self._accelerometer = Accelerometer(motion_at, truth.accelerometer, seed, truth.temperature_c)
         other = np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, 1))

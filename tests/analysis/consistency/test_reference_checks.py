@@ -62,8 +62,8 @@ def read_of(movement: Movement, axes: int, axis_rad: float) -> ReferenceModel:
     if found.lever_arm_m is not None:
         theta[LEVER], theta[DELAY] = found.lever_arm_m, found.delay_s
     known = StatedArm(NOMINAL, float(np.degrees(np.sqrt(3) * axis_rad)), np.eye(3), found.attitude_error.std_rad)
-    swept_s = 8.0 * np.arange(len(movement.sweeps.speeds_rad_s))
-    times_s = np.concatenate([100 + 5.0 * np.arange(len(JOINTS)), swept_s])
+    swept_s = 8.0 * np.arange(len(movement.sweeps.speeds_rad_s), dtype=np.float64)
+    times_s = np.concatenate([100 + 5.0 * np.arange(len(JOINTS), dtype=np.float64), swept_s])
     return ReferenceModel(
         theta, movement, arm_patterns(theta, movement, stood(axes), known), times_s, second_order=False
     )

@@ -215,9 +215,9 @@ def laid_down(seed: int) -> tuple[Followed, Turning]:
         rates[own] = (1 - np.cos(2 * np.pi * share))[:, None] / 1.5 * move
     matrix, bias = np.eye(3) + 0.02 * rng.normal(size=(3, 3)), 0.01 * rng.normal(size=3)
     felt = (rates + EARTH_RAD_S @ attitudes) @ matrix.T + bias + rng.normal(size=rates.shape) * 3e-4 * np.sqrt(200)
-    start_s = 3.5 * np.arange(13) + 0.1
+    start_s = 3.5 * np.arange(13, dtype=np.float64) + 0.1
     told = np.asarray((Rotation.from_rotvec(rng.normal(size=(13, 3)) * 2e-3) * faces).as_matrix())
-    followed = Followed(time_s, felt, start_s.astype(np.float64), told, np.zeros((13, 3)), matrix, bias)
+    followed = Followed(time_s, felt, start_s, told, np.zeros((13, 3)), matrix, bias)
     return followed, Turning(time_s, felt, np.column_stack([start_s, start_s + 1.8]), told)
 
 

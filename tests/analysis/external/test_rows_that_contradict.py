@@ -8,7 +8,7 @@ import pytest
 
 from rig.analysis.external.attitudes import solve_placed
 from rig.analysis.external.external_recordings import budget_of, solve_swept
-from rig.data.quantity import ACCELERATION, RATE
+from rig.data.quantity import ACCELERATION, RATE, Quantity
 from rig.data.recording.settings import Elsewhere, Site
 from rig.errors import Fault, Refused
 from rig.observation.external.attitude_import import placed_by, read_attitudes
@@ -73,7 +73,7 @@ def test_where_few_rows_are_left_uncertainty_covers_whatever_the_table_errs_by(
     rests, seeds = 1, 200 if thorough else 10
     speed_rad_s, row_s, noise_rad_s = np.pi / 2, 5.0, 5e-4
     axes = np.array([*np.eye(3), *-np.eye(3), *np.tile([0.0, 0.0, 1.0], (rests, 1))])
-    speeds, starts_s = np.array([speed_rad_s] * 6 + [0.0] * rests), row_s * np.arange(6 + rests)
+    speeds, starts_s = np.array([speed_rad_s] * 6 + [0.0] * rests), row_s * np.arange(6 + rests, dtype=np.float64)
     time_s = np.arange(round((6 + rests) * row_s * 100)) / 100
     rates = (speeds[:, None] * axes)[(time_s // row_s).astype(int)] @ MATRIX.T
     within = []
@@ -93,7 +93,8 @@ def test_three_sweeps_and_a_rest_tell_nothing_of_the_table_and_so_does_their_unc
     axes = np.vstack([np.eye(3), [0.0, 0.0, 1.0]])
     speeds = np.array([1.0, 1.0, 1.0, 0.0])
     rates = (speeds[:, None] * axes)[(time_s // 5).astype(int)] @ MATRIX.T + 1e-3 * rng.normal(size=(2000, 3))
-    rows = np.column_stack([5 * np.arange(4) + 0.3, 5 * np.arange(4) + 4.3, speeds])
+    begins_s = 5 * np.arange(4, dtype=np.float64)
+    rows = np.column_stack([begins_s + 0.3, begins_s + 4.3, speeds])
     data = average(np.column_stack([time_s, rates]), rows, axes)
     expanded = budget_of(solve_swept(data, None), data).expanded
     assert (expanded[:3] > 1e-3).all() and (expanded[:3] < 0.1).all()
@@ -113,10 +114,10 @@ def test_rows_outside_the_recording_are_not_covered_and_lack_no_samples() -> Non
     assert placed.incomplete == ()
 
 
-def constant(samples: Samples, quantity: object, value: float) -> Samples:
+def constant(samples: Samples, quantity: Quantity, value: float) -> Samples:
     """The z axis of a sensor has one value throughout."""
     readings = {each: column.copy() for each, column in samples.readings.items()}
-    readings[quantity][:, 2] = value  # type: ignore[index]
+    readings[quantity][:, 2] = value
     return replace(samples, readings=readings)
 
 

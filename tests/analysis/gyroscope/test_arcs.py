@@ -1,5 +1,7 @@
 """Sweeps that are no whole turns: what is found from them, how well, and what the encoders do to it."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -13,8 +15,8 @@ from support.recordings.synthetic_run import Setup, synthetic_run, truth
 STD_DEG = 0.05
 
 
-def arcs(arc_deg: float, *, std_deg: float = STD_DEG, **more: object) -> Setup:
-    return Setup(procedure=(("arc_deg", f"{arc_deg:g}"),), angle_std_deg=std_deg, **more)  # type: ignore[arg-type]
+def arcs(arc_deg: float, *, std_deg: float = STD_DEG, **more: Any) -> Setup:
+    return Setup(procedure=(("arc_deg", f"{arc_deg:g}"),), angle_std_deg=std_deg, **more)
 
 
 def errors(seen: Drawn) -> tuple[Array, Budget, tuple[Observation, ...]]:

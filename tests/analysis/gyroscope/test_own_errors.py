@@ -86,7 +86,7 @@ def test_a_bias_that_follows_the_recorded_temperature_is_that_at_the_mean_one() 
 @pytest.mark.parametrize("steps", [0, 1, 2, 3])
 def test_a_bias_follows_a_temperature_of_few_steps_and_one_that_its_steps_hide(steps: int) -> None:
     """A pattern of each axis by what was recorded, and by half a step either way in the course of the run."""
-    step_k, per_k, windows_s = 0.1, 6e-5, 10.0 * np.arange(8)[:, None] + [0.0, 6.0]
+    step_k, per_k, windows_s = 0.1, 6e-5, 10.0 * np.arange(8, dtype=np.float64)[:, None] + [0.0, 6.0]
     recorded_c = 22 + step_k * np.round(np.linspace(0, steps, 8))
     known = KnownSensor(0.0, 1.0, per_k, 0.0, 0.0, recorded_c, step_k)
     errors = own_errors(known, np.eye(3), np.ones((8, 3)), windows_s, ())

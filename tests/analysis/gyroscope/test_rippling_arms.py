@@ -1,6 +1,7 @@
 """Whole turns and arcs of arms that ripple and vibrate by any order of the turn: what is stated of a result holds."""
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,8 +20,10 @@ def errors(kind: str, arc_deg: float | None, seed: int) -> tuple[np.ndarray, np.
     """(6,) of scale and bias, over u and over U."""
     rng = np.random.default_rng([seed, 47])
     speed_deg_s = float(rng.uniform(35, 120))
-    arc = {} if arc_deg is None else {"procedure": (("arc_deg", f"{arc_deg:g}"),), "angle_std_deg": 0.05}
-    setup = Setup(speed_deg_s=speed_deg_s, state_rate_hz=500.0, **arc)  # type: ignore[arg-type]
+    arc: dict[str, Any] = {}
+    if arc_deg is not None:
+        arc = {"procedure": (("arc_deg", f"{arc_deg:g}"),), "angle_std_deg": 0.05}
+    setup = Setup(speed_deg_s=speed_deg_s, state_rate_hz=500.0, **arc)
     ripple = drawn_ripple(rng, speed_deg_s / 360, [KINDS[kind].sensor.rate_hz])
     case = drawn(seed, KINDS[kind], setup, ripple)
     found = solve_inputs(case.run)[1]["gyro"]

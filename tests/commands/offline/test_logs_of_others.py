@@ -296,7 +296,7 @@ def test_attitudes_that_only_the_accelerometer_believes_do_not_pass(
     readings = np.hstack([rates + 0.01, felt]) + [*(5e-4,) * 3, *(5e-3,) * 3] * rng.normal(size=(6000, 6))
     names = [*(f"{a}_rad_s" for a in AXES), *(f"{a}_m_s2" for a in AXES)]
     samples = write_table(tmp_path / "samples.csv", ["time_s", *names], time_s, readings)
-    starts_s = 5.0 * np.arange(12)
+    starts_s = 5.0 * np.arange(12, dtype=np.float64)
     rows = np.column_stack([starts_s + 0.3, starts_s + 3.7, faces.as_quat()[:, [3, 0, 1, 2]]])
     attitudes = write_table(tmp_path / "attitudes.csv", ["start_s", "end_s", "qw", "qx", "qy", "qz"], rows)
     found = solved(capsys, samples, "--attitudes", attitudes, status=1)

@@ -1,6 +1,7 @@
 """`rig look` says what a file holds, and the map that it writes solves the file as its plain form does."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -48,7 +49,7 @@ def matlab(folder: Path) -> Path:
 
 
 @pytest.mark.parametrize("make", [spaces, two_imus, counter, matlab])
-def test_the_map_that_it_writes_solves_the_file(make, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+def test_the_map_that_it_writes_solves_the_file(make: Callable[[Path], Path], tmp_path: Path) -> None:
     log, columns = make(tmp_path), tmp_path / "columns.yaml"
     looked = rig_here("look", log, "--write", columns)
     assert looked.returncode == 0, looked.stderr

@@ -86,7 +86,7 @@ def test_a_batch_agrees_with_a_loop_of_scipy() -> None:
     batch = newton_batch(means, speeds)
     start = np.concatenate([np.ones(3), np.zeros(3)])
     loop = [
-        least_squares(lambda x, m=m: speeds**2 - squared_rate(x, m), start, method="lm", xtol=1e-12, ftol=1e-12).x  # type: ignore[misc]
+        least_squares(lambda x, m=m: speeds**2 - squared_rate(x, m), start, method="lm", xtol=1e-12, ftol=1e-12).x
         for m in means
     ]
     np.testing.assert_allclose(np.concatenate([batch.scale, batch.bias_rad_s], axis=1), loop, atol=1e-9)

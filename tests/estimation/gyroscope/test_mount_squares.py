@@ -25,7 +25,7 @@ def solved(off_rad: Array, axes: Array, matrix: Array) -> tuple[Array, Budget]:
     turns = SPEED_RAD_S * np.concatenate([axes, -axes], axis=1).reshape(-1, 3)
     felt = np.array([rotation_by(off_rad[stage]) @ turn for stage, turn in zip(stages, turns, strict=True)])
     rest, count = np.zeros((1, 3)), len(turns) + 1
-    windows = 10.0 * np.arange(count)[:, None] + [0.0, 6.0]
+    windows = 10.0 * np.arange(count, dtype=np.float64)[:, None] + [0.0, 6.0]
     noise = NOISE_RAD_S * np.random.default_rng(1).standard_normal((count, 3))
     seen = VectorInputs(
         means_rad_s=np.concatenate([felt, rest]) @ matrix.T + 0.01 + noise,

@@ -10,7 +10,7 @@ from rig.estimation.gyroscope.vector_model import VectorSolution, solve_vector_b
 from rig.estimation.sensor_axes import non_orthogonality
 
 SPEED = np.pi / 3
-SWEEPS = SPEED * np.kron(np.eye(3), [[1.0], [-1.0]])
+SWEEPS: Array = SPEED * np.kron(np.eye(3), [[1.0], [-1.0]]).astype(np.float64)
 RESTS = np.zeros((6, 3))
 RATES = np.concatenate([SWEEPS, RESTS])
 SCALE = np.array([1.1771, 1.1554, 1.1440])  # the turntable's LSM9DS1, SIX, table II

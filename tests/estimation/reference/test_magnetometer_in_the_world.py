@@ -1,5 +1,7 @@
 """Magnetometers on the simulated arm: what is found in a uniform field, what is refused, what turning over tells."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -43,8 +45,8 @@ def test_in_a_uniform_field_no_estimate_is_worse_than_its_bound() -> None:
     assert all(each.uniform.uniform for each in found)
 
 
-def refused(**what: object) -> bool:
-    return not solve_field(method="maximum_likelihood", **what).uniform.uniform  # type: ignore[arg-type]
+def refused(**what: Any) -> bool:
+    return not solve_field(method="maximum_likelihood", **what).uniform.uniform
 
 
 @pytest.mark.slow

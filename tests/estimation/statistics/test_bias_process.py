@@ -14,7 +14,7 @@ SPEED_RAD_S = np.radians(60)
 
 def session() -> tuple[Array, Array]:
     """Windows (12, 2) of six sweeps and the rests after them, and the rates (12, 3): sweeps first."""
-    begins = 10.0 * np.arange(6)
+    begins = 10.0 * np.arange(6, dtype=np.float64)
     sweeps, rests = np.column_stack([begins, begins + 6]), np.column_stack([begins + 6.5, begins + 9.1])
     return np.concatenate([sweeps, rests]), np.concatenate([SPEED_RAD_S * AXES, np.zeros((6, 3))])
 

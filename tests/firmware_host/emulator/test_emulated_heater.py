@@ -43,7 +43,8 @@ def start(session: Session) -> None:
 def heat(session: Session, power: int = POWER) -> str:
     answer = session.ask("heat", power=power)
     assert answer.name == "heating"
-    return HEATER_CAUSES[answer.values["cause"]]
+    cause: int = answer.values["cause"]
+    return HEATER_CAUSES[cause]
 
 
 def off_after_s(session: Session, at_most_s: float) -> float:

@@ -88,8 +88,7 @@ def test_the_low_pass_weakens_and_delays_as_one_of_first_order() -> None:
     seen = np.array([low_pass.step(t, [math.sin(turn * t)])[0] for t in times_s])[1000:]
     assert seen == pytest.approx(math.sqrt(0.5) * np.sin(turn * times_s[1000:] - math.pi / 4), abs=1e-3)
     ramp = LowPass(5.0)
-    for t in np.arange(0.0, 2.0, 0.05):
-        value = ramp.step(float(t), [3.0 * t])[0]
+    *_, value = [ramp.step(float(t), [3.0 * t])[0] for t in np.arange(0.0, 2.0, 0.05)]
     assert value == pytest.approx(3.0 * (1.95 - 1 / turn), abs=1e-9)  # exact however far apart the steps of a ramp are
 
 

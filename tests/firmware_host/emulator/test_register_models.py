@@ -43,6 +43,7 @@ def counts(driver: Driver, conversions: int) -> np.ndarray:
 def settled(driver: Driver) -> np.ndarray:
     """One conversion, (3,), after the part has settled."""
     end_s = driver.part.next_event_s + DISCARD_S
+    rates: Sequence[float] = ()
     while driver.part.next_event_s < end_s:
         driver.await_data()
         rates, _temperature = driver.read()

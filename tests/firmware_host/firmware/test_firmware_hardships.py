@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 import pytest
@@ -85,8 +86,8 @@ def test_an_adis16465_whose_data_path_was_overrun_is_reset_when_it_is_configured
 def test_a_line_left_high_does_not_stop_the_stream(monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[OvertakenGyro] = []
 
-    def overtaken(*arguments: object, **more: object) -> OvertakenGyro:
-        made.append(OvertakenGyro(*arguments, **more))  # type: ignore[arg-type]
+    def overtaken(*arguments: Any, **more: Any) -> OvertakenGyro:
+        made.append(OvertakenGyro(*arguments, **more))
         return made[0]
 
     parts: dict[str, Callable[..., object]] = {**emulated_session.PARTS, "lsm9ds1": overtaken}
@@ -110,7 +111,7 @@ def test_both_dies_of_the_lsm9ds1_and_the_mpu9250_are_kept_off_i2c_from_the_star
 
 
 def registers(session: Session, part: str) -> Sequence[int] | dict[int, int]:
-    found: dict[int, int] = session.sensors[part]._registers.values  # type: ignore[attr-defined]
+    found: dict[int, int] = session.sensors[part]._registers.values  # pyrefly: ignore[missing-attribute]
     return found
 
 

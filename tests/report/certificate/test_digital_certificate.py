@@ -1,16 +1,18 @@
 """The digital certificate: valid by PTB's schema and by PTB's rules, and it holds what the result holds."""
 
+from collections.abc import Callable
 from typing import Any
 from xml.etree.ElementTree import Element, fromstring
 
 import numpy as np
 import pytest
 
-from rig.config.judging.judging_sections import CertificateSection, SiteSection
+from rig.config.judging.judging_sections import SiteSection
 from rig.data.entries.earth_rate import EarthRateEntry
 from rig.data.result_file import ResultDocument, VectorEntry, read_result
 from rig.errors import Refused
 from rig.estimation.statistics.coverage import coverage_factors
+from rig.report.certificate.content import Certificate
 from rig.report.certificate.dcc import digital_certificate
 from rig.report.certificate.statements import StatedFacts
 from rig.report.tables.certificate import JOINT_FACTOR
@@ -36,9 +38,7 @@ SILENT = StatedFacts(SiteSection(country="DE"))
 SIMULATED = StatedFacts(SiteSection(country="DE"), simulated=True)
 AMENDED = StatedFacts(
     LABORATORY.site.model_copy(update={"laboratory": HOSTILE}) if LABORATORY.site else None,
-    CertificateSection.model_construct(
-        **{**LABORATORY.certificate.model_dump(), "replaces": "RIG-1", "customer": HOSTILE, "condition": " "}
-    ),
+    LABORATORY.certificate.model_copy(update={"replaces": "RIG-1", "customer": HOSTILE, "condition": " "}),
 )
 # (what stands there, what is planted): each must be refused by the schema or by the rules.
 FAULTS = {
@@ -211,8 +211,10 @@ def test_values_uncertainties_and_covariance_are_the_result_s() -> None:
     assert isinstance(sensor.vector_model, VectorEntry)
     assert skew == [*sensor.vector_model.non_orthogonality_rad]
     vector = sensor.vector_model
-    stds = [*vector.non_orthogonality_std_rad, *np.ravel(vector.g_sensitivity_std_rad_s_per_m_s2)]  # type: ignore[arg-type]
-    dof = [*vector.non_orthogonality_degrees_of_freedom, *np.ravel(vector.g_sensitivity_degrees_of_freedom)]  # type: ignore[arg-type,misc]
+    assert vector.g_sensitivity_std_rad_s_per_m_s2 and vector.g_sensitivity_degrees_of_freedom
+    assert vector.non_orthogonality_degrees_of_freedom
+    stds = [*vector.non_orthogonality_std_rad, *np.ravel(vector.g_sensitivity_std_rad_s_per_m_s2)]
+    dof = [*vector.non_orthogonality_degrees_of_freedom, *sum(vector.g_sensitivity_degrees_of_freedom, ())]
     factors = coverage_factors([np.inf if each is None else each for each in dof])
     assert len(felt) == 9 and min(factors) > 2
     np.testing.assert_allclose(expanded, [*sensor.budget.expanded, *(factors * stds)], rtol=1e-12)
@@ -279,7 +281,7 @@ def half_known() -> ResultDocument:
         (lambda: certificate(half_known()), "only a part of the uncertainty of lsm9ds1 LSM9DS1-001 is known"),
     ],
 )
-def test_what_cannot_be_certified_is_refused(refused, why: str) -> None:  # type: ignore[no-untyped-def]
+def test_what_cannot_be_certified_is_refused(refused: Callable[[], Certificate], why: str) -> None:
     with pytest.raises(Refused, match=why) as error:
         digital_certificate(refused())
     assert error.value.name == "no_digital_certificate"

@@ -66,7 +66,7 @@ class DensityEntry(GyroscopeEntry):
 class DensityDocument(ResultDocument):
     """Such a result."""
 
-    gyroscopes: dict[str, DensityEntry]  # type: ignore[assignment]  # of one kind more special
+    gyroscopes: dict[str, DensityEntry]  # pyrefly: ignore[bad-override]  # of one kind more special
 
 
 def plain() -> ResultDocument:

@@ -27,7 +27,7 @@ def texts_replaced(value: Any, keys: frozenset[str]) -> None:
     for key, each in value.items() if isinstance(value, dict) else enumerate(value):
         if isinstance(each, str) and key in keys:
             value[key] = HOSTILE
-        elif isinstance(each, dict | list):
+        elif isinstance(each, (dict, list)):
             texts_replaced(each, keys)
 
 

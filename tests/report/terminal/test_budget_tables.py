@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
-from xml.etree.ElementTree import fromstring
+from xml.etree.ElementTree import Element, fromstring
 
 import numpy as np
 import pytest
@@ -268,7 +268,7 @@ def test_each_value_has_the_coverage_factor_of_its_degrees_of_freedom() -> None:
     assert bias.uncertainty in by_dof.expanded[3:] and bias.coverage_factor in by_dof.coverage_factors[3:]
 
 
-def listed(found, name: str) -> list[float]:  # type: ignore[no-untyped-def]
+def listed(found: Element, name: str) -> list[float]:
     """One for each of three values, of which one may stand for all."""
     numbers = [float(word) for word in found.findtext(f".//si:{name}", "", NAMES).split()]
     return numbers * 3 if len(numbers) == 1 else numbers

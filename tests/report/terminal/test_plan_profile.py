@@ -2,6 +2,7 @@
 
 import math
 from itertools import pairwise
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ ARM = ArmSection(host="127.0.0.1", payload_kg=0.35)
 
 
 @pytest.mark.parametrize("axes", [3, 6])
-def test_every_axis_turns_both_ways_through_more_than_a_whole_turn_at_an_even_rate(axes: int) -> None:
+def test_every_axis_turns_both_ways_through_more_than_a_whole_turn_at_an_even_rate(axes: Literal[3, 6]) -> None:
     plan = plan_six_observation(ARM, SixObservationSection(name="six_observation", axes=axes))
     points = profile(plan)
     by_axis = {

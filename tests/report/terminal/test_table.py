@@ -4,6 +4,7 @@ import io
 import shutil
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import pytest
 from rich.console import Console
@@ -28,7 +29,7 @@ def shown(document: ResultDocument) -> str:
 
 
 def test_the_checks_say_what_was_not_measured_and_what_was_not_set() -> None:
-    of = {"unit": "rad/s", "passed": False, "kind": "conformity", "sensor": "gyro", "quantity": "rate"}
+    of: dict[str, Any] = {"unit": "rad/s", "passed": False, "kind": "conformity", "sensor": "gyro", "quantity": "rate"}
     checks = (
         CheckEntry(name="gyro.bias", value=None, limit=0.1, criterion="bias", **of),
         CheckEntry(name="gyro.verification_rms", value=0.001, limit=None, criterion="verification_rms", **of),

@@ -56,8 +56,10 @@ def test_a_quiet_imu_passes_by_every_message(message: str, tmp_path: Path) -> No
 def test_what_is_stated_by_every_message_and_number_of_digits_holds(source: str | int, tmp_path: Path) -> None:
     def run(draw: tuple[float, bool, int]) -> Judged:
         noise_rad_s, vibrates, seed = draw
-        drawn = world_of_message if isinstance(source, str) else world_with_digits
-        document = drawn(source, noise_rad_s, vibrates=vibrates, seed=seed)  # type: ignore[arg-type]
+        if isinstance(source, str):
+            document = world_of_message(source, noise_rad_s, vibrates=vibrates, seed=seed)
+        else:
+            document = world_with_digits(source, noise_rad_s, vibrates=vibrates, seed=seed)
         return judged(document, tmp_path / f"{noise_rad_s}-{vibrates}-{seed}")
 
     with ThreadPoolExecutor(2) as two_at_once:  # each run is mostly one process that simulates, and waits for its arm

@@ -33,7 +33,6 @@ class ByteRegisters:
     """
 
     max_hz = 10e6
-    line_is_high = False  # parts with pulses
 
     def __init__(self, size: int = 128) -> None:
         self.values = bytearray(size)
@@ -42,7 +41,12 @@ class ByteRegisters:
         self.transfers: list[int] = []
         self.fresh = False
 
-    def transfer(self, data: bytes, max_hz: int, _time_us: int) -> bytes:
+    @property
+    def line_is_high(self) -> bool:
+        """False, for parts with pulses."""
+        return False
+
+    def transfer(self, data: bytes, max_hz: int, time_us: int) -> bytes:
         """One chip select: the bytes in, the bytes out."""
         assert max_hz <= self.max_hz
         self.transfers.append(len(data))

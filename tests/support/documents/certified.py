@@ -219,7 +219,7 @@ def bias_drift(unit: str, *, slope: bool) -> DriftEntry:
     """Return three repeats, the last of them warmer; x falls, then rises."""
     biases = ((3e-6, 1e-6, 0.0), (1e-6, 2e-6, 0.0), (9e-6, 3e-6, 1e-6))
     stds = ((3e-7,) * 3, (4e-7,) * 3, (5e-7,) * 3)
-    slope_of = {
+    slope_of: dict[str, Any] = {
         "slope": (2e-6, 6e-7, 2e-7),
         "std": (2e-7,) * 3,
         "range_c": (22.0, 26.0),
@@ -392,6 +392,6 @@ def plant(value: Any, text: str, kept: Collection[str]) -> Any:
     """Return a document in which every text that others could have written is `text`."""
     if isinstance(value, dict):
         return {key: part if key in kept else plant(part, text, kept) for key, part in value.items()}
-    if isinstance(value, list | tuple):
+    if isinstance(value, (list, tuple)):
         return [plant(part, text, kept) for part in value]
     return text if isinstance(value, str) else value

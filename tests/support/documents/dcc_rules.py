@@ -7,6 +7,7 @@ for in the folder RIG_DCC_SCHEMAS names, in tests/fixtures/dcc, and in shared/dc
 import functools
 import os
 from pathlib import Path
+from typing import Any
 
 import pytest
 from lxml import etree
@@ -38,8 +39,8 @@ def schema_faults(xml: bytes) -> list[str]:
 
 @functools.cache
 def _schema(folder: Path) -> etree.XMLSchema:
-    class Local(etree.Resolver):  # type: ignore[misc]
-        def resolve(self, url, public_id, context):  # type: ignore[no-untyped-def]
+    class Local(etree.Resolver):  # pyrefly: ignore[unknown-base-class]
+        def resolve(self, url: str, public_id: str, context: Any) -> Any:
             return self.resolve_filename(str(folder / FILES[url]), context) if url in FILES else None
 
     parser = etree.XMLParser(no_network=True)
@@ -58,7 +59,7 @@ def rule_faults(xml: bytes) -> list[str]:
 
 
 @functools.cache
-def _rules():  # type: ignore[no-untyped-def]
+def _rules() -> Any:
     from dcclib.validation.schematron import SchematronValidator
 
     return SchematronValidator.for_dcc()

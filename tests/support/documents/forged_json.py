@@ -27,7 +27,8 @@ def document(change: Callable[[dict[str, Any]], object]) -> Forgery:
 
 
 def written(value: Any, **form: Any) -> bytes:
-    return (json.dumps(value, **{"indent": 2, "ensure_ascii": False, **form}) + "\n").encode()
+    usual: dict[str, Any] = {"indent": 2, "ensure_ascii": False}
+    return (json.dumps(value, **{**usual, **form}) + "\n").encode()
 
 
 def reorder(entries: dict[str, Any]) -> None:

@@ -65,7 +65,7 @@ def server_altered(stamped: Any, _: Any) -> None:
 def lists_added(signed: Any, _: Any) -> None:
     from asn1crypto import crl, pem
 
-    der = pem.unarmor(revocation_list(holder("Authority")))[2]
+    der = pem.unarmor(revocation_list(holder("Authority")))[2]  # pyrefly: ignore[bad-index]  # one block, no generator of several
     signed["crls"] = [cms.RevocationInfoChoice("crl", crl.CertificateList.load(der))]
 
 

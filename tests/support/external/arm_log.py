@@ -158,7 +158,7 @@ def _reports(
     stamps_s = np.maximum.accumulate(stamps_s)  # a report that overtakes another waits for it
     waiting = np.concatenate([[False], np.diff(stamps_s) <= 0])
     first = np.maximum.accumulate(np.where(waiting, 0, np.arange(len(stamps_s))))
-    stamps_s = stamps_s + 1e-5 * (np.arange(len(stamps_s)) - first)
+    stamps_s = stamps_s + 1e-5 * (np.arange(len(stamps_s)) - first).astype(np.float64)
     reported = _compute_reported(log, joints, attitudes, indices, rng)
     return stamps_s, np.asarray(
         (Rotation.from_rotvec(rng.normal(size=(len(indices), 3)) * log.report_rad) * reported).as_matrix()

@@ -53,7 +53,7 @@ def lay_down(box: Box, seed: int) -> Laid:
     changed = box.changes_m_s2 * rng.normal(size=(count, 3))[where.astype(int)]
     moving = (since_s > REST_S)[:, None] * 6 * rng.normal(size=forces.shape)
     readings = (forces + moving) @ matrix.T + bias + changed + box.noise_m_s2 * rng.normal(size=forces.shape)
-    start_s = np.arange(box.named) * (REST_S + MOVE_S)
+    start_s = np.arange(box.named, dtype=np.float64) * (REST_S + MOVE_S)
     quaternions = FACES[np.arange(box.named) % 6].as_quat()[:, [3, 0, 1, 2]]
     rows = np.column_stack([start_s + 0.3, start_s + REST_S - 0.3, quaternions])
     return Laid(time_s, readings, rows, matrix, bias)

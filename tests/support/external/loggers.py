@@ -150,7 +150,7 @@ def laid_down(
     """Draw an accelerometer on six faces in one log, and rows [start_s, end_s, qw, qx, qy, qz] of the faces."""
     rng = np.random.default_rng(seed)
     count, move_s = round(dwell_s * rate_hz), 4.0
-    start_s = np.arange(6) * (dwell_s + move_s)
+    start_s = np.arange(6, dtype=np.float64) * (dwell_s + move_s)
     time_s = (start_s[:, None] + np.arange(count) / rate_hz).ravel()
     forces = GRAVITY_M_S2 * np.repeat(FORCES, count, axis=0).astype(float)
     for knock in knocks:

@@ -51,7 +51,7 @@ def _still(folder: Path, rng: np.random.Generator) -> None:
     field = (FIELD_T @ where) @ FIELD_MATRIX.T + FIELD_BIAS_T + FIELD_NOISE_T * rng.normal(size=sensed.shape)
     columns = ["time_s", "x_m_s2", "y_m_s2", "z_m_s2", "x_t", "y_t", "z_t"]
     _write(folder / "still_samples.csv", columns, np.column_stack([time_s, sensed, field]))
-    start_s = np.arange(STILL) * (DWELL_S + BETWEEN_S)
+    start_s = np.arange(STILL, dtype=np.float64) * (DWELL_S + BETWEEN_S)
     rows = np.column_stack([start_s, start_s + DWELL_S, _quaternions(turned)])
     _write(folder / "still_attitudes.csv", ["start_s", "end_s", "qw", "qx", "qy", "qz"], rows)
 

@@ -12,6 +12,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from random import Random
 from types import MappingProxyType
+from typing import Any
 
 from support.fault_matrix.bench import Bench
 from support.fault_matrix.wires import Damage, flipping, losing, repeating
@@ -147,8 +148,16 @@ def _heal_and_stop(bench: Bench, random: Random) -> None:
     bench.world.control({"do": "stop_program"})
 
 
-def _net(name: str, bring: Act, names: frozenset[str] = LINK, *, mend: Act = _heal, **more: object) -> Fault:
-    return Fault("network", name, bring, mend, names, **{"known_s": LINK_S, **more})  # type: ignore[arg-type]
+def _net(
+    name: str,
+    bring: Act,
+    names: frozenset[str] = LINK,
+    *,
+    mend: Act = _heal,
+    known_s: float | None = LINK_S,
+    **more: Any,
+) -> Fault:
+    return Fault("network", name, bring, mend, names, known_s=known_s, **more)
 
 
 # -- processes -------------------------------------------------------------------------------------------------------
@@ -194,10 +203,10 @@ def _shift_clock(seconds: int) -> Act:
     return lambda bench, random: (bench.config.parent.parent / "clock_shift").write_text(f"{seconds}")
 
 
-def _sensor(name: str, fault: str, names: frozenset[str], *, known_s: float | None = None, **more: object) -> Fault:
+def _sensor(name: str, fault: str, names: frozenset[str], *, known_s: float | None = None, **more: Any) -> Fault:
     return Fault(
         "sensor", name, _order("sensor_fault", sensor="gyro", fault=fault),
-        _order("sensor_fault", sensor="gyro", fault=None), names, known_s=known_s, **more,  # type: ignore[arg-type]
+        _order("sensor_fault", sensor="gyro", fault=None), names, known_s=known_s, **more,
     )  # fmt: skip
 
 

@@ -166,10 +166,11 @@ def record_samples(truth: Truth, poses: Poses, sweep: Sweep, sampling: Sampling,
         """Return the joint's angle, speed and acceleration, with a ripple locked to the commanded angle."""
         smooth, share = np.pi + speed * time_s, sampling.vibration * np.sqrt(2 / len(sampling.cycles))
         waves = [(cycles, cycles * smooth + phase) for cycles, phase in zip(sampling.cycles, phases, strict=True)]
+        none = np.zeros_like(smooth)
         return (
-            smooth + sum(share / cycles * np.sin(wave) for cycles, wave in waves),
-            speed * (1 + sum(share * np.cos(wave) for _, wave in waves)),
-            -(speed**2) * sum(share * cycles * np.sin(wave) for cycles, wave in waves),
+            smooth + sum((share / cycles * np.sin(wave) for cycles, wave in waves), none),
+            speed * (1 + sum((share * np.cos(wave) for _, wave in waves), none)),
+            -(speed**2) * sum((share * cycles * np.sin(wave) for cycles, wave in waves), none),
         )
 
     half_s = np.pi / sweep.speed_rad_s

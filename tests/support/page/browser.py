@@ -56,7 +56,7 @@ def _as_nice_as_all_else(service: Service) -> Service:
     """Keep root's browser from the priority that it would give itself, over the laboratory whose run it shows."""
     if os.geteuid() == 0 and (setpriv := shutil.which("setpriv")):
         driver, service.path = service.path, setpriv
-        service.command_line_args = lambda: [  # type: ignore[method-assign]
+        service.command_line_args = lambda: [  # pyrefly: ignore[method-assign]
             "--bounding-set=-sys_nice",
             driver,
             f"--port={service.port}",
@@ -150,14 +150,14 @@ def kind(driver: Chrome) -> str:
 
 def severe(driver: Chrome) -> list[str]:
     """Return the console's errors since the last call."""
-    entries: list[dict[str, Any]] = driver.get_log("browser")  # type: ignore[no-untyped-call]
+    entries: list[dict[str, Any]] = driver.get_log("browser")
     return [entry["message"] for entry in entries if entry["level"] == "SEVERE"]
 
 
 def list_requested_hosts(driver: Chrome) -> set[str]:
     """The hosts of every address the browser has asked for since it was asked last."""
     hosts = set()
-    for entry in driver.get_log("performance"):  # type: ignore[no-untyped-call]
+    for entry in driver.get_log("performance"):
         message = json.loads(entry["message"])["message"]
         if message["method"] == "Network.requestWillBeSent":
             address = urlsplit(message["params"]["request"]["url"])

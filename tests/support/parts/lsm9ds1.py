@@ -74,7 +74,7 @@ class Lsm9ds1Registers(ByteRegisters):
         self.after_acceleration: Callable[[], None] | None = None  # or just after
 
     @property
-    def line_is_high(self) -> bool:  # type: ignore[override]
+    def line_is_high(self) -> bool:
         """Its line is up until it is read."""
         return self.fresh
 

@@ -15,7 +15,7 @@ class Lsm9ds1MagnetometerRegisters(ByteRegisters):
         self.is_heard = True  # False: the wire it answers on is not connected
 
     @property
-    def line_is_high(self) -> bool:  # type: ignore[override]
+    def line_is_high(self) -> bool:
         """Its line is up until it is read."""
         return self.fresh
 

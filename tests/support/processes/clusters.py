@@ -18,7 +18,7 @@ def local_cluster(**of: Any) -> Iterator[Any]:
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # distributed's own, about the loop it closes
-        with LocalCluster(threads_per_worker=1, dashboard_address=None, **of) as cluster:  # type: ignore[no-untyped-call]
+        with LocalCluster(threads_per_worker=1, dashboard_address=None, **of) as cluster:
             yield cluster
 
 

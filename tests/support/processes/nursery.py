@@ -52,7 +52,7 @@ class Forked(subprocess.Popen[Any]):
         super().__init__(command, **options)
 
     def _execute_child(self, *given: Any) -> None:
-        of_popen = super()._execute_child  # type: ignore[misc]
+        of_popen = super()._execute_child  # pyrefly: ignore[missing-attribute]
         named = inspect.signature(of_popen).bind(*given).arguments
         module, *words = named["args"]
         order = {
@@ -68,18 +68,18 @@ class Forked(subprocess.Popen[Any]):
         inherited_or_given = [number if named[end] == -1 else named[end] for number, end in enumerate(ends)]
         self.pid, self._status = _born(self._address, order, inherited_or_given)
         self._child_created = True
-        self._close_pipe_fds(  # type: ignore[attr-defined]
+        self._close_pipe_fds(  # pyrefly: ignore[missing-attribute]
             *(named[end] for end in ("p2cread", "p2cwrite", "c2pread", "c2pwrite", "errread", "errwrite"))
         )
 
     def _internal_poll(self, _deadstate: int | None = None) -> int | None:
-        if self.returncode is None and self._waitpid_lock.acquire(blocking=False):  # type: ignore[attr-defined]
+        if self.returncode is None and self._waitpid_lock.acquire(blocking=False):  # pyrefly: ignore[missing-attribute]
             try:
                 pid, status = self._try_wait(os.WNOHANG)
                 if pid == self.pid:
-                    self._handle_exitstatus(status)  # type: ignore[attr-defined]
+                    self._handle_exitstatus(status)  # pyrefly: ignore[missing-attribute]
             finally:
-                self._waitpid_lock.release()  # type: ignore[attr-defined]
+                self._waitpid_lock.release()  # pyrefly: ignore[missing-attribute]
         return self.returncode
 
     def _try_wait(self, wait_flags: int) -> tuple[int, int]:
@@ -106,7 +106,7 @@ def fork_modules(modules: Collection[str], address: Callable[[str], str]) -> Non
         is_one = named and (args[3] != LABORATORY or options.get("start_new_session"))
         return object.__new__(Named if is_one else kind)
 
-    subprocess.Popen.__new__ = new  # type: ignore[method-assign,assignment]
+    subprocess.Popen.__new__ = new  # pyrefly: ignore[bad-assignment, method-assign]
 
 
 def _born(address: str, order: Order, streams: list[int]) -> tuple[int, socket.socket]:

@@ -185,9 +185,10 @@ def test_a_planned_sweep_turns_a_whole_revolution_at_its_speed(laboratory: World
     sweep = plan.sweeps[0]
     with Arm(laboratory.host, states.append) as arm:
         arm.take_control(PAYLOAD)
-        for motion in plan.motions[: plan.motions.index(sweep) + 1]:
-            began_s = arm.latest.time_s
+        for motion in plan.motions[: plan.motions.index(sweep)]:
             arm.move(motion)
+        began_s = arm.latest.time_s
+        arm.move(sweep)
     low, high = sweep.revolution_rad
     inside = [s for s in states if s.time_s > began_s and low < s.q_rad[sweep.joint] < high]
     turned_rad = inside[-1].q_rad[sweep.joint] - inside[0].q_rad[sweep.joint]
