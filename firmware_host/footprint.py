@@ -76,7 +76,7 @@ class Session:
         for _ in range(math.ceil(duration_s / STEP_S)):
             self._steps += 1
             self._board.advance(self._steps * STEP_S)
-            frames += self._reader.feed(self._board.take_sent())
+            frames.extend(self._reader.feed(self._board.take_sent()))
         return frames
 
     def ask(self, name: str, **values: Any) -> dict[str, Any]:

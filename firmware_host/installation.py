@@ -4,6 +4,7 @@ import json
 import shlex
 import sys
 from pathlib import Path
+from typing import Any
 from urllib.parse import urlsplit
 from urllib.request import url2pathname
 
@@ -26,7 +27,7 @@ def _source() -> tuple[bool, str]:
         is_in_sources = Path(str(installed.locate_file(""))).resolve() == SOURCE  # metadata left by a build
         if is_in_sources and (SOURCE / "pyproject.toml").exists():
             return True, str(SOURCE)
-        origin = json.loads(installed.read_text("direct_url.json") or "{}")
+        origin: dict[str, Any] = json.loads(installed.read_text("direct_url.json") or "{}")
     except PackageNotFoundError:  # run from a folder of sources that is not installed
         return True, str(SOURCE)
     except ValueError:

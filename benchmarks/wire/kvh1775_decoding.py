@@ -47,7 +47,8 @@ def measure(name: Format, stream: bytes, size: int) -> float:
 
 
 def main(megabytes: float) -> int:
-    slow, slowest_mb_s = [], float("inf")
+    slowest_mb_s = float("inf")
+    slow = []
     for name in FORMATS:
         stream = sent(name, megabytes)
         for size in READS:

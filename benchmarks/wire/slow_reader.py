@@ -38,7 +38,8 @@ def measure_pace(
     prompt: socket.socket, slow: socket.socket | None, reads_hz: float, duration_s: float
 ) -> tuple[float, float]:
     """The world's seconds in a wall second, over `duration_s`, and the longest wait for a state (wall time)."""
-    times_s, stamps_s, read_s = [time.monotonic()], [], time.monotonic()
+    times_s, read_s = [time.monotonic()], time.monotonic()
+    stamps_s = []
     while times_s[-1] - times_s[0] < duration_s:
         stamps_s.append(STATE.unpack(prompt.recv(STATE.size, socket.MSG_WAITALL))[3])
         times_s.append(time.monotonic())
@@ -65,7 +66,8 @@ def main() -> int:
         with socket.create_connection((host, int(port)), 10.0) as control:
             control.sendall(json.dumps({"do": "pace", "time_scale": options.pace}).encode() + b"\n")
             control.recv(4096)
-        alone, with_slow_reader = [], []
+        alone = []
+        with_slow_reader = []
         with reader(ready["arm"]) as prompt:
             for _ in range(options.turns):
                 alone.append(measure_pace(prompt, None, options.reads, 10.0))

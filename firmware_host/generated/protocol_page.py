@@ -78,7 +78,8 @@ def _row(message: Message) -> tuple[str, ...]:
 
 def _layout(fields: Sequence[Field], heading: str) -> Iterator[str]:
     """Return a table of fields, which follow each other without gaps."""
-    offsets, offset = [], 0
+    offset = 0
+    offsets = []
     for field in fields:
         offsets.append(offset)
         offset += struct.calcsize("<" + protocol.KINDS[field.kind][0])

@@ -59,11 +59,12 @@ def of_gyroscope(recordings: Sequence[ObservedRun], name: str) -> GyroscopeCondi
 
 def of_accelerometer(recordings: Sequence[ObservedRun], name: str, dwells: Iterable[int]) -> When:
     """Return the conditions of an accelerometer's readings: in the dwells with these indices, and in sweeps."""
-    wanted, read = frozenset(dwells), []
+    wanted = frozenset(dwells)
+    read = []
     for recording in recordings:
         part, offset_s = recording.sensors[name], recording.clock_offset_s
-        read += [_read_average(turn.average, offset_s) for turn in part.revolutions if turn.acceleration is not None]
-        read += [
+        read.extend(_read_average(turn.average, offset_s) for turn in part.revolutions if turn.acceleration is not None)
+        read.extend(
             _WeightedReadings(
                 dwell.window.start_s + offset_s,
                 dwell.window.end_s + offset_s,
@@ -72,7 +73,7 @@ def of_accelerometer(recordings: Sequence[ObservedRun], name: str, dwells: Itera
             )
             for dwell in part.dwells
             if dwell.index in wanted
-        ]
+        )
     return _average_conditions(recordings, name, read)
 
 

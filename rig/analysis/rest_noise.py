@@ -63,7 +63,7 @@ def at_rest(runs: Sequence[RunData]) -> dict[str, SensorAtRest]:
         intervals = []
         for run, motion in zip(runs, motions, strict=True):
             stream = synchronize_stream(run.samples[name], sensor, motion)
-            intervals += [(stream, inside) for inside in still_samples(run, stream, motion)]
+            intervals.extend((stream, inside) for inside in still_samples(run, stream, motion))
         quantities = [RATE, ACCELERATION] if sensor.measures(ACCELERATION) else [RATE]
         results[name] = SensorAtRest(
             sensor,

@@ -223,7 +223,9 @@ class SensorsConfig(Section):
     turner: Any = None
     board: BoardSection | None = None
     sensors: dict[SensorName, SensorSection] = Field(min_length=1)
-    magnetometers: dict[SensorName, MagnetometerSection] = Field(default={}, max_length=len(MAGNETOMETERS))
+    magnetometers: dict[SensorName, MagnetometerSection] = Field(
+        default=dict[SensorName, MagnetometerSection](), max_length=len(MAGNETOMETERS)
+    )
     procedure: Any = None
     observation: ObservationSection = ObservationSection()
     site: SiteSection = SiteSection()

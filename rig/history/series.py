@@ -203,7 +203,7 @@ def rig_states(pasts: Sequence[Past]) -> list[RigState]:
         serials = []
         for (_, serial_number, *_), series in standards.items():
             of_rig = [past for past in series if past.rig == rig]
-            serials += [serial_number] if of_rig else []
+            serials.extend([serial_number] if of_rig else [])
             for name, trend in trends(of_rig).items():
                 if trend.chart is not None:
                     judged = zip(trend.times, trend.chart.deviation.tolist(), strict=True)

@@ -28,7 +28,8 @@ def draw_trends(subjects: Mapping[Subject, Mapping[str, Trend]], folder: Path) -
     """Draw `history_<serial number>_<quantity>` as PNG and SVG for each subject into the existing `folder`."""
     from matplotlib.figure import Figure
 
-    written, names = [], set[str]()
+    names = set[str]()
+    written = []
     for subject, trends in subjects.items():
         (name,) = plain_names([f"history_{subject[1]}_{subject[2]}{'_simulated' * subject[4]}"]).values()
         while name in names:  # the same sensor at another range
@@ -49,7 +50,7 @@ def draw_trends(subjects: Mapping[Subject, Mapping[str, Trend]], folder: Path) -
             for axes in rows[-1]:
                 axes.tick_params(axis="x", rotation=30)
             save(figure, folder, name)
-        written += [folder / f"{name}.png", folder / f"{name}.svg"]
+        written.extend([folder / f"{name}.png", folder / f"{name}.svg"])
     return written
 
 

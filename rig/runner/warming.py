@@ -131,7 +131,8 @@ class Warming:
 
     def begin_set(self) -> None:
         """Begin to average the temperatures of the next set."""
-        self._of_set, self._began_s = [], self._looked_s
+        self._began_s = self._looked_s
+        self._of_set = []
 
     def end_set(self, first: int, end: int) -> None:
         """End the set with the sweeps and dwells from index `first` up to `end`."""

@@ -199,7 +199,12 @@ def _build_session(twists: Array, speed_rad_s: float) -> Session:
     In the flange's frame a wrist's axis is fixed while that wrist turns, and `twists` (3, 2) tilt it. At home the
     flange's x, y and z point forward, left and up in the base.
     """
-    attitudes, rates, arms, rest_attitudes, windows, rests = [], [], [], [], [], []
+    attitudes = []
+    rates = []
+    arms = []
+    rest_attitudes = []
+    windows = []
+    rests = []
     start_s, sweep_s = 0.0, 2 * np.pi / speed_rad_s
     turn = np.linspace(-np.pi, np.pi, ATTITUDES, endpoint=False) + np.pi / ATTITUDES
     for number, joint in enumerate((2, 1, 0)):

@@ -70,7 +70,7 @@ def _simulate_gyroscope(runs: int, rng: np.random.Generator, _: int) -> Array:
         )
         six = six_observation_bound(scale, rates @ mounting.T, variances)
         bounds = (six, six, six, vector_bound(F, rates, variances), vector_bound(F, all_rates, all_variances))
-        ratios += [_compare(estimate - truth, bound) for estimate, bound in zip(estimates, bounds, strict=True)]
+        ratios.extend(_compare(estimate - truth, bound) for estimate, bound in zip(estimates, bounds, strict=True))
     return np.array(ratios).reshape(len(SPEEDS), len(GYRO_ESTIMATORS), 2, 6)
 
 

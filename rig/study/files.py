@@ -96,6 +96,6 @@ def _write_plots(report: StudyReport, paths: Sequence[Path]) -> None:
         report.draw(figure)
         for path in paths:
             # Without the date the same study gives the same file.
-            metadata = {"Date": None} if path.suffix == ".svg" else {}
+            metadata: dict[str, None] = {"Date": None} if path.suffix == ".svg" else {}
             with _remove_incomplete(path):
                 figure.savefig(path, dpi=80, metadata=metadata)

@@ -46,27 +46,33 @@ def study(settings: Settings) -> StudyReport:
         norms = np.linalg.norm(estimates[:, 9:12], axis=1) / rt.DEG_H
         residual = np.degrees(np.max([residual for _, _, residual in solved]))
         norm_std = float(norms.std(ddof=1))
-        findings += [
-            StudyFinding(f"largest residual std, {kind}", float(residual), "deg/s", 0.0475),
-            StudyFinding(f"norm of the Earth's rate, {kind}, mean", float(norms.mean()), "deg/h", 15.4035),
-            StudyFinding(f"norm of the Earth's rate, {kind}, std of one calibration", norm_std, "deg/h"),
-            StudyFinding(f"largest error of F, {kind}", float(np.abs(estimates[0, :9] - TRUTH[:9]).max()), "1"),
-        ]
+        findings.extend(
+            [
+                StudyFinding(f"largest residual std, {kind}", float(residual), "deg/s", 0.0475),
+                StudyFinding(f"norm of the Earth's rate, {kind}, mean", float(norms.mean()), "deg/h", 15.4035),
+                StudyFinding(f"norm of the Earth's rate, {kind}, std of one calibration", norm_std, "deg/h"),
+                StudyFinding(f"largest error of F, {kind}", float(np.abs(estimates[0, :9] - TRUTH[:9]).max()), "1"),
+            ]
+        )
     true_norm = rt.EARTH_RATE_RAD_S / rt.DEG_H
     printed = float(np.linalg.norm(rt.GYRO_REFERENCE_RAD_S)) / rt.DEG_H
     drift = _simulate_drift(settings.seed)
-    findings += [
-        StudyFinding("printed Earth rate against 7.2921159e-5 rad/s", 100 * (printed / true_norm - 1), "%", 2.69),
-        StudyFinding("printed Earth rate against 15 deg/h", 100 * (printed / 15 - 1), "%", 2.69),
-        StudyFinding(
-            "RMS error of the drifting bias, F and reference held", rt.rms_drift_error(drift, "held", "deg_h"), "deg/h"
-        ),
-        StudyFinding(
-            "RMS error of the drifting bias, all parameters estimated",
-            rt.rms_drift_error(drift, "free", "deg_h"),
-            "deg/h",
-        ),
-    ]
+    findings.extend(
+        [
+            StudyFinding("printed Earth rate against 7.2921159e-5 rad/s", 100 * (printed / true_norm - 1), "%", 2.69),
+            StudyFinding("printed Earth rate against 15 deg/h", 100 * (printed / 15 - 1), "%", 2.69),
+            StudyFinding(
+                "RMS error of the drifting bias, F and reference held",
+                rt.rms_drift_error(drift, "held", "deg_h"),
+                "deg/h",
+            ),
+            StudyFinding(
+                "RMS error of the drifting bias, all parameters estimated",
+                rt.rms_drift_error(drift, "free", "deg_h"),
+                "deg/h",
+            ),
+        ]
+    )
     return StudyReport(table(rows), tuple(findings), partial(_draw, rows, drift), (12.0, 5.0))
 
 

@@ -57,7 +57,7 @@ def test_an_answer_needs_the_token_the_page_and_the_question(ask: Asking, answer
     assert ask("GET", "/say") == 405
     assert ask("POST", "/say", {**right, "number": 2}) == 409
     unfit = [{**right, "text": "a\nb"}, {**right, "text": "x" * 201}, {"number": True, "text": "x"}]
-    for wrong in ([], {"number": 1}, *unfit):
+    for wrong in (list[str](), {"number": 1}, *unfit):
         assert ask("POST", "/say", wrong) == 400
     assert answers.empty()
     assert ask("POST", "/say", right) == 202

@@ -133,7 +133,8 @@ def test_numbers_cut_toward_zero_are_twice_as_coarse_about_zero_alone() -> None:
     """And a mean of them is as uncertain as it errs, whatever an autopilot's offset has been added since."""
     milli, offset, rng = 1e-3, 0.03, np.random.default_rng(29)
     channel = Channel("rate", "counts", "<i4", 1e-8, step=2 * milli)
-    in_std, trues = [], rng.uniform(-6, 6, (300, 3))
+    trues = rng.uniform(-6, 6, (300, 3))
+    in_std = []
     cut = np.trunc(trues[:, None] + 0.6 * rng.standard_normal((300, 300, 3)))
     everything = milli * (cut + 0.5 * np.sign(cut)) + offset
     steps = channel.steps(everything.reshape(-1, 3))

@@ -301,7 +301,9 @@ def test_time_stamps_that_scatter_are_in_the_uncertainty() -> None:
 def test_a_session_tells_more_with_every_move_and_names_the_last_one() -> None:
     wrong = TurnAction(1, Mistake("short", 5.0))
     recorded = handle((*TWELVE[:9], TurnAction(1), wrong, *TWELVE[9:]), 5, rest_s=1.8)
-    feed, refused, known, asked = Segmenter(), NotCounted(), [], []
+    feed, refused = Segmenter(), NotCounted()
+    known = []
+    asked = []
     for start in range(0, len(recorded.time_s), 12):
         rows = slice(start, start + 12)
         if feed.feed(recorded.time_s[rows], recorded.rates[rows], recorded.acceleration[rows]):

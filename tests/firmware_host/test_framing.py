@@ -156,7 +156,8 @@ def test_a_damaged_frame_is_dropped_and_a_sound_one_decodes(body: bytes, data: s
 
 def test_the_c_structures_lie_as_the_table_says(tmp_path: Path) -> None:
     structs = {f"{m.name}_payload": m.fields for m in MESSAGES} | {f"{m.name}_item": m.items for m in MESSAGES}
-    expected, prints = [], []
+    expected = []
+    prints = []
     for struct_name, fields in structs.items():
         offset = 0
         for field in fields:

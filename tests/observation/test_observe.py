@@ -506,7 +506,9 @@ def thinned(run: RunData, seed: int) -> RunData:
 @pytest.mark.slow
 @pytest.mark.proof
 def test_holes_between_arm_states_cost_certainty_not_truth(thorough: bool) -> None:
-    errors, clocks, stds = [], [], []
+    errors = []
+    clocks = []
+    stds = []
     for seed in range(24 if thorough else 4):
         setup = Setup(seed=seed, rest_s=1.0, vibration=0.05, orders=ROUGH_ORDERS)
         result = solve_runs([thinned(synthetic_run(setup), seed)])["gyro"]
@@ -654,7 +656,8 @@ def test_reported_uncertainties_are_those_of_many_sessions(thorough: bool) -> No
     """Sessions over four movements: errors in units of their reported standard deviation have RMS 1."""
     sessions = 50 if thorough else 5
     within = 3.3 / np.sqrt(2 * 4 * sessions)
-    parameters, clocks = [], []
+    parameters = []
+    clocks = []
     for movement in range(4):
         setup = Setup(seed=movement, rest_s=0.5, speed_deg_s=120.0, boot_s=-50.0 - 7.7 * movement)
         rng = np.random.default_rng(100 + movement)

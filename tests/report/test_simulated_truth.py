@@ -4,6 +4,7 @@ import json
 import re
 import shutil
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ from support.laboratories.commands import configuration, rig, rig_here
 from support.page.told_runs import ABOUT
 from support.paths import CONFIGS, RECORDINGS, ROOT
 
-TRUE = {
+TRUE: dict[str, Any] = {
     "schema": "rig.truth/1",
     "simulated": True,
     "gyroscopes": {"gyro": {"scale": [1.18, 1.15, 1.14], "bias_rad_s": [0.007, -0.009, -0.004]}},

@@ -83,7 +83,8 @@ garbage = st.one_of(st.binary(max_size=40), st.integers(4, 35).map(lambda length
 @pytest.mark.slow
 @given(st.lists(st.one_of(st.sampled_from(FORMATS), st.just("test"), garbage), max_size=20))
 def test_whatever_stands_between_them_costs_no_whole_message(parts: list[Format | str | bytes]) -> None:
-    sent, wanted = b"", []
+    sent = b""
+    wanted = []
     for number, part in enumerate(parts):
         if isinstance(part, bytes):
             sent += part
@@ -100,7 +101,8 @@ def test_whatever_stands_between_them_costs_no_whole_message(parts: list[Format 
 def damage(data: bytes, size: int, rng: np.random.Generator, faults: int) -> bytes:
     """`faults` of all kinds, at least two messages apart: bits turned, bytes lost, bytes that came from nowhere."""
     places = rng.choice(np.arange(1, len(data) // (3 * size)), faults, replace=False) * 3 * size
-    pieces, last = [], 0
+    last = 0
+    pieces = []
     for place in np.sort(places + rng.integers(0, size, faults)).tolist():
         pieces.append(data[last:place])
         kind, length = rng.integers(3), int(rng.integers(1, 12))

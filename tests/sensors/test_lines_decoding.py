@@ -118,7 +118,8 @@ def damaged(count: int, seed: int) -> tuple[bytes, np.ndarray, list[int]]:
     """So many lines with a sum, of each of which one or several bytes are wrong; what was printed; bytes wrong."""
     rng = np.random.default_rng(seed)
     readings = rng.normal(0, 50, (count, 6))
-    lines, sizes = [], []
+    lines = []
+    sizes = []
     for number, row in enumerate(readings):
         line = bytearray(add_checksum(f"$IMU,{number * 1000}," + ",".join(f"{each:.2f}" for each in row))[:-2])
         size = int(rng.integers(1, 6))

@@ -222,7 +222,7 @@ def test_a_bias_walks_as_its_truth_alone_says() -> None:
 def test_a_filter_and_a_delay_make_readings_late() -> None:
     """On a ramp of 5 rad/s² a reading is short by 5 rad/s² times (delay + 1/(2π bandwidth))."""
     ramps = []
-    for late in ({}, {"delay_ms": 20, "bandwidth_hz": 10}):
+    for late in (dict[str, object](), {"delay_ms": 20, "bandwidth_hz": 10}):
         one = laboratory(late)
         one.laboratory.robot.motion.speed((0.0, 0.0, 0.0, 0.0, 0.0, 3.0), 5.0)
         one.ticks(100)

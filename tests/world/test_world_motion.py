@@ -123,7 +123,8 @@ def test_the_measured_turn_takes_the_time_of_the_smooth_speed() -> None:
     """Two passes of the joint, a whole turn apart, give the commanded speed whatever the vibration."""
     player = Player(0.08, start=turned(HOME, 5, -3.6))
     player.motion.move(turned(HOME, 5, 3.6), 1.0, 2.0)
-    times, angles_seen = [], []
+    times = []
+    angles_seen = []
     while not player.motion.standing:
         player.tick()
         times.append(player.ticks * TICK_S)

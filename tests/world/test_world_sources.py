@@ -61,7 +61,9 @@ class Heard:
         first = np.concatenate([batch.values for batch in batches])[:FIRST, time_column]
         step_s = find_time_step_s(first, reader.time_decimals, section.time.unit)
         stamper = Stamper(section, RATE_HZ, "it", step_s)
-        values, numbers, times_us = [], [], []
+        values = []
+        numbers = []
+        times_us = []
         for block, batch in enumerate(batches):
             taken, number, time_us = stamper.stamp(batch.values, len(batch.samples_before), block * BLOCK_S)
             values.append(batch.values[taken])

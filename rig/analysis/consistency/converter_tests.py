@@ -147,7 +147,7 @@ def _find_spikes(windows: Sequence[RawReadings], step_counts: Array) -> tuple[fl
     omitted, because the filter of a quiet sensor has not settled.
     """
     half = step_counts / 2
-    farthest, sizes = 0.0, [[], [], []]  # type: float, list[list[Array]]
+    farthest, sizes = 0.0, [list[Array]() for _ in range(3)]
     deviations_by_window = [
         (window.residual_counts - np.median(window.residual_counts, axis=0))[SETTLING:] for window in windows
     ]

@@ -42,9 +42,9 @@ def build_reading_patterns(segments: Segments, noise_rad: float) -> Array:
             interval = segments.intervals[np.flatnonzero(share)[0]]
             at_s = interval.end_s if share[share != 0][0] > 0 else interval.start_s
             directions, sizes, _ = np.linalg.svd(interval.motion.axes(interval.motion.angles(at_s))[:, counted])
-            patterns += [
+            patterns.extend(
                 noise_rad * share[:, None] / lengths * axis for axis in (directions[:, : len(sizes)] * sizes).T
-            ]
+            )
     return np.reshape(patterns, (-1, *segments.means_rad_s.shape))
 
 

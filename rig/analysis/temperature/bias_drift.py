@@ -134,7 +134,8 @@ def _accelerations(recordings: Sequence[ObservedRun], name: str, sensor: Recorde
 
 def _rates(recordings: Sequence[ObservedRun], name: str, sensor: RecordedSensor) -> dict[int, DwellMean]:
     """Return the means of the gyroscope in every dwell, which is a rest for it."""
-    mounting, means = np.array(sensor.mounting), {}
+    mounting = np.array(sensor.mounting)
+    means = {}
     for recording in recordings:
         for index, (start_s, end_s) in dwell_times_s(recording.run).items():
             for rest in recording.sensors[name].rests:

@@ -56,7 +56,7 @@ def run(options: Namespace) -> int:
         for name, (port, speed) in ports.items():
             info = _query_instrument(name, port, speed)
             print_kvh_info(info, as_json=options.json)
-            problems += [info.problem] if info.problem is not None else []
+            problems.extend([info.problem] if info.problem is not None else [])
     for problem in problems:
         say(f"rig: {problem}", file=sys.stderr)
     return 2 if problems else 0

@@ -91,7 +91,7 @@ def _read_recordings(run: Path, columns: Path | None) -> "Sequence[RunData]":
     from rig.observation.formats.sample_files import is_in_format
     from rig.plans.recorded_run import open_run
 
-    logs = [] if run.is_dir() and not is_in_format(run) else find_logs(run)
+    logs = list[Path]() if run.is_dir() and not is_in_format(run) else find_logs(run)
     if not logs:
         if columns is not None:
             raise Refused("bad_option", "--columns is for a log, and a run needs no map", "Leave it out")

@@ -252,7 +252,7 @@ def _recompute_finished(folder: Path, history: History, *, solve: bool) -> Finis
     from rig.report.document import document_of
 
     document = document_of(judged(open_run(folder)))
-    differing = [] if claimed is None else not_given(claimed.document, document)
+    differing = list[str]() if claimed is None else not_given(claimed.document, document)
     if claimed is not None and not differing:
         return claimed
     if not solve:

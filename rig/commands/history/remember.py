@@ -198,6 +198,6 @@ def _compare_with_earlier(history: "History", run_id: int) -> "list[CalibrationC
     for now in history.of_run(run_id):
         series = subjects(history.calibrations(Selection(serial_number=now.serial_number))).get(now.subject, [])
         earlier = [past for past in series if (past.started_utc, past.id) < (now.started_utc, now.id)]
-        pairs += [(earlier[-1], now)] if earlier else []
+        pairs.extend([(earlier[-1], now)] if earlier else [])
     changes = changes_in([(before.parameters, now.parameters) for before, now in pairs])
     return [CalibrationComparison(before, now, changed) for (before, now), changed in zip(pairs, changes, strict=True)]

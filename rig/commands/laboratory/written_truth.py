@@ -37,14 +37,19 @@ def _windows(outcome: "Outcome", *, follows_arm: bool) -> dict[str, Any]:
     Only an arm's controller shares the laboratory's clock. With any other clock the whole time is one window.
     """
     recordings = outcome.recordings if follows_arm else ()
-    gyroscopes, accelerometers = {}, {}
+    gyroscopes = {}
+    accelerometers = {}
     for name, result in outcome.results.items():
         if name not in outcome.settings.to_calibrate:
             continue
         sensors = [recording.sensors[name] for recording in recordings]
         sweeps_s = [(turn.average.start_s, turn.average.end_s) for sensor in sensors for turn in sensor.revolutions]
         rests_s = [(rest.start_s, rest.end_s) for sensor in sensors for rest in sensor.rests]
-        speeds = [] if outcome.settings.by_hand is not None else [turn.speed_rad_s for turn in result.observations]
+        speeds = (
+            list[float]()
+            if outcome.settings.by_hand is not None
+            else [turn.speed_rad_s for turn in result.observations]
+        )
         gyroscopes[name] = {
             "sweeps_s": sweeps_s,
             "averages_s": sweeps_s + rests_s,

@@ -68,9 +68,9 @@ def _pairs(folder: Path) -> list[tuple[Path, Path]]:
     for name in NAMES:
         source = supplied(name)
         files = sorted(source.rglob("*")) if source.is_dir() else [source]
-        pairs += [
+        pairs.extend(
             (file, folder / name / file.relative_to(source) if source.is_dir() else folder / name)
             for file in files
             if file.is_file() and "__pycache__" not in file.parts
-        ]
+        )
     return pairs

@@ -49,7 +49,8 @@ def _analyse_logs(paths: Sequence[Path], columns: Path | None) -> "dict[str, Sen
     from rig.observation.external.csv_samples import read_sample_table, samples_in
     from rig.observation.formats.column_selection import map_samples
 
-    mapped, sensors = map_samples(read_column_map(columns)), {}
+    mapped = map_samples(read_column_map(columns))
+    sensors = {}
     for path in paths:
         table = read_sample_table(path, (), mapped)
         if table.note:

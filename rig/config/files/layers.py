@@ -78,7 +78,8 @@ def merge(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
 
 def _layers(text: str, path: Path | None) -> Iterator[_Layer]:
     """Return a file followed by the files it is based on."""
-    layer, names, files = _layer(text, ""), ["this file"], []
+    layer, names = _layer(text, ""), ["this file"]
+    files = []
     while BASE in layer.data:
         where, wanted = f"{BASE} ({layer.places[(BASE,)]})", layer.data.pop(BASE)
         yield layer

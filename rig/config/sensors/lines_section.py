@@ -197,7 +197,9 @@ class LinesSection(Section):
         default=LineTemperatureSection(), description="the thermometer's column, or the temperature stated in its place"
     )
     scalars: dict[ScalarName, LineScalarSection] = Field(
-        default={}, max_length=16, description="columns of quantities without axes, by their names"
+        default=dict[ScalarName, LineScalarSection](),
+        max_length=16,
+        description="columns of quantities without axes, by their names",
     )
 
     @field_validator("columns")

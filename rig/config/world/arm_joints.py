@@ -69,7 +69,7 @@ class SimulatedDriveSection(Section):
 
 
 # What a key of `world.arm` is if it is left out and `joints` is not `measured`.
-_STIFF = {"ripple": [], "lag_s": 0.0, "yield_s2": 0.0, "crosstalk": 0.0}
+_STIFF: dict[str, Any] = {"ripple": [], "lag_s": 0.0, "yield_s2": 0.0, "crosstalk": 0.0}
 _READ_EXACTLY: dict[str, Any] = {"encoder_noise_rad": 0.0, "encoder_speed_noise_rad_s": 0.0}
 KEYS_OF_KIND: Mapping[str, Mapping[str, Any]] = MappingProxyType(
     {

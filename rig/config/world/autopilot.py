@@ -27,7 +27,7 @@ class SimulatedAutopilotSection(Section):
     )
     armed: bool = Field(default=False, description="whether its motors may turn")
     parameters: dict[str, float] = Field(
-        default={},
+        default=dict[str, float](),
         description="parameters that differ from those of a new one, by their names",
         json_schema_extra={"allowed": "parameters that it has", "usual": "`{}`", **RATIO},
     )

@@ -48,7 +48,7 @@ class SimulatedHandSection(Section):
         default=(0.5, 2.0), description="how long, at least and at most, from an instruction to the first touch"
     )
     mistakes: dict[Mistaken, Probability] = Field(
-        default={},
+        default=dict[Mistaken, Probability](),
         description="probability of this mistake in an action: "
         + ", ".join(f"`{mistake}`" for mistake in get_args(Mistaken)),
         json_schema_extra={"unit": "1", "allowed": "mistakes with a number 0 to 1 each", "usual": "`{}`"},

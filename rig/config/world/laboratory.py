@@ -258,7 +258,7 @@ class SimulatedArmSection(Section):
     fieldbus: SimulatedFieldbusSection | None = None
     log: SimulatedPoseLogSection | None = None
     calibration: CalibrationSection = CalibrationSection()
-    iron: dict[SensorName, IronSection] = Field(default={}, max_length=20)
+    iron: dict[SensorName, IronSection] = Field(default=dict[SensorName, IronSection](), max_length=20)
     unmodelled: ResidueSection = ResidueSection()
 
     @model_validator(mode="before")
@@ -380,7 +380,7 @@ class SimulatedKvhSection(Section):
         description="how long it has been on; its microseconds start again at zero after 4295 s",
     )
     settings: dict[str, str] = Field(
-        default={},
+        default=dict[str, str](),
         description="settings that differ from those of delivery, in the words of its commands: `{DR: '250', "
         "OUTPUTFMT: B}`",
         json_schema_extra={"allowed": "settings of its commands", "usual": "`{}`"},
@@ -533,14 +533,18 @@ class WorldSection(Section):
         description="how warm board and parts are; without it, each sensor of the board warms up by itself",
     )
     sensors: dict[SensorName, SimulatedSensorSection] = Field(min_length=1)
-    magnetometers: dict[SensorName, SimulatedMagnetometerSection] = Field(default={})
+    magnetometers: dict[SensorName, SimulatedMagnetometerSection] = Field(
+        default=dict[SensorName, SimulatedMagnetometerSection]()
+    )
     mounts: tuple[StageMountSection, ...] = Field(
         default=(),
         max_length=12,
         description="how the simulated operator truly mounts the item for each of `procedure.stages`",
     )
     tray: dict[PartNumber, SimulatedPartSection] = Field(
-        default={}, max_length=10_000, description="peculiarities of parts of a series, by serial number"
+        default=dict[PartNumber, SimulatedPartSection](),
+        max_length=10_000,
+        description="peculiarities of parts of a series, by serial number",
     )
 
     def misfits(self, turner: TurnerSection) -> Iterator[str]:

@@ -41,7 +41,7 @@ class SimulatedLinesSection(Section):
         default=0.0, ge=0, le=0.01, description="share of wrong bits on the line", json_schema_extra=RATIO
     )
     scalars: dict[str, float] = Field(
-        default={},
+        default=dict[str, float](),
         description="the number that it prints in a column of `lines.scalars`, by its name; left out, 0",
         json_schema_extra={"unit": "as printed", "allowed": "a number for each name"},
     )

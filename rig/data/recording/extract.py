@@ -45,7 +45,7 @@ def extract(path: Path) -> Iterator[dict[str, Any] | NDArray[Any]]:
             raise ValueError(f"its schema is {schema!r:.60}; this version of the rig reads {SCHEMA!r}")
         texts = {name: _text(file, name) for name in TEXTS[schema]}
         is_external = schema == SCHEMA_ELSEWHERE
-        group = {} if is_external else _member(file, "samples", h5py.Group)
+        group = dict[str, Any]() if is_external else _member(file, "samples", h5py.Group)
         if len(group) > MAX_SENSORS:
             raise ValueError(f"it announces {len(group)} sensors")
         samples = {name: _member(group, name, h5py.Dataset) for name in group}

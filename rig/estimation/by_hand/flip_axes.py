@@ -41,7 +41,8 @@ def check_axes(session: HandRecording) -> None:
 
 def _quarters(session: HandRecording) -> tuple[Array, Array]:
     """Return the rotation vectors (k, 3) of quarter turns by the accelerometer, and (k, 3) by the gyroscope."""
-    about, swept = [], []
+    about = []
+    swept = []
     for row, move in enumerate(session.moves):
         first, second = session.rests[row], session.rests[row + 1]
         if not move.is_usable or first.acceleration_m_s2 is None or second.acceleration_m_s2 is None:

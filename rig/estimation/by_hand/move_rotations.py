@@ -54,7 +54,8 @@ def integrate_moves(session: HandRecording, gyroscope: GyroscopeModel, up: Array
     matrix, biases, sensitivity, bends = gyroscope.matrix, gyroscope.biases, gyroscope.sensitivity, gyroscope.bends
     middles = np.array([(rest.start_s + rest.end_s) / 2 for rest in session.rests])
     inverse = np.linalg.inv(matrix)
-    rotations, by_theta, by_gravity, by_bends, swept, durations, paths, changes = ([] for _ in range(8))
+    rotations, by_theta, by_gravity, by_bends, swept = (list[Array]() for _ in range(5))
+    durations, paths, changes = (list[float]() for _ in range(3))
     for row, move in enumerate(session.moves):
         inside = _select_inside(session.time_s, move.start_s, move.end_s)
         times_s = session.time_s[inside]

@@ -93,7 +93,8 @@ def _test_hypotheses(fit: GraphFit, since: int | None) -> list[FaultHypothesis]:
     def remove_explained(columns: Array) -> Array:
         return np.asarray(columns - basis @ (basis.T @ columns), dtype=np.float64)
 
-    remaining, hypotheses = remove_explained(residual), []
+    remaining = remove_explained(residual)
+    hypotheses = []
     for name, index in _hypotheses(fit, since):
         columns = remove_explained(_fault_columns(fit, name, index) / std[:, None])
         rest = remaining - columns @ np.linalg.lstsq(columns, remaining, rcond=FREE)[0]

@@ -83,7 +83,9 @@ def course(time_s: Array, readings: Array, matrix: Array, bias: Array, at_s: Arr
         for block, instants in _split_into_blocks(time_s, at_s)
     ]
     attitude, sensitivity = np.eye(3), np.zeros((3, PARAMETERS))
-    attitudes, sensitivities, rates = [], [], []
+    attitudes = []
+    sensitivities = []
+    rates = []
     for block_attitudes, block_sensitivities, block_rates in blocks:
         attitudes.append(attitude @ block_attitudes[:-1])
         sensitivities.append(sensitivity + attitude @ block_sensitivities[:-1])

@@ -133,7 +133,8 @@ class MixedModel:
         The estimates are those for `std` (k,), the intervals those over all standard deviations.
         """
         top = wanted @ self.solve(std).theta
-        offsets, variances = [], []
+        offsets = []
+        variances = []
 
         def evaluate(logarithms: Array) -> float:
             try:

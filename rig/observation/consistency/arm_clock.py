@@ -56,7 +56,8 @@ def state_jitter(recordings: Sequence[ObservedRun]) -> Jitter:
     times' errors, and the noise and the steps of the encoder. Neighbouring differences share states: n of them have
     n / Σ ρ² degrees of freedom, with Σ ρ² = C(24, 12) / C(12, 6)² over all lags.
     """
-    scatter, count = [], 0
+    count = 0
+    scatter = []
     for sweep, steps_rad in _difference_sweeps(recordings):
         steps = steps_rad[:, sweep.joint]
         if len(steps):

@@ -59,7 +59,8 @@ def raw_acceleration_dwells(name: str, recording: ObservedRun, matrix: Array) ->
 
 def raw_acceleration_sweeps(name: str, recording: ObservedRun) -> list[RawReadings]:
     """Return a sensor's raw accelerations in its revolutions, each with its number in the recording."""
-    stream, sweeps = recording.stream(name), []
+    stream = recording.stream(name)
+    sweeps = []
     for index, turn in enumerate(recording.sensors[name].revolutions):
         if turn.acceleration is not None:
             lsb = stream.sensor.channel(ACCELERATION).unit_per_count

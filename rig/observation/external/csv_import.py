@@ -135,7 +135,8 @@ def average(samples: Array, sweeps: Array, axes: Array, temperature_c: Array | N
     if 2 * sum(kept) < len(kept) or is_losing(rows):
         for row, (gaps, window) in enumerate(zip(rows, windows, strict=True), start=1):
             check_complete(gaps.count, gaps.expected, window, f"sweep {row}")
-    turns, rests = [], []
+    turns = []
+    rests = []
     for row, (window, speed, gaps) in enumerate(zip(windows, sweeps[:, 2].tolist(), rows, strict=True), start=1):
         within = inside(time_s, window)
         if not gaps.is_inside:

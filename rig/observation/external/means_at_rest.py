@@ -30,7 +30,9 @@ def means_at_rest(turning: Turning, clock_s: float) -> MeansAtRest | None:
     """
     rows_s = turning.rows_s.mean(axis=1) + clock_s
     lying = still_windows(turning.rows_s + clock_s, turning.attitudes)
-    readings, rates, lasting_s = [], [], 0.0
+    lasting_s = 0.0
+    readings = []
+    rates = []
     for rest in _split_single(find_rests(turning.time_s, {RATE: turning.readings_rad_s}, lying=lying)):
         rows = np.flatnonzero((rows_s >= rest.start_s) & (rows_s <= rest.end_s))
         if not len(rows):

@@ -203,7 +203,9 @@ def _read(
     time_s: Array, readings: Mapping[Quantity, Array], cuts: Sequence[NDArray[np.intp]]
 ) -> tuple[Rested, NDArray[np.intp]]:
     """Return the means of the rests, and the knocked samples. Rests with few samples get the noise of the others."""
-    means, variances, dof = {}, {}, {}
+    means = {}
+    variances = {}
+    dof = {}
     knocked = np.zeros(0, dtype=np.intp)
     for quantity, values in readings.items():
         axes = values.shape[1]

@@ -59,7 +59,8 @@ def _thin(time_s: Array) -> NDArray[np.intp]:
     median_s = float(np.median(steps_s)) if len(steps_s) else 0.0
     if median_s >= EVEN_S or not len(steps_s) or np.abs(steps_s - median_s).mean() <= UNEVEN * median_s:
         return np.arange(len(time_s))
-    kept, last_s = [], -np.inf
+    last_s = -np.inf
+    kept = []
     for row, row_s in enumerate(time_s.tolist()):
         if row_s - last_s >= EVEN_S:
             kept.append(row)

@@ -66,7 +66,9 @@ def find_turns(
     rates = readings - bias
     sampling = find_sampling(time_s)
     gaps = np.flatnonzero(sampling.missing)
-    turns, rows, hiding = [], [], []
+    turns = []
+    rows = []
+    hiding = []
     means = [RateMean(rest.mean_rad_s, rest.variance_rad2_s2, np.zeros(3)) for rest in resting]
     for sweep in sweeps:
         row = sweep.sweep - 1

@@ -197,7 +197,7 @@ def _check_layout(store: Any, connections: Any) -> None:
         if definition.format == MessageDefinitionFormat.MSG:
             fields = get_types_from_msg(definition.data, kind)
         elif definition.format == MessageDefinitionFormat.IDL:
-            fields = {}
+            fields = dict[str, Any]()
             for text in definition.data.split("=" * 80 + "\n"):
                 fields |= get_types_from_idl(text.partition("\n")[2] if text.startswith("IDL: ") else text)
         else:

@@ -117,7 +117,7 @@ def csv_parts(
 def _parts(path: Path, header: Header, largest_mb: int, mapped: Mapped | None, origin_s: int | None) -> Iterator[Part]:
     skipped = 0 if mapped is None else mapped.skip_lines
     rows = read_mat_rows(path, header, mapped) if is_mat(path) else read_rows(path, largest_mb, skipped)
-    headings, first = [name.strip() for name in next(rows, [])], next(rows, [])
+    headings, first = [name.strip() for name in next(rows, list[str]())], next(rows, list[str]())
     first_line = skipped + 2
     if mapped is not None and mapped.is_by_number and all(is_value(cell) for cell in headings if cell):
         rows, headings, first_line = chain([headings, first], rows), [""] * len(headings), skipped + 1
@@ -236,7 +236,7 @@ class _Wanted:
                 for cell, factor, name in zip(cells, self.factors, self.names.values(), strict=True)
             ]
         except (ValueError, ArithmeticError):
-            numbers = []
+            numbers = list[float]()
         right = [abs(number) < LARGEST_NUMBER or not cell.strip() for number, cell in zip(numbers, cells, strict=False)]
         if len(right) < len(cells) or not all(right):
             raise Refused(

@@ -145,7 +145,8 @@ def _find_ends(time_s: Array, travelled: Array, first: int, last: int, turn_rad:
     speed, offset = np.polyfit(t - t[0], angle, 1)
     ripple = float(np.std(angle - offset - speed * (t - t[0])))
     unsteady = float(np.sqrt(np.mean((np.diff(angle) / np.diff(t) - speed) ** 2)))
-    ends, missed = [], []
+    ends = []
+    missed = []
     for before, level in ((first - 1, 0.0), (last, turn_rad)):
         step_s = time_s[before + 1] - time_s[before]
         if step_s <= MAX_STATE_STEP_S:

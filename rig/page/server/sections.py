@@ -31,5 +31,6 @@ class Sections:
     def news(self) -> bytes | None:
         """Return the changes since the last call; None without changes."""
         with self._lock:
-            changed, self._changed = self._changed, {}
+            changed = self._changed
+            self._changed = {}
         return frame_of("some", changed) if changed else None

@@ -140,10 +140,10 @@ def _stations(home: Joints, procedure: SixSweepsSection, order: Sequence[str]) -
         joint = JOINT_NAMES.index(name)
         stations.append(SweepPose(joint, name, home))
         if joint == WRIST_1:
-            stations += [
+            stations.extend(
                 SweepPose(joint, name, (*home[:WRIST_2], home[WRIST_2] + second, home[WRIST_3] + third))
                 for second, third in offsets
-            ]
+            )
     return tuple(stations)
 
 

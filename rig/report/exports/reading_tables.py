@@ -25,7 +25,8 @@ def tables_of(recordings: Sequence[Exported]) -> Iterator[ExportTable]:
 
 def write_csv(recordings: Sequence[Exported], folder: Path) -> list[Path]:
     """Write a file for each table, and `README.txt` with their meanings."""
-    written, lines = [], []
+    written = []
+    lines = []
     for table in tables_of(recordings):
         path = folder / f"{table.name}.csv"
         rows = np.column_stack(list(table.columns.values()))

@@ -71,7 +71,7 @@ def draw_at_rest(sensors: Mapping[str, SensorAtRest], folder: Path) -> list[Path
                 _draw(axes, quantity, result)
             figure.suptitle(f"{_title(name, sensor)} at rest; bands hold 95 %")
             save(figure, folder, f"allan_{name}")
-        written += [folder / f"allan_{name}.png", folder / f"allan_{name}.svg"]
+        written.extend([folder / f"allan_{name}.png", folder / f"allan_{name}.svg"])
     return written
 
 

@@ -96,5 +96,6 @@ def _drop_parameters(algorithm: Any) -> Any:
     name = algorithm["algorithm"].native
     if name == WITH_PARAMETERS:
         return algorithm
-    forms = [type(algorithm)({"algorithm": name, **none}) for none in ({}, {"parameters": None})]
+    nones: tuple[dict[str, None], ...] = ({}, {"parameters": None})
+    forms = [type(algorithm)({"algorithm": name, **none}) for none in nones]
     return next((form for form in forms if form.dump() == algorithm.dump()), forms[0])

@@ -51,7 +51,7 @@ def read_trusted_certificates(files: Sequence[Path]) -> tuple[bytes, ...]:
         try:
             content = read_regular_file(file, SIZE_MAX_BYTES)
             pem = b"-----BEGIN" in content
-            certificates += load_pem_x509_certificates(content) if pem else [load_der_x509_certificate(content)]
+            certificates.extend(load_pem_x509_certificates(content) if pem else [load_der_x509_certificate(content)])
         except (UnfitFile, OSError, ValueError) as error:
             why = getattr(error, "strerror", None) or error
             raise Refused("trust_file", f"{file} is not a certificate: {why}", "Give it as PEM or DER") from None

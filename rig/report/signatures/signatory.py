@@ -105,7 +105,7 @@ def _open_file(file: Path) -> Iterator[Signatory]:
 
 def _order_chain(certificates: "Sequence[Certificate]", key: Any) -> "list[Certificate]":
     """Return the certificates, that of the key before those above it; none if the key's own is missing."""
-    matching = [] if key is None else [one for one in certificates if one.public_key() == key.public_key()]
+    matching = [one for one in certificates if key is not None and one.public_key() == key.public_key()]
     return chain_of([matching[0], *certificates]) if matching else []
 
 

@@ -99,7 +99,8 @@ class HandSession:
             elif isinstance(event, HandRested):
                 self._lay.append(event.face)
             elif isinstance(event, HandBegunAnew):
-                self._accepted, self._lay = [], []
+                self._accepted = []
+                self._lay = []
 
     def carry_out(self, check: Callable[[], None]) -> None:
         """Request the moves of the list until all are made or U reaches the target.
@@ -222,7 +223,8 @@ class HandSession:
             events.append(HandRestRefused(*self._board_us(rest), wrong.name))
         elif wrong.name in ANEW:
             events.append(HandBegunAnew(self._board_us(rest)[0], wrong.name))
-            self._accepted, self._lay = [], []
+            self._accepted = []
+            self._lay = []
         elif move is not None:
             events.append(HandMoveRefused(*self._board_us(move), wrong.name))
         for event in events:

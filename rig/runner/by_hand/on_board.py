@@ -70,7 +70,10 @@ class FollowedSession:
         """
         wrong = None
         if self.reports and report.judged < self.reports[-1].judged:
-            self.reports, self._accepted, self._lay, self._has_asked = [], [], [], False
+            self._has_asked = False
+            self.reports = []
+            self._accepted = []
+            self._lay = []
         if new := report.judged > (self.reports[-1].judged if self.reports else 0):
             self.reports.append(report)
             wrong = self._judge(report)

@@ -94,7 +94,8 @@ def _report(bus: Bus, port: str, servo_id: int) -> ServoReport:
     (firmware,) = bus.look_up(FIRMWARE)
     high, low = bus.look_up(VOLTAGE_LIMITS)
     (hardware_error,) = bus.look_up(HARDWARE_ERROR)
-    round_trips, states = [], []
+    round_trips = []
+    states = []
     for _ in range(ROUND_TRIPS):
         began_s = bus.clock.reference_s()
         try:

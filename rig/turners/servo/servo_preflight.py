@@ -107,7 +107,8 @@ def _settings(report: ServoReport) -> list[Problem]:
 
 
 def _condition(report: ServoReport) -> list[Problem]:
-    problems, state = [], report.state
+    state = report.state
+    problems = []
     if state.hardware_error:
         problems.append(hardware_problem(state.hardware_error))
     low, high = report.voltage_limits_v

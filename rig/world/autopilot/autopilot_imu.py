@@ -33,7 +33,8 @@ class LowPass:
         if cutoff_hz <= 0:
             return value
         if cutoff_hz != self._cutoff_hz:
-            self._cutoff_hz, self._before = cutoff_hz, []
+            self._cutoff_hz = cutoff_hz
+            self._before = []
             ohm = tan(pi * cutoff_hz / RATE_HZ)
             whole = 1 + 2 * cos(pi / 4) * ohm + ohm**2
             self._b0 = ohm**2 / whole

@@ -39,7 +39,8 @@ class Shaft:
         stands = ProfileSegment(time_s, time_s, self.start_at(time_s).angle_rad, 0.0)
         gap = self._gap_at(time_s)
         last = self._index(time_s)
-        self._segments[last + 1 :], self._gaps[last + 1 :] = [], []
+        self._segments[last + 1 :] = []
+        self._gaps[last + 1 :] = []
         ended = self._segments[last]
         self._segments[last] = ended._replace(end_s=min(ended.end_s, time_s))
         for segment in segments or [stands]:

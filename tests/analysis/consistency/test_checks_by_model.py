@@ -64,7 +64,7 @@ def test_the_least_damage_that_matters_is_told(name: str, thorough: bool) -> Non
         for seed in seeds:
             seen = drawn(500 + seed, KINDS[kind])
             run = add_readings(seen, KINDS[kind], damage(seen, float(sizes[place])))
-            passed += [] if list_failed(check_run(run)) else [seed]
+            passed.extend([] if list_failed(check_run(run)) else [seed])
         print(f"{kind}: {len(passed)} of {len(seeds)} passed {passed}")
         assert len(passed) <= 0.05 * len(seeds), (kind, passed)
 

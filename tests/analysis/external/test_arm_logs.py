@@ -33,7 +33,8 @@ def errors(found: InIncrements, recorded: Recorded) -> tuple[Array, Array]:
 
 def figures(seeds: range) -> tuple[Array, Counter[str]]:
     """Errors over u (draws, 6) of scale and bias, and the names of what was refused."""
-    off, refused = [], Counter[str]()
+    refused = Counter[str]()
+    off = []
     for seed in seeds:
         recorded = record(draw(seed), seed)
         try:

@@ -4,6 +4,7 @@ import json
 import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -46,16 +47,16 @@ def solved(capsys: pytest.CaptureFixture[str], files: Sequence[Path], *options: 
     assert main([*solve(files, *options), "--json"]) == 0, capsys.readouterr().err
     document = json.loads(capsys.readouterr().out)
     assert document["schema"] == "rig.result/1"
-    parts = {}
+    parts: dict[str, Any] = {}
     for rate in document["gyroscopes"].values():
         earth = rate["in_attitudes"]["earth_rate_rad_s"]
-        told = [rate["vector_model"]["matrix"], earth, np.negative(rate["bias_rad_s"]), []]
+        told = [rate["vector_model"]["matrix"], earth, np.negative(rate["bias_rad_s"])]
         parts["rate"] = told, rate["in_attitudes"]
     for at_rest in document.get("accelerometers", {}).values():
-        told = [at_rest["matrix"], at_rest["reference_m_s2"], at_rest["bias_m_s2"], at_rest["second_order_s2_m"] or []]
+        told = [at_rest["matrix"], at_rest["reference_m_s2"], at_rest["bias_m_s2"], at_rest["second_order_s2_m"] or ()]
         parts["acceleration"] = told, at_rest["placement"]
     for at_rest in document.get("magnetometers", {}).values():
-        parts["field"] = [at_rest["matrix"], at_rest["field_base_t"], at_rest["bias_t"], []], at_rest["placement"]
+        parts["field"] = [at_rest["matrix"], at_rest["field_base_t"], at_rest["bias_t"]], at_rest["placement"]
     found = {}
     for quantity, (told, known) in parts.items():
         theta = np.concatenate([np.ravel(each) for each in told])
@@ -271,7 +272,8 @@ def test_what_the_sensor_does_not_need_is_refused(capsys: pytest.CaptureFixture[
 def felt_in(turned: Sequence[Rotation], folder: Path) -> list[Path]:
     """A linear sensor's readings, 4 s at 25 Hz in each attitude."""
     rng = np.random.default_rng(3)
-    samples, rows = [], []
+    samples = []
+    rows = []
     for place, attitude in enumerate(turned):
         rows.append(quaternion({"start_s": repr(4.0 * place), "end_s": repr(4.0 * place + 4)}, attitude))
         for tick in range(100):

@@ -114,7 +114,7 @@ def test_the_earths_rate_is_told_only_where_it_is_seen(tmp_path: Path, capsys: p
     followed = follow(World(duration_s=20), 2)
     noisy = followed.rates_rad_s + np.random.default_rng(2).normal(size=followed.rates_rad_s.shape) * 0.05
     files = write(tmp_path, followed, noisy)
-    for options in ([], ["--exact-rates"]):
+    for options in ((), ("--exact-rates",)):
         rate = document(capsys, files, *options)
         assert rate["in_attitudes"]["earth_rate_rad_s"] is None
         assert rate["in_attitudes"]["earth_rate_error"].startswith("earth_rate_not_observable")

@@ -76,8 +76,9 @@ def test_the_whole_matrix_leaves_no_error_where_the_axes_are_not_at_right_angles
     lean = np.array([[1.0, 0.0052, -0.0035], [0.0, 1.0, 0.0044], [0.0, 0.0, 1.0]])
     axes = lean / np.linalg.norm(lean, axis=1)[:, None]
     made, again = recording(QUIET, axes=axes), replace(QUIET, seed=2, boot_s=33.0)
-    worst, turned = {}, {}
-    for kind, corrected in {"matrix": ["gyro"], "diagonal": []}.items():
+    worst = {}
+    turned = {}
+    for kind, corrected in {"matrix": ["gyro"], "diagonal": list[str]()}.items():
         found = solve_runs([made], matrix_corrected=corrected)["gyro"]
         assert found.correction == kind
         repeated = recording(again, stored=found, axes=axes)
@@ -240,10 +241,11 @@ def test_axes_that_are_not_at_right_angles_stay_an_error() -> None:
 
 def test_the_recordings_of_a_resumed_run_count_together() -> None:
     def part(sweeps: range) -> RunData:
-        kept, current = [], 0
+        current = 0
+        kept = []
         for recorded in movement().events:  # a rest follows its sweep and carries no number
             current = recorded.event.sweep.index if isinstance(recorded.event, SweepStarted) else current
-            kept += [recorded] if current in sweeps else []
+            kept.extend([recorded] if current in sweeps else [])
         return replace(movement(), events=tuple(kept))
 
     before = verified().before

@@ -156,7 +156,8 @@ def test_the_readings_tell_how_much_of_what_an_arm_is_off_by_is_new_in_each_dwel
     new_rad: float, least: float, most: float
 ) -> None:
     """Of an arm that always errs by 0.3 mrad, and besides stands a little elsewhere whenever it comes back."""
-    shares, off = [], []
+    shares = []
+    off = []
     for seed in range(6):
         session = drawn_accelerations.drawn("adis16465", seed, arm_rad=3e-4)
         turns = turned(session.truth.theta(), session.movement)[:, : OWN_ERRORS * len(JOINTS)]

@@ -95,7 +95,8 @@ def test_halves_of_a_real_session_agree(tmp_path: Path, capsys: pytest.CaptureFi
     """
     log = np.loadtxt(unpack("mikoff", "imu0.log", tmp_path))
     time_s = np.arange(len(log)) / 100.0
-    names, halves = "time_s,x_rad_s,y_rad_s,z_rad_s,x_m_s2,y_m_s2,z_m_s2", []
+    names = "time_s,x_rad_s,y_rad_s,z_rad_s,x_m_s2,y_m_s2,z_m_s2"
+    halves = []
     for number, rows in enumerate(np.array_split(np.arange(len(log)), 2)):
         half = tmp_path / f"{number}.csv"
         table = np.column_stack([time_s[rows], log[rows, 3:], log[rows, :3]])

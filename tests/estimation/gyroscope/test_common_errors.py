@@ -41,7 +41,8 @@ def test_the_angles_stated_uncertainty_holds_the_arms_errors(axes: int, most_deg
     rng = np.random.default_rng(axes)
     variances = np.full(rates.shape, 7e-5**2)  # an MPU-9250 over six seconds
     none, unit = np.zeros(len(rates)), MATRIX / np.linalg.norm(MATRIX, axis=1, keepdims=True)
-    drawn, stated = [], []
+    drawn = []
+    stated = []
     for _ in range(DRAWS if thorough else FEW):
         true = rates + np.einsum("p,pni->ni", rng.standard_normal(len(off)), off)
         means = true @ MATRIX.T - BIAS + np.sqrt(variances) * rng.standard_normal(rates.shape)

@@ -46,7 +46,9 @@ def solved(off_rad: Array, axes: Array, matrix: Array) -> tuple[Array, Budget]:
 
 def drawn(axes: Array, matrix: Array, count: int) -> tuple[float, float, float]:
     """Errors of the scale by their standard uncertainty, root mean square and largest; and the errors in ppm."""
-    rng, ratios, errors = np.random.default_rng(7), [], []
+    rng = np.random.default_rng(7)
+    ratios = []
+    errors = []
     for _ in range(count):
         error, found = solved(np.radians(MOUNT_DEG) * rng.uniform(-1, 1, (len(axes), 3)), axes, matrix)
         ratios.append(error / found.std_of(MOUNTS)[:3])

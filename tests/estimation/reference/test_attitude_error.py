@@ -64,7 +64,11 @@ class Errors:
 
 
 def errors(arm: Arm, std: float, method: Method, runs: int, joints: Array = JOINTS) -> Errors:
-    scale, angles, bias, stated, found = [], [], [], [], []
+    scale = []
+    angles = []
+    bias = []
+    stated = []
+    found = []
     true_scale = np.linalg.norm(ACCELEROMETER_MATRIX, axis=1)
     true_axes = ACCELEROMETER_MATRIX / true_scale[:, None]
     for seed in range(runs):

@@ -109,7 +109,10 @@ class Errors:
 
 
 def errors(design: Design, rms_rad: float, part: str, runs: int) -> Errors:
-    off, stated, bound, delta = [], [], [], []
+    off = []
+    stated = []
+    bound = []
+    delta = []
     for seed in range(runs):
         truth, dwells, sweeps = recorded(design, rms_rad, DENSITY_UG[part], seed)
         solution, theta = solve(dwells, sweeps), truth.theta()
@@ -267,7 +270,8 @@ def test_the_uncertainty_of_the_attitude_error_is_its_scatter() -> None:
     theta = drawn(np.random.default_rng(1)).theta()
     movement = Movement(dwells, sweeps)
     means, by_arm, noise = predicted(theta, movement), effects(theta, movement), np.linalg.cholesky(movement.noise())
-    count, told_errors = len(dwells.readings_m_s2), []
+    count = len(dwells.readings_m_s2)
+    told_errors = []
     for seed in range(40):
         rng = np.random.default_rng(seed)
         off = 1e-3 * by_arm @ rng.normal(size=by_arm.shape[1]) + noise @ rng.normal(size=len(noise))
@@ -306,11 +310,13 @@ def test_points_of_a_turn_that_are_taken_for_independent_state_too_little() -> N
 @pytest.mark.slow
 def test_a_joint_that_stands_elsewhere_when_it_comes_from_the_other_side_is_no_delay() -> None:
     """Both look alike, so the delay is stated as well as the arm repeats; without that far too well."""
-    half_width_rad, delays = 5e-5, []
+    half_width_rad = 5e-5
+    delays = []
     for seed in range(5):
         rng = np.random.default_rng(seed)
         truth, arm = drawn(rng), draw_true_arm(1e-4, rng)
-        dwells, swept = record_dwells(truth, arm, JOINTS, DENSITY_UG["ADIS16465"], rng), []
+        dwells = record_dwells(truth, arm, JOINTS, DENSITY_UG["ADIS16465"], rng)
+        swept = []
         for sweep in plan_sweeps(6):
             lag = half_width_rad / 2 * np.r_[0, 0, 0, rng.choice([-1, 1], 3)]
             lag[sweep.joint] = half_width_rad / 2 * (1 if sweep.direction == "ccw" else -1)

@@ -161,7 +161,8 @@ def test_a_calibration_from_samples_reaches_the_bound_of_their_noise(part: str, 
     ideal = record_sweeps(TRUTH, EXACT, sweeps, density_ug, np.random.default_rng(0))
     bound = np.diag(covariance_bound(theta, Movement(NO_DWELLS, ideal), 0.0)[0])
     theta[DELAY] += Sampling(0.0).clock_error_s
-    off, stated = [], []
+    off = []
+    stated = []
     for seed in range(10):
         rng = np.random.default_rng(seed)
         turns = [reduced(record_samples(TRUTH, EXACT, sweep, sampling(density_ug), rng)) for sweep in sweeps]

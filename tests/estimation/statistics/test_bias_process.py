@@ -48,7 +48,8 @@ def test_a_bias_that_walks_is_as_uncertain_as_it_has_to_be(noise_rad_s: float) -
     windows_s, rates = session()
     variances = noise_rad_s**2 / (200 * (windows_s[:, 1:] - windows_s[:, :1])) * np.ones(3)
     rng = np.random.default_rng(2)
-    errors, widths = [], []
+    errors = []
+    widths = []
     known = BiasProcess(3e-5, 0.0, 0)
     best = solve(rates + 1e-9 * rng.standard_normal((12, 3)), rates, variances, known, windows_s)
     for _ in range(150):
@@ -76,7 +77,8 @@ def test_a_steady_bias_is_stated_hardly_less_well_than_if_it_were_known_to_be(th
     windows_s, rates = session()
     variances = np.full((12, 3), 1e-10)
     rng = np.random.default_rng(3)
-    widths, errors = [], []
+    widths = []
+    errors = []
     for _ in range(200 if thorough else 80):
         means = rates + np.sqrt(variances) * rng.standard_normal((12, 3))
         process = bias_process(design_matrix(rates, None), means, variances, windows_s)

@@ -13,7 +13,9 @@ GRADIENT_K = 0.1  # uncertainty.thermometer_gradient_k as it usually is
 
 def errors(sensors: int) -> tuple[Array, Array]:
     """(n, 2, 6) errors over u of what k and c change by, over the range and about its middle; (n, 3) the loop's."""
-    of, slopes, loops = warm_board(), [], []
+    of = warm_board()
+    slopes = []
+    loops = []
     for seed in range(sensors):
         found = fit_over_temperature(repeat_means(of, seed), REFERENCE_C, GRADIENT_K)
         assert found.hysteresis is not None

@@ -73,7 +73,9 @@ def test_u_covers_the_truth_of_forty_sensors() -> None:
 
 @pytest.mark.slow
 def test_what_is_left_of_the_bias_is_thirty_times_less_than_before() -> None:
-    before, after, u = [], [], []
+    before = []
+    after = []
+    u = []
     for seed in range(2):
         sensor, rng = upright(seed, gradient_k=0.0)
         found = calibrate(sensor, session(), rng)

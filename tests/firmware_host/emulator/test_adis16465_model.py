@@ -136,7 +136,8 @@ def test_data_ready_rests_while_the_registers_change(polarity: int, high: bool) 
     driver = Adis16465Driver()
     driver.set(MSC_CTRL, polarity)
     driver.advance(0.1)
-    levels, times_s = [], []
+    levels = []
+    times_s = []
     for _ in range(6):
         driver.advance(driver.part.next_event_s)
         levels.append(driver.part.interrupt_level == high)

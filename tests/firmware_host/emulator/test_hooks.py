@@ -132,7 +132,7 @@ def bytes_by_tick(parts: Sequence[str], duration_s: float) -> list[bytes]:
     frames = []
     for _tick in range(round(duration_s / 0.002)):
         before = len(session.sent)
-        frames += session.run(0.002)
+        frames.extend(session.run(0.002))
         sent.append(bytes(session.sent[before:]))
     counts = [len(samples(frames, sensor)) for sensor in range(len(parts))]
     assert min(counts) > 10, counts

@@ -55,7 +55,6 @@ def test_accelerations_come_with_their_rates_only_where_they_are_wanted(
 def test_a_stream_with_accelerations_is_numbered_and_stamped_as_any_other(board: HostBoard, sensor: int) -> None:
     configure(board, sensor, range_g=8)
     board.ask("start", 2, sensors=0)
-    frames = []
     for k in range(60):
         convert(board, 100_000 + 5000 * k, (k, 0, 0), sensor=sensor, acceleration=(0, k, 0))
     frames = [f for f in board.ask("stop", 3) if f.name == "imu_samples"]

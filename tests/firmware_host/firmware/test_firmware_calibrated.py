@@ -96,7 +96,8 @@ def test_a_calibration_that_cannot_be_right_is_refused_and_the_stored_one_stays(
 
 def test_requests_about_calibrations_are_refused_by_name() -> None:
     board = HostBoard()
-    for name, values in (("read_calibration", {}), ("write_calibration", CALIBRATION), ("erase_calibration", {})):
+    none = dict[str, Any]()
+    for name, values in (("read_calibration", none), ("write_calibration", CALIBRATION), ("erase_calibration", none)):
         assert error_of(board.ask(name, sensor=len(BOARD_PARTS), **values)) == "no_such_sensor"
     assert error_of(board.ask("write_calibration", sensor=0, **CALIBRATION)) == "not_configured"
     configure(board, 0, 238, 245)
@@ -165,8 +166,8 @@ def test_the_whole_matrix_corrects_within_the_bound_of_single_precision(range_de
     frames = []
     for k, row in enumerate(counts.tolist()):
         convert(board, (k + 1) * PERIOD_US, row)
-        frames += board.frames()
-    frames += board.ask("stop")
+        frames.extend(board.frames())
+    frames.extend(board.ask("stop"))
     matrix, bias = (values.astype(np.float32).astype(float) for values in (MATRIX, BIAS_RAD_S))  # as kept
     readings = counts * setup["sensitivity_rad_s"]
     error_rad_s = np.abs(rates(frames) - (readings + bias) @ matrix.T)
@@ -291,8 +292,8 @@ def test_readings_are_corrected_as_warm_as_the_part_is_and_beyond_the_range_as_a
     frames = []
     for k, (row, temperature) in enumerate(zip(counts.tolist(), warm.tolist(), strict=True)):
         convert(board, (k + 1) * PERIOD_US, row, temperature_counts=temperature)
-        frames += board.frames()
-    frames += board.ask("stop")
+        frames.extend(board.frames())
+    frames.extend(board.ask("stop"))
     temperature_c = warm * setup["temperature_scale_c"] + setup["temperature_offset_c"]
     assert temperature_c.min() < 0 and temperature_c.max() > 70
     expected, bound = twin(calibration, counts * setup["sensitivity_rad_s"], temperature_c)
@@ -337,7 +338,9 @@ def test_polynomials_that_cannot_be_right_are_refused(wrong: dict[str, Any]) -> 
 def test_what_the_board_leaves_of_a_bias_over_temperature_is_thirty_times_less_than_before() -> None:
     """Polynomials of sweeps from 20 to 60 °C and back, in the board's flash, correct a part that stands still there."""
     sensor_index, (at_zero_c, counts_per_k) = list(BOARD_PARTS).index("icm42688p"), (25.0, 132.48)
-    before, after, u = [], [], []
+    before = []
+    after = []
+    u = []
     for seed in range(4):
         rng = np.random.default_rng([31, seed])
         sensor = replace(drawn(rng, gradient_k=0.0, walk=0.0), leaning=np.zeros((12, 3)))
@@ -359,8 +362,8 @@ def test_what_the_board_leaves_of_a_bias_over_temperature_is_thirty_times_less_t
             counts = np.round(reads[place] / setup["sensitivity_rad_s"]).astype(int).tolist()
             temperature = round((warm[place] - at_zero_c) * counts_per_k)
             convert(board, 2000 * (k + 1), counts, sensor=sensor_index, temperature_counts=temperature)
-            frames += board.frames()
-        frames += board.ask("stop")
+            frames.extend(board.frames())
+        frames.extend(board.ask("stop"))
         left = rates(frames)[-9:]
         before.append(reads - sensor.at(REFERENCE_C)[3:])
         after.append(left / found.scale[0])

@@ -45,10 +45,10 @@ def test_the_scale_is_as_well_known_as_stated_whatever_the_encoders_see_of_a_vib
     found = []
     for seed in range(3):
         setup = replace(QUIET, seed=seed, seen_vibration_rad_s=seen_rad_s, seen_vibration_hz=HERTZ)
-        found += [
+        found.extend(
             (errors(revolution), revolution)
             for revolution in revolutions(shaken(synthetic_run(setup), unseen_rad_s, seed))
-        ]
+        )
     along = [error["xyz".index(each.axis)] for error, each in found]
     assert all(len(each.average.lines_hz) for _, each in found)
     assert 0.5 < np.sqrt(np.mean(np.square(along))) < 1.35  # a line of 8 cycles is hard to tell from what is smooth

@@ -28,7 +28,9 @@ def readings(duration_s: float, vibration_hz: float, seed: int) -> tuple[Array, 
 @pytest.mark.slow
 @pytest.mark.parametrize("vibration_hz", [14.0, 9.3])
 def test_nothing_is_left_of_a_vibration_and_the_variance_is_that_of_the_noise(vibration_hz: float) -> None:
-    off, stated, plain = [], [], []
+    off = []
+    stated = []
+    plain = []
     for seed in range(RESTS):
         duration_s = 9.6 + 0.01 * seed
         time_s, rates = readings(duration_s, vibration_hz, seed)

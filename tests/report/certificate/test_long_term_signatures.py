@@ -102,7 +102,9 @@ def test_the_lists_are_signed_too_and_clear_the_signer_and_other_programs_agree(
 def test_the_claim_is_made_only_where_an_authority_is_trusted(signing: Signing) -> None:
     made = signing.signed(revocation_list(signing.authority))
     own = signing.laboratory.chain[0].public_bytes(Encoding.DER)
-    for trust, problems in (([], ["signer_unknown"]), ([own], ["signer_not_trusted"]), ([own, *signing.trust], [])):
+    all_trusted, found = [own, *signing.trust], list[str]()
+    cases = ((list[bytes](), ["signer_unknown"]), ([own], ["signer_not_trusted"]), (all_trusted, found))
+    for trust, problems in cases:
         looked = seen(made, trust)
         assert [problem.name for problem in looked.problems] == problems and not looked.signatures[0].long_term
 

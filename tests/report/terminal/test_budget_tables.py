@@ -282,7 +282,7 @@ def ks_of(sentence: str) -> list[str]:
     found = []
     for group in sentence.partition("scale factors k")[2].split("biases k"):
         alike = re.findall(r"^ = ([\d.]+) ", group)
-        found += alike * 3 if alike else re.findall(r"[xyz] ([\d.]+) \(", group)
+        found.extend(alike * 3 if alike else re.findall(r"[xyz] ([\d.]+) \(", group))
     return found
 
 

@@ -61,7 +61,7 @@ def test_whatever_fails_the_end_fits_its_lines(folder: Path, width: int) -> None
     one = len([*calibrated, *beside]) == 1
     most = 12 if one else 25
     names = [check.name for check in result.checks]
-    for broken in ([], *([name] for name in names), names[:2], names):
+    for broken in (list[str](), *([name] for name in names), names[:2], names):
         lines = ended(fail_checks(result, *broken), width)
         assert len(lines) <= most, lines
         said = "\n".join(lines)
@@ -178,7 +178,7 @@ def shown(capsys: pytest.CaptureFixture[str], *options: str) -> str:
 
 @pytest.mark.slow
 def test_a_finished_run_is_shown_as_it_ended_or_in_full(capsys: pytest.CaptureFixture[str]) -> None:
-    short, budget, checks = (shown(capsys, *each) for each in ([], ["--budget"], ["--checks"]))
+    short, budget, checks = (shown(capsys, *each) for each in ((), ("--budget",), ("--checks",)))
     assert short.splitlines()[0].startswith("gyroscope gyro ") and len(short.splitlines()) <= 12
     assert "non-orthogonality" in budget and "checks of gyro" not in budget
     assert "checks of gyro" in checks and "non-orthogonality yz" not in checks

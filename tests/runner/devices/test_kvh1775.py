@@ -151,7 +151,9 @@ def test_its_accelerometers_are_calibrated_where_those_of_the_board_are(tmp_path
 @pytest.mark.timeout(3600)
 def test_it_finds_the_earths_rate_beside_what_the_paper_found(tmp_path: Path) -> None:
     """TRIAX, section III-A, which is 0.36 °/h off: whole runs on an arm that vibrates, at another heading each."""
-    off, over, parameters = [], [], []
+    off = []
+    over = []
+    parameters = []
     for seed in range(1, 7):
         heading_deg = 47 * seed % 360
         world = {"world": {"seed": seed, "site": {"heading_deg": heading_deg}}}
@@ -166,7 +168,7 @@ def test_it_finds_the_earths_rate_beside_what_the_paper_found(tmp_path: Path) ->
         truth = [0.99959967, 0.99869272, 1.00028956, 2.634478e-6, -9.332663e-7, 1.35263e-7]
         beside = result["accelerometers"]["kvh"]
         bent = np.subtract(beside["second_order_s2_m"], [9.72e-6, -9.478e-5, -1.764e-5])
-        parameters += [*(stated - truth) / std, *bent / beside["second_order_std_s2_m"]]
+        parameters.extend([*(stated - truth) / std, *bent / beside["second_order_std_s2_m"]])
         print(f"seed {seed}: {off[-1]:+.3f} deg/h, {over[-1]:+.2f} σ")
     rms, ratio = np.sqrt(np.mean(np.square(off))), np.sqrt(np.mean(np.square(over)))
     print(f"norm {rms:.3f} deg/h RMS, over σ {ratio:.2f}; F, b and φ at most {np.abs(parameters).max():.1f} σ off")

@@ -68,7 +68,8 @@ def test_three_stages_tell_the_scale_of_one_run(tmp_path: Path) -> None:
     """The difference of both is within the U of both, as often as U says. One run is in test_stages.py."""
     apart: dict[int, list[float]] = {}
     for seed in SEEDS:
-        rng, found = np.random.default_rng(FIRST_SEED + seed), []
+        rng = np.random.default_rng(FIRST_SEED + seed)
+        found = []
         mounts = [a_little_off(rng, mount) for mount in (AS_DRAWN, QUARTER, TIPPED)]
         for name, document in (
             ("stages", laboratory(seed, THREE, mounts)),

@@ -79,7 +79,11 @@ def test_scale_and_bias_hold_on_an_arm_that_is_off_by_a_milliradian(tmp_path: Pa
     with ThreadPoolExecutor(2) as two_at_once:
         runs = list(two_at_once.map(lambda seed: finished(seed, tmp_path / str(seed)), SEEDS))
     for name, (scale_ppm, bias_ug, better) in LIMITS.items():
-        errors, stds, published, levers, skews = [], [], [], [], []
+        errors = []
+        stds = []
+        published = []
+        levers = []
+        skews = []
         for document, result in runs:
             simulated, found = document["world"]["sensors"][name], result["accelerometers"][name]
             truth = np.array(simulated["accelerometer"]["scale"] + simulated["accelerometer"]["bias_m_s2"])

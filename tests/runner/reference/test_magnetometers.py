@@ -313,5 +313,7 @@ def test_a_field_that_does_not_calibrate_says_why_and_costs_the_accelerometer_no
     outcome = calibrate([damage(recorded(finished[0]))])
     assert outcome.magnetometers.faults["compass"].name == name
     assert set(outcome.accelerometers) == {"gyro"}
-    wanted = [] if name == "field_strength_unknown" else ["compass.field_unsolved"]  # what asks for it is not there
+    wanted = (
+        list[str]() if name == "field_strength_unknown" else ["compass.field_unsolved"]
+    )  # what asks for it is not there
     assert [check.name for check in outcome.checks if not check.passed] == wanted

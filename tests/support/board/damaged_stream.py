@@ -96,7 +96,9 @@ def damage(random: np.random.Generator, stream: bytes, faults: int) -> tuple[byt
         lambda run: noise(len(run)),
         lambda run: noise(len(run)) + run,
     )
-    pieces, spans, end = [], [], 0
+    end = 0
+    pieces = []
+    spans = []
     for position, length, kind in zip(
         np.sort(random.integers(0, len(stream) - 1, faults)).tolist(),
         random.geometric(1 / MEAN_FAULT_BYTES, faults).tolist(),
@@ -106,7 +108,7 @@ def damage(random: np.random.Generator, stream: bytes, faults: int) -> tuple[byt
         begin = max(position, end)
         run = stream[begin : begin + length]
         if run:
-            pieces += [stream[end:begin], kinds[kind](run)]
+            pieces.extend([stream[end:begin], kinds[kind](run)])
             end = begin + len(run)
             spans.append((begin, end))
     return b"".join([*pieces, stream[end:]]), spans

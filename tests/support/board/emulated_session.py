@@ -113,7 +113,8 @@ class Session:
             self.sent += data
             self._frames += self.reader.feed(data)
         assert self.reader.damaged == 0
-        frames, self._frames = self._frames, []
+        frames = self._frames
+        self._frames = []
         return frames
 
     def ask(self, name: str, **values: Any) -> Frame:

@@ -23,6 +23,6 @@ def result_document(sensors: Mapping[str, GyroscopeEntry], *, passed: bool = Tru
 
 def remove_budget(document: ResultDocument) -> ResultDocument:
     """Return the result of an estimator that has no uncertainty budget."""
-    nothing = {"covariance_combined": None, "budget": None}
+    nothing: dict[str, None] = {"covariance_combined": None, "budget": None}
     gyroscopes = {name: gyroscope.model_copy(update=nothing) for name, gyroscope in document.gyroscopes.items()}
     return document.model_copy(update={"gyroscopes": gyroscopes})

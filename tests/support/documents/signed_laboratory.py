@@ -79,7 +79,7 @@ def make_signed_laboratory(base: Path) -> Iterator[Laboratory]:
         stranger = holder("Laboratory", holder("Authority"))
         command = ["report", str(folder), "--pdf", "--dcc", "--time-server", url, "--sign"]
         elsewhere = ["--out", str(base / "stranger"), "--history", "off"]
-        for by, more in ((signer, []), (stranger, elsewhere)):
+        for by, more in ((signer, list[str]()), (stranger, elsewhere)):
             ended = rig_here(*command, str(by.p12(base / "key.p12")), *more)
             assert ended.returncode == 0, ended.stderr
     yield Laboratory(folder, history, base / "root.pem", base / "stranger", authority, signer)

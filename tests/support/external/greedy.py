@@ -24,7 +24,7 @@ def processor(path: Path) -> Iterator[Part]:
     """Reckon without end."""
     while True:
         pass
-    yield {}
+    yield dict[str, object]()
 
 
 def output(path: Path) -> Iterator[Part]:
@@ -46,7 +46,7 @@ def patience(path: Path) -> Iterator[Part]:
     (path / "asleep").touch()
     while True:
         signal.pause()
-    yield {}
+    yield dict[str, object]()
 
 
 def crash(path: Path) -> Iterator[Part]:

@@ -114,7 +114,8 @@ def orientation_errors_deg(log: RobotLog, rates_rad_s: np.ndarray) -> np.ndarray
     """
     index = [int(np.argmin(np.abs(log.time_s - middle_s))) for middle_s in log.rests_s.mean(axis=1)]
     steps = Rotation.from_rotvec((rates_rad_s[1:] + rates_rad_s[:-1]) / 2 / RATE_HZ)
-    turned, true = [], []
+    turned = []
+    true = []
     for first, last in pairwise(index):
         turned.append(compose(steps[first:last]))
         true.append(log.attitudes[first].inv() * log.attitudes[last])

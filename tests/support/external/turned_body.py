@@ -46,7 +46,8 @@ class Session:
 def turn(hand: Hand, seed: int) -> Session:
     rng = np.random.default_rng(seed)
     pulses: list[tuple[float, float, Array]] = []  # beginning, length, angle about which axis
-    rows, now_s = [], REST_S
+    now_s = REST_S
+    rows = []
     rows.append([0.1, REST_S - 0.1, 0, 0, 0, 0.0])
     for axis in hand.axes:
         leant = axis + hand.leans_rad * across(axis, rng)

@@ -54,7 +54,7 @@ class Fault:
     known_s: float | None = 0.0
     lasts_s: float | None = None
     kept_s: float = 0.0
-    environment: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    environment: Mapping[str, str] = field(default_factory=lambda: MappingProxyType(dict[str, str]()))
 
 
 # -- the controller, by the world's control channel ------------------------------------------------------------------

@@ -40,7 +40,8 @@ class Wire:
 
     def hang_up(self) -> None:
         """Reset every connection, towards both ends."""
-        pairs, self._open = self._open, []
+        pairs = self._open
+        self._open = []
         for wire_end in (end for pair in pairs for end in pair):
             with suppress(OSError):
                 wire_end.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, RESET)

@@ -54,7 +54,7 @@ def document(
 ) -> ResultDocument:
     """Return the result, with only the checks of scale and bias."""
     assert isinstance(SENSOR.vector_model, VectorEntry)
-    without_gravity = {"g_sensitivity_rad_s_per_m_s2": None, "g_sensitivity_std_rad_s_per_m_s2": None}
+    without_gravity: dict[str, None] = {"g_sensitivity_rad_s_per_m_s2": None, "g_sensitivity_std_rad_s_per_m_s2": None}
     sensor = SENSOR.model_copy(
         update={
             "serial_number": serial_number,

@@ -201,7 +201,7 @@ def _shaking(document: dict[str, Any], *, vibrates: bool) -> dict[str, Any]:
     still: dict[str, Any] = dict.fromkeys(
         ("vibration_fraction", "vibration_rms_rad_s", "vibration_measured_rms_rad_s"), 0.0
     )
-    still["drive"] = {"ripple": []}
+    still["drive"] = {"ripple": list[float]()}
     shaken: dict[str, Any] = document if vibrates else merge(document, {"world": {"arm": still}})
     return shaken
 

@@ -54,7 +54,7 @@ def world_with_effect(effect: Effect, seed: int) -> dict[str, Any]:
             arm["calibration"] = {"delta_alpha_rad": [0, 0, 0, -8e-4, 4e-4, 0]}
         case Effect.CLOCK:
             arm["clock_ppm"] = 40
-            clock_ppm = {}
+            clock_ppm = dict[str, float]()
     changes = {
         "procedure": procedure,
         "uncertainty": {**clock_ppm, "axis_deg": 0, "sensor_offset_mm": 0},

@@ -54,7 +54,8 @@ class LoggedArm:
 
     def take(self) -> dict[str, Array]:
         """Return what was logged since the last time: columns of (n,) or (n, 6)."""
-        rows, self._rows = np.array(self._rows), []
+        rows = np.array(self._rows)
+        self._rows = []
         ends = np.cumsum(list(COLUMNS.values()))
         return {
             name: rows[:, end - size] if size == 1 else rows[:, end - size : end]

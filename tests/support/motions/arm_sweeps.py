@@ -90,7 +90,8 @@ def record_sweeps(
     truth: Truth, poses: Poses, sweeps: tuple[Sweep, ...], density_ug: float, rng: np.random.Generator
 ) -> Sweeps:
     """Return the first harmonics of uniform sweeps, with white noise in µg/√Hz."""
-    harmonics, covariances = [], []
+    harmonics = []
+    covariances = []
     angle = np.arange(POINTS) * 2 * np.pi / POINTS
     columns = np.column_stack([np.full(POINTS, 0.5), np.cos(angle), np.sin(angle)]) * 2 / POINTS
     for sweep in sweeps:

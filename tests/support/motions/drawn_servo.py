@@ -170,7 +170,8 @@ def _driven(
     for register, values in ((DRIVE_MODE, (4,)), (OPERATING_MODE, (4,)), (TORQUE, (1,)), (PROFILE, (500, 1500))):
         far.write(time_s - 0.9, register, *values)
     far.write(time_s - 0.8, GOAL, home)
-    rows, events = [], list[TimedEvent]()
+    events = list[TimedEvent]()
+    rows = []
     next_s = time_s
 
     def poll(until_s: float) -> None:

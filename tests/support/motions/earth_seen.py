@@ -189,7 +189,9 @@ def _rests(session: Session, poses: Callable[[Array], Array], rng: np.random.Gen
 def _vibrating(session: Session, windows_s: Array, turns: int, rng: np.random.Generator) -> tuple[Array, Array, Array]:
     """(N, 3) what noise and vibration leave in each average, by whole turns evenly, else as the rig averages rests; the
     variances (N, 3) of that, and the windows (N, 2) as the rig tells them."""
-    noises, variances, windows = [], [], windows_s.copy()
+    windows = windows_s.copy()
+    noises = []
+    variances = []
     for index, (start, end) in enumerate(windows_s):
         edges = np.linspace(start, end, round((end - start) * SAMPLES_HZ) + 1)
         turn = 2 * np.pi * VIBRATION_HZ

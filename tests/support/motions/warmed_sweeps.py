@@ -131,7 +131,8 @@ def write_files(
     sensor: Drawn, course: Session, rng: np.random.Generator, folder: Path, rate_hz: float = 20.0
 ) -> tuple[Path, Path]:
     """Write the sweeps and the samples with a column of temperature, as `rig solve --sweeps` takes them."""
-    means, rows = readings(sensor, course, rng), []
+    means = readings(sensor, course, rng)
+    rows = []
     for mean, (start_s, end_s), warm in zip(means, course.windows_s, course.temperature_c, strict=True):
         times = np.arange(start_s + 0.5 / rate_hz, end_s, 1 / rate_hz)
         noise = rng.normal(0, sensor.noise * np.sqrt(len(times)), (len(times), 3))

@@ -26,7 +26,8 @@ MOVED = b"HTTP/1.1 308 Permanent Redirect\r\nLocation: http://elsewhere/new/plac
 def saying(port: int, answers: Sequence[bytes]) -> Iterator[tuple[str, list[bytes]]]:
     """A controller that says one of these to each client in turn, and stays; its address, and what it was told."""
     heard: list[bytes] = []
-    host, clients = fresh_host(), []
+    host = fresh_host()
+    clients = []
     with socket.create_server((host, port)) as listener:
 
         def serve() -> None:

@@ -57,7 +57,8 @@ def test_a_pose_log_is_slow_late_and_off_as_stated_and_the_rig_reads_it(tmp_path
         f"world.arm.unmodelled.zero_rad={[*ZEROS_RAD]}",
     )
     PrimarySession(built.robot).receive(MOVE)
-    times_s, true = [], []
+    times_s = []
+    true = []
     for _ in range(8 * TICKS_PER_SECOND):
         built.turn()
         times_s.append(built.on_arm.time_s)

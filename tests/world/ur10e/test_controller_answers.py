@@ -73,7 +73,8 @@ def test_the_forward_kinematics_of_given_joints(robot: Robot) -> None:
 
 def told(session: PrimarySession, kind: MessageKind) -> list[bytes]:
     """The robot messages of a kind that a client of the primary interface gets now: what comes after their header."""
-    data, contents = session.tick(), []
+    data = session.tick()
+    contents = []
     while data:
         size, package = struct.unpack_from(">iB", data)
         if package == ROBOT_MESSAGE and data[14] == kind:

@@ -160,7 +160,7 @@ def test_speeds_and_accelerations_are_the_changes_of_the_poses() -> None:
     one = laboratory("world.arm.encoder_step_rad=0", "world.arm.encoder_noise_rad=0")
     one.robot.motion.move(TILTED, 1.0, 2.0)
     ticks(one, 60)
-    pose = {"actual": [], "target": []}  # type: dict[str, list[np.ndarray]]
+    pose: dict[str, list[np.ndarray]] = {"actual": [], "target": []}
     middle: dict[str, np.ndarray] = {}
     for tick in range(3):
         ticks(one, 1)

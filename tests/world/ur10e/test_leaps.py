@@ -154,7 +154,8 @@ def session(loaded: Loaded, ports: dict[str, int], dwell_s: float) -> tuple[dict
 
 @pytest.mark.slow
 def test_every_wire_carries_the_same_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
-    found, host = [], fresh_host()
+    host = fresh_host()
+    found = []
     for leap in (1, world_process.LEAP):
         monkeypatch.setattr(world_process, "LEAP", leap)
         found.append(session(*loaded_from("own_port/kvh1775_earth.yaml", host), dwell_s=0.6))

@@ -117,7 +117,7 @@ def test_while_wrist_1_turns_the_elbow_is_shaken_and_joints_with_other_axes_are_
 def test_the_flange_feels_what_the_joints_do_but_not_the_encoders_noise() -> None:
     """The true rates of a noisy arm are those of one whose encoders have no noise, and ripple as the joints do."""
     rates = []
-    for overrides in ([], ["world.arm.encoder_noise_rad=0", "world.arm.encoder_speed_noise_rad_s=0"]):
+    for overrides in ((), ("world.arm.encoder_noise_rad=0", "world.arm.encoder_speed_noise_rad_s=0")):
         arm = LoggedArm([*PLAIN, "world.arm.vibration_rms_rad_s=0", "world.site.latitude_deg=null", *overrides])
         q = list(arm.robot.motion.now.target_q_rad)
         q[5] += 3.0

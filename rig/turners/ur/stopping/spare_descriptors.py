@@ -22,6 +22,7 @@ class SpareDescriptors:
 
     def release(self) -> None:
         """Close the spare descriptors, so that sockets can be opened."""
-        descriptors, self._descriptors = self._descriptors, []
+        descriptors = self._descriptors
+        self._descriptors = []
         for descriptor in descriptors:
             os.close(descriptor)

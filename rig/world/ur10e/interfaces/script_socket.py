@@ -45,7 +45,8 @@ class ScriptReader:
             elif words == "end":
                 self._depth = max(0, self._depth - 1)
             if self._depth == 0:
-                program, self._lines, self._size = self._lines, [], len(self._partial)
+                program, self._size = self._lines, len(self._partial)
+                self._lines = []
                 yield program
         if self._size > TEXT_BYTES:
             raise ProgramError(f"a program of more than {TEXT_BYTES} bytes is none")

@@ -29,7 +29,7 @@ class Encoders:
     lateness_s: Callable[[], float] | None = None
     seed: int = 0
     _late_s: float = field(default=0.0, init=False)
-    _block: tuple[int, list[list[float]]] = field(default=(-1, []), init=False)
+    _block: tuple[int, list[list[float]]] = field(default=(-1, list[list[float]]()), init=False)
 
     def step(self) -> None:
         """Begin a tick."""

@@ -190,9 +190,8 @@ class JointMotion:
         shaken = []  # joint, angle and its derivatives that come on top
         for joint in moving:
             if drive.orders[joint]:
-                shaken += drive.shake(joint, smooth[joint], speed[joint], change[joint])
-        for motion in tick.yielding:
-            shaken += [(motion.joint, *drive.yield_at(motion, elapsed))]
+                shaken.extend(drive.shake(joint, smooth[joint], speed[joint], change[joint]))
+        shaken.extend((motion.joint, *drive.yield_at(motion, elapsed)) for motion in tick.yielding)
         for joint, angle, rate, bend in shaken:
             q[joint] += angle
             qd[joint] += rate

@@ -124,7 +124,8 @@ def plan_soft_joint_move(
     cruise_s = max(0.0, (longest - gentle - ramp - brake) / speed)
     legs = [(SOFT_STEP_S, acceleration) for acceleration in steps]
     legs += [(ramp_s, acceleration_rad_s2), (cruise_s, 0.0), (brake_s, -acceleration_rad_s2)]
-    segments, distance, rate = [], 0.0, 0.0
+    distance, rate = 0.0, 0.0
+    segments = []
     ratios = tuple(w / longest for w in path)
     for duration_s, acceleration in legs:
         q_rad = tuple(a + s * distance for a, s in zip(start_rad, ratios, strict=True))
