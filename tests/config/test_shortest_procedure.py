@@ -75,6 +75,6 @@ def test_what_is_wanted_is_a_limit_of_the_verdict_unless_the_file_has_its_own() 
     wish = "procedure.target_uncertainty={scale: 5e-4, bias: 1e-4}"
     for said, limit in (((), 5e-4), (("limits.scale_u=2e-3",), 2e-3)):
         config = parse(TEXT, overrides=["procedure.name=shortest", wish, *said]).config
-        plan = plan_six_observation(config.arm, config.procedure)  # pyrefly: ignore[bad-argument-type]
+        plan = plan_six_observation(config.arm, config.procedure)  # pyrefly: ignore[bad-argument-type]  # this file has its section
         limits = settings_of(config, plan).limits
         assert limits is not None and (limits.scale_u, limits.bias_u_rad_s) == (limit, 1e-4)

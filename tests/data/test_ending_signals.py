@@ -56,7 +56,7 @@ def test_no_signal_leaves_a_lock_taken(interrupts: Interrupts) -> None:
     for _ in range(20):
         lock = Signalling()
         interrupts.allow()
-        with pytest.raises(KeyboardInterrupt, match="interrupted"), threading.Condition(lock):  # pyrefly: ignore[bad-argument-type]
+        with pytest.raises(KeyboardInterrupt, match="interrupted"), threading.Condition(lock):  # pyrefly: ignore[bad-argument-type]  # all that a condition needs
             signal.pause()
         assert not lock.locked()
 

@@ -408,7 +408,7 @@ def test_another_baud_rate_makes_noise_of_an_idle_board(wire: tuple[BoardOnAWire
 @ON_ONE_WIRE
 @pytest.mark.usefixtures("no_crowd")
 def test_a_board_that_sends_but_does_not_hear(wire: tuple[BoardOnAWire, str]) -> None:
-    wire[0].board.receive = lambda data: wire[0].board.run()  # pyrefly: ignore[method-assign]
+    wire[0].board.receive = lambda data: wire[0].board.run()  # pyrefly: ignore[method-assign]  # a stand-in
     with pytest.raises(BoardError, match="does not answer") as failure:
         Board(wire[1], protocol.BAUD_RATE, ignore, timeout_s=0.7)
     assert failure.value.name == "no_board"
@@ -428,7 +428,7 @@ def test_a_board_that_answers_late_is_lost_unless_the_computer_is_crowded(
         heard.extend(data)
         receive(data if heard.count(0) >= 2 * 5 else b"")  # a frame begins and ends with a zero; four are usual
 
-    board.receive = overhear  # pyrefly: ignore[method-assign]
+    board.receive = overhear  # pyrefly: ignore[method-assign]  # a stand-in
     if crowded > 1.0:
         Board(wire[1], protocol.BAUD_RATE, ignore, timeout_s=0.1).close()
         return

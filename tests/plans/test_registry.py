@@ -65,7 +65,7 @@ def failing(*_: object) -> Plan:
 
 
 def giving_nothing(*_: object) -> Plan:
-    return None  # pyrefly: ignore[bad-return]
+    return None  # pyrefly: ignore[bad-return]  # the mistake
 
 
 def ending(*_: object) -> Plan:

@@ -231,7 +231,7 @@ def test_more_than_the_rest_is_chosen() -> None:
     config = demo()
     quick = shortest_run(config, TargetUncertainty(scale=1.3e-4))
     assert quick.best is not None and quick.before is not None
-    assert quick.best.candidate.procedure.speed_deg_s > 60  # pyrefly: ignore[missing-attribute]
+    assert quick.best.candidate.procedure.speed_deg_s > 60  # pyrefly: ignore[missing-attribute]  # of this procedure
     assert quick.best.candidate.duration_s < quick.before.candidate.duration_s < 90
     assert quick.best.reached.scale <= 1.3e-4
 
@@ -281,10 +281,10 @@ def budgets_of(tells: Tells) -> Callable[[Candidate], Budgets]:
 @pytest.mark.thorough
 @pytest.mark.slow
 def test_several_speeds_are_tried_and_keep_what_the_file_says_of_them() -> None:
-    speeds = {candidate.procedure.speeds_deg_s for candidate in find_search(demo()).candidates()}  # pyrefly: ignore[missing-attribute]
+    speeds = {candidate.procedure.speeds_deg_s for candidate in find_search(demo()).candidates()}  # pyrefly: ignore[missing-attribute]  # of this procedure
     assert None in speeds and (15.0, 150.0) in speeds
     said = load(CONFIGS / "demo.yaml", ["procedure.speeds_deg_s=[20, 50]"], sections(installed()), turners.sections())
-    speeds = {candidate.procedure.speeds_deg_s for candidate in find_search(said.config).candidates()}  # pyrefly: ignore[missing-attribute]
+    speeds = {candidate.procedure.speeds_deg_s for candidate in find_search(said.config).candidates()}  # pyrefly: ignore[missing-attribute]  # of this procedure
     assert speeds == {(20.0, 50.0)}
 
 
@@ -303,7 +303,7 @@ def test_attitudes_are_chosen_for_an_accelerometer() -> None:
         for wanted in (TargetUncertainty(acceleration_scale=3e-4), TargetUncertainty(acceleration_bias_m_s2=2.8e-3))
     )
     assert scale.best is not None and bias.best is not None and scale.before is not None
-    assert [len(each.candidate.procedure.attitudes) for each in (scale.best, bias.best)] == [12, 18]  # pyrefly: ignore[missing-attribute]
+    assert [len(each.candidate.procedure.attitudes) for each in (scale.best, bias.best)] == [12, 18]  # pyrefly: ignore[missing-attribute]  # of this procedure
     assert scale.best.reached.acceleration_scale <= 3e-4 and bias.best.reached.acceleration_bias_m_s2 <= 2.8e-3
     assert scale.best.candidate.duration_s < scale.before.candidate.duration_s
 
@@ -374,7 +374,7 @@ def test_by_hand_the_session_also_ends_when_u_is_reached(tmp_path: Path, capsys:
     words = ["plan", str(CONFIGS / "by_hand.yaml"), "--target-uncertainty", "scale=1.2e-3", "--write", str(written)]
     assert main(words) == 0
     section = load(written, (), sections(installed()), turners.sections()).config.procedure
-    assert section.target_scale_u == pytest.approx((1.2e-3**2 - 1e-3**2) ** 0.5, rel=1e-3)  # pyrefly: ignore[missing-attribute]
+    assert section.target_scale_u == pytest.approx((1.2e-3**2 - 1e-3**2) ** 0.5, rel=1e-3)  # pyrefly: ignore[missing-attribute]  # of this procedure
     assert main(["plan", str(CONFIGS / "by_hand.yaml"), "--target-uncertainty", "scale=9e-4"]) == 1
     assert "recordings of real hands" in " ".join(capsys.readouterr().out.split())
     assert main(["plan", str(CONFIGS / "demo.yaml"), "--target-uncertainty", "scale=often"]) == 2
@@ -382,4 +382,4 @@ def test_by_hand_the_session_also_ends_when_u_is_reached(tmp_path: Path, capsys:
     assert (
         main(["plan", str(CONFIGS / "by_hand.yaml"), "--target-uncertainty", "scale=0.2", "--write", str(loose)]) == 0
     )
-    assert load(loose, (), sections(installed()), turners.sections()).config.procedure.target_scale_u is None  # pyrefly: ignore[missing-attribute]
+    assert load(loose, (), sections(installed()), turners.sections()).config.procedure.target_scale_u is None  # pyrefly: ignore[missing-attribute]  # of this procedure

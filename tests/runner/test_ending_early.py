@@ -36,7 +36,7 @@ def resumed(start_q_rad: Joints | None, done: Collection[int], /, **keys: object
     said = [f"procedure.{key}={json.dumps(value)}" for key, value in keys.items()]
     text = CONFIG.format(speed_deg_s=60, rest_s=3, repeats=REPEATS, part="lsm9ds1", procedure="", uncertainty="")
     config = parse(text, overrides=said).config
-    return plan_six_observation(config.arm, config.procedure, start_q_rad, done)  # pyrefly: ignore[bad-argument-type]
+    return plan_six_observation(config.arm, config.procedure, start_q_rad, done)  # pyrefly: ignore[bad-argument-type]  # this file has its section
 
 
 def made_of(plan: Plan, enough: int) -> list[Motion]:

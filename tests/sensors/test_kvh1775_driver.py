@@ -218,7 +218,7 @@ def test_a_dead_line_and_a_missing_port_are_named() -> None:
 @pytest.mark.slow
 def test_a_line_that_carries_one_way_only_is_named() -> None:
     with kvh_on_a_wire() as wire:
-        wire.line.send_to_device = lambda data, host_baud: None  # pyrefly: ignore[method-assign]
+        wire.line.send_to_device = lambda data, host_baud: None  # pyrefly: ignore[method-assign]  # a stand-in
         with pytest.raises(SensorError) as caught:
             Kvh1775("kvh", wire.port, 921600, patience=Patience(first_s=0.5))
     assert caught.value.name == "kvh_does_not_hear"

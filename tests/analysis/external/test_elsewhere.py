@@ -121,7 +121,7 @@ def test_the_notebook_and_rig_solve_find_the_same_numbers(
     entries = [*document.gyroscopes.values(), *document.accelerometers.values(), *document.magnetometers.values()]
     assert len(result) == len(entries) == len(example.kinds)
     for found, stated in zip(result.values(), entries, strict=True):
-        np.testing.assert_allclose(found.scale, stated.scale, rtol=1e-12)  # pyrefly: ignore[missing-attribute]
+        np.testing.assert_allclose(found.scale, stated.scale, rtol=1e-12)  # pyrefly: ignore[missing-attribute]  # none is an error
     assert main(["solve", str(folder / "run"), "--json"]) == 0
     again = json.loads(capsys.readouterr().out)
     first = json.loads((folder / "run" / "result.json").read_text(encoding="utf-8"))

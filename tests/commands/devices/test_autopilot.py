@@ -144,10 +144,10 @@ def killed_after(wire: AutopilotOnAWire, arguments: list[Any], place: int, *, ap
         if len(done) > place:
             os.kill(process[0].pid, signal.SIGKILL)
 
-    wire.parameters.set_field = setting  # pyrefly: ignore[method-assign]
+    wire.parameters.set_field = setting  # pyrefly: ignore[method-assign]  # a stand-in
     process.append(start_module("autopilot", "store", *arguments, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL))
     assert process[0].wait(PATIENCE_S) == -signal.SIGKILL
-    wire.parameters.set_field = set_field  # pyrefly: ignore[method-assign]
+    wire.parameters.set_field = set_field  # pyrefly: ignore[method-assign]  # a stand-in
 
 
 def seen(wire: AutopilotOnAWire) -> list[SensorError]:

@@ -168,9 +168,9 @@ def test_a_read_without_new_data_is_a_bus_error_and_no_sample(status: str) -> No
         board.run()
     else:
         transfer = board.gyro.transfer
-        board.gyro.transfer = lambda data, *_: b"\xff" * len(data)  # pyrefly: ignore[bad-assignment, method-assign]
+        board.gyro.transfer = lambda data, *_: b"\xff" * len(data)  # pyrefly: ignore[bad-assignment, method-assign]  # a stand-in
         convert(board, 2 * PERIOD_US)
-        board.gyro.transfer = transfer  # pyrefly: ignore[method-assign]
+        board.gyro.transfer = transfer  # pyrefly: ignore[method-assign]  # a stand-in
     convert(board, 3 * PERIOD_US)
     report = board.ask("status", 2)[-1]
     frames = board.ask("stop", 3)
@@ -273,5 +273,5 @@ def test_a_line_that_rattles_does_not_hold_the_board_up(board: HostBoard) -> Non
         board.data_ready(time_us)
         return transfer(data, max_hz, time_us)
 
-    board.gyro.transfer = rattling  # pyrefly: ignore[bad-assignment, method-assign]
+    board.gyro.transfer = rattling  # pyrefly: ignore[bad-assignment, method-assign]  # a stand-in
     assert [frame.name for frame in board.ask("start", 2, sensors=0)] == ["ack"]

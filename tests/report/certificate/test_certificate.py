@@ -267,7 +267,7 @@ def test_the_decision_rule_is_said(guard: float, words: str) -> None:
 def test_time_is_traceable_only_through_a_reference_that_is_named_and_was_compared() -> None:
     unnamed = StatedFacts(SiteSection(), CertificateSection())
     simulated = StatedFacts(LABORATORY.site, simulated=True)
-    alone = result().model_copy(update={"clock": result().clock.model_copy(update={"comparisons": ()})})  # pyrefly: ignore[missing-attribute]
+    alone = result().model_copy(update={"clock": result().clock.model_copy(update={"comparisons": ()})})  # pyrefly: ignore[missing-attribute]  # it has a clock
     assert certificate(add_comparison(result())).traceable
     assert "traceable to the second" in read(certificate(add_comparison(result()))).under["7.8.4.1c"]
     for found in (
@@ -382,7 +382,7 @@ def test_a_drift_beyond_its_limit_is_a_statement_and_no_spoilt_measurement() -> 
 
 def test_a_clock_that_was_compared_with_none_was_not_found_to_be_anything() -> None:
     assert result().clock is not None
-    alone = result().clock.model_copy(update={"comparisons": (), "error": 0.0, "std": 2.9e-5})  # pyrefly: ignore[missing-attribute]
+    alone = result().clock.model_copy(update={"comparisons": (), "error": 0.0, "std": 2.9e-5})  # pyrefly: ignore[missing-attribute]  # it has a clock
     said = read(certificate(result().model_copy(update={"clock": alone}))).under["7.8.4.1c"]
     assert "compared with no other clock and is assumed correct to ± 58 × 10⁻⁶" in said and "found (" not in said
 

@@ -39,7 +39,7 @@ def schema_faults(xml: bytes) -> list[str]:
 
 @functools.cache
 def _schema(folder: Path) -> etree.XMLSchema:
-    class Local(etree.Resolver):  # pyrefly: ignore[unknown-base-class]
+    class Local(etree.Resolver):  # pyrefly: ignore[unknown-base-class]  # lxml has no types
         def resolve(self, url: str, public_id: str, context: Any) -> Any:
             return self.resolve_filename(str(folder / FILES[url]), context) if url in FILES else None
 

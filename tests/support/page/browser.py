@@ -56,7 +56,7 @@ def _as_nice_as_all_else(service: Service) -> Service:
     """Keep root's browser from the priority that it would give itself, over the laboratory whose run it shows."""
     if os.geteuid() == 0 and (setpriv := shutil.which("setpriv")):
         driver, service.path = service.path, setpriv
-        service.command_line_args = lambda: [  # pyrefly: ignore[method-assign]
+        service.command_line_args = lambda: [  # pyrefly: ignore[method-assign]  # a stand-in
             "--bounding-set=-sys_nice",
             driver,
             f"--port={service.port}",

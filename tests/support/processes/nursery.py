@@ -52,7 +52,7 @@ class Forked(subprocess.Popen[Any]):
         super().__init__(command, **options)
 
     def _execute_child(self, *given: Any) -> None:
-        of_popen = super()._execute_child  # pyrefly: ignore[missing-attribute]
+        of_popen = super()._execute_child  # pyrefly: ignore[missing-attribute]  # of CPython itself
         named = inspect.signature(of_popen).bind(*given).arguments
         module, *words = named["args"]
         order = {
@@ -68,18 +68,18 @@ class Forked(subprocess.Popen[Any]):
         inherited_or_given = [number if named[end] == -1 else named[end] for number, end in enumerate(ends)]
         self.pid, self._status = _born(self._address, order, inherited_or_given)
         self._child_created = True
-        self._close_pipe_fds(  # pyrefly: ignore[missing-attribute]
+        self._close_pipe_fds(  # pyrefly: ignore[missing-attribute]  # of CPython itself
             *(named[end] for end in ("p2cread", "p2cwrite", "c2pread", "c2pwrite", "errread", "errwrite"))
         )
 
     def _internal_poll(self, _deadstate: int | None = None) -> int | None:
-        if self.returncode is None and self._waitpid_lock.acquire(blocking=False):  # pyrefly: ignore[missing-attribute]
+        if self.returncode is None and self._waitpid_lock.acquire(blocking=False):  # pyrefly: ignore[missing-attribute]  # of CPython itself
             try:
                 pid, status = self._try_wait(os.WNOHANG)
                 if pid == self.pid:
-                    self._handle_exitstatus(status)  # pyrefly: ignore[missing-attribute]
+                    self._handle_exitstatus(status)  # pyrefly: ignore[missing-attribute]  # of CPython itself
             finally:
-                self._waitpid_lock.release()  # pyrefly: ignore[missing-attribute]
+                self._waitpid_lock.release()  # pyrefly: ignore[missing-attribute]  # of CPython itself
         return self.returncode
 
     def _try_wait(self, wait_flags: int) -> tuple[int, int]:
@@ -106,7 +106,7 @@ def fork_modules(modules: Collection[str], address: Callable[[str], str]) -> Non
         is_one = named and (args[3] != LABORATORY or options.get("start_new_session"))
         return object.__new__(Named if is_one else kind)
 
-    subprocess.Popen.__new__ = new  # pyrefly: ignore[bad-assignment, method-assign]
+    subprocess.Popen.__new__ = new  # pyrefly: ignore[bad-assignment, method-assign]  # of CPython itself
 
 
 def _born(address: str, order: Order, streams: list[int]) -> tuple[int, socket.socket]:

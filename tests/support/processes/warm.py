@@ -66,11 +66,11 @@ def readers_forked() -> None:
 def readers_of_system() -> Iterator[None]:
     """For the length of the block they are processes that the system starts."""
     forking = subprocess.Popen.__new__
-    subprocess.Popen.__new__ = lambda kind, *_, **__: object.__new__(kind)  # pyrefly: ignore[bad-assignment, method-assign]
+    subprocess.Popen.__new__ = lambda kind, *_, **__: object.__new__(kind)  # pyrefly: ignore[bad-assignment, method-assign]  # of CPython itself
     try:
         yield
     finally:
-        subprocess.Popen.__new__ = forking  # pyrefly: ignore[method-assign]
+        subprocess.Popen.__new__ = forking  # pyrefly: ignore[method-assign]  # of CPython itself
 
 
 def start_module(*words: str | Path, module: str = "rig", **options: Any) -> "subprocess.Popen[Any]":

@@ -65,14 +65,14 @@ class Laboratory:
             self.senses += 1
             sense()
 
-        laboratory.turn, laboratory.sense = counted_turn, counted_sense  # pyrefly: ignore[method-assign]
+        laboratory.turn, laboratory.sense = counted_turn, counted_sense  # pyrefly: ignore[method-assign]  # a stand-in
 
     def ask(self, **request: Any) -> None:
         """Ask the world itself, reading all wires until it has answered."""
         self.control.send(json.dumps(request).encode() + b"\n")
         while b"\n" not in self._replies:
             for key, _ in self._selector.select(20.0):
-                data = key.fileobj.recv(1 << 16)  # pyrefly: ignore[missing-attribute]
+                data = key.fileobj.recv(1 << 16)  # pyrefly: ignore[missing-attribute]  # a socket
                 assert data, f"{key.data} hung up"
                 if key.data == "control":
                     self._replies += data
