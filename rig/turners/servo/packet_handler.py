@@ -23,6 +23,8 @@ ATTEMPTS = 4  # a write without acknowledgement is read back, and repeated if it
 ALERT = 0x80  # in the error byte: Hardware Error Status is not zero. A flag, no failure of the instruction
 SUCCESS, NOT_SENT = 0, (-1000, -1001, -2000)  # results of the packet handler: port busy, not sent, wrong instruction
 DAMAGED = -3002
+ID, LENGTH, ERROR, DATA = 4, 5, 8, 9  # indices in a status packet of protocol 2.0
+WITHOUT_DATA = 4  # the length of a status packet without data: instruction, error, checksum
 
 
 class BusError(Exception):
@@ -63,7 +65,7 @@ class Bus:
         try:
             self._port = Port(path, baud, SLACK_S, clock)
         except (OSError, ValueError) as error:  # SerialException is an OSError
-            raise Refused.of(_no_port(path, baud, error)) from error
+            raise Refused.from_problem(_no_port(path, baud, error)) from error
         try:
             lower_latency(self._port.serial, path)
         except BaseException:
@@ -95,13 +97,22 @@ class Bus:
         return register.unpack(self.read_bytes(register))
 
     def read_bytes(self, register: Register) -> bytes:
-        """Read a register's bytes. Raise Lost, Denied, PortGone."""
+        """Read a register's bytes. Raise Lost, Denied, PortGone.
+
+        The packet handler's own `readTxRx` takes as many bytes as it asked for from a reply of any length: the checksum
+        from the late acknowledgement of a write.
+        """
         with self._failing():
-            data, result, error = self._packets.readTxRx(self._port, self._id, register.address, register.size)
-        self._judge(result, error, register)
-        if len(data) != register.size:  # the late reply to another question
+            result = self._packets.readTx(self._port, self._id, register.address, register.size)
+            reply: list[int] = []
+            while result == SUCCESS and (not reply or reply[ID] != self._id):
+                reply, result = self._packets.rxPacket(self._port, False)
+        self._judge(result, reply[ERROR] if result == SUCCESS else 0, register)
+        if (
+            reply[LENGTH] + 256 * reply[LENGTH + 1] != register.size + WITHOUT_DATA
+        ):  # the late reply to another question
             raise ReplyLost(damaged=True)
-        return bytes(data)
+        return bytes(reply[DATA : DATA + register.size])
 
     def look_up(self, register: Register) -> tuple[int, ...]:
         """Read a register's values, with a second attempt after a lost reply. Raise Lost, Denied, PortGone."""
