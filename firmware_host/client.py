@@ -298,7 +298,9 @@ class Board:
             )
         part = self._parts[sensor] if sensor < len(self._parts) else f"sensor {sensor}"
         about = "" if problem.name in _ABOUT_THE_BOARD else f", of its {part}"
-        return BoardError.of(problem._replace(what=f"the board on {self._link.port} says{about}: {problem.what}"))
+        return BoardError.from_problem(
+            problem._replace(what=f"the board on {self._link.port} says{about}: {problem.what}")
+        )
 
 
 def _power_counts(power: float) -> int:

@@ -110,7 +110,7 @@ class Session:
         for direction, duration_s in ((STILL, REST_S), (DIRECTIONS[0], 2 * math.pi / SPEED_RAD_S), (STILL, REST_S)):
             self.direction = direction
             self.run(duration_s)
-        if (solution := self.ask("hand_solve"))["taken"] != 1:
+        if (solution := self.ask("hand_solve"))["accepted"] != 1:
             raise RuntimeError(f"the board has not taken the move: {solution}")
 
 

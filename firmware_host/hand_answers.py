@@ -17,7 +17,7 @@ class HandReport:
     - `before`, `after`: the faces at its ends, of `protocol.HAND_FACES`; None for no face.
     - `whole`: whether whole revolutions on a face count as closed.
     - `settled`: whether the equations are linearized about the solution after that move.
-    - `judged`, `taken`: the numbers of moves judged and accepted.
+    - `judged`, `accepted`: the numbers of moves judged and accepted.
     - `angle_rad`: the rotation of that move, there and back.
     - `noise_rad_s`: the standard deviation of a reading at rest, used as its weight.
     - `scale_std`: the largest standard uncertainty of a scale factor.
@@ -33,7 +33,7 @@ class HandReport:
     whole: bool
     settled: bool
     judged: int
-    taken: int
+    accepted: int
     angle_rad: float
     noise_rad_s: float
     scale_std: float
@@ -63,9 +63,9 @@ class HandReport:
 
 @dataclass(frozen=True, slots=True)
 class BoardHandSolution:
-    """A `hand_solution`, g = C (m + b), of `taken` moves in single precision.
+    """A `hand_solution`, g = C (m + b), of `accepted` moves in single precision.
 
-    - `sensor`, `state`, `taken`: its index, one of `protocol.HAND_STATES`, and the number of accepted moves.
+    - `sensor`, `state`, `accepted`: its index, one of `protocol.HAND_STATES`, and the number of accepted moves.
     - `scale_std`: the largest standard uncertainty of a scale factor by that session.
     - `range_deg_s`, `temperature_c`: the sensor's range, and its temperature when it was last laid down.
     - `matrix`, `bias_rad_s`: C and b.
@@ -74,7 +74,7 @@ class BoardHandSolution:
 
     sensor: int
     state: str
-    taken: int
+    accepted: int
     scale_std: float
     range_deg_s: float
     temperature_c: float
@@ -89,7 +89,7 @@ class BoardHandSolution:
         return cls(
             sensor=values["sensor"],
             state=protocol.HAND_STATES[values["state"]],
-            taken=values["taken"],
+            accepted=values["accepted"],
             scale_std=values["scale_std"],
             range_deg_s=values["range_deg_s"],
             temperature_c=values["temperature_c"],

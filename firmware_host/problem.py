@@ -27,7 +27,7 @@ class ProblemError(Exception):
         self.problem = Problem(name, what, remedy)
 
     @classmethod
-    def of(cls, problem: Problem) -> Self:
+    def from_problem(cls, problem: Problem) -> Self:
         """Return the problem as an exception of this kind."""
         return cls(problem.name, problem.what, problem.remedy)
 

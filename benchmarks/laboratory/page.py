@@ -26,7 +26,7 @@ from rig.station.events import RunEvent
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
 sys.path.insert(0, str(Path(__file__).parents[2]))  # before the tests' folders of the same names
-from support.page.told_runs import ABOUT, before_it_moves, moving, plan_demo
+from support.page.scripted_runs import ABOUT, before_it_moves, moving, plan_demo
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from goals import record

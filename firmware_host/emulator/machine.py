@@ -235,7 +235,7 @@ class EmulatedBoard:
         location = symbols.describe(address)
         if not symbols.function(address):
             location += f", called at {symbols.describe(link)}"
-        return BoardError.of(violation.problem._replace(what=f"{violation.what}, at {location}"))
+        return BoardError.from_problem(violation.problem._replace(what=f"{violation.what}, at {location}"))
 
     # --- reset
 

@@ -52,7 +52,7 @@ def raised_as(kind: type[RigError]) -> Iterator[None]:
     except ProblemError as error:
         if isinstance(error, (kind, Refused)):
             raise
-        raise kind.of(error.problem) from error
+        raise kind.from_problem(error.problem) from error
 
 
 def refuse(problems: Sequence[Problem]) -> None:

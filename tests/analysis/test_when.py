@@ -85,7 +85,7 @@ def parsed_attributes(sensor: RecordedSensor) -> dict[str, Any]:
 
 @pytest.mark.slow
 def test_a_sensor_without_thermometer_is_certified_at_the_temperature_that_was_stated() -> None:
-    document = document_of(calibrate([without_thermometer(synthetic_run(Setup(told=NOMINAL)))]))
+    document = document_of(calibrate([without_thermometer(synthetic_run(Setup(stated_kinematics=NOMINAL)))]))
     sensor = document.gyroscopes["gyro"]
     assert (
         sensor.bias_conditions is not None

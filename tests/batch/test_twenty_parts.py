@@ -42,7 +42,7 @@ def test_twenty_parts_in_a_row_each_get_the_right_verdict(tmp_path: Path) -> Non
             at.types("")
             if number == unplugged:
                 at.waits_for("again? ")
-                assert at.said("no_port")
+                assert at.has_printed("no_port")
                 at.types("yes")
                 at.waits_for("then Enter")
                 at.types("")

@@ -27,7 +27,7 @@ def raised() -> dict[str, list[Raised]]:
 
 @pytest.mark.slow
 def test_an_error_s_name_is_written_out_where_it_is_made() -> None:
-    hidden = [error.place for error in find_errors() if error.name is None]
+    hidden = [error.location for error in find_errors() if error.name is None]
     assert not hidden, f"write the names out, or nobody finds them: {', '.join(hidden)}"
 
 
@@ -35,7 +35,7 @@ def test_an_error_s_name_is_written_out_where_it_is_made() -> None:
 def test_every_error_that_is_raised_is_in_the_table() -> None:
     known = {entry.name for entry in catalogue()}
     lines = [
-        f"{name} | {kind_of(places)} | WHEN IT OCCURS | What to do      (made in {', '.join(p.place for p in places)})"
+        f"{name} | {kind_of(places)} | WHEN IT OCCURS | What to do ({', '.join(error.location for error in places)})"
         for name, places in sorted(raised().items())
         if name not in known
     ]

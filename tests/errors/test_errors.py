@@ -13,7 +13,7 @@ PROBLEM = Problem("no_board", "nothing answers on /dev/ttyACM0", "Check the cabl
 
 @pytest.mark.parametrize("kind", [Refused, Fault, BoardError, Violation])
 def test_every_kind_of_error_carries_a_problem(kind: type[ProblemError]) -> None:
-    error = kind.of(PROBLEM)
+    error = kind.from_problem(PROBLEM)
     assert error.problem == PROBLEM
     assert (error.name, error.what, error.remedy) == (PROBLEM.name, PROBLEM.what, PROBLEM.remedy)
     assert str(error) == str(PROBLEM) == "no_board: nothing answers on /dev/ttyACM0. Check the cable."
@@ -35,6 +35,6 @@ def test_one_converter_serves_every_kind(
     raised: type[ProblemError], as_kind: type[RigError], expected: type[RigError]
 ) -> None:
     with pytest.raises(ProblemError) as caught, raised_as(as_kind):
-        raise raised.of(PROBLEM)
+        raise raised.from_problem(PROBLEM)
     assert type(caught.value) is expected
     assert caught.value.problem == PROBLEM

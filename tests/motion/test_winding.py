@@ -10,7 +10,7 @@ from rig.motion.winding import cable_words, windings_rad
 from rig.plans.motions.six_sweeps import plan_six_observation
 from rig.runner.announcement import announcement
 from rig.turners.ur.ur_kind import UR
-from support.page.told_runs import report
+from support.page.scripted_runs import report
 
 ARM = ArmSection(host="10.0.0.2", payload_kg=0.3)
 TURN = radians(360)

@@ -21,7 +21,7 @@ def taken(rate_hz: float, count: int = COUNT) -> np.ndarray:
 @pytest.mark.parametrize(("rate_hz", "stamps"), ROUNDED + FINE + BURSTS + LATE)
 def test_nothing_is_lost_where_stamps_are_only_bad(rate_hz: float, stamps: Stamps) -> None:
     count = COUNT - COUNT % stamps.burst  # whole packets
-    stamped_s, _ = stamps.of(taken(rate_hz, count))
+    stamped_s, _ = stamps.stamp(taken(rate_hz, count))
     found = find_sampling(stamped_s)
     assert found.interval_s == pytest.approx(1 / rate_hz, rel=1e-3)
     assert found.missing.sum() <= 1e-3 * count and found.scattered == 0
@@ -40,7 +40,7 @@ def test_nothing_is_lost_where_stamps_are_only_bad(rate_hz: float, stamps: Stamp
     ],
 )
 def test_real_losses_are_found_at_bad_stamps(rate_hz: float, stamps: Stamps) -> None:
-    stamped_s, kept = stamps.of(taken(rate_hz))
+    stamped_s, kept = stamps.stamp(taken(rate_hz))
     found, lost = find_sampling(stamped_s), 1 - kept.mean()
     missing = found.missing.sum() / COUNT + found.scattered
     assert 0.6 * lost < missing < 2.5 * lost, "their number is known where stamps tell it, else about"
@@ -59,7 +59,7 @@ def test_real_losses_are_found_at_bad_stamps(rate_hz: float, stamps: Stamps) -> 
     ],
 )
 def test_a_gap_is_where_it_is(rate_hz: float, stamps: Stamps) -> None:
-    stamped_s, _ = stamps.of(taken(rate_hz))
+    stamped_s, _ = stamps.stamp(taken(rate_hz))
     found = find_sampling(stamped_s)
     lost = sum(count for _, count in stamps.gaps)
     assert found.missing.sum() == pytest.approx(lost, abs=2)
@@ -73,7 +73,7 @@ def test_a_gap_is_where_it_is(rate_hz: float, stamps: Stamps) -> None:
 @pytest.mark.parametrize("burst", [2, 5, 20])
 def test_readings_that_arrive_together_were_taken_one_after_the_other(burst: int) -> None:
     time_s = taken(100)
-    stamped_s, _ = Stamps(burst=burst).of(time_s)
+    stamped_s, _ = Stamps(burst=burst).stamp(time_s)
     even_s = find_taken_times(stamped_s, find_sampling(stamped_s))
     off_s = even_s - time_s
     assert np.ptp(off_s) < 1e-3, "but for a latency that they all have"

@@ -66,7 +66,7 @@ def test_bad_stamps_lose_nothing_and_rise(rate_hz: float, stamp: Callable[[Array
 
 @pytest.mark.parametrize("lost", [0.005, 0.02, 0.04])
 def test_losses_are_counted_behind_the_rounding(lost: float) -> None:
-    stamped_s, kept = Stamps(rounded_s=1e-3, lost=lost).of(taken())
+    stamped_s, kept = Stamps(rounded_s=1e-3, lost=lost).stamp(taken())
     found = ordered(stamped_s)
     assert found.sampling.missing.sum() == pytest.approx(COUNT - kept.sum(), abs=2)
 

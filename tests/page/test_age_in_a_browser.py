@@ -22,8 +22,8 @@ from support.laboratories.commands import configuration
 from support.laboratories.servo_runs import configure
 from support.laboratories.worlds import fresh_host, merge
 from support.page.browser import needs_browser, picture
-from support.page.told_page import showing
-from support.page.told_runs import report, servo_report, servo_state, state
+from support.page.scripted_page import showing
+from support.page.scripted_runs import report, servo_report, servo_state, state
 from support.paths import CONFIGS
 from support.processes.waiting import alive, wait_for
 

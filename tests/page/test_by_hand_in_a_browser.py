@@ -16,7 +16,7 @@ from rig.plans.by_hand import WantedMoves, still_open
 from rig.station.events import ArmConnected, HandSeen, PhaseStarted
 from rig.turners.turner_registry import installed
 from support.page.browser import legible, needs_browser, picture, screen, text
-from support.page.told_page import showing
+from support.page.scripted_page import showing
 from support.processes.waiting import wait_for
 
 pytestmark = [pytest.mark.slow, needs_browser, pytest.mark.usefixtures("nothing_severe_and_nothing_from_elsewhere")]

@@ -15,7 +15,7 @@ from rig.page.recent_readings import POINTS, STEP_S
 from rig.page.server.feed import Broadcast, Feed, Mailbox
 from rig.station.events import ArmConnected, ArmSeen, HandSeen, RunEvent, SamplesTaken, SensorSamples
 from rig.turners.turner_registry import installed
-from support.page.told_runs import (
+from support.page.scripted_runs import (
     ABOUT,
     before_it_moves,
     judge,

@@ -12,9 +12,9 @@ from rig.data.run_folder import RESULT
 from rig.errors import Fault
 from rig.station.events import DocumentWritten, Failed, Prompt
 from support.page.browser import TABLET, kind, legible, needs_browser, picture, screen, set_theme, text
-from support.page.told_page import Telling, showing
-from support.page.told_runs import before_it_moves, judge, look, moving, plan_demo
-from support.page.told_six import IMU, PARTS, SIX, six_found, six_judged, six_moving
+from support.page.scripted_page import Telling, showing
+from support.page.scripted_runs import before_it_moves, judge, look, moving, plan_demo
+from support.page.scripted_six_sensors import IMU, PARTS, SIX, six_found, six_judged, six_moving
 from support.processes.waiting import wait_for
 
 pytestmark = [pytest.mark.slow, needs_browser, pytest.mark.usefixtures("nothing_severe_and_nothing_from_elsewhere")]

@@ -13,7 +13,7 @@ from rig.page.analysis_process import looking_out
 from rig.page.page_state import PageState
 from rig.page.server.feed import Feed
 from rig.station.events import StepFinished
-from support.page.told_runs import moving, plan_demo
+from support.page.scripted_runs import moving, plan_demo
 from support.processes.waiting import wait_for
 
 

@@ -16,8 +16,8 @@ from rig.errors import Fault
 from rig.motion.turner_state import ArmState, RuntimeState
 from rig.station.events import ArmSeen, Failed, Interrupted, PhaseRecorded, RunEvent, SensorSamples
 from support.page.browser import kind, legible, needs_browser, picture, severe, text
-from support.page.told_page import showing
-from support.page.told_runs import before_it_moves, judge, moving, plan_demo
+from support.page.scripted_page import showing
+from support.page.scripted_runs import before_it_moves, judge, moving, plan_demo
 from support.paths import ROOT
 from support.processes.waiting import wait_for
 
@@ -163,7 +163,7 @@ def page_of_its_own() -> Iterator[tuple["subprocess.Popen[str]", str]]:
     """A process that moves on a page, and the page's address."""
     paths = os.pathsep.join([str(ROOT), str(ROOT / "tests")])
     process = subprocess.Popen(
-        [sys.executable, "-m", "support.page.told_page"],
+        [sys.executable, "-m", "support.page.scripted_page"],
         stdout=subprocess.PIPE,
         text=True,
         env={**os.environ, "PYTHONPATH": paths},

@@ -17,7 +17,7 @@ from rig.page.server.control import Control
 from rig.page.server.feed import Feed
 from rig.page.server.serving import PageAddress, serving
 from rig.station.events import Answered, Crashed, Failed, Interrupted, PhaseRecorded, Prompt, RunEvent, SensorSamples
-from support.page import told_runs
+from support.page import scripted_runs
 from support.page.browser import (
     TABLET,
     kind,
@@ -29,8 +29,8 @@ from support.page.browser import (
     severe,
     text,
 )
-from support.page.told_page import showing
-from support.page.told_runs import ABOUT, before_it_moves, judge, moving, plan_demo
+from support.page.scripted_page import showing
+from support.page.scripted_runs import ABOUT, before_it_moves, judge, moving, plan_demo
 from support.processes.waiting import wait_for
 
 pytestmark = [pytest.mark.slow, needs_browser, pytest.mark.usefixtures("nothing_severe_and_nothing_from_elsewhere")]
@@ -108,8 +108,8 @@ def test_a_run_is_shown_from_the_question_to_the_verdict(driver: Chrome, tmp_pat
         assert [re.split(" over", plot.get_attribute("aria-label") or "")[0] for plot in plots] == [
             "gyro, rate", "reference, rate", "reference, acceleration",
         ]  # fmt: skip
-        assert told_runs.SATURATED in text(driver, "observations") and "0.90661" in text(driver, "observations")
-        assert all(words in text(driver, "dwells") for words in ("at -90 -90 0, +z up", "9.8142", told_runs.SHAKEN))
+        assert scripted_runs.SATURATED in text(driver, "observations") and "0.90661" in text(driver, "observations")
+        assert all(words in text(driver, "dwells") for words in ("at -90 -90 0, +z up", "9.8142", scripted_runs.SHAKEN))
         assert "no scale factors yet" in text(driver, "parameters") and "0.00064" in text(driver, "parameters")
         assert "3 ⚠" in text(driver, "samples")
         picture(driver, "moving-dark")

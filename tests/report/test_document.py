@@ -71,7 +71,7 @@ def test_a_field_the_document_does_not_have_is_not_written(outcome: Outcome) -> 
 
 @pytest.mark.slow
 def test_the_result_says_which_arm_was_reckoned_with_and_at_what_speed_it_is_valid() -> None:
-    document = document_of(calibrate([synthetic_run(Setup(told=NOMINAL))]))
+    document = document_of(calibrate([synthetic_run(Setup(stated_kinematics=NOMINAL))]))
     assert document.provenance.arm_kinematics is not None
     assert document.provenance.arm_kinematics.alpha_rad == NOMINAL.alpha_rad
     sensor = json.loads(document.text())["gyroscopes"]["gyro"]

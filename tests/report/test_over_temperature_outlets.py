@@ -54,7 +54,7 @@ def test_the_result_holds_the_sensor_and_agrees_with_its_calibration(
     warmed: tuple[Path, Drawn], result: ResultDocument, entry: OverTemperatureEntry
 ) -> None:
     for row in entry.table:
-        true = warmed[1].at(row.temperature_c)
+        true = warmed[1].evaluate(row.temperature_c)
         assert (np.abs(np.array(row.scale) - true[:3]) < 3 * np.array(row.expanded_scale) + 1e-3).all()
         assert (np.abs(-np.array(row.bias) - true[3:]) < 3 * np.array(row.expanded_bias) + 5e-4).all()  # axes lean
     calibration = result.gyroscopes["imu"]

@@ -18,7 +18,7 @@ from rig.station.events import DocumentWritten
 from rig.world.board.windowed_truth import SimulatedTruth, truth_document
 from rig.world.world_section import read_world_section
 from support.laboratories.commands import configuration, rig, rig_here
-from support.page.told_runs import ABOUT
+from support.page.scripted_runs import ABOUT
 from support.paths import CONFIGS, RECORDINGS, ROOT
 
 TRUE: dict[str, Any] = {

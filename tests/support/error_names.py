@@ -27,11 +27,11 @@ FIELDS = 3  # name, what, remedy
 
 @dataclass(frozen=True, slots=True)
 class Raised:
-    """An error made at `place`, "file:line". `name` is None when it is not written out there."""
+    """An error made at `location`, "file:line". `name` is None when it is not written out there."""
 
     name: str | None
     kind: str
-    place: str
+    location: str
 
 
 @functools.cache

@@ -51,8 +51,8 @@ def compare_with_board(
     Raise Fault `board_unverified` if readings or reports are missing, `board_disagrees` if the limits are exceeded.
     """
     host = solve_like_board(tuple(_moves(readings, reports)))
-    if (used := sum(report.outcome == "taken" for report in reports)) != solved.taken:
-        raise _unverified_fault(f"it has taken {solved.taken} moves, of which this computer received {used}")
+    if (used := sum(report.outcome == "taken" for report in reports)) != solved.accepted:
+        raise _unverified_fault(f"it has taken {solved.accepted} moves, of which this computer received {used}")
     matrix = float(np.max(np.abs(np.array(solved.matrix) - host.matrix)))
     bias = float(np.max(np.abs(np.array(solved.bias_rad_s) - host.bias_rad_s)))
     if not (matrix <= SCALE_LIMIT and bias <= BIAS_LIMIT_RAD_S):

@@ -160,7 +160,7 @@ def _document(name: str, by_board: "CalibratedByBoard", calibration: Calibration
     return {
         "sensor": name,
         "serial_number": calibration.serial_number,
-        "moves": by_board.solved.taken,
+        "moves": by_board.solved.accepted,
         "scale": list(calibration.scale),
         "scale_std_of_session": by_board.solved.scale_std,
         "expanded_scale": scale_u,
@@ -176,7 +176,7 @@ def _describe(name: str, by_board: "CalibratedByBoard", calibration: Calibration
     scale = " ".join(f"{value:.5f}" for value in calibration.scale)
     bias = " ".join(f"{value:+.6f}" for value in calibration.bias_rad_s)
     agreement, std = by_board.agreement, by_board.solved.scale_std
-    yield f"{name}: the board has calibrated it from {by_board.solved.taken} moves"
+    yield f"{name}: the board has calibrated it from {by_board.solved.accepted} moves"
     yield f"  scale  {scale}, U (k = 2) {scale_u:.1e}, of which {2 * std:.1e} by this session"
     yield f"  bias   {bias} rad/s"
     if agreement is None:

@@ -42,7 +42,7 @@ def simulated_laboratory(config_text: str, late: Path | None = None, truth: Path
         try:
             answer = json.loads(answers.readline() or "{}")
             if "problem" in answer:
-                raise Refused.of(Problem(**answer["problem"]))
+                raise Refused.from_problem(Problem(**answer["problem"]))
             if not answer.get("ready"):
                 raise Refused(
                     "world_not_ready",

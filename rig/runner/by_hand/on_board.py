@@ -160,7 +160,7 @@ def read_kept_solution(board: Board) -> CalibratedByBoard:
     if report.state == "failed":
         why = f"it was given up, for ten moves in a row were refused; the last because {AGAIN[report.outcome][1]}"
     elif report.state != "idle":
-        why = f"it was not done after {report.taken} moves, and has ended now"
+        why = f"it was not done after {report.accepted} moves, and has ended now"
     raise Refused(
         "no_answer_by_hand",
         f"the board keeps no answer of a session by hand: {why}",

@@ -35,7 +35,7 @@ def make_ready(bus: Bus, watchdog: int) -> None:
     bus.write(TORQUE, 1)
     bus.write(WATCHDOG, watchdog)
     if (readback := bus.look_up(WATCHDOG)) != (watchdog,):
-        raise Refused.of(
+        raise Refused.from_problem(
             Problem(
                 "servo_watchdog_not_armed",
                 f"the servo's watchdog was set to {watchdog} and reads {readback[0]}",
@@ -73,7 +73,7 @@ def _hold_position(bus: Bus) -> None:
 def _read_back(bus: Bus, register: Register, *wanted: int) -> None:
     readback = bus.look_up(register)
     if readback != wanted:
-        raise Refused.of(
+        raise Refused.from_problem(
             Problem(
                 "servo_setting_not_kept",
                 f"{register.name} of the servo was set to {_join(wanted)} and reads {_join(readback)}",

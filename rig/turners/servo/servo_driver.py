@@ -129,10 +129,10 @@ class Servo:
             "servo_stopped", "the servo was stopped on request", "Start again when ready"
         )
         if not self._holds:
-            raise Refused.of(problem)
+            raise Refused.from_problem(problem)
         outcome = self.stop()
         remedy = f"{outcome.remedy}. {problem.remedy}" if outcome.remedy else problem.remedy
-        raise Fault.of(problem._replace(what=f"{problem.what}; {outcome.what}", remedy=remedy))
+        raise Fault.from_problem(problem._replace(what=f"{problem.what}; {outcome.what}", remedy=remedy))
 
     # Moving -----------------------------------------------------------------------------------------------------
 

@@ -109,9 +109,9 @@ class Arm:
             self._link.start()
             self._wait(lambda: self._latest is not None or self._answer is not None)
         if isinstance(self._answer, RequestFailed):
-            raise Refused.of(self._answer.problem)
+            raise Refused.from_problem(self._answer.problem)
         if problem := stop_problem(self._host, self._controller.version):
-            raise Refused.of(problem)
+            raise Refused.from_problem(problem)
 
     @property
     def latest(self) -> ArmState:
@@ -131,13 +131,13 @@ class Arm:
             return
         problem = self._problem or Problem("arm_stopped", "the arm was stopped on request", "Start again when ready")
         if not self._holds_arm:
-            raise Refused.of(problem)
+            raise Refused.from_problem(problem)
         outcome = self.stop()
         problem = self._explain(problem)
         remedy = f"{outcome.remedy}. {problem.remedy}" if outcome.remedy else problem.remedy
         # Before control is taken nothing has moved.
         kind = Fault if self._supervision.stage is ControlStage.CONTROLLED else Refused
-        raise kind.of(problem._replace(what=f"{problem.what}; {outcome.what}", remedy=remedy))
+        raise kind.from_problem(problem._replace(what=f"{problem.what}; {outcome.what}", remedy=remedy))
 
     # Moving -------------------------------------------------------------------------------------------------------
 
@@ -153,7 +153,7 @@ class Arm:
         if problem is None and reports_local_control(self._host, self._controller.version):
             problem = local_control(self._host)
         if problem is not None:
-            raise Refused.of(problem)
+            raise Refused.from_problem(problem)
         self._arm_stop.descriptors.keep()
         with stopping_on_error(self.stop):
             self._holds_arm = True
@@ -285,7 +285,7 @@ class Arm:
         problem = stop_trial(self._host, RobotApi(self._host, self._robot_api_port, ANSWER_S), self._shows)
         if problem is not None:
             self._holds_arm = False
-            raise Refused.of(readiness(self.latest) or problem)
+            raise Refused.from_problem(readiness(self.latest) or problem)
 
     def _shows(self, runtime_state: RuntimeState, timeout_s: float) -> bool:
         """Return whether the arm's states report that state of its program within `timeout_s`."""
@@ -300,7 +300,7 @@ class Arm:
         problem = self._answer.problem
         if problem.name in NOT_BEGUN:
             self._holds_arm = False
-            raise Refused.of(problem)
+            raise Refused.from_problem(problem)
         if problem.name == "control_not_taken" and self._watch and OUR_PROGRAM in self._watch.stopped_programs:
             problem = describe_early_end(problem)  # too soon for a state to show it running
         self._fail(self._supervision.interruption or problem)

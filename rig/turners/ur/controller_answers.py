@@ -87,7 +87,7 @@ def read_report(host: str, connected: Connected, state: ArmState, robot_api_port
             with closing(Dashboard(host, ANSWER_S)) as dashboard:
                 complete = _add_dashboard_answers(report, dashboard)
         except OSError as error:
-            raise Refused.of(_describe_closed_port(Dashboard, host, error)) from error
+            raise Refused.from_problem(_describe_closed_port(Dashboard, host, error)) from error
     return replace(complete, model=identify_model(complete))
 
 

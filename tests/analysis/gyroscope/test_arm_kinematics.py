@@ -29,6 +29,6 @@ def non_orthogonality(setup: Setup) -> Array:
 @pytest.mark.slow
 def test_the_sensors_axes_are_found_on_an_arm_whose_controller_knows_it() -> None:
     setup = Setup(kinematics=MADE, noise_rad_s=0.001)
-    known, unknown = (np.abs(non_orthogonality(replace(setup, told=told))).max() for told in (MADE, None))
+    known, unknown = (np.abs(non_orthogonality(replace(setup, stated_kinematics=told))).max() for told in (MADE, None))
     assert known < 1e-4
     assert unknown > 5e-4

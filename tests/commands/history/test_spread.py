@@ -10,7 +10,7 @@ from rig.commands.history.worker_pools import Cluster, Processes, distribute, so
 from rig.data.run_folder import RESULT
 from rig.errors import Fault
 from rig.history.recompute.result_comparison import RecomputedResult, Unsolved
-from support.history.again_stand_ins import DEADLY, WAITING, answer_at_once, deadly, failing, task, waiting
+from support.history.recompute_stand_ins import DEADLY, WAITING, answer_at_once, deadly, failing, task, waiting
 from support.processes.clusters import local_cluster
 
 NAMES = (*(f"before {i}" for i in range(3)), DEADLY, *(f"after {i}" for i in range(4)))

@@ -12,7 +12,7 @@ from rig.estimation.earth import DEG_H, EARTH_RATE_RAD_S
 from rig.estimation.gyroscope.earth_rate import EarthRate, EarthRatePrior, find_earth_rate
 from rig.estimation.gyroscope.vector_fit import explain
 from rig.study.rate_table import GYRO_MATRIX
-from support.motions.earth_seen import KVH1775, LATITUDE_RAD, LSM9DS1, MPU9250, UP, Part, Session, Truth, record
+from support.motions.earth_rate_session import KVH1775, LATITUDE_RAD, LSM9DS1, MPU9250, UP, Part, Session, Truth, record
 
 KNOWN = EarthRatePrior(UP, repeatability_rad=5e-5, state_jitter_s=2e-5)
 SENSITIVE = replace(KNOWN, g_sensitivity=True)

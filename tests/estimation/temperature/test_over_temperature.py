@@ -35,7 +35,7 @@ def upright(seed: int, **planted: float) -> tuple[Drawn, np.random.Generator]:
 def errors(sensor: Drawn, found: OverTemperature) -> tuple[Array, Array]:
     """(5, 6) errors at five temperatures, over u and over U."""
     held = [found.evaluate(each) for each in FIVE_C]
-    off = np.array([each.values - sensor.at(warm) for each, warm in zip(held, FIVE_C, strict=True)])
+    off = np.array([each.values - sensor.evaluate(warm) for each, warm in zip(held, FIVE_C, strict=True)])
     return off / [each.std for each in held], off / [each.expanded for each in held]
 
 
@@ -81,8 +81,8 @@ def test_what_is_left_of_the_bias_is_thirty_times_less_than_before() -> None:
         found = calibrate(sensor, session(), rng)
         for warm in np.linspace(*found.range_c, 9):
             held = found.evaluate(float(warm))
-            before.append(sensor.at(warm)[3:] - sensor.at(REFERENCE_C)[3:])
-            after.append(held.values[3:] - sensor.at(warm)[3:])
+            before.append(sensor.evaluate(warm)[3:] - sensor.evaluate(REFERENCE_C)[3:])
+            after.append(held.values[3:] - sensor.evaluate(warm)[3:])
             u.append(held.std[3:])
 
     assert np.sqrt(np.mean(np.square(before))) > 30 * np.sqrt(np.mean(np.square(after)))
@@ -138,7 +138,9 @@ def test_a_hysteresis_is_found_and_covered() -> None:
     assert (np.abs(loop[3:] - sensor.hysteresis) < 4 * std[3:] + 1e-4).all()
     for way in (-1, 1):  # whoever warms, whoever cools
         held = found.evaluate(40.0)
-        assert (np.abs(held.values[3:] - sensor.at(40.0)[3:] - way * sensor.hysteresis) < 1.3 * held.expanded[3:]).all()
+        assert (
+            np.abs(held.values[3:] - sensor.evaluate(40.0)[3:] - way * sensor.hysteresis) < 1.3 * held.expanded[3:]
+        ).all()
 
 
 @pytest.mark.slow

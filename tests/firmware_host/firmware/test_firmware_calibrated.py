@@ -356,7 +356,7 @@ def test_what_the_board_leaves_of_a_bias_over_temperature_is_thirty_times_less_t
         )  # fmt: skip
         board.ask("start", sensors=1 << sensor_index)
         warm = np.linspace(*found.range_c, 9)
-        reads = np.array([sensor.at(each)[3:] for each in warm])
+        reads = np.array([sensor.evaluate(each)[3:] for each in warm])
         frames = []
         for k, place in enumerate([0] * 60 + list(range(9))):  # the part settles first
             counts = np.round(reads[place] / setup["sensitivity_rad_s"]).astype(int).tolist()
@@ -365,7 +365,7 @@ def test_what_the_board_leaves_of_a_bias_over_temperature_is_thirty_times_less_t
             frames.extend(board.frames())
         frames.extend(board.ask("stop"))
         left = rates(frames)[-9:]
-        before.append(reads - sensor.at(REFERENCE_C)[3:])
+        before.append(reads - sensor.evaluate(REFERENCE_C)[3:])
         after.append(left / found.scale[0])
         u.append([found.evaluate(float(each)).std[3:] for each in warm])
     rms_before, rms_after, rms_u = (float(np.sqrt(np.mean(np.square(each)))) for each in (before, after, u))

@@ -59,7 +59,7 @@ def test_twelve_flips_are_found_and_taken(played: Played) -> None:
     assert played.outcomes == ["taken"] * 12
     assert [report.after for report in played.reports] == [flip.to for flip in TWELVE if isinstance(flip, FlipAction)]
     assert played.solved.state == "done"
-    assert played.solved.taken == 12
+    assert played.solved.accepted == 12
 
 
 @pytest.mark.one_in(4)
@@ -234,7 +234,7 @@ def test_the_button_sets_a_gyroscope_up_starts_it_and_begins_a_session() -> None
 def test_what_was_found_alone_stays_until_the_next_session() -> None:
     board = run_button_session(twelve())
     kept = BoardHandSolution.decode(query(board, "hand_solve"))
-    assert (kept.state, kept.taken, kept.sensor, kept.range_deg_s) == ("done", 12, 0, 500.0)
+    assert (kept.state, kept.accepted, kept.sensor, kept.range_deg_s) == ("done", 12, 0, 500.0)
     assert kept.temperature_c == 25.0, "the middle of the part's scale, as was given"
     assert 1e-5 < kept.scale_std < 1e-3
     board.ask("stop", 2)

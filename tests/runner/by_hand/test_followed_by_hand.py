@@ -9,7 +9,7 @@ from rig.data.recording.hand_events import HandAsked, HandMoveTaken, OfTheHand
 from rig.runner.by_hand.on_board import FollowedSession
 from support.board.hand_on_board import play
 from support.external.handled_body import TWELVE, handle
-from support.laboratories.at_the_table import SENSOR
+from support.laboratories.hand_session_laboratory import SENSOR
 
 
 @pytest.mark.slow
@@ -20,7 +20,7 @@ def test_a_press_of_the_button_begins_anew_and_only_what_follows_is_held_against
     for report in played.reports[:5]:
         session.take(report)
     begun = dataclasses.replace(
-        played.reports[0], state="starting", outcome="nothing", before=None, after=None, judged=0, taken=0
+        played.reports[0], state="starting", outcome="nothing", before=None, after=None, judged=0, accepted=0
     )
     session.take(begun)
     assert isinstance(told[-1], HandAsked)

@@ -8,7 +8,7 @@ import pytest
 
 from rig.data.recording.hand_events import HandBegunAnew
 from rig.errors import Fault
-from support.laboratories.at_the_table import LIST, TRUE_SCALE, Table
+from support.laboratories.hand_session_laboratory import LIST, TRUE_SCALE, Table
 
 SHORT = replace(LIST, flips=8, turns=2)
 
@@ -26,8 +26,8 @@ def test_without_a_mistake_the_list_is_made_and_gives_the_truth() -> None:
     table = Table(seed=3)
     table.sit()
     assert not table.reminded
-    assert [each.kind for each in table.taken].count("flip") == 12
-    assert [each.kind for each in table.taken].count("turn") == 3
+    assert [each.kind for each in table.accepted].count("flip") == 12
+    assert [each.kind for each in table.accepted].count("turn") == 3
     held(table)
 
 
@@ -36,7 +36,7 @@ def test_without_a_mistake_the_list_is_made_and_gives_the_truth() -> None:
 def test_it_ends_when_u_is_as_small_as_is_wanted() -> None:
     short = Table(seed=4, settings=replace(LIST, wanted_scale_u=2e-3))
     short.sit()
-    assert len(short.taken) < 15
+    assert len(short.accepted) < 15
     assert float(max(short.solution.expanded_scale)) <= 2e-3
 
 
@@ -100,7 +100,7 @@ def test_a_rest_in_which_it_creeps_costs_this_rest_and_not_the_session(creeps: i
     table.sit()
     assert table.again == ["bias_jumped"]
     assert not [event for event in table.events if isinstance(event, HandBegunAnew)]
-    assert [move.kind for move in table.taken].count("turn") == 2
+    assert [move.kind for move in table.accepted].count("turn") == 2
     held(table)
 
 

@@ -40,15 +40,15 @@ def test_a_run_that_lost_its_supply_is_resumed_and_solved(tmp_path: Path) -> Non
     config, out = configure(tmp_path), tmp_path / "run"
     off = asked(do="servo_power", on=False)
     seen = carry_out("run", config, "--out", out, config=config, when=TURNS, times=2, act=off, after_s=0.8)
-    said = "".join(seen.said)
+    said = "".join(seen.output)
     assert seen.process.returncode == 3 and "servo_link_lost" in said and "rig resume" in said
     assert seen.at_rest_after_s < 1.0 and seen.stood
     begun = [read_run(out / name) for name in ("run.h5", "run-2.h5")]
     assert [len(run.samples["gyro"]) > 1000 for run in begun] == [True, True] and len(begun[1].states) > 100
 
     rest = carry_out("resume", out, config=config)
-    assert rest.process.returncode == 0, "".join(rest.said)
-    assert "stage 1 of 3" not in "".join(rest.said).lower()
+    assert rest.process.returncode == 0, "".join(rest.output)
+    assert "stage 1 of 3" not in "".join(rest.output).lower()
 
     result = json.loads((out / "result.json").read_text(encoding="utf-8"))
     gyro = result["gyroscopes"]["gyro"]
@@ -117,7 +117,7 @@ def test_whatever_happens_the_shaft_stands_the_data_are_kept_and_the_run_goes_on
     (act, status, name), (times, after_s) = FAULTS[what], MOMENTS[moment]
     config, out = configure(tmp_path), tmp_path / "run"
     seen = carry_out("run", config, "--out", out, config=config, when=TURNS, times=times, act=act, after_s=after_s)
-    said = "".join(seen.said)
+    said = "".join(seen.output)
     silent_s = SILENCE_S * crowding()
     print(f"at rest after {seen.at_rest_after_s:.2f} s; a silence is known after {silent_s:.2f} s here")
     names = {name, *ALSO.get(what, ())}
@@ -129,4 +129,4 @@ def test_whatever_happens_the_shaft_stands_the_data_are_kept_and_the_run_goes_on
     last = read_run(sorted(out.glob("run*.h5"), key=lambda path: path.stat().st_mtime)[-1])
     assert len(last.samples["gyro"]) > 500 and len(last.states) > 100
     rest = carry_out("resume", out, config=config)
-    assert rest.process.returncode == 0, "".join(rest.said)
+    assert rest.process.returncode == 0, "".join(rest.output)

@@ -61,7 +61,7 @@ def test_no_fault_leaves_the_heater_on(name: str, tmp_path: Path) -> None:
     environment = shift_clock(tmp_path) if "CLOCK_SHIFT" in fault.environment else {}
     with bench(folder, HEATED, environment) as here:
         here.start()
-        assert here.until(lambda _state: heats(here), START_S), here.said("run")[-500:]
+        assert here.until(lambda _state: heats(here), START_S), here.read_output("run")[-500:]
         here.pace(REAL)
         fault.bring(here, Random(5))
         if fault.lasts_s is not None:

@@ -60,7 +60,7 @@ LABORATORY = StatedFacts(
 @functools.cache
 def result() -> ResultDocument:
     """Return the result of a recording whose budget is complete. The checks of a board are left out."""
-    document = document_of(calibrate([synthetic_run(Setup(told=NOMINAL))]))
+    document = document_of(calibrate([synthetic_run(Setup(stated_kinematics=NOMINAL))]))
     checks = tuple(check for check in document.checks if not check.name.startswith("gyro.board"))
     return document.model_copy(update={"checks": checks, "verdict": "pass"})
 

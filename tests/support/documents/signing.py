@@ -122,8 +122,8 @@ def revocation_list(by: Holder, *revoked: Holder, days: tuple[int, int] = (-1, 7
 
 
 @contextmanager
-def time_server(by: Holder, said: Sequence[bytes] = ()) -> Iterator[str]:
-    """Serve RFC 3161 on loopback with an RSA key; yield its URL. `said`, if there is any, is its only answer."""
+def time_server(by: Holder, answers: Sequence[bytes] = ()) -> Iterator[str]:
+    """Serve RFC 3161 on loopback with an RSA key; yield its URL. `answers`, if there are any, are its only ones."""
     from asn1crypto import keys, tsp
     from asn1crypto import x509 as asn1
     from pyhanko.sign.timestamps import DummyTimeStamper
@@ -138,7 +138,7 @@ def time_server(by: Holder, said: Sequence[bytes] = ()) -> Iterator[str]:
     class Answers(BaseHTTPRequestHandler):
         def do_POST(self) -> None:
             request = self.rfile.read(int(self.headers["Content-Length"]))
-            answer = said[0] if said else stamper.request_tsa_response(tsp.TimeStampReq.load(request)).dump()
+            answer = answers[0] if answers else stamper.request_tsa_response(tsp.TimeStampReq.load(request)).dump()
             self.send_response(200)
             self.send_header("Content-Type", "application/timestamp-reply")
             self.send_header("Content-Length", str(len(answer)))

@@ -85,7 +85,7 @@ class _Swings:
         self._phases = rng.uniform(0, 2 * np.pi, size=(3, 3))
         self._sizes = world.swing_rad * rng.dirichlet([2, 2, 2], size=3)
 
-    def at(self, time_s: Array) -> tuple[Array, Array]:
+    def evaluate(self, time_s: Array) -> tuple[Array, Array]:
         """Return attitudes (n, 3, 3), body to room, and rates (n, 3) in body coordinates."""
         phases = self._paces * time_s[:, None, None] + self._phases
         yaw, pitch, roll = np.sum(self._sizes * np.sin(phases), axis=2).T
@@ -104,7 +104,7 @@ def _stopping(swings: _Swings, world: World, time_s: Array) -> tuple[Array, Arra
     since_s = time_s[:, None] - np.array(world.stops_s)
     stood_s = np.clip(since_s, 0, world.stop_lasts_s)
     moving = np.all((since_s <= 0) | (since_s >= world.stop_lasts_s), axis=1)
-    attitudes, rates = swings.at(time_s - stood_s.sum(axis=1))
+    attitudes, rates = swings.evaluate(time_s - stood_s.sum(axis=1))
     return attitudes, rates * moving[:, None], moving
 
 

@@ -72,7 +72,7 @@ class Stamps:
     lost: float = 0.0
     gaps: tuple[tuple[int, int], ...] = ()
 
-    def of(self, time_s: Array, seed: int = 0) -> tuple[Array, NDArray[np.bool_]]:
+    def stamp(self, time_s: Array, seed: int = 0) -> tuple[Array, NDArray[np.bool_]]:
         """The stamps (k,) of the readings that were kept (n,)."""
         rng = np.random.default_rng(seed)
         kept = rng.random(len(time_s)) >= self.lost
@@ -161,7 +161,7 @@ def laid_down(
 
 def write_rates(folder: Path, log: Log, stamps: Stamps | None = None, motion: str = "speed_rad_s") -> tuple[Path, Path]:
     """Write the two files of `rig solve --sweeps`."""
-    stamped_s, kept = (stamps or Stamps()).of(log.time_s)
+    stamped_s, kept = (stamps or Stamps()).stamp(log.time_s)
     samples = write_table(
         folder / "samples.csv", ["time_s", *(f"{a}_rad_s" for a in AXES)], stamped_s, log.readings[kept]
     )
@@ -172,7 +172,7 @@ def write_rates(folder: Path, log: Log, stamps: Stamps | None = None, motion: st
 
 def write_forces(folder: Path, log: Log, stamps: Stamps | None = None, *beside: tuple[str, Array]) -> tuple[Path, Path]:
     """Write the two files of `rig solve --attitudes`, with further columns (n,)."""
-    stamped_s, kept = (stamps or Stamps()).of(log.time_s)
+    stamped_s, kept = (stamps or Stamps()).stamp(log.time_s)
     names = ["time_s", *(f"{a}_m_s2" for a in AXES), *(name for name, _ in beside)]
     samples = write_table(
         folder / "samples.csv", names, stamped_s, log.readings[kept], *(column[kept] for _, column in beside)

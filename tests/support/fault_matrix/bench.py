@@ -91,7 +91,7 @@ class Bench:
             time.sleep(POLL_S)
         return not self.running
 
-    def said(self, command: str) -> str:
+    def read_output(self, command: str) -> str:
         """Return the text that `rig COMMAND` has written on stderr."""
         return (self.config.parent / f"{command}.txt").read_text(encoding="utf-8", errors="replace")
 

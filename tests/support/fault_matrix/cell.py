@@ -63,7 +63,7 @@ def carry_out(
     with bench(folder, SETUPS[setup], environment) as rig_bench:
         rig_bench.start()
         if not rig_bench.until(lambda state: state["program_running"], START_S):
-            cell.deviations.append(f"did not start: {rig_bench.said('run')[-300:]}")
+            cell.deviations.append(f"did not start: {rig_bench.read_output('run')[-300:]}")
             return cell
         start_s = rig_bench.world.state()["time_s"]
         cell.met = fault is None or rig_bench.until(lambda state: state["time_s"] >= start_s + moment * span_s, START_S)
@@ -127,7 +127,7 @@ def _companions(rig_bench: Bench, cell: Cell) -> None:
 def _account(rig_bench: Bench, fault: Fault | None, cell: Cell, *, fault_s: float, fault_wall_s: float) -> None:
     """Record the end of the run, the time of the arm's rest, and whether the file has all that was received."""
     assert rig_bench.process is not None
-    output = rig_bench.said("run")
+    output = rig_bench.read_output("run")
     cell.status = rig_bench.process.poll()
     cell.ending = _ending(cell.status, output)
     if cell.status == 0:
@@ -202,12 +202,12 @@ def _resume(rig_bench: Bench, cell: Cell) -> None:
         status = rig_bench.process.poll()
         if status not in (0, 1):
             break
-    finished = cell.status == 1 and "already_finished" in rig_bench.said(
+    finished = cell.status == 1 and "already_finished" in rig_bench.read_output(
         "resume"
     )  # the verdict it had is the one it has
     cell.verdict = "fail" if finished else {0: "pass", 1: "fail"}.get(-1 if status is None else status, "none")
     if status != 0 and not finished:
-        cell.deviations.append(f"resumed, it ended with {status}: {rig_bench.said('resume')[-400:]}")
+        cell.deviations.append(f"resumed, it ended with {status}: {rig_bench.read_output('resume')[-400:]}")
 
 
 def span(setup: str, folder: Path) -> tuple[Cell, float]:

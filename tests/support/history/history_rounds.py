@@ -67,7 +67,7 @@ def drawn(seed: int) -> Round:
 
 
 class Rounds:
-    """Rounds on the history at `place`, with all that was said to be entered in them so far, by calibration number.
+    """Rounds on the history at `address`, with all that was said to be entered in them so far, by calibration number.
 
     `refused` has what a whole station said that did not measure all its parts.
     That is no fault of the history, so the rounds go on.
@@ -120,7 +120,7 @@ class Rounds:
 
     def _take(self, user: "_User", this: Round) -> None:
         """Note the entries that a user reported: a station's, a run's, an import's."""
-        lines = user.said.read_text(encoding="utf-8").splitlines(keepends=True)
+        lines = user.output_path.read_text(encoding="utf-8").splitlines(keepends=True)
         whole_lines = [line for line in lines if line.endswith("\n")]
         assert user.process.returncode < 0 or "Traceback" not in "".join(lines), f"{this}: {''.join(lines)}"
         for line in whole_lines:
@@ -132,7 +132,7 @@ class Rounds:
                 self._entered([int(entry_match[2])], entry_match[1], this)
             elif "not entered in the history" in line:
                 self.not_remembered.append(line)
-        if this.whole and user.said.name == f"whole{this.seed}.txt":
+        if this.whole and user.output_path.name == f"whole{this.seed}.txt":
             entries = re.findall(r"entered in .* as calibration (\d+).*\nwritten: .*/\d+-(\S+)\n", "".join(whole_lines))
             for number, serial_number in entries:
                 self._entered([int(number)], serial_number, this)
@@ -183,9 +183,11 @@ class Rounds:
 class _User:
     """A process that works on the history; what it says goes into a file."""
 
-    def __init__(self, said: Path, module: str, words: tuple[str | Path, ...], environment: dict[str, str]) -> None:
-        self.said = said.with_name(f"{said.name}.txt")
-        with self.said.open("wb") as file:
+    def __init__(
+        self, output_path: Path, module: str, words: tuple[str | Path, ...], environment: dict[str, str]
+    ) -> None:
+        self.output_path = output_path.with_name(f"{output_path.name}.txt")
+        with self.output_path.open("wb") as file:
             self.process: subprocess.Popen[Any] = start_module(
                 *words, module=module, cwd=ROOT / "tests", env=environment,
                 stdin=subprocess.PIPE, stdout=file, stderr=file,
@@ -194,7 +196,9 @@ class _User:
     def begun(self, words: str) -> "_User":
         """Wait until the user has reported these words, and return it."""
         wait_for(
-            lambda: words in self.said.read_text(encoding="utf-8") or self.process.poll() is not None, words, BUSY_S
+            lambda: words in self.output_path.read_text(encoding="utf-8") or self.process.poll() is not None,
+            words,
+            BUSY_S,
         )
         return self
 

@@ -42,7 +42,7 @@ class Scanner:
             assert end >= 0, f"{words!r} not said after:\n{self._output[max(0, self._read - 2000) :]}"
             return end
 
-    def said(self, words: str) -> bool:
+    def has_printed(self, words: str) -> bool:
         """Return whether these words were ever printed."""
         with self._more:
             return words in self._output

@@ -35,7 +35,7 @@ class Seen:
 
     process: "subprocess.Popen[str]"
     control_at: tuple[str, int]
-    said: list[str] = field(default_factory=list)
+    output: list[str] = field(default_factory=list)
     rates: list[tuple[float, float]] = field(default_factory=list)
     acted_s: float = 0.0
 
@@ -86,7 +86,7 @@ def carry_out(*command: str | Path, config: Path, when: str = "", times: int = 1
     assert process.stdout is not None
     heard = 0
     for line in process.stdout:
-        record.said.append(line)
+        record.output.append(line)
         heard += bool(when) and when in line
         if act is not None and heard == times and not record.acted_s:
             watching.start()

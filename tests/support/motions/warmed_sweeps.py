@@ -45,7 +45,7 @@ class Drawn:
     noise: float
     walk: float
 
-    def at(self, temperature_c: float) -> Array:
+    def evaluate(self, temperature_c: float) -> Array:
         """Return k and c (6,) at that temperature of the thermometer, in use."""
         even, tilted = self.gradient_k
         warmer_k = even + tilted * (2 * temperature_c - FROM_C - TO_C) / (TO_C - FROM_C)

@@ -91,7 +91,7 @@ class Setup:
     encoders_err: float = 1.0  # as many times what is stated
     odd_per_rad_s: float = 0.0  # of each axis
     even_per_rad_s: float = 0.0
-    told: DenavitHartenberg | None = None  # how its controller says it is made
+    stated_kinematics: DenavitHartenberg | None = None  # how its controller says it is made
     g_sensitivity_rad_s_per_g: tuple[tuple[float, ...], ...] = ()  # of the sensor's axes to what they feel
     offset_m: tuple[float, ...] = (0.0, 0.0, 0.0)  # from the flange's centre
     part: str = "lsm9ds1"  # as it is called; what it does is said above
@@ -234,7 +234,9 @@ def run_data(setup: Setup, motion: Motion, board_s: Array, counts: Array) -> Run
     arm["q_rad"], arm["qd_rad_s"] = encoder_angles(setup, q), qd
     arm["target_speed_fraction"] = arm["speed_scaling"] = 1.0
     arm["robot_mode"], arm["safety_mode"], arm["runtime_state"] = 7, 1, 2
-    provenance = replace(PROVENANCE, arm_kinematics=setup.told, board_follows_crystal=setup.follows_crystal)
+    provenance = replace(
+        PROVENANCE, arm_kinematics=setup.stated_kinematics, board_follows_crystal=setup.follows_crystal
+    )
     return RunData(
         motion.config,
         motion.settings,

@@ -41,7 +41,7 @@ class AutopilotOnAWire:
     def __init__(
         self,
         firmware: Literal["ardupilot", "px4"],
-        left: Mapping[str, float],
+        stored_parameters: Mapping[str, float],
         motion_at: Callable[[float], Sequence[float]],
         *,
         imus: int = 1,
@@ -55,7 +55,7 @@ class AutopilotOnAWire:
         provides_temperature: bool = True,
         mavlink_version: int = 2,
     ) -> None:
-        self.parameters = Parameters(firmware, imus, left, file)
+        self.parameters = Parameters(firmware, imus, stored_parameters, file)
         self._firmware, self._motion_at, self._imus = firmware, motion_at, imus
         self._on_for_s, self._armed = uptime_s, armed
         self._simulated, self._clock_ppm = simulated, clock_ppm
@@ -111,12 +111,12 @@ class AutopilotOnAWire:
 @contextmanager
 def autopilot_on_a_wire(
     firmware: Literal["ardupilot", "px4"] = "ardupilot",
-    left: Mapping[str, float] | None = None,
+    stored_parameters: Mapping[str, float] | None = None,
     motion_at: Callable[[float], Sequence[float]] = lambda time_s: STILL,
     **of_it: Any,
 ) -> Iterator[AutopilotOnAWire]:
     """For the length of the `with` block; over a `dead` line nothing has ever come."""
-    wire = AutopilotOnAWire(firmware, left or {}, motion_at, **of_it)
+    wire = AutopilotOnAWire(firmware, stored_parameters or {}, motion_at, **of_it)
     try:
         yield wire
     finally:

@@ -35,7 +35,7 @@ class KvhOnAWire:
 
     def __init__(
         self,
-        left: Mapping[str, str],
+        stored_settings: Mapping[str, str],
         motion_at: Callable[[float], Sequence[float]] = lambda time_s: STILL,
         pace: float = 1.0,
         uptime_s: float = 3.0,
@@ -43,7 +43,7 @@ class KvhOnAWire:
         *,
         dead: bool = False,
     ) -> None:
-        self.memory = KvhMemory(left)
+        self.memory = KvhMemory(stored_settings)
         self._field_at = field_at
         self._motion_at, self._on_for_s = motion_at, uptime_s
         self.kvh: SimulatedKvh1775 | None = None
@@ -86,7 +86,7 @@ class KvhOnAWire:
 
 @contextmanager
 def kvh_on_a_wire(
-    left: Mapping[str, str] | None = None,
+    stored_settings: Mapping[str, str] | None = None,
     motion_at: Callable[[float], Sequence[float]] = lambda time_s: STILL,
     *,
     pace: float = 1.0,
@@ -95,7 +95,7 @@ def kvh_on_a_wire(
     dead: bool = False,
 ) -> Iterator[KvhOnAWire]:
     """For the length of the `with` block; over a `dead` line nothing has ever come."""
-    wire = KvhOnAWire(left or {}, motion_at, pace, uptime_s, field_at, dead=dead)
+    wire = KvhOnAWire(stored_settings or {}, motion_at, pace, uptime_s, field_at, dead=dead)
     try:
         yield wire
     finally:

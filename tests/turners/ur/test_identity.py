@@ -23,7 +23,7 @@ from rig.turners.ur.identity import identify_model, identity_problems
 from rig.world.ur10e.motion.arm_models import MODELS
 from support.laboratories.commands import rig
 from support.laboratories.worlds import World, WorldHandle, hardware, worlds
-from support.page.told_runs import report
+from support.page.scripted_runs import report
 
 ARM = ArmSection(host="10.0.0.2", payload_kg=0.3)
 BY_NOMINAL = ArmSection(host="10.0.0.2", payload_kg=0.3, kinematics="nominal")

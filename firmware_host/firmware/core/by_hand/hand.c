@@ -47,7 +47,7 @@ struct rest {
 
 /* The sums of two consecutive rests and of the move between them. */
 static struct {
-    uint8_t sensor, state, wanted, taken, refused;
+    uint8_t sensor, state, wanted, accepted, refused;
     float wanted_std, scale_std, sensitivity, microsecond_s, noise_rad_s, first_rad_s[3];
     float range_deg_s, temperature_c; /* of the sensor: as configured; when it was last laid down */
     int16_t temperature_counts;
@@ -207,8 +207,8 @@ static uint8_t find_outcome(struct rest *after)
         return MOVE_CONTRADICTS;
     hand.report.settled = hand.estimate.settled;
     after->counted = true;
-    if (hand.taken < UINT8_MAX)
-        hand.taken++;
+    if (hand.accepted < UINT8_MAX)
+        hand.accepted++;
     hand.scale_std = estimate_scale_std(&hand.estimate);
     return MOVE_TAKEN;
 }
@@ -253,7 +253,7 @@ static void complete_rest(void)
     if (hand.before.face != NO_FACE)
         estimate_up(&hand.estimate, hand.before.face, hand.up);
     begin_move();
-    if (hand.taken >= hand.wanted && hand.scale_std <= hand.wanted_std)
+    if (hand.accepted >= hand.wanted && hand.scale_std <= hand.wanted_std)
         hand.state = HAND_DONE;
     else
         hand.state = hand.refused < MAX_REFUSED ? HAND_RESTING : HAND_FAILED;
@@ -391,7 +391,7 @@ void hand_on_status(const struct frame *request)
     report.reply_to = request->sequence;
     report.sensor = hand.sensor;
     report.state = hand.state;
-    report.taken = hand.taken;
+    report.accepted = hand.accepted;
     report.scale_std = hand.scale_std;
     link_send(MESSAGE_HAND_REPORT, &report, sizeof report);
 }
@@ -404,7 +404,7 @@ void hand_on_solve(const struct frame *request)
         .reply_to = request->sequence,
         .sensor = hand.sensor,
         .state = hand.state,
-        .taken = hand.taken,
+        .accepted = hand.accepted,
         .scale_std = hand.scale_std,
         .range_deg_s = hand.range_deg_s,
         .temperature_c = hand.temperature_c,

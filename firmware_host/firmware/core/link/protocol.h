@@ -441,7 +441,7 @@ struct hand_report_payload {
     uint8_t whole; /* 1 = whole revolutions on a face, which count as closed */
     uint8_t settled; /* 1 = the equations are linearized about the solution after it from then on */
     uint16_t judged; /* moves judged so far */
-    uint8_t taken; /* accepted moves */
+    uint8_t accepted; /* accepted moves */
     float angle_rad; /* rotation of that move, there and back */
     float noise_rad_s; /* standard deviation of a reading at rest, used as its weight */
     float scale_std; /* largest standard uncertainty of a scale factor */
@@ -458,7 +458,7 @@ struct hand_solution_payload {
     uint8_t reply_to; /* sequence of the answered frame, 0 = unrequested */
     uint8_t sensor; /* index in the identity's list */
     uint8_t state; /* enum hand_state */
-    uint8_t taken; /* number of accepted moves */
+    uint8_t accepted; /* number of accepted moves */
     float scale_std; /* largest standard uncertainty of a scale factor */
     float range_deg_s; /* range of the sensor, degrees per second */
     float temperature_c; /* of the sensor when it was last laid down, degrees Celsius */

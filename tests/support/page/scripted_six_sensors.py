@@ -9,7 +9,7 @@ from rig.data.result_file import ResultDocument, read_result, write_result
 from rig.data.run_folder import RESULT
 from rig.page.replay import ended
 from rig.station.events import Checked, DocumentWritten, Remembered, RunEvent, SamplesTaken, Since, VerdictReached
-from support.page.told_runs import ABOUT, moving, plan_demo
+from support.page.scripted_runs import ABOUT, moving, plan_demo
 from support.paths import RECORDINGS
 
 PARTS = {

@@ -100,7 +100,7 @@ class Table:
         return [event.again for event in self.events if isinstance(event, HandAsked) and event.again is not None]
 
     @property
-    def taken(self) -> list[HandMoveTaken]:
+    def accepted(self) -> list[HandMoveTaken]:
         """Return the moves that count."""
         return [event for event in self.events if isinstance(event, HandMoveTaken)]
 

@@ -15,7 +15,7 @@ from rig.report.words.mounting_words import farthest_off, mount_lines
 from rig.station.events import DocumentWritten
 from support.documents.certified import add_comparison, certificate, read, result
 from support.documents.dcc_rules import schema_faults
-from support.page.told_runs import ABOUT
+from support.page.scripted_runs import ABOUT
 
 LINE = "mounting error in stage {}: {}° about x, {}° about y, {}° about z"
 TOLD = [

@@ -9,7 +9,7 @@ import pytest
 
 from rig.cli import main
 from rig.estimation.arrays import Array
-from support.external.laid_down import GRAVITY_M_S2, Box, Laid, lay_down, write
+from support.external.box_on_faces import GRAVITY_M_S2, Box, Laid, lay_down, write
 from support.external.real import recording, unpack
 
 pytestmark = pytest.mark.slow

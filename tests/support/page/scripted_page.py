@@ -22,7 +22,7 @@ from rig.page.server.feed import Feed
 from rig.page.server.serving import PageAddress, serving
 from rig.station.events import ArmSeen, HandSeen, Progress, RunEvent, SamplesTaken, StepFinished, StepStarted
 from support.page.browser import text
-from support.page.told_runs import ABOUT, before_it_moves, look, moving, plan_demo
+from support.page.scripted_runs import ABOUT, before_it_moves, look, moving, plan_demo
 from support.processes.waiting import wait_for
 
 AGAIN_S = 0.2  # a run that goes on tells so all the time

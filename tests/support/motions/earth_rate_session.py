@@ -89,13 +89,16 @@ class Truth:
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """A sweep or a rest: how long; the true mean rate against the room; the mean attitude, true and told; and the
-    arm's account of the turn, with what its own errors do to it."""
+    """A sweep or a rest.
+
+    Its duration, the true mean rate against the room, the mean attitude, true and as reported, and the arm's account of
+    the turn with the effect of its own errors on it.
+    """
 
     duration_s: float
     rate_rad_s: Array
     attitude: Array
-    told: Array
+    reported_attitude: Array
     turn_rad_s: Array
     axis_errors_rad_s: Array
     joint: str | None
@@ -121,7 +124,7 @@ def record(session: Session, seed: int) -> tuple[VectorInputs, Truth]:
     windows = np.column_stack([starts, starts + lengths])
 
     attitudes = np.array([stretch.attitude for stretch in stretches])
-    reported = np.array([stretch.told for stretch in stretches])
+    reported = np.array([stretch.reported_attitude for stretch in stretches])
     wandered, whole = _wandering(session.part, windows, rng)
     rates = np.array([stretch.rate_rad_s for stretch in stretches]) + attitudes @ earth
     pulled = attitudes @ -UP @ np.reshape(session.g_sensitivity_rad_s_g, (3, 3)).T

@@ -8,8 +8,8 @@ from rig.analysis.check import Check, fitness
 from rig.data.meaning import Meaning
 from rig.page.outcome_screen import after_fault, after_verdict, outcome_rows, since_rows
 from rig.station.events import Since
-from support.page.told_runs import ABOUT
-from support.page.told_six import PARTS, six_found
+from support.page.scripted_runs import ABOUT
+from support.page.scripted_six_sensors import PARTS, six_found
 
 CONFORMING = Check("gyro.bias", 0.2, 0.1, "rad/s", Meaning("conformity", "gyro", "rate", "bias"))
 UNFIT = fitness("gyro", "rate", "scale_std", 0.002, 0.001)
