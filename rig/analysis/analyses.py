@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 def calibrate(runs: "Sequence[RunData]", estimator: str = DEFAULT_ESTIMATOR, *, drifting: bool = False) -> Outcome:
     """Solve and judge the recordings of a calibration.
 
-    At least one recording is needed, from a run that just ended or from files. If `drifting`, a bias drift is no
-    contradiction. Raise Fault or Refused if the recordings lack something.
+    At least one recording is needed, from a run that just ended or from files. If `drifting`, a bias drift does not
+    count as a contradiction. Raise Fault or Refused if the recordings lack something.
     """
     if (external := runs[0].external) is not None:
         from rig.analysis.external import external_outcome as external_judging
@@ -55,7 +55,7 @@ def calibrate_by_hand(runs: "Sequence[RunData]") -> Outcome:
 
 @solvable()
 def verify_calibration(outcome: Outcome, repeated: "Sequence[RunData]") -> Outcome:
-    """Return the outcome with the verification by `repeated`: the same movement with calibrated readings.
+    """Return the outcome with a verification by `repeated`, recordings of the same movement with calibrated readings.
 
     Without such a recording the checks of the verification fail. Raise Fault as `observe_runs` and `verify` do.
     """

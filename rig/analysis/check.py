@@ -66,7 +66,7 @@ def fitness(
 ) -> Check:
     """Return a check of a sensor's quantity with a `limit` of its own.
 
-    The plan's `sweep` or `dwell` that the check is about adds its index to the name.
+    If the check is about one `sweep` or `dwell` of the plan, the name contains its index.
     """
     means, index = Meaning("fitness", sensor, quantity, parameter, sweep, what), dwell if sweep is None else sweep
     name = name_check(sensor, quantity, what)
@@ -76,7 +76,7 @@ def fitness(
 def list_unsolved(faults: Iterable[tuple[str, str, Fault]]) -> Iterator[Check]:
     """Yield a failing check for each sensor without a solution, from name, quantity and Fault.
 
-    A sensor that is only recorded, such as a magnetometer in sweeps, has none.
+    A sensor that is only recorded, such as a magnetometer in sweeps, gets no check.
     """
     for sensor, quantity, fault in faults:
         if fault.name not in ONLY_RECORDED:

@@ -92,7 +92,7 @@ class ClockCheck:
 
 
 def check_clock(recording: ObservedRun, uncertainty: Uncertainty) -> ClockCheck:
-    """Return the error of the clock of one recording's controller, by every other clock."""
+    """Return the error of the controller's clock in one recording, relative to every other clock."""
     from rig.data.recording.provenance import calls_itself_simulated  # with a tenth of a plan's imports
 
     compared = (_compare_to_computer(recording, uncertainty), _compare_to_crystal(recording, uncertainty))

@@ -100,9 +100,10 @@ def _in_attitudes(budget: Budget, response: Array, noise: Array, std: Array) -> 
 
 
 def _of_readings(noise: Array, walk: Array, explained: Explained) -> dict[str, Array]:
-    """Return the parts of a gyroscope's variances, by the contributor that has their degrees of freedom.
+    """Return the parts of a gyroscope's variances that are estimated from readings, by their contributor.
 
-    If the readings show no bias drift, the drift is the data sheet's flicker, with infinite degrees of freedom.
+    If the readings show no bias drift, the drift's part is omitted: it is the data sheet's flicker, whose dof is
+    infinite.
     """
     return {NOISE: noise, **({WANDERING: walk} if explained.bias.is_drifting else {})}
 
@@ -120,7 +121,7 @@ def _split(whole: Array, parts: dict[str, Array], budget: Budget) -> Array:
 
 
 def _to_angles(matrix: Array) -> Array:
-    """Return the derivative (6, 3, 3) by F of the angles between the axes and of their mounting."""
+    """Return the derivative (6, 3, 3) of the angles between the axes, and of their mounting, with respect to F."""
     return SensorAxes.from_matrix(matrix).to_angles.reshape(6, 3, 3)
 
 

@@ -59,7 +59,7 @@ class LookedFile:
 
 
 def look_at(path: Path, stated: ColumnMap | None = None) -> LookedFile:
-    """Return a description of a file's content, by its headings and numbers, or by a `stated` map of its columns.
+    """Return a description of a file's content, from its headings and numbers, or from a `stated` map of its columns.
 
     Raise Refused `bad_option` for a file of sweeps, and as `find_layout` does for a file that is no table.
     """
@@ -83,7 +83,7 @@ def look_at(path: Path, stated: ColumnMap | None = None) -> LookedFile:
 
 
 def count_from(looked: LookedFile, origin_s: int) -> LookedFile:
-    """Return a reference's file whose attitudes count from the origin of a log's times."""
+    """Return a reference's file with the times of its attitudes counted from the origin of a log's times."""
     if looked.attitudes is None or not origin_s:
         return looked
     times = {name: looked.attitudes[name] - origin_s for name in ("start_s", "end_s")}

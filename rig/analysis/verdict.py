@@ -51,7 +51,7 @@ class _LimitSet:
         return Check(name_check(self.sensor, self.quantity, what), value, limit, row.unit, means)
 
     def nearest(self, what: str, values: Array, uncertainty: ExpandedUncertainty | None) -> Check:
-        """Return the check of the one of three axes whose value is nearest to its limit, by the decision rule."""
+        """Return the check of the worst of three axes: its value is nearest to the limit by the decision rule."""
         check = self.check(what, _largest_magnitude(values))
         if uncertainty is None or check.value is None:
             return check

@@ -16,7 +16,7 @@ NO_SWEEPS = Fault("too_few_observations", "moves by hand are no sweeps", "Give s
 
 
 def solve_hand_samples(item: Item, samples: Samples, columns: Columns) -> SensorResult:
-    """Solve the gyroscope of readings, with the stated conditions of the session (`read_conditions`).
+    """Calibrate the gyroscope from readings, under the stated conditions of the session (`read_conditions`).
 
     Raise Fault and Refused as `rig.estimation.by_hand.solve_by_hand` does, and `stuck_sensor`.
     """
@@ -46,7 +46,7 @@ def build_hand_result(sensor: RecordedSensor | Item, solution: HandSolution, cor
 
 
 def read_conditions(columns: Columns) -> SessionConditions:
-    """Return the conditions in the one row of a table of "turns" (`rig.data.recording.motion_file`)."""
+    """Return the conditions that the only row of a table "turns" states (`rig.data.recording.motion_file`)."""
     first = columns.get("first_face")
     return SessionConditions(
         clock_ppm=float(columns["clock_ppm"][0]),

@@ -59,7 +59,7 @@ def contradictions(
     false_alarms: float = FALSE_ALARMS,
     has_limits: bool = True,
 ) -> ConsistencyChecks:
-    """Return the checks of these sensors' results against contradictions.
+    """Return the checks for contradictions in the results of these sensors.
 
     `surroundings` are those of the recordings, `false_alarms` is the fraction of undamaged runs that may fail. The
     check of a disturbed sweep has its index in its name, `gyro.disturbed_sweep.3`, and in its meaning. `has_limits`:
@@ -133,7 +133,7 @@ def check_references(
     *,
     drifting: bool = False,
 ) -> ConsistencyChecks:
-    """Return the checks of readings of gravity and field against contradictions.
+    """Return the checks for contradictions between the readings of accelerometers and magnetometers.
 
     Dwells and sweeps are named as those of gyroscopes: `gyro.acceleration_disturbed_dwell.13`. If `drifting`, the bias
     may change steadily.
@@ -172,7 +172,7 @@ def _false_alarm_probability(run: RunData, sensors: Sequence[str], settings: Run
 
 
 def disturbed_sweeps(runs: Sequence[RunData]) -> frozenset[int]:
-    """Return the sweeps of an unfinished run that contradict the others, by any sensor, as the verdict would.
+    """Return the sweeps of an unfinished run that contradict the others for any sensor, judged as in the verdict.
 
     Gyroscopes and accelerometers that cannot be solved yet contribute none.
     """

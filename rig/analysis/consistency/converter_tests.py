@@ -78,8 +78,9 @@ def judge_readings(
 ) -> Statistics:
     """Return statistic and limit by the check's name, from all readings (n, 3) and the windows of each recording.
 
-    Each statistic has at most that false-alarm probability. The noise is the median of all windows, so a stuck axis in
-    some of them does not make it zero. `frozen`: the longest run of equal readings of an axis that moved meanwhile.
+    Each statistic has at most the given false-alarm probability. The noise is the median of all windows, so a stuck
+    axis in some of them does not make it zero. `frozen`: the longest run of equal readings of an axis that moved
+    meanwhile.
     """
     from scipy.special import ndtri
 
@@ -141,7 +142,7 @@ def _count_uneven_bits(windows: Sequence[RawReadings], noise: Array, critical_va
 
 
 def _find_spikes(windows: Sequence[RawReadings], step_counts: Array) -> tuple[float, int]:
-    """Return the largest deviation over the noise, and the number of axes whose spikes are one power of two.
+    """Return the largest deviation relative to noise, and the number of axes whose spikes all equal one power of two.
 
     Such spikes come from a faulty bit. The noise includes vibration and is at least half a step. The first readings are
     omitted, because the filter of a quiet sensor has not settled.

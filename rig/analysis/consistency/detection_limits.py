@@ -74,7 +74,7 @@ def _means_of_solve(explained: Explained) -> Means:
 
 
 def _error_over_expanded(patterns: Array, explained: Explained, mounting: Array, inputs: Unknown) -> float | None:
-    """Return the error, in U, of a result by the worst of the patterns (k, N, 3); None without a solution.
+    """Return a result's error, in units of U, due to the worst of the patterns (k, N, 3); None without a solution.
 
     The means are solved again with the fault, which may look like bias drift and increase U.
     """

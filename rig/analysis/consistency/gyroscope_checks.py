@@ -102,7 +102,7 @@ def check_gyroscope(
     """Test the model of a gyroscope against each alternative, find outlier sweeps, and compute detection limits.
 
     Faults that persist (`changes`) are tested with the transfers between segments, `differences` without. Each test has
-    that false-alarm probability; `matrix` (3, 3) is F.
+    the given false-alarm probability; `matrix` (3, 3) is F.
     """
     segments = _steady_rates(segments, matrix)
     allowance = replace(allowance, transfers=_steady_rates(allowance.transfers, matrix))
@@ -144,9 +144,9 @@ def check_gyroscope(
 
 
 def _steady_rates(segments: Segments, matrix: Array) -> Segments:
-    """Return segments whose rate is the same throughout a sweep, and whose readings have no more of it either.
+    """Return the segments with one rate per sweep, its mean, and with the difference removed from the readings too.
 
-    The noise of the encoders is in the rates, and as large in the readings' residuals: columns with noise explain it.
+    Encoder noise in the rates appears equally in the residuals of the readings, so noisy columns would explain it.
     """
     rates = segments.rates_rad_s.copy()
     for sweep in np.unique(segments.sweep[segments.sweep > REST]):
@@ -188,7 +188,7 @@ def _inflate_transfers(segments_only: _Tested, matrix: Array, allowance: ErrorPa
 def _residual_chi_square(tested: _Tested) -> tuple[float, int]:
     """Return the χ² of segments with all possible changes in the model, and its degrees of freedom.
 
-    A change that differs from the model by noise of the rates alone is none: sweeps without transfers have such.
+    Changes that differ from the model only by noise of the rates are ignored; they occur in sweeps without transfers.
     """
     changed = [*changes(tested.segments, tested.axis_rates).values(), quarter_columns(tested.means)]
     columns = [apply_whitener(tested.model.whitener, change) for change in changed if change is not None]

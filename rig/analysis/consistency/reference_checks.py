@@ -141,7 +141,7 @@ class WhitenedReference:
         return 2 * information(self.growth, delta_rad, model) * delta_rad**4
 
     def _delta_fraction(self, model: Array, columns: Array, delta_rad: float) -> float:
-        """Return the fraction (0 to 1) of the variance along columns that is due to δ."""
+        """Return which fraction (0 to 1) of the variance of residuals projected onto the columns is due to δ."""
         variance = 1 + delta_rad**2 * self.growth
         model_basis, _ = self._whiten_residuals(model, delta_rad)
         projections = remaining_directions(model_basis, columns / np.sqrt(variance)[:, None])
@@ -149,7 +149,7 @@ class WhitenedReference:
 
 
 def check_reference(readings: ReferenceModel, false_alarm_probability: float, *, drifting: bool = False) -> TestResults:
-    """Return every statistic with its critical value, each with that false-alarm probability.
+    """Return every statistic with its critical value, each with the given false-alarm probability.
 
     If `drifting`, the bias may change steadily.
     """

@@ -151,7 +151,7 @@ def read_magnetometer(
 def compute_reference_statistics(
     readings: ReferenceReadings, false_alarm_probability: float, *, drifting: bool
 ) -> ReferenceStatistics:
-    """Return the statistics of a sensor's readings, each with that false-alarm probability."""
+    """Return the statistics of a sensor's readings, each with the given false-alarm probability."""
     tested = check_reference(readings.model, false_alarm_probability, drifting=drifting)
     disturbed = [(readings.segments[index], statistic) for index, statistic in sorted(tested.disturbed.items())]
     worst = SegmentName(DISTURBED_DWELL if readings.model.dwells else DISTURBED_SWEEP)

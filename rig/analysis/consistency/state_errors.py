@@ -18,7 +18,7 @@ SAME_S = 1e-5  # farther apart, two times are two edges
 
 
 def build_time_patterns(segments: Segments, jitter_s: float) -> Array:
-    """Return the patterns (P, N, 3) rad/s of the times between segments of a sweep."""
+    """Return the patterns (P, N, 3) rad/s of errors in the times at which one segment of a sweep follows another."""
     lengths = np.diff(segments.times_s)
     by_rate = jitter_s * segments.rates_rad_s / lengths
     shares = [share for sweep in np.unique(segments.sweep[segments.sweep > REST]) for share in _edges(segments, sweep)]
@@ -28,8 +28,8 @@ def build_time_patterns(segments: Segments, jitter_s: float) -> Array:
 def build_reading_patterns(segments: Segments, noise_rad: float) -> Array:
     """Return the patterns (P, N, 3) rad/s of joint angles read with noise at the edges of sweeps and transfers.
 
-    In sweeps, of the joints that stand. In transfers of all joints, because at their ends none turns. At an edge the
-    independent errors of all joints are as many as they have directions: three at most.
+    In sweeps, only the joints that stand still count; in transfers all joints do, because none turns at their ends. At
+    each edge, the joints have as many independent errors as their axes have directions: three at most.
     """
     lengths = np.diff(segments.times_s)
     patterns = []
@@ -49,7 +49,7 @@ def build_reading_patterns(segments: Segments, noise_rad: float) -> Array:
 
 
 def _edges(segments: Segments, sweep: int) -> Iterator[NDArray[np.float64]]:
-    """Yield for each edge of a sweep's segments (N,) 1 of the segment that ends there and −1 of the one that begins."""
+    """Yield (N,) for each edge of a sweep's segments: 1 for the segment that ends there, −1 for the one that begins."""
     inside = segments.sweep == sweep
     times_s = np.sort(segments.times_s[inside].ravel())
     for time_s in times_s[np.append(True, np.diff(times_s) > SAME_S)]:

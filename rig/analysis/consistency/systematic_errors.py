@@ -121,7 +121,7 @@ def build_known_errors(
     temperature_times_s: Array,
     stamp_s: float = 0.0,
 ) -> KnownErrors:
-    """Return the standard uncertainties of all modelled error sources of gyroscope `name` with that full scale."""
+    """Return the standard uncertainties of all modelled error sources of gyroscope `name` with the given full scale."""
     steady = np.array([angle.startswith(("twist", "zero")) for angle in ANGLES])
     cube, square = (uncertainty.stated_size(what, name) / 100 / np.sqrt(3) for what in CURVE)
     return KnownErrors(
@@ -142,7 +142,7 @@ def build_known_errors(
 def build_error_patterns(
     known_errors: KnownErrors, segments: Segments, transfers: Segments, matrix: Array
 ) -> ErrorPatterns:
-    """Return the patterns of known errors in the means of a sensor of F (3, 3).
+    """Return the patterns of known errors in the means of a sensor with matrix F (3, 3).
 
     The even part of its nonlinearity is free in transfers, which are faster than sweeps: there it is no sign of a
     change.
@@ -173,7 +173,7 @@ def unknown_earth_rate(*, is_known: bool) -> Array:
 
 
 def patterns(segments: Segments, matrix: Array, known_errors: KnownErrors) -> Array:
-    """Return the patterns (P, N, 3) rad/s in the readings of segments, for a sensor of F (3, 3)."""
+    """Return the patterns (P, N, 3) rad/s in the readings of segments, for a sensor with matrix F (3, 3)."""
     arm_patterns = np.concatenate(
         [
             _angle_patterns(segments, known_errors),
@@ -224,7 +224,8 @@ def _angle_patterns(segments: Segments, known_errors: KnownErrors) -> Array:
 def _encoder_patterns(segments: Segments, encoder_rad: float) -> Array:
     """Return the patterns of encoder errors at each angle where arcs begin or end.
 
-    Angles within a quarter of an arc are one mark, because a sweep back passes the same marks.
+    Angles closer together than a quarter of an arc count as one encoder mark, because a sweep back passes the same
+    marks.
     """
     marks: list[tuple[int, float]] = []
     patterns_by_mark: list[Array] = []
@@ -268,7 +269,7 @@ def _sweeps_between_moves(segments: Segments, joint: int) -> list[list[int]]:
 def rate_errors(intervals: Sequence[MotionInterval], steps: int) -> Array:
     """Return the errors (17, n, 3) rad/s of the flange's mean rate, per radian of each of `ANGLES`.
 
-    The n intervals are of one motion, each in as many `steps`.
+    The n intervals belong to one motion; each is integrated in the given number of `steps`.
     """
     motion, ends_s = intervals[0].motion, np.array([(interval.start_s, interval.end_s) for interval in intervals])
     q_rad = motion.angles(np.linspace(ends_s[:, 0], ends_s[:, 1], steps + 1, axis=1))  # (n, steps + 1, joints)
@@ -293,7 +294,7 @@ def _wave_indices(motion: ArmMotion) -> dict[int, int]:
 
 
 def _end_patterns(interval: MotionInterval) -> list[Array]:
-    """Return a transfer's rate error (3,), rad/s per radian of error of one joint, moved before or after it."""
+    """Return a transfer's rate errors (3,), rad/s per radian of one moved joint's angle error at its start or end."""
     q_rad = interval.motion.angles(np.array([interval.start_s, interval.end_s]))
     axes = interval.motion.axes(q_rad) / (interval.end_s - interval.start_s)
     moved = [joint for joint in _wave_indices(interval.motion) if np.ptp(q_rad[:, joint]) >= STANDS_RAD]
@@ -301,7 +302,7 @@ def _end_patterns(interval: MotionInterval) -> list[Array]:
 
 
 def _stamp_patterns(segments: Segments, stamp_s: float) -> Array:
-    """Return the patterns by the stamps of each transfer's first and last sample; steady sweeps are not affected."""
+    """Return the patterns of time-stamp errors of each transfer's first and last sample; they do not affect sweeps."""
     transfers = np.flatnonzero((segments.sweep < REST) & (stamp_s > 0))
     patterns_by_mark = np.zeros((len(transfers), *segments.means_rad_s.shape))
     lasting_s = np.diff(segments.times_s[transfers])

@@ -34,7 +34,7 @@ class Scatter:
 
     @property
     def common_rad2_s2(self) -> Array:
-        """The covariance (3, N, N) of each axis' means by the shared errors."""
+        """The covariance (3, N, N) of each axis' means that is due to the shared errors."""
         by_axis = np.moveaxis(self.shared_rad_s, -1, 0)
         return np.asarray(np.swapaxes(by_axis, 1, 2) @ by_axis, dtype=np.float64)
 

@@ -97,7 +97,7 @@ def _mounting_rotation(angle_deg: float) -> Array:
 
 
 def _simulate_readings(inputs: VectorInputs, matrix: Array) -> Array:
-    """Return simulated readings (N, 3) of a sensor of F (3, 3); noise of a fixed seed makes all different."""
+    """Return simulated readings (N, 3) of a sensor with matrix F (3, 3); noise makes all different."""
     noise = np.random.default_rng(len(inputs.windows_s)).standard_normal((len(inputs.windows_s), 3))
     readings: Array = inputs.rates_rad_s @ matrix.T + np.sqrt(inputs.variances_rad2_s2) * noise
     return readings

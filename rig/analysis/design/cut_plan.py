@@ -24,7 +24,7 @@ class PlannedSegments:
     with_transfers: Segments
 
     def read_with(self, matrix: Array, angle_random_walk_rad_sqrt_s: float, rate_hz: float) -> "PlannedSegments":
-        """Return the segments as read by a sensor of F (3, 3) with that angle random walk.
+        """Return the segments as read by a sensor with matrix F (3, 3) and the given angle random walk.
 
         Transfers are omitted if samples are too far apart to resolve them.
         """

@@ -29,7 +29,7 @@ SOURCES: Mapping[str, tuple[Literal["A", "B"], str]] = {
 
 
 def noise_dof(solution: TriaxialSolution, equations: Equations) -> float:
-    """Return the degrees of freedom of the noise, the smallest of scale and bias, by the weights of the readings."""
+    """Return the noise's degrees of freedom from the weights of the readings: the smallest over scale and bias."""
     response = response_in_attitudes(solution, equations.measurements)
     rows = scale_and_bias(solution.matrix, scale_of(solution.matrix), len(response)) @ response
     return fewest_dof(rows, equations.variances.ravel(), equations.dof.ravel())

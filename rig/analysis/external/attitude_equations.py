@@ -36,7 +36,7 @@ class Equations:
 
     @staticmethod
     def from_rows(placed: PlacedReadings, *, exact_rates: bool) -> "Equations":
-        """Return a gyroscope's equations, by its reference's rates. Raise Fault `no_rates`."""
+        """Return a gyroscope's equations, with the rates of its reference. Raise Fault `no_rates`."""
         rows = placed.rows
         if rows is None or rows.rates_rad_s is None or not exact_rates:
             raise Fault(
@@ -56,7 +56,7 @@ class Equations:
     def from_placements(
         placements: Placements, quantity: Quantity, reference: KnownNorm, *, second_order: bool
     ) -> "Equations":
-        """Return the equations of a sensor of a constant reference."""
+        """Return the equations of a sensor that measures a constant reference."""
         return Equations(
             placements.read.means[quantity],
             placements.read.variances[quantity],
@@ -80,7 +80,7 @@ class Equations:
         return Placed(self.means, self.variances, self.attitudes, nothing, std_rad, norm_known=True)
 
     def solve(self, method: Method) -> TriaxialSolution:
-        """Return the solution. Raise Fault as `solve_triaxial` does, and `inverted_attitudes`."""
+        """Return the solution. Raise Fault `inverted_attitudes`, and as `solve_triaxial` does."""
         return solve_unless_inverted(self.attitudes, partial(self._solve, method), ["attitude_untrustworthy"])
 
     def _solve(self, method: Method, attitudes: Array) -> TriaxialSolution:

@@ -122,7 +122,7 @@ def _check_noisy(placements: Placements, quantity: Quantity) -> None:
 
 
 def find_method(name: str | None) -> Chosen | None:
-    """Return the method of that name. Raise Refused `unknown_estimator`."""
+    """Return the method called `name`. Raise Refused `unknown_estimator`."""
     return None if name is None else choose_estimator(CHOICES, name)
 
 

@@ -99,7 +99,7 @@ def _mean_rates(time_s: Array, total: Array, edges_s: Array, close: NDArray[np.b
 
 
 def _explain(rates: Array, readings: Array) -> tuple[float, Array]:
-    """Return the fraction of the rates' variance (n, 3) that a linear function of readings (n, 3) explains, and it."""
+    """Return the fraction of variance of rates (n, 3) that a linear map of readings (n, 3) explains, and that map."""
     design = np.column_stack([readings, np.ones(len(readings))])
     fit = np.linalg.lstsq(design, rates, rcond=None)[0]
     residuals = rates - design @ fit

@@ -182,7 +182,7 @@ def _solve_sweeps(read: ReadElsewhere, samples: Samples, name: str | None, refer
 def solve_swept(data: ExternalData, estimator: BySweeps | None) -> Estimate:
     """Solve by `estimator`; None chooses "increments" if the body was turned from rest to rest, else "vector".
 
-    Raise Fault as the estimators do, and `no_turns`.
+    Raise Fault `no_turns`, and as the estimators do.
     """
     if estimator is None:
         estimator = "vector" if data.turned is None else "increments"
@@ -277,7 +277,7 @@ def _gyroscope(item: Item, result: Result, clock: TimeBase | None) -> SensorResu
 
 
 def _describe_as_swept(result: Result) -> TurnedSolution:
-    """F and b of m = F ω + b as g = K (m + b) has them, with what the covariance is made of."""
+    """Return a solution for m = F ω + b in the form of one for g = K (m + b), with the budget of its covariance."""
     solution, matrix = result.solution, result.solution.matrix
     axes = SensorAxes.from_matrix(matrix)
     of_matrix = np.r_[F, OFFSET]

@@ -56,8 +56,8 @@ def _spell_time(time_s: float) -> str:
 def solve_turning(turning: Turning, window_s: float | None, *, any_mounting: bool) -> InIncrements:
     """Return the gyroscope's matrix and bias, from windows of a given or an automatically chosen length.
 
-    Raise Fault as `gather`, `solve_known_increments`, `check_rests_agree` and `check_axes` do, and
-    `inverted_attitudes`.
+    Raise Fault `inverted_attitudes`, and as `gather`, `solve_known_increments`, `check_rests_agree` and `check_axes`
+    do.
     """
     solved = solve_unless_inverted(
         turning.attitudes, lambda attitudes: _solve(replace(turning, attitudes=attitudes), window_s), CONTRADICTING

@@ -25,8 +25,8 @@ TAIL = 0.1  # of the rests, at either end, that may be none
 def check_rests_agree(turning: Turning, solution: KnownIncrements) -> None:
     """Raise Fault `bias_contradicts_rests` if the bias is not what the gyroscope reads at rest.
 
-    A rest must be one by the readings, and by the attitudes of its rows. Rests may differ by their own scatter, by
-    motion that the reference does not show, and by the effect of gravity on a gyroscope.
+    A rest counts only if both the readings and the attitudes of its rows show one. Rests may differ by their own
+    scatter, by motion that the reference does not show, and by the effect of gravity on a gyroscope.
     """
     at_rest = means_at_rest(turning, solution.clock_s)
     if at_rest is None:
@@ -49,7 +49,7 @@ def check_rests_agree(turning: Turning, solution: KnownIncrements) -> None:
 
 
 def _critical_value(dof: float) -> float:
-    """Return the critical value of the worst of three axes for `FALSE_ALARM` of sound recordings, by Student's t."""
+    """Return Student's critical value for the worst of three axes, which good recordings exceed with `FALSE_ALARM`."""
     from scipy.special import ndtri, stdtrit
 
     tail = false_alarm_of_each(FALSE_ALARM, 2 * len(RATE.axes))
@@ -57,9 +57,9 @@ def _critical_value(dof: float) -> float:
 
 
 def _undetected_std_rad_s(turned_rad_s: Array) -> float:
-    """Return the standard deviation of the body's undetected rate in the mean of all rests, about any axis.
+    """Return the standard deviation, about any axis, of the body's undetected motion averaged over all rests.
 
-    It comes from the scatter of the reference's rates (k, 3), inflated as Student's t.
+    It is estimated from the scatter of the reference's rates (k, 3) and inflated by Student's t for so few rests.
     """
     count = len(turned_rad_s)
     scatter = float(np.sqrt(np.var(turned_rad_s, axis=0, ddof=1).mean()))

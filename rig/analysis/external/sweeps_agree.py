@@ -88,7 +88,7 @@ def sweep_errors(solution: VectorSolution, data: ExternalData) -> SweepErrors | 
     rate_variance, axis_variance = sizes.median_variances
 
     def inflate(to_values: Array, dof: float, noise_dof: float) -> Array:
-        """Return the covariance (q, q) of values with derivatives (q, 12), by U over all possible sizes of errors."""
+        """Return the covariance (q, q) of values with derivatives (q, 12), scaled to U over all sizes of errors."""
         on_noise, on_rate, on_axis, on_wrong = (
             to_values @ effects @ effects.T @ to_values.T for effects in (noise, by_rate, by_axis, wrong)
         )
@@ -116,7 +116,7 @@ def count_redundant_rows(data: ExternalData) -> int:
 
 
 def noise_dof(solution: VectorSolution, data: ExternalData) -> float:
-    """Return the smallest degrees of freedom of the noise, by the weights of the means in the vector model."""
+    """Return the smallest degrees of freedom of the noise, from the weights of the means in the vector model."""
     averages = [*(sweep.average for sweep in data.sweeps), *data.rests]
     variances = np.array([average.variance_rad2_s2 for average in averages])
     dof = by_axis(average.dof for average in averages)

@@ -30,7 +30,7 @@ class MeanRates:
     covariance_rad2_s2: Array
 
     def rotate(self, matrix: Array) -> "MeanRates":
-        """Return the mean rates in another frame, or corrected, by a matrix (3, 3)."""
+        """Return the mean rates multiplied by a matrix (3, 3), to rotate them into another frame or to correct them."""
         return MeanRates(self.rate_rad_s @ matrix.T, matrix @ self.covariance_rad2_s2 @ matrix.T)
 
 

@@ -43,7 +43,7 @@ class EstimatedMount:
 def observe_as_mounted(
     runs: Sequence[RunData], settings: RunSettings
 ) -> tuple[tuple[ObservedRun, ...], tuple[EstimatedMount, ...]]:
-    """Return the observations of one calibration by the item's estimated mounts, and these mounts.
+    """Return the observations of one calibration, made with the item's estimated mounts, and these mounts.
 
     The solution of each sensor estimates the remaining mount errors, which are of second order. Raise as
     `observe_recordings` does.

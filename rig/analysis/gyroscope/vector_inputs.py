@@ -111,7 +111,7 @@ def _describe_recorded(
 def describe_sensor(
     uncertainty: Uncertainty, name: str, full_scale_rad_s: float, temperature_c: Array, temperature_step_k: float
 ) -> KnownSensor:
-    """Return the stated properties of the sensor `name` with that range, and its temperature in each average (N,)."""
+    """Return the stated properties of the sensor `name` with its range, and its temperature in each average (N,)."""
     return KnownSensor(
         nonlinearity=uncertainty.stated_size("nonlinearity_percent", name) / 100,
         full_scale_rad_s=full_scale_rad_s,
@@ -135,7 +135,7 @@ def lever_arms_m(turns: Sequence[Observation], extension_m: Array, mount: Array 
 
 
 def _axis_errors(turns: Sequence[Observation], rests: int, axis_deg: float) -> Array:
-    """Return the errors (P, N, 3) as in `VectorInputs` of the arm's angles, whose half-width is `axis_deg`."""
+    """Return the errors (P, N, 3) of the arm's angles, with the half-width `axis_deg`, as in `VectorInputs`."""
     steady = np.array([name.startswith(("twist", "zero")) for name in AXIS_ERRORS])
     std = np.radians(axis_deg) / np.sqrt(3) * np.where(steady, 1.0, WAVE_FRACTION)
     errors = [std[:, None] * turn.speed_rad_s * turn.axis_errors for turn in turns if turn.axis_errors is not None]
@@ -143,7 +143,7 @@ def _axis_errors(turns: Sequence[Observation], rests: int, axis_deg: float) -> A
 
 
 def _return_errors(turns: Sequence[Observation], rests: int, uncertainty: Uncertainty) -> Array:
-    """Return the errors (P, N, 3) as in `VectorInputs` of joints that return imperfectly to a sweep's axis."""
+    """Return the errors (P, N, 3) of joints that return imperfectly to a sweep's axis, as in `VectorInputs`."""
     errors = np.array([turn.speed_rad_s * turn.axis_errors for turn in turns if turn.axis_errors is not None])
     tilts = uncertainty.repeatability_std_rad * np.swapaxes(errors[:, ZEROS], 0, 1)
     visits = np.array([np.isin(np.arange(len(turns)), visit) for visit in _group_by_axis(turns)])
@@ -153,7 +153,7 @@ def _return_errors(turns: Sequence[Observation], rests: int, uncertainty: Uncert
 
 
 def _encoder_errors(turns: Sequence[Observation], rests: int, uncertainty: Uncertainty) -> Array | None:
-    """Return the errors (P, N, 3) of `VectorInputs` by a joint's encoder at each angle where arcs begin or end.
+    """Return the errors (P, N, 3), as in `VectorInputs`, of a joint's encoder at each angle where arcs begin or end.
 
     Sweeps in both directions share these angles, so repeats do not average the errors out. Return None if all sweeps
     are whole revolutions, which end where they began.
@@ -209,7 +209,7 @@ def list_given(surroundings: Surroundings, name: str) -> EarthRatePrior:
 def list_uncertainties(
     surroundings: Surroundings, name: str, earth_rate: EarthRate | None, stamp_std_s: float | None = None
 ) -> Unknown:
-    """Return the uncertainties that no recording of sensor `name` shows, including the estimated Earth's rate's.
+    """Return the uncertainties that no recording of sensor `name` shows, including that of the estimated Earth rate.
 
     `stamp_std_s` is as in `RecordedSensor`.
     """

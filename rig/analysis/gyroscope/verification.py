@@ -47,7 +47,7 @@ def verify(
     """Compare the readings that the board has calibrated (`after`) with those of the reference.
 
     - `before`: recordings of raw readings, from which the `calibration` was made; they determine the rotation between
-      the sensors. Without them `after` does.
+      the sensors. Without them, `after` determines it.
     - `gravity_rad_s`, two of (N, 3): gravity's effect on the corrected readings of sensor and reference in the
       revolutions of `after`, if the calibration estimated it.
 
@@ -84,7 +84,7 @@ def _gravity_difference(gravity_rad_s: tuple[Array, Array] | None, rotation: Arr
 def fit_mounting(
     sensor: str, reference: Reference, recordings: Sequence[ObservedRun], calibration: LinearCalibration | None
 ) -> RelativeRotation:
-    """Return the rotation from reference to sensor by the revolutions of the recordings.
+    """Return the rotation from reference to sensor, fitted to the revolutions of the recordings.
 
     `calibration` is None if the readings are calibrated. Raise Fault as `fit_rotation` does.
     """

@@ -117,8 +117,8 @@ def calibrate_accelerometers(
 ) -> dict[str, AccelerometerResult]:
     """Calibrate every sensor whose accelerations were recorded in dwells; align it with its gyroscope.
 
-    Raise Fault as `solve_imu` and `solve_triaxial` do, and `not_all_attitudes`, `second_order_not_seen`,
-    `swapped_axes`, `mirrored_axis`, `wrong_mounting`.
+    Raise Fault `not_all_attitudes`, `second_order_not_seen`, `swapped_axes`, `mirrored_axis`, `wrong_mounting`, and as
+    `solve_imu` and `solve_triaxial` do.
     """
     if not settings.planned_dwells:
         return {}

@@ -54,7 +54,7 @@ class AtReference:
 def correct_recordings(recordings: Sequence[ObservedRun], settings: RunSettings, reference_c: float) -> AtReference:
     """Correct every sensor to calibrate: its rates, and its accelerations in dwells.
 
-    Raise Fault as `fit_over_temperature` does, and `temperature_not_recorded`.
+    Raise Fault `temperature_not_recorded`, and as `fit_over_temperature` does.
     """
     surroundings = surroundings_of(recordings, settings)
     runs, polynomials = list(recordings), dict[str, dict[Quantity, OverTemperature]]()
