@@ -52,7 +52,7 @@ class SensorAxes:
         return covariance
 
     def non_orthogonality_std_rad(self, of_matrix: Array) -> Array:
-        """Return the standard deviations (3,) of the non-orthogonality, by the covariance (9, 9) of F."""
+        """Return the standard deviations (3,) of the non-orthogonality, from the covariance (9, 9) of F."""
         std: Array = np.sqrt(np.diag(self.angles_covariance_rad2(of_matrix)))[:3]
         return std
 
@@ -71,7 +71,7 @@ def nearest_rotation(axes: Array) -> Array:
 
 
 def parameter_jacobian(matrix: Array, scale: Array) -> Array:
-    """Return the derivative (6, 12) of k and b by F (row by row) and c: δk = −k³ F_i·δF_i, δb = −δc."""
+    """Return the derivative (6, 12) of k and b with respect to F, row by row, and c: δk = −k³ F_i·δF_i, δb = −δc."""
     jacobian = np.zeros((6, 12))
     jacobian[:3, :9].reshape(3, 3, 3)[PAIR, PAIR] = -(scale**3)[:, None] * matrix
     jacobian[3:, 9:] = -np.eye(3)
@@ -79,10 +79,10 @@ def parameter_jacobian(matrix: Array, scale: Array) -> Array:
 
 
 def angle_jacobian(axes: Array, scale: Array, rotation: Array) -> Array:
-    """Return the derivative (6, 9) of the non-orthogonality and of the mounting's `rotation` by F, row by row.
+    """Return the derivative (6, 9) of non-orthogonality and mounting `rotation` with respect to F, row by row.
 
-    δa_i = P_i δF_i with P_i = k_i (1 − a_i a_iᵀ). With A = S R and δR = [δθ]× R: (tr S − S) δθ = the axial vector of
-    M − Mᵀ, M = δA Rᵀ.
+    δa_i = P_i δF_i with P_i = k_i (1 − a_i a_iᵀ). With A = S R and δR = [δθ]× R: (tr S − S) δθ = the axial vector of M
+    − Mᵀ, M = δA Rᵀ.
     """
     project = scale[:, None, None] * (np.eye(3) - axes[:, :, None] * axes[:, None, :])
     against_axes, against_mounting = project @ axes.T, project @ rotation.T  # [i, :, j] = P_i a_j and P_i r_j

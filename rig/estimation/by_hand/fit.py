@@ -58,7 +58,7 @@ class GraphFit:
     iterations: int
 
     def redundancy_numbers(self, factor: Factor) -> Array:
-        """Return the redundancy number (r,) of each row of a factor: one less its leverage (Baarda 1968)."""
+        """Return the redundancy number (r,) of each row of a factor: one minus its leverage (Baarda 1968)."""
         design, _ = whiten_rows([factor])
         return np.asarray(np.clip(1 - _leverages(design, self.covariance), 1e-6, 1.0), dtype=np.float64)
 

@@ -40,7 +40,7 @@ def check_axes(session: HandRecording) -> None:
 
 
 def _quarters(session: HandRecording) -> tuple[Array, Array]:
-    """Return the rotation vectors (k, 3) of quarter turns by the accelerometer, and (k, 3) by the gyroscope."""
+    """Return the rotation vectors (k, 3) of quarter turns as measured by the accelerometer, and by the gyroscope."""
     about = []
     swept = []
     for row, move in enumerate(session.moves):

@@ -138,7 +138,7 @@ class Graph:
 
     @cached_property
     def residuals_rad(self) -> Array:
-        """The rotation vectors (N − 1, 3) of each move by the gyroscope, less those by the attitudes."""
+        """The rotation vectors (N − 1, 3) of each move from the gyroscope, minus those from the attitudes."""
         return rotation_vectors(self.integrals.rotations @ np.swapaxes(self.between, -1, -2))
 
     @cached_property
@@ -153,7 +153,7 @@ class Graph:
 
     @cached_property
     def stamp_std_s(self) -> float:
-        """The standard deviation of time stamps, by their second differences.
+        """The standard deviation of time stamps, from their second differences.
 
         The largest differences are omitted, because gaps cause them. True irregular sampling cannot be distinguished
         from wrong stamps.
@@ -203,7 +203,7 @@ def reading_noise(session: HandRecording) -> float:
 
 
 def _hand_held_std(scatter: Array, quiet: float, lasting_s: float) -> float:
-    """Return the standard deviation of the mean of a rest in the hand, by the low-frequency part of its readings."""
+    """Return the standard deviation of the mean of a rest in the hand, from the low-frequency part of its readings."""
     beyond = float(np.mean(scatter**2)) - (AS_QUIET * quiet) ** 2
     return float(np.sqrt(max(beyond, 0.0) / max(TREMOR_HZ * lasting_s, 1.0)))
 

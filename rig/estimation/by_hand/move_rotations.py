@@ -50,7 +50,7 @@ class GyroscopeModel:
 
 
 def integrate_moves(session: HandRecording, gyroscope: GyroscopeModel, up: Array) -> MoveIntegrals:
-    """Integrate the moves by a gyroscope's model, with the vertical `up` (N, 3) in the body at each rest."""
+    """Integrate the moves with a gyroscope's model. `up` (N, 3) is the vertical in the body at each rest."""
     matrix, biases, sensitivity, bends = gyroscope.matrix, gyroscope.biases, gyroscope.sensitivity, gyroscope.bends
     middles = np.array([(rest.start_s + rest.end_s) / 2 for rest in session.rests])
     inverse = np.linalg.inv(matrix)

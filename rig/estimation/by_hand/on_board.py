@@ -66,7 +66,7 @@ class BoardSolution:
 
 
 def solve_like_board(moves: Sequence[BoardMove]) -> BoardSolution:
-    """Solve the moves that the board has used, in their order."""
+    """Return the calibration that the board's algorithm computes from the moves it has used, in their order."""
     centre = np.concatenate([np.eye(3).ravel(), np.zeros(24)])
     information, gradient = np.diag(PRIOR_STD**-2.0), np.zeros(len(centre))
     for move in moves:
@@ -100,7 +100,7 @@ def _equations(centre: Array, move: BoardMove) -> Iterator[Equation]:
 
 
 def _vertical_on_face(centre: Array, face: int) -> tuple[Array, Array]:
-    """Return the vertical (3,) in a body that lies on a face, and its derivative (3, 2) by the face's two angles."""
+    """Return the vertical (3,) in a body on a face, and its derivative (3, 2) with respect to the face's two angles."""
     axis, leans = face // 2, centre[FACES][2 * face : 2 * face + 2]
     up, face_axes = np.zeros(3), np.zeros((3, 2))
     face_axes[(axis + 1) % 3, 0] = face_axes[(axis + 2) % 3, 1] = 1.0

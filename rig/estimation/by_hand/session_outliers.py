@@ -82,9 +82,9 @@ def _hypotheses(fit: GraphFit, since: int | None) -> Iterator[tuple[str, int]]:
 
 
 def _test_hypotheses(fit: GraphFit, since: int | None) -> list[FaultHypothesis]:
-    """Return each hypothesis with the drop of χ² beyond that by leaving out as many equations at random.
+    """Return each hypothesis with its drop of χ², minus the drop from as many equations left out at random.
 
-    The columns are projected off the model's, so the graph is not solved for each hypothesis.
+    The fault's columns are made orthogonal to the model's, so the graph need not be solved for each hypothesis.
     """
     design, residual = whiten_rows(fit.factors)
     std = np.concatenate([row.std for row in fit.factors])

@@ -118,7 +118,7 @@ class FixedAttitudes:
 
 
 def average_fixes(recorded: AttitudeSamples, state: DriftState) -> FixedAttitudes:
-    """Return the fixes by the gyroscope's integration with the parameters of a state."""
+    """Return the mean attitude of each fix, from which the gyroscope, with a state's parameters, removes the motion."""
     fixes, time_s = recorded.fixes, recorded.time_s
     at_s = np.clip(fixes.at_s + state.clock_s, time_s[0], time_s[-1])
     integrated = course(time_s, recorded.readings, state.matrix, state.bias, at_s)
@@ -225,7 +225,7 @@ def drift_model(averaged: FixedAttitudes, fixes: Fixes) -> DriftModel:
 
 
 def _list_errors(averaged: FixedAttitudes, fixes: Fixes, correlation: Array, step: Array) -> dict[str, Array]:
-    """Return the covariances (3n, 3n) of the increments by unit errors of the reference and of the times, by cause."""
+    """Return the covariances (3n, 3n) of the increments due to unit errors of the reference and the times, by cause."""
     count = len(fixes.placement)
     first = np.searchsorted(fixes.fix, np.arange(count))
     ratio = _relative(fixes)[first]
@@ -252,10 +252,10 @@ def _list_errors(averaged: FixedAttitudes, fixes: Fixes, correlation: Array, ste
 
 
 def _correlate(fixes: Fixes) -> Array:
-    """Return the correlation (N, N) between the fixes' means of an error that varies smoothly with attitude.
+    """Return the correlation (N, N) between fixes of an error that varies smoothly with attitude, averaged in each fix.
 
-    Matérn's function, ν = 3/2, of the chordal distance ‖R − R′‖/√2, which for small angles is the angle: positive
-    definite on SO(3) (Rasmussen and Williams, Gaussian Processes for Machine Learning (2006), 4.2).
+    It is Matérn's function, ν = 3/2, of the chordal distance ‖R − R′‖/√2, which equals the angle if small. It is
+    positive definite on SO(3) (Rasmussen and Williams, Gaussian Processes for Machine Learning (2006), 4.2).
     """
     counts = np.bincount(fixes.fix)
     begins = np.cumsum(counts) - counts
@@ -292,7 +292,7 @@ def _weigh_bias(averaged: FixedAttitudes, fixes: Fixes) -> Array:
 
 
 def _find_bias_changes(sensitivities: Array, nearby: Array, middles_s: Array, weights: Array) -> Array:
-    """Return the covariance (3n, 3n) of the increments by unit changes of b with attitude and time.
+    """Return the covariance (3n, 3n) of the increments due to unit changes of b with attitude and time.
 
     `nearby` (n, n) is the correlation by attitude, `middles_s` (n,) are the increments' middle times. b is their mean
     with `weights` (n,), and changes count from this mean: its distance from the mean of all recordings is no error.

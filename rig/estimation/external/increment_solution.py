@@ -114,10 +114,10 @@ class KnownIncrements:
 
 
 def solve_known_increments(time_s: Array, readings: Array, fixes: Fixes, start: DriftState) -> KnownIncrements:
-    """Solve readings (n, 3) in rad/s at times (n,), beginning at `start`.
+    """Estimate a gyroscope's matrix and bias from readings (n, 3) in rad/s at times (n,), with outlying fixes left out.
 
-    Raise Fault `rank_deficient`, `ill_conditioned`, `attitude_untrustworthy`, `clocks_apart`, `wrong_unit`,
-    `mirrored_axis`.
+    `start` holds the initial values of the bias drift. Raise Fault `rank_deficient`, `ill_conditioned`,
+    `attitude_untrustworthy`, `clocks_apart`, `wrong_unit`, `mirrored_axis`.
     """
     recorded = AttitudeSamples(time_s, readings, fixes, np.ones(len(fixes.at_s), dtype=np.bool_))
     settled = _settle(recorded, start)
@@ -294,7 +294,7 @@ def _causes(settled: _Settled) -> dict[str, Array]:
 
 
 def _earth(rate_rad_s: Array, covariance: Array) -> EarthSeen | Fault:
-    """Return the Earth's rate by the increments, without the prior of its norm, or the Fault if undetected."""
+    """Return the Earth's rate from the increments, without a prior of its norm, or the Fault if it is undetected."""
     information = np.linalg.inv(covariance)
     data_information: Array = information - EARTH_PRECISION * np.eye(3)
     data_information = data_information + 1e-9 * EARTH_PRECISION * np.eye(3)

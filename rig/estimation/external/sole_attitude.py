@@ -19,9 +19,9 @@ SMALLEST = 1e-9  # of the information: nothing
 
 
 def find_sole_attitude(theta: Array, placed: Placed) -> tuple[int, int] | None:
-    """Return the axis whose scale depends on one placement alone, and this placement; else None.
+    """Return the axis whose scale factor depends on a single placement, and that placement; None if there is none.
 
-    None too if no attitude was repeated. `theta` (p,) is the solution, in SI units and scaled about 1.
+    Return None also if no attitude was repeated. `theta` (p,) is the solution: SI units, scale factors about 1.
     """
     size = np.linalg.norm(theta[REFERENCE])
     verticals = np.einsum("nji,j->ni", placed.attitudes, theta[REFERENCE] / size)
@@ -58,7 +58,7 @@ def _group(verticals: Array) -> NDArray[np.intp]:
 
 
 def _find_std(rows: Array, wanted: Array) -> Array:
-    """Return the standard deviations (k,) of combinations `wanted` (k, q) by whitened rows (N, 3, q)."""
+    """Return the standard deviations (k,) of combinations `wanted` (k, q) that whitened rows (N, 3, q) determine."""
     flat = rows.reshape(-1, rows.shape[-1])
     scale = np.linalg.norm(flat, axis=0)
     scale = np.where(scale > 0, scale, 1.0)

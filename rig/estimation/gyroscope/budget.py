@@ -77,7 +77,7 @@ class Budget:
         return {contributor.name: contributor for contributor in self.contributors}[name]
 
     def std_of(self, name: str) -> Array:
-        """Return the standard uncertainties (6,) by one contributor. Raise KeyError as `line` does."""
+        """Return the standard uncertainties (6,) due to one contributor. Raise KeyError as `line` does."""
         return self.line(name).std
 
     def without(self, names: Collection[str]) -> "Budget":
@@ -160,7 +160,7 @@ def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributo
     matrix = solution.matrix
 
     def propagate(patterns: Array) -> Array:
-        """Return the covariance (6, 6) by independent patterns (k, N, 3) in rad/s of one standard uncertainty."""
+        """Return the covariance (6, 6) due to independent patterns (k, N, 3) in rad/s of one standard uncertainty."""
         effects = np.einsum("qni,kni->kq", solution.response, patterns)
         covariance: Array = effects.T @ effects
         return covariance

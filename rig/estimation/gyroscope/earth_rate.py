@@ -86,7 +86,7 @@ class EarthRate:
 
     @property
     def latitude_rad(self) -> float:
-        """The latitude by the rate's angle to the vertical, or its level part if the vertical one is fixed."""
+        """The latitude, from the rate's angle to the vertical, or from its level part if its vertical part is fixed."""
         return float(np.arcsin(self.up @ self.rate_rad_s / self.norm_rad_s))
 
     @property

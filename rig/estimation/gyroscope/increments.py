@@ -95,7 +95,7 @@ def course(time_s: Array, readings: Array, matrix: Array, bias: Array, at_s: Arr
 
 
 def track(time_s: Array, readings: Array, matrix: Array) -> Track:
-    """Integrate the readings, given less their bias, to their own times; otherwise as `course`."""
+    """Integrate readings from which the bias was subtracted to their own times; otherwise as `course`."""
     inverse = np.asarray(np.linalg.inv(matrix), dtype=np.float64)
     interval = _find_slopes(time_s, readings @ inverse.T)
     steps = _whole_steps(interval)
@@ -146,7 +146,7 @@ def _find_slopes(time_s: Array, rates: Array) -> _Interval:
 
 
 def _integrate_block(interval: _Interval, at_s: Array, inverse: Array) -> tuple[Array, Array, Array]:
-    """Return C and S at the instants and the end of a block, in its first body coordinates, and the rates."""
+    """Return C and S at the instants and the end of a block, relative to the body at its start, and the rates."""
     before = np.clip(np.searchsorted(interval.time_s, at_s, side="right") - 1, 0, len(interval.time_s) - 2)
     whole = _whole_steps(interval)
     attitudes = _running_product(whole.vectors)
@@ -167,9 +167,9 @@ class _IncrementSteps:
     lasting_s: Array
 
     def middle(self, inverse: Array) -> Array:
-        """Return the rotation (k, 3, 3) of each step per rate error, in body coordinates at the step's start.
+        """Return the rotation (k, 3, 3) of each step per unit of rate error, in the body's coordinates at its start.
 
-        The attitude half-way represents the whole step. The error of this is of the order φ²/24.
+        The attitude half-way stands for the whole step, which is wrong by about φ²/24.
         """
         return np.asarray(-_matrices(self.vectors / 2) @ inverse, dtype=np.float64)
 

@@ -28,7 +28,7 @@ def propagate_mount_squares(explained: Explained) -> Array:
 
 
 def _find_curvatures(explained: Explained, turns_rad: Array) -> Array:
-    """Return the second derivatives (6, E, E) of scale and bias by the mounts' E errors, in prior standard deviations.
+    """Return the second derivatives (6, E, E) of scale and bias with respect to E mount errors, per prior std.
 
     If D and S are the first- and second-order errors of the rates in F, its estimate is F + D + S; k is 1 / ‖row of F‖.
     """

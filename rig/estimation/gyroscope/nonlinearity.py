@@ -27,7 +27,7 @@ class Nonlinearity:
 
 
 def distinct_speeds(speeds_rad_s: Array) -> tuple[float, ...]:
-    """Return the mean of each group of speeds (n,) that differ by the arm's timing alone, slowest first."""
+    """Return the mean of each group of speeds (n,) that differ only because of the arm's timing, slowest first."""
     ordered = np.sort(speeds_rad_s)
     steps = np.flatnonzero(ordered[1:] > DISTINCT * ordered[:-1]) + 1
     return tuple(float(group.mean()) for group in np.split(ordered, steps))

@@ -58,7 +58,7 @@ class OwnError:
 def own_errors(
     sensor: KnownSensor, matrix: Array, turns_rad_s: Array, windows_s: Array, speeds_rad_s: tuple[float, ...]
 ) -> Iterator[OwnError]:
-    """Yield errors of a sensor of F (3, 3) at rates `turns_rad_s` (N, 3), zero at rest, in `windows_s` (N, 2).
+    """Yield errors of a sensor with matrix F (3, 3) at rates `turns_rad_s` (N, 3), zero at rest, in `windows_s` (N, 2).
 
     If all sweeps have one speed, the scale is that at this speed along an axis: an oblique rotation was slower, so its
     scale may differ. Several speeds determine the nonlinearity themselves.
@@ -103,13 +103,13 @@ def rounding_errors(means_rad_s: Array, roundings_rad_s: Array | float, variance
 
 
 def _temperature_deviations_k(sensor: KnownSensor, windows_s: Array, weights: Array) -> Array:
-    """Return deviations (2, N), K, from the weighted mean temperature: recorded, then hidden by the steps."""
+    """Return the deviations (2, N), K, from the weighted mean temperature: recorded ones, then those below a step."""
     recorded = subtract_mean(sensor.temperature_c, weights)
     return np.array([recorded, unseen_k(sensor.temperature_step_k, windows_s, weights)])
 
 
 def unseen_k(step_k: float, windows_s: Array, weights: Array) -> Array:
-    """Return the temperature change (N,), K, that one recorded step may hide: ± half a step as a linear drift.
+    """Return the temperature change (N,), K, below the thermometer's resolution: ± half a step as a linear drift.
 
     It is counted from the mean over the windows (N, 2) by their weights (N,).
     """

@@ -233,7 +233,7 @@ def _equate_rotation(
 
 
 def _derive(rate: Array, rows: Array) -> Array:
-    """Return the derivative (r, 12) of `rows` (r, 3) of F ω + c by F and c."""
+    """Return the derivative (r, 12) of `rows` (r, 3) · (F ω + c) with respect to F and c."""
     return np.asarray(np.hstack([np.kron(rows, rate), rows]), dtype=np.float64)
 
 
@@ -263,7 +263,7 @@ def _conditioning(equations: Sequence[_NormalEquations]) -> refusals.Conditionin
 
 
 def _find_birge_ratio(turns: Sequence[_NormalEquations], covariance: Array) -> tuple[float, float]:
-    """Return the Birge ratio of the rotations and its degrees of freedom; 1 and infinity if χ² is within these."""
+    """Return the Birge ratio of the rotations and its degrees of freedom; 1 and infinity if χ² is no larger."""
     chi_square, dof = 0.0, 0.0
     for turn in turns:
         weight = np.linalg.inv(turn.covariance)
@@ -293,7 +293,10 @@ def _check_closed(turns: Sequence[Turn], equations: Sequence[_NormalEquations], 
 
 
 def _budget(equations: Sequence[_NormalEquations], gain: Array) -> Budget:
-    """Return the contribution of each cause to scale and bias; `gain` (6, 12) is their derivative by the gradient."""
+    """Return each cause's contribution to scale and bias.
+
+    `gain` (6, 12) is their derivative with respect to the gradient.
+    """
     sources = {
         NOISE: "scatter of the readings",
         BIAS: "scatter of the rests",

@@ -50,7 +50,7 @@ def six_observation_budget(explained: Explained, six: Solution, unknown: Unknown
 
 
 def response_of(solution: Solution, inputs: VectorInputs) -> Array:
-    """Return the derivative (6, N, 3) of scale and bias by the mean readings; zero for rests, which are unused.
+    """Return the derivative (6, N, 3) of scale and bias with respect to the mean readings; zero for the unused rests.
 
     To first order, as in `Accumulator.solve`: δβ = (XᵀW X + XᵀW 1 ∂Γ/∂β)⁻¹ XᵀW e with e = −2 Σ_j k_j² (m_j + b_j) δm_j.
     """
@@ -84,7 +84,7 @@ def _propagate_speeds(inputs: VectorInputs, matrix: Array) -> Array:
 
 
 def _propagate_drift(bias: BiasProcess, response: Array, windows_s: Array) -> Array:
-    """Return the covariance (6, 6) by the drift of the bias."""
+    """Return the covariance (6, 6) due to the drift of the bias."""
     flicker = replace(bias, walk_rad_s_sqrt_s=0.0, scatter_rad_s=0.0)
     wandering = replace(bias, instability_rad_s=0.0)
     covariance: Array = np.sum(

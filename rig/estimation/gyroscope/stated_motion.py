@@ -95,7 +95,7 @@ class MotionErrors:
 
 
 def motion_errors(motion: StatedMotion) -> MotionErrors:
-    """Return the posterior sizes of the errors of the stated motion, by the residuals of sweeps and rests."""
+    """Return the posterior sizes of the errors of the stated motion, from the residuals of sweeps and rests."""
     smallest = min(SMALLEST_OF_NOISE * motion.relative_noise, LARGEST / 10)
     sizes = np.geomspace(smallest, LARGEST, SIZES)
     prior = -np.log(np.maximum(sizes / PRIOR_KNEE, 1.0))
@@ -107,7 +107,7 @@ def motion_errors(motion: StatedMotion) -> MotionErrors:
 
 
 def _likelihoods(motion: StatedMotion, axis_rad: float, rates: Array) -> Array:
-    """Return the restricted log likelihoods (k,) of several `rates` (k,) of rate errors and one of axis errors.
+    """Return the restricted log-likelihoods (k,) of sizes `rates` (k,) of rate errors, for one size of axis errors.
 
     A rate error changes the covariance of a sweep by one dyad, so each inverse has a rank-one update (Sherman and
     Morrison, Ann. Math. Stat. 21 (1950) 124).

@@ -107,12 +107,12 @@ def solve_vector_model(
     """Solve m = F ω + c (+ G a) by weighted least squares.
 
     - `means_rad_s`, `variances_rad2_s2` (N, 3): mean readings and the variances of these means.
-    - `rates_rad_s` (N, 3): the mean rate in the flange frame, zero for a rest; `speed_std_rad_s` (N,): of its size.
+    - `rates_rad_s` (N, 3): the mean rate in the flange frame, zero for a rest.
+    - `speed_std_rad_s` (N,): the standard deviation of the size of that rate.
     - `gravity_m_s2` (N, 3): the mean apparent gravity, in the flange frame.
     - `nominal_mounting` (3, 3): flange to sensor, to be compared with.
-    - `shared_covariance_rad2_s2` (N, N): covariance of the means beyond their own variances, as by bias drift, alike
-      and
-      independent for the three axes.
+    - `shared_covariance_rad2_s2` (N, N): covariance of the means beyond their own variances, for example due to
+      bias drift. It is equal for the three axes, which are independent.
 
     Raise Fault `too_few_observations`, `not_finite`, `bad_variance`, `zero_reading`, `duplicated_observation`,
     `rank_deficient`, `ill_conditioned`, `wrong_unit`, `mirrored_axis`, `swapped_axes`, `wrong_mounting`.
@@ -175,7 +175,7 @@ def solve_vector_model(
 
 
 def solve_vector_batch(means_rad_s: ArrayLike, rates_rad_s: ArrayLike, variances_rad2_s2: ArrayLike) -> VectorBatch:
-    """Solve the vector model of many runs at once, without checks: for studies of a design that is sound.
+    """Solve the vector model of many runs at once, without checks: for studies of a design known to be identifiable.
 
     `means_rad_s` (R, N, 3); `rates_rad_s` (N, 3) or (R, N, 3); `variances_rad2_s2` (N, 3), alike for all runs.
     """
@@ -266,16 +266,17 @@ def index_coefficients(columns: int) -> tuple[NDArray[np.intp], NDArray[np.intp]
 
 
 def _all_variances(variances: Array, speed_noise: Array, shared: Array | None) -> Array:
-    """Return the variances (N, 3) of each mean reading by all causes."""
+    """Return the variances (N, 3) of each mean reading from all causes."""
     common = 0.0 if shared is None else np.diag(shared)[:, None]
     total: Array = variances + speed_noise**2 + common
     return total
 
 
 def _response(to_parameters: Array, inverse: Array) -> Array:
-    """Return the derivative (6, N, 3) of k and b by the mean readings, by the chain rule.
+    """Return the derivative (6, N, 3) of k and b with respect to the mean readings, by the chain rule.
 
-    The factors are the derivative (6, 12) by the coefficients, and these coefficients' linear map (3, p, N).
+    The factors are their derivative (6, 12) with respect to the coefficients, and the linear map (3, p, N) from
+    readings to coefficients.
     """
     by_axis = np.concatenate([to_parameters[:, :9].reshape(6, 3, 3), to_parameters[:, 9:, None]], axis=2)
     response: Array = np.matmul(np.swapaxes(by_axis, 0, 1), inverse[:, :4]).transpose(1, 2, 0)

@@ -179,7 +179,7 @@ def project_reference(delay_s: float, movement: Movement) -> Array:
 
 
 def _differentiate_lag(waves: Array, sweeps: Sweeps) -> Array:
-    """Return the derivative of harmonics (M, 3, …) by the lag of the angle. The mean rate's own effect is left out."""
+    """Return the derivative of harmonics (M, 3, …) with respect to the angle's lag, without the mean rate's effect."""
     by_wave = (len(waves), 3, *(1,) * (waves.ndim - 2))
     cosine, sine = (sweeps.turning_rad2_s2[:, row] / sweeps.speeds_rad_s[:, None] for row in (4, 5))
     changed: Array = sine.reshape(by_wave) * waves[:, 1:2] - cosine.reshape(by_wave) * waves[:, 2:]
@@ -195,7 +195,7 @@ def project_lever_arm(delay_s: float, movement: Movement) -> Array:
 
 
 def _around_axes(turning_rad2_s2: Array, movement: Movement) -> Array:
-    """Return the matrices (K, 3, 3) that map a lever arm to its acceleration by ω² and α (M, 2, 3) in sweeps."""
+    """Return the matrices (K, 3, 3) that map a lever arm to its acceleration in sweeps, due to ω² and α (M, 2, 3)."""
     axes = movement.sweeps.axes_flange
     centripetal, euler = axes[:, :, None] * axes[:, None, :] - np.eye(3), cross(axes)
     squares, accelerations = np.moveaxis(turning_rad2_s2, 1, 0)[..., None, None]
@@ -216,7 +216,7 @@ def _arms(lever_m: Array, movement: Movement) -> Array:
 
 
 def _differentiate_delay(theta: Array, movement: Movement) -> Array:
-    """Return the derivative (K, 3) of the specific force by the delay."""
+    """Return the derivative (K, 3) of the specific force with respect to the delay."""
     sweeps = movement.sweeps
     evenly = replace(movement, sweeps=replace(sweeps, turning_rad2_s2=np.zeros_like(sweeps.turning_rad2_s2)))
     waves = _harmonics_of_sweeps(project_reference(theta[DELAY], evenly) @ theta[REFERENCE], movement)
@@ -249,7 +249,7 @@ def effects(theta: Array, movement: Movement) -> Array:
 
     Each dwell has three errors. The sweeps of a station share ten: small rotations of flange and base, and waves of the
     joint's angle, A cos θ + B sin θ + C cos 2θ + D sin 2θ, of which the first harmonic remains. If the wrists' errors
-    are known by kind, they follow, shared by all.
+    are given by kind, they come last and are common to all stations.
     """
     return combine_effects(*split_effects(theta, movement), movement.own_share)
 
@@ -286,7 +286,7 @@ def turned(theta: Array, movement: Movement) -> Array:
 
 
 def _differentiate_angle(apparent: Array, theta: Array, sweeps: Sweeps) -> Array:
-    """Return the change (3 M, 3, 4) of the specific force by waves w of the angle.
+    """Return the change (3 M, 3, 4) of the specific force due to waves w of the angle.
 
     Gravity `apparent` turns by w times the derivative of its first harmonic, the rate grows by ω w′; centripetal 2 ω²
     w′ (a aᵀ − 1) (p + r) and Euler ω² w″ a × (p + r) have a first harmonic for the waves of one period per revolution.
@@ -306,7 +306,7 @@ def _differentiate_angle(apparent: Array, theta: Array, sweeps: Sweeps) -> Array
 
 
 def _read(changes: Array, s: Array, theta: Array, movement: Movement) -> Array:
-    """Return the changes (K, 3, P) of the readings by small changes (K, 3, P) of the specific force s (K, 3)."""
+    """Return the changes (K, 3, P) of the readings due to small changes (K, 3, P) of the specific force s (K, 3)."""
     if not theta[SECOND].any():
         return np.asarray(matrix(theta) @ changes, dtype=np.float64)
     nonlinear: Array = changes + 2 * theta[SECOND][:, None] * _product(s[..., None], changes, movement)

@@ -121,7 +121,7 @@ def find_worst_attitude(start: Array, placed: Placed, fit: AttitudeWeighted) -> 
 
 
 def effects(theta: Array, attitudes: Array, v_bar: Array) -> Array:
-    """Return E (N, 3, 3): the change of each reading by a small rotation of its attitude."""
+    """Return E (N, 3, 3): the change of each reading due to a small rotation of its attitude."""
     reference = np.einsum("nji,j->ni", attitudes, theta[REFERENCE])
     cross = np.zeros((len(attitudes), 3, 3))
     x, y, z = reference.T
@@ -197,7 +197,7 @@ def maximise_likelihood(
 
 
 def _find_uncertainty(delta: float, fit: Array, rotations: Array) -> float:
-    """Return the uncertainty by the expected information on δ²: tr((P G)²)/2, G = E Eᵀ, P the residual maker."""
+    """Return the uncertainty from the expected information on δ²: tr((P G)²)/2, G = E Eᵀ, P the residual maker."""
     orthogonal = np.linalg.qr(fit)[0].reshape(*rotations.shape[:2], -1)
     growth = rotations @ np.swapaxes(rotations, -1, -2)
     grown = growth @ orthogonal

@@ -42,11 +42,11 @@ class Fit:
     iterations: int
 
     def covariance(self) -> Array:
-        """Return the covariance (22, 22) of θ by the Fisher information."""
+        """Return the covariance (22, 22) of θ from the Fisher information."""
         return np.asarray(self.free @ self._inverse() @ self.free.T, dtype=np.float64)
 
     def response(self) -> Array:
-        """Return the derivative (22, 3 K) of θ by the readings."""
+        """Return the derivative (22, 3 K) of θ with respect to the readings."""
         whitener = self.readings.whitener(self.std_rad)
         return np.asarray(self.free @ self._inverse() @ (whitener @ self.jacobian).T @ whitener, dtype=np.float64)
 

@@ -55,7 +55,7 @@ def uniformity(
     variances_t2: ArrayLike,
     attitude_error_rad: float,
 ) -> Uniformity:
-    """Return the test of a uniform field: the fit of the readings with that error of the attitudes.
+    """Return the test of a uniform field: a fit of the readings with the given error of the attitudes.
 
     `solution` is that of these `readings_t`, `variances_t2` (N, 3) in `attitudes` (N, 3, 3). Raise Fault
     `attitude_untrustworthy` if no fit exists.

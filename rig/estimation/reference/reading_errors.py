@@ -49,7 +49,7 @@ def bending(theta: Array, movement: Movement) -> Array:
 def bias_warming(movement: Movement) -> Array:
     """Return the patterns (6, 3 K) of one standard uncertainty of β, the bias's temperature coefficient, by axis.
 
-    Three are for the recorded temperature, three for changes that the recorded steps hide.
+    Three are for the recorded temperature, three for changes smaller than a step of the thermometer.
     """
     sensor = movement.sensor_errors
     if sensor is None:
@@ -71,7 +71,7 @@ def scale_warming(theta: Array, movement: Movement) -> Array:
 
 
 def _warmer_k(sensor: AccelerometerErrors, movement: Movement) -> tuple[Array, Array]:
-    """Return the temperature above the mean (K,) of each segment as recorded, and the part (K,) that steps may hide."""
+    """Return each segment's recorded temperature above the mean (K,), and the part (K,) below the recorded steps."""
     return repeat_by_segment(sensor.warmer_k, movement), repeat_by_segment(sensor.unseen_k, movement)
 
 
@@ -96,7 +96,7 @@ def wandering(movement: Movement) -> Array:
 
 
 def walking(sensor: AccelerometerErrors, movement: Movement) -> Array:
-    """Return the covariance (3 K, 3 K) of a random walk of each axis, 1 m/s² in a second."""
+    """Return the covariance (3 K, 3 K) of a random walk of each axis, of 1 m/s² after one second."""
     return _expand_bias(walk_covariance(sensor.windows_s), movement)
 
 
@@ -138,7 +138,7 @@ def project_errors(theta: Array, movement: Movement, change: Callable[[Array], A
 
 
 def _not_repeated(theta: Array, movement: Movement) -> Array:
-    """Return the covariance (3 K, 3 K) by small rotations of sweeps, independent for each sweep."""
+    """Return the covariance (3 K, 3 K) due to small rotations of sweeps, independent for each sweep."""
     sweeps = movement.sweeps
     if movement.repeatability_rad == 0.0:
         return np.zeros((movement.readings().size,) * 2)

@@ -71,7 +71,7 @@ class KnownSize:
 
 
 def scale_and_bias(matrix: Array, scale: Array, parameters: int) -> Array:
-    """Return the derivative (6, p) of scale and bias by θ (p,), which begins with F, the reference and b.
+    """Return the derivative (6, p) of scale and bias with respect to θ (p,), which begins with F, the reference and b.
 
     The bias changes sign: in θ it is a part of the reading, in a gyroscope's result it is added to the reading.
     """

@@ -35,12 +35,12 @@ def decorrelate(noise: Array, effects: Array) -> Decorrelation:
 
 
 def estimate_common_error(readings: Decorrelation, residuals: Array, jacobian: Array) -> float:
-    """Return δ in rad of restricted maximum likelihood from residuals (n,) and J (n, q)."""
+    """Return δ in rad, by restricted maximum likelihood, from residuals (n,) and J (n, q)."""
     return maximise_likelihood(readings.growth, readings.transform @ residuals, readings.transform @ jacobian)[0]
 
 
 def add_uncertainty(readings: Decorrelation, std_rad: float, jacobian: Array) -> AttitudeError:
-    """Return δ with its uncertainty by the expected information on δ²."""
+    """Return δ with its uncertainty, from the expected information on δ²."""
     expected = information(readings.growth, std_rad, readings.transform @ jacobian)
     if expected <= 0:
         return AttitudeError(std_rad, float("inf"))

@@ -103,7 +103,7 @@ def allan_curve(stretches: Sequence[Array], interval_s: float) -> AllanCurve:
 
 
 def read_axis(curve: AllanCurve, axis: int) -> AllanAxis:
-    """Return random walk and bias instability by the curve of one axis."""
+    """Return random walk and bias instability from the curve of one axis."""
     walk = _random_walk(curve, axis)
     return AllanAxis(walk, _instability(curve, axis, walk))
 

@@ -45,7 +45,7 @@ class Steps:
 
     @property
     def variance(self) -> Array:
-        """The variance (3,) of a reading by its rounding: a twelfth of the square of a step."""
+        """The variance (3,) of a reading due to rounding: a twelfth of the square of a step."""
         result: Array = self.units**2 / 12
         return result
 
@@ -96,7 +96,7 @@ def find_steps(readings: Array) -> Array:
 
 
 def bound_rounding_variance(readings: Array, steps: Steps, smooth: Array, scatter: Array) -> Array:
-    """Return an upper bound of the variance (3,) by rounding of a mean of readings (n, 3).
+    """Return an upper bound of the variance (3,) that rounding adds to a mean of readings (n, 3).
 
     `smooth` (n, 3) is their known variation, such as the ripple of the arm, which makes readings cross steps; `scatter`
     (3,) is the variance of the rest, noise and rounding together (Sheppard). Readings with fewer than three different

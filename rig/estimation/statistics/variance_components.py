@@ -116,7 +116,7 @@ class MixedModel:
         return optimum
 
     def causes(self, std: Array, fit: MixedFit) -> list[Array]:
-        """Return the parts (p, p) of θ's covariance by C₀, each component, and the prior of θ."""
+        """Return the parts (p, p) of θ's covariance that are due to C₀, each variance component, and the prior of θ."""
         from scipy.linalg import cho_factor, cho_solve
 
         factor = cho_factor(self.covariance(std), lower=True)
@@ -130,7 +130,8 @@ class MixedModel:
     def expand(self, std: Array, wanted: Array) -> Array:
         """Return the half-widths (q,) of 95.45 % intervals of `wanted` (q, p) combinations of θ about their estimates.
 
-        The estimates are those for `std` (k,), the intervals those over all standard deviations.
+        The estimates are those at the standard deviations `std` (k,). The intervals integrate over all standard
+        deviations.
         """
         top = wanted @ self.solve(std).theta
         offsets = []
@@ -168,7 +169,7 @@ class MixedModel:
         return lower, design, observed, information, -0.5 * (determinant + square)
 
     def _log_prior(self, logarithms: Array) -> float:
-        """Return the log-density of ln σ for half-Cauchy σ and the squares measured alone, but for a constant."""
+        """Return the log-density of ln σ, up to a constant: half-Cauchy for σ, χ² for squares measured separately."""
         relative = logarithms - np.log(self.mixed.scales)
         squares, dof = self.mixed.alone.T
         measured = dof * logarithms + squares / 2 * np.exp(-2 * logarithms)

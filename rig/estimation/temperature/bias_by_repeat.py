@@ -98,13 +98,13 @@ def bias_by_repeat(readings: Array, variances: Array, modelled: Array, bias: Arr
 
 
 def _residual_dof(errors: Array) -> int:
-    """Return the degrees of freedom of residuals (R, N, 3) after an error per attitude and a bias per repeat."""
+    """Return the dof of residuals (R, N, 3) after a fit of an error per attitude and a bias per repeat."""
     repeats, attitudes = errors.shape[:2]
     return int((repeats - 1) * (attitudes - 1))
 
 
 def _excess(errors: Array, variances: Array) -> Array:
-    """Return the Birge ratio (3,), 1 at least, of residuals after an error per attitude and a bias per repeat."""
+    """Return the Birge ratio (3,), at least 1, after a fit of one error per attitude and one bias per repeat."""
     residuals = errors - errors.mean(axis=0) - errors.mean(axis=1, keepdims=True) + errors.mean(axis=(0, 1))
     dof = _residual_dof(errors)
     if dof == 0:

@@ -282,7 +282,7 @@ class _ParameterFits:
         self.count = 3 * (len(readings.means) - poses.shape[1])
 
     def refer(self, readings: RepeatedMeans, fit: "_TemperatureFit") -> None:
-        """Refer the inputs to the readings at the reference temperature instead of the mean one."""
+        """Express the inputs by the readings at the reference temperature instead of at the mean temperature."""
         powers = self.powers[:, 1:] * self.span ** np.arange(1.0, HIGHEST + 1)
         self._take(readings, readings.means - powers @ fit.bias + (1 - 1 / (1 + powers @ fit.relative)) * self.inputs)
 
@@ -434,7 +434,7 @@ def _centred_coefficients(fit: _TemperatureFit, centre: Array) -> Array:
 
 
 def _loop_covariance(size: Array, std: Array) -> Array:
-    """Return the covariance (24, 24) of values within the hysteresis loop, beyond that by noise."""
+    """Return the covariance (24, 24) of values within the hysteresis loop, beyond that due to noise."""
     variances = np.zeros(COEFFICIENTS)
     half = np.maximum(size**2 - std**2, 0.0) / 3
     variances[:3], variances[COEFFICIENTS // 2 : COEFFICIENTS // 2 + 3] = half[:3], half[3:]
