@@ -126,7 +126,7 @@ def convert_stream(raw: NDArray[Any], sensor: RecordedSensor, clock: TimeBase) -
 
 
 def steps_of(raw: NDArray[Any], sensor: RecordedSensor, quantity: Quantity) -> Steps:
-    """Return the steps of a quantity in a sensor's samples (n,): a board records the converter's counts."""
+    """Return the resolution steps of a quantity in a sensor's samples (n,). A board records the converter's counts."""
     channel = sensor.channel(quantity)
     return channel.steps(channel.values(raw), trusts_counts=sensor.on_board)
 

@@ -95,13 +95,13 @@ class SensorObservations:
 def observe_sensor(
     run: RunData, sensor: str, motion: ArmMotion, settings: ObservationThresholds, superseded: Collection[int] = ()
 ) -> SensorObservations:
-    """Average every finished sweep of a recording in which the arm moved by `motion`.
+    """Average every finished sweep of a recording; `motion` is the arm's motion in it.
 
     Interrupted sweeps are left out. So are sweeps and dwells whose index is in `superseded`, which a later recording of
-    the run repeats, and the rests next to them. Raise Fault as `dwell_readings` does, and `incomplete_revolution`,
-    `arm_states_lost`, `speed_slider`, `speed_not_constant`, `other_joint_moved`, `lost_samples`, `saturation`,
-    `stuck_sensor`, `stuck_axis`, `wrong_axis`, `wrong_sign`, `wrong_unit`, `not_finite`, `time_base_not_found`,
-    `board_clock_restarted`, `duplicated_samples`, `impossible_times`.
+    the run repeats, and the rests next to them. Raise Fault `incomplete_revolution`, `arm_states_lost`, `speed_slider`,
+    `speed_not_constant`, `other_joint_moved`, `lost_samples`, `saturation`, `stuck_sensor`, `stuck_axis`, `wrong_axis`,
+    `wrong_sign`, `wrong_unit`, `not_finite`, `time_base_not_found`, `board_clock_restarted`, `duplicated_samples`,
+    `impossible_times`, and as `dwell_readings` does.
     """
     stream = synchronize_stream(run.samples[sensor], run.sensors[sensor], motion)
     revolutions = list[Observation]()
@@ -225,7 +225,7 @@ def _average_revolution(
 
 
 def _sample_turn(time_s: Array, motion: ArmMotion, turn: Revolution, covered: NDArray[np.bool_]) -> SampledTurn:
-    """Return a turn at those of the times (n,) with a record of the arm's motion, and their mask (n,), `covered`."""
+    """Return a turn at those times at which the arm's motion is recorded, and the mask (n,) of these, `covered`."""
     fraction = (time_s - turn.start_s) / turn.duration_s
     waves = harmonics(turn.angle_rad * fraction, 2 * turn.beats)[covered]
     if not turn.closed:

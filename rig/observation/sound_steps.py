@@ -39,7 +39,7 @@ def _find_sound_steps(run: RunData, settings: ObservationThresholds) -> frozense
 def _find_sound_steps_of(
     run: RunData, sensor: str, motion: ArmMotion, settings: ObservationThresholds
 ) -> frozenset[int]:
-    """Return one sensor's sound sweeps and dwells.
+    """Return one sensor's sweeps and dwells that have no fault.
 
     Return None if the sensor ever failed to follow the arm, because the onset of that fault is unknown.
     """

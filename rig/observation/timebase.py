@@ -156,8 +156,8 @@ def check_readings(board_time_s: Array, readings: Array) -> None:
 def _find_first_clock(board_time_s: Array, readings: Array, motion: KnownMotion) -> tuple[TimeBase, int]:
     """Return the coarse clock of the first samples that suffice to find one, and their number.
 
-    A recording of ordinary length needs all samples. In one of hours they are a part; the fine clock is then extended
-    to twice its length, repeatedly.
+    A recording of ordinary length needs all samples. In a recording of hours a part suffices; the fine clock is then
+    extended to twice its length, repeatedly.
     """
     span_s = LONG_RUN_S
     while True:
@@ -205,7 +205,7 @@ def estimate_coarse_offset(board_time_s: Array, readings_rad_s: Array, motion: K
 
 
 def _arm_rate(motion: KnownMotion, step_s: float) -> tuple[float, Array]:
-    """Return the time at which the motion starts, and from then its rate (3, n) at even steps, less its mean."""
+    """Return the time at which the motion starts, and from then its rate (3, n) at even steps, minus its mean."""
     grid = np.arange(motion.time_s[0], motion.time_s[-1], step_s)
     rate = motion.rate(grid).T
     return float(grid[0]), rate - rate.mean(axis=1, keepdims=True)
@@ -252,8 +252,8 @@ def _fast_length(least: int) -> int:
 def _explained_fractions(turning: Array, filled: NDArray[np.bool_], moving: Array, lags: NDArray[np.intp]) -> Array:
     """Return the fraction (k,) of the variance that the arm's rate explains at each lag (k,) of bins; 0 if few overlap.
 
-    The arm's rate (3, m) explains the board's rate (3, n) by a linear map, over the bins that are `filled` (n,). By the
-    normal equations: the fine fit starts from the best lag, so their precision is enough.
+    The arm's rate (3, m) explains the board's rate (3, n) by a linear map, over the bins that are `filled` (n,). The
+    normal equations are precise enough, because the best lag is only the start of the fine fit.
     """
     board, products = np.vstack([filled, turning]), np.empty((len(lags), 7, 7))
     for product, lag in zip(products, lags, strict=True):

@@ -104,10 +104,10 @@ def turn_mean(readings: Array, steps: Steps, turn: SampledTurn) -> tuple[Mean, A
 
 
 def _line_variance(slow: Array, weights: Array, residuals: Array) -> Array:
-    """Return the variance (3,) of a mean by weights (n,) due to slow columns (n, k) fitted to residuals (n, 3).
+    """Return the variance (3,) of a mean with weights (n,) due to slow columns (n, k) fitted to residuals (n, 3).
 
-    Only their amplitude is used: the phase is arbitrary, and by chance of phase even a large line may change this mean
-    little.
+    Only their amplitude is used, because the phase is arbitrary: with some phases even a large line hardly changes this
+    mean.
     """
     powers = (fit_columns(slow, residuals) ** 2).reshape(-1, 2, 3).sum(axis=1)
     kept = ((weights @ slow) ** 2).reshape(-1, 2).sum(axis=1)
@@ -123,7 +123,7 @@ def _fit_residuals(columns: Array, values: Array) -> Array:
 
 
 def _find_turn_lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines:
-    """Find the vibrations in readings (n, 3), besides steady columns (n, k) and the rates by the encoders.
+    """Find the vibrations in readings (n, 3) beyond steady columns (n, k) and the rates that the encoders measure.
 
     Fast lines of the arm's rate appear in the readings at the same frequency. The residuals show the others.
     """

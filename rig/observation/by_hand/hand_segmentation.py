@@ -173,7 +173,7 @@ class Segmenter:
 
     @property
     def live(self) -> Live:
-        """The body's state by the latest evaluation."""
+        """The body's state at the latest evaluation."""
         session = self._session
         if not session.rests:
             return Live(self._looked_s, "starting", self._looked_s, np.zeros(3), 0.0)

@@ -41,10 +41,10 @@ def find_rests(
     still_at_first: bool = False,
     lying: Sequence[Window] = (),
 ) -> tuple[Window, ...]:
-    """Return the rests of two blocks and longer, by readings (n, 3) of one or several quantities at rising times (n,).
+    """Return the rests of at least two blocks, from readings (n, 3) of one or several quantities at rising times (n,).
 
-    `still_at_first`: the first second shows the body as still as it ever is. `lying`: windows of declared rests, in
-    which it lies still at least part of the time, if anything is declared.
+    `still_at_first`: whether the body was at rest in the first second, so that its scatter there counts as rest.
+    `lying`: windows of rests that the user declared; the body lies still for at least a part of each.
     """
     quantity = next(quantity for quantity in quantities().values() if quantity in readings)
     if len(time_s) < 2 * FEWEST:

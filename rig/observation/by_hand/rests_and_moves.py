@@ -36,12 +36,12 @@ Readings = tuple[Array, Array, Array | None]  # times (n,), rates (n, 3), accele
 
 
 def microsecond_of(sensor: RecordedSensor) -> float:
-    """Return the duration, s, of a microsecond of a sensor's stamps by the clock of its board."""
+    """Return the true duration, s, of one microsecond in a sensor's time stamps, which its board's clock counts."""
     return MICROSECOND_S if sensor.on_board else 1e-6
 
 
 def readings_of(sensor: RecordedSensor, samples: NDArray[np.void], from_s: float = 0.0) -> Readings:
-    """Return samples (n,) in SI units, at times of the crystal that stamps them, shifted by `from_s`."""
+    """Return samples (n,) in SI units, with times on the clock of the crystal that stamps them, shifted by `from_s`."""
     time_s = from_s + microsecond_of(sensor) * samples["board_time_us"].astype(np.float64)
     force = sensor.channel(ACCELERATION).values(samples) if sensor.measures(ACCELERATION) else None
     return time_s, sensor.channel(RATE).values(samples), force
@@ -138,7 +138,7 @@ def replay_runs(runs: Sequence[RunData], name: str) -> tuple[Segmenter, NotCount
 
 
 def session_of(runs: Sequence[RunData], name: str) -> HandRecording:
-    """Return a session's rests and moves by one sensor, for the solution."""
+    """Return a session's rests and moves as one sensor recorded them, for the solution."""
     segmenter, refused, _ = replay_runs(runs, name)
     return refused.filter_session(segmenter.handled)
 

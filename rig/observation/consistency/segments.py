@@ -127,7 +127,7 @@ class _Division:
         return mean_weights(self.groups, self.groups[:, :0])
 
     def subtract_means(self, values: Array, weights: Array) -> Array:
-        """Return values (m, k) less their segments' means by weights (p, m)."""
+        """Return values (m, k) minus the means of their segments with weights (p, m)."""
         residuals: Array = values - self.groups @ (weights @ values)
         return residuals
 
@@ -151,7 +151,7 @@ def _segment_revolution(
 ) -> SegmentedAverage:
     """Average a revolution or an arc in segments, without the spectral lines of the whole average.
 
-    A vibration that the encoders miss in part is no noise of a segment.
+    A vibration that the encoders measure only in part does not count as noise of a segment.
     """
     average, axis = turn.average, turn.axis_flange
     times_s = stream.time_s[between(stream, average.start_s, average.end_s)]
@@ -217,7 +217,7 @@ def _segment_rest(stream: Stream, motion: ArmMotion, average: Average, count: in
 
 
 def _noise_at_rest(residuals: Array, segments: int, columns: int, steps: Steps) -> MeanNoise:
-    """Return the noise of readings by the residuals (n, 3) of a fit of segment means and spectral lines."""
+    """Return the noise of readings, from the residuals (n, 3) of a fit of segment means and spectral lines."""
     dof = max(len(residuals) - segments - columns, 1)
     scatter = np.maximum(np.sum(residuals**2, axis=0) / dof, steps.variance)
     in_a_mean = scatter * np.array([correlation_inflation(axis) for axis in residuals.T])

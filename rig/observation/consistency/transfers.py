@@ -70,7 +70,7 @@ class WristTransfer:
 def average_transfers(
     name: str, recordings: Sequence[ObservedRun], matrix: Array, site: Site, extension_m: Array
 ) -> list[WristTransfer]:
-    """Average all transfers of a gyroscope of F (3, 3) mounted at `extension_m` (3,) from the flange, in its frame.
+    """Average all transfers of a gyroscope with matrix F (3, 3), mounted at `extension_m` (3,) in the flange's frame.
 
     Transfers with a missing sample or one out of range are left out.
     """
@@ -150,7 +150,7 @@ def _scatter(readings: Array, time_s: Array, motion: ArmMotion, down_m_s2: Array
 def _find_transfers(run: RunData, stream: Stream, motion: ArmMotion) -> Iterator[MotionInterval]:
     """Yield the intervals from before the arm moves until it has stopped, if no sample is missing.
 
-    A transfer is a part of a turn, so a shaft whose encoder is exact over whole turns only has none.
+    A transfer is a part of a turn, so a shaft whose encoder is exact only over whole turns has no usable transfers.
     """
     if not motion.tells_parts_of_turns:
         return

@@ -102,7 +102,7 @@ def average_sweeps(samples: Samples, sweeps: Mapping[str, Array]) -> ExternalDat
 
 
 def _list_hiding(by_angle: TurnedData, data: ExternalData) -> Iterator[Omitted]:
-    """Yield an entry for the turns that are left out because readings are missing, if there are any."""
+    """Yield an entry for the turns left out because missing readings may hide a part of them, if there are any."""
     if by_angle.hiding:
         first = next(sweep for sweep in data.sweeps if sweep.sweep in by_angle.hiding)
         where = f"row {first.sweep}, from {first.average.start_s:.10g} s"

@@ -75,8 +75,8 @@ def read_sample_table(
     """Return the columns of a file in any format: the quantities `needed` and all others it holds.
 
     `mapped` is for a table whose columns have other names. Rows with blank cells count if they hold all quantities of
-    the sensors in `only`, or all that the file has. Raise Refused as `readings_in` does, and `no_file`,
-    `wrong_columns`, `wrong_unit`, `not_a_number`, `blank_cells`.
+    the sensors in `only`, or all that the file has. Raise Refused `no_file`, `wrong_columns`, `wrong_unit`,
+    `not_a_number`, `blank_cells`, and as `readings_in` does.
     """
     readings = readings_in(path)
     if readings is not None:
@@ -169,7 +169,7 @@ def _refuse_separate_rows(
 
 
 def samples_in(table: Columns, where: str) -> Samples:
-    """Return the readings in columns (n,), in the order of `order_stamps`; messages call them `where`.
+    """Return the readings in columns (n,), in the order of `order_stamps`; error messages call their source `where`.
 
     Raise Refused `wrong_columns`, `not_a_number`, `time_not_increasing`.
     """

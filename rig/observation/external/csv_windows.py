@@ -21,7 +21,7 @@ MOSTLY = 0.5  # of a row's readings: the least that tell its mean
 
 
 def check_times(time_s: Array, where: str = "the samples") -> None:
-    """Raise Refused `time_not_increasing` if samples are too few or their times do not rise; it names `where`."""
+    """Raise Refused `time_not_increasing`, naming `where`, if samples are too few or their times do not rise."""
     what = f"{where} has {len(time_s)} samples, {MIN_SAMPLES} are the least" if len(time_s) < MIN_SAMPLES else None
     steps_back = np.flatnonzero(~(np.diff(time_s) > 0))
     if len(steps_back):

@@ -65,9 +65,9 @@ class Gathered:
 def gather(turning: Turning, window_s: float | None = None, clock_s: float = 0.0) -> Gathered:
     """Return the fixes of a reference's rows, in windows of a given or a suitable length.
 
-    The reference's attitude at time t is that at t + `clock_s` of the readings. Raise Fault `too_few_observations` if
-    too few increments remain in which the body moves. Raise `lost_samples`, `saturation` or `turned_too_fast` if that
-    is the cause, or if more increments are left out than remain.
+    Time t of the reference is time t + `clock_s` of the readings. Raise Fault `too_few_observations` if too few
+    increments remain in which the body moves. Raise `lost_samples`, `saturation` or `turned_too_fast` instead if that
+    is the cause, or if more increments are left out for that reason than remain.
     """
     turning = select_covered(turning, clock_s)
     if len(turning.rows_s) < 2:
@@ -113,9 +113,9 @@ def _fixes(turning: Turning, still: NDArray[np.bool_], window_s: float) -> Fixes
 
 
 def _measure_walk(turning: Turning, rests_s: Array) -> tuple[float, float]:
-    """Return the sum of squares in rad²/s, and its dof, of the random walk in rests (k, 2) by means of `BATCH_S`.
+    """Return the sum of squares in rad²/s, and its dof, of the random walk in rests (k, 2), from means over `BATCH_S`.
 
-    Batch means: the readings' noise may be coloured over a few samples.
+    Batch means are used because the readings' noise may be coloured over a few samples.
     """
     squares, dof = 0.0, 0.0
     for start_s, end_s in rests_s.tolist():

@@ -42,7 +42,7 @@ class Account:
     dwells: NDArray[np.bool_]
 
     def check_mostly_at_rest(self) -> None:
-        """Raise Fault `not_at_rest` if the body moves in every row, or in more than half of the dwells."""
+        """Raise Fault `not_at_rest` if the body moves in all rows, or in more than half of the dwells."""
         left_out, windows = int((self.rest[self.dwells] < 0).sum()), self.rows.windows
         if (self.rest >= 0).any() and 2 * left_out <= int(self.dwells.sum()):
             return
@@ -56,7 +56,7 @@ class Account:
         )
 
     def list_omitted(self, knocked: NDArray[np.intp]) -> Iterator[Omitted]:
-        """Yield entries for rows left out, and for readings left out of dwells: `knocked` (k,), moved or missing."""
+        """Yield entries for rows left out, and for readings left out of dwells because of a knock, motion or a gap."""
         yield from self._moving(np.ones_like(self.dwells))
         kept = [self._inside(row) for row in self._kept]
         total = sum(map(len, kept))
@@ -103,7 +103,7 @@ class Account:
         return [int(row) for row in np.flatnonzero((self.rest >= 0) & self.dwells)]
 
     def _moving(self, rows: NDArray[np.bool_]) -> Iterator[Omitted]:
-        """Yield an entry for the rows, among those passed, in which the body moves, if there are any."""
+        """Yield an entry for those of the given rows in which the body moves, if there are any."""
         left_out = np.flatnonzero((self.rest < 0) & rows)
         if len(left_out):
             first = int(left_out[0])
@@ -114,7 +114,7 @@ class Account:
         return np.arange(*inside(self.time_s, self.rows.windows[row]).indices(len(self.time_s)))
 
     def _find_moved(self, row: int) -> NDArray[np.intp]:
-        """Return the samples of a dwell that are not at rest; the ends of a rest are uncertain by a block."""
+        """Return the samples of a dwell in which the body moves; the ends of a rest are uncertain by a block."""
         window, left_out = self.rows.windows[row], np.setdiff1d(self._inside(row), self.cuts[row])
         near = (self.time_s[left_out] < window.start_s + BLOCK_S) | (self.time_s[left_out] > window.end_s - BLOCK_S)
         return left_out[~near]

@@ -86,7 +86,7 @@ class _PlacedRest:
 
 
 def find_placements(time_s: Array, readings: Mapping[Quantity, Array], rows: AttitudeRows) -> Placements:
-    """Return the placements in readings (n, 3) at rising times (n,) by a reference's rows.
+    """Return the placements that a reference's rows state in readings (n, 3) at rising times (n,).
 
     Raise Fault `not_at_rest` if the body moves in every row, or in more than half of the dwells.
     """
@@ -158,8 +158,8 @@ def _same_rest(time_s: Array, read: Array, quantity: Quantity, before: Window, a
 def _find_rest(time_s: Array, window: Window, rests: Sequence[_PlacedRest]) -> tuple[int, NDArray[np.intp]]:
     """Return the number of the rest that contains a row, −1 if none does, and the row's samples at rest.
 
-    A rest contains a row to within a block at either end. Of a dwell it need contain only the most, if no other rest
-    does.
+    A rest contains a row if neither end of the row exceeds it by more than a block. If no rest contains a dwell, one
+    that contains most of it suffices.
     """
     row, nothing = inside(time_s, window), np.zeros(0, dtype=np.intp)
     met: list[tuple[int, float, NDArray[np.intp]]] = []
@@ -223,7 +223,7 @@ def _read(
 
 
 def _fill_variances(variances: Array, counts: NDArray[np.intp], readings: Array, quantity: Quantity) -> Array:
-    """Return variances (N, 3); missing ones come from the other rests, or from the jumps of readings (n, 3)."""
+    """Return variances (N, 3); missing ones come from other rests, or successive differences of readings (n, 3)."""
     unknown = np.isnan(variances[:, 0])
     if not unknown.any():
         return variances

@@ -26,7 +26,7 @@ EXPLAINED = 0.3  # of the readings' variance, by the coarse offset
 
 
 def find_reference_clock(turning: Turning, rates_rad_s: Array | None) -> TimeBase:
-    """Return the clock of a reference with rows that have `rates_rad_s` (N, 3), None if only attitudes are given.
+    """Return the clock of a reference from its rows. `rates_rad_s` (N, 3) are their rates, None for attitudes alone.
 
     Raise Fault `inverted_attitudes`, and those of `TableMotion` and `estimate_time_base`.
     """
@@ -48,7 +48,7 @@ def find_reference_clock(turning: Turning, rates_rad_s: Array | None) -> TimeBas
 
 
 def _find_steady_clock(turning: Turning, motion: TableMotion) -> tuple[TimeBase, float]:
-    """Return the clock without drift, and the fraction of the rotation that it leaves unexplained: 1 if all."""
+    """Return the clock without drift, and the fraction (0 to 1) of the rotation that it leaves unexplained."""
     time_s = turning.time_s
     explained, offset_s = estimate_coarse_offset(time_s, turning.readings_rad_s, motion)
     unexplained, bias_rad_s = 1.0, np.zeros(3)

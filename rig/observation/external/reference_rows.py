@@ -85,14 +85,14 @@ def join_rests(turning: Turning, clock_s: float) -> tuple[Turning, NDArray[np.bo
 
 
 def _find_dense_rests(turning: Turning, clock_s: float) -> list[tuple[float, float]]:
-    """Return start and end of each rest by readings and rows, on the readings' clock."""
+    """Return the start and end of each rest that both readings and rows show, on the readings' clock."""
     lying = still_windows(turning.rows_s + clock_s, turning.attitudes)
     rests = find_rests(turning.time_s, {RATE: turning.readings_rad_s}, lying=lying)
     return [(rest.start_s, rest.end_s) for rest in rests if rest.end_s - rest.start_s > 3 * MARGIN_S]
 
 
 def _find_rate_rad_s(attitudes: Array, times_s: Array) -> float:
-    """Return the body's rate by attitudes (k, 3, 3) at times (k,): from the mean of one half to the other's."""
+    """Return the body's rate from the mean of the first half of attitudes (k, 3, 3), at times (k,), to the second's."""
     half = len(times_s) // 2
     if not half:
         return 0.0
@@ -102,7 +102,7 @@ def _find_rate_rad_s(attitudes: Array, times_s: Array) -> float:
 
 
 def _find_still(turning: Turning, clock_s: float) -> NDArray[np.bool_]:
-    """Return the rows (N,) in which the body lay still: long ones with equal means, and with noise alone."""
+    """Return the rows (N,) in which the body lay still: long rows with equal means and with nothing but noise."""
     rows_s = turning.rows_s
     start, end = np.searchsorted(turning.time_s, rows_s.T + clock_s)
     still: NDArray[np.bool_] = (rows_s[:, 1] - rows_s[:, 0] >= STILL_S) & (end - start >= STILL_SAMPLES)

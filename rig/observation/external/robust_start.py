@@ -44,7 +44,7 @@ class _Pairs:
 
 
 def find_start(turning: Turning) -> RobustStart:
-    """Return start values of F, b and τ. If the rows do not show them, those of an aligned sensor on the same clock."""
+    """Return initial values of F, b and τ; if rows do not show them, those of an aligned sensor on the same clock."""
     aligned = RobustStart(DriftState(np.eye(3), np.zeros(3), 0.0), 1.0)
     pairs = _find_pairs(turning)
     if len(pairs.begin_s) < FEWEST:
@@ -71,7 +71,7 @@ def find_start(turning: Turning) -> RobustStart:
 
 
 def _find_pairs(turning: Turning) -> _Pairs:
-    """Return pairs of rows in close succession: all those with motion between them, and as many at rest."""
+    """Return pairs of rows in close succession: all pairs with motion between the rows, and as many pairs at rest."""
     middles_s = turning.rows_s.mean(axis=1)
     later = np.searchsorted(middles_s, middles_s + APART_S)
     later = np.maximum(later, np.arange(len(middles_s)) + 1)

@@ -32,7 +32,7 @@ def read_table_log(
 
 
 def _attitudes(log: Columns, table: TableSection) -> dict[str, Array]:
-    """Return a row (N,) about the middle of each record; the outermost axis carries the others."""
+    """Return one row (N,) around the middle of each record of the log; the outermost axis carries the others."""
     from scipy.spatial.transform import Rotation
 
     time_s = log[TIME]

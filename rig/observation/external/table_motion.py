@@ -54,7 +54,7 @@ class TableMotion:
 
 
 def _thin(time_s: Array) -> NDArray[np.intp]:
-    """Return rows, by rising times (n,), so far apart that errors of their stamps hardly change a rate."""
+    """Return rows at rising times (n,), so far apart that errors of their time stamps hardly change a rate."""
     steps_s = np.diff(time_s)
     median_s = float(np.median(steps_s)) if len(steps_s) else 0.0
     if median_s >= EVEN_S or not len(steps_s) or np.abs(steps_s - median_s).mean() <= UNEVEN * median_s:

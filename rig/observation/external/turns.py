@@ -99,7 +99,7 @@ def find_turns(
 
 
 def _find_pauses(time_s: Array, sweeps: Sequence[Observation]) -> list[Window]:
-    """Return the intervals between sweeps, in which alone the body is declared to lie still."""
+    """Return the intervals between sweeps, the only ones in which the body is declared to lie still."""
     intervals = sorted((sweep.average.start_s, sweep.average.end_s) for sweep in sweeps)
     starts = [float(time_s[0]), *(end_s for _, end_s in intervals)]
     ends = [*(start_s for start_s, _ in intervals), float(time_s[-1])]
@@ -107,7 +107,7 @@ def _find_pauses(time_s: Array, sweeps: Sequence[Observation]) -> list[Window]:
 
 
 def _enclosing_window(sweep: Observation, lying: Sequence[Window]) -> Window | None:
-    """Return the window from the rest before a sweep to the rest after it; None if either is far away."""
+    """Return the window from the rest before a sweep to the rest after it; None if either rest is far away."""
     start_s, end_s = sweep.average.start_s, sweep.average.end_s
     before = [rest for rest in lying if rest.start_s < start_s and rest.end_s >= start_s - REACH_S]
     after = [rest for rest in lying if rest.end_s > end_s and rest.start_s <= end_s + REACH_S]

@@ -54,7 +54,7 @@ def bag_readings(path: Path, inside: str | None) -> Iterator[Part]:
     """Yield, in blocks, the readings of the topic `inside` a bag, or of its only topic of type Imu.
 
     The columns are those of a CSV file, times count from the beginning of the bag, and rows have the order of the bag.
-    Messages without a rate are left out and counted. If some of the others lack an acceleration, all accelerations are
+    Messages without a rate are left out and counted. If any other message lacks an acceleration, all accelerations are
     left out. Raise Refused `missing_extra` or `bag_topic`, and any error of the parser for a damaged bag.
     """
     with _open_bag(path) as reader:
@@ -69,7 +69,7 @@ def bag_readings(path: Path, inside: str | None) -> Iterator[Part]:
 
 
 def bag_attitudes(path: Path, inside: str | None) -> Iterator[Part]:
-    """Yield, in blocks, the poses in a bag: a time and a quaternion each. Raise as `bag_readings`."""
+    """Yield, in blocks, the poses in a bag: a time and a quaternion each. Raise as `bag_readings` does."""
     with _open_bag(path) as reader:
         poses = _read_messages(reader, _select_topic(reader, POSES, inside, "attitudes"))
         orientations = ((time_s, _orientation(message)) for time_s, message in poses)
@@ -81,8 +81,8 @@ def _inertial(
 ) -> Iterator[tuple[float, ...]]:
     """Yield the time, rate and acceleration of `sensor_msgs/Imu`; absent columns are set to None.
 
-    Messages without a rate are kept back until a message with a rate comes, then left out and counted in `counts`.
-    Raise Refused `bag_topic` if no message holds a rate or an acceleration.
+    Messages without a rate are held back until a message with a rate comes; they are then left out and counted in
+    `counts`. Raise Refused `bag_topic` if no message holds a rate or an acceleration.
     """
     forces: list[tuple[float, ...]] = []
     has_rates, all_forces = False, True

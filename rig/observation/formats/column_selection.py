@@ -43,7 +43,7 @@ def map_samples(columns: ColumnMap) -> Mapped | None:
 
 
 def map_motion(columns: ColumnMap) -> Mapped | None:
-    """Return the map of a file of sweeps or attitudes, as `map_samples`."""
+    """Return the map of a file of sweeps or attitudes, as `map_samples` does."""
     return _unless_empty(
         _build_map(columns.motion, columns.motion_skip_lines, columns.motion_rate_hz, columns.motion_missing)
     )

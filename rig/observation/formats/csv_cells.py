@@ -40,7 +40,7 @@ def is_time_of_day(cell: str) -> bool:
 
 
 def seconds_of(cell: str, factor: float) -> Decimal:
-    """Return the time in a cell: a number in units of `factor` s, or a text, counted from 1970 or from midnight.
+    """Return the time, s, in a cell: a number in units of `factor` s, or a text, counted from 1970 or midnight.
 
     Raise ValueError or ArithmeticError if it is neither, or if a text has a unit.
     """

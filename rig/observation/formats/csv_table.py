@@ -74,8 +74,8 @@ def read_table(
     The first row holds the names. If it is divided by semicolons, as in spreadsheets with a decimal comma, or by tabs,
     so are all rows. Empty rows and rows of units below the heading are skipped. Of a `mapped` file, only columns named
     in the map, or by the rig's names, are returned. A file packed by gzip is unpacked. Times count from `origin_s`;
-    None chooses it by the first of them. A packed or long file is read in a process of its own, as it might exhaust the
-    memory. Raise Refused `no_file`, `file_too_costly`, `temporary_folder_full`, `wrong_columns`, `wrong_unit`,
+    with None, the first time determines it. A packed or long file is read in a process of its own, as it might exhaust
+    the memory. Raise Refused `no_file`, `file_too_costly`, `temporary_folder_full`, `wrong_columns`, `wrong_unit`,
     `not_a_number`.
     """
     rate_hz = None if mapped is None else mapped.rate_hz
@@ -108,8 +108,8 @@ def csv_parts(
 ) -> Iterator[Part]:
     """Yield the parts that `read_table` reads; `names` are fields of a header, `mapped` fields of a column map.
 
-    The rows come in blocks, with the line of each as an additional column; `origin_s` and whether times are of the day
-    come last.
+    The rows come in blocks, with each row's line number as an additional column. Last come `origin_s`, and whether
+    times are times of day.
     """
     return _parts(path, Header(*names), largest_mb, None if mapped is None else Mapped(**mapped), origin_s)
 
@@ -211,7 +211,7 @@ class _Wanted:
         return ["" if cell.strip() in self.missing else cell for cell in cells]
 
     def is_by_day(self, cells: Sequence[str]) -> bool:
-        """Return whether the first row holds a time of the day."""
+        """Return whether the first row holds a time of day."""
         return any(
             name in TIMES and is_time_of_day(cell) for cell, name in zip(cells, self.names.values(), strict=True)
         )

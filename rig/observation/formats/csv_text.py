@@ -67,8 +67,8 @@ def _raise_no_file(path: Path) -> Iterator[None]:
 def _text(file: BinaryIO | GzipFile) -> TextIOWrapper:
     """Return a file's text, unpacked, in the encoding that its beginning shows.
 
-    Raise UnfitFile if it is not text. Loggers' headings such as "°/s" and "µT", if not in UTF-8, are mostly in the
-    encoding of Windows.
+    Raise UnfitFile if it is not text. If it is not UTF-8, headings such as "°/s" and "µT" are mostly in the Windows
+    encoding.
     """
     if _read_beginning(file).startswith(GZIP):
         file = GzipFile(fileobj=file)

@@ -56,7 +56,7 @@ FORMATS = (
 
 
 def is_in_format(path: Path) -> bool:
-    """Return whether a path names a file in a format of `FORMATS`, or a part of one."""
+    """Return whether a path names a file in a format of `FORMATS`, or a part of such a file."""
     return _format(path) is not None
 
 
@@ -80,7 +80,7 @@ class FormatColumns:
 def readings_in(path: Path) -> FormatColumns | None:
     """Return the readings of a file in a format of `FORMATS`; None for a table.
 
-    Raise Refused as its reader does, and `no_file`, `file_too_costly`, `temporary_folder_full`.
+    Raise Refused `no_file`, `file_too_costly`, `temporary_folder_full`, and as its reader does.
     """
     form = _format(path)
     return None if form is None else _read(form, form.readings, path)
@@ -89,8 +89,8 @@ def readings_in(path: Path) -> FormatColumns | None:
 def attitudes_in(path: Path) -> Columns | None:
     """Return the attitudes in a file, each with a short interval about its time; None for a table.
 
-    The file has a format of `FORMATS`; the intervals are those of `rows_around`. Raise Refused as `readings_in` does,
-    and `no_attitudes` if the file holds none.
+    The file has a format of `FORMATS`; the intervals are those of `rows_around`. Raise Refused `no_attitudes` if the
+    file holds none, and as `readings_in` does.
     """
     form = _format(path)
     if form is None:
@@ -109,8 +109,8 @@ def attitudes_in(path: Path) -> Columns | None:
 def rows_around(time_s: Array, path: Path) -> dict[str, Array]:
     """Return intervals, `start_s` and `end_s` (n,), about the times of attitudes.
 
-    An interval reaches half-way to its neighbours, but is too short to be taken for a rest. Raise Refused
-    `no_attitudes` for a single attitude.
+    An interval reaches at most half-way to its neighbours. It is kept so short that it cannot count as a rest. Raise
+    Refused `no_attitudes` for a single attitude.
     """
     if len(time_s) < 2:
         raise Refused("no_attitudes", f"{path} holds one pose", "Record the poses while the sensor is turned")
@@ -136,7 +136,7 @@ def entry_of(path: Path) -> FileEntry:
 
 
 def _read(form: Format, reader: str, path: Path) -> FormatColumns:
-    """Return the columns, ordered by time. Raise Refused as `readings_in`."""
+    """Return the columns, ordered by time. Raise Refused as `readings_in` does."""
     source = form.reads(whole(path))
     parts = parts_read_apart(
         reader, source, {"inside": _part_inside(path)}, else_=f"is no {form.name} that can be read", remedy=form.remedy

@@ -68,7 +68,7 @@ class TableLayout:
 
 
 def find_layout(path: Path, largest_mb: int) -> TableLayout:
-    """Return the layout of a text table or a `.mat` file. Raise Refused as `read_table`."""
+    """Return the layout of a text table or a `.mat` file. Raise Refused as `read_table` does."""
     arguments = {"largest_mb": largest_mb}
     if not is_mat(path) and is_harmless(path, largest_mb):
         (part,) = layout_parts(path, **arguments)
@@ -173,7 +173,7 @@ def _strip_columns(cells: Sequence[Sequence[str]], missing: Sequence[str]) -> li
 
 
 def _select_indices(columns: Sequence[Sequence[str]], accept: Callable[[str], bool]) -> list[int]:
-    """Return the indices of the columns that have cells and accept all of them."""
+    """Return the indices of the columns that have cells, all of which satisfy the condition."""
     return [index for index, column in enumerate(columns) if column and all(map(accept, column))]
 
 
@@ -196,7 +196,7 @@ def _find_time(
 ) -> int | None:
     """Return the index of the time column: by its name or unit, else the first that increases.
 
-    Of columns named so, only one whose values rise counts.
+    A column with such a name counts only if its values rise.
     """
     rising = [index for index in times if _rises(columns[index])]
     for index in rising:

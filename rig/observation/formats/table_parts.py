@@ -23,10 +23,10 @@ NOTE = "note"  # what the readings lack, in words
 def in_blocks(
     rows: Iterable[Sequence[float]], columns: Sequence[str | None], counts: Mapping[str, Any] | None = None
 ) -> Iterator[Part]:
-    """Yield the rows, a number for each of the columns, in blocks (n, columns), then the names of the columns.
+    """Yield the rows in blocks (n, columns), then the names of the columns. A row has a number for each column.
 
-    The names are read after the last row, when a reader may have replaced some by None, which omits the column.
-    `counts` may hold the number of `LEFT_OUT` rows, and a `NOTE`.
+    The names are read after the last row: by then the reader may have replaced a name by None, which omits the column.
+    `counts` are further entries beside the names: the number of `LEFT_OUT` rows, and a `NOTE`.
     """
     values, width = array("d"), len(columns)
     for row in rows:
@@ -60,7 +60,7 @@ def note_of(parts: Sequence[Part]) -> str:
 
 
 def parts_read_apart(reader: str, path: Path, arguments: Mapping[str, Any], *, else_: str, remedy: str) -> list[Part]:
-    """Return the parts that a `reader` ("module:function") yields of a file, in a process of its own.
+    """Return the parts of a file that a `reader` ("module:function") yields in a process of its own.
 
     Raise Refused as the reader does, `temporary_folder_full`, and the error that `else_` names, `no_file` or
     `file_too_costly`.

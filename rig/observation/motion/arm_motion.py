@@ -103,7 +103,7 @@ class ArmMotion:
         return rotations
 
     def axes(self, q_rad: Array) -> Array:
-        """Return the joints' axes (…, 3, 6) of growing angles at joint angles (…, 6)."""
+        """Return the joints' axes (…, 3, 6), directed for growing angles, at joint angles (…, 6)."""
         axes: Array = self.mount @ flange_axes(q_rad, self.kinematics)
         return axes
 
@@ -137,7 +137,7 @@ class ArmMotion:
         return travel_rad
 
     def swing_rates(self, time_s: Array) -> Array:
-        """Return rates (n, 3) as `sampled_rates`, at rising times (n,), for a standing arm that oscillates; else zero.
+        """Return the `rates_at_samples` (n, 3) at rising times (n,) if the standing arm oscillates, else zero.
 
         Without an oscillation the encoders show only noise, which is not added as a rate.
         """
@@ -250,7 +250,10 @@ def _check_order(time_s: Array) -> None:
 
 
 def turner_of(run: RunData) -> "RecordedTurner":
-    """Return the turner of a recording. Raise Refused `recorded_elsewhere` for one from files, which has none."""
+    """Return the turner of a recording.
+
+    Raise Refused `recorded_elsewhere` for a recording from files, which has no turner.
+    """
     if run.turner is None:
         raise Refused(
             "recorded_elsewhere",

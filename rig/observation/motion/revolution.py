@@ -45,7 +45,7 @@ class Revolution:
 
     @property
     def beats(self) -> int:
-        """The number of sidebands of each spectral line: by so many cycles per turn the shaft runs unevenly.
+        """The number of sidebands of each spectral line: the shaft's speed varies up to so many times per turn.
 
         An encoder with a large error errs once and twice a turn; products of these errors come up to four times.
         """

@@ -34,7 +34,7 @@ def turn_speed(time_s: NDArray[np.float64], q_rad: NDArray[np.float64]) -> TurnS
     """Return the speed 2π/T of a shaft that turns evenly through more than a whole turn.
 
     `time_s` (n,) rising, `q_rad` (n,) the encoder's readings, turns counted; all between the ramps. T is the time
-    between readings one turn apart, in the mean over all such pairs: the more readings beyond the turn, the better T is
+    between readings one turn apart, averaged over all such pairs: the more readings beyond the turn, the better T is
     determined. A quarter of a turn more, read at 100 Hz at 60°/s by a 12-bit encoder with a noise of 0.06°, gives 2e-5
     (one standard deviation). The standard deviation follows from the scatter of these differences, with white noise of
     the single readings. Each reading of the second turn enters two differences, which correlates neighbours; that is
@@ -71,9 +71,9 @@ def turn_speed(time_s: NDArray[np.float64], q_rad: NDArray[np.float64]) -> TurnS
 def _std_of_mean(later_s: NDArray[np.float64], time_s: NDArray[np.float64], beyond_rad: NDArray[np.float64]) -> float:
     """Return the standard deviation of the mean of differences between interpolated and single readings.
 
-    Difference i is (1 − w) e_j + w e_{j+1} − e_i of the readings' white errors e: the variance of the single reading
-    follows from the differences' scatter, and the variance of their mean from the number of differences that each
-    reading enters.
+    With white errors e of the readings, difference i has the error (1 − w) e_j + w e_{j+1} − e_i. The scatter of the
+    differences gives the variance of a single reading. The variance of their mean then follows from the total weight of
+    each reading in all differences.
     """
     pairs, count = len(beyond_rad), len(time_s)
     after = np.searchsorted(time_s, later_s, side="right").clip(1, count - 1)

@@ -130,7 +130,8 @@ def _dwell_reading(
 def gravity_difference(attitudes: Array, expected: Array, sensor: RecordedSensor, site: Site) -> Array:
     """Return gravity at actual attitudes minus gravity at expected ones (n, 3), m/s², in the sensor's nominal axes.
 
-    attitudes (n, 3, 3): by the arm's encoders. expected (n, 3, 3): in the readings' model.
+    `attitudes` (n, 3, 3) are actual, from the arm's encoders; `expected` (n, 3, 3) are those assumed by the model of
+    the readings.
     """
     difference: Array = (attitudes - expected) @ -site.down_m_s2 @ np.array(sensor.mounting).T
     return difference

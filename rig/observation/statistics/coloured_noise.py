@@ -32,7 +32,7 @@ def correlation_inflation(residuals: Array) -> float:
 
 
 def fit_noise_factor(residuals: Array) -> float:
-    """Return the factor on a mean's variance by an autoregressive model, below 1 if residuals are mostly vibration.
+    """Return the factor on a mean's variance from an autoregressive model, below 1 if residuals are mostly vibration.
 
     Over many periods a vibration averages out, whatever the sum of its correlations is. The variance of a long mean is
     the spectrum at zero: with coefficients a and innovations e, var(e) / (1 − Σ a)². Akaike's criterion chooses the
@@ -44,8 +44,8 @@ def fit_noise_factor(residuals: Array) -> float:
 def fit_autoregression(residuals: Array, memories: Sequence[int] = MEMORIES) -> VarianceInflation:
     """Return the factor of `fit_noise_factor`, and the degrees of freedom of the resulting variance.
 
-    White residuals have one less than their number. Others have twice the inverse of the spectrum's relative variance
-    (JCGM 100, G.4.2): 2/n of the innovations, 4 var(Σ a) / (1 − Σ a)² of the coefficients.
+    For n white residuals these are n − 1. For others they are 2 / v (JCGM 100, G.4.2), where v is the relative variance
+    of the spectrum: 2/n from the innovations, plus 4 var(Σ a) / (1 − Σ a)² from the coefficients.
     """
     if _correlations(residuals) is None:
         return VarianceInflation(1.0, max(len(residuals) - 1.0, 1.0))
@@ -68,7 +68,7 @@ def _spectrum_dof(centred: Array, memory: int) -> float:
 
 
 def _autoregression(products: Array, count: int, memory: int) -> tuple[float, float, int]:
-    """Return Akaike's criterion and the spectrum at zero by the `_products` of `count` residuals, and the `memory`.
+    """Return Akaike's criterion and the spectrum at zero, from the `_products` of `count` residuals, and the `memory`.
 
     The spectrum is 0 / 0 for residuals that only repeat, such as coarse readings with few different values.
     """
@@ -82,14 +82,14 @@ def _autoregression(products: Array, count: int, memory: int) -> tuple[float, fl
 
 
 def _products(residuals: Array, memory: int) -> Array:
-    """Return sums (memory + 1, memory + 1) of products of residuals (n,) and the `memory` before each, nearest last."""
+    """Return sums (memory + 1, memory + 1) of products of residuals (n,) and the `memory` previous, nearest last."""
     lagged = np.array([residuals[lag : len(residuals) - memory + lag] for lag in range(memory + 1)])
     products: Array = lagged @ lagged.T
     return products
 
 
 def _predict(products: Array) -> tuple[Array, float]:
-    """Return the best linear prediction of residuals from the k before each, by their `_products`.
+    """Return the best linear prediction of residuals from the k previous ones, computed from their `_products`.
 
     Return its coefficients (k,), and the sum of squares of its errors, the innovations.
     """

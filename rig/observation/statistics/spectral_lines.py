@@ -89,7 +89,7 @@ def median_power(residuals: Array) -> float:
 
 
 def column_count(beats: int) -> int:
-    """Return the number of columns of `waves` per line."""
+    """Return the number of columns of `waves` per spectral line."""
     return WIDE * (1 + beats)
 
 

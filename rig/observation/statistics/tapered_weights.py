@@ -47,7 +47,7 @@ def noise_at_zero(readings: Array, low: float = LOW) -> Array:
     """Return the variance (3,) per reading for a long mean: the spectrum near zero without its lines.
 
     It is the median over low frequencies, which lines do not shift, divided by the median of χ² with two degrees of
-    freedom. Low is up to a fraction `low` of the data rate, but never fewer bins than `FEWEST_BINS`.
+    freedom. Low frequencies reach up to a fraction `low` of the data rate, but have at least `FEWEST_BINS` bins.
     """
     powers = np.abs(np.fft.rfft(apply_window(readings), axis=0)[MAIN_LOBE : _count_low_bins(len(readings), low)]) ** 2
     medians: Array = np.median(powers, axis=0) / np.log(2)
@@ -55,7 +55,7 @@ def noise_at_zero(readings: Array, low: float = LOW) -> Array:
 
 
 def apply_window(readings: Array) -> Array:
-    """Return readings (n, 3) less their mean under Blackman and Harris' window, whose squares add up to 1."""
+    """Return readings (n, 3) minus their mean under Blackman and Harris' window, whose squares add up to 1."""
     windowed: Array = _window(len(readings))[:, None] * (readings - readings.mean(axis=0))
     return windowed
 
@@ -70,9 +70,9 @@ def _window(count: int) -> Array:
 
 
 def dof_at_zero(count: int) -> float:
-    """Return the degrees of freedom of `noise_at_zero` from `count` readings: by the median of m independent powers.
+    """Return the degrees of freedom of `noise_at_zero`, a median of m independent powers, from `count` readings.
 
-    Its relative variance is 1 / (m ln² 2), and ν is two over that (JCGM 100, G.4.2).
+    Its relative variance is 1 / (m ln² 2), and ν is 2 divided by this (JCGM 100, G.4.2).
     """
     return float(2 * np.log(2) ** 2 * (_count_low_bins(count) - MAIN_LOBE) / NOISE_BINS)
 

@@ -21,7 +21,7 @@ BRIEF = (1, 2)  # memories that fit a colour, but not the remainder of a line
 
 
 def average_rest(readings: Array, time_s: Array, window: Window, steps: Steps) -> Mean:
-    """Average readings at rest by weights that cancel a vibration (`average_tapered`), with the noise without lines."""
+    """Average readings at rest with weights that cancel a vibration (`average_tapered`), which is not noise."""
     residuals = readings - readings.mean(axis=0)
     shaking = _columns(residuals, LineSearch(beats=0))
     columns = np.column_stack([np.ones(len(residuals)), shaking])
@@ -55,7 +55,7 @@ def _columns(residuals: Array, search: LineSearch) -> Array:
 
 
 def estimate_noise(residuals: Array, parameters: int, steps: Steps, memories: Sequence[int]) -> MeanNoise:
-    """Return the noise of readings with resolution `steps`, by residuals (n, 3) of a fit with `parameters` columns."""
+    """Return the noise of readings with resolution `steps`, from residuals (n, 3) of a fit of `parameters` columns."""
     scatter = np.maximum(np.sum(residuals**2, axis=0) / (len(residuals) - parameters), steps.variance)
     inflations = [fit_autoregression(axis, memories) for axis in residuals.T]
     return MeanNoise(
