@@ -105,7 +105,7 @@ class Calibration:
         return np.diag(self.scale) if matrix is None else np.array(matrix)
 
     def apply(self, readings: ArrayLike) -> Array:
-        """Return readings (n, 3) of this sensor, in the SI unit of its quantity, corrected (n, 3) in the same unit.
+        """Return the corrected readings (n, 3) of this sensor, from readings (n, 3) in the SI unit of its quantity.
 
         A gyroscope's are g = M (m + b), with M = K if only scale factors are corrected; an accelerometer's and a
         magnetometer's M (m − b). They are in the frame of `correction_matrix` in `result.json`, as by the functions of

@@ -88,7 +88,7 @@ def plot_comparison(comparison: Comparison, sensor: str, reference: str) -> Plot
 
 
 def _finish(axes: "Axes", title: str) -> None:
-    """Set the title on the left, and the axes' names to its right."""
+    """Write the title at the left, and the axes' names to the right of it."""
     axes.set_title(title, loc="left")
     axes.legend(loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0, ncols=3, frameon=False)
 

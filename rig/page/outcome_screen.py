@@ -47,7 +47,7 @@ def outcome_rows(result: ResultDocument, parts: Mapping[str, str], true_rows: Se
 
 
 def since_rows(since: Iterable[Since]) -> dict[str, Row]:
-    """Return the previous results in units of the rows that they are shown with, by the rows' names."""
+    """Return the previous results, by the names of the rows with which they are shown, in the rows' units."""
     rows = {}
     for since_result in since:
         quantity = quantities().get(since_result.quantity)

@@ -26,7 +26,7 @@ class PageHistory:
         return self.first + len(self._points)
 
     def due(self, time_s: float) -> bool:
-        """Return whether to store a point of that time: enough time has passed, or time has run backwards."""
+        """Return whether to store a point of this time: enough time has passed, or time has run backwards."""
         return not self._points or not 0 <= time_s - self._points[-1][0] < SOON_S
 
     def add(self, time_s: float, values: Values) -> None:

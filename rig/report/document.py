@@ -17,7 +17,7 @@ ALWAYS = ("gyroscopes", "verification")  # in every result, even if they are emp
 
 
 def document_of(outcome: Outcome) -> ResultDocument:
-    """Return the result as plain numbers, texts and tuples, in SI units, by the schema "rig.result/1"."""
+    """Return the result as plain numbers, texts and tuples, in SI units, in the schema "rig.result/1"."""
     by_kind = {kind.key: kind.entries(outcome) for kind in kinds() if not isinstance(kind.entries, NoOutlet)}
     entries: dict[str, object] = {key: of_kind for key, of_kind in by_kind.items() if of_kind or key in ALWAYS}
     others = {key: _plain_values(entries.pop(key)) for key in list(entries) if key not in ResultDocument.model_fields}

@@ -61,7 +61,7 @@ class TrueValues:
 
     @property
     def truth_texts(self) -> list[str]:
-        """The truth of each axis in print, to as many decimals as U."""
+        """The printed true value of each axis, with as many decimals as U."""
         return [in_print(true, u)[0] for true, u in zip(self.truth, self.result.expanded, strict=True)]
 
 

@@ -37,7 +37,7 @@ OPENER = {"cross-origin-opener-policy": "same-origin"}  # browsers obey it for l
 
 
 def new_token() -> str:
-    """Return 128 random bits in a form for an address."""
+    """Return 128 random bits as text that may be part of a URL."""
     return token_urlsafe(TOKEN_BYTES)
 
 

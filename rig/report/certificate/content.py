@@ -319,7 +319,7 @@ def _marks(result: ResultDocument, stated: StatedFacts, fitness: Sequence[CheckE
 
 
 def _angles_rad(result: ResultDocument) -> Iterator[float]:
-    """Yield the angles of the sweeps that are known: a file may state speeds only."""
+    """Yield the known angles of sweeps; a file may state only their speeds."""
     for sensor in result.gyroscopes.values():
         yield from (turn.angle_rad for turn in sensor.observations if turn.angle_rad is not None)
     for verification in result.verification.values():

@@ -115,7 +115,7 @@ def reach_in(largest: float, units: Sequence[DisplayUnit]) -> tuple[float, Displ
 
 
 def contributions(budget: BudgetEntry, scale: Sequence[float]) -> Contributions:
-    """Return each contributor's standard uncertainty over the combined one, at least 1e-4, for the printed budget."""
+    """Return the ratio of each contributor's standard uncertainty to the combined one, at least 1e-4, for a plot."""
     k, b = printed_indices(budget, scale)
     across = (WIDTH - NAMES - RIGHT_MARGIN) / DECADES
 

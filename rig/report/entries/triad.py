@@ -69,7 +69,7 @@ def triad_entry(
 def attitudes_entry(
     models: Models[EntryT], result: MagnetometerResult | InAttitudes, sensor: RecordedSensor | Item, **more: Any
 ) -> EntryT:
-    """Return the entry of a sensor that was calibrated by attitudes alone."""
+    """Return the entry of a sensor that was calibrated in attitudes alone."""
     solution = result.solution
     residuals = solution.residuals, attitude_residual_std(solution, result.measurements)
     bias = {models.quantity.named("bias"): solution.bias}

@@ -43,7 +43,7 @@ Autopilot = Mapping[Quantity, Callable[[int, Corrected], Parameters]]
 
 
 def px4_files(calibrations: ExportedCalibrations) -> Mapping[str, str]:
-    """Return `px4.params` as QGroundControl loads it: vehicle, component, name, value, type, between tabs."""
+    """Return `px4.params` as QGroundControl loads it: vehicle, component, name, value, type, separated by tabs."""
     lines = [
         *HEADING,
         "# Lost too: CAL_GYROn_ID, CAL_ACCn_ID, CAL_MAGn_ID, which only the vehicle knows; PX4 uses parameters",

@@ -25,7 +25,7 @@ class Imu:
 
     @property
     def name(self) -> str:
-        """The name of the sensor that contains both."""
+        """The name of the sensor that contains gyroscope and accelerometer."""
         return self.gyroscope.sensor
 
     @property

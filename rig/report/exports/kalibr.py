@@ -26,7 +26,7 @@ def kalibr_files(calibrations: ExportedCalibrations) -> Mapping[str, str]:
 
 
 def triangular(matrix: Array) -> tuple[Array, Array]:
-    """Return M, C (3, 3) with matrix = M · C, of a right-handed matrix.
+    """Return M and C (3, 3) such that M · C is the given right-handed matrix.
 
     M is lower triangular with a positive diagonal, C a rotation.
     """

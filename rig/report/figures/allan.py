@@ -41,7 +41,7 @@ def print_at_rest(sensors: Mapping[str, SensorAtRest], *, as_json: bool) -> None
 
 
 def document(sensors: Mapping[str, SensorAtRest]) -> dict[str, Any]:
-    """Return the results at rest in SI units, by the schema "rig.allan/1"."""
+    """Return the results at rest in SI units, in the schema "rig.allan/1"."""
     return {
         "schema": SCHEMA,
         "sensors": {

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def write_temperature_figures(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
-    """Write `over_temperature_<sensor>` for each sensor calibrated so, as PNG and SVG; none without matplotlib."""
+    """Write `over_temperature_<sensor>` for each sensor with polynomials, as PNG and SVG; none without matplotlib."""
     return write_pictures(
         [
             Picture(

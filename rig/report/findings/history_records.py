@@ -40,7 +40,7 @@ class Parameter:
 
     @property
     def std(self) -> float:
-        """The combined standard uncertainty if available, else the standard uncertainty by noise."""
+        """The combined standard uncertainty if available, else the standard uncertainty due to noise."""
         return self.std_statistical if self.std_combined is None else self.std_combined
 
     @property
@@ -50,7 +50,7 @@ class Parameter:
 
     @property
     def dof(self) -> float:
-        """The degrees of freedom of the standard uncertainty, by its coverage factor."""
+        """The degrees of freedom of the standard uncertainty, from its coverage factor."""
         return find_dof_by_factor(self.coverage_factor)
 
     @property

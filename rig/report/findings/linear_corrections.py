@@ -61,17 +61,17 @@ class Corrected:
 
     @property
     def name(self) -> str:
-        """The sensor's name among others of the same name."""
+        """The sensor's name, which distinguishes it from others of the same name."""
         return self.quantity.label(self.sensor)
 
     @property
     def gains(self) -> Array:
-        """Diagonal matrix (3, 3) of the reading for one unit."""
+        """Diagonal matrix (3, 3) of the reading per unit of the true value."""
         return np.diag(np.linalg.norm(self.matrix, axis=1))
 
     @property
     def axes(self) -> Array:
-        """Unit vectors of the axes (3, 3), in rows: matrix = gains · axes."""
+        """Unit vectors (3, 3) of the axes as rows, such that matrix = gains · axes."""
         axes: Array = self.matrix / np.linalg.norm(self.matrix, axis=1)[:, None]
         return axes
 
@@ -80,7 +80,7 @@ def noise_of(means: Sequence[Averaged], at_rest: Sequence[tuple[Sequence[float],
     """Return the readings' noise, from each rest's standard deviation of one sample and number of samples.
 
     The density is σ over √rate of the noisiest axis, for noise that is white up to half the rate. It is None for
-    readings in attitudes of a file.
+    readings in attitudes that a file states.
     """
     duration_s = sum(mean.duration_s for mean in means)
     rate_hz = sum(mean.samples for mean in means) / duration_s if duration_s > 0 else None

@@ -145,7 +145,7 @@ class ResultKind(Generic[EntryT]):
 
 
 def row_of(term: Term, whose: str | None = None, noun: str | None = None) -> DisplayRow:
-    """Return the row of a characteristic; by default it has the names of the sensor and the characteristic."""
+    """Return the display row of a characteristic, by default named after the sensor and the characteristic."""
     finding, whose, noun = term.finding, whose or term.whose, noun or term.name
     labels, values, widths = zip(*term.printed, strict=True)
     numbers, unit = AxisValues(values, widths), term.units.shown

@@ -114,7 +114,7 @@ def _build_correction(finding: Finding[GyroscopeEntry]) -> Corrected | None:
 
 
 def temperatures_c(sensor: GyroscopeEntry) -> dict[str, float | None]:
-    """Return the temperatures of a gyroscope's values, one for scale factors if they come from sweeps alone."""
+    """Return the temperatures to which a gyroscope's values refer: one, or one for scale factors and one for biases."""
     if sensor.scale_conditions is None or sensor.bias_conditions is None:
         return {"": sensor.temperature_c}
     return warmth(sensor.scale_conditions, " at the scale factors") | warmth(sensor.bias_conditions, " at the biases")
@@ -155,7 +155,7 @@ def _lines(finding: Finding[GyroscopeEntry]) -> Iterator[str]:
 
 
 def _describe_difference(sensor: GyroscopeEntry, other: EstimateEntry | VectorEntry) -> Iterator[str]:
-    """Yield a sentence on which of two estimators to prefer, if they differ by more than U."""
+    """Yield a sentence that says which of two estimators to prefer, if they differ by more than U."""
     expanded = expanded_uncertainties(sensor.budget, sensor.covariance)
     values, others = ((*solution.scale, *solution.bias_rad_s) for solution in (sensor, other))
     differences = divide_or_infinity(np.abs(np.subtract(others, values)), expanded)

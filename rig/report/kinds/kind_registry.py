@@ -48,13 +48,13 @@ def terms_of(document: ResultDocument, outlet: Outlet | None = None) -> Iterator
 
 
 def shown(document: ResultDocument) -> Iterator[DisplayRow]:
-    """Yield the rows of page and notebook: those of the kinds for all sensors, then those of the characteristics."""
+    """Yield the rows that page and notebook show: those of all kinds of results, then those of characteristics."""
     yield from (show(finding) for _, show, finding in outlets(document, lambda kind: kind.shown))
     yield from map(row_of, terms_of(document, "page"))
 
 
 def followed(document: ResultDocument) -> tuple[HistoryRecord, ...]:
-    """Return the records of a result for a history, of all sensors including references."""
+    """Return the records of a result that a history follows, of all sensors including references."""
     return tuple(_records(document))
 
 

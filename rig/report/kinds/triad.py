@@ -49,7 +49,7 @@ def bias_of(quantity: Quantity, entry: object) -> Sequence[float]:
 
 
 def shown_of(finding: Finding[Any]) -> DisplayRow:
-    """Return the row of such a sensor for page and notebook."""
+    """Return the row for page and notebook of a sensor with three axes."""
     quantity, entry = finding.quantity, finding.entry
     expanded, size = expanded_uncertainties(entry.budget, entry.covariance), quantity.bias.size
     count = len(entry.scale)
@@ -153,7 +153,7 @@ def triad_kind(
     standard: Standard,
     characteristics: tuple[Characteristic, ...],
 ) -> ResultKind[Any]:
-    """Return the kind of a sensor that is calibrated by attitudes, with its entries at `key` and its `words`."""
+    """Return the kind of a sensor that is calibrated in attitudes, with its entries at `key` and its `words`."""
 
     def find(document: ResultDocument) -> Iterator[Finding[Any]]:
         all_entries: Mapping[str, Any] = getattr(document, key)

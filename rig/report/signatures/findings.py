@@ -44,14 +44,14 @@ def not_signed(name: str) -> Refused:
 
 
 def not_as_signed(name: str, why: str) -> Refused:
-    """Return the problem of a file that was altered, or is another one than the signed file."""
+    """Return the problem of a file that was altered, or that is not the signed file."""
     return Refused(
         "not_as_signed", f"{name} is not as it was signed: {why}", "Do not rely on it; ask the laboratory for it"
     )
 
 
 def signer_not_trusted(name: str, signer: str, why: str) -> Refused:
-    """Return the problem of an unaltered file with another signer than expected."""
+    """Return the problem of an unaltered file whose signer is not the expected one."""
     return Refused(
         "signer_not_trusted",
         f"{name} is signed by {signer}, who is not trusted: {why}",

@@ -61,7 +61,7 @@ def read_authorities(files: Sequence[Path]) -> Authorities:
 
 
 def unfit(why: str) -> Refused:
-    """Return the refusal of a signature whose certificates could not be checked later."""
+    """Return the refusal to make a signature whose certificates could not be checked later."""
     return Refused(
         "revocation_list",
         f"the revocation lists are not sufficient: {why}",

@@ -18,8 +18,8 @@ def sign_as_pades(
 ) -> bytes:
     """Return the PDF with a certification signature that permits no changes: B-B, or B-T with a time server's URL.
 
-    With `authorities` it is B-LT: their lists are in the same revision, under the signature. Raise Refused
-    `time_server` if that gives no time stamp, `revocation_list` if the lists do not cover every certificate.
+    With `authorities` it is B-LT: their lists are in the same revision, and the signature covers them. Raise Refused
+    `time_server` if that server gives no time stamp, `revocation_list` if the lists do not cover every certificate.
     """
     from pyhanko.pdf_utils.incremental_writer import IncrementalPdfFileWriter
     from pyhanko.sign.fields import MDPPerm, SigSeedSubFilter

@@ -54,7 +54,7 @@ def inspect_xml(name: str, content: bytes, trust: Trust) -> FileInspection:
 
 
 def _method(certificate: Certificate) -> SignatureMethod:
-    """Return the signature method for this kind of key."""
+    """Return the signature method for the kind of this key."""
     rsa = isinstance(certificate.public_key(), RSAPublicKey)
     return SignatureMethod.RSA_SHA256 if rsa else SignatureMethod.ECDSA_SHA256
 

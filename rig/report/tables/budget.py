@@ -12,7 +12,7 @@ from rig.station.plain_text import plain
 
 
 def heading_for(budget: BudgetEntry | None) -> str:
-    """Return the heading of a column: U by a budget or, without one, two standard deviations."""
+    """Return the heading of a column: U if there is a budget, else two standard deviations."""
     return heading_of((COVERAGE_FACTOR,) if budget is None else budget.coverage_factors)
 
 

@@ -64,7 +64,7 @@ def pair(value: float, uncertainty: float) -> Pair:
 
 
 def axis_rows(sensor: GyroscopeEntry) -> list[AxisRow]:
-    """Return a gyroscope's axes with U by the budget; without one, with the standard deviation of the noise."""
+    """Return a gyroscope's axes with U from the budget; without one, with the standard deviation of the noise."""
     return rows_of(sensor.scale, sensor.bias_rad_s, _widths(sensor), too=degrees_of(sensor)[1])
 
 
@@ -126,12 +126,12 @@ def _largest_turn(errors: Sequence[Sequence[float]], axis: int) -> str:
 
 
 def pairs(term: Term) -> list[tuple[str, Pair]]:
-    """Return a characteristic's numbers by label, with U, in the unit of print."""
+    """Return a characteristic's numbers by label, with U, in the printed unit."""
     return [(label, pair(value, width)) for label, value, width in term.printed]
 
 
 def earth_rate_rows(entry: EarthRateEntry) -> list[tuple[str, str, Pair]]:
-    """Return name, unit, and value with U."""
+    """Return the name, unit, and value with U of each number of the Earth's rate."""
     (k,) = expanded([1.0], entry.dofs(1)).factors
     std = np.sqrt(np.diag(entry.covariance_rad2_s2))
     rows = [("size", "rad/s", pair(entry.norm_rad_s, k * entry.norm_std_rad_s))]

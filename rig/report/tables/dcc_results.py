@@ -31,7 +31,7 @@ SOLUTION = "± U of the solution"
 
 
 def gyroscope(sensor: GyroscopeEntry) -> Iterator[Element]:
-    """Yield scale factors and biases with U of the budget, and with the combined covariance."""
+    """Yield scale factors and biases with U from the budget, and with the combined covariance."""
     budget, covariance = _full_uncertainty(sensor)
     covered, (scale, bias) = coverage_sentence(budget), _widths(budget)
     model = f"{sensor.model}: true rate g, reading m, K = diag(k)."
@@ -63,7 +63,7 @@ def magnetometer(entry: MagnetometerEntry, reversal: ReversalEntry | None) -> It
 
 
 def further_results(characteristics: Iterable[Term]) -> Iterator[Element]:
-    """Yield quantities other than scale and bias, with U by their standard deviations."""
+    """Yield quantities other than scale and bias, with U from their standard deviations."""
     for term in characteristics:
         characteristic, numbers = term.characteristic, term.numbers
         remark = characteristic.remark(term.finding.entry)
@@ -207,7 +207,7 @@ def _joint(numbers: list[float], covariance: Sequence[Sequence[float]], unit: st
 def _wide_result(
     name: str, statement: str, labels: Sequence[str], values_and_stds: ValuesAndStds, unit: str
 ) -> Element:
-    """Return values with U, by their standard deviations and degrees of freedom."""
+    """Return values with U, from their standard deviations and degrees of freedom."""
     numbers, stds, dof = values_and_stds
     words = f"{statement}, {factor_words(dof)}."
     return _result(name, words, real_list(labels, numbers, [unit], expanded=expanded(stds, dof)))

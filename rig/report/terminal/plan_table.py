@@ -40,7 +40,10 @@ class DryRun:
 
     @cached_property
     def account(self) -> "AttitudeAccount | None":
-        """The expected accuracy by attitudes, None without any. Raise the errors of `attitude_account`."""
+        """The expected accuracy of a calibration in the plan's attitudes; None without attitudes.
+
+        Raise the errors of `attitude_account`.
+        """
         from rig.analysis.design.attitude_information import attitude_account
 
         return attitude_account(self.config, self.plan)
@@ -61,7 +64,7 @@ class DryRun:
 
     @property
     def duration_s(self) -> float:
-        """The duration of the movement, without settling and without its repetition."""
+        """The duration of the movement, without the settling of sensors or a repetition for the verification."""
         return self.plan.duration_s
 
     def to_dict(self) -> dict[str, Any]:
@@ -151,7 +154,7 @@ def _print_steps(planned: DryRun, console: Console) -> None:
 
 
 def _print_predictions(planned: DryRun, console: Console) -> None:
-    """Print the accuracy of accelerometers by attitudes, and the detection limits of the checks."""
+    """Print the accuracy of accelerometers expected from the attitudes, and the detection limits of the checks."""
     from rig.report.terminal.attitude_accuracy import print_account
 
     account, detection_limits = planned.account, planned.detection_limits
@@ -165,7 +168,7 @@ def _print_predictions(planned: DryRun, console: Console) -> None:
 
 
 def _counts(plan: Plan) -> str:
-    """Return the numbers of sweeps and dwells, as the beginning of a line on counts."""
+    """Return the numbers of sweeps and dwells in words, with which a line begins."""
     sweeps = f"{len(plan.sweeps)} sweeps, " if plan.sweeps or not plan.dwells else ""
     return sweeps + (f"{len(plan.dwells)} dwells, " if plan.dwells else "")
 

@@ -10,7 +10,7 @@ from rig.station.plain_text import plain
 
 
 def truth_tables(rows: Sequence[TruthRow], sensor: str | None = None) -> Iterator[Table]:
-    """Yield a table for each row of the result whose truth is known, of all sensors or one."""
+    """Yield a table for each row of the result whose true values are known, for all sensors or for one."""
     for row in rows:
         if sensor not in (None, row.row.sensor):
             continue

@@ -48,9 +48,9 @@ def words_of_name(name: str) -> CheckWords | None:
 
 
 def what_failed(check: CheckEntry, folder: Path | None) -> str | None:
-    """Return the meaning of a failed check and its remedy, with run folder and limit key in the commands.
+    """Return the meaning of a failed check and its remedy; the commands name the run folder and the limit's key.
 
-    If no configuration has that limit, the advice to raise it is left out.
+    If no configuration has this limit, the advice to raise it is left out.
     """
     if (words := words_of(check)) is None:
         return None
