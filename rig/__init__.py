@@ -81,7 +81,7 @@ _PLACES = {
 
 
 def __getattr__(name: str) -> Any:
-    """The public names, each imported when it is first asked for: the command line starts without them."""
+    """Return a public name, imported when it is first used, so that the command line starts without it."""
     if name not in _PLACES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from importlib import import_module

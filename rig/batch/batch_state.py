@@ -41,7 +41,7 @@ class Chip:
     who_am_i: tuple[int, ...] = ()
 
     def is_that(self, other: "Chip") -> bool:
-        """Return whether both are the same, by the sensors that were read."""
+        """Return whether both are the same chip, judged by board and, if both were read, by the sensors' identities."""
         both_read = self.who_am_i and other.who_am_i
         return self.board == other.board and (not both_read or self.who_am_i == other.who_am_i)
 
@@ -174,7 +174,7 @@ class Doubt:
 
 
 def doubt_of(serial: str, batch: Batch, section: StationSection, today: Callable[[str], str | None]) -> Doubt | None:
-    """Return the objection to running that number now, or None; `today` describes a run of today in the history."""
+    """Return the objection to running this serial number now, or None; `today` describes its run of today, if any."""
     try:
         check_serial_number(serial)
     except ValueError as error:

@@ -80,7 +80,7 @@ class Operator:
         return nullcontext() if self.voice is None else self.asking(what)
 
     def _agrees(self, kind: Kind, text: str, *lines: str) -> bool:
-        """Ask a question with two answers; no without a voice."""
+        """Ask a yes-or-no question; if no operator can be asked, the answer is no."""
         return self.voice is not None and is_agreed(self.voice, Question(kind, text, lines))
 
     def _answer(self, question: Question) -> str | None:

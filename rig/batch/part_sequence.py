@@ -36,7 +36,7 @@ class Bench(Protocol):
     def simulated(self) -> bool: ...
 
     def today(self, serial: str) -> str | None:
-        """Describe the history's run of that number today; None if there is none."""
+        """Describe today's run of the serial number in the history; None if there is none."""
         ...
 
     def known_as(self, chip: Chip, serial: str) -> str | None:

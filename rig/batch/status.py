@@ -130,7 +130,7 @@ def update_by_batch(now: Now, batch: Batch) -> Now:
 
 
 def last(now: Now) -> Now:
-    """Return the last state. A batch that has not ended, by itself or by a fault, becomes stopped."""
+    """Return the last state. A batch that ended neither by itself nor by a fault gets the state "stopped"."""
     return replace(now, state=now.state if now.state in ENDINGS else "stopped", left_s=None, over=True)
 
 

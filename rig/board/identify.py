@@ -18,7 +18,7 @@ changing = partial(raised_as, Fault)  # while the board is being changed, a refu
 
 
 def require_board_section(config: SensorsConfig) -> BoardSection:
-    """Return the section board. Raise Refused `no_board_section` if every sensor has a port of its own."""
+    """Return the section `board`. Raise Refused `no_board_section` if every sensor has a port of its own."""
     if config.board is None:
         raise Refused(
             "no_board_section",

@@ -58,7 +58,7 @@ def _complete_runs(prefix: str, **_: Any) -> Iterator[str]:
 
 
 def add_columns(parser: _ActionsContainer) -> None:
-    """Add the argument `--columns`, the same for all commands that read files of others."""
+    """Add the argument `--columns`, the same for all commands that read files of other programs."""
     parser.add_argument(
         "--columns",
         type=Path,

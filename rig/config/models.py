@@ -194,7 +194,7 @@ class ProcedureSection(Section):
 
     @property
     def finds_earth_rate(self) -> bool:
-        """Whether readings determine the Earth's rate; otherwise the site states it, or it is unknown."""
+        """Whether the Earth's rate is estimated from the readings; otherwise the site states it, or it is unknown."""
         return False
 
     def problems(self, config: "RigConfig") -> Iterable[str]:
@@ -312,7 +312,7 @@ class SensorsConfig(Section):
 
     @property
     def parts_on_board(self) -> Mapping[str, ConfiguredSensor]:
-        """All that the board reads, by name, gyroscopes first."""
+        """All sensors that the board reads, by name, gyroscopes first."""
         return {**self.on_board, **self.magnetometers}
 
     @property
@@ -322,7 +322,7 @@ class SensorsConfig(Section):
 
     @property
     def reference(self) -> tuple[str, SensorSection] | None:
-        """The sensor with a given calibration and its name, if there is one."""
+        """The sensor that has a stated calibration, with its name; None if there is none."""
         return next(((name, s) for name, s in self.sensors.items() if s.role == "reference"), None)
 
 

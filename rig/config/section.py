@@ -35,7 +35,7 @@ def no_number_is_true(cls: type[BaseModel], value: Any, info: ValidationInfo) ->
 
 
 def _kinds(annotation: Any) -> set[Any]:
-    """Return the types in a field's annotation."""
+    """Return the types in a field's type annotation."""
     return {annotation}.union(*map(_kinds, get_args(annotation))) if get_args(annotation) else {annotation}
 
 
@@ -50,8 +50,9 @@ class Section(BaseModel):
 def check_host(name: str) -> str:
     """Return a host's IP address or name unchanged. Raise ValueError if it can be neither.
 
-    A name has the form of RFC 1123, section 2.1; one with letters beyond ASCII has it once encoded (IDNA, RFC 3490). A
-    name whose last part is a number could only be an IPv4 address. An address that means any or many hosts is none.
+    A name has the form of RFC 1123, section 2.1; one with non-ASCII letters must have it after encoding (IDNA, RFC
+    3490). A name whose last part is a number could only be an IPv4 address, so it is refused. So are addresses of many
+    or unspecified hosts.
     """
     try:
         address = ipaddress.ip_address(name)

@@ -71,7 +71,7 @@ class Quantity:
         return self.name
 
     def named(self, what: str) -> str:
-        """Return the name in a file of `what` in this quantity's unit: `bias_rad_s`."""
+        """Return a file's key for the value `what` in this quantity's unit, such as `bias_rad_s`."""
         return f"{what}_{self.suffix}"
 
     def label(self, sensor: str) -> str:
@@ -80,7 +80,7 @@ class Quantity:
 
     @property
     def prefix(self) -> str:
-        """Beginning of the names of its checks, limits and columns, as `acceleration_`; empty for a rate."""
+        """Prefix of the names of its checks, limits and columns, such as `acceleration_`; empty for a rate."""
         return "" if self.name == RATE.name else f"{self.name}_"
 
     def full_label(self, sensor: str) -> str:
@@ -123,7 +123,7 @@ class Scalar:
     reading: DisplayUnit
 
     def named(self, what: str) -> str:
-        """Return the name in a file of `what` in this quantity's unit: `pressure_pa`."""
+        """Return a file's key for the value `what` in this quantity's unit, such as `pressure_pa`."""
         return f"{what}_{self.suffix}"
 
     @property

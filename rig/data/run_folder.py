@@ -36,7 +36,7 @@ class ScriptIdentity:
 
 
 def new_folder(out: Path | None, loaded: "Loaded", script: str, identity: ScriptIdentity) -> Path:
-    """Make a run folder with the configuration as used, the script's text and its identity, nothing else.
+    """Make a run folder that holds only the configuration as used, and the script's text and identity.
 
     Raise Refused `run_folder`.
     """

@@ -28,5 +28,5 @@ def is_own(sha256: str) -> bool:
 
 
 def _folder() -> Path:
-    """Return the folder of the notes. Raise as `own_folder`."""
+    """Return the folder of the notes. Raise as `own_folder` does."""
     return own_folder() / "own"

@@ -24,7 +24,7 @@ class Attempts(Generic[Key, Result]):
     faults: Mapping[Key, Fault] = field(default_factory=dict)
 
     def updated(self, later: "Attempts[Key, Result]") -> "Attempts[Key, Result]":
-        """Return the attempts with those in `later` added, which replace earlier ones of the same key."""
+        """Return the attempts together with those in `later`, which replace earlier ones of the same key."""
         repeated = later.results.keys() | later.faults.keys()
         kept = {key: result for key, result in self.results.items() if key not in repeated}
         kept_faults = {key: fault for key, fault in self.faults.items() if key not in repeated}

@@ -9,7 +9,7 @@ NO_BREAK_SPACE = "\N{NO-BREAK SPACE}"
 
 
 def printable(text: str) -> str:
-    """Return the text with every invisible character, line ends too, in Python's notation: `\\x1b`, `\
+    """Return the text with every invisible character, including line ends, in Python's notation: `\\x1b`, `\
     `.
 
     A no-break space stays: it separates a number from its power of ten or its unit.

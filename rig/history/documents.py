@@ -186,7 +186,7 @@ def _parameter(parameter: Parameter) -> dict[str, Any]:
 
 
 def cell(value: object) -> object:
-    """Return a value that a spreadsheet takes for text or a number: one line, and no formula."""
+    """Return a value such that a spreadsheet reads it as a text or a number: one line, and no formula."""
     if not isinstance(value, str):
         return value
     line = " ".join(value.splitlines())

@@ -86,7 +86,7 @@ def _record(past: Past) -> HistoryRecord:
 
 
 def _files_by_folder(history: History) -> Mapping[str, set[tuple[str, str]]]:
-    """Return the entered files by folder; a resumed run was entered again, from the same folder."""
+    """Return the entered files by folder; a resumed run has been entered again from the same folder."""
     by_folder: dict[str, set[tuple[str, str]]] = {}
     for path, name, sha256 in history.files():
         by_folder.setdefault(path, set()).add((name, sha256))
@@ -130,7 +130,7 @@ def _files(
 
 
 def _unknown(folder: Path, entered: Mapping[str, set[tuple[str, str]]]) -> Iterator[EntryState]:
-    """Yield the files of a run in its folder that were entered with no run.
+    """Yield the files in a run's folder that were not entered with any run.
 
     A further recording would change the folder's result.
     """
@@ -143,7 +143,7 @@ def _unknown(folder: Path, entered: Mapping[str, set[tuple[str, str]]]) -> Itera
 
 
 def _names(run: Kept, folder: Path) -> set[str]:
-    """Return the names of the entered files; if their computer may be another one, only of those present here."""
+    """Return the names of the entered files; if they may be on another computer, only of those present here."""
     possible = {RESULT, *(name for certificate in run.certificates for name, _ in certificate.files)}
     return {name for name, _ in run.documents} | {name for name in possible if (folder / name).exists()}
 

@@ -74,12 +74,12 @@ class Trend:
 
     @cached_property
     def mean(self) -> Fitted | None:
-        """The mean, with the scatter between runs."""
+        """The mean of the values, and their scatter between runs."""
         return fit(np.ones((self.count, 1)), self.values, self.std) if self.enough else None
 
     @cached_property
     def line(self) -> Fitted | None:
-        """The straight line over time: value at the first result, slope per day; None with few results or days."""
+        """The straight line over time: value at the first result and slope per day; None with few results or days."""
         if not self.enough or np.ptp(self.days) < DRIFT_DAYS:
             return None
         return fit(np.stack([np.ones(self.count), self.days], axis=1), self.values, self.std)
@@ -236,5 +236,5 @@ def effects(pasts: Sequence[Past]) -> dict[str, tuple[RigEffect, ...]]:
 
 
 def time_of(past: Past) -> datetime:
-    """Return the time at which a calibration's run began."""
+    """Return the time at which a calibration's run started."""
     return datetime.fromisoformat(past.started_utc).astimezone(UTC)

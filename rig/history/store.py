@@ -110,7 +110,7 @@ def open_history(where: str | HistoryAddress | None = None) -> Iterator["History
     """Open a history by its file or URL, the user's own by default; make or migrate its tables if necessary.
 
     Raise Refused `history_unreachable`, `history_too_old`, `history_too_new`, `not_a_history`, `missing_extra`;
-    `history_gone` or `history_exchanged` if this process has opened it before and it is gone or another one.
+    `history_gone` or `history_exchanged` if this process has opened it before and it is missing or has been replaced.
     """
     address = where if isinstance(where, HistoryAddress) else resolve_address(where)
     try:
@@ -160,12 +160,12 @@ class History:
         return entered
 
     def has(self, content_sha256: str) -> bool:
-        """Return whether a run with that result was entered."""
+        """Return whether a run with this result was entered."""
         with self.engine.connect() as connection:
             return self._run_id(connection, content_sha256) is not None
 
     def certify(self, content_sha256: str, certificate: Issued) -> bool:
-        """Add a certificate of the run with that result; return False if the run is not in the history.
+        """Add a certificate of the run with this result; return False if the run is not in the history.
 
         Raise Refused `entry_not_kept`.
         """
@@ -233,7 +233,7 @@ class History:
             yield from ((path, RESULT, sha256) for path, sha256 in connection.execute(result))
 
     def broken(self) -> Iterator[journal.Broken]:
-        """Yield triggers, numbers and rows that differ from those entered, as `journal.broken` does."""
+        """Yield changed triggers, gaps in the row numbers, and the broken rows that `journal.broken` finds."""
         with self.engine.connect() as connection:
             yield from triggers.unlike_made(connection)
             yield from row_numbers.gaps(connection)

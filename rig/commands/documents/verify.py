@@ -133,7 +133,7 @@ def _look_up(
 def _judge(
     file: Path, content: bytes, looks: "Mapping[Path, FileInspection]", history_answer: "FileEntries | None"
 ) -> VerifiedFile:
-    """Judge one file. If it has no signature, a signed file that contains it, or the history, decides."""
+    """Judge one file by its signature; without one, by a signed file that contains it, or by the history."""
     look, attached_to = looks[file], None
     problems = look.problems
     if not look.signatures:

@@ -31,7 +31,7 @@ TO_CONNECT = {
 def ask_history(address: "HistoryAddress", work: Callable[[], T], modules: Sequence[str] = ()) -> T:
     """Return the result of `work` on the history at `address`; raise its errors, or TimeoutError if it takes too long.
 
-    The needed modules, and `modules`, are imported before that time begins.
+    The needed modules, and `modules`, are imported before the time limit starts to run.
     """
     is_file = isinstance(address.where, Path)
     for name in (*TO_ASK, *modules):

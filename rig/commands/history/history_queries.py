@@ -147,7 +147,7 @@ def import_runs(options: Namespace) -> int:
 
 
 def verify(options: Namespace) -> int:
-    """Compare rows with journal and results, files with hashes; print the differences, return 1 if there are any."""
+    """Compare rows with journal and results, and files with hashes; print differences; return 1 if there are any."""
     from rig.history.integrity import STATES, WRONG, examine_history
 
     counts = dict.fromkeys(STATES, 0)
@@ -165,7 +165,7 @@ def verify(options: Namespace) -> int:
 def compare(options: Namespace) -> int:
     """Print how two calibrations of one sensor differ, and draw it with `--plot`; return 0.
 
-    Raise Refused `not_in_history`, `not_comparable`, and as `plot`.
+    Raise Refused `not_in_history`, `not_comparable`, and as `plot` does.
     """
     with open_named_history(options) as history:
         first, second = history.calibration(options.first), history.calibration(options.second)
@@ -222,7 +222,7 @@ def _select_pasts(history: History, selection: Selection) -> list[Past]:
 
 
 def _find_run_folders(folders: list[Path], *, unsolved: bool) -> Iterator[Path]:
-    """Yield the run folders among and within `folders`; yield a folder without any too, to be refused by name."""
+    """Yield the run folders among and within `folders`, and any folder without one, so that it is refused by name."""
     for folder in folders:
         inner = {file.parent for file in folder.rglob(RESULT)}
         if unsolved:

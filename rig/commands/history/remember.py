@@ -39,7 +39,7 @@ def remember(folder: Path, section: "HistorySection") -> tuple[RunEvent | None, 
 
 
 def remember_own(folder: Path, named: str | None) -> tuple[RunEvent | None, tuple[CalibrationComparison, ...]]:
-    """Enter the run in `folder` in the user's own history, or the `named` one. Return as `remember` does."""
+    """Enter the run in `folder` in the user's own history, or the `named` one. Return what `remember` returns."""
     from rig.history.storage.address import own_history_address
 
     return _enter_run(folder, lambda: own_history_address(named))

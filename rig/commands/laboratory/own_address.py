@@ -22,8 +22,9 @@ CANDIDATES = 250
 def find_own_address(config: SensorsConfig, laboratory: str | None) -> Iterator[list[str]]:
     """Yield the overrides that give a configuration's laboratory an address of its own during the block.
 
-    `laboratory` is the file with defaults if it simulates one, else None. There are no overrides if its address is
-    free, if it is real, or if no candidate is free: then the device that needs the address reports it.
+    `laboratory` is the file with all defaults if it simulates a laboratory, else None. There are no overrides if the
+    address is free, or if the laboratory is real. There are none either if no candidate is free; then the device that
+    needs the address reports this.
     """
     if laboratory is None or not isinstance(config, RigConfig):
         yield []
@@ -54,7 +55,7 @@ def _candidate_addresses() -> Iterator[str]:
 
 
 def _take_if_free(host: str, stack: ExitStack) -> bool:
-    """Claim an address if it is free: no other rig or laboratory uses it, and nothing listens."""
+    """Claim an address if it is free: no other rig or laboratory uses it, and no program listens there."""
     with ExitStack() as claims, socket.socket() as probe:
         try:
             claims.enter_context(claim_laboratory(host))

@@ -45,7 +45,7 @@ def _sha256(file: Path) -> str:
 def _list_addresses(loaded: Loaded) -> Iterator[tuple[str, str]]:
     """Yield each device that a run would connect to, with its address.
 
-    A simulated laboratory is on this computer, but may store its board's flash in a file.
+    A simulated laboratory connects to no device, but may store its board's flash in a file, which is then listed.
     """
     config = loaded.config
     if loaded.flash_file is not None:

@@ -28,7 +28,7 @@ def add(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Run the demonstration and return as `rig run` does; with `--files` copy the files and return 0.
+    """Run the demonstration and return the exit status of `rig run`; with `--files` copy the files and return 0.
 
     Raise Refused `files_not_copied`, and as `rig run` does.
     """

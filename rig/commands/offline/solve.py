@@ -83,8 +83,8 @@ def _refuse_samples(path: Path) -> None:
 def _solve_recording(options: Namespace) -> int:
     """Recompute the result of a run folder or a run file.
 
-    Return as `rig run` does. `--set` changes the settings that judge it, see `RunSettings.with_overrides`. `--script`
-    is the script of another user's recording.
+    Return 0 if it passed, else 1. `--set` changes the settings that judge it, see `RunSettings.with_overrides`.
+    `--script` names the script with which another user made the recording.
     """
     from rig.data.recording.run_reading import reading_ahead
 

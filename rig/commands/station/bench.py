@@ -221,8 +221,8 @@ class RigBench:
 def open_bench(configured: Configured, folder: Path, station: BatchSettings) -> Iterator[RigBench]:
     """Open the bench during the block; `folder` is the batch's.
 
-    Raise Refused as `claim_devices` does, and `station_sensors` if the configuration has no sensors that a station can
-    calibrate.
+    Raise Refused `station_sensors` if the configuration has no sensors that a station can calibrate, and as
+    `claim_devices` does.
     """
     config = configured.loaded.config
     refuse_other_sensors(config)

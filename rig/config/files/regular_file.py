@@ -17,7 +17,7 @@ class UnfitFile(Exception):
 
 
 def file_identity(path: Path) -> FileIdentity | None:
-    """Return the identity of the file or link at that path; None if nothing exists there. Raise OSError."""
+    """Return the identity of the file or link at a path; None if nothing exists there. Raise OSError."""
     try:
         status = path.lstat()
     except FileNotFoundError:

@@ -15,9 +15,9 @@ NO_LINK = getattr(os, "O_NOFOLLOW", 0)
 
 @contextmanager
 def replace_together() -> Iterator[None]:
-    """Put all files written in this block in place at its end, the one written last first.
+    """Move all files written in this block to their paths at its end, in reverse order of writing.
 
-    If the block raises an error, or a file cannot be put in place, new files that replace none are removed.
+    If the block raises an error, or a file cannot be moved, the new files that have not been moved yet are removed.
     """
     parts: dict[Path, Path] = {}
     token = _held_back.set(parts)
@@ -37,8 +37,8 @@ def replace_together() -> Iterator[None]:
 def new_file(path: Path) -> Iterator[BinaryIO]:
     """Open a file to be written in this block, which then replaces `path` completely or not at all.
 
-    Within `replace_together` this happens at the end of that block. A link at `path` is replaced itself, not its
-    target. Raise OSError as writing does, also if another process creates a file of that name at the same moment.
+    Within `replace_together` this happens at the end of that block. If `path` is a link, the link is replaced and its
+    target stays. Raise OSError as writing does, also if another process creates a file of that name at the same moment.
     """
     part = path.with_name(path.name + PART)
     part.unlink(missing_ok=True)

@@ -11,7 +11,7 @@ from rig.config.files.yaml_text import Location
 
 
 def take_text_as_written(model: type[BaseModel], data: Any, prefix: Location, written: Mapping[Location, str]) -> None:
-    """Restore texts in `data`, a section of `model` at `prefix`, as the file has them (`written`).
+    """Restore the texts in `data`, a section of `model` at `prefix`, to their spelling in the file (`written`).
 
     YAML reads a serial number 0017 as 15, and 2026-11-20 as a date.
     """

@@ -174,7 +174,7 @@ def _survey(
 
 
 def _visible(node: yaml.ScalarNode, location: Location) -> Iterator[str]:
-    """Yield a problem for a control character, which an escape in quotes can produce unseen."""
+    """Yield a problem for a control character, which an escape sequence in quotes can produce unnoticed."""
     if (character := first_control_character(node.value)) is not None:
         line = node.start_mark.line + 1
         yield f"{dotted_path(location)} (line {line}): holds the control character {printable(character)}"

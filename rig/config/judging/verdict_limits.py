@@ -135,12 +135,12 @@ _KEYS: Mapping[tuple[str, str], str] = {(row.quantity, row.what): key for key, r
 
 
 def key_of(quantity: str | None, what: str | None) -> str | None:
-    """Return the key of the limit for a check of that quantity; None if no configuration has one."""
+    """Return the key of the limit for a check of the given quantity; None if no configuration has one."""
     return _KEYS.get((quantity or "", what or ""))
 
 
 def limit_of(limits: Limits | None, quantity: str, what: str) -> tuple[Limit, float | None]:
-    """Return the row of that name, and its limit or None if it is not set. Raise KeyError for an unknown name."""
+    """Return the row called `name`, and its limit, or None if it is not set. Raise KeyError for an unknown name."""
     key = _KEYS[quantity, what]
     limit: float | None = getattr(limits, key, None)
     return LIMITS[key], limit

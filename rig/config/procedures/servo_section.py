@@ -67,5 +67,5 @@ class ServoSection(TurnerSection):
         return urlsplit(self.port).hostname if self.port.startswith("socket://") else None
 
     def moved_to(self, host: str) -> Mapping[str, str]:
-        """Return the key of the servo's port, with the new value."""
+        """Return the key of the servo's port, with the same port number at another `host`."""
         return {"port": f"socket://{host}:{urlsplit(self.port).port}"}

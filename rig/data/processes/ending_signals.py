@@ -52,7 +52,7 @@ class Interrupts:
         self._first_s: float | None = None  # when the signal came that waits for a lock
 
     def hear(self, number: int, frame: FrameType | None, text: str = "") -> None:
-        """Handle a signal by an exception, except within a burst of signals.
+        """Raise an exception for a signal, except within a burst of signals.
 
         While a thread takes a lock, wait a moment, at most as long as a burst lasts.
         """

@@ -30,9 +30,9 @@ def can_fork() -> bool:
 
 @cache
 def load_hdf5() -> bool:
-    """Load HDF5 without plugins, for all the reading processes that a program forks which reads many files.
+    """Load HDF5 without plugins, for all reading processes that a program forks when it reads many files.
 
-    Return False if it was loaded before, with those that the environment names.
+    Return False if it was already loaded, with the plugins that the environment names.
     """
     if "h5py" in sys.modules:
         return False

@@ -177,7 +177,7 @@ class ReadingTask:
 
 
 def _start(request: BinaryIO, out: BinaryIO, environment: Mapping[str, str]) -> "subprocess.Popen[bytes]":
-    """Return a new process that reads."""
+    """Start a process that reads the file, and return it."""
     # Not from the working folder, where any file could pass for a module, but by this process' own search path.
     command = [sys.executable, "-P", "-m", "rig.data.processes.reading_child"]
     environment = {**os.environ, **environment, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
@@ -187,7 +187,7 @@ def _start(request: BinaryIO, out: BinaryIO, environment: Mapping[str, str]) -> 
 def _fork(
     request: Mapping[str, Any], out: BinaryIO, complaints: BinaryIO, environment: Mapping[str, str]
 ) -> ForkedReader:
-    """Return a process forked from this one that reads."""
+    """Fork a process from this one that reads the file, and return it."""
     from rig.data.processes.reading_child import read_and_end
 
     limits = request["limits"]

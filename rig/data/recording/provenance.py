@@ -129,7 +129,7 @@ def provenance_of(
     follows_crystal: bool | None,
     kind: str,
 ) -> Provenance:
-    """Return the provenance of a recording that begins now, with a turner of that `kind` and `model`."""
+    """Return the provenance of a recording that begins now, with a turner of the given `kind` and `model`."""
     return Provenance(
         started_utc=datetime.now(UTC).isoformat(timespec="seconds"),
         **_program(),

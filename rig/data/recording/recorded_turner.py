@@ -42,7 +42,7 @@ class RecordedTurner:
     def build(
         cls, kind: str, model: TurnerIdentity, joints: Sequence[str], fields: Sequence[StateField]
     ) -> "RecordedTurner":
-        """Return a turner of that kind and model, whose states have these fields. Raise ValueError."""
+        """Return a turner of the given kind and model, whose states have these fields. Raise ValueError."""
         motion = tuple(joints), model.kinematics, tuple(fields), model.reading_std_rad
         return parse_turner(asdict(cls(kind, model.maker, model.model, *motion)))
 

@@ -35,7 +35,7 @@ class RunData:
     external: "ReadElsewhere | None" = None
 
     def measuring(self, quantity: "Quantity | Scalar") -> "dict[str, RecordedSensor]":
-        """Return the sensors whose samples hold that quantity, by name."""
+        """Return the sensors whose samples hold the given quantity, by name."""
         return {name: sensor for name, sensor in self.sensors.items() if sensor.measures(quantity)}
 
     def judged_by(self, overrides: Sequence[str]) -> "RunData":

@@ -218,9 +218,9 @@ def write_elsewhere(path: Path, run: RunData) -> None:
 
 
 def make_plain(path: Path) -> None:
-    """Rewrite a killed run's file, which only SWMR readers open, so that any HDF5 tool opens it.
+    """Rewrite a killed run's file, which only SWMR readers can open, so that any HDF5 tool can open it.
 
-    The content stays. Nothing may be writing the file. Raise Refused as `read_run` does; OSError.
+    The content stays the same. No process may be writing the file meanwhile. Raise Refused as `read_run` does; OSError.
     """
     contents = _contents(path, None)
     samples = {name: _whole_rows(rows) for name, rows in contents.samples.items()}

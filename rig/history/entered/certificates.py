@@ -36,7 +36,7 @@ def enter(connection: Connection, run_id: int, issued: Issued, now_utc: str) -> 
 
 
 def of_run(connection: Connection, run_id: int) -> tuple[Issued, ...]:
-    """Return the certificates of a run, and the files of each, in the order of entry."""
+    """Return the certificates of a run, each with its files, in the order of entry."""
     query = select(certificate).where(certificate.c.run_id == run_id).order_by(certificate.c.id)
     return tuple(
         Issued(row.number, row.title, row.issued, row.replaces, row.marks, _files(connection, row.id))

@@ -71,7 +71,7 @@ class FinishedRun:
 
 
 def read_finished_run(folder: Path, document: "ResultDocument | None" = None) -> FinishedRun:
-    """Return the run in `folder`, with its result.json or the `document` computed from its recordings.
+    """Return the run in `folder` with its result.json, or with the `document` computed from its recordings.
 
     Raise the errors of `read_result`; OSError if a recording cannot be read.
     """
@@ -157,7 +157,7 @@ def content_sha256(text: str) -> str:
 def read_configuration(folder: Path) -> "Loaded | None":
     """Return the folder's configuration, or None if it has none or this program refuses it.
 
-    In the latter case, for example of an unknown key, the result is entered nevertheless.
+    A configuration is refused, for example, for an unknown key; the result is entered nevertheless.
     """
     if not (folder / CONFIG).exists():
         return None
@@ -172,7 +172,7 @@ def read_configuration(folder: Path) -> "Loaded | None":
 def _certificate(folder: Path, document: "ResultDocument", stated: "StatedFacts") -> Issued | None:
     """Return the certificate in the folder if its content is that of this result; an equal number proves nothing.
 
-    An amended certificate is entered when it is made.
+    An amended certificate is not entered here, but when it is made.
     """
     try:
         page = read_regular_file(folder / PAGE, PAGE_MAX_BYTES)

@@ -40,12 +40,12 @@ def measurement_sha256(document: ResultDocument) -> str:
 
 
 def fit(document: ResultDocument) -> bool:
-    """Return whether the measurement passed its own checks; limits of the sensor do not matter."""
+    """Return whether the measurement passed its own checks; whether the sensor is within its limits does not matter."""
     return all(check.passed for check in document.checks if check.means.kind == "fitness")
 
 
 def utc(text: str) -> str:
-    """Return a time in UTC and one form, so that texts sort like times."""
+    """Return a time as a text in UTC, always in the same form, so that texts sort like times."""
     return datetime.fromisoformat(text).astimezone(UTC).isoformat(timespec="seconds")
 
 

@@ -60,7 +60,7 @@ STATE_WORDS = {
 
 
 def again_csv(outcome: RecomputeOutcome) -> str:
-    """Return a line for each calibration with its most changed parameter, and one for a run without calibrations."""
+    """Return CSV with a line for each calibration and its most changed parameter, or for a run without calibrations."""
     out = io.StringIO(newline="")
     writer = csv.DictWriter(out, COLUMNS, lineterminator="\n", restval="")
     writer.writeheader()

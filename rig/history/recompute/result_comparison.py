@@ -101,7 +101,7 @@ class Compared:
 
     @cached_property
     def moves(self) -> Mapping[int, tuple[ParameterMove, ...]]:
-        """Every parameter of each calibration, by its number, the largest change first; empty if unsolved."""
+        """The changes of every parameter, largest first, by the calibration's number; empty if unsolved."""
         if not isinstance(self.answer, RecomputedResult):
             return {}
         now = {(record.sensor, record.quantity): record.parameters for record in self.answer.calibrations}
@@ -171,7 +171,7 @@ class RecomputeOutcome:
 
     @property
     def verdicts_changed(self) -> int:
-        """The number of results with another verdict."""
+        """The number of results whose verdict has changed."""
         return sum(comparison.verdict_changed for comparison in self.compared)
 
     @property

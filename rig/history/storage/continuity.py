@@ -34,7 +34,7 @@ _identities: dict[Path | URL, _Identity] = {}
 
 
 def is_there(address: HistoryAddress) -> bool:
-    """Return whether a history exists to be opened; True for a server that was not asked yet.
+    """Return whether there is a history to open; True for a server that has not been asked yet.
 
     Raise as `refuse_another_file` does.
     """
@@ -43,7 +43,7 @@ def is_there(address: HistoryAddress) -> bool:
 
 
 def refuse_another_file(address: HistoryAddress) -> None:
-    """Raise Refused `history_gone`, `history_exchanged` if the file of a known history is gone or another one."""
+    """Raise Refused `history_gone`, `history_exchanged` if the file of a known history is gone or was replaced."""
     identity = _identities.get(address.where)
     if identity is not None and isinstance(address.where, Path):
         refuse_unlike(identity.file, address.where, address.label)

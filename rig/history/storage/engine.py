@@ -22,7 +22,7 @@ __all__ = ["WRITES", "connection_apart", "engine_of"]
 def engine_of(address: HistoryAddress) -> Iterator[Engine]:
     """Yield the engine of a history, migrated and ready; a process has one engine for each file.
 
-    Raise Refused as `bring_up_to_date`, `history_is_there` and `continuity` do, and `missing_extra`; SQLAlchemyError
+    Raise Refused `missing_extra`, and as `bring_up_to_date`, `history_is_there` and `continuity` do; SQLAlchemyError
     and OSError.
     """
     continuity.refuse_another_file(address)
@@ -44,7 +44,7 @@ def engine_of(address: HistoryAddress) -> Iterator[Engine]:
 
 @contextmanager
 def connection_apart(engine: Engine) -> Iterator[Connection]:
-    """Yield a new connection, which does not share another connection's view of the history."""
+    """Yield a new connection with its own view of the history."""
     with engine.connect() as connection:
         connection.invalidate()  # the pool's connection may be the one that wrote
         yield connection

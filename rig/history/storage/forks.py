@@ -13,7 +13,7 @@ _parent_pools: list[Pool] = []
 
 
 def kept_from_children(engine: Engine) -> Engine:
-    """Return the engine, made safe for forked processes, which open connections of their own."""
+    """Return the engine, made safe to inherit: a forked process opens its own connections."""
     _engines.add(engine)
     return engine
 

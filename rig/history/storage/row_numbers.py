@@ -11,7 +11,7 @@ NUMBERED = (schema.run, schema.location, schema.calibration, schema.certificate)
 
 
 def next_number(connection: Connection, table: Table) -> int:
-    """Return the number of the next row, in a transaction that writes alone."""
+    """Return the number of the next row. Call it in a transaction during which no other connection can write."""
     return int(connection.scalar(select(func.coalesce(func.max(table.c.id), 0))) or 0) + 1
 
 

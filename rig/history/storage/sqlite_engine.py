@@ -35,7 +35,7 @@ _sharing = threading.Lock()
 
 @contextmanager
 def shared_engine(file: Path, label: str) -> Iterator[Engine]:
-    """Yield this process's engine of a history's file; when its last user leaves, its connections are closed."""
+    """Yield this process's engine of a history's file; when its last user has finished, its connections are closed."""
     key = file.parent.resolve() / file.name
     with _sharing:
         if key not in _engines:
@@ -57,7 +57,8 @@ def shared_engine(file: Path, label: str) -> Iterator[Engine]:
 def sqlite_engine(file: Path, label: str, *, new: bool = False) -> Engine:
     """Return an engine of a history's file, or of a `new` one.
 
-    Each use of a connection raises Refused `history_gone` or `history_exchanged` if the file is gone or another one.
+    Each use of a connection raises Refused `history_gone` or `history_exchanged` if the file is missing or has been
+    replaced.
     """
     may_write = new or (os.access(file, os.W_OK) and os.access(file.parent, os.W_OK))
     identity = file_identity(file)
@@ -100,7 +101,8 @@ def _connect_to_write(file: Path, *, new: bool) -> sqlite3.Connection:
 def _connect_to_read(file: Path) -> sqlite3.Connection:
     """Open a file for reading only, in a folder in which the user can make no files.
 
-    A writer would have a log there. Without a log the file does not change while it is read, so no lock is needed.
+    A writer would keep a log in that folder. Without a log the file does not change while it is read, so no lock is
+    needed.
     """
     log = file.with_name(f"{file.name}-wal")
     return _connect(file, "mode=ro" if log.exists() else "mode=ro&immutable=1")

@@ -22,7 +22,7 @@ SUFFIXES = ("-wal", "-shm")  # of SQLite's companion files: its log, and the log
 
 
 def history_is_there(file: Path) -> bool:
-    """Return whether a history exists; False if there is no file at all.
+    """Return whether a history exists; False if there is no file.
 
     Raise Refused `not_a_history`, `history_too_old`; OSError.
     """
@@ -51,7 +51,7 @@ def address_of(file: Path, options: str) -> str:
 
 
 def refuse_unmarked(connection: sqlite3.Connection, file: Path) -> None:
-    """Raise Refused `not_a_history` for another database, before the connection writes."""
+    """Raise Refused `not_a_history` for a database that is not a history, before the connection writes."""
     if not _is_marked(connection):
         raise _not_a_history(file, "it is another kind of database")
 
@@ -60,7 +60,8 @@ def refuse_unmarked(connection: sqlite3.Connection, file: Path) -> None:
 def new_file_in_place(file: Path) -> Iterator[Path]:
     """Yield the path for a new database, which is moved to `file` when complete, or removed.
 
-    A file that another process has put there meanwhile stays. An incomplete one is never visible. Raise OSError.
+    A file that another process has put at `file` meanwhile stays. An incomplete database is never visible. Raise
+    OSError.
     """
     file.parent.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory(prefix=".history-", dir=file.parent) as folder:

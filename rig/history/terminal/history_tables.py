@@ -50,7 +50,7 @@ def trends_table(subject: Subject, trends: Sequence[Trend]) -> FittingTable:
 
 
 def trend_lines(trends: Mapping[str, Trend]) -> Iterator[str]:
-    """Yield explanations of the table and of its missing values."""
+    """Yield lines that explain the table and its missing values."""
     if not trends:
         return
     fewest = min(trend.count for trend in trends.values())
