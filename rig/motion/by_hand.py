@@ -25,7 +25,7 @@ class Instruction:
 
     @property
     def words(self) -> str:
-        """The request in one line."""
+        """The request to the operator in one line."""
         if self.say == "lay":
             return f"Lay it down with the side {self.face} up, and let go"
         count = "one whole turn" if abs(self.turns) == 1 else f"{abs(self.turns)} whole turns"

@@ -72,8 +72,8 @@ NOMINAL = DenavitHartenberg(  # a UR10e's (maker's article 45257), the arm of re
 def axis_errors(q_rad: ArrayLike, joint: int, arm: DenavitHartenberg = NOMINAL) -> Array:
     """Return the change (…, 13, 3) of a wrist axis' direction in the flange's frame, per radian of `AXIS_ERRORS`.
 
-    The joint angles are `q_rad` (…, n). A rotation of the whole flange is part of a sensor's mounting. The wrists of
-    another chain are its last three joints; if it has fewer, the errors of the others are zero.
+    The joint angles are `q_rad` (…, n). A rotation of the whole flange is part of a sensor's mounting. If `arm` has
+    another number of joints, its last three count as the wrists; errors of missing joints are zero.
     """
     q = np.asarray(q_rad, dtype=np.float64)
     frames = [frame[..., :3, :3] for frame in _frames(q, arm)]
@@ -93,8 +93,8 @@ def axis_errors(q_rad: ArrayLike, joint: int, arm: DenavitHartenberg = NOMINAL) 
 def flange_errors(q_rad: ArrayLike, arm: DenavitHartenberg = NOMINAL) -> Array:
     """Return the flange's rotations (3, 6, 3) in the base's frame, per radian of each wrist's errors.
 
-    The joint angles are `q_rad` (n,). Errors of a wrist are its twist, its zero, and the `WAVES` of its angle. The
-    wrists of another chain are its last three joints; if it has fewer, the errors of the others are zero.
+    The joint angles are `q_rad` (n,). Errors of a wrist are its twist, its zero, and the `WAVES` of its angle. If `arm`
+    has another number of joints, its last three count as the wrists; errors of missing joints are zero.
     """
     q = np.asarray(q_rad, dtype=np.float64)
     frames = np.array(_frames(q, arm))[:, :3, :3]
@@ -187,7 +187,7 @@ def distance_to_upper_arm(
 
 
 def lengths_m(arm: DenavitHartenberg) -> Array:
-    """Return the lengths (6,), m, named by `LENGTHS`, which an arm shows to measurement whatever its parameters."""
+    """Return the lengths (6,), m, named by `LENGTHS`, which can be measured on an arm, however it is parametrised."""
     frames = _frames(np.zeros(6), arm)
     base, wrist_2, wrist_3, flange = (frames[joint][:3, 3] for joint in (0, 4, 5, 6))
     shoulder, elbow, wrist_1 = _find_bends(frames)
@@ -200,8 +200,8 @@ def lengths_m(arm: DenavitHartenberg) -> Array:
 def _find_bends(frames: list[Array]) -> tuple[Array, Array, Array]:
     """Return shoulder, elbow and wrist 1, (…, 3) m, each in the plane of the previous one.
 
-    Except for the factory's calibration, the axes of these three are parallel, so they meet hundreds of metres away,
-    and the origins of a calibrated arm's frames lie anywhere along them.
+    The axes of these three are parallel except for the factory's calibration. They therefore meet hundreds of metres
+    away, and the origins of a calibrated arm's frames may lie anywhere along them.
     """
     shoulder = frames[1][..., :3, 3]
     elbow = _nearest_origin(shoulder, frames[1][..., :3, 2], frames[2])
@@ -262,7 +262,7 @@ def flange_arm(q_rad: ArrayLike, joint: int, arm: DenavitHartenberg = NOMINAL) -
 def flange_rate(q_rad: ArrayLike, qd_rad_s: ArrayLike, arm: DenavitHartenberg = NOMINAL) -> Array:
     """Return angular velocities (…, 3) of the flange in its own frame, rad/s, from joint angles and speeds (…, n).
 
-    They are propagated from link to link, each in its own frame, because a recording has many states.
+    The rate is propagated from link to link, each in its own frame, which is fast for the many states of a recording.
     """
     angles = np.moveaxis(np.asarray(q_rad, dtype=np.float64) + arm.theta_rad, -1, 0)
     speeds = np.moveaxis(np.asarray(qd_rad_s, dtype=np.float64), -1, 0)

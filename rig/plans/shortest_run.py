@@ -157,7 +157,7 @@ def _change(section: SectionT, **keys: object) -> SectionT:
 
 
 def _add_target(planned: Planned, keys: Mapping[str, float]) -> Planned:
-    """Return the run with the keys of the procedure that end it when the target is reached."""
+    """Return the planned run with `keys` set in its procedure, which make the run end when it reaches the target."""
     procedure = planned.candidate.procedure
     with suppress(ValidationError):  # the target is larger than a file may have
         procedure = _change(procedure, **keys)
@@ -304,7 +304,7 @@ class _ByHand:
             return None
 
     def ending(self, procedure: ProcedureSection, wanted: TargetUncertainty) -> Mapping[str, float]:
-        """Return the key and target of a session, less the part of U that no session reduces."""
+        """Return the key that ends a session at the target, minus the part of U that no session can reduce."""
         remaining = wanted.scale**2 - (2 * REAL_HANDS) ** 2
         return {"target_scale_u": round(remaining**0.5, 7)} if 0 < remaining < inf else {}
 

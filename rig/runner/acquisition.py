@@ -73,7 +73,10 @@ class _Thinning:
     last_s: float = 0.0
 
     def keeps(self, time_s: float) -> bool:
-        """Return whether to record the state at `time_s`. Call it once for each state, in their order."""
+        """Return whether to record the state at `time_s`: all at first, later only some.
+
+        Call it for each state in order.
+        """
         if self.began_s is None:
             self.began_s = time_s
         if time_s - self.began_s > WHOLE_S and time_s - self.last_s < STANDING_S:
@@ -138,7 +141,7 @@ class Acquisition:
             self._thinning = None
 
     def hear(self) -> "SimpleQueue[tuple[str, NDArray[Any]]]":
-        """Return a queue that receives all samples from now on, as pairs of the sensor's name and samples (n,)."""
+        """Return a queue that receives all samples from now on, in pairs of a sensor's name and its samples (n,)."""
         self._heard = SimpleQueue()
         return self._heard
 
@@ -148,7 +151,7 @@ class Acquisition:
             self._kept.append(_Part(defaultdict(list), []))
 
     def collect_kept(self, sensor: str) -> tuple[np.ndarray, list[State], int]:
-        """Return the kept samples (n,) of one sensor, the kept arm states, and how many of these are new.
+        """Return the kept samples (n,) of one sensor, the kept states of the arm, and the number of new states.
 
         States since the latest `keep` are new. Older states reach at most `REACHES_BACK_S` before it, however long the
         run has waited.

@@ -16,7 +16,7 @@ NOBODY = "Nobody and nothing may be within its reach."
 
 
 def mounting(plan: Plan, number: int, words: Wording) -> Prompt:
-    """Return the question whether the item is mounted for the stage `number` (from 0); `words` names the turner."""
+    """Return the question that asks if the item is mounted for stage `number` (from 0); `words` names the turner."""
     stages, stage = plan.stages, plan.stages[number]
     far = _farthest(plan)
     lines = (

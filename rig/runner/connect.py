@@ -68,7 +68,7 @@ class Connector:
     connecting: Connecting | None = None
 
     def _find_omitted(self, whole_plan: Plan) -> frozenset[int]:
-        """Return the indices of sweeps and dwells not to be done now: finished ones, and those of other stages."""
+        """Return the indices of sweeps and dwells not to do now: finished ones, and those of other stages."""
         others = (stage.indices for index, stage in enumerate(whole_plan.stages) if index != self.settings.stage)
         return self.resumed.done.union(*others)
 
@@ -77,7 +77,8 @@ class Connector:
         """Connect everything and start recording; at the end stop the turner and close the file.
 
         Nothing moves while connecting. Raise `Refused` by name if the turner, the board or a sensor differs from the
-        configuration or from the recording so far, or has no calibration to correct by.
+        configuration or from the recording so far, or if a sensor has no calibration by which its readings could be
+        corrected.
         """
         whole_plan = self.phase.plan()
         if self.resumed.earlier and not self.phase.agreed:  # a stage that follows resumes nothing

@@ -84,7 +84,7 @@ class _Connection:
         return self._turner
 
     def _let_go(self) -> None:
-        """Drop the references to the run, which would keep all of its readings in memory."""
+        """Drop the references to the run, because they would keep all of its readings in memory."""
         self._on_state, self._turner = _forget, None
 
     def close(self) -> None:

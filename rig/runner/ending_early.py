@@ -61,7 +61,7 @@ class EndingEarly:
             self._stands_at(self.plan.start_q_rad, len(remaining))
 
     def note_sweep(self, sweep: Sweep) -> None:
-        """Note that a sweep was made."""
+        """Note a recorded sweep, and whether it completes a repeat."""
         self._recorded = True
         remaining = [motion.index for motion in self.plan.motions[self._motions :] if isinstance(motion, Sweep)]
         self._due = False
@@ -91,7 +91,10 @@ class EndingEarly:
         return UncertaintySoFar(reached.scale, reached.bias_rad_s, self._repeats_left, self.ended)
 
     def skips(self, motion: Motion) -> bool:
-        """Return whether to skip the next motion of the plan: at the early end, all but the way home are skipped."""
+        """Return whether to skip the next motion of the plan.
+
+        At an early end all motions are skipped except the one home.
+        """
         index, self._motions = self._motions, self._motions + 1
         return self.ended and index != self._home
 
@@ -108,7 +111,7 @@ class EndingEarly:
         return self.sweeps // self.repeats
 
     def _stands_at(self, pose: Joints, sweeps_left: int) -> None:
-        """Note that an assessment is due, if a motion home from the present pose is in the remaining plan."""
+        """Note that an assessment is due, if the remaining plan contains a motion home from the present pose."""
         self._repeats_left = -(-sweeps_left // self._per_repeat)
         self._home = next(
             (

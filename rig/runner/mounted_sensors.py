@@ -26,7 +26,7 @@ class CalibratedBefore:
 
     @property
     def words(self) -> str:
-        """The day and the verdict of the calibration, and its number."""
+        """The day, the verdict and the number of the calibration, in words."""
         return f"{self.day}, {self.verdict.upper()} (calibration {self.number})"
 
 
@@ -90,7 +90,7 @@ def find_mounted(
 ) -> Mounted:
     """Return the sensors of a run that can be calibrated, on the board with the identifier `board`.
 
-    `sensors` is by name. A simulated sensor is never the same as a real one.
+    `sensors` are the sensors by name. A simulated sensor is never the same as a real one.
     """
     turned = []
     for name, sensor in sensors.items():

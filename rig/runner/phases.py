@@ -92,7 +92,7 @@ class Run:
         return bool(planned - self._resume(phase).done)
 
     def _resume(self, phase: Phase) -> Resumption:
-        """Return the steps of earlier recordings that count; none of corrected readings, which are compared whole."""
+        """Return the steps of earlier recordings that count; none of corrected readings, which are never resumed."""
         if phase.procedure.reads_corrected:
             return Resumption()
         with self.report_end(self._advice, moved=False):
@@ -102,9 +102,9 @@ class Run:
     def _record_phase(
         self, phase: Phase, resumed: Resumption, *, moved: bool, results: Mapping[str, SensorResult] | None = None
     ) -> tuple[RunData, ...]:
-        """Carry out the phase's script, by `results` of the calibration before; return all recordings of the phase.
+        """Carry out the phase's script, with `results` of the previous calibration; return all recordings of the phase.
 
-        Before each stage the item is mounted with nothing connected, as cables may have to be unplugged.
+        While the item is mounted for a stage, nothing is connected, because cables may have to be unplugged.
         """
         readings = phase.procedure.readings
         with self.report_end(self._advice, moved=moved):
@@ -255,7 +255,7 @@ class Run:
 
 
 def _add_notes(what: str, error: BaseException) -> str:
-    """Return the message `what` followed by the notes of the error, such as the arm's on its stop."""
+    """Return the message `what` followed by the notes of the error, such as the one on how the arm stopped."""
     return "; ".join([what, *dict.fromkeys(_notes(error))])
 
 

@@ -219,7 +219,7 @@ class Rig:
             self._resting_rad_s[readings.name] = readings.rates_rad_s.mean(axis=0)
 
     def _collect_readings(self, lasting_s: float, watch: Callable[[], None]) -> list[GyroscopeReadings]:
-        """Return the gyroscopes' readings since the latest `keep`, once they last `lasting_s` by each clock."""
+        """Return the gyroscopes' readings since the latest `keep`, once they span `lasting_s` on each clock."""
         acquisition = self.devices.acquisition
         sensors = {name: sensor for name, sensor in self.recording.sensors.items() if sensor.measures(RATE)}
 
@@ -254,9 +254,10 @@ class Rig:
                 self._try_the_mounting(transfer, self.devices.turner.latest.time_s - began_s)
 
     def sweep(self, sweep: Sweep) -> None:
-        """Turn one joint through a revolution, or an arc, at constant speed, and record its begin and end.
+        """Turn one joint through a revolution, or an arc, at constant speed, and record its start and end.
 
-        Afterwards, while the arm stands still, a board that calibrates by itself averages it. Raise `unplanned_motion`.
+        Afterwards, while the arm stands still, a board that calibrates by itself averages the sweep's readings. Raise
+        `unplanned_motion`.
         """
         self._refuse_unplanned(sweep)
         if self._skips(sweep):
@@ -466,7 +467,7 @@ class Rig:
 
 
 def _span_s(samples: np.ndarray) -> float:
-    """Return the time between the first and the last of samples (n,), s, by the clock that stamped them."""
+    """Return the time between the first and the last of samples (n,), s, on the clock that stamped them."""
     return float(np.ptp(samples["board_time_us"])) * 1e-6 if len(samples) else 0.0
 
 

@@ -26,7 +26,7 @@ class Resumption:
     def refuse_other_instruments(self, provenance: Provenance, sensors: Mapping[str, RecordedSensor]) -> None:
         """Raise Refused `another_board`, `another_arm`, `another_sensor` if the devices differ.
 
-        Readings of two boards, or at two settings, are not one calibration.
+        Readings of two boards, or with two settings, cannot be used for one calibration.
         """
         for run in self.earlier:
             begun = run.provenance

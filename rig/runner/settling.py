@@ -38,7 +38,7 @@ class _Watched:
     def scatter_counts(self, before: int = 0) -> float | None:
         """Return the standard deviation of the newest span of readings, as RMS over the axes; None with too few.
 
-        `before` counts spans back from the newest one.
+        `before` is the number of spans to go back from the newest one.
         """
         if len(self.recent) < (before + 1) * self.enough:
             return None
@@ -55,7 +55,7 @@ class _Watched:
 
     @property
     def settled(self) -> bool:
-        """Whether the sensor scatters as at rest, or slightly more but no longer decreasing."""
+        """Whether the readings scatter as at rest, or slightly more with a scatter that no longer decreases."""
         ratio, scatter, earlier = self.over_rest(), self.scatter_counts(), self.scatter_counts(before=1)
         if ratio is None or scatter is None:
             return False

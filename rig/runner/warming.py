@@ -53,7 +53,7 @@ class Warming:
     _looked_s: float = -np.inf
 
     def prepare(self) -> None:
-        """Raise Refused, before anything moves, if a sensor has `no_thermometer` or the board `no_heater`."""
+        """Raise Refused `no_thermometer` for a sensor, or `no_heater` for the board, before anything moves."""
         for name in self.names:
             sensor = self.acquisition.counts[name].sensor
             if sensor.temperature_stated or not sensor.measures(TEMPERATURE):
@@ -153,7 +153,7 @@ class Warming:
             self.heater.keep_heating(0.0)
 
     def _nearest(self, now_c: Mapping[str, float]) -> float:
-        """Return the temperature of the sensor that is last on the way through the range."""
+        """Return the temperature of the sensor that has come least far on the way through the range."""
         return max(now_c.values()) if self.course.warming is False else min(now_c.values())
 
     def _refuse_hot(self, now_c: Mapping[str, float]) -> None:

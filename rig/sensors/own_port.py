@@ -57,7 +57,7 @@ class OwnPort:
         patience: Patience = USUAL,
         farewell: Callable[[], None] = lambda: None,
     ) -> None:
-        """Prepare the reader of the port called `name`; `farewell` runs at the close, while the port is still open."""
+        """Prepare the reader of the port called `name`; `farewell` is called before the port closes."""
         self.news = threading.Condition()
         self.silence = PortSilence()
         self.fault: SensorError | None = None
@@ -84,7 +84,7 @@ class OwnPort:
     def check(self, clock_s: float | None = None) -> None:
         """Raise the fault of the port, or of a stream that has been silent for too long.
 
-        `clock_s` is the present time on another instrument's clock: the silence must be too long by that clock as well.
+        `clock_s` is the present time on another instrument's clock: the silence must be too long on that clock as well.
         """
         if self.fault is not None:
             raise self.fault
@@ -109,7 +109,7 @@ class OwnPort:
             raise self._faults.complete(error) from error
 
     def close(self) -> None:
-        """Run the farewell, end the thread and close the port. May be called twice."""
+        """Call the `farewell` function, end the thread and close the port. May be called twice."""
         if self._closing.is_set():
             return
         with suppress(SensorError):

@@ -15,7 +15,7 @@ class Patience:
     silent_s: float = 2.0
 
     def attempts(self, more_s: float = 0.0) -> list[float]:
-        """Return the time-outs, s, of repeated requests, each twice the last, in sum `first_s` plus `more_s`."""
+        """Return the time-outs, s, of repeated requests: each twice the previous one, together `first_s` + `more_s`."""
         return [(self.first_s + more_s) * 2**attempt / (2**ATTEMPTS - 1) for attempt in range(ATTEMPTS)]
 
 
@@ -46,7 +46,7 @@ class PortSilence:
 
     @property
     def lasts_s(self) -> float:
-        """The duration without data, s, in time spent reading, so that a delayed reader does not make a device silent.
+        """The time spent reading, s, without receiving data: a delayed reader does not make a device appear silent.
 
         Time in which another instrument's clock stands still, as in a simulation, does not count either.
         """

@@ -28,7 +28,7 @@ class Thermometer:
         return bool(np.isfinite(self.last_c))
 
     def read(self, temperatures_c: Array) -> Array:
-        """Return temperatures (n,) with each NaN replaced by the last value before it, NaN before the first.
+        """Return temperatures (n,) with each NaN replaced by the last value before it; NaN remain before the first.
 
         Raise SensorError `temperature_lost` if the source has provided none for `LONGEST_WITHOUT_S`.
         """

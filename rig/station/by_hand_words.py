@@ -16,7 +16,7 @@ RED_FROM = 0.8  # of the range: above it a reading may clip
 
 
 def by_hand_line(event: RunEvent) -> str | None:
-    """Return an event of a session by hand in one line; None for other events and for events between the devices."""
+    """Return an event of a session by hand in one line; None for other events, and for those among devices."""
     text: str | None
     match event:
         case HandAsked(instruction, again, why):

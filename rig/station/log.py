@@ -34,7 +34,7 @@ class Log:
 def log(path: Path) -> Iterator[Log]:
     """Open the log at `path` for the block; existing lines stay.
 
-    Raise Refused `run_folder` if it cannot be written, as the recording in the same folder cannot be either.
+    Raise Refused `run_folder` if it cannot be written, because the recording in this folder could not be either.
     """
     try:
         file = os.fdopen(open_to_append(path), "a", encoding="utf-8")

@@ -59,5 +59,5 @@ class Stations:
 
 
 def always_yes(announcement: Sequence[str], to_do: str) -> bool:
-    """Return True, for a run without anybody to ask."""
+    """Return True, for a run in which nobody can be asked."""
     return True

@@ -31,7 +31,7 @@ def say_on_terminal(doing: str) -> None:
 
 
 def for_file(text: str, file: TextIO) -> str:
-    """Return a message for a file such as stderr: for a terminal in lines broken between words, else unchanged."""
+    """Return a message for a file such as stderr: broken between words for a terminal, unchanged otherwise."""
     if not file.isatty():
         return text
     width = _columns(file)
@@ -41,7 +41,7 @@ def for_file(text: str, file: TextIO) -> str:
 
 
 def wrapped(text: str, width: int) -> list[str]:
-    """Return one line's text in lines of at most `width`; a command or a long word is not broken."""
+    """Return the text of one line, broken into lines of at most `width`; a command or a long word is not broken."""
     import textwrap
 
     unbroken = "".join(part.replace(" ", UNBROKEN) if i % 2 else part for i, part in enumerate(COMMAND.split(text)))

@@ -68,7 +68,10 @@ class Terminal:
     """The keyboard of the terminal. A scanner is a keyboard that ends each number with Enter."""
 
     def answer(self, question: Question) -> str | None:
-        """Return the text typed after the question: earlier input does not answer it. None if the terminal has gone."""
+        """Return the text typed after the question: earlier input does not answer it.
+
+        Return None if the terminal has gone.
+        """
         _forget_what_was_typed()
         for line in (question.hint,) if question.hint else question.lines:
             print(for_file(printable_lines(line), sys.stderr), file=sys.stderr)
@@ -78,7 +81,7 @@ class Terminal:
 
 
 def question_before(announcement: Sequence[str], to_do: str) -> Question:
-    """Return the question before an announced action: `go` lets something start to move, and `yes` anything else."""
+    """Return the question before an announced action: the answer `go` permits motion, `yes` anything else."""
     from rig.station.events import Prompt
 
     if to_do == Prompt(()).to_do:
@@ -87,7 +90,7 @@ def question_before(announcement: Sequence[str], to_do: str) -> Question:
 
 
 def is_agreed(voice: Voice, question: Question) -> bool:
-    """Ask until an answer is one of the question's own, and return its meaning; False if the operator has left."""
+    """Ask until an answer is one of the question's choices, and return its meaning; False if the operator has left."""
     while (answer := voice.answer(question)) is not None:
         if (yes := question.meaning(answer)) is not None:
             return yes

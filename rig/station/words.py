@@ -87,7 +87,7 @@ def _temperature_line(event: RunEvent) -> str | None:
 
 
 def _outcome_line(event: RunEvent) -> str | None:
-    """Return an event in words, if it is one of those after the last motion, else None."""
+    """Return an event in words if it is one that comes after the last motion, else None."""
     text: str | None
     match event:
         case CalibrationStored(sensor, part, serial_number, record):

@@ -41,7 +41,7 @@ class StopOnce:
                 self._thread.start()
 
     def outcome(self) -> StopOutcome:
-        """Stop, unless the stop has begun; wait for the outcome, less than 1 s.
+        """Stop, unless the stop has begun; wait for the outcome, which takes less than 1 s.
 
         An interrupt meanwhile is raised once the outcome is known. (It waits for an event, because in Python 3.11 an
         interrupted `join` takes the thread for ended.)

@@ -27,7 +27,7 @@ class Turner(Protocol):
         ...
 
     def report(self) -> Report:
-        """Read the turner's report of itself, for pre-flight; nothing moves."""
+        """Read what the turner reports about itself, for the pre-flight check; nothing moves."""
         ...
 
     def check(self) -> None:
@@ -39,7 +39,7 @@ class Turner(Protocol):
         ...
 
     def move(self, motion: Motion, watch: Callable[[], None] = ...) -> None:
-        """Make one movement, and return when the turner stands at its end; stop a movement that takes too long."""
+        """Make one movement, and return when the turner stands still at its end; stop one that takes too long."""
         ...
 
     def rest(self, duration_s: float, watch: Callable[[], None] = ...) -> None:

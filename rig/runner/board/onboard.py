@@ -79,7 +79,7 @@ class BoardCalibration:
             pool.shutdown(wait=False, cancel_futures=True)
 
     def observe(self, sweep: Sweep, revolutions: Attempts[str, Revolution]) -> None:
-        """Make the board average the revolutions; record and omit one that it cannot use."""
+        """Make the board average the revolutions; one that it cannot use is recorded as such and omitted."""
         for name, fault in revolutions.faults.items():
             self.note(BoardNotObserved(name, sweep.index, str(fault)))
         for name, revolution in revolutions.results.items():

@@ -166,7 +166,7 @@ class HandSession:
         self._ask(self._next(now, face), wrong)
 
     def _pauses_before(self, rest: HandRest) -> None:
-        """Refuse rests too short to be judged; they are pauses of a move."""
+        """Discard rests that are too short to be judged, because they are pauses within a move."""
         for pause in self._segmenter.handled.rests:
             if self._judged_s < pause.start_s and pause.end_s < rest.start_s:
                 event = HandRestRefused(*self._board_us(pause), "held_not_laid_down")
@@ -204,10 +204,10 @@ class HandSession:
         self.note(HandMoveTaken(*self._board_us(move), kind, before, face, self._accepted[-1].turns))
 
     def _refuse_move(self, wrong: Fault, move: Move | None, rest: HandRest) -> bool:
-        """Omit what a fault concerns: the move, the rest, or everything before it. Return whether the rest counts.
+        """Leave out what a fault concerns: the move, the rest, or everything before it. Return whether the rest counts.
 
         If the bias has changed at one rest, the item may have crept, so that rest is omitted. If it has changed at the
-        next rest too, the bias is a new one. Raise the fault if no move can correct it.
+        next rest too, the bias itself has changed. Raise the fault if no move can correct it.
         """
         self._refused += 1
         if wrong.name not in MENDED_BY_HAND:
@@ -255,7 +255,7 @@ class HandSession:
         return rotate_face(of_sensor, np.array(self.sensor.mounting).T)
 
     def _board_us(self, part: HandRest | Move) -> tuple[int, int]:
-        """Return the start and end of a rest or a move by the board's clock, µs."""
+        """Return the start and end of a rest or a move on the board's clock, µs."""
         shift_s, microsecond_s = self._shift_s or 0.0, microsecond_of(self.sensor)
         return round((part.start_s - shift_s) / microsecond_s), round((part.end_s - shift_s) / microsecond_s)
 

@@ -122,10 +122,10 @@ class FollowedSession:
 def calibrate_by_board(
     config: RigConfig, name: str, moves: int, scale_std: float, tell: Callable[[OfTheHand], None]
 ) -> Iterator[tuple[Board, CalibratedByBoard]]:
-    """Calibrate one sensor by its board, which stays connected in the block.
+    """Let the board calibrate one of its sensors; the board stays connected in the block.
 
-    The session ends after at least `moves`, when the standard uncertainty of the scale is at most `scale_std`. Raise
-    Refused `clock_unknown`, `first_face_not_told`, and as `open_board_source` does; Fault `board_unverified`,
+    The session ends after at least `moves` moves, once the standard uncertainty of the scale is at most `scale_std`.
+    Raise Refused `clock_unknown`, `first_face_not_told`, and as `open_board_source` does; Fault `board_unverified`,
     `board_disagrees`, the error of ten refused moves in a row, and the board's own.
     """
     arrived: SimpleQueue[tuple[str, NDArray[Any]]] = SimpleQueue()

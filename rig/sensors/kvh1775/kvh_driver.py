@@ -60,7 +60,10 @@ class Kvh1775:
             self.settings = {name: self._ask(f"?{name}", name) for name in NAMES}
 
     def correct(self, settings: dict[str, str]) -> None:
-        """Change settings in its memory, and read all back. Raise SensorError, among others `kvh_setting_not_kept`."""
+        """Change settings in the instrument's memory, and read all of them back.
+
+        Raise SensorError, among others `kvh_setting_not_kept`.
+        """
         for name, value in settings.items():
             self._ask(f"={name},{value}", name)
         self.settings = {name: self._ask(f"?{name}", name) for name in NAMES}

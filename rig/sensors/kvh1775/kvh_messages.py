@@ -86,7 +86,7 @@ class BuiltInTest:
 
     @property
     def passed(self) -> bool:
-        """Whether all bytes are good."""
+        """Whether all bytes of the built-in test report success."""
         return all(value == GOOD_TEST_BYTE for value in self.values)
 
 
@@ -108,7 +108,7 @@ class MessageReader:
         self._rest = b""
 
     def feed(self, data: bytes) -> MessageBatch:
-        """Add received bytes; return the messages and tests that are now complete."""
+        """Add received bytes; return the messages and built-in test results that are now complete."""
         data = self._rest + data
         backwards = memoryview(data.translate(_BITS_REVERSED))
         starts: dict[bytes, list[int]] = {header: [] for header in _HEADERS.values()}

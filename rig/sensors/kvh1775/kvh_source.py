@@ -69,7 +69,7 @@ class Kvh1775Source:
 
     @property
     def sensors(self) -> Mapping[str, RecordedSensor]:
-        """The instrument, and its magnetometer in format C, by name."""
+        """The instrument's inertial sensor and, in format C, its magnetometer, by name."""
         field = {} if self._field is None else {self._field_name: self._field}
         return {self._name: self._description, **field}
 
@@ -86,7 +86,7 @@ class Kvh1775Source:
         self._driver.close()
 
     def _take(self, messages: NDArray[Any], numbers: NDArray[Any], times_us: NDArray[Any], host_time_s: float) -> None:
-        """Pass valid samples on, on the reader's thread. The field has no validity bits."""
+        """Pass valid samples on, on the reader's thread. Samples of the magnetic field have no validity bits."""
         if self._field is not None:
             fields = self._field_reader.feed(messages, numbers, times_us, host_time_s)
             if len(fields):
@@ -125,7 +125,7 @@ class Kvh1775Source:
             )
 
     def _temperatures_c(self, messages: NDArray[Any]) -> Array:
-        """Return the temperatures (n,), °C, NaN for messages without one: format C sends it in every fourth."""
+        """Return the temperatures (n,), °C, NaN for messages without one; in format C every fourth has one."""
         if self._required.message == "C":
             celsius = np.where(messages["sequence"] % 4 == 0, messages["fourth"].astype(np.float64), np.nan)
         else:

@@ -32,7 +32,7 @@ class MessageCounter:
     _time_us: int = 0  # of the last message, counted from a zero of its microseconds before the first message
 
     def count(self, messages: NDArray[Any], silent_s: float = 0.0) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Return the numbers (n,) and times (n,) in µs of messages (n,) that follow a silence of `silent_s`.
+        """Return the running numbers (n,) and times (n,) in µs of messages (n,) that follow a silence of `silent_s`.
 
         Raise SensorError: `kvh_gap_ambiguous` after 128 messages or more lost in a row, `kvh_time_contradicts` if
         sequence numbers and microseconds disagree.

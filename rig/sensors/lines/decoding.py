@@ -207,7 +207,7 @@ class LineReader:
 def _have_valid_bytes(
     classes: NDArray[np.uint8], line_starts: NDArray[np.intp], line_ends: NDArray[np.intp]
 ) -> NDArray[np.bool_]:
-    """Return which lines have only bytes that a sample may contain. Bytes between lines belong to none."""
+    """Return which lines have only bytes that a sample may contain. Bytes between lines belong to no line."""
     good = np.ones(len(line_starts), np.bool_)
     others = np.flatnonzero(classes == _OTHER)
     if len(others):

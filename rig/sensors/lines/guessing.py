@@ -108,7 +108,7 @@ def guess_triads(names: tuple[str, ...], values: Array, still: Flags, rate_hz: f
 
 
 def _match_names(names: tuple[str, ...]) -> dict[int, str]:
-    """Return the columns that a header names, by index; a name that occurs twice names none."""
+    """Return the columns that a header names, by index; a name that occurs twice is ignored."""
     names_by_index: dict[int, str] = {}
     for index, name in enumerate(names):
         plain = re.sub(r"\s*[\[(].*?[\])]", "", name).strip().lower()

@@ -45,7 +45,7 @@ class Counts:
     first_other: bytes = b""
 
     def add(self, decoded: LineBatch) -> None:
-        """Count the lines of one read."""
+        """Count the lines in a block of data that was read."""
         has_samples = self.samples > 0
         boot = 0 if has_samples else int(np.count_nonzero(decoded.samples_before == 0))
         self.before += boot
@@ -95,7 +95,7 @@ class LinesDevice:
 
     @property
     def where(self) -> str:
-        """The device in messages."""
+        """The device's name in messages."""
         return f"sensors.{self._sensor}: the device on {self._line.port}"
 
     @property
@@ -124,7 +124,10 @@ class LinesDevice:
 
     # -- the first lines -----------------------------------------------------------------------------------------
     def _look(self, timeout_s: float) -> float:
-        """Return the sample rate by the device's own time, NaN if it prints none. Raise as the constructor does."""
+        """Return the sample rate according to the device's own time; NaN if it prints none.
+
+        Raise as the constructor does.
+        """
         has_enough = self.own_port.wait(self._has_enough, timeout_s)
         if not has_enough and not self.counts.samples:
             raise self._why_no_sample(timeout_s)
@@ -164,7 +167,7 @@ class LinesDevice:
         return float(passed.sum()) * UNITS[self._section.time.unit].size
 
     def _measure_rate_hz(self) -> float:
-        """Return the sample rate: by the median step of the device's time if fine, else by the whole interval."""
+        """Return the sample rate, from the median step of the device's time if it is fine, else from the total time."""
         time_section = self._section.time
         if time_section is None or self.counts.samples < 5:
             return float("nan")

@@ -53,7 +53,7 @@ class LinesSource:
     """A device that prints as configured; samples are passed on from `start` on."""
 
     def __init__(self, name: str, section: SensorSection, on_samples: OnSamples, *, patience: Patience = USUAL) -> None:
-        """Connect and read the first lines. Raise SensorError as `LinesDevice`."""
+        """Connect and read the first lines. Raise SensorError as `LinesDevice` does."""
         self._on_samples = on_samples
         line, lines = _split_section(section)
         self._device = LinesDevice(name, line, lines, section.rate_hz, self._take, patience=patience)

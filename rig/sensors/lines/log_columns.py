@@ -77,7 +77,7 @@ def guess_columns(layout: TableLayout, values: Array, time: Array | None) -> Log
 def _guess_samples(
     layout: TableLayout, values: Array, quaternion: Mapping[str, int], rate_hz: float
 ) -> tuple[dict[str, ColumnEntry], list[str]]:
-    """Return the map of the columns of readings, and sentences on what nothing shows about them.
+    """Return the map of the columns of readings, and sentences on what could not be determined.
 
     Of two sensors the first is read.
     """
@@ -123,7 +123,7 @@ def _map_triad(
 
 
 def _list_others(layout: TableLayout, entries: Sequence[ColumnEntry]) -> list[str]:
-    """Return the columns that have a heading or numbers and are in no entry of the map."""
+    """Return the columns that have a heading or numbers and that the map does not contain."""
     read = {entry["column"] for entry in entries}
     return [
         heading or f"column {index + 1}"
@@ -133,7 +133,7 @@ def _list_others(layout: TableLayout, entries: Sequence[ColumnEntry]) -> list[st
 
 
 def _name_once(names: list[str]) -> list[str]:
-    """Return names without repetitions, which become blank: of two sensors of one name, the first is read."""
+    """Return the names with repeated ones made blank, because of two sensors of one name the first is read."""
     return [name if name not in names[:index] else "" for index, name in enumerate(names)]
 
 
@@ -203,7 +203,7 @@ UNIT_WORDS = {"rad", "s", "deg", "dps", "mdps", "m", "s2", "g", "mg", "t", "ut"}
 def _group_columns(
     layout: TableLayout, values: Array, quaternion: Mapping[str, int], rate_hz: float
 ) -> Iterator[_ColumnGroup]:
-    """Yield the columns that vary, in groups that fill the same rows, one for each rate of the logger.
+    """Yield the columns that vary, in groups that have values in the same rows: one group for each rate of the logger.
 
     Columns of a reference are left out.
     """

@@ -111,7 +111,7 @@ def _find_number_shape(checked: Sequence[_CheckedLine]) -> Shape:
 
 
 def _select_short(checked: list[_CheckedLine]) -> list[_CheckedLine]:
-    """Return the lines that are short enough to be one sample each. Raise NoShape if too few remain."""
+    """Return the lines that are short enough to hold a single sample. Raise NoShape if too few remain."""
     if len(checked) < FEWEST:
         raise NoShape(f"only {len(checked)} lines came, which is too few to see what they have in common")
     short = [line for line in checked if len(line[1]) <= LONGEST_LINE]

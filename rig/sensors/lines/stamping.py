@@ -55,7 +55,7 @@ class Stamper:
     ) -> tuple[NDArray[np.bool_], NDArray[np.int64], NDArray[np.int64]]:
         """Return a mask (n,) of the samples in `values` (n, columns), their numbers (m,) from 0, and times (m,), µs.
 
-        `skipped` rejected lines preceded them; they arrived at `host_time_s`. Raise SensorError `lines_time_jumped`.
+        They arrived at `host_time_s`, after `skipped` lines that were rejected. Raise SensorError `lines_time_jumped`.
         """
         if not len(values):
             return np.zeros(0, np.bool_), np.zeros(0, np.int64), np.zeros(0, np.int64)
@@ -162,7 +162,7 @@ class Stamper:
         return self.section.time is not None and is_coarse(self.step_s, self.rate_hz)
 
     def _count_coarse_steps(self, device_s: Array) -> NDArray[np.int64]:
-        """Return the number of samples (n,) since the previous one, by coarse times (n,): more than one after a jump.
+        """Return the number of steps (n,) since the previous sample, from coarse times (n,): over one after a jump.
 
         A loss that is shorter than a step of the time does not show.
         """

@@ -54,7 +54,7 @@ class AutopilotLink:
     def __init__(
         self, sensor: str, port: str, baud: int, on_messages: OnMessages | None = None, *, patience: Patience = USUAL
     ) -> None:
-        """Open the port, and wait for the heartbeat of an autopilot that is not armed.
+        """Open the port, and wait for the heartbeat of an autopilot, which must not be armed.
 
         Raise SensorError: no_port, no_autopilot, mavlink_no_message, mavlink_other_device, autopilot_armed; Refused
         `missing_extra`.
@@ -93,7 +93,7 @@ class AutopilotLink:
 
     # -- the dialogue ----------------------------------------------------------------------------------------------
     def parameters(self, needed: Iterable[str], others: Iterable[str] = ()) -> Mapping[str, AutopilotParameter]:
-        """Read the parameters `needed` and `others`, which may be missing.
+        """Read the parameters `needed`, and those of `others` that exist.
 
         Raise SensorError `autopilot_silent` if no request is answered.
         """

@@ -45,7 +45,7 @@ class UdpPort:
         return bytes(received)
 
     def write(self, data: bytes) -> None:
-        """Send, once a sender is known."""
+        """Send data; drop it as long as no autopilot has sent anything, because its address is not known yet."""
         if self._peer is not None:
             with suppress(BlockingIOError, ConnectionRefusedError):  # no receiver at the moment: the silence shows it
                 self._socket.sendto(data, self._peer)

@@ -75,7 +75,7 @@ class _ImuStream:
     def take(self, message: Any, *, is_consecutive: bool) -> tuple[int, int, ImuReading] | None:
         """Return number, time and reading of a message; None for a repeated reading.
 
-        `is_consecutive`: no message was lost before it.
+        `is_consecutive`: whether no message was lost before it.
         """
         reading = decode_reading(message)
         if not self.thermometer.provides:
@@ -113,7 +113,7 @@ class MavlinkSource:
     def __init__(
         self, sections: Mapping[str, SensorSection], on_samples: OnSamples, *, patience: Patience = USUAL
     ) -> None:
-        """Connect and set up. Raise as link and `refusals`, autopilot_rate, _other_uid, _several_imus."""
+        """Connect and set up. Raise as `AutopilotLink` and `refusals` do; autopilot_rate, _other_uid, _several_imus."""
         self._on_samples = on_samples
         self._imus: dict[str, _ImuStream] = {
             mavlink_section(section).imu: _ImuStream(name, section) for name, section in sections.items()

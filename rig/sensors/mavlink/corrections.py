@@ -101,7 +101,7 @@ def parameter_names(firmware: int, section: MavlinkSection) -> ParameterNames:
 
 
 def refusals(sensor: str, names: ParameterNames, parameters: Mapping[str, float]) -> Iterator[SensorError]:
-    """Yield errors for corrections that cannot be undone.
+    """Yield errors for corrections that cannot be undone:
 
     `autopilot_corrects`, `autopilot_orientation`, `autopilot_filter_slow`, `autopilot_not_calibrated`,
     `autopilot_parameter_missing`.
@@ -144,7 +144,10 @@ def refusals(sensor: str, names: ParameterNames, parameters: Mapping[str, float]
 
 
 def read_correction(names: ParameterNames, parameters: Mapping[str, float]) -> OnboardCorrection:
-    """Return the correction to undo, by parameters without `refusals`. Raise ValueError for an orientation."""
+    """Return the correction to undo, from parameters without `refusals`.
+
+    Raise ValueError for an orientation that is refused.
+    """
     orientation = board_rotation(parameters[names.orientation])
     if orientation is None:
         raise ValueError(f"{names.orientation} is refused before")
@@ -158,7 +161,7 @@ def read_correction(names: ParameterNames, parameters: Mapping[str, float]) -> O
 
 
 def delay_s(names: ParameterNames, parameters: Mapping[str, float]) -> float:
-    """Return the delay of rates, s, by a low-pass of second order (Butterworth): √2 / (2π f); 0 without one."""
+    """Return the delay of rates, s, due to a second-order Butterworth low-pass: √2 / (2π f); 0 without one."""
     cutoff_hz = parameters.get(names.filters[0], 0.0) if names.filters else 0.0
     return float(np.sqrt(2.0) / (2.0 * np.pi * cutoff_hz)) if cutoff_hz > 0 else 0.0
 

@@ -14,7 +14,7 @@ def autopilot_id(link: AutopilotLink) -> str:
 
 
 def change(link: AutopilotLink, planned: ParameterChange, target: Mapping[str, AutopilotParameter]) -> None:
-    """Bring an autopilot to one of the two sets of a change, `target`.
+    """Write the parameters `target` to an autopilot: the old or the new ones of a planned change.
 
     Raise SensorError as `AutopilotLink.set_parameter` does, and `autopilot_not_stored` if it reads back another value;
     then the journal still holds the change. Raise Refused as `ParameterChange.begin` does.
@@ -34,7 +34,7 @@ def change(link: AutopilotLink, planned: ParameterChange, target: Mapping[str, A
 
 
 def find_unfinished_change(link: AutopilotLink) -> Iterator[SensorError]:
-    """Yield the error `autopilot_mixture` if a change of this autopilot stopped between the sets.
+    """Yield the error `autopilot_mixture` if a change of this autopilot stopped with only a part of it made.
 
     A change that stopped before the first parameter or after the last is removed from the journal. Raise as
     `find_change` does.

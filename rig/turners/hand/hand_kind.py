@@ -59,7 +59,7 @@ class HandReport:
 
     @property
     def words(self) -> str:
-        """The turner in a line of text."""
+        """The turner described in a line of text."""
         return "none, an operator's hand turns the item"
 
 

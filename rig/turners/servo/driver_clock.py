@@ -10,10 +10,10 @@ class Clock(Protocol):
     """A monotonic clock and waiting by it; a simulated servo may bring another."""
 
     def now_s(self) -> float:
-        """Return the time for time-outs, s."""
+        """Return the time by which time-outs are measured, s."""
 
     def reference_s(self) -> float:
-        """Return the time for the stamps of states, s."""
+        """Return the time with which states are stamped, s."""
 
     def wait(self, event: threading.Event, timeout_s: float) -> bool:
         """Wait for an event; return whether it came in time."""
@@ -38,11 +38,11 @@ class HostClock:
         return time.monotonic() if raw is None else time.clock_gettime(raw)
 
     def wait(self, event: threading.Event, timeout_s: float) -> bool:
-        """Wait for an event by the host's clock; return whether it occurred in time."""
+        """Wait for an event on the host's clock; return whether it occurred in time."""
         return event.wait(timeout_s)
 
     def wait_for(self, changed: threading.Condition, done: Callable[[], bool], timeout_s: float) -> bool:
-        """Wait until `done` is true, by the host's clock; return its last value."""
+        """Wait until `done` is true, on the host's clock; return its last value."""
         return changed.wait_for(done, timeout_s)
 
 

@@ -32,7 +32,7 @@ ANSWER_ALL = 2  # value of Status Return Level: every write is acknowledged
 
 
 def look_at(bus: Bus, port: str, servo_id: int) -> ServoReport:
-    """Read the servo's report of itself. Raise Refused `no_servo`, `servo_not_alone`, `other_servo`."""
+    """Read what the servo reports about itself. Raise Refused `no_servo`, `servo_not_alone`, `other_servo`."""
     try:
         _ping(bus, port, servo_id)
         _request_acknowledgements(bus)
@@ -46,7 +46,10 @@ def look_at(bus: Bus, port: str, servo_id: int) -> ServoReport:
 
 
 def _ping(bus: Bus, port: str, servo_id: int) -> None:
-    """Raise Refused unless one servo answers pings; one wrong answer in four may be a late one and is accepted."""
+    """Raise Refused unless exactly one servo answers pings.
+
+    One wrong answer in four is accepted: it may be a late one.
+    """
     answers = odd = 0
     for _ in range(PINGS):
         try:

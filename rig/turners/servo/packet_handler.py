@@ -85,7 +85,7 @@ class Bus:
         return int(number)
 
     def more_came(self, wait_s: float) -> bool:
-        """Return whether a byte that nobody requested follows within `wait_s`."""
+        """Return whether another byte, which nobody requested, arrives within `wait_s`."""
         with self._failing():
             for _ in range(max(1, round(wait_s / 0.002))):
                 if self._port.readPort(1):

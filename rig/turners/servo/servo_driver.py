@@ -80,7 +80,10 @@ class Servo:
     # Looking ----------------------------------------------------------------------------------------------------
 
     def start(self) -> None:
-        """Open the port, read a report, and start to receive; nothing moves. Raise `Refused` if no servo answers."""
+        """Open the port, read the servo's report, and start to receive states; nothing moves.
+
+        Raise `Refused` if no servo answers.
+        """
         self._bus = Bus(self._port, self._baud, self._id, self._clock)
         try:
             self._report = look_at(self._bus, self._port, self._id)
@@ -108,7 +111,7 @@ class Servo:
         return self._states[-1]
 
     def report(self) -> ServoReport:
-        """Return the servo's report of itself from the opening of the port, for pre-flight."""
+        """Return what the servo reported about itself when the port was opened, for the pre-flight check."""
         self.check()
         return self._report
 
@@ -152,8 +155,8 @@ class Servo:
     def move(self, motion: Motion, watch: Callable[[], None] = _watch_nothing) -> None:
         """Make one movement and return when the shaft has arrived and stands still.
 
-        `watch` is called first and then at least every 20 ms; its exception stops the shaft and goes on to the caller.
-        The servo executes `moves.move_of(motion)`.
+        `watch` is called first and then at least every 20 ms; its exception stops the shaft and is passed to the
+        caller. The servo executes `moves.move_of(motion)`.
         """
         with stopping_on_error(self.stop):
             watch()
@@ -192,7 +195,7 @@ class Servo:
         """Stop the shaft and return its state; takes less than 1 s.
 
         It may be called at any time, repeatedly, from any thread. A Ctrl-C meanwhile is raised after the stop.
-        Afterwards this object moves the shaft no more.
+        Afterwards this object no longer moves the shaft.
         """
         return self._stopper.outcome() if self._holds else NOT_CONTROLLED
 

@@ -49,7 +49,7 @@ MODELS = (
 
 
 def model_of(number: int) -> ServoModel | None:
-    """Return the model with that number in its register 0; None if it is unknown."""
+    """Return the model whose register 0 has the given number; None if the number is unknown."""
     return next((model for model in MODELS if model.number == number), None)
 
 

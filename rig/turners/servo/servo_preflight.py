@@ -22,7 +22,7 @@ HEADROOM_C = 10.0  # margin below its limit: a servo that holds and turns for mi
 
 
 def servo_problems(report: ServoReport, wanted_model: str, carried: FlangeLoad, period_s: float) -> list[Problem]:
-    """Return all reasons not to drive this servo as it is; `period_s` is the period of its states."""
+    """Return all reasons not to drive this servo in its present state; `period_s` is the period of its states."""
     problems = [*_identity(report, wanted_model), *_settings(report), *_condition(report), *_load(report, carried)]
     if report.round_trip_s > period_s:
         problems.append(

@@ -141,7 +141,7 @@ class ServoReport:
 
     @property
     def kinematics(self) -> DenavitHartenberg | None:
-        """The geometry: None, which a servo does not report."""
+        """The geometry: None, because a servo does not report it."""
         return None
 
     @property
@@ -151,5 +151,5 @@ class ServoReport:
 
     @property
     def words(self) -> str:
-        """The servo in a line of text."""
+        """The servo described in a line of text."""
         return f"{MAKER} {self.servo.title}, ID {self.servo_id}, firmware {self.firmware}"

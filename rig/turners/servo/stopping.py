@@ -44,7 +44,7 @@ class ShaftStop:
         self._await_rest, self._lets_go = await_rest, lets_go
 
     def carry_out(self) -> StopOutcome:
-        """Stop the shaft and return its state; less than 1 s."""
+        """Stop the shaft and return its state, within 1 s."""
         clock = self._clock
         since_s, ends_s = clock.reference_s(), clock.now_s() + STOP_S
         acknowledged = threading.Event()

@@ -104,7 +104,10 @@ class Arm:
     # Looking ------------------------------------------------------------------------------------------------------
 
     def start(self) -> None:
-        """Connect and receive; nothing moves and no program is stopped. Raise `Refused` if no arm answers."""
+        """Connect and start to receive states; nothing moves and no program is stopped.
+
+        Raise `Refused` if no arm answers.
+        """
         with self._link.patience():
             self._link.start()
             self._wait(lambda: self._latest is not None or self._answer is not None)
@@ -121,7 +124,7 @@ class Arm:
         return self._latest
 
     def report(self) -> ArmReport:
-        """Return the arm's report of itself, for pre-flight."""
+        """Return what the controller reports about its arm, for the pre-flight check."""
         self.check()
         return read_report(self._host, self._controller, self.latest, self._robot_api_port)
 
@@ -172,7 +175,7 @@ class Arm:
     def move(self, motion: Motion, watch: Callable[[], None] = _watch_nothing) -> None:
         """Make one movement and return when the arm has arrived and stands still.
 
-        `watch` is called first and then at least every 20 ms; its exception stops the arm and goes on to the caller.
+        `watch` is called first and then at least every 20 ms; its exception stops the arm and is passed to the caller.
         """
         with stopping_on_error(self.stop):
             watch()
@@ -187,7 +190,7 @@ class Arm:
             deadline_s, reported_s = self.latest.time_s + takes_s, time.monotonic() + takes_s + REPORT_S
 
             def is_late() -> bool:
-                """Return whether the move lasts too long by the controller's clock, with time for the report."""
+                """Return whether the move takes too long on the controller's clock, allowing time for the report."""
                 has_arrived = self._stands_at(motion) and time.monotonic() < reported_s
                 return self.latest.time_s > deadline_s and not has_arrived
 
@@ -218,7 +221,7 @@ class Arm:
         """Stop the arm and return its state; takes less than 1 s.
 
         It may be called at any time, repeatedly, from any thread. A Ctrl-C meanwhile is raised after the stop.
-        Afterwards the control script has ended and this object moves the arm no more.
+        Afterwards the control script has ended, and this object no longer moves the arm.
         """
         if not self._holds_arm:
             return NOT_CONTROLLED
@@ -281,14 +284,14 @@ class Arm:
             self._watch.start()
 
     def _prove_the_stop(self) -> None:
-        """Raise `Refused` if a trial shows that the arm cannot be stopped without the client."""
+        """Test the stop; raise `Refused` if the arm cannot be stopped without the client."""
         problem = stop_trial(self._host, RobotApi(self._host, self._robot_api_port, ANSWER_S), self._shows)
         if problem is not None:
             self._holds_arm = False
             raise Refused.from_problem(readiness(self.latest) or problem)
 
     def _shows(self, runtime_state: RuntimeState, timeout_s: float) -> bool:
-        """Return whether the arm's states report that state of its program within `timeout_s`."""
+        """Return whether the arm's states report the given state of its program within `timeout_s`."""
         with self._changed:
             return self._changed.wait_for(lambda: self.latest.runtime_state == runtime_state, timeout_s)
 

@@ -62,6 +62,6 @@ class ArmReport:
 
     @property
     def words(self) -> str:
-        """The arm in a line of text: model, serial number, software."""
+        """The arm described in a line of text: model, serial number, software."""
         model = "model not told" if self.model is None else f"{MAKER} {self.model}"
         return f"{model}, serial number {self.serial_number}, PolyScope {self.polyscope}"

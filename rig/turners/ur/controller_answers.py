@@ -25,7 +25,7 @@ NOT_TOLD = "not told"
 
 
 def stop_problem(host: str, version: tuple[int, ...]) -> Problem | None:
-    """Return why the rig could not stop an arm there without its client; None if it could."""
+    """Return why the rig could not stop the arm at this controller without its client; None if it could."""
     interface = PrimaryStop if is_polyscope_x(version) else Dashboard
     try:
         interface(host, LOOK_S).close()
@@ -65,7 +65,10 @@ def reports_local_control(host: str, version: tuple[int, ...]) -> bool:
 
 
 def read_report(host: str, connected: Connected, state: ArmState, robot_api_port: int) -> ArmReport:
-    """Return the controller's report of itself and its arm, which is in `state`. Raise `Refused` by name."""
+    """Return what the controller reports about itself and its arm, whose present state is `state`.
+
+    Raise `Refused` by name.
+    """
     description = _read_description(host)
     report = ArmReport(
         host=host,

@@ -52,7 +52,7 @@ def identify_model(report: ArmReport) -> str | None:
 
 
 def is_polyscope_x(version: tuple[int, ...]) -> bool:
-    """Return whether software of that version is a PolyScope X, which has no dashboard."""
+    """Return whether software of this version is a PolyScope X, which has no dashboard."""
     return version[:1] >= (POLYSCOPE_X,)
 
 
@@ -79,7 +79,7 @@ def series_problem(host: str, version: tuple[int, ...]) -> Problem | None:
 
 
 def identity_problems(arm: "ArmSection", report: ArmReport) -> list[Problem]:
-    """Compare the arm that answers with the configured one by series, type and lengths; return at most one problem."""
+    """Compare the connected arm with the configured one, by series, type and lengths; return at most one problem."""
     model, robot_type = model_of(arm), _robot_type(report)
     if series := series_problem(report.host, report.version):
         if not (model.series == "CB3" and series.name == "cb3_not_supported"):

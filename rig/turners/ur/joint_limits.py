@@ -89,7 +89,7 @@ def _ramp_problems(motion: Motion, ours_rad_s2: Joints, theirs_rad_s2: Joints | 
 
 
 def _find_excess(values: Array, ours: Joints, theirs: Joints | None) -> Iterator[tuple[str, float, float, str]]:
-    """Yield the joints whose `values` (6,) exceed the narrower limit: name, value, that limit, and its owner."""
+    """Yield the joints whose `values` (6,) exceed the narrower limit: name, value, limit, and the limit's owner."""
     for joint, name in enumerate(JOINT_NAMES):
         limit, whose = _narrower(ours[joint], None if theirs is None else theirs[joint])
         if values[joint] > limit:

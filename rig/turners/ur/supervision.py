@@ -41,7 +41,7 @@ class Supervision:
     def judge(self, state: ArmState) -> Problem | None:
         """Return why the arm cannot continue; the safety bits that explain a stopped program may come one packet later.
 
-        An interruption ends our program. If one runs again a moment later, it belongs to another client.
+        An interruption ends our program. A program that runs a moment later belongs to another client.
         """
         if self.stage is ControlStage.LOOKING:
             return None

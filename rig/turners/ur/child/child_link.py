@@ -67,7 +67,10 @@ class ChildLink:
         )
 
     def start(self) -> None:
-        """Start the child; `on_message` gets `Connected` or `RequestFailed`."""
+        """Start the child process; it answers `on_message` with `Connected` or `RequestFailed`.
+
+        Watch for silence of the child and, if local, of the controller.
+        """
         ip = resolve_address(self._host)
         self._is_remote = ip is None or not ip.is_loopback
         if ip is not None and not self._is_remote and (controller_pid := find_listener(ip, PORT)) is not None:
@@ -194,7 +197,7 @@ def _writable(pipe: "Connection[Request, Message]") -> bool:
 
 @contextmanager
 def _block_interrupts() -> Iterator[None]:
-    """Hold back Ctrl-C in the block: a child started there never receives it, the parent afterwards."""
+    """Hold back Ctrl-C in the block: a child started there never receives it; the parent receives it afterwards."""
     if not hasattr(signal, "pthread_sigmask"):  # Windows: the child ignores Ctrl-C once it runs
         yield
         return

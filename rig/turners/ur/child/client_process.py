@@ -233,8 +233,9 @@ class _Child:
     def _await_payload(self, wanted_kg: float) -> Message:
         """Wait until the states show the payload; the parent judges everything else in the states.
 
-        Older states may still wait to be read: the client's constructor held the interpreter, or this process got
-        no processor. So what counts as refused is what the first state on a new connection shows.
+        Older states may still wait to be read, because the client's constructor held the interpreter or this process
+        got no processor. The payload therefore counts as refused only if the first state on a new connection does not
+        show it.
         """
         host_s, arm_s = time.monotonic(), self._latest.state.time_s
         while abs((latest := self._latest).payload_kg - wanted_kg) > PAYLOAD_TOLERANCE_KG:
@@ -259,13 +260,13 @@ class _Child:
             return states.first.payload_kg
 
     def _link_problem(self, *, silent: bool = False) -> Problem | None:
-        """Return the problem of a lost link, if any; its consequences would else be reported as the arm's faults."""
+        """Return the problem of a lost link, if any, so that its consequences are not reported as faults of the arm."""
         if self._states.problem is not None or not (self._states.closed or silent):
             return self._states.problem
         return link_lost(f"no new state arrives from the arm at {self._host}")
 
     def _let_parent_see(self) -> None:
-        """Wait until the parent has been sent all states so far."""
+        """Wait until all states so far have been sent to the parent."""
         beats, began_s = self._beats, time.monotonic()
         while self._beats < beats + 2 and time.monotonic() - began_s < ABANDON_S:
             time.sleep(HEARTBEAT_S)
@@ -285,9 +286,9 @@ class _Child:
             self.send(RequestFailed(move_failure("the controller did not start the move")))
 
     def _await_state(self) -> None:
-        """Wait for another state: if none comes, a lost link is the reason why the move did not begin.
+        """Wait for a new state. If none comes, the move did not begin because the link is lost.
 
-        Without a state the parent reports the lost link before this wait ends.
+        In that case the parent reports the lost link before this wait ends.
         """
         latest, began_s = self._latest, time.monotonic()
         while self._latest is latest and time.monotonic() - began_s < ABANDON_S:

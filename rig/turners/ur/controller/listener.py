@@ -19,7 +19,7 @@ def resolve_address(host: str) -> IPv4Address | None:
 
 
 def is_loopback(host: str) -> bool:
-    """Return whether a host is this machine by a loopback address."""
+    """Return whether a host's address is a loopback address, so that it is this machine."""
     ip = resolve_address(host)
     return ip is not None and ip.is_loopback
 
@@ -27,8 +27,7 @@ def is_loopback(host: str) -> bool:
 def find_listener(host: IPv4Address, port: int) -> int | None:
     """Return the id of the process that listens at this host and port.
 
-    Return None if proc(5) does not show it: on systems other than Linux, for another user's processes, in another
-    container.
+    Return None if proc(5) does not show it: on systems other than Linux, for another user's process, or in a container.
     """
     addresses = {f"{int.from_bytes(ip.packed, 'little'):08X}:{port:04X}" for ip in (host, IPv4Address(0))}
     with suppress(OSError):

@@ -48,7 +48,7 @@ class ArmDescription:
 
     @property
     def complete(self) -> bool:
-        """Whether all expected items have come; the software comes before all others, or never."""
+        """Whether all expected items have come. The software comes before all others, if at all."""
         return None not in (self.kinematics, self.tcp_offset, self.setup)
 
 

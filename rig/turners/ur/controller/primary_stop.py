@@ -47,7 +47,7 @@ class PrimaryStop:
         self.send("stop program\n")
 
     def program_running(self) -> bool:
-        """Return whether any program runs or is paused on the controller, by its next state.
+        """Return whether any program runs or is paused on the controller, according to its next state.
 
         The first state is skipped: it may be older than the last script.
         """

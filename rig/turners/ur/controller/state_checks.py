@@ -60,7 +60,7 @@ def impossible_motion(before: ArmState, after: ArmState) -> Problem | None:
 def clock_step(before_s: float, after_s: float, period_s: float, missed_s: float) -> Problem | None:
     """Return the problem of a time that is not a whole number of periods after the last one.
 
-    `missed_s` is the longest recent gap, by the controller's clock, in which states may have been lost.
+    `missed_s` is the longest recent gap, on the controller's clock, in which states may have been lost.
     """
     step_s = after_s - before_s
     step_unit_s = period_s if _divides(period_s) else CYCLE_S

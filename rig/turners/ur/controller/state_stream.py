@@ -172,7 +172,8 @@ class StateStream:
     def _missed_s(self) -> float:
         """The longest time, s of the controller's clock, for which recent silences may have lost states.
 
-        A local controller's connection loses none, unless it was silent for `SILENT_S`: then any number.
+        A local controller's connection loses no states, unless it was silent for `SILENT_S`; then any number may be
+        lost.
         """
         if self._is_remote:
             return CLOCKS_DIFFER * self._gap_s

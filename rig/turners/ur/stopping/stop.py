@@ -36,15 +36,15 @@ class StopOrder:
             threading.Thread(target=self._give, args=(path,), name=f"arm stop by {path.name}", daemon=True).start()
 
     def await_delivery(self) -> bool:
-        """Wait until every path has delivered the order or failed; return whether that happened in the order's time.
+        """Wait until every path has delivered the order or failed; return whether that was within the order's time.
 
-        A delivery after that would end a program that is started meanwhile.
+        A later delivery would end a program that is started meanwhile.
         """
         with self._changed:
             return self._changed.wait_for(lambda: not self._pending, max(0.0, self._remaining_s))
 
     def await_answers(self, timeout_s: float) -> None:
-        """Wait at most `timeout_s` for every path's answer to the order, which may come after its delivery."""
+        """Wait at most `timeout_s` until every stop path has answered, which may be after the order's delivery."""
         with self._changed:
             self._changed.wait_for(lambda: not self._unanswered, timeout_s)
 
@@ -144,7 +144,7 @@ class ArmStop:
         self.descriptors = SpareDescriptors()  # reserve before the arm is under control
 
     def carry_out(self) -> StopOutcome:
-        """Stop the arm and return its state; less than 1 s."""
+        """Stop the arm and return its state, within 1 s."""
         began_s = time.monotonic()
         # In a thread of its own: a child that does not read must not delay the stop over the controller's ports.
         threading.Thread(target=self._send, args=(BrakeRequest(BRAKE_RAD_S2),), name="arm brake", daemon=True).start()

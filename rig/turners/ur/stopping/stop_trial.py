@@ -23,7 +23,7 @@ END_S = 2.0
 def stop_trial(host: str, api: RobotApi, shows: Callable[[RuntimeState, float], bool]) -> Problem | None:
     """Run a program that moves nothing and stop it; return why the primary interface could not stop it, or None.
 
-    `shows(state, timeout_s)` waits for that state of the arm's program and returns whether it came.
+    `shows(state, timeout_s)` waits for this state of the arm's program and returns whether it came.
     """
     if api.is_in_remote_control() is False:
         return local_control(host)
