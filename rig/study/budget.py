@@ -80,7 +80,7 @@ class Session:
 
 
 def study(settings: Settings) -> StudyReport:
-    """Find the coverage of ± 2 u, and the RMS of error over standard uncertainty, with and without the remedies."""
+    """Find the coverage of ± 2 u, and the RMS of error / standard uncertainty, with and without the remedies."""
     ratios = errors(Effects(), settings)
     rows = [
         {
@@ -96,7 +96,7 @@ def study(settings: Settings) -> StudyReport:
 
 
 def errors(effects: Effects, settings: Settings) -> Array:
-    """Return errors of scale and bias over standard uncertainty, with and without the remedies, (draws, 2, 6)."""
+    """Return the errors of scale and bias / standard uncertainty, with and without the remedies, (draws, 2, 6)."""
     draws = settings.runs or DRAWS
     counts = [draws // BATCHES + (batch < draws % BATCHES) for batch in range(BATCHES)]
     return np.concatenate(run_parallel(partial(_simulate_batch, effects), [n for n in counts if n], settings))

@@ -45,7 +45,7 @@ def study(settings: Settings) -> StudyReport:
 
 
 def _simulate_gyroscope(runs: int, rng: np.random.Generator, _: int) -> Array:
-    """Return mean squared errors of kx ky kz bx by bz, over the bound and absolute, (speeds, estimators, 2, 6)."""
+    """Return mean squared errors of kx ky kz bx by bz, relative to bounds, and absolute, (speeds, estimators, 2, 6)."""
     scale, bias = sim.NORMAL.draw(rng)
     mounting = sim.draw_mountings(rng, 1)[0]
     F = sim.build_sensitivity(scale, mounting)
@@ -132,7 +132,7 @@ def _simulate_rate_table(runs: int, rng: np.random.Generator, _: int) -> dict[st
 
 
 def _compare(errors: Array, bound: Array) -> Array:
-    """Return the mean squared error of R runs (R, p), divided by the bound's diagonal, and absolute, (2, p)."""
+    """Return the mean squared errors of R runs (R, p), relative to the bound's diagonal and absolute, (2, p)."""
     return np.array([efficiency(errors, bound), np.mean(errors**2, axis=0)])
 
 

@@ -155,7 +155,7 @@ def rms_drift_error(rows: list[dict[str, Any]], kind: str, unit_name: str) -> fl
 def build_parameter_rows(
     kind: str, names: Mapping[str, tuple[str, float]], truth: Array, estimates: Array, stated: Array
 ) -> list[dict[str, Any]]:
-    """Return one row per parameter. `names`: unit and its size; `estimates` (runs, p); `stated` (p,) σ."""
+    """Return one row per parameter. `names`: its unit and the unit's size; `estimates` (runs, p); `stated` (p,) σ."""
     return [
         {
             "noise": kind,

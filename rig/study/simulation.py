@@ -63,7 +63,7 @@ class SimulatedSweep:
 
     @property
     def variance_rad2_s2(self) -> float:
-        """Variance of a mean reading by the sensor's noise alone."""
+        """Variance of a mean reading due to the sensor's noise alone."""
         return self.noise_rad_s**2 / self.samples
 
 
@@ -107,8 +107,8 @@ def draw_means_and_squares(
     """Draw averages of readings and of their squares, both (…, 6, 3), of the same samples, exactly.
 
     Let d = n + c v be the deviation of a sample from the mean, with noise n and the vibration v common to the axes. v
-    enters through Σ(v − v̄)² ~ χ²(N − 1), the noise along v through one Gaussian z, and its rest through χ²(N − 2), so
-    that Σ(d − d̄)² = (σ z + c √Σ(v − v̄)²)² + σ² χ²(N − 2).
+    enters through Σ(v − v̄)² ~ χ²(N − 1), the noise along v through one Gaussian z, and the rest of the noise through
+    χ²(N − 2), so that Σ(d − d̄)² = (σ z + c √Σ(v − v̄)²)² + σ² χ²(N − 2).
     """
     mean, per_vibration = _draw_means(rng, F, bias_rad_s, sweep)
     shape, count = mean.shape, sweep.samples

@@ -24,8 +24,8 @@ PUBLISHED_ESTIMATE = (0.9070, 1.0502, 0.8735, 0.0529, 0.0802, -0.0994)
 def study(settings: Settings) -> StudyReport:
     """Simulate a calibration at 3 rad/s, then a sine of 1 rad/s and 0.75 Hz about an axis equally far from x, y and z.
 
-    SIX corrects "using Eq. (1)"; with g = K m + b as printed, its own estimates would leave errors of (1 − k) b. The
-    correction here is g = K (m + b).
+    SIX corrects "using Eq. (1)". With g = K m + b, as printed there, its own estimates would leave errors of (1 − k) b.
+    The correction here is g = K (m + b).
     """
     rng = np.random.default_rng(settings.seed)
     sweep = sim.build_whole_turn(sim.FAST_RAD_S, NOISE_RAD_S)

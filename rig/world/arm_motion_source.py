@@ -72,7 +72,7 @@ class OnArm:
 
     @property
     def tick_s(self) -> float:
-        """The duration of a tick, s, which is 2 ms by the controller's clock."""
+        """The duration of a tick, s, which is 2 ms on the controller's clock."""
         return self.arm.tick_s
 
     @property

@@ -281,7 +281,7 @@ class ControlSession:
 
 
 def _servo_torque(bench: ServoBench, on: bool) -> None:
-    """Switch torque on or off as another program does."""
+    """Switch the servo's torque on or off, as another program on the bus would."""
     bench.servo.obey(ServoPacket(bench.servo.memory["ID"], WRITE, bytes([64, 0, bool(on)]), True), bench.now_s())
 
 

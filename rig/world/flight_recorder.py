@@ -39,7 +39,7 @@ class FlightRecorder:
         self._thread.start()
 
     def alive(self) -> None:
-        """Note that a step has been made, or that none is due."""
+        """Record that a step has been made, or that none is due."""
         now_s = time.monotonic()
         late_s, self._alive_s = now_s - self._alive_s, now_s
         if late_s > LATE_S:
@@ -88,7 +88,7 @@ class FlightRecorder:
 
 
 def read_processor_times() -> tuple[float, float]:
-    """Return how long this thread has run, and has waited for a processor, s; the latter is 0 without proc(5)."""
+    """Return the times, s, that this thread has run and waited for a processor; the latter is 0 without proc(5)."""
     try:
         ran_ns, starved_ns, _ = Path(f"/proc/self/task/{threading.get_native_id()}/schedstat").read_text().split()
     except (OSError, ValueError):

@@ -168,7 +168,7 @@ class Laboratory:
 
     @property
     def tick_s(self) -> float:
-        """The duration of a tick, which is 2 ms by an arm controller's clock."""
+        """The duration of a tick, which is 2 ms on an arm controller's clock."""
         return self.motion_source.tick_s
 
     @property

@@ -28,7 +28,7 @@ class ClientSession(Protocol):
 
     @property
     def dialogue(self) -> bool:
-        """Whether the client asks questions that depend on the previous answer."""
+        """Whether each of the client's questions depends on the previous answer."""
 
     def greeting(self) -> bytes: ...
     def receive(self, data: bytes) -> bytes: ...
@@ -98,7 +98,10 @@ class ClientConnection:
         self.due = (b"" if self.listener.silent else self.due) + self.session.tick()
 
     def deliver(self, idle: bool, patient: bool) -> float:
-        """Send the bytes of past ticks. Return the time to wait, s, if a client lags too far and `patient` is set."""
+        """Send the bytes of past ticks.
+
+        Return the time to wait, s, if a client lags too far behind and `patient` is set.
+        """
         if self.listener.silent:
             return 0.0
         if self.listener.gathers and not idle and time.monotonic() - self._delivered_s < GATHER_S:
@@ -232,7 +235,7 @@ class PortListener:
         connection.greet()
 
     def set_silent(self, silent: bool) -> None:
-        """Make the port silent, or end this. A silent port sends and reads nothing; connections stay open."""
+        """Make the port silent, or end the silence. A silent port sends and reads nothing; connections stay open."""
         self.silent = silent
         for connection in self.connections:
             connection.watch()
@@ -290,8 +293,8 @@ class Network:
     def deliver(self, idle: bool = True, patient: bool = True) -> float:
         """Send the bytes of past ticks to every client that can take them; return the wait for the others, s.
 
-        A tick is over when this returns 0. `idle`: the next tick is not due yet, so nothing needs to be gathered.
-        `patient`: wait for clients that lag, as no real controller and no real board does.
+        A tick is over when this returns 0. `idle`: the next tick is not due yet, so that bytes need not be collected.
+        `patient`: wait for clients that lag behind, which no real controller or board would do.
         """
         due = [connection for connection in self.connections if connection.due]
         return max([connection.deliver(idle, patient) for connection in due], default=0.0)

@@ -61,7 +61,7 @@ class SimulatedOperator:
 
     @property
     def state(self) -> dict[str, Any]:
-        """The progress for tests: the side up, the number of actions, and the mistakes made."""
+        """The operator's progress, for tests: the side up, the number of actions, and the mistakes made."""
         return {"face": self._hand.face, "acts": self._acts, "mistakes": self._mistakes}
 
     def instruct(self, say: str, face: Face, turns: int = 0, *, again: bool = False) -> None:

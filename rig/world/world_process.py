@@ -150,7 +150,7 @@ class World:
 
     # -- faults of the wires ---------------------------------------------------------------------------------------
     def silence_arm(self, duration_s: float) -> None:
-        """Let the controller neither send nor read for `duration_s` of wall time, which clients' time-outs use."""
+        """Let the controller neither send nor read for `duration_s` of wall time, because clients time out by it."""
         self._silent_until_s = time.monotonic() + duration_s
         for listener in self.arm_listeners:
             listener.set_silent(True)
@@ -217,8 +217,8 @@ class World:
     def run(self, alive: Callable[[], None] = lambda: None) -> None:
         """Serve until `end`. A tick ends when its bytes have been delivered to the clients, which set the pace.
 
-        While nobody is connected, it goes no faster than a real laboratory: it would only take processor time.
-        `alive` is called after every tick, and whenever none is due.
+        While nobody is connected, the world runs no faster than a real laboratory, because that would only waste
+        processor time. `alive` is called after every tick, and whenever none is due.
         """
         polled_s = 0.0
         while not self._is_ended:
@@ -244,9 +244,9 @@ class World:
     def _tick(self) -> None:
         """Simulate one tick, or all that are due, at most `LEAP`, while only a client can make the arm move.
 
-        With a board it is one at a time: its core takes as long in any case, and clients would get their packets in
-        bursts. If the arm is at rest, its motion is sensed once at the end of several ticks, with the same bytes as a
-        result. Every session is called at every tick.
+        With a board, ticks are simulated one at a time: its core takes as long in any case, and clients would get their
+        packets in bursts. If the arm is at rest, its motion is sensed once at the end of several ticks, with the same
+        bytes as a result. Every session is called at every tick.
         """
         for remaining in reversed(range(LEAP if self.board_listener is None else 1)):
             self.clock.count()

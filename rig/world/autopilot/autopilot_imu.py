@@ -86,7 +86,7 @@ class SimulatedImu:
         return list(self._repeats.next_rates(self.rate.tolist()))
 
     def step(self, at_s: float, time_us: int) -> None:
-        """Read it once at the virtual time `at_s`, which is `time_us` by the autopilot's clock."""
+        """Read the IMU once at the virtual time `at_s`, which is `time_us` on the autopilot's clock."""
         offset, force_offset, force_scale = (
             np.array([self._parameters[name] for name in names]) for names in self._names
         )
@@ -107,7 +107,10 @@ class SimulatedImu:
 
 
 def simulated_rotation(number: float) -> Vector:
-    """Return the rotation (3, 3) of the board orientation `number`. Raise ValueError if it is not simulated."""
+    """Return the rotation (3, 3) of the board orientation `number`.
+
+    Raise ValueError if this orientation is not simulated.
+    """
     if int(number) not in ORIENTATIONS:
         raise ValueError(f"the simulated autopilot has no orientation {number:g}")
     rotation = np.eye(3)

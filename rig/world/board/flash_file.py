@@ -48,7 +48,10 @@ def open_flash(path: Path | None) -> FlashMemory:
 
 
 def _check(data: bytes) -> None:
-    """Raise UnfitFile unless `data` is a flash; it will be replaced, and foreign configurations may name any file."""
+    """Raise UnfitFile unless `data` is a flash.
+
+    The file will be replaced, and a foreign configuration may name any file.
+    """
     if len(data) < FLASH_BYTES or len(data) % 4:
         raise UnfitFile(f"it has {len(data)} bytes")
     stack, reset = struct.unpack_from("<II", data)

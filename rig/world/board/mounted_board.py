@@ -22,7 +22,7 @@ from rig.world.board.sensor_truth import SensorTruth
 
 @cache
 def read_firmware(suffix: str) -> bytes:
-    """Return the image that is flashed (`bin`), or the same with its symbols (`elf`)."""
+    """Return the firmware's image: as it is flashed (`bin`), or with its symbols (`elf`)."""
     return (resources.files("firmware_host") / "firmware" / "image" / f"rig_l432.{suffix}").read_bytes()
 
 

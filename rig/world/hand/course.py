@@ -31,7 +31,7 @@ class HandCourse:
 def move(start: Array, end: Array, vector: Array, habits: Habits, rng: np.random.Generator) -> tuple[Array, Array]:
     """Simulate a hand that turns the body from attitude `start` to `end` (3, 3); return times and body rates.
 
-    `vector` (3,) is the rotation vector between them, in body axes.
+    `vector` (3,) is the rotation vector between the two attitudes, in body axes.
     """
     angle = float(np.linalg.norm(vector))
     axis = vector / angle

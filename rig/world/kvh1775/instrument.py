@@ -107,7 +107,7 @@ class SimulatedKvh1775:
         return data
 
     def receive(self, data: bytes) -> None:
-        """Take commands, which end with CR, LF or both."""
+        """Receive commands, which end with CR, LF or both."""
         for byte in data:
             if byte in LINE_END:
                 line, self._command = bytes(self._command), bytearray()

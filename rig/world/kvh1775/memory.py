@@ -59,7 +59,7 @@ class KvhMemory:
         return _matrix(self["AXES"])
 
     def obey(self, command: str) -> str:
-        """Return the answer to a command in capitals."""
+        """Execute a command, given in capitals, and return the answer."""
         sign, name = command[:1], command[1:]
         if sign == "?" and name in self._settings:
             return self._report(name)

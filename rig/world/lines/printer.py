@@ -94,7 +94,7 @@ class Printer:
         return data
 
     def receive(self, data: bytes) -> None:
-        """Ignore bytes to the device, which reads none."""
+        """Ignore bytes sent to the device, because it reads nothing."""
 
     def advance(self, time_s: float) -> None:
         """Simulate until the virtual time `time_s`, which lies in the laboratory's last tick."""

@@ -166,7 +166,7 @@ class ServoMemory:
                 self[register.name] = register.initial
 
     def read(self, address: int, length: int) -> bytes | int:
-        """Return the bytes; an error number if a byte belongs to no register."""
+        """Return the bytes, or an error number if a byte belongs to no register."""
         if length == 0 or any(a not in self._defined for a in range(address, address + length)):
             return ACCESS_ERROR
         return bytes(self._bytes[address : address + length])

@@ -116,7 +116,7 @@ class Drive:
         self.shaft.follow(time_s, falls)
 
     def go(self, goal: int, time_s: float) -> None:
-        """Begin a move to `goal` (register units) in a mode that has goals. The shaft follows with its lag."""
+        """Begin a move to `goal` (register units) in an operating mode with goals. The shaft follows with its lag."""
         memory = self._memory
         if not self.torque or memory["Operating Mode"] not in (POSITION, EXTENDED):
             return

@@ -84,7 +84,7 @@ class SimulatedServo:
         self._powered = on
 
     def advance(self, time_s: float) -> None:
-        """Simulate until `time_s`, with no new instruction."""
+        """Simulate until `time_s`, without a new instruction."""
         if self._powered:
             self.drive.advance(time_s)
 

@@ -60,7 +60,7 @@ class ServoBench:
         self.bus = SimulatedBus([self.servo], LineTruth(latency_ms=section.latency_ms), self.now_s, seed=seed)
 
     def now_s(self) -> float:
-        """Return the servo's time: wall time since the world began, s. No tick is ahead of it."""
+        """Return the servo's time: wall time since the world began, s. No tick is ahead of this time."""
         return time.monotonic() - self._began_s + AHEAD_S
 
     @property

@@ -260,7 +260,7 @@ class Robot:
             self.runtime_state = RuntimeState.STOPPED if self.motion.standing else RuntimeState.STOPPING
 
     def pause(self) -> bool:
-        """Pause the program; the current move continues after play. Return whether one was playing."""
+        """Pause the program; the current move continues after play. Return whether a program was playing."""
         if self.runtime_state != RuntimeState.PLAYING:
             return False
         self.motion.fraction_wanted = 0.0
@@ -316,7 +316,7 @@ class Robot:
             self.safety_mode = SafetyMode.NORMAL
 
     def release(self) -> None:
-        """Release the emergency stop button, without power, or reset the safeguard; a program stays paused."""
+        """Release the emergency stop button, still without power, or reset the safeguard; a program stays paused."""
         if self.safety_mode in (SafetyMode.ROBOT_EMERGENCY_STOP, SafetyMode.SAFEGUARD_STOP):
             self.safety_mode = SafetyMode.NORMAL
 
@@ -345,7 +345,7 @@ class Robot:
         self._update_scaling()
 
     def set_safety_limit(self, fraction: float) -> None:
-        """Limit the speed to this fraction of the programmed one, as a safety limit does; 1: no limit."""
+        """Limit the speed to a fraction of the programmed one, as a safety limit does; 1 means no limit."""
         self.faults.safety_limit = min(max(fraction, 0.0), 1.0)
         self._update_scaling()
 
@@ -359,7 +359,7 @@ class Robot:
             self.motion.fraction_wanted = self._fraction
 
     def lose_operation(self, mode: RobotMode) -> None:
-        """Change to another robot mode, as during an update of the firmware; the program stops."""
+        """Leave the running mode for another robot mode, as during an update of the firmware; the program stops."""
         self.stop_program(f"robot mode {mode.name}")
         self.motion.stop(BRAKE_RAD_S2)
         self._mode_changes = []
@@ -417,7 +417,7 @@ class Robot:
 
     @property
     def tcp_motion(self) -> TcpMotion:
-        """The motion of the tool centre point by the encoders."""
+        """The motion of the tool centre point as the encoders measure it."""
         return find_tcp_motion(*self.motion.actual, self.links)
 
     @property

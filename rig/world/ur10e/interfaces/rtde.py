@@ -50,7 +50,7 @@ class OutputRecipe:
         self._due_fraction = 1.0 - self._per_tick  # the first package goes out with the first tick
 
     def is_due(self) -> bool:
-        """Return whether this tick has a package. Call it once per tick."""
+        """Return whether a package is due in this tick. Call it once per tick."""
         self._due_fraction += self._per_tick
         if self._due_fraction < 1.0 - 1e-9:
             return False
@@ -85,7 +85,7 @@ class RtdeSession:
 
     @property
     def dialogue(self) -> bool:
-        """Whether the client asks questions, as until its recipes are set up. Then it reads, and writes registers."""
+        """Whether the client asks questions, as until its recipes are set up. Afterwards it reads and writes values."""
         return not self._started
 
     def greeting(self) -> bytes:

@@ -29,13 +29,14 @@ class StoredPrograms:
         return name in self._documents
 
     def read(self, name: str) -> str:
-        """Return a program's document. Raise KeyError if there is none of that name."""
+        """Return a program's document. Raise KeyError if there is none of this name."""
         return self._documents[name]
 
     def store(self, form: bytes, *, replace: bool) -> str:
         """Store the document that a client sends, and return its name.
 
-        Raise ValueError if the form contains no document, or if it is stored already and not to be replaced.
+        Raise ValueError if the form contains no document, or if one of its name is stored already and must not be
+        replaced.
         """
         text = form[form.find(b"{") : form.rfind(b"}") + 1].decode()
         try:

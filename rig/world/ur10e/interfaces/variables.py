@@ -174,7 +174,7 @@ def _put_bits(first: int) -> Put:
 
 
 def _ignore(robot: Robot, value: Any) -> None:
-    """Ignore an input: a mask, which `apply_masked` reads itself, or a force, which is not simulated."""
+    """Ignore an input: a mask, because `apply_masked` reads it, or a force, because it is not simulated."""
 
 
 INPUTS: dict[str, tuple[str, Put]] = {

@@ -76,7 +76,7 @@ class JointErrors:
     def step(self, time_s: float, smooth_qd_rad_s: Joints, q_rad: Callable[[], Joints]) -> None:
         """Update the errors with the joints' smooth speeds at the end of a tick, and their angles.
 
-        Angles are requested at reversals only. A joint's own speed changes its sign where the joint settles or is
+        Angles are computed only at reversals. A joint's own speed changes its sign where the joint settles or is
         shaken.
         """
         if smooth_qd_rad_s is self._speed:
@@ -136,7 +136,7 @@ class JointErrors:
         return angles, speeds, accelerations
 
     def _true_angle(self, joint: int, e: float) -> tuple[float, float, float]:
-        """Return the true angle at an encoder's angle, rad, and two derivatives by the latter."""
+        """Return the true angle at an encoder's angle, rad, and two derivatives with respect to the latter."""
         errors, (once, twice, _) = self._errors, self._phases[joint]
         a, b = errors.encoder_once_rad, errors.encoder_twice_rad
         lag, slope, bend = self._hysteresis(joint, e)
@@ -147,7 +147,7 @@ class JointErrors:
         )
 
     def _hysteresis(self, joint: int, e: float) -> tuple[float, float, float]:
-        """Return the joint's lag, rad, and two derivatives by the encoder's angle."""
+        """Return the joint's lag, rad, and its first two derivatives with respect to the encoder's angle."""
         reversal_rad, lag = self._reversal[joint]
         end = 0.5 * self._errors.hysteresis_rad * self._direction[joint]
         excess = (lag - end) * exp(-abs(e - reversal_rad) / REVERSAL_RAD)

@@ -108,7 +108,7 @@ class JointMotion:
 
     @property
     def still(self) -> bool:
-        """Whether nothing moved in the last tick and in those in memory."""
+        """Whether nothing moved in the last tick and in the earlier ticks in memory."""
         return not self._moving_ticks
 
     @property
@@ -141,7 +141,7 @@ class JointMotion:
 
     @property
     def actual_qd_rad_s(self) -> Joints:
-        """The joints' speeds as the encoders show them."""
+        """The joints' speeds as the encoders measure them."""
         return self._encoders.read_speeds(self._end_s, self._vibrating(ZERO)[1])
 
     @property
@@ -153,7 +153,7 @@ class JointMotion:
 
     @property
     def actual(self) -> tuple[Joints, Joints, Joints]:
-        """Angles, speeds and accelerations by encoders of perfect resolution without noise."""
+        """Angles, speeds and accelerations as encoders with perfect resolution and without noise would measure them."""
         return self._vibrating(self.qdd_rad_s2)
 
     def _vibrating(self, qdd_rad_s2: Joints) -> tuple[Joints, Joints, Joints]:
@@ -161,7 +161,7 @@ class JointMotion:
         return joints if self.vibration is None else self.vibration.add(self._end_s, *joints)
 
     def joints_at(self, time_s: float) -> tuple[Joints, Joints]:
-        """Return angles and speeds of the joints at a virtual time within the last tick, or `memory_s` before it."""
+        """Return angles and speeds of the joints at a virtual time within the last tick or the `memory_s` before it."""
         return self.state_at(time_s)[:2]
 
     def state_at(self, time_s: float) -> tuple[Joints, Joints, Joints]:
@@ -290,7 +290,7 @@ class JointMotion:
         self._now = None
 
     def _map(self, start: Joints, end: Joints) -> tuple[Joints, Joints]:
-        """Return offset and gain from target to smooth angle that make the joints rest exactly on the path's ends."""
+        """Return offset and gain from target to smooth angle, such that the joints rest exactly at the path's ends."""
         first = [r.smooth(q) for r, q in zip(self._ripples, start, strict=True)]
         last = [r.smooth(q) for r, q in zip(self._ripples, end, strict=True)]
         gain = tuple(  # a path shorter than any useful precision has none

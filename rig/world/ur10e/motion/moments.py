@@ -45,7 +45,7 @@ def find_load(
     links: Links,
     bodies: Bodies,
 ) -> Load:
-    """Return joint torques, the payload's wrench in the flange's frame and the arm's momentum: inverse dynamics.
+    """Return, by inverse dynamics, joint torques, the payload's wrench in the flange's frame and the arm's momentum.
 
     The inputs are joint angles, speeds and accelerations (rad, s), and a payload in the flange's axes.
     """

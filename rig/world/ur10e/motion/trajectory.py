@@ -104,7 +104,7 @@ def plan_soft_joint_move(
     """Plan a moveJ that a controller plays as a program of its own: it starts gently, and stops as any other.
 
     In logs of a UR3 and of the maker's simulator the acceleration grows with the square of time in 19 steps of 8 ms, to
-    1.38 times the requested one, which follows. A move too slow or too short for that is planned without it.
+    1.38 times the requested one, which follows. A move that is too slow or too short for this is planned without it.
     """
     path = tuple(b - a for a, b in zip(start_rad, end_rad, strict=True))
     longest = max(abs(w) for w in path)
@@ -137,7 +137,7 @@ def plan_soft_joint_move(
 
 
 def plan_speed_change(q_rad: Joints, from_rad_s: Joints, to_rad_s: Joints, acceleration_rad_s2: float) -> Trajectory:
-    """Plan a change of velocity, with that acceleration for the joint that changes most; then keep it, or rest."""
+    """Plan a change of velocity, with the given acceleration for the joint that changes most; then keep it, or rest."""
     change = tuple(b - a for a, b in zip(from_rad_s, to_rad_s, strict=True))
     ramp_s = max(abs(c) for c in change) / acceleration_rad_s2
     segments = []

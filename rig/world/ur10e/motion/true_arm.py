@@ -20,7 +20,7 @@ WRIST = 3  # the first joint that vibrates: those before it are mostly at rest
 def build_calibrated_links(
     calibration: CalibrationSection, twist_rad: tuple[float, ...] = ZERO6, drawing: Drawing = UR10E
 ) -> Links:
-    """Return the links by the maker's calibration. With `twist_rad`, unknown to the maker, they are the true links."""
+    """Return the links as the maker calibrated them; with `twist_rad`, unknown to the maker, the true links."""
     return links(
         calibration.delta_theta_rad,
         [1e-3 * length for length in calibration.delta_a_mm],
@@ -65,7 +65,7 @@ class TrueArm:
         return controller_s / self._speed
 
     def step(self, controller_s: float) -> None:
-        """Update after a tick of the controller."""
+        """Update the arm after a tick of the controller."""
         if not self._motion.still:
             self._at_rest = None
             if self._errors is not None:
