@@ -35,7 +35,7 @@ class SampleBatch(NamedTuple):
 
 
 def sample_batches(frames: Iterable[Frame], host_time_s: float) -> Iterator[SampleBatch]:
-    """Yield the batches of frames of a stream that came together at `host_time_s`, as few as possible.
+    """Yield the frames of a stream that came together at `host_time_s`, in as few batches of samples as possible.
 
     Batches of a sensor are in order; a batch ends at missing samples, or at a change of their kind.
     """
@@ -65,7 +65,7 @@ def _runs(frames: Iterable[Frame]) -> list[list[Frame]]:
 
 
 def _samples(name: str, runs: Sequence[Sequence[Frame]], host_time_s: float) -> np.ndarray:
-    """Return the samples (n,) of all frames of that name, run after run.
+    """Return the samples (n,) of all frames of one name, run after run.
 
     Joining their bytes and decoding once shares most of a frame's cost.
     """
@@ -91,7 +91,7 @@ def _samples(name: str, runs: Sequence[Sequence[Frame]], host_time_s: float) -> 
 
 
 def _continues(before: Frame, frame: Frame) -> bool:
-    """Return whether the samples of a sensor's frame follow those of the one before, of the same kind."""
+    """Return whether the samples of a sensor's frame are of the same kind as the previous frame's, and follow these."""
     previous, current = before.values, frame.values
     return bool(
         frame.name == before.name
@@ -300,7 +300,7 @@ class StoredPolynomials:
     bias_change_rad_s: Matrix
 
     def most(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return (3,) the largest change of scale, as a fraction, and bias, rad/s, by axis, within the range."""
+        """Return the largest changes within the range, by axis: of scale (3,) as a fraction, of bias (3,) in rad/s."""
         powers = (self.range_c[1] - self.range_c[0]) ** np.arange(1, 4)
         return powers @ np.abs(self.scale_change), powers @ np.abs(self.bias_change_rad_s)
 
@@ -323,7 +323,7 @@ class Calibration:
 
     @property
     def scale(self) -> Vector:
-        """The scale factors k by axis, 1/‖row i of F‖, with F⁻¹ the matrix up to a rotation."""
+        """The scale factors k by axis, 1/‖row i of F‖, where F⁻¹ is the matrix up to a rotation."""
         if self.model == protocol.MODELS[1]:
             return self.matrix[0][0], self.matrix[1][1], self.matrix[2][2]
         kx, ky, kz = (1 / np.linalg.norm(np.linalg.inv(self.matrix), axis=1)).tolist()

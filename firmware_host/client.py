@@ -83,7 +83,8 @@ class Board:
     def configure(self, sensor: int, rate_hz: float, range_deg_s: float, range_g: float = 0.0) -> SensorSetup:
         """Set a gyroscope to the nearest data rate and the next range up.
 
-        With a `range_g` other than 0 its accelerations are sent too, in the next range up; not in a calibrated stream.
+        With a `range_g` other than 0, accelerations are sent too, in the next range up, unless the stream is
+        calibrated.
         """
         return self._configure(sensor, rate_hz, range_deg_s=range_deg_s, range_g=range_g)
 
@@ -117,7 +118,7 @@ class Board:
         return BoardObservation.decode(self._ask("observe", values))
 
     def recall(self, sensor: int, index: int, mean_rad_s: Sequence[float], speed_rad_s: float) -> BoardObservation:
-        """Add an observation from before a reset: `mean_rad_s` as observed then; `index` as in `observe`."""
+        """Add an observation from before a reset, with the `mean_rad_s` of that time; `index` is as in `observe`."""
         values = {"sensor": sensor, "index": index, "mean_rad_s": mean_rad_s, "speed_rad_s": speed_rad_s}
         return BoardObservation.decode(self._ask("recall", values))
 
@@ -157,7 +158,7 @@ class Board:
         self._ask("write_calibration", {"sensor": sensor, **calibration.values()}, _FLASH_TIMEOUT_S)
 
     def erase_calibration(self, sensor: int) -> None:
-        """Erase a sensor's calibration on the board; a missing one is no error."""
+        """Erase a sensor's calibration on the board; it is no error if there is none."""
         self._ask("erase_calibration", {"sensor": sensor}, _FLASH_TIMEOUT_S)
 
     def heat(self, power: float) -> Heating:
@@ -165,7 +166,7 @@ class Board:
         return Heating.decode(self._ask("heat", {"power": _power_counts(power)}))
 
     def keep_heating(self, power: float) -> None:
-        """Repeat that request without waiting for the answer, which becomes `heating`."""
+        """Repeat the request of `heat` without waiting for the answer, which is stored in `heating`."""
         self._link.tell("heat", {"power": _power_counts(power)})
 
     def reboot(self) -> None:
@@ -174,9 +175,10 @@ class Board:
         self.identity = self._hello()
 
     def check(self, clock_s: float | None = None) -> None:
-        """Raise errors of the meantime: the board's own error, or board_link_lost (closed, silent in a stream).
+        """Raise errors since the last call: the board's own error, or board_link_lost (closed, or silent in a stream).
 
-        `clock_s` is the present time of another instrument's clock, if any: a silence must also be as long by that.
+        `clock_s` is the present time of another instrument's clock, if any: a silence must be as long on that clock
+        too.
         """
         if self._link.fault is not None:
             raise self._link.fault
@@ -227,7 +229,7 @@ class Board:
         return identity
 
     def _why_no_hello(self, byte_count: int, frame_count: int) -> BoardError:
-        """Return the reason by the data received: an idle board sends twice a second."""
+        """Return why no greeting came, judged from the received data: an idle board sends twice a second."""
         if frame_count:
             return BoardError(
                 "no_board",

@@ -7,14 +7,15 @@ CROWDED = 5.0  # largest factor on a limit: the number of runnable programs per 
 
 
 def exceeds(delay: float, limit: float) -> bool:
-    """Return whether a delay exceeds a limit that the crowding stretches; that is read only beyond the limit itself."""
+    """Return whether a delay exceeds a limit times the crowding, which is read only if the limit itself is exceeded."""
     return delay > limit and delay > limit * crowding()
 
 
 def crowding() -> float:
     """Return the number of programs per processor of this machine, 1 to CROWDED, by which a delay may be stretched.
 
-    In the mean of the last minute, or now: after a quarter of a minute the mean shows only a quarter of a crowd.
+    It is the mean of the last minute or the present number, if larger: after 15 s the mean shows only a quarter of a
+    new crowd.
     """
     if not hasattr(os, "getloadavg"):  # Windows
         return 1.0

@@ -254,7 +254,7 @@ def refuse_other_drive(drive: Path) -> None:
 
 
 def _code(drive: Path) -> str | None:
-    """Return the board code of a drive, from the link in its MBED.HTM; None if it has no such file."""
+    """Return the board code of a drive, from the link in its MBED.HTM; None if the drive has no such file."""
     try:
         page = _short_text(drive / "MBED.HTM")
     except OSError:

@@ -168,8 +168,8 @@ class FrameReader:
     def _is_repeated(self, block: bytes, frame: Frame) -> bool:
         """Return whether the line repeats a frame.
 
-        An idle board sends the same identity every 256 frames, and after a reset; so an identity is compared with the
-        latest one alone, and is new if it has the expected sequence.
+        An idle board sends the same identity every 256 frames, and after a reset; so an identity is compared only with
+        the latest one, and is new if it has the expected sequence number.
         """
         if frame.name == "identity":
             is_repeated = block == self._identity and frame.sequence != self._expected

@@ -19,7 +19,7 @@ def install_command(extra: str) -> str:
 
 
 def _source() -> tuple[bool, str]:
-    """Return whether it runs from the folder of its sources, and the requirement for pip."""
+    """Return whether the program runs from the folder of its sources, and the requirement for pip."""
     from importlib.metadata import PackageNotFoundError, distribution
 
     try:

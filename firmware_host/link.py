@@ -70,7 +70,7 @@ class BoardLink:
 
     @property
     def silent_s(self) -> float:
-        """The time without a frame, in time spent reading: a delayed reader does not make the board silent."""
+        """The time spent reading without receiving a frame: a delayed reader does not make the board appear silent."""
         return self._reads_without_frame * READ_TIMEOUT_S
 
     @property
@@ -93,10 +93,10 @@ class BoardLink:
         return self._closing.is_set()
 
     def ask(self, name: str, values: dict[str, Any] | None, timeout_s: float) -> Frame:
-        """Send a request until its answer comes; so every request must tolerate a repetition.
+        """Send a request repeatedly until its answer comes; every request must tolerate a repetition.
 
-        Raise BoardError `board_link_lost` after `timeout_s`, and `fault` if there is one. On a crowded computer,
-        where neither the reader nor a simulated board may get a processor, the last attempt is repeated for longer.
+        Raise BoardError `board_link_lost` after `timeout_s`, and `fault` if there is one. On a crowded computer, where
+        neither the reader nor a simulated board may get a processor, the last attempt is repeated for longer.
         """
         with self._sending:
             self._sequence = sequence = self._sequence % 255 + 1
@@ -128,7 +128,7 @@ class BoardLink:
         self._send(name, 0, values or {})
 
     def fail(self, error: Exception) -> None:
-        """Make `error` the fault, unless there is one already."""
+        """Store `error` as the fault, unless there is one already."""
         self.fault = self.fault or error
 
     def close(self) -> None:

@@ -45,7 +45,7 @@ class BoardPart:
         return model_class
 
     def describe_other(self, who_am_i: int) -> str:
-        """Return the description of another part that answers, by its identity register."""
+        """Return the description of a different part that answers, identified by its identity register."""
         other = self.identities.get(who_am_i, "an unknown part")
         return f"{other}, identity 0x{who_am_i:02x} instead of 0x{self.who_am_i:02x}"
 

@@ -38,12 +38,12 @@ class ProblemError(Exception):
 
     @property
     def what(self) -> str:
-        """One clause on what happened and where."""
+        """A clause that says what happened and where."""
         return self.problem.what
 
     @property
     def remedy(self) -> str:
-        """One clause on what to do."""
+        """A clause that says what to do."""
         return self.problem.remedy
 
     def __str__(self) -> str:

@@ -33,9 +33,9 @@ class SerialPort:
             raise OSError(str(error)) from error
 
     def read(self) -> bytes:
-        """Return the data received within `READ_TIMEOUT_S`; if the port closes, first the data from before.
+        """Return the data received within `READ_TIMEOUT_S`; if the port closes, first return the data received before.
 
-        pyserial could wait itself, but drops data that it has read when the port closes during the wait.
+        pyserial could wait itself, but loses data that it has read if the port closes during the wait.
         """
         time.sleep(READ_TIMEOUT_S)
         return bytes(self._serial.read(_READ_SIZE))

@@ -202,7 +202,10 @@ class Engine:
         self._add(UC_HOOK_BLOCK, ctypes.c_void_p(address_of("block")), ctypes.byref(meter))
 
     def hook_instruction(self, address: int, hook: Callable[[int], None]) -> Callable[[], None]:
-        """Call `hook(address)` before that instruction, until the returned function is called. Use between two runs."""
+        """Call `hook(address)` before the instruction at `address`, until the returned function is called.
+
+        Use between two runs.
+        """
 
         def call_hook(_handle: int, address: int, _size: int) -> None:
             try:
@@ -229,7 +232,7 @@ class Engine:
         self._hook(UC_HOOK_INTR, _INTERRUPT(call_hook))
 
     def hook_invalid(self, hook: Callable[[str, int], None]) -> None:
-        """Call `hook(attempt, address)` for an access without accessible memory; attempt is such as "read from"."""
+        """Call `hook(attempt, address)` for an access to inaccessible memory; `attempt` is "read from", for example."""
 
         def call_hook(_handle: int, kind: int, address: int, _size: int, _value: int, _user: int) -> bool:
             try:
@@ -278,7 +281,7 @@ class Engine:
         _check(status)
 
     def fault_registers(self) -> list[int]:
-        """Return program counter and link register at a callback's first exception; without one, the present ones."""
+        """Return program counter and link register at the first exception of a callback, or now if there was none."""
         return self._pc_and_link.read() if self._fault_registers is None else self._fault_registers
 
     def stop(self) -> None:
@@ -299,7 +302,7 @@ class Engine:
         self.stop()
 
     def _hook(self, kind: int, callback: Any, begin: int = 1, end: int = 0) -> ctypes.c_size_t:
-        """Add a hook for addresses from `begin` to `end`; the default is Unicorn's encoding of everywhere."""
+        """Add a hook for addresses from `begin` to `end`; by default all addresses, as Unicorn encodes them."""
         self._callbacks.append(callback)
         return self._add(kind, _pointer(callback), None, begin, end)
 

@@ -46,7 +46,7 @@ class BlockTicks:
 
     @property
     def fields(self) -> tuple[int, int, int]:
-        """The last fields of `Meter`."""
+        """The last fields of a `Meter`."""
         return self._first_address, self._halfwords, ctypes.addressof(self._ticks)
 
     def __getitem__(self, address: int) -> int:
@@ -137,7 +137,7 @@ class Shortcuts(ctypes.Structure):
 
 
 def reader(function: str, *shared: ctypes.Structure) -> Callable[[], int]:
-    """Return a register's read in machine code as a Python function; `shared` are its arguments."""
+    """Return the machine code that reads a register as a Python function; `shared` are its arguments."""
     read = ctypes.CFUNCTYPE(ctypes.c_uint64, *[ctypes.c_void_p] * len(shared))(address_of(function))
     return lambda: int(read(*map(ctypes.addressof, shared)))
 

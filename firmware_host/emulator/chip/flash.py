@@ -170,7 +170,7 @@ class Flash:
         self._start(offset, b"\xff" * PAGE_BYTES, _ERASE_TICKS)
 
     def _program(self, offset: int, value: int) -> None:
-        """Program a doubleword: an erased one, or any to zero."""
+        """Program a doubleword that is erased, or set any doubleword to zero."""
         if value and self._memory.data[offset : offset + DOUBLEWORD_BYTES] != b"\xff" * DOUBLEWORD_BYTES:
             self._status |= _PROGERR
             return

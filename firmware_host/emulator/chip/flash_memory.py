@@ -41,12 +41,15 @@ class FlashMemory:
     def fail_power(self, operation: int, torn: bool) -> None:
         """Let the power fail at an operation, counted as `operations` counts.
 
-        With `torn` it has begun and is cut off; without, it has not yet.
+        With `torn`, the operation has begun and is cut off; without, it has not begun.
         """
         self._fails_at, self._fails_torn = operation, torn
 
     def begin(self, offset: int, content: bytes) -> None:
-        """Begin to write `content` at `offset`: until `finish` it is torn. Raise PowerLost if the power is to fail."""
+        """Begin to write `content` at `offset`; until `finish` it is incomplete.
+
+        Raise PowerLost if the power is to fail.
+        """
         self.operations += 1
         fails = self.operations == self._fails_at
         if not fails or self._fails_torn:

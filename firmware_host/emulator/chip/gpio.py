@@ -74,7 +74,7 @@ class Port:
         return bool(self._input_pins >> pin & 1)
 
     def _read_levels(self) -> int:
-        """Return the levels of the pins that devices drive; the others' levels have no model and read 0."""
+        """Return the levels of the pins that devices drive; other pins have no model and read 0."""
         return self._levels & self._input_pins
 
     def _set_and_reset(self, value: int) -> None:

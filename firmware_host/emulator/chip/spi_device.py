@@ -58,7 +58,7 @@ class SpiDevice(Protocol):
         """Exchange one byte. Raise Violation for accesses that the part forbids or the model lacks."""
 
     def predict(self) -> bytes:
-        """Return the answers to the next pairs of bytes, whatever these are and until chip select rises.
+        """Return the answers to the next pairs of bytes, whichever bytes come, until chip select rises.
 
         Called after the first pair of an access; predicted bytes count as exchanged.
         """
@@ -203,7 +203,7 @@ class DeviceLink:
         return answer
 
     def predict(self) -> bytes:
-        """Return the device's next answers, see `SpiDevice.predict`; none of a faulty device."""
+        """Return the device's next answers, see `SpiDevice.predict`; none for a faulty device."""
         return self.device.predict() if self.device.fault is None else b""
 
     def _exchange_faulty(self, pair: int) -> int:

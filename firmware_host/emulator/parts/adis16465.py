@@ -168,7 +168,7 @@ class Adis16465:
         return answer
 
     def predict(self) -> bytes:
-        """Return all of a burst, whose data are of its start."""
+        """Return the complete burst, whose data were frozen at its start."""
         predicted, self._burst = self._burst or b"", self._burst and b""
         return predicted
 
@@ -233,7 +233,7 @@ class Adis16465:
         return fixed[address]
 
     def _take_diagnosis(self) -> int:
-        """Return the diagnosis and clear all flags but a persistent one."""
+        """Return the diagnosis and clear all of its flags except a persistent one."""
         diagnosis, self._diagnosis = self._diagnosis, 0
         return diagnosis | (_OVERRUN if self.overrun else 0)
 

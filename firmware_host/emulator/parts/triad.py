@@ -99,7 +99,7 @@ class Triad:
         return sensed
 
     def warmer_k(self, time_s: float) -> float:
-        """Return the temperature of the part above that of its stated errors, K."""
+        """Return how much warmer the part is than the temperature of its stated errors, K."""
         if not self._temperature_varies:
             return 0.0
         die = self._errors.die
@@ -124,13 +124,13 @@ class Triad:
         return 0.0 if self._errors.die is None else self._errors.die.branch(time_s)
 
     def _compute_bias(self, warmer_k: Any, branch: Any) -> list[Any]:
-        """Return the bias at `warmer_k`, on that branch of the hysteresis: three floats or arrays."""
+        """Return the bias at `warmer_k`, on the given branch of the hysteresis: three floats or arrays."""
         errors = self._errors
         rows = zip(self._bias, errors.bias_per_k, errors.bias_per_k2, errors.hysteresis, strict=True)
         return [b + per_k * warmer_k + per_k2 * warmer_k**2 + size * branch for b, per_k, per_k2, size in rows]
 
     def all_warmer_k(self, time_s: np.ndarray) -> np.ndarray | float:
-        """Return the temperature of the part above that of its stated errors, K: (n,), or one number for all times."""
+        """Return how much warmer the part is than at its stated errors, K: (n,), or one number for all times."""
         return np.array([self.warmer_k(t) for t in time_s.tolist()]) if self._temperature_varies else 0.0
 
     def readings(self, time_s: np.ndarray, sensed: Sequence[np.ndarray], warmer_k: np.ndarray | float) -> np.ndarray:
