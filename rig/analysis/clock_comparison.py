@@ -71,7 +71,7 @@ class ClockCheck:
     half_width: float
 
     def differences(self) -> Iterator[ClockDifference]:
-        """Yield the difference of each pair of clocks; half-widths add up, as values in them are equally likely."""
+        """Yield the difference of each pair of clocks; half-widths add up, as all values within are equally likely."""
         clocks = [("controller", 0.0, self.half_width, 0.0)]
         clocks += [
             (SHORT[comparison.by], comparison.error, comparison.half_width, comparison.noise_std)

@@ -61,7 +61,7 @@ class LookedFile:
 def look_at(path: Path, stated: ColumnMap | None = None) -> LookedFile:
     """Return a description of a file's content, from its headings and numbers, or from a `stated` map of its columns.
 
-    Raise Refused `bad_option` for a file of sweeps, and as `find_layout` does for a file that is no table.
+    Raise Refused `bad_option` for a file of sweeps, and as `find_layout` does for a file that is not a table.
     """
     if is_in_format(path):
         return _read_contents(LookedFile(path, None, None, {}), AS_NAMED, has_readings=True, has_attitudes=True)

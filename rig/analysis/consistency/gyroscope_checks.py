@@ -144,7 +144,7 @@ def check_gyroscope(
 
 
 def _steady_rates(segments: Segments, matrix: Array) -> Segments:
-    """Return the segments with one rate per sweep, its mean, and with the difference removed from the readings too.
+    """Return the segments with the mean rate of each sweep, and with the deviations from it removed from the readings.
 
     Encoder noise in the rates appears equally in the residuals of the readings, so noisy columns would explain it.
     """

@@ -123,8 +123,8 @@ def remaining_directions(model_basis: Array, columns: Array) -> Array:
 def chi_square_of(readings: Array, base: Array, columns: Array | None) -> tuple[float, int]:
     """Return the χ² that columns explain of the residuals of `base`, and its degrees of freedom.
 
-    Columns None explain all residuals. (A decomposition of so many columns is slow, and LAPACK's fast driver does not
-    always converge.)
+    Columns None explain all residuals. (A decomposition of all these columns would be slow, and LAPACK's fast driver
+    does not always converge.)
     """
     model_basis = orthonormal_basis(base)
     unexplained = readings - model_basis @ (model_basis.T @ readings)

@@ -144,7 +144,7 @@ def build_error_patterns(
 ) -> ErrorPatterns:
     """Return the patterns of known errors in the means of a sensor with matrix F (3, 3).
 
-    The even part of its nonlinearity is free in transfers, which are faster than sweeps: there it is no sign of a
+    The even part of its nonlinearity is free in transfers, which are faster than sweeps: there it does not indicate a
     change.
     """
     on_transfers = replace(known_errors, curve=replace(known_errors.curve, square=1.0))
@@ -247,10 +247,10 @@ def _encoder_patterns(segments: Segments, encoder_rad: float) -> Array:
 
 
 def _sweeps_between_moves(segments: Segments, joint: int) -> list[list[int]]:
-    """Return the sweeps and transfers between successive moves of a joint; one with a move belongs to the later part.
+    """Return the sweeps and transfers between successive moves of a joint; a transfer that moves it begins a new list.
 
-    The joint is counted from the end of the chain. If a transfer is missing, a changed angle or another recording shows
-    that the joint moved.
+    `joint` is negative: it counts from the end of the chain. If a transfer is missing, a changed angle or another
+    recording shows that the joint moved.
     """
     sweeps, firsts = np.unique(segments.sweep, return_index=True)
     patterns_by_mark: list[list[int]] = []

@@ -61,6 +61,6 @@ def _budget(accelerometer: PlannedAccelerometer) -> Budget:
 
 
 def _new_fraction(dof: Uncertainty) -> float:
-    """Return the stated fraction of δ² that is independent between dwells, limited to those that a solve considers."""
+    """Return the stated fraction of δ² that is independent between dwells, limited to those that solutions consider."""
     fraction = dof.repeatability_deg**2 / max(dof.repeatability_deg**2 + dof.axis_deg**2, np.finfo(np.float64).tiny)
     return float(np.clip(fraction, OWN_SHARES[0], OWN_SHARES[-1]))

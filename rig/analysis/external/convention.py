@@ -1,4 +1,4 @@
-"""The convention of a reference's quaternions, by the readings of a gyroscope that was turned with it.
+"""The convention of a reference's quaternions, from the readings of a gyroscope that was turned with it.
 
 A quaternion may take body to room coordinates or the other way. Under the right convention the body's rates are a
 linear function of the gyroscope's readings. Whether the scalar part stands first or last changes the frames of body and

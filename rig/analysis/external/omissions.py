@@ -19,7 +19,7 @@ from rig.observation.external.placements import Placements
 def list_omitted(
     placed: PlacedReadings, results: Mapping[Quantity, Result | OfKind]
 ) -> Iterator[tuple[Quantity | None, Omitted]]:
-    """Yield the readings left out of a solution in attitudes, by the quantity that lacks them, None for all."""
+    """Yield the readings left out of a solution in attitudes, by the quantity concerned, None for all quantities."""
     yield from ((None, omitted) for omitted in placed.omitted)
     rates = results.get(RATE)
     if isinstance(rates, InIncrements | InAttitudes):

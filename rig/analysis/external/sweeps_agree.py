@@ -147,7 +147,7 @@ def _derivatives(design: Array, means: Array, variances: Array) -> Array:
 
 
 def _contradictions(stated: StatedMotion, sizes: MotionErrors, design: Array) -> Array:
-    """Return the contradiction (N, 3) of each sweep with the others, beyond errors of these sizes.
+    """Return the contradiction (N, 3) of each sweep with the others, beyond errors of the given sizes.
 
     One wrong row among many hardly increases the sizes, but two sweeps about an axis show nothing else.
     """

@@ -45,7 +45,7 @@ NOT_IDENTIFIABLE = "Set procedure.second_order: false, which makes the bias much
 class HeldOut:
     """The last repeat of the attitudes, which the calibration does not use.
 
-    `error_m_s2` (N,): the size of each calibrated acceleration less that of gravity.
+    `error_m_s2` (N,): the size of each calibrated acceleration minus that of gravity.
     """
 
     dwells: tuple[DwellReading, ...]

@@ -153,9 +153,9 @@ def add_errors(
 def separate_sensor_errors(
     spread: Spread, theta: Array, movement: Movement, datasheet: Datasheet
 ) -> tuple[Spread, list[Contributor]]:
-    """Return the `spread` by noise and arm, and the contributors of the sensor itself in this `movement`.
+    """Return the `spread` due to noise and arm, and the contributors of the sensor itself in this `movement`.
 
-    The spread's response is that of a fit of all parameters, φ too, so a nonlinear sensor has more noise.
+    The spread's response is that of a fit of all parameters, including φ, so a nonlinear sensor has more noise.
     """
     drift, flicker = (
         spread.response @ shared @ spread.response.T for shared in (wandering(movement), flickering(movement))

@@ -27,7 +27,7 @@ class Triad:
     """Three axes by a solution's matrix F and bias, and by its covariance alone.
 
     - `scale` (3,): 1/‖row of F‖; `covariance` (6, 6): of scale and bias.
-    - `correction_matrix` M (3, 3): from a reading less its bias to the orthogonal frame nearest to the axes.
+    - `correction_matrix` M (3, 3): from a reading minus its bias to the orthogonal frame nearest to the axes.
     """
 
     scale: Array

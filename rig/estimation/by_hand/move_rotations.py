@@ -1,4 +1,4 @@
-"""The rotation of the body in each move by the gyroscope, and its derivatives by the unknowns.
+"""The rotation of the body in each move by the gyroscope, and its derivatives with respect to the unknowns.
 
     m = r + even r² + odd r |r| + b + G f,   r = F ω
 
@@ -22,7 +22,7 @@ class MoveIntegrals:
 
     - `rotations` (k, 3, 3): R from body coordinates at the end to those at the start; exp(J δθ) R with the derivatives
       `by_matrix` (k, 3, 9), `by_bias` (k, 3, 3), `by_gravity` (k, 3, 9), `by_bends` (k, 3, 6).
-    - `swept_rad` (k, 3): the integral of the reading less offset, g-sensitivity and nonlinearity.
+    - `swept_rad` (k, 3): the integral of the reading minus offset, g-sensitivity and nonlinearity.
     - `durations_s` (k,), `paths_rad` (k,): the total angle, there and back.
     - `changes_rad_s` (k,): the root of the summed squares of the rate's changes from sample to sample; times the error
       of a time stamp it is an angle.
@@ -50,7 +50,10 @@ class GyroscopeModel:
 
 
 def integrate_moves(session: HandRecording, gyroscope: GyroscopeModel, up: Array) -> MoveIntegrals:
-    """Integrate the moves with a gyroscope's model. `up` (N, 3) is the vertical in the body at each rest."""
+    """Integrate the readings of each move to a rotation, with its derivatives with respect to the gyroscope's model.
+
+    `up` (N, 3) is the vertical in the body at each rest.
+    """
     matrix, biases, sensitivity, bends = gyroscope.matrix, gyroscope.biases, gyroscope.sensitivity, gyroscope.bends
     middles = np.array([(rest.start_s + rest.end_s) / 2 for rest in session.rests])
     inverse = np.linalg.inv(matrix)

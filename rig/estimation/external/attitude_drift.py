@@ -225,7 +225,11 @@ def drift_model(averaged: FixedAttitudes, fixes: Fixes) -> DriftModel:
 
 
 def _list_errors(averaged: FixedAttitudes, fixes: Fixes, correlation: Array, step: Array) -> dict[str, Array]:
-    """Return the covariances (3n, 3n) of the increments due to unit errors of the reference and the times, by cause."""
+    """Return the covariances (3n, 3n) of the increments due to unit errors of the reference and the times, by cause.
+
+    Errors of the reference vary with attitude, or are new in each visit, rest, or fix in motion. Errors of times are
+    jitter of the stamps, and intervals between readings that a drift of the sampling lengthens.
+    """
     count = len(fixes.placement)
     first = np.searchsorted(fixes.fix, np.arange(count))
     ratio = _relative(fixes)[first]

@@ -75,12 +75,12 @@ class EarthSeen:
 
 @dataclass(frozen=True, slots=True)
 class KnownIncrements:
-    """A gyroscope's matrix and bias by its increments, with their covariance and variance components.
+    """A gyroscope's matrix and bias from its increments, with their covariance and variance components.
 
     - matrix (3, 3), bias (3,): F and b.
     - covariance (15, 15): of F row by row, ω_E, b.
     - causes: parts (15, 15) of the covariance, by name.
-    - earth: the Earth's rate by the increments, or the fault.
+    - earth: the Earth's rate from the increments, or the fault.
     - clock_s, clock_std_s: τ, where the reference's attitude of the time t was that of t + τ.
     - fix_std_rad: error of a fix about each axis.
     - random_walk_rad_sqrt_s: random walk of the gyroscope's angle.
@@ -188,7 +188,7 @@ def _limit_outliers(fixes: Fixes) -> float:
 
 
 def _conditioning(mixed: Mixed) -> refusals.Conditioning:
-    """Return the conditioning of the design with F and b scaled alike."""
+    """Return the conditioning of the design, with F and b scaled to the same size."""
     columns = mixed.design[:, : BIAS.stop]
     sizes = [np.linalg.norm(columns[:, block]) for block in (MATRIX, BIAS)]
     return refusals.condition_of(columns / np.repeat(sizes, [9, 3]), BIAS.stop)

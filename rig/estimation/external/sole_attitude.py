@@ -21,7 +21,8 @@ SMALLEST = 1e-9  # of the information: nothing
 def find_sole_attitude(theta: Array, placed: Placed) -> tuple[int, int] | None:
     """Return the axis whose scale factor depends on a single placement, and that placement; None if there is none.
 
-    Return None also if no attitude was repeated. `theta` (p,) is the solution: SI units, scale factors about 1.
+    Without that placement, its standard deviation exceeds `UNDETERMINED`. Return None also if no attitude was repeated.
+    `theta` (p,) is the solution: SI units, scale factors about 1.
     """
     size = np.linalg.norm(theta[REFERENCE])
     verticals = np.einsum("nji,j->ni", placed.attitudes, theta[REFERENCE] / size)

@@ -237,7 +237,7 @@ def _check_identifiable(inputs: VectorInputs, directions: Array, gravity: Array 
 
 
 def _condition(inputs: VectorInputs, directions: Array, gravity: Array | None) -> tuple[refusals.Conditioning, int]:
-    """Return the conditioning of the design (3 N, 3 p + d), its blocks scaled alike, and its number of columns."""
+    """Return the conditioning of the design (3 N, 3 p + d), blocks scaled to one size, and its number of columns."""
     sweeps = inputs.turns_rad_s / (np.linalg.norm(inputs.turns_rad_s) / len(inputs.turns_rad_s) ** 0.5 or 1.0)
     scaled_gravity = None if gravity is None else gravity / (np.linalg.norm(gravity) / len(gravity) ** 0.5)
     sensor_columns = np.kron(design_matrix(sweeps, scaled_gravity), np.eye(3))

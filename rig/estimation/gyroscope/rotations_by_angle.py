@@ -134,7 +134,7 @@ class _TurnsEstimate:
 def solve_turned(
     gyroscope: Gyroscope, turns: Sequence[Turn], means: Sequence[RateMean], matrix: Array, bias_rad_s: Array
 ) -> TurnedSolution:
-    """Return F and b, of g = K (m + b), by Gauss–Newton steps from `matrix` (3, 3) and `bias_rad_s` (3,).
+    """Return F, and b of g = K (m + b), by Gauss–Newton steps from `matrix` (3, 3) and `bias_rad_s` (3,).
 
     Raise Fault `rank_deficient`, `ill_conditioned`, `turn_not_closed`, `wrong_unit`, `mirrored_axis`.
     """
@@ -295,7 +295,7 @@ def _check_closed(turns: Sequence[Turn], equations: Sequence[_NormalEquations], 
 def _budget(equations: Sequence[_NormalEquations], gain: Array) -> Budget:
     """Return each cause's contribution to scale and bias.
 
-    `gain` (6, 12) is their derivative with respect to the gradient.
+    `gain` (6, 12) maps the gradient of the least squares to scale and bias.
     """
     sources = {
         NOISE: "scatter of the readings",

@@ -27,7 +27,7 @@ SIZES = 20  # of each kind
 class StatedMotion:
     """Mean readings of sweeps and rests, and their stated motion.
 
-    `residuals_rad_s` (N, 3): readings less the model's; `rates_rad_s` (N, 3), zero for a rest; `variances_rad2_s2` (N,
+    `residuals_rad_s` (N, 3): readings minus the model's; `rates_rad_s` (N, 3), zero for a rest; `variances_rad2_s2` (N,
     3) of the noise of each mean. `rate_patterns` (N, 3): the effects of a relative rate error of 1; `axis_patterns` (2,
     N, 3): of axes tilted by 1 rad about either direction across them.
     """

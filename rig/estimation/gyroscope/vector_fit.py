@@ -35,7 +35,7 @@ class VectorInputs:
     - speed_std_rad_s (N,): standard deviations of the speeds.
     - attitudes (N, 3, 3): rotations from the base into the flange frame.
     - gravity_m_s2 (N, 3): downwards, in the flange frame.
-    - windows_s (N, 2): begin and end on the clock of the first recording.
+    - windows_s (N, 2): start and end on the clock of the first recording.
     - joints (N): the joint that turned, None for a rest.
     - axis_errors_rad_s (P, N, 3): effect of one standard uncertainty of each of the arm's angles on the rates.
     - return_errors_rad_s (P, N, 3): the same for each return of a joint to an angle.
@@ -86,7 +86,7 @@ class VectorInputs:
 
     @property
     def apparent_gravity_m_s2(self) -> Array:
-        """The apparent gravity (N, 3) in the flange's frame: gravity less the acceleration."""
+        """The apparent gravity (N, 3) in the flange's frame: gravity minus the acceleration."""
         apparent: Array = self.gravity_m_s2 - self.acceleration_m_s2
         return apparent
 

@@ -51,7 +51,7 @@ class VectorSolution:
     - covariance (6, 6): in the order kx ky kz bx by bz.
     - matrix (3, 3): F.
     - matrix_covariance (12, 12): of the rows of F, then c.
-    - non_orthogonality_rad (3,): 90° less the angles between y and z, z and x, x and y.
+    - non_orthogonality_rad (3,): 90° minus the angles between y and z, z and x, x and y.
     - mounting (3, 3): rotation from the flange frame to the sensor frame nearest to the three axes.
     - angles_covariance_rad2 (6, 6): of non_orthogonality_rad, then of small rotations of mounting about sensor x y z.
     - g_sensitivity (3, 3): in rad/s per m/s², None if not estimated.
@@ -177,7 +177,7 @@ def solve_vector_model(
 def solve_vector_batch(means_rad_s: ArrayLike, rates_rad_s: ArrayLike, variances_rad2_s2: ArrayLike) -> VectorBatch:
     """Solve the vector model of many runs at once, without checks: for studies of a design known to be identifiable.
 
-    `means_rad_s` (R, N, 3); `rates_rad_s` (N, 3) or (R, N, 3); `variances_rad2_s2` (N, 3), alike for all runs.
+    `means_rad_s` (R, N, 3); `rates_rad_s` (N, 3) or (R, N, 3); `variances_rad2_s2` (N, 3), the same for all runs.
     """
     means, rates, variances = (np.asarray(a, dtype=np.float64) for a in (means_rad_s, rates_rad_s, variances_rad2_s2))
     coefficients, _ = regress(design_matrix(rates, None), means, variances)

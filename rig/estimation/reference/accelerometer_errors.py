@@ -25,8 +25,8 @@ class AccelerometerErrors:
     - norm_m_s2: g.
     - bias_m_s2_k, scale_per_k: β and κ.
     - warmer_k (K',): ΔT as recorded.
-    - unseen_k (K',): ΔT hidden by the recorded steps.
-    - windows_s (K', 2): begin and end of each.
+    - unseen_k (K',): ΔT below the recorded steps.
+    - windows_s (K', 2): start and end of each.
     - instability_m_s2: the least Allan deviation of the flicker in w.
     - walk_m_s2_sqrt_s: random walk of w, estimated from the readings.
     - louder (K',): extra variance of a disturbed dwell or sweep relative to its noise, estimated.

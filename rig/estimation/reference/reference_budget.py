@@ -25,7 +25,7 @@ ATTITUDES = "arm's attitudes"
 
 @dataclass(frozen=True, slots=True)
 class Spread:
-    """The uncertainty of scale and bias by the readings: kx ky kz bx by bz, n readings.
+    """The uncertainty of scale and bias from the readings: kx ky kz bx by bz, n readings.
 
     - `scale` (3,), `covariance` (6, 6) of noise and attitudes, `response` (6, n) to the readings.
     - `noise` (n, n): covariance of the readings' own.

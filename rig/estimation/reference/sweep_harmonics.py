@@ -1,7 +1,7 @@
 """The first harmonic of one revolution: mean, cosine and sine of accelerometer readings over the joint's angle.
 
 It extends the mean to which a gyroscope's revolution is reduced. The effects of the servo's vibration follow from the
-joint's own speed: centripetal acceleration by ω² less the square of its mean, Euler acceleration by the angular
+joint's own speed: centripetal acceleration by ω² minus the square of its mean, Euler acceleration by the angular
 acceleration α, and gravity by the joint's extra rotation during the filter's lag. One regression removes them all, so
 they neither bias the result nor count as noise. It also removes the second and the third harmonic, by angle errors and
 a nonlinear sensor. A speed with one to four periods per revolution cannot be separated from gravity; its effect
@@ -147,7 +147,7 @@ def _fourier_columns(angle_rad: Array, count: int) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class _Uneven:
-    """The joint's `rate` (n,) less its mean, `acceleration` (n,) and `jerk` (n,), and their fast part.
+    """The joint's `rate` (n,) minus its mean, `acceleration` (n,) and `jerk` (n,), and their fast part.
 
     `fast` (4, n): the rate and its first three derivatives, without the lowest four harmonics of a revolution.
     """
