@@ -85,7 +85,7 @@ class AxisSection(Section):
 
     @model_validator(mode="after")
     def match_units(self) -> Self:
-        """Refuse units of another quantity than angle and rate."""
+        """Refuse units of quantities other than angle and rate."""
         _fit("angle", self.angle, ANGLE)
         if self.rate is not None:
             _fit("rate", self.rate, RATE)

@@ -92,7 +92,7 @@ def load(
 def load_sensors(path: str | Path, overrides: Sequence[str] = ()) -> tuple[SensorsConfig, str | None]:
     """Read the sensors' part of a configuration, and the file with defaults if it has a `world:` section, else None.
 
-    A file with that section must be complete, because the laboratory simulates all of it. Raise `ConfigurationRefused`.
+    A file with this section must be complete, because the laboratory simulates all of it. Raise `ConfigurationRefused`.
     """
     layered = _read(path, overrides)
     if "world" in layered.document:
@@ -371,7 +371,7 @@ def _instruments_fit(config: RigConfig, world: WorldSection) -> Iterator[str]:
 
 
 def _is_loopback(host: str) -> bool:
-    """Return whether a host is this machine; 127.example.org, which begins with 127 too, is another one."""
+    """Return whether a host is this machine; 127.example.org, which also begins with 127, is not."""
     try:
         return host == "localhost" or ipaddress.IPv4Address(host).is_loopback
     except ValueError:

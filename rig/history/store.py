@@ -240,7 +240,7 @@ class History:
             yield from journal.broken(connection)
 
     def head(self) -> journal.Head:
-        """Return the end of the journal, as `journal.head`."""
+        """Return the end of the journal, as `journal.head` does."""
         with self.engine.connect() as connection:
             return journal.head(connection)
 

@@ -23,7 +23,7 @@ class LogSurvey:
 
     - rests: windows in which the body lay still.
     - turns: by axis ("+x"), "other" without one, the number of turns from rest to rest.
-    - at_rest: by quantity, the mean norm of the readings at rest less the bias of rates; largest: by quantity.
+    - at_rest: by quantity, the mean norm of the readings at rest minus the bias of rates; largest: by quantity.
     - faces: number of directions of gravity at rest that differ by more than 45°.
     """
 

@@ -345,10 +345,10 @@ def _remaining_steps(ratio: float) -> float:
 def _refine_clock(
     clock: TimeBase, board_time_s: Array, readings: Array, motion: KnownMotion, inflation: Array | None = None
 ) -> tuple[TimeBase, Array]:
-    """Return the clock after one Gauss–Newton step, and the inflation (3,) of each axis' variance by correlation.
+    """Return the clock after one Gauss–Newton step, and the inflation (3,) of each axis' variance due to correlation.
 
-    Model: m = A r(t) + c + noise, r the flange's rate at controller time t; A (3, 3) and c (3,) are fitted too. Without
-    `inflation` it is that of the residuals.
+    Model: m = A r(t) + c + noise, r the flange's rate at controller time t; A (3, 3) and c (3,) are also fitted.
+    Without `inflation` it is that of the residuals.
     """
     t, since = clock.controller_time_s(board_time_s), board_time_s - clock.reference_s
     columns = np.column_stack([motion.rate(t), np.ones(len(t))])

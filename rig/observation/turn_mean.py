@@ -41,8 +41,8 @@ class SampledTurn:
 
     - `share` (n,): elapsed fraction of its time.
     - `rates_rad_s` (n, 3): the flange's mean rate around each sample, by the encoders.
-    - `uneven_rad_s` (n,): the part of that along the axis, less its mean over the turn by both ends.
-    - `passing` (n, k): columns of what comes once, twice and so on in a turn; for an arc less their means.
+    - `uneven_rad_s` (n,): the part of that along the axis, minus its mean over the turn by both ends.
+    - `passing` (n, k): columns of what comes once, twice and so on in a turn; for an arc minus their means.
     - `beats`: number of sidebands of its lines, see `Revolution`.
     - `encoders_true`: whether the encoders are right within a turn, and not over whole turns alone.
     - `closed`: whether it consists of whole turns.
@@ -76,7 +76,7 @@ class Lines:
 
 
 def turn_mean(readings: Array, steps: Steps, turn: SampledTurn) -> tuple[Mean, Array]:
-    """Return the mean of readings (n, 3) with resolution `steps`, and its weights (n,), to average the arm's rate too.
+    """Return the mean of readings (n, 3) with resolution `steps`, and its weights (n,), also for the arm's rate.
 
     A line slower than `SLOW` is poorly determined: its effect on the mean, or the effect of a line of its size, adds
     variance.

@@ -150,7 +150,7 @@ def _survey(
 ) -> Iterator[str]:
     """Record the line of every key, and the text of every value that is not a string.
 
-    Yield a problem for each key that is no word or occurs twice, because YAML would keep the last.
+    Yield a problem for each key that is not a word or occurs twice, because YAML would keep the last.
     """
     if isinstance(node, yaml.MappingNode):
         for key, value in node.value:

@@ -31,7 +31,7 @@ OfSensors = TypeVar("OfSensors")  # a size that a configuration states of all se
 
 
 def _part_default_key(what: str, unit: str | None = None) -> Any:
-    """Return the field of a key whose default is the value of the sensor's part in the catalogue."""
+    """Return the field of a key that, if left out, has the catalogue's value for the sensor's part."""
     extra: dict[str, Any] | None = None if unit is None else {"unit": unit}
     return Field(default=None, description=f"{what}; if left out, the part's value", json_schema_extra=extra)
 

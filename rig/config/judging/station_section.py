@@ -43,7 +43,7 @@ class StationSection(Section):
     @field_validator("serial_pattern")
     @classmethod
     def check_pattern(cls, value: str) -> str:
-        """Refuse a text that is no regular expression."""
+        """Refuse a text that is not a regular expression."""
         try:
             re.compile(value, re.ASCII)
         except re.error as error:

@@ -52,7 +52,7 @@ class ShortestSection(Section):
 
 
 def alternative_procedure(document: Mapping[str, Any]) -> str | None:
-    """Return what to use instead if the turner is no arm and cannot carry out this procedure; None for an arm."""
+    """Return what to use instead if the turner is not an arm and cannot carry out this procedure; None for an arm."""
     turner = document.get("turner")
     kind = str(turner.get("kind")) if isinstance(turner, dict) else ""
     if kind not in OTHERS:

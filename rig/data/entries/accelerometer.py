@@ -49,7 +49,7 @@ class DwellEntry(Entry):
 
 
 class ValidationEntry(Entry):
-    """The last repeat of the attitudes, which the calibration does not use: size of acceleration less gravity."""
+    """The last repeat of the attitudes, which the calibration does not use: size of acceleration minus gravity."""
 
     dwells: int
     rms_m_s2: float

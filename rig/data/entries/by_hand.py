@@ -18,7 +18,7 @@ class RestByHandEntry(Entry):
 class MoveByHandEntry(Entry):
     """A move from a rest to the next: a flip to another face, or whole `turns` on a face, by `angle_rad` in all.
 
-    `closure_error_rad` is a turn's end less its beginning, null for flips and without a stated edge.
+    `closure_error_rad` is a turn's end minus its beginning, null for flips and without a stated edge.
     """
 
     kind: Literal["flip", "turn", "omitted"]

@@ -42,7 +42,7 @@ def load_hdf5() -> bool:
 
 
 def measure_address_space() -> int:
-    """Return the size of this process' address space, which a forked one has too."""
+    """Return the size of this process' address space, which a forked process also has."""
     return int(Path("/proc/self/statm").read_text("ascii").split()[0]) * os.sysconf("SC_PAGE_SIZE")
 
 

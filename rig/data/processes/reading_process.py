@@ -205,8 +205,8 @@ def read_apart(reader: str, path: Path, arguments: Mapping[str, Any], limits: Re
 def _wait_for(reading: "subprocess.Popen[bytes] | ForkedReader", idle_s: float) -> bytes:
     """Return the process' output on stderr, once it has ended.
 
-    Raise TimeoutError. A hanging library may sleep, which uses no processor time, so sleep counts too; waiting for a
-    processor or for the disk is no sleep.
+    Raise TimeoutError. A hanging library may sleep, which uses no processor time, so sleep also counts; waiting for a
+    processor or for the disk does not.
     """
     silent = Silence(reading.pid, spared=SPARED)
     while not silent.lasts_over(idle_s / TICK_S):

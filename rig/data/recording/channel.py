@@ -51,7 +51,7 @@ class Channel:
 
     @property
     def resolution(self) -> float:
-        """Step between neighbouring readings in the quantity's unit; 0 for numbers that are no counts."""
+        """Step between neighbouring readings in the quantity's unit; 0 for numbers that are not counts."""
         return self.step or (0.0 if self.type == "<f8" else self.unit_per_count)
 
     def steps(self, readings: Array, *, trusts_counts: bool = False) -> Steps:

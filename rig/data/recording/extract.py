@@ -94,7 +94,7 @@ def _is_left_open(path: Path) -> bool:
 
 
 def _member(group: Any, name: str, kind: type) -> Any:
-    """Return a group or dataset of this file. Raise ValueError if it is in another one."""
+    """Return a group or dataset of this file. Raise ValueError if it is in another file."""
     import h5py
 
     if (link := group.get(name, getlink=True)) is None:

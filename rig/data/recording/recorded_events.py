@@ -150,7 +150,7 @@ def encode_event(recorded: TimedEvent) -> bytes:
 def decode_events(stream: bytes) -> Iterator[TimedEvent]:
     """Yield the events of a run file; a last line without an end, cut off by a kill, is left out.
 
-    Raise ValueError naming the first line that is no event, or not of the form of its kind.
+    Raise ValueError naming the first line that is not an event, or that does not have the form of its kind.
     """
     for number, line in enumerate(stream.split(b"\n")[:-1], start=1):
         if line.strip(b"\0"):
@@ -178,7 +178,7 @@ def _decode_document(document: Any) -> TimedEvent:
 
 
 def _nest_answer(name: str, detail: dict[str, Any]) -> dict[str, Any]:
-    """Return the details with the board's answer nested; schema "rig.run/1" has its fields among the others."""
+    """Return the details with the board's answer nested. In schema "rig.run/1", its fields were not nested."""
     answer = {"board_observed": "observation", "board_solved": "solution"}.get(name)
     return {**detail, answer: detail} if answer is not None and answer not in detail else detail
 

@@ -131,7 +131,7 @@ def sensor_of(document: Mapping[str, Any]) -> RecordedSensor:
     """Return the sensor of a description in plain values.
 
     Raise ValueError naming the error: a value, an unknown or duplicate quantity, columns of one name, a mounting that
-    is no rotation, a gyroscope without range.
+    is not a rotation, a gyroscope without range.
     """
     sensor = validate(RecordedSensor, document, "sensor")
     quantities = [channel.quantity for channel in sensor.channels]

@@ -236,7 +236,7 @@ class RunSettings:
 
     @property
     def has_arcs(self) -> bool:
-        """Whether a sweep is planned that is no whole turn."""
+        """Whether a sweep is planned that is not a whole turn."""
         from rig.motion.steps import closes
 
         return not all(closes(sweep.angle_rad) for sweep in self.planned_sweeps)

@@ -51,7 +51,7 @@ def fit(design: Array, values: Array, std: Array) -> Fitted:
 
     The variance between runs is DerSimonian and Laird's moment estimate (Control. Clin. Trials 7 (1986) 177), for any
     design as in a meta-regression. The covariance is Knapp and Hartung's (Stat. Med. 22 (2003) 2693), which with
-    Student's t is valid for few runs too; it is never below the covariance that follows from the stated stds. Raise
+    Student's t is also valid for few runs; it is never below the covariance that follows from the stated stds. Raise
     ValueError for n ≤ p.
     """
     n, p = design.shape

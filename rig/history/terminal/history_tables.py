@@ -161,7 +161,7 @@ def title_of(subject: Subject) -> str:
 
 
 def value_text(parameter: Parameter) -> str:
-    """Return a parameter's value ± U in print."""
+    """Return a parameter's printed value ± U."""
     return plus_minus(parameter.value, parameter.expanded)
 
 

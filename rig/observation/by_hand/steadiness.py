@@ -18,9 +18,9 @@ NORMAL = 1.4826  # standard deviation over median deviation
 
 
 def contiguous_slices(time_s: Array, sampling: Sampling) -> Iterator[slice]:
-    """Yield the rows between the gaps of a log with increasing times (n,); a few missing readings are no gap.
+    """Yield the rows between the gaps of a log with increasing times (n,); a few missing readings are not a gap.
 
-    So few readings can be interpolated by `fill_missing` with hardly any loss of noise.
+    `fill_missing` can interpolate so few readings with hardly any loss of noise.
     """
     gaps = sampling.gaps(time_s)
     short = gaps & (np.diff(time_s) <= BRIDGED_S)

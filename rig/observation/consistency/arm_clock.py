@@ -69,7 +69,7 @@ def state_jitter(recordings: Sequence[ObservedRun]) -> Jitter:
 
 
 def find_encoder_noise_rad(recordings: Sequence[ObservedRun]) -> float:
-    """Return the noise of one reading of a joint's angle, rad, from the joints that stand while another one sweeps.
+    """Return the noise of one reading of a joint's angle, rad, from the joints that are at rest during a sweep.
 
     It uses differences of the sixth order, as `state_jitter` does; the steps of the encoders count as noise. It is zero
     for a turner with one shaft, and for one whose single readings scatter.

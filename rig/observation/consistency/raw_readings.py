@@ -21,7 +21,7 @@ class RawReadings:
     """Raw readings of one revolution, rest or dwell.
 
     sweep: the index of the revolution among all of the sensor's, −1 of a rest. counts (n, 3): the readings as recorded.
-    residual_counts (m, 3): readings less the mean of their segment and less the arm's vibration, or in a rest any
+    residual_counts (m, 3): readings minus the mean of their segment and the arm's vibration, or in a rest any
     vibration. Only samples for which the arm's motion is recorded. vibration_counts (3,): RMS of the arm's vibration.
     swing_rad2 (3,): mean square difference of the vibration's angle between two moments of a rest.
     """

@@ -51,10 +51,10 @@ class WristTransfer:
     """A transfer in which only the wrists turned, averaged; times are on the clock of its recording.
 
     clock_offset_s: converts its times to the clock of the first recording. mean_rad_s (3,): mean of the readings.
-    scatter_rad2_s2 (3,): variance of the mean by the residuals of a fit of the arm's rate and gravity. rounding_rad2_s2
-    (3,): variance of the mean by rounding. rate_rad_s (3,): mean rate of the flange against the base, in its frame.
-    gravity_m_s2 (3,): gravity less the acceleration of the sensors' position, in that frame. attitude (3, 3): from the
-    base into that frame.
+    scatter_rad2_s2 (3,): variance of the mean, from the residuals of a fit of the arm's rate and gravity.
+    rounding_rad2_s2 (3,): variance of the mean due to rounding. rate_rad_s (3,): mean rate of the flange against the
+    base, in its frame. gravity_m_s2 (3,): gravity minus the acceleration at the sensors' position, in the same frame.
+    attitude (3, 3): from the base into that frame.
     """
 
     clock_offset_s: float
@@ -123,7 +123,7 @@ def is_by_wrists(interval: MotionInterval) -> bool:
 
 
 def mean_specific_force_m_s2(interval: MotionInterval, down_m_s2: Array, extension_m: Array) -> Array:
-    """Return the mean (3,) of gravity less the acceleration of the sensors' position, in the flange's frame."""
+    """Return the mean (3,) of gravity minus the acceleration at the sensors' position, in the flange's frame."""
     time_s, step_s = np.linspace(interval.start_s, interval.end_s, STEPS, retstep=True)
     pose = flange_pose(interval.motion.angles(time_s), interval.motion.kinematics)
     position_m = pose[:, :3, 3] + pose[:, :3, :3] @ extension_m
@@ -135,8 +135,8 @@ def mean_specific_force_m_s2(interval: MotionInterval, down_m_s2: Array, extensi
 def _scatter(readings: Array, time_s: Array, motion: ArmMotion, down_m_s2: Array) -> Array:
     """Return the variance (3,) of the mean of readings (n, 3), after removal of the arm's rate and gravity.
 
-    The arm's rates of adjacent samples are removed too, as a sensor's filter combines them. A ripple above half the
-    data rate is aliased to low frequencies, where it looks like noise.
+    The arm's rates of adjacent samples are also removed, because a sensor's filter combines them. A ripple above half
+    the data rate is aliased to low frequencies, where it looks like noise.
     """
     step_s = float(np.median(np.diff(time_s)))
     rates = [motion.rates_at_samples(time_s + shift * step_s) for shift in FILTERED]

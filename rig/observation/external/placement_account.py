@@ -1,4 +1,4 @@
-"""The rows of a reference and the readings in them that are no placement: counted, with reason, row and time."""
+"""The rows of a reference and the readings in them that are not a placement: counted, with reason, row and time."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

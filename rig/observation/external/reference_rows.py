@@ -92,7 +92,10 @@ def _find_dense_rests(turning: Turning, clock_s: float) -> list[tuple[float, flo
 
 
 def _find_rate_rad_s(attitudes: Array, times_s: Array) -> float:
-    """Return the body's rate from the mean of the first half of attitudes (k, 3, 3), at times (k,), to the second's."""
+    """Return the size of the body's mean rate over attitudes (k, 3, 3) at times (k,).
+
+    It comes from the rotation between the mean attitudes of the first and the second half.
+    """
     half = len(times_s) // 2
     if not half:
         return 0.0

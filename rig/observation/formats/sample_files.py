@@ -1,4 +1,4 @@
-"""Files of readings and attitudes that are no tables, each with its reader, recognized by their look.
+"""Files of readings and attitudes that are not tables, each with its reader, recognized by their look.
 
 A path may select a part of the file behind two colons: `session::/imu/data` is a topic of a bag, `flight.ulg::1` an
 instance in PX4's log.

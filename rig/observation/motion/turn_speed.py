@@ -38,8 +38,8 @@ def turn_speed(time_s: NDArray[np.float64], q_rad: NDArray[np.float64]) -> TurnS
     determined. A quarter of a turn more, read at 100 Hz at 60°/s by a 12-bit encoder with a noise of 0.06°, gives 2e-5
     (one standard deviation). The standard deviation follows from the scatter of these differences, with white noise of
     the single readings. Each reading of the second turn enters two differences, which correlates neighbours; that is
-    included. Raise Fault `turn_too_short` for less than a turn and `FEWEST_PAIRS` readings more, or a shaft that
-    stands.
+    included. Raise Fault `turn_too_short` for less than a turn and `FEWEST_PAIRS` readings more, or a shaft that stands
+    still.
     """
     far_rad = abs(float(q_rad[-1] - q_rad[0])) if len(q_rad) > FEWEST_PAIRS else 0.0
     if far_rad <= TURN_RAD:

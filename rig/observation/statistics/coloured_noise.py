@@ -99,7 +99,7 @@ def _predict(products: Array) -> tuple[Array, float]:
 
 
 def innovations(residuals: Array, memory: int) -> Array:
-    """Return the errors (n − memory,) of the best linear prediction of residuals (n,) from the `memory` before each."""
+    """Return the errors (n − memory,) of the best linear prediction of residuals (n,) from `memory` previous ones."""
     coefficients, _ = _predict(_products(residuals, memory))
     return residuals[memory:] - np.lib.stride_tricks.sliding_window_view(residuals[:-1], memory) @ coefficients
 

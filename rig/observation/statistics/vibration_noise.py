@@ -1,6 +1,6 @@
 """The noise of readings that vibrate: spectral lines model the vibration, and the residuals are the sensor's own noise.
 
-The scatter of a vibration is no noise: the few low frequencies without it are too few to show the noise in one turn.
+The scatter of a vibration is not noise: the few low frequencies without it are too few to show the noise in one turn.
 Without its lines the noise is usually white, and then all residuals determine it; else their correlations do.
 """
 

@@ -1,6 +1,6 @@
 """The time stamps of a log put in order: what belongs to the recording, and when each reading was taken.
 
-Other people's loggers write rows that are no readings (NaN, zeros before the first conversion), the same row twice,
+Other people's loggers write rows that are not readings (NaN, zeros before the first conversion), the same row twice,
 rows in another order, counters that wrap, and readings that had waited in a buffer: at the start of a recording stale
 ones, which come faster than they were taken, and after a stall of the link those that were taken meanwhile. A stall is
 no gap: after it all readings are there. So a long step between two stamps is held against the number of readings that
