@@ -119,7 +119,7 @@ class Work:
                     return self._end_part(PartEnded(outcome, now_utc(), f"{error.name}: {error.what}"))
 
     def refuse_same_chip(self, part: BatchPart, chip: Chip) -> None:
-        """Raise Refused `same_chip` if another number had this chip, unless the operator confirms it."""
+        """Raise Refused `same_chip` if another serial number had this chip, unless the operator confirms it."""
         if not self.section.own_board:
             return
         other = self.journal.batch.same_chip(chip, part.serial)

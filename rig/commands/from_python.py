@@ -95,9 +95,10 @@ def write_certificate(
 ) -> list[Path]:
     """Write the certificate of a finished run again, as `rig report` does, and print the file names.
 
-    HTML is always written; a PDF and the digital certificate (XML) on request. `changes` replace entries on it:
-    `{"certificate.customer": "Example"}`. `out` is a folder, by default the run's; `history` is the history that notes
-    the certificate, by default the user's own. Return the files. Raise Refused as `rig report` does.
+    HTML is always written; a PDF and the digital certificate (XML) on request. `changes` replace entries of the
+    certificate: `{"certificate.customer": "Example"}`. `out` is a folder, by default the run's; `history` is the
+    history in which the certificate is entered, by default the user's own. Return the files. Raise Refused as `rig
+    report` does.
     """
     from rig.commands.documents.report import add, write_documents
 

@@ -109,7 +109,7 @@ def flange_errors(q_rad: ArrayLike, arm: DenavitHartenberg = NOMINAL) -> Array:
 
 
 def _last_three(arm: DenavitHartenberg) -> tuple[int, int, int]:
-    """Return the indices of a chain's last three joints; if it has fewer, those of the others are negative."""
+    """Return the indices of a chain's last three joints; an index is negative if the chain has too few joints."""
     return arm.joints - 3, arm.joints - 2, arm.joints - 1
 
 

@@ -108,7 +108,7 @@ def _measure_to_upper_arm(
 
 
 def _find_nearest(names: Sequence[str], distances_m: Array) -> tuple[str, float]:
-    """Return the name and value of the smallest distance of (k, N)."""
+    """Return the smallest of the distances (k, N), m, and the name of the part that has it, of k `names`."""
     least_m = distances_m.min(axis=1)
     return names[int(least_m.argmin())], float(least_m.min())
 

@@ -127,7 +127,7 @@ def calibrations(
     """Return all calibrations of a serial number, of a part, or of all sensors, as `rig history` lists them.
 
     `history` is a file or a URL, by default RIG_HISTORY, else the user's own. Raise Refused `not_in_history` if the
-    history has no calibration of that serial number, and as `open_history` does.
+    history has no calibration of this serial number, and as `open_history` does.
     """
     address = None if history is None else str(history)
     with open_history(own_history_address(address) or resolve_address(None)) as opened:

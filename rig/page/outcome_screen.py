@@ -94,7 +94,7 @@ def after_fault(command: str, *, repeats: bool) -> Row:
 
 
 def _truth(true: TruthRow | None) -> Row | None:
-    """Return the true values in print, and (result − truth)/U; None without a truth."""
+    """Return the printed true values, and (result − truth)/U; None without a truth."""
     if true is None:
         return None
     return {

@@ -1,4 +1,4 @@
-"""Errors in the code of a user's own procedure, by name: they are no defects of the rig."""
+"""Errors in the code of a user's own procedure, by name: they are not defects of the rig."""
 
 import traceback
 from collections.abc import Iterator

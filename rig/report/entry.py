@@ -14,8 +14,8 @@ EntryT = TypeVar("EntryT", bound=BaseModel)
 def entry(kind: type[EntryT], /, *sources: object, **more: Any) -> EntryT:
     """Return an entry of `kind`: each field from `more`, or by the table from the first source that has it.
 
-    Arrays become tuples. Raise ValueError if a field has no source or its value does not fit. Raise TypeError if the
-    entry has no field of that name in `more`, or if the table does not list a source: a reader ignores unknown keys, a
+    Arrays become tuples. Raise ValueError if a field has no source or its value does not fit. Raise TypeError if `more`
+    has a name that is no field of the entry, or if the table does not list a source: a reader ignores unknown keys, a
     writer must not. Raise AttributeError if a source lacks an attribute of the table.
     """
     if unknown := more.keys() - kind.model_fields.keys():

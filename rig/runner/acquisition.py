@@ -73,7 +73,7 @@ class _Thinning:
     last_s: float = 0.0
 
     def keeps(self, time_s: float) -> bool:
-        """Return whether to record the state at `time_s`: all at first, later only some.
+        """Return whether to record the state at `time_s`: every state for `WHOLE_S`, then one in each `STANDING_S`.
 
         Call it for each state in order.
         """

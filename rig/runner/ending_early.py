@@ -111,7 +111,7 @@ class EndingEarly:
         return self.sweeps // self.repeats
 
     def _stands_at(self, pose: Joints, sweeps_left: int) -> None:
-        """Note that an assessment is due, if the remaining plan contains a motion home from the present pose."""
+        """Mark an assessment as due if the remaining plan contains a motion home from the present pose."""
         self._repeats_left = -(-sweeps_left // self._per_repeat)
         self._home = next(
             (

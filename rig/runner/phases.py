@@ -212,7 +212,7 @@ class Run:
 
     @contextmanager
     def report_end(self, advice: Advice | None = None, *, moved: bool = False) -> Iterator[None]:
-        """Report the early end of a run, in its log too, followed by `advice` after a fault.
+        """Report the early end of a run, also in its log; after a fault, `advice` follows.
 
         A refusal means that nothing has moved; if the run has `moved`, it becomes a fault.
         """

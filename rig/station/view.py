@@ -89,7 +89,7 @@ def _panel(progress: Progress, samples: SamplesTaken) -> Table:
 
 
 def _bar(fraction: float) -> ProgressBar:
-    """Return a bar that is green from the beginning; the library's own turns from red to green."""
+    """Return a progress bar that is always green; the library's own bar changes from red to green."""
     return ProgressBar(total=1.0, completed=fraction, width=40, complete_style="green", finished_style="green")
 
 

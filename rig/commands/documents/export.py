@@ -50,8 +50,8 @@ def export_files(options: Namespace) -> list[Path]:
     """Write readings of the first movement with its motion, or the calibrations of a passed run, into `--out`.
 
     `--at-temperature`: a temperature in °C, and the run of `bias_drift` with the slopes. Return the files. Raise
-    Refused `report_folder`, `bad_option`, `missing_extra`, as `refuse_links`; for readings as `open_run`, `read_log`
-    and `exported`; for calibrations as `read_passed_result`, `at_temperature` and the format.
+    Refused `report_folder`, `bad_option`, `missing_extra`, and as `refuse_links` does; for readings as `open_run`,
+    `read_log` and `exported`; for calibrations as `read_passed_result`, `at_temperature` and the format.
     """
     from rig.report.exports.exported_recording import exported
 

@@ -133,7 +133,11 @@ def _look_up(
 def _judge(
     file: Path, content: bytes, looks: "Mapping[Path, FileInspection]", history_answer: "FileEntries | None"
 ) -> VerifiedFile:
-    """Judge one file by its signature; without one, by a signed file that contains it, or by the history."""
+    """Judge one file by its signature; without one, by a signed file that contains it, or by the history.
+
+    `looks` are the inspections of all files. If the history confirms an unsigned file, it does not matter whether a
+    signer is trusted.
+    """
     look, attached_to = looks[file], None
     problems = look.problems
     if not look.signatures:

@@ -129,7 +129,7 @@ class Cluster:
         raise _cluster_lost("the scheduler does not answer any more")
 
     def room(self) -> int:
-        """Return how many more tasks the cluster can take: a few per thread, less those in progress.
+        """Return how many more tasks the cluster can take: a few per thread, minus those in progress.
 
         Raise Fault `cluster_lost` if there has been no worker for long.
         """

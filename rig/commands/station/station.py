@@ -141,7 +141,7 @@ def _serve_page(wanted: "PageWish", present: "Present") -> "Iterator[Voice]":
 
 
 def resume_command(options: Namespace, folder: Path) -> str:
-    """Return the command that continues the batch in `folder`; a token typed into the first one is omitted."""
+    """Return the command that continues the batch in `folder`; a token typed into the first command is omitted."""
     series = [] if options.series is None else ["--series", str(options.series)]
     script = [] if options.script is None else ["--script", str(options.script)]
     changes = [word for override in options.overrides for word in ("--set", override)]

@@ -72,7 +72,7 @@ class Control:
                 self._waiting = False
 
     def answer(self, number: int, *, agreed: bool) -> bool:
-        """Answer question `number`, from 1; return False if another one, or none, is open."""
+        """Answer question `number`, from 1; return False if no question or a different one is open."""
         with self._changed:
             if not (self._may_answer and self._waiting) or number != self._question or self._answer is not None:
                 return False
@@ -86,7 +86,7 @@ class Control:
         return self._gone
 
     def leave(self) -> None:
-        """Note that no browser can send requests any more."""
+        """Record that no browser can send requests any more."""
         with self._changed:
             self._gone = True
             self._changed.notify_all()

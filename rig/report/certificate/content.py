@@ -382,7 +382,7 @@ def _deviations(result: ResultDocument) -> Iterator[str]:
 
 
 def _references(result: ResultDocument) -> Iterator[str]:
-    """Yield the references' calibrations, which are results of others."""
+    """Yield the references' calibrations, which are the results of other laboratories."""
     for entry in {entry.reference: entry for entry in result.verification.values()}.values():
         serial = result.provenance.sensor_serial_numbers.get(entry.reference, "not stated")
         scale = ", ".join(f"{k:g}" for k in entry.reference_scale)

@@ -69,7 +69,7 @@ def _build_row(finding: Finding[OverTemperatureEntry]) -> DisplayRow:
 
 
 def _build_record(finding: Finding[OverTemperatureEntry], _: ResultDocument) -> HistoryRecord | None:
-    """Return the slopes at the reference temperature; scale and bias there are in the sensor's calibration."""
+    """Return the slopes at the reference temperature; the sensor's calibration has the scale and bias at it."""
     entry = finding.entry
     return HistoryRecord(
         finding.sensor,

@@ -26,7 +26,7 @@ def expanded(stds: Sequence[float], counted: Sequence[Freedom] | None) -> Expand
 
 
 def factor_words(dof: Sequence[Freedom] | None) -> str:
-    """Return k in print: one number if all are equal, else the smallest and the largest."""
+    """Return k as printed: one number if all are equal, else the smallest and the largest."""
     if dof is None:
         return f"k = {COVERAGE_FACTOR:g}, degrees of freedom not counted"
     factors = expanded([1.0] * len(dof), dof).factors

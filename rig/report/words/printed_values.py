@@ -18,7 +18,7 @@ class Rounded:
 
     @property
     def value_text(self) -> str:
-        """The value in print, with a typographic minus sign."""
+        """The printed value, with a typographic minus sign."""
         return f"{self.value:f}".replace("-", "−")
 
     @property
@@ -56,7 +56,7 @@ def in_print(value: float, uncertainty: float) -> tuple[str, str]:
 
 
 def plus_minus(value: float, uncertainty: float) -> str:
-    """Return a value ± U in print; the value alone without U."""
+    """Return a printed value ± U; the value alone without U."""
     text, width = in_print(value, uncertainty)
     return text if width == NO_U else f"{text} ± {width}"
 

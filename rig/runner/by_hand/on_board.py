@@ -66,7 +66,7 @@ class FollowedSession:
     def take(self, report: HandReport) -> None:
         """Process the board's report and announce its changes.
 
-        If the board's button has begun a new session, begin a new one here too.
+        If the board's button has begun a new session, begin a new one here as well.
         """
         wrong = None
         if self.reports and report.judged < self.reports[-1].judged:

@@ -245,7 +245,7 @@ def _field(level: float) -> tuple[str, float] | None:
 
 
 def _unit(shape: Shape, guess: Guess, kind: str, still: Flags) -> dict[str, object]:
-    """Return the unit and scale of a triad, by its names or else by its readings."""
+    """Return the unit and scale of a triad, from its names or else from its readings."""
     indices = [guess.columns.index(kind + axis) for axis in "xyz"]
     name = shape.names[indices[0]].lower() if shape.names else ""
     for pattern, unit in _UNITS[kind].items():

@@ -122,7 +122,7 @@ class StateStream:
 
         Once `closed`, there are none. A packet with an impossible state or time is omitted and becomes the stream's
         `problem`. An impossible state also closes the stream. After a step of the clock the states continue, because
-        they still show whether the arm stands.
+        they still show whether the arm stands still.
         """
         looked_s = time.monotonic()
         if self.closed:
