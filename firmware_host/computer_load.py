@@ -1,4 +1,4 @@
-"""How crowded this computer is: by that a time-out is stretched, so that a starved computer is no lost link."""
+"""The crowding of this computer stretches time-outs, so that a starved computer does not look like a lost link."""
 
 import os
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The check of word accesses that the chip traps at addresses that are no multiple of four, and Unicorn does not."""
+"""The check of word accesses that the chip traps at addresses that are not a multiple of four, and Unicorn does not."""
 
 from collections.abc import Callable
 

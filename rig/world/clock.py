@@ -64,7 +64,7 @@ class WorldClock:
         self._anchor()
 
     def dialogue(self) -> None:
-        """Note that a client has asked something, and that its next question depends on the answer."""
+        """Record that a client has asked something, and that its next question depends on the answer."""
         self._dialogue_until_s = self._wall() + DIALOGUE_S
 
     def wait_s(self) -> float:

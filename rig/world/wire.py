@@ -96,7 +96,7 @@ class Wire:
         self._send_s, self._send_time_s = 0.0, 0.0  # wall time and virtual time of the last packet
 
     def record_send(self, time_s: float) -> None:
-        """Note that something was sent at the virtual time `time_s`."""
+        """Record that something was sent at the virtual time `time_s`."""
         self._send_s, self._send_time_s = self._wall(), time_s
         if self._behind_since_s is None:
             self._behind_since_s = time_s
@@ -122,7 +122,7 @@ class Wire:
         return max(0.0, min(due_s, max(LOOK_S[0], waited_s / 4), LOOK_S[1]))
 
     def _take(self, now_s: float) -> None:
-        """Note that the client has read something. If it did not read before, reduce its patience."""
+        """Record that the client has read something. If it did not read before, reduce its patience."""
         waited_s = 0.0 if self._waiting_since_s is None else now_s - self._waiting_since_s
         if waited_s > IN_PACE_S:
             self._slept = True
@@ -130,7 +130,7 @@ class Wire:
         self._waiting_since_s = now_s
 
     def _settle(self, now_s: float) -> None:
-        """Note that the client has caught up."""
+        """Record that the client has caught up."""
         self._in_pace, self._slept = not self._slept, False
         if self._in_pace:
             self._patience_s = min(self._patience_s + EARNED * (now_s - self._settled_s), PATIENCE_S)

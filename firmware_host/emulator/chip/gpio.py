@@ -55,12 +55,12 @@ class Port:
         )
 
     def watch(self, pin: int, on_level: Callable[[bool], None]) -> None:
-        """Call `on_level` after a change of the firmware's output on `pin`; a pin that is no output counts as high."""
+        """Call `on_level` after a change of the firmware's output on `pin`; other pins count as high."""
         self._watched[pin] = on_level
         self._watched_pins |= 1 << pin
 
     def function(self, pin: int) -> int | None:
-        """Return the alternate function selected on `pin`, None if it is no alternate-function pin."""
+        """Return the alternate function selected on `pin`, None if it has no alternate function."""
         if self._mode.value >> 2 * pin & 3 != _ALTERNATE:
             return None
         return self._alternate[pin // 8].value >> 4 * (pin % 8) & 0xF

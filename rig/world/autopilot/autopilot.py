@@ -154,7 +154,10 @@ class SimulatedAutopilot:
         self._send(message)
 
     def _read_barometer(self, celsius: float) -> tuple[float, int]:
-        """Return temperature, °C, and the flags of new fields: always with ArduPilot, after a reading with PX4."""
+        """Return the temperature, °C, and the flags of updated fields.
+
+        PX4 flags it after a reading, ArduPilot always.
+        """
         if not self._provides_temperature:
             return 0.0, UPDATED
         own_s = self._steps / RATE_HZ
