@@ -142,7 +142,7 @@ def parse(
     sections: Sections = STOCK_SECTIONS,
     turners: Turners = None,
 ) -> Loaded:
-    """Validate the configuration in a text as `load` does; it cannot build on a file."""
+    """Validate the configuration in a text as `load` does; the text cannot be based on a file."""
     try:
         layered = merge_layers(text, None, overrides)
     except Unreadable as error:

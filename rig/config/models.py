@@ -47,7 +47,7 @@ class TurnerSection(Section):
 
     @property
     def address_key(self) -> str:
-        """The key of this section with the address; empty if the turner needs no connection."""
+        """The key in this section whose value is the address; empty if the turner needs no connection."""
         return ""
 
     @property
@@ -61,7 +61,7 @@ class TurnerSection(Section):
         return None
 
     def moved_to(self, host: str) -> Mapping[str, str]:
-        """Return the keys and values that give a simulated turner another host."""
+        """Return the keys and values that move a simulated turner to another host."""
         return {}
 
 
@@ -128,7 +128,7 @@ class ArmSection(TurnerSection):
 
     @property
     def address_key(self) -> str:
-        """The key of this section with the address."""
+        """The key in this section whose value is the address."""
         return "host"
 
     @property
@@ -137,7 +137,7 @@ class ArmSection(TurnerSection):
         return self.host
 
     def moved_to(self, host: str) -> Mapping[str, str]:
-        """Return the key of the controller's host with a new value."""
+        """Return the key of the controller's host, with another `host` as its value."""
         return {"host": host}
 
     @property

@@ -176,9 +176,9 @@ class History:
             return run_id is not None
 
     def calibrations(self, selection: Selection = Selection(), *, replaced_too: bool = False) -> list[Past]:
-        """Calibrations in the order of time, including voided ones.
+        """Return calibrations in the order of time, including voided ones.
 
-        Those that a later calibration of their run replaced are included on request only.
+        Calibrations that a later one of their run has replaced are included only on request.
         """
         question = select(*_COLUMNS).select_from(_ROWS).order_by(*_IN_TIME)
         return self._pasts(chosen(question if replaced_too else question.where(~replaced()), selection))

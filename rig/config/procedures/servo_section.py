@@ -58,7 +58,7 @@ class ServoSection(TurnerSection):
 
     @property
     def address_key(self) -> str:
-        """The key of this section with the address."""
+        """The key in this section whose value is the address."""
         return "port"
 
     @property

@@ -64,7 +64,7 @@ class GraphFit:
 
 
 def fit_session(session: HandRecording, conditions: SessionConditions, trusted: int | None = None) -> GraphFit:
-    """Fit a session of one rest at least.
+    """Fit the gyroscope and all attitudes and biases to a session of at least one rest.
 
     The variance components are estimated from its first `trusted` rests, or from all. Raise Fault `no_fit`, Refused
     `first_face_not_told`.

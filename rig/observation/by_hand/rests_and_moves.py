@@ -36,7 +36,7 @@ Readings = tuple[Array, Array, Array | None]  # times (n,), rates (n, 3), accele
 
 
 def microsecond_of(sensor: RecordedSensor) -> float:
-    """Return the true duration, s, of one microsecond in a sensor's time stamps, which its board's clock counts."""
+    """Return the duration, s, of a microsecond in a sensor's time stamps, which is not exact on a board's clock."""
     return MICROSECOND_S if sensor.on_board else 1e-6
 
 

@@ -61,7 +61,7 @@ def seconds_of(cell: str, factor: float) -> Decimal:
 
 
 def origin_of(times_s: Iterable[float]) -> int:
-    """Return the origin of times, in whole seconds, by the first time; 0 for a clock that counts from its own start."""
+    """Return the origin of times, in whole seconds, from the first time; 0 for a clock that starts at its own zero."""
     first_s = next(iter(times_s), 0.0)
     return int(first_s) if abs(first_s) >= LONG_AGO_S else 0
 

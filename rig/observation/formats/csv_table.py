@@ -217,7 +217,7 @@ class _Wanted:
         )
 
     def origin_s(self, cells: Sequence[str]) -> int:
-        """Return the origin of times, s, by the first row; 0 if the row holds no time."""
+        """Return the origin of times, s, from the first row; 0 if the row holds no time."""
         timed = [index for index, name in enumerate(self.names.values()) if name in TIMES and is_value(cells[index])]
         try:
             return origin_of(float(seconds_of(cells[index], self.factors[index])) for index in timed)

@@ -82,7 +82,7 @@ def _autoregression(products: Array, count: int, memory: int) -> tuple[float, fl
 
 
 def _products(residuals: Array, memory: int) -> Array:
-    """Return sums (memory + 1, memory + 1) of products of residuals (n,) and the `memory` previous, nearest last."""
+    """Return sums (memory + 1, memory + 1) of products of each residual (n,) and its predecessors, nearest last."""
     lagged = np.array([residuals[lag : len(residuals) - memory + lag] for lag in range(memory + 1)])
     products: Array = lagged @ lagged.T
     return products

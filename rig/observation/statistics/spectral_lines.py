@@ -73,8 +73,9 @@ def find_lines(residuals: Array, search: LineSearch, previous: Array = NONE, fra
 def _are_too_near(cycles: Array, search: LineSearch) -> bool:
     """Return whether lines merge, or the slowest merges with the turn's own waves.
 
-    Below the search's lowest frequency a refined line is valid only if its sidebands are apart from any other line's:
-    two such lines, about a vibration and a ripple less than a cycle apart, explain a part of the mean.
+    A refined line below the search's lowest frequency is valid only if its sidebands are apart from those of all other
+    lines. Otherwise two lines, around a vibration and a ripple less than a cycle apart, would explain a part of the
+    mean.
     """
     ordered = np.sort(cycles)
     gaps = np.diff(ordered)

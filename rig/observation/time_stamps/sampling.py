@@ -144,7 +144,7 @@ def _has_late(time_s: Array, single: _PeriodCandidate) -> bool:
 
 
 def _list_wider(time_s: Array) -> list[_PeriodCandidate]:
-    """Return the candidates that span several readings, narrowest first, without those whose losses are a beat."""
+    """Return the candidates that span several readings, narrowest first, without those with a beat (`_is_beat`)."""
     widths = takewhile(lambda width: 4 * width <= len(time_s), WIDTHS[1:])
     wider = (_count_missing(time_s, width, quantile) for width in widths for quantile in (MEDIAN, UNDISTURBED))
     return [candidate for candidate in wider if not _is_beat(candidate.missing)]

@@ -51,13 +51,13 @@ def plan_six_observation(
 ) -> Plan:
     """Plan the movement of SIX, Section III: each wrist in its order turns one way, rests, turns back, rests.
 
-    With `axes: 6` wrist 1 turns about three axes more, with wrists 2 and 3 turned; with several speeds all of it is
-    made at each. A sweep turns by `arc_deg` about the home pose, one revolution by default. An order and directions
-    that the file leaves open are chosen so that a steady drift of the bias does least harm (`drift_effect`). The whole
-    series repeats `procedure.repeats` times. `start_q_rad` is the arm's pose (home if None); from there the plan goes
-    home first, slowly, and it ends at home. `done` holds the indices of sweeps to leave out: those an interrupted run
-    has finished. If the item is mounted in several stages, all of it is done in each, with the wrists that are swept
-    there. Limits are checked by the turner's `problems`. Raise Refused `axes_do_not_span`.
+    With `axes: 6` wrist 1 turns about three more axes, with wrists 2 and 3 turned. With several speeds, all sweeps are
+    made at each speed. A sweep turns by `arc_deg` about the home pose, one revolution by default. An order and
+    directions that the file leaves open are chosen so that a steady drift of the bias does least harm (`drift_effect`).
+    The whole series repeats `procedure.repeats` times. `start_q_rad` is the arm's pose (home if None); from there the
+    plan goes home first, slowly, and it ends at home. `done` holds the indices of sweeps to leave out: those an
+    interrupted run has finished. If the item is mounted in several stages, each stage has all of this, with the wrists
+    that are swept in it. Limits are checked by the turner's `problems`. Raise Refused `axes_do_not_span`.
     """
     home = find_home(arm)
     swept = _order_sweeps(arm, procedure)

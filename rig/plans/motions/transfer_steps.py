@@ -17,7 +17,7 @@ class Pace:
 
 
 def pace_of(speed_deg_s: float, acceleration_deg_s2: float) -> Pace:
-    """Return the pace that a file gives in degrees."""
+    """Return the pace for a speed and an acceleration that a file states in degrees."""
     return Pace(math.radians(speed_deg_s), math.radians(acceleration_deg_s2))
 
 
