@@ -137,7 +137,7 @@ class Shortcuts(ctypes.Structure):
 
 
 def reader(function: str, *shared: ctypes.Structure) -> Callable[[], int]:
-    """Return the machine code that reads a register as a Python function; `shared` are its arguments."""
+    """Return, as a Python function, the machine code that reads a register; `shared` are its arguments."""
     read = ctypes.CFUNCTYPE(ctypes.c_uint64, *[ctypes.c_void_p] * len(shared))(address_of(function))
     return lambda: int(read(*map(ctypes.addressof, shared)))
 

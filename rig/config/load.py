@@ -222,7 +222,7 @@ def _validate_procedure(data: Any, sections: Sections, layered: Layered) -> tupl
 def _validate_turner(
     document: Mapping[str, Any], turners: Turners, layered: Layered
 ) -> tuple[TurnerSection | None, list[str]]:
-    """Validate the turner's section: `arm` or, with its kind, `turner`. A wrong kind is one problem."""
+    """Validate the turner's section: `arm` or, with its kind, `turner`. A wrong kind gives a single problem."""
     if "turner" not in document:
         if "arm" not in document:
             return None, ["arm: missing"]

@@ -74,7 +74,7 @@ class Trend:
 
     @cached_property
     def mean(self) -> Fitted | None:
-        """The mean of the values, and their scatter between runs."""
+        """The mean of the values, with an uncertainty that includes the scatter between runs."""
         return fit(np.ones((self.count, 1)), self.values, self.std) if self.enough else None
 
     @cached_property

@@ -213,7 +213,7 @@ class _Swept:
         return candidates
 
     def select_endless(self, candidates: Sequence[Candidate]) -> Sequence[Candidate]:
-        """Return each family's candidates with the largest angle and dwell, extreme rests, and up to two repeats."""
+        """Return each family's candidates with the largest angle and dwell, extreme rests, and at most two repeats."""
         selected = {
             (candidate.family, candidate.rests_s): candidate
             for candidate in sorted(candidates, key=lambda candidate: candidate.sizes)

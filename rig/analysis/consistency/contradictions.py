@@ -133,7 +133,7 @@ def check_references(
     *,
     drifting: bool = False,
 ) -> ConsistencyChecks:
-    """Return the checks for contradictions between the readings of accelerometers and magnetometers.
+    """Return the checks for contradictions within the readings of each accelerometer and magnetometer.
 
     Dwells and sweeps are named as those of gyroscopes: `gyro.acceleration_disturbed_dwell.13`. If `drifting`, the bias
     may change steadily.

@@ -194,7 +194,7 @@ class RigBench:
     def _compare_with_truth(self, folder: Path, configured: Configured, outcome: Outcome, station: Stations) -> str:
         """Have a simulated laboratory write its truth; return how the result agrees with it, empty without a truth.
 
-        A run that was begun in another laboratory has windows of another clock, so it gets none.
+        A run that was begun in another laboratory is not compared, because its windows are on another clock.
         """
         (folder / TRUTH).unlink(missing_ok=True)
         if self.control is None or folder not in self.begun:

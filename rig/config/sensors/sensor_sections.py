@@ -39,7 +39,7 @@ def field_name(sensor: str) -> str:
 
 
 def scalar_name(sensor: str, scalar: str) -> str:
-    """Return the name of the quantity without axes called `scalar` in the lines of the device `sensor`."""
+    """Return the name of the scalar quantity `scalar` in the lines of the device `sensor`."""
     return f"{sensor}_{scalar}"
 
 

@@ -155,8 +155,8 @@ def powers_at(difference_k: float) -> Array:
 def fit_over_temperature(readings: RepeatedMeans, reference_c: float, gradient_k: float) -> OverTemperature:
     """Fit the polynomials, with k at the reference by plain least squares (`combine_with_reference` improves it).
 
-    `gradient_k`: half-width of the change of the difference between thermometer and sensor in use.
-    Raise Fault  `too_few_observations`, `temperature_range_too_small`, `temperature_outside`, `not_finite`.
+    `gradient_k`: half-width of the change, in use, of the temperature difference between thermometer and sensor. Raise
+    Fault `too_few_observations`, `temperature_range_too_small`, `temperature_outside`, `not_finite`.
     """
     check_finite(means=readings.means, temperature_c=readings.temperature_c)
     range_c = (float(readings.temperature_c.min()), float(readings.temperature_c.max()))
@@ -282,7 +282,7 @@ class _ParameterFits:
         self.count = 3 * (len(readings.means) - poses.shape[1])
 
     def refer(self, readings: RepeatedMeans, fit: "_TemperatureFit") -> None:
-        """Express the inputs by the readings at the reference temperature instead of at the mean temperature."""
+        """Recompute the inputs from the readings at the reference temperature instead of at the mean temperature."""
         powers = self.powers[:, 1:] * self.span ** np.arange(1.0, HIGHEST + 1)
         self._take(readings, readings.means - powers @ fit.bias + (1 - 1 / (1 + powers @ fit.relative)) * self.inputs)
 

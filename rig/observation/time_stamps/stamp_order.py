@@ -285,5 +285,5 @@ def _separate_equal(log: _UnorderedLog) -> _UnorderedLog:
 
 
 def _estimate_usual_delay_s(late_s: Array, interval_s: float) -> float:
-    """Return the delay that readings rarely exceed unless they waited, relative to the shortest delay soon after."""
+    """Return the delay, relative to the shortest delay soon after, that readings rarely exceed unless they waited."""
     return USUAL * float(np.median(late_s - find_least_ahead(late_s, LONG[-1]))) + ON_TIME * interval_s

@@ -61,7 +61,7 @@ class Corrected:
 
     @property
     def name(self) -> str:
-        """The sensor's name, which distinguishes it from others of the same name."""
+        """The sensor's name with its quantity, which distinguishes it from others of this name."""
         return self.quantity.label(self.sensor)
 
     @property

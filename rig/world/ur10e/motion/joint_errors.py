@@ -76,8 +76,7 @@ class JointErrors:
     def step(self, time_s: float, smooth_qd_rad_s: Joints, q_rad: Callable[[], Joints]) -> None:
         """Update the errors with the joints' smooth speeds at the end of a tick, and their angles.
 
-        Angles are computed only at reversals. A joint's own speed changes its sign where the joint settles or is
-        shaken.
+        `q_rad` is called only at reversals. A joint's own speed changes its sign where the joint settles or is shaken.
         """
         if smooth_qd_rad_s is self._speed:
             return
