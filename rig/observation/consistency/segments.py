@@ -21,8 +21,16 @@ from rig.observation.observe import Observation, fit_response
 from rig.observation.observed_run import ObservedRun
 from rig.observation.statistics.coloured_noise import correlation_inflation
 from rig.observation.statistics.mean import Mean, MeanNoise, weighted_means
-from rig.observation.statistics.spectral_lines import LineSearch, find_lines, fit_columns, line_swing, waves
+from rig.observation.statistics.spectral_lines import (
+    LineSearch,
+    column_count,
+    find_lines,
+    fit_columns,
+    line_swing,
+    waves,
+)
 from rig.observation.statistics.tapered_weights import noise_at_zero
+from rig.observation.turn_mean import SLOW
 
 # Not four: at the ends of quarters one of an encoder's waves that come twice a turn is zero, and no segment shows it.
 OF_REVOLUTION, OF_REST, MOST = 6, 3, 72  # segments of one revolution; times fewer in a rest; of all revolutions
@@ -151,7 +159,9 @@ def _segment_revolution(
 ) -> SegmentedAverage:
     """Average a revolution or an arc in segments, without the spectral lines of the whole average.
 
-    A vibration that the encoders measure only in part does not count as noise of a segment.
+    Lines slower than `SLOW` remain, because they are almost collinear with segments: weights that cancel them would
+    amplify the encoders' noise. The variance of the whole average allows for them. A vibration that the encoders
+    measure only in part does not count as noise of a segment.
     """
     average, axis = turn.average, turn.axis_flange
     times_s = stream.time_s[between(stream, average.start_s, average.end_s)]
@@ -166,10 +176,11 @@ def _segment_revolution(
     vibrating = vibration @ np.linalg.lstsq(vibration, residual, rcond=None)[0]
     noise_alone = residual - vibrating
     noise = MeanNoise(average.noise_rad_s**2, average.noise_rad2_s2 * average.samples, average.dof)
+    is_slow = np.repeat(average.lines_hz * average.duration_s < SLOW, column_count(turn.beats))
     segments = _average(
         division,
         motion,
-        weights=mean_weights(division.groups, lines),
+        weights=mean_weights(division.groups, lines[:, ~is_slow]),
         residuals=noise_alone - lines @ fit_columns(lines, noise_alone),
         rates=rates,
         noise=noise,

@@ -26,11 +26,11 @@ NOISE_RAD = 2.4e-5  # of an encoder
 UNSEEN_RAD_S, HERTZ = 0.004, 8.58
 
 
-def unseen(run: RunData) -> RunData:
+def unseen(run: RunData, hertz: float = HERTZ, rms_rad_s: float | tuple[float, float, float] = UNSEEN_RAD_S) -> RunData:
     """With a vibration about each axis of which no state tells."""
     samples = run.samples["gyro"].copy()
-    phase = 2 * np.pi * HERTZ * 1e-6 * samples["board_time_us"][:, None] + [0.3, 2.0, 4.1]
-    samples["counts"] += np.round(np.sqrt(2) * UNSEEN_RAD_S * np.sin(phase) / SENSITIVITY).astype(np.int32)
+    phase = 2 * np.pi * hertz * 1e-6 * samples["board_time_us"][:, None] + [0.3, 2.0, 4.1]
+    samples["counts"] += np.round(np.sqrt(2) * np.array(rms_rad_s) * np.sin(phase) / SENSITIVITY).astype(np.int32)
     return replace(run, samples={"gyro": samples})
 
 
@@ -63,6 +63,27 @@ def test_of_a_vibration_that_no_encoder_sees_a_segment_keeps_no_more_than_is_sta
     variances = segments.variances_rad2_s2[turning]
     assert np.sqrt(np.mean(variances)) < known_rad_s
     assert 0.75 < np.sqrt(np.mean(off**2 / variances)) < 1.25
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("axes", [(1.0, 0.0, 0.0), (1.0, 1.0, 1.0)])
+def test_a_vibration_slower_than_a_segment_is_in_its_uncertainty(axes: tuple[float, float, float]) -> None:
+    """Weights that cancel it would amplify the encoders' noise: sound sweeps would contradict each other."""
+    run = unseen(synthetic_run(replace(SHAKEN, noise_rad_s=5e-5)))
+    for hertz in (0.81, 1.29):
+        run = unseen(run, hertz, (5e-4 * axes[0], 5e-4 * axes[1], 5e-4 * axes[2]))
+    segments = segments_of(run)
+    turning = segments.sweep >= 0
+    off = (segments.means_rad_s + BIAS_RAD_S - segments.rates_rad_s / SCALE)[turning]
+    relative = np.sqrt(np.mean(off**2 / segments.variances_rad2_s2[turning], axis=0))
+    assert ((relative > 0.5) & (relative < 1.25)).all()
+    (recorded,) = observe_recordings([run])
+    amplification = [
+        segment.mean.weights @ segment.mean.weights * segment.mean.samples
+        for turn in segment_recordings("gyro", [recorded])
+        for segment in turn.segments
+    ]
+    assert max(amplification) < 1.5, "nothing is amplified"
 
 
 @pytest.mark.slow
