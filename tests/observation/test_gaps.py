@@ -43,3 +43,10 @@ def test_a_long_gap_hides_all_and_a_short_one_in_a_swing_is_not_bridged() -> Non
     swing = np.delete(3 * np.sin(2 * np.pi * TIME_S)[:, None] * [0, 1, 0], np.s_[3000:3017], axis=0)
     assert find_hiding_gaps(time_s, swing, np.array([2999])).tolist() == [2999]
     assert find_hiding_gaps(time_s, 0 * swing, np.array([2999])).tolist() == []
+
+
+@pytest.mark.parametrize("at_s", [29.9, 29.99, 30.0, 30.05])
+def test_a_gap_that_holds_the_start_of_a_turn_hides_when_it_started(at_s: float) -> None:
+    rates = np.clip(6 * (TIME_S - 30), 0, 1.6)
+    hidden, true = hidden_and_true(rates, 0.3, at_s)
+    assert hidden > 0.02 and true < 2.5 * hidden

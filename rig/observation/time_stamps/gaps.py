@@ -2,7 +2,8 @@
 
 A gap of a rate is bridged by the trapezoidal rule. How wrong that is does not depend on the gap's length alone: of a
 body at rest, or one that turns evenly, it hides nothing; of one that starts or swings, a short one hides much. So the
-same gap is made in the readings on either side, and bridged, and compared with their integral. All functions are pure.
+same gap is made in the readings on either side, and bridged, and compared with their integral. Between two rates that
+differ by more than readings do on either side, the change may lie anywhere in the gap. All functions are pure.
 """
 
 import numpy as np
@@ -12,6 +13,7 @@ from rig.estimation.arrays import Array, integrate_rates
 
 HIDDEN_RAD = 2e-3  # as references of attitude err: a gap that may hide more is not bridged
 LONGEST_S = 1.0  # of a gap: in a longer one a body may be taken up and laid back
+STEP_STD = 12**-0.5  # of the moment of a sudden change, uniform in a gap of length 1
 REACH, FEWEST = 4, 12  # lengths of a gap on either side, and at least so many readings
 
 
@@ -38,12 +40,20 @@ def _hidden_rad(time_s: Array, readings: Array, turned: Array, gap: int) -> floa
     first = min(int(np.searchsorted(time_s, time_s[gap] - size)), gap - FEWEST)
     last = max(int(np.searchsorted(time_s, time_s[gap + 1] + size)), gap + 1 + FEWEST)
     sides = (slice(max(first, 0), gap + 1), slice(gap + 1, min(last, len(time_s))))
-    errors = [_bridging_rad(time_s[side], readings[side], turned[side], lasts_s) for side in sides]
-    return max((error for error in errors if error is not None), default=np.inf)
+    bridged = [_bridge(time_s[side], readings[side], turned[side], lasts_s) for side in sides]
+    known = [errors for errors in bridged if errors is not None]
+    if not known:
+        return np.inf
+    change_rad_s = float(np.linalg.norm(readings[gap + 1] - readings[gap]))
+    excess_rad_s = max(change_rad_s - max(changes for _, changes in known), 0.0)
+    return float(np.hypot(max(rms for rms, _ in known), excess_rad_s * lasts_s * STEP_STD))
 
 
-def _bridging_rad(time_s: Array, readings: Array, turned: Array, lasts_s: float) -> float | None:
-    """Return the RMS error of interpolating steps of some length; None if the readings are too few."""
+def _bridge(time_s: Array, readings: Array, turned: Array, lasts_s: float) -> tuple[float, float] | None:
+    """Return the RMS error of interpolating steps of some length, and the largest change of the rate over one.
+
+    None if the readings are too few.
+    """
     end = np.searchsorted(time_s, time_s + lasts_s * (1 - 1e-9))
     start = np.flatnonzero(end < len(time_s))
     if len(start) < 2:
@@ -51,4 +61,5 @@ def _bridging_rad(time_s: Array, readings: Array, turned: Array, lasts_s: float)
     end = end[start]
     span_s = (time_s[end] - time_s[start])[:, None]
     error = turned[end] - turned[start] - span_s * (readings[end] + readings[start]) / 2
-    return float(np.sqrt(np.mean(np.sum(error**2, axis=1))))
+    changes_rad_s = np.linalg.norm(readings[end] - readings[start], axis=1)
+    return float(np.sqrt(np.mean(np.sum(error**2, axis=1)))), float(changes_rad_s.max())
