@@ -106,7 +106,7 @@ def _read_numbers(path: Path, layout: TableLayout) -> tuple[Array, Array | None]
     columns = {f"column_{index}": (str(index + 1), 1.0) for index in layout.numbers if index != layout.time}
     if layout.time is not None:
         columns[TIME] = (str(layout.time + 1), unit_s)
-    mapped = Mapped(columns, layout.skip_lines, missing=layout.missing)
+    mapped = Mapped(columns, layout.skip_lines, missing=layout.missing, in_any_unit=True)
     table = read_table(path, Header(tuple(columns)), SAMPLES_MB, mapped, None if layout.time_unit is None else 0)
     values = np.full((len(table.lines), len(layout.headings)), np.nan)
     for index in layout.numbers:
@@ -123,6 +123,8 @@ def _map_of(layout: TableLayout, guess: LogColumns) -> dict[str, Any]:
         if not entries:
             continue
         named = {name: dict(entry) for name, entry in entries.items() if entry["column"] != name}
+        if not named and guess.others:  # without a map every column must have one of the rig's names
+            named = {name: dict(entry) for name, entry in entries.items()}
         rows = [heading for heading in layout.headings if heading in TIMES]
         if section == "motion" and "start_s" in rows:  # the rig's own file of attitudes has two times
             named.pop(TIME, None)

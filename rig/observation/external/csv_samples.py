@@ -22,6 +22,7 @@ from rig.errors import Refused
 from rig.errors.quoting import quote
 from rig.estimation.arrays import Array
 from rig.observation.external.csv_windows import check_times
+from rig.observation.external.impossible_values import check_possible, check_temperatures
 from rig.observation.external.omission import Omitted
 from rig.observation.formats.column_selection import Mapped
 from rig.observation.formats.csv_table import CsvTable, blank_cell, read_table
@@ -171,7 +172,7 @@ def _refuse_separate_rows(
 def samples_in(table: Columns, where: str) -> Samples:
     """Return the readings in columns (n,), in the order of `order_stamps`; error messages call their source `where`.
 
-    Raise Refused `wrong_columns`, `not_a_number`, `time_not_increasing`.
+    Raise Refused `wrong_columns`, `wrong_unit`, `not_a_number`, `time_not_increasing`.
     """
     present = [quantity for quantity in quantities().values() if quantity.columns[0] in table]
     if not present:
@@ -189,7 +190,11 @@ def samples_in(table: Columns, where: str) -> Samples:
                 "Leave out what was not measured, or record again",
             )
     check_times(ordered.time_s, where)
+    for quantity in present:
+        check_possible(np.column_stack([table[name] for name in quantity.columns])[rows], rows, quantity, where)
     temperature_c = table.get(TEMPERATURE.columns[0])
+    if temperature_c is not None:
+        check_temperatures(temperature_c[rows], rows, where)
     total = len(table[TIME])
     return Samples(
         ordered.time_s,

@@ -21,6 +21,7 @@ class Mapped:
     - wraps: by the rig's name of a time, the number at which its counter begins again at 0.
     - rate_hz: rows per second, for a file without times.
     - missing: texts that stand for a blank cell.
+    - in_any_unit: the numbers count as they are, so a row of units contradicts nothing.
     """
 
     columns: Mapping[str, tuple[str, float]]
@@ -28,6 +29,7 @@ class Mapped:
     wraps: Mapping[str, float] = field(default_factory=dict)
     rate_hz: float | None = None
     missing: Sequence[str] = ()
+    in_any_unit: bool = False
 
     @property
     def is_by_number(self) -> bool:

@@ -84,6 +84,17 @@ def unit_of(cell: str) -> Unit | None:
     return UNITS.get(name)
 
 
+def strip_blank_end(headings: Sequence[str]) -> list[str]:
+    """Return headings without the blank ones at the end, which loggers write that end every line by a separator."""
+    count = max((index for index, name in enumerate(headings, start=1) if name), default=0)
+    return [*headings[:count]]
+
+
+def repeats(row: Sequence[str], headings: Sequence[str]) -> bool:
+    """Return whether a row is the heading again, as loggers write it when they start anew or every some rows."""
+    return strip_blank_end([cell.strip().lstrip("#% ") for cell in row]) == strip_blank_end(headings)
+
+
 def find_wrong_unit(cells: Sequence[str], factors: Sequence[float]) -> int | None:
     """Return the index of the first cell in a row of units that contradicts its column's unit, or None."""
     for index, (cell, factor) in enumerate(zip(cells, factors, strict=True)):

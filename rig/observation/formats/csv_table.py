@@ -22,8 +22,10 @@ from rig.observation.formats.csv_cells import (
     is_time_of_day,
     is_value,
     origin_of,
+    repeats,
     seconds_of,
     since,
+    strip_blank_end,
     unit_of,
 )
 from rig.observation.formats.csv_text import is_harmless, read_rows
@@ -72,11 +74,11 @@ def read_table(
     """Return the columns of a file by the names in its header; each group of optional columns is complete or absent.
 
     The first row holds the names. If it is divided by semicolons, as in spreadsheets with a decimal comma, or by tabs,
-    so are all rows. Empty rows and rows of units below the heading are skipped. Of a `mapped` file, only columns named
-    in the map, or by the rig's names, are returned. A file packed by gzip is unpacked. Times count from `origin_s`;
-    with None, the first time determines it. A packed or long file is read in a process of its own, as it might exhaust
-    the memory. Raise Refused `no_file`, `file_too_costly`, `temporary_folder_full`, `wrong_columns`, `wrong_unit`,
-    `not_a_number`.
+    so are all rows. Empty rows, rows of units below the heading, and repetitions of the heading are skipped. Of a
+    `mapped` file, only columns named in the map, or by the rig's names, are returned. A file packed by gzip is
+    unpacked. Times count from `origin_s`; with None, the first time determines it. A packed or long file is read in a
+    process of its own, as it might exhaust the memory. Raise Refused `no_file`, `file_too_costly`,
+    `temporary_folder_full`, `wrong_columns`, `wrong_unit`, `not_a_number`.
     """
     rate_hz = None if mapped is None else mapped.rate_hz
     if rate_hz is not None:
@@ -122,6 +124,7 @@ def _parts(path: Path, header: Header, largest_mb: int, mapped: Mapped | None, o
     if mapped is not None and mapped.is_by_number and all(is_value(cell) for cell in headings if cell):
         rows, headings, first_line = chain([headings, first], rows), [""] * len(headings), skipped + 1
     else:
+        headings = strip_blank_end(headings)
         check_headings(path, headings)
         rows = chain([first], rows)
     by_number = mapped is not None and mapped.is_by_number
@@ -134,16 +137,21 @@ def _parts(path: Path, header: Header, largest_mb: int, mapped: Mapped | None, o
         selected,
         tuple(factors.get(name, 1.0) for name in selected.values()),
         frozenset() if mapped is None else frozenset(mapped.missing),
+        in_any_unit=mapped is not None and mapped.in_any_unit,
     )
     by_day = False
 
     def number_rows() -> Iterator[Sequence[float]]:
         nonlocal origin_s, by_day
-        has_rows = False
+        has_rows, repeated = False, False
         for line, row in enumerate(rows, start=first_line):
             numbers = () if origin_s != 0 else wanted.plain_numbers(row)
             if not numbers:
-                if not any(map(str.strip, row)) or (not has_rows and wanted.names_units(line, row)):
+                if not any(map(str.strip, row)):
+                    continue
+                is_repeated = any(headings) and repeats(row, headings)
+                if is_repeated or ((repeated or not has_rows) and wanted.names_units(line, row)):
+                    repeated = is_repeated
                     continue
                 cells = wanted.cells(line, row)
                 if not has_rows:
@@ -151,7 +159,7 @@ def _parts(path: Path, header: Header, largest_mb: int, mapped: Mapped | None, o
                 if origin_s is None:
                     origin_s = wanted.origin_s(cells)
                 numbers = wanted.numbers(line, cells, origin_s)
-            has_rows = True
+            has_rows, repeated = True, False
             yield line, *numbers
 
     yield from in_blocks(number_rows(), [LINE, *selected.values()])
@@ -162,7 +170,7 @@ def _parts(path: Path, header: Header, largest_mb: int, mapped: Mapped | None, o
 class _Wanted:
     """The columns to read from a file: their `names` by index, out of `width`, and their `factors` to SI.
 
-    A cell with a text of `missing` is blank.
+    A cell with a text of `missing` is blank. `in_any_unit`: the units that a row states do not matter.
     """
 
     path: Path
@@ -170,6 +178,7 @@ class _Wanted:
     names: Mapping[int, str]
     factors: tuple[float, ...]
     missing: frozenset[str] = frozenset()
+    in_any_unit: bool = False
 
     def plain_numbers(self, row: Sequence[str]) -> Sequence[float]:
         """Return a row's numbers in SI units by a fast method; none for a row that needs the careful one."""
@@ -188,7 +197,7 @@ class _Wanted:
         cells = [row[index] if index < len(row) else "" for index in self.names]
         if not any(map(unit_of, cells)):
             return False
-        if (wrong := find_wrong_unit(cells, self.factors)) is not None:
+        if not self.in_any_unit and (wrong := find_wrong_unit(cells, self.factors)) is not None:
             name = [*self.names.values()][wrong]
             raise Refused(
                 "wrong_unit",
@@ -243,7 +252,7 @@ class _Wanted:
                 "not_a_number",
                 f"{self.path}, line {line}: {quote(','.join(cells))} is not {len(cells)} numbers below "
                 f"{LARGEST_NUMBER:g}",
-                "Write plain decimal numbers with a point, no NaN, one for each column; or state the text of a missing "
-                "value with --columns",
+                "Write plain decimal numbers with a point, no NaN, one for each column; state the text of a missing "
+                "value with --columns; or leave out what is no reading",
             )
         return numbers

@@ -68,20 +68,20 @@ def _text(file: BinaryIO | GzipFile) -> TextIOWrapper:
     """Return a file's text, unpacked, in the encoding that its beginning shows.
 
     Raise UnfitFile if it is not text. If it is not UTF-8, headings such as "°/s" and "µT" are mostly in the Windows
-    encoding.
+    encoding. Damaged characters further on are replaced: the row that they are in is refused by its line.
     """
     if _read_beginning(file).startswith(GZIP):
         file = GzipFile(fileobj=file)
     begin = _read_beginning(file)
     if begin.startswith(UTF_16):
-        return TextIOWrapper(file, encoding="utf-16", newline="")
+        return TextIOWrapper(file, encoding="utf-16", errors="replace", newline="")
     if b"\0" in begin:
         raise UnfitFile("it is no text, but a spreadsheet, an archive or another program's own file")
     try:
         codecs.getincrementaldecoder("utf-8")().decode(begin)
     except UnicodeDecodeError:
         return TextIOWrapper(file, encoding="cp1252", errors="replace", newline="")
-    return TextIOWrapper(file, encoding="utf-8-sig", newline="")
+    return TextIOWrapper(file, encoding="utf-8-sig", errors="replace", newline="")
 
 
 def _read_beginning(file: BinaryIO | GzipFile) -> bytes:

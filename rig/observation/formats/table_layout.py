@@ -14,7 +14,7 @@ from rig.config.units import TIME, UNITS
 from rig.data.processes.reading_parts import Part
 from rig.data.recording.motion_file import LARGEST_NUMBER
 from rig.errors import Refused
-from rig.observation.formats.csv_cells import is_number, is_value, seconds_of, unit_of
+from rig.observation.formats.csv_cells import is_number, is_value, repeats, seconds_of, unit_of
 from rig.observation.formats.csv_text import is_harmless, read_rows
 from rig.observation.formats.mat_table import is_mat, read_mat_columns
 from rig.observation.formats.table_parts import parts_read_apart
@@ -100,7 +100,7 @@ def layout_parts(path: Path, largest_mb: int) -> Iterator[Part]:
     sampled: list[list[str]] = []
     units, missing, count = [""] * len(heading), set[str](), 0
     for row in data:
-        if not any(map(str.strip, row)):
+        if not any(map(str.strip, row)) or (heading and repeats(row, [name.strip() for name in heading])):
             continue
         if not count and not any(map(is_value, row)) and any(map(unit_of, row)):
             units = [cell.strip() for cell in row]

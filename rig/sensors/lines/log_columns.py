@@ -19,6 +19,7 @@ NAMES = {"g": "_rad_s", "a": "_m_s2", "m": "_t"}
 SENSORS = {"g": "gyroscope", "a": "accelerometer", "m": "magnetometer"}
 SI_UNITS = {"g": "rad/s", "a": "m/s2", "m": "T"}
 OPEN = "?"  # where a number is still to be stated
+HOTTEST_C = 200.0  # that a part with a thermometer survives
 LIKELY_HZ = 100.0  # of a log without times
 LARGEST_COUNT = 500.0  # whole numbers beyond it are steps of a converter
 BLOCK_S, QUIETEST, AS_QUIET = 0.25, 0.1, 3.0  # a block as quiet as the quietest tenth is at rest
@@ -29,6 +30,7 @@ REFERENCE = {name for group in MOTIONS["attitudes"].optional for name in group} 
 QUATERNION_NAME = re.compile(r"(?:.*_)?(?:q|quat|quaternion|orientation|rot|rotation|attitude)_?([wxyz0-3])")
 DIGITS = {"0": "qw", "1": "qx", "2": "qy", "3": "qz"}
 GRAVITY = {"m/s2": STANDARD_GRAVITY_M_S2, "g": 1.0, "mg": 1000.0}
+ANGLE_WORDS = {"yaw", "pitch", "roll", "heading", "azimuth", "phi", "theta", "psi", "euler"}
 ROUND_STEPS = (131.0, 65.5, 32.8, 16.4)  # steps per °/s, as data sheets state them
 
 ColumnEntry = Mapping[str, Any]  # of a column: its name or number, and its unit
@@ -68,6 +70,9 @@ def guess_columns(layout: TableLayout, values: Array, time: Array | None) -> Log
     samples, gaps = _guess_samples(layout, values, quaternion, rate_hz)
     if layout.time is None:
         gaps.append("no column of time: state samples_rate_hz")
+    if not quaternion and (angles := _list_angles(layout)):
+        names = " ".join(layout.headings[index] for index in angles)
+        gaps.append(f"the order of the turns in {names}: attitudes are read as quaternions, qw qx qy qz; convert them")
     timed = {} if layout.time is None else {"time_s": _time_entry(layout, time)}
     motion = {name: {"column": layout.name(index), "unit": "1"} for name, index in quaternion.items()}
     others = _list_others(layout, [*samples.values(), *motion.values(), *timed.values()])
@@ -96,8 +101,15 @@ def _guess_samples(
             if reason:
                 gaps.append(f"the unit of the {SENSORS[kind]}: {reason}")
         if "temperature" in guessed.columns and "temperature_c" not in samples:
-            index = group.indices[guessed.columns.index("temperature")]
-            samples["temperature_c"] = {"column": layout.name(index), "unit": "C"}
+            position = guessed.columns.index("temperature")
+            column = layout.name(group.indices[position])
+            largest = float(np.abs(group.values[:, position]).max())
+            if largest < HOTTEST_C:
+                samples["temperature_c"] = {"column": column, "unit": "C"}
+            else:
+                gaps.append(
+                    f"the unit of the temperature {column}, up to {largest:.4g}: convert it to °C; it is not read"
+                )
     return samples, gaps
 
 
@@ -209,6 +221,7 @@ def _group_columns(
     """
     names = _name_once([_plain_name(layout, index) for index in range(len(layout.headings))])
     used = {layout.time, *quaternion.values(), *(i for i, name in enumerate(layout.headings) if name in REFERENCE)}
+    used |= set(_list_angles(layout))
     groups: dict[bytes, list[int]] = {}
     for index in layout.numbers:
         if index not in used and np.nanstd(values[:, index]) > 0:
@@ -217,6 +230,17 @@ def _group_columns(
         part = values[np.isfinite(values[:, indices[0]])][:, indices]
         still = find_still(part, rate_hz * len(part) / max(len(values), 1))
         yield _ColumnGroup(indices, tuple(names[index] for index in indices), part, still)
+
+
+def _list_angles(layout: TableLayout) -> list[int]:
+    """Return the columns that their headings call angles of an attitude, and that have no unit of a rate."""
+    return [
+        index
+        for index in layout.numbers
+        if ANGLE_WORDS.intersection(re.split(r"[\W_\d]+", layout.headings[index].lower()))
+        and "rate" not in layout.headings[index].lower()
+        and (layout.units[index] not in UNITS or UNITS[layout.units[index]].quantity != UNITS["rad/s"].quantity)
+    ]
 
 
 def _find_quaternion(layout: TableLayout, values: Array) -> dict[str, int]:

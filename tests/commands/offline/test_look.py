@@ -48,7 +48,11 @@ def matlab(folder: Path) -> Path:
     return folder / "log.mat"
 
 
-@pytest.mark.parametrize("make", [spaces, two_imus, counter, matlab])
+def units_below(folder: Path) -> Path:
+    return write(folder / "log.csv", "t;Gx;Gy;Gz\ns;°/s;°/s;°/s", [TIME_S, *RATES_DEG_S.T], ";")
+
+
+@pytest.mark.parametrize("make", [spaces, two_imus, counter, matlab, units_below])
 def test_the_map_that_it_writes_solves_the_file(make: Callable[[Path], Path], tmp_path: Path) -> None:
     log, columns = make(tmp_path), tmp_path / "columns.yaml"
     looked = rig_here("look", log, "--write", columns)
@@ -138,3 +142,19 @@ def test_a_file_without_numbers_is_refused_in_one_line(tmp_path: Path) -> None:
 def test_a_file_of_sweeps_is_no_log() -> None:
     done = rig_here("look", SWEEPS)
     assert done.returncode == 2 and f"rig solve LOG --sweeps {SWEEPS}" in done.stderr
+
+
+def test_angles_of_an_attitude_are_no_gyroscope(tmp_path: Path) -> None:
+    log = write(tmp_path / "poses.csv", "time,yaw,pitch,roll", [TIME_S, *RATES_DEG_S.T])
+    looked = look_at(log)
+    assert looked.guess is not None and not looked.guess.samples
+    assert any("quaternions" in gap for gap in looked.guess.gaps)
+
+
+def test_a_log_with_the_rigs_names_and_counts_of_a_thermometer_is_mapped_without_these(tmp_path: Path) -> None:
+    counts = np.rint(-3920 + TIME_S)
+    log = write(
+        tmp_path / "log.csv", "time_s,x_rad_s,y_rad_s,z_rad_s,temp", [TIME_S, *np.radians(RATES_DEG_S).T, counts]
+    )
+    looked = look_at(log)
+    assert not looked.refusals and looked.samples is not None and looked.samples.temperature_c is None

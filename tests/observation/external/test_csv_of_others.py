@@ -42,6 +42,8 @@ def read(path: Path, mapped: Mapped | None = None) -> np.ndarray:
         lambda text: text.replace(",", ";").replace(".", ",").encode("utf-8-sig"),
         lambda text: ("# " + text.replace(",", "   ")).encode(),
         lambda text: b"% " + text.encode(),
+        lambda text: text.replace("\n", ",\n").encode(),
+        lambda text: text.replace("\n1.0,", "\ntime_s,x_rad_s,y_rad_s,z_rad_s\ns,rad/s,rad/s,rad/s\n1.0,").encode(),
     ],
     ids=[
         "gzip",
@@ -51,6 +53,8 @@ def read(path: Path, mapped: Mapped | None = None) -> np.ndarray:
         "semicolons and BOM",
         "NumPy's spaces",
         "MATLAB's comment",
+        "a separator at the end of every line",
+        "the heading and the units again",
     ],
 )
 def test_what_others_write_is_read(tmp_path: Path, as_written: Callable[[str], bytes]) -> None:
@@ -72,7 +76,8 @@ def test_headings_of_a_german_logger_are_found_in_any_encoding(tmp_path: Path, e
     [
         (b"Device 7\n" + PLAIN.encode(), "wrong_columns: .*neither by commas nor by semicolons, tabs or spaces"),
         ("\n".join(ROWS).encode(), "wrong_columns: .*numbers in its first row and no names"),
-        (PLAIN.replace("\n", ",\n").encode(), "wrong_columns: .*a column without a name"),
+        (PLAIN.replace("_s,", "_s,,", 1).encode(), "wrong_columns: .*a column without a name"),
+        (PLAIN.encode() + b"3,0\xff\xfe,1,1\n", "not_a_number: .*line 32"),
         (PLAIN.replace("time_s", "Zeit").encode(), "lacks time_s, has the unknown Zeit.* --columns"),
         (b"PK\x03\x04\0\0\0\0xl/worksheets", "no_file: .*log.csv cannot be read: it is no text, but a spreadsheet"),
         (gzip.compress(PLAIN.encode(), mtime=0)[:60], "no_file: .*ended before the end"),
@@ -95,3 +100,24 @@ def test_a_packed_file_is_as_long_as_what_it_holds(tmp_path: Path) -> None:
     assert len(packed) < 10_000
     with pytest.raises(Refused, match=r"no_file: .*its unpacked content is too long"):
         read_columns(written(tmp_path, packed), Header(tuple(HEAD)), 1)
+
+
+@pytest.mark.parametrize(("mark", "at"), [("1e10", 9), ("-9999", 150)])
+def test_a_loggers_mark_of_a_missing_value_is_no_wrong_unit(tmp_path: Path, mark: str, at: int) -> None:
+    rows = [f"{n / 100},0.0{n % 7},-1.5,1.{n % 10}" for n in range(300)]
+    rows[at] = f"{at / 100},0,{mark},1"
+    content = "\n".join([",".join(HEAD), *rows]).encode()
+    with pytest.raises(
+        Refused, match=f"not_a_number: .* 1 samples that no gyroscope reads, .*sample {at + 1}, .*y_rad_s"
+    ):
+        read(written(tmp_path, content))
+    mapped = Mapped({"time_s": ("time_s", 1.0)}, missing=(mark,))
+    with pytest.raises(Refused, match=f"line {at + 2}: y_rad_s is blank"):
+        read(written(tmp_path, content), mapped)
+
+
+def test_counts_are_no_temperature(tmp_path: Path) -> None:
+    head = [*HEAD, "temperature_c"]
+    content = "\n".join([",".join(head), *(f"{row},-3735" for row in ROWS)]).encode()
+    with pytest.raises(Refused, match=r"wrong_unit: .*30 samples whose temperature_c is no temperature"):
+        read(written(tmp_path, content))
