@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from rig.errors import Fault
 from rig.estimation.arrays import Array
@@ -136,21 +136,21 @@ def check_reads(matrix: Array) -> None:
 
 def check_unit(scale: Array) -> None:
     """Raise Fault `wrong_unit` for a scale factor (3,) above 4 or below 1/4; name the likely unit if there is one."""
-    if not _is_plausible(scale):
+    if not is_plausible(scale).all():
         typical = float(np.exp(np.mean(np.log(scale))))
         raise _wrong_unit(f"the scale factors come out near {typical:.3g}", 1 / typical)
 
 
 def check_reading_ratio(ratio: float, where: str) -> None:
     """Raise Fault `wrong_unit` if readings are more than 4 times, or less than a quarter of, the turn rate."""
-    if not _is_plausible(ratio):
+    if not is_plausible(ratio).all():
         raise _wrong_unit(f"in {where} the gyroscope reads {ratio:.3g} times the turn rate", ratio)
 
 
-def _is_plausible(ratio: ArrayLike) -> bool:
-    """Return whether a sensor can have these ratios of reading over true value, or their inverses."""
+def is_plausible(ratio: ArrayLike) -> NDArray[np.bool_]:
+    """Return which of these ratios of reading over true value, or their inverses, a sensor can have."""
     ratios = np.asarray(ratio, dtype=np.float64)
-    return bool(np.all((ratios < MAX_SCALE) & (ratios > 1 / MAX_SCALE)))
+    return (ratios < MAX_SCALE) & (ratios > 1 / MAX_SCALE)
 
 
 def _wrong_unit(what: str, ratio: float) -> Fault:

@@ -10,6 +10,7 @@ from rig.estimation.by_hand import HandSolution, SessionConditions, solve_by_han
 from rig.estimation.by_hand.session_parts import FACES
 from rig.observation.by_hand.hand_segmentation import segment_session
 from rig.observation.external.csv_samples import Samples
+from rig.observation.false_readings import check_frozen
 from rig.observation.stuck_check import check_reads
 
 NO_SWEEPS = Fault("too_few_observations", "moves by hand are no sweeps", "Give sweeps in six directions")
@@ -21,6 +22,7 @@ def solve_hand_samples(item: Item, samples: Samples, columns: Columns) -> Sensor
     Raise Fault and Refused as `rig.estimation.by_hand.solve_by_hand` does, and `stuck_sensor`.
     """
     check_reads(samples.readings[RATE], RATE)
+    check_frozen(samples.time_s, samples.readings[RATE])
     session = segment_session(samples.time_s, samples.readings[RATE], samples.readings.get(ACCELERATION))
     solution = solve_by_hand(session, read_conditions(columns))
     return build_hand_result(item, solution, matrix_correction(solution.turned))

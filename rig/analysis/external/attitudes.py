@@ -28,6 +28,7 @@ from rig.estimation.reference.triaxial import EqualWeights, Method, TriaxialSolu
 from rig.observation.external.attitude_import import PlacedReadings
 from rig.observation.external.placements import Placements
 from rig.observation.external.reference_rows import Turning
+from rig.observation.false_readings import check_frozen
 from rig.observation.statistics.mean import StaticReading
 from rig.observation.stuck_check import check_reads
 
@@ -78,6 +79,7 @@ def solve_placed(
 
     def solve_rate(turning: Turning) -> Result:
         check_reads(turning.readings_rad_s, RATE)
+        check_frozen(turning.time_s, turning.readings_rad_s)
         chosen = method or ("maximum_likelihood" if exact_rates else "increments")
         if chosen != "increments":
             return _solve_rows(Equations.from_rows(placed, exact_rates=exact_rates), chosen, any_mounting=any_mounting)

@@ -17,7 +17,8 @@ from rig.errors import Refused, RigError
 from rig.history.documents import change_entry, history_csv, history_document, rigs_document
 from rig.history.entered.finished_run import PAGE, FinishedRun, read_finished_run
 from rig.history.series import Change, changes_between, effects, rig_states, subjects, trends
-from rig.history.storage.address import own_history_address, resolve_address
+from rig.history.storage.address import HistoryAddress, own_history_address, resolve_address
+from rig.history.storage.continuity import is_there
 from rig.history.store import History, Past, Selection, open_history
 from rig.history.terminal.change_words import comparison_in_words
 from rig.history.terminal.history_tables import (
@@ -39,8 +40,10 @@ DISAGREE = 1
 def list_calibrations(options: Namespace) -> int:
     """Print calibrations, and trends of a serial number. Raise `not_in_history`, and as `open_named_history` does."""
     selection = _read_selection(options)
-    with open_named_history(options) as history:
-        pasts = _select_pasts(history, selection)
+    pasts = list[Past]()
+    if selection.serial_number is not None or is_there(_read_address(options)):
+        with open_named_history(options) as history:
+            pasts = _select_pasts(history, selection)
     series = {subject: trends(past) for subject, past in subjects(pasts).items()}
     if options.csv:
         for line in history_csv(pasts).rstrip("\n").split("\n"):
@@ -49,7 +52,7 @@ def list_calibrations(options: Namespace) -> int:
         document = history_document(pasts, series if selection.serial_number is not None else None)
         print(json.dumps(document, indent=2, allow_nan=False))
     elif not pasts:
-        say("No calibration is in this history yet; `rig run` enters each one.")
+        say(f"No calibration is in {_read_address(options).label} yet; `rig run` enters each one.")
     else:
         console = Console(highlight=False)
         console.print(calibrations_table(pasts))
@@ -127,7 +130,7 @@ def import_runs(options: Namespace) -> int:
     from rig.station.words import calibrations_in_words
 
     new = existing = refused = 0
-    with open_named_history(options) as history:
+    with open_history(_read_address(options)) as history:
         for folder in _find_run_folders(options.folders, unsolved=options.solve):
             try:
                 run = _recompute_finished(folder, history, solve=options.solve)
@@ -201,8 +204,20 @@ def void(options: Namespace) -> int:
 
 
 def open_named_history(options: Namespace) -> AbstractContextManager[History]:
-    """Open the named history. Raise Refused as `open_history` does, and as `load` does if a configuration names it."""
-    return open_history(own_history_address(read_history_name(options.history)) or resolve_address(None))
+    """Open the named history.
+
+    Raise Refused `no_history` if there is none, for opening it would make an empty one; as `open_history` does, and as
+    `load` does if a configuration names it.
+    """
+    address = _read_address(options)
+    if not is_there(address):
+        what = f"there is no history {address.label}"
+        raise Refused("no_history", what, "Name another with --history or RIG_HISTORY; `rig history import` makes one")
+    return open_history(address)
+
+
+def _read_address(options: Namespace) -> HistoryAddress:
+    return own_history_address(read_history_name(options.history)) or resolve_address(None)
 
 
 def _read_selection(options: Namespace) -> Selection:

@@ -149,7 +149,7 @@ def solve_triaxial(
             theta, covariance, iterations = weighted.theta, weighted.covariance, weighted.iterations
             attitude_error, whiteners = weighted.attitude_error, weighted.whiteners
     f = theta[F].reshape(3, 3)
-    refusals.check_unit(scale_of(f))
+    _check_scale(scale_of(f), m, prior)
     refusals.check_handedness(f)
     residuals = m - predicted(theta, r, v_bar)
     return TriaxialSolution(
@@ -214,6 +214,20 @@ def _check_size(m: Array, norm: float) -> None:
     """Raise Fault `wrong_unit` if readings are smaller than the reference, or differ more than attitudes explain."""
     size, spread = (float(np.sqrt(np.mean(np.sum(vectors**2, axis=1)))) for vectors in (m, m - m.mean(axis=0)))
     refusals.check_unit(np.full(3, norm / np.clip(norm, spread, size)))
+
+
+def _check_scale(scale: Array, m: Array, prior: ReferencePrior) -> None:
+    """Raise Fault `wrong_unit` for an implausible scale factor (3,), or `attitude_untrustworthy`.
+
+    If the readings (N, 3) of every axis reach from about minus to plus a known norm, their units are right.
+    """
+    if isinstance(prior, KnownNorm) and not refusals.is_plausible(scale).all():
+        amplitudes = np.ptp(m, axis=0) / 2
+        if refusals.is_plausible(amplitudes / prior.norm).all():
+            raise refusals.untrustworthy_attitudes(
+                "the readings have the size of the reference, but the attitudes do not fit them with any scale factors"
+            )
+    refusals.check_unit(scale)
 
 
 def _conditioning(scaled: Array, m: Array, v: Array, needed: int) -> refusals.Conditioning:

@@ -174,7 +174,11 @@ def _random_walk(curve: AllanCurve, axis: int) -> AllanReading | Fault:
     index = int(np.argmin(np.abs(curve.tau_s - RANDOM_WALK_TAU_S)))
     tau_s, relative_std = float(curve.tau_s[index]), float(curve.relative_std[index, axis])
     if abs(tau_s - RANDOM_WALK_TAU_S) > RANDOM_WALK_TAU_S / 2:
-        return too_short(f"no stretch reaches {RANDOM_WALK_TAU_S:g} s, where random walk is read")
+        what = f"no stretch reaches {RANDOM_WALK_TAU_S:g} s, where random walk is read"
+        if curve.total_s >= ENOUGH_S:
+            what = f"readings are missing so often that {what}"
+            return Fault("lost_samples", what, "See that the sensor's link loses nothing, and record again")
+        return too_short(what)
     if relative_std > RANDOM_WALK_STD:
         worst = float(curve.relative_std[index].max())  # one sentence for all axes
         return too_short(

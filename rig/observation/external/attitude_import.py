@@ -137,11 +137,12 @@ def placed_by(samples: Samples, table: Mapping[str, Array], *, find_clock: bool 
     """
     time_s, readings = samples.time_s, samples.readings
     on_arrival = samples.sampling is not None and samples.sampling.on_arrival
+    numbers = _select_different_times(table)
+    total = len(table["start_s"])
+    table = {name: column[numbers - 1] for name, column in table.items()}
     rates = np.column_stack([table[name] for name in RATE_COLUMNS]) if RATE_COLUMNS[0] in table else None
     windows = _windows(table)
-    all_rows = rows_found = _ReferenceRows(
-        windows, _rotations(table), rates, _attitude_std(table), np.arange(1, len(windows) + 1)
-    )
+    all_rows = rows_found = _ReferenceRows(windows, _rotations(table), rates, _attitude_std(table), numbers)
     clock = None
     if find_clock:
         _check_has_rates(readings)
@@ -171,7 +172,7 @@ def placed_by(samples: Samples, table: Mapping[str, Array], *, find_clock: bool 
         else Turning(time_s, rate, rows_found.rows_s, rows_found.attitudes, rows_found.std_rad, on_arrival),
         None if set(readings) == {RATE} else or_fault(find),  # a gyroscope needs none
         clock,
-        tuple(_list_omitted(all_rows, covered, "not covered by the recording")),
+        (*_list_repeated(numbers, total), *_list_omitted(all_rows, covered, "not covered by the recording")),
         tuple(_list_omitted(covered, whole, "lost_samples: samples are missing in them")),
         tuple(_list_omitted(covered, sampled, "lost_samples: half of their samples or more are missing")),
     )
@@ -197,6 +198,19 @@ class _ReferenceRows:
     def select(self, rows: NDArray[np.intp]) -> "_ReferenceRows":
         rates, std = (None if values is None else values[rows] for values in (self.rates_rad_s, self.std_rad))
         return _ReferenceRows([self.windows[row] for row in rows], self.attitudes[rows], rates, std, self.numbers[rows])
+
+
+def _select_different_times(rows: Mapping[str, Array]) -> NDArray[np.intp]:
+    """Return the numbers, from 1, of all rows but those of no length at the time of another row."""
+    middles_s = (rows["start_s"] + rows["end_s"]) / 2
+    lasting = rows["end_s"] != rows["start_s"]
+    return 1 + np.flatnonzero(lasting | ~np.isin(middles_s, middles_s[lasting]))
+
+
+def _list_repeated(numbers: NDArray[np.intp], total: int) -> Iterator[Omitted]:
+    """Yield an entry for the rows out of `total` that repeat the time of another one, if there are any."""
+    if len(repeated := np.setdiff1d(np.arange(1, total + 1), numbers)):
+        yield Omitted("rows", len(repeated), total, "they repeat the time of another one", f"row {repeated[0]}")
 
 
 def _is_covered(rows_s: Array, time_s: Array) -> NDArray[np.bool_]:

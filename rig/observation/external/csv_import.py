@@ -40,6 +40,7 @@ from rig.observation.external.csv_windows import (
 )
 from rig.observation.external.omission import Omitted
 from rig.observation.external.turns import DeclaredTurns, TurnedData, find_turns
+from rig.observation.false_readings import check_frozen, check_unclipped
 from rig.observation.formats.column_selection import Mapped
 from rig.observation.formats.csv_table import read_columns
 from rig.observation.observe import Observation, nearest_axis
@@ -50,6 +51,7 @@ from rig.observation.windows import Window, inside
 AXIS_COLUMNS = ("axis_x", "axis_y", "axis_z")
 STD_COLUMNS = ("angle_std_rad", "axis_std_rad")
 MIN_DURATION_S = 1e-3  # the fewest samples take longer at any data rate
+SAME_AXIS, OPPOSITE, SENSED = 0.9, -0.5, 0.25  # cosines of axes, of readings; of a sweep's speed, as a reading
 LEAST_MOTION = 1e-9  # rad or rad/s: no sweep, and its square might be 0
 SWEEPS_MB = 1  # some ten thousand sweeps
 
@@ -85,6 +87,9 @@ def average_sweeps(samples: Samples, sweeps: Mapping[str, Array]) -> ExternalDat
     Raise Refused `time_not_increasing`, `bad_sweep`, `overlapping_sweeps`; Fault `stuck_sensor` and those of `average`.
     """
     check_reads(samples.readings[RATE], RATE)
+    check_frozen(samples.time_s, samples.readings[RATE])
+    windows = [Window(*row) for row in np.column_stack([sweeps["start_s"], sweeps["end_s"]]).tolist()]
+    check_unclipped(samples.time_s, samples.readings[RATE], windows)
     data = average(
         np.column_stack([samples.time_s, samples.readings[RATE]]),
         np.column_stack([sweeps["start_s"], sweeps["end_s"], _speeds(sweeps)]),
@@ -114,7 +119,7 @@ def average(samples: Array, sweeps: Array, axes: Array, temperature_c: Array | N
     """Average samples (n, 4) = [time_s, x, y, z] over sweeps (k, 3) = [start_s, end_s, speed_rad_s] about axes (k, 3).
 
     `temperature_c` (n,) is each sample's temperature, None without a thermometer. Raise Refused `time_not_increasing`,
-    `overlapping_sweeps`; Fault `too_few_observations`, `clocks_apart`, `lost_samples`, `wrong_unit`.
+    `overlapping_sweeps`, `bad_sweep`; Fault `too_few_observations`, `clocks_apart`, `lost_samples`, `wrong_unit`.
     """
     time_s, readings = samples[:, 0], samples[:, 1:]
     check_times(time_s)
@@ -151,6 +156,7 @@ def average(samples: Array, sweeps: Array, axes: Array, temperature_c: Array | N
         else:
             turns.append(_observation(row, mean, speed, axes[row - 1]))
     _check_unit(turns)
+    _check_directions(turns, rests)
     return ExternalData(tuple(turns), tuple(rests), omitted=tuple(_list_omitted(rows, windows)))
 
 
@@ -223,3 +229,25 @@ def _check_unit(turns: Sequence[Observation]) -> None:
     means = np.array([turn.average.mean_rad_s for turn in turns])
     rms_rad_s = np.sqrt(np.mean(np.sum((means - means.mean(axis=0)) ** 2, axis=1)))
     check_reading_ratio(float(rms_rad_s / np.sqrt(np.mean([turn.speed_rad_s**2 for turn in turns]))), "the sweeps")
+
+
+def _check_directions(turns: Sequence[Observation], rests: Sequence[Average]) -> None:
+    """Raise Refused `bad_sweep` if the readings of two sweeps about one axis contradict the directions of the two."""
+    if len(turns) < 2:
+        return
+    means = np.array([turn.average.mean_rad_s for turn in turns])
+    rates = means - np.mean([rest.mean_rad_s for rest in rests] if rests else means, axis=0)
+    sizes = np.linalg.norm(rates, axis=1)
+    axes = np.array([turn.axis_flange for turn in turns])
+    sensed = sizes > SENSED * np.array([turn.speed_rad_s for turn in turns])
+    cosines = axes @ axes.T
+    agreement = np.sign(cosines) * (rates @ rates.T) / np.maximum(np.outer(sizes, sizes), np.finfo(float).tiny)
+    contradicting = (np.abs(cosines) > SAME_AXIS) & (agreement < OPPOSITE) & np.outer(sensed, sensed)
+    if contradicting.any():
+        worst = int(np.argmax(contradicting.sum(axis=1)))
+        others = np.flatnonzero(contradicting[worst])
+        what = f"sweep {turns[worst].sweep} reads the other way round than the others about its axis"
+        if len(others) == 1:
+            both = sorted((turns[worst].sweep, turns[int(others[0])].sweep))
+            what = f"sweeps {both[0]} and {both[1]} read the other way round than their axes say"
+        raise Refused("bad_sweep", what, "Look at the sign of the axis in their rows, and at start and end")

@@ -22,8 +22,8 @@ from rig.errors import Refused
 from rig.errors.quoting import quote
 from rig.estimation.arrays import Array
 from rig.observation.external.csv_windows import check_times
-from rig.observation.external.impossible_values import check_possible, check_temperatures
 from rig.observation.external.omission import Omitted
+from rig.observation.false_readings import check_possible, check_temperatures
 from rig.observation.formats.column_selection import Mapped
 from rig.observation.formats.csv_table import CsvTable, blank_cell, read_table
 from rig.observation.formats.sample_files import readings_in

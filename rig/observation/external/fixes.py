@@ -18,6 +18,7 @@ from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.external.attitude_drift import Fixes
 from rig.observation.external.reference_rows import Turning, join_rests, select_covered
+from rig.observation.false_readings import find_clipped
 from rig.observation.time_stamps.gaps import hidden_angles_rad
 from rig.observation.time_stamps.sampling import find_sampling
 
@@ -28,7 +29,6 @@ WINDOW_S, SHORTEST_S = (
 WINDOWS, MOST = 40, 120  # at least, while they are longer than the shortest; at most
 GAP = 2  # missing readings: a cubic through the others bridges one
 MAX_STEP_RAD = 0.35  # between two readings: up to here a cubic through rates is right to microradians
-CLIPPED, CLIPPED_RAD_S = 4, 1.0  # equal readings in a row at the end of an axis' readings; least range of these
 MOST_HIDDEN_RAD, UNKNOWN_RAD = 0.05, 10.0  # std of a rotation that is no increment any more; of one that nothing tells
 BATCH_S = 0.1  # of readings at rest: colour over a few samples averages out
 FEWEST = 6  # increments in which the body moves: 18 numbers for 12 parameters
@@ -179,7 +179,7 @@ def _find_unknown_steps(turning: Turning) -> Iterator[tuple[str, NDArray[np.intp
     steps_s = np.diff(turning.time_s)
     readings = turning.readings_rad_s
     angle_rad = np.linalg.norm(readings[:-1] - np.median(readings, axis=0), axis=1) * steps_s
-    clipped = np.flatnonzero(_find_clipped(readings))
+    clipped = np.flatnonzero(find_clipped(readings))
     adjacent = np.unique(np.clip(np.concatenate([clipped - 1, clipped]), 0, len(steps_s) - 1))
     lost = find_sampling(turning.time_s).gaps(turning.time_s, GAP)
     gaps = np.flatnonzero(lost)
@@ -187,23 +187,6 @@ def _find_unknown_steps(turning: Turning) -> Iterator[tuple[str, NDArray[np.intp
     yield "lost_samples", gaps, np.minimum(hidden_angles_rad(turning.time_s, readings, gaps), UNKNOWN_RAD)
     yield "saturation", adjacent, np.full(len(adjacent), UNKNOWN_RAD)
     yield "turned_too_fast", fast, np.full(len(fast), UNKNOWN_RAD)
-
-
-def _find_clipped(readings: Array) -> NDArray[np.bool_]:
-    """Return which readings (n,) repeat the largest or smallest value of their axis several times.
-
-    A sensor at rest repeats values too, but then its largest and smallest ones are close together.
-    """
-    clipped = np.zeros(len(readings), dtype=np.bool_)
-    for axis in readings.T:
-        if np.ptp(axis) < CLIPPED_RAD_S:
-            continue
-        for end in (axis.max(), axis.min()):
-            at_end = np.concatenate([[False], axis == end, [False]])
-            edges = np.flatnonzero(np.diff(at_end.astype(np.int8))).reshape(-1, 2)
-            for begin, stop in edges[np.diff(edges, axis=1)[:, 0] >= CLIPPED].tolist():
-                clipped[begin:stop] = True
-    return clipped
 
 
 def _all_lost(count: int, total: int, left_out: tuple[LeftOut, ...]) -> Fault:

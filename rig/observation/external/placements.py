@@ -29,6 +29,7 @@ from rig.observation.windows import Window, inside
 
 TURNED_RAD = 0.02  # rows of one rest that are farther apart: the body was turned about the measured vector
 INTERRUPTED_S = 1.0  # longest knock after which equal readings show that the body lay still
+LATE_S = 0.2  # by which a row's attitude may be late or early
 MOSTLY = 0.5  # of a dwell: if the body lies still for as long, only the remainder is left out
 
 
@@ -104,7 +105,8 @@ def find_placements(time_s: Array, readings: Mapping[Quantity, Array], rows: Att
         near = slice(*(int(np.searchsorted(*windows)) for windows in ((ends, window.start_s), (starts, window.end_s))))
         matches.append(_find_rest(time_s, window, rests[near]))
     rest, cuts = np.array([number for number, _ in matches]), [cut for _, cut in matches]
-    groups = _group_by_placement(rest, rows.attitudes)
+    inner = dwells | _mask_inner(rest, windows_s, starts, ends)
+    groups = _group_by_placement(np.where(inner, rest, -1), rows.attitudes)
     account = Account(time_s, rows, rest, cuts, dwells)
     account.check_mostly_at_rest()
     covered = [np.unique(np.concatenate([cuts[row] for row in group])) for group in groups]
@@ -146,11 +148,11 @@ def _same_rest(time_s: Array, read: Array, quantity: Quantity, before: Window, a
     tolerance = quantity.steady + BEYOND * noise * np.sqrt(1 / len(one) + 1 / len(other))
     if (np.abs(one.mean(axis=0) - other.mean(axis=0)) > tolerance).any():
         return False
-    knock = _closed_slice(time_s, Window(before.end_s, after.start_s))
-    if np.diff(time_s[knock]).max() > BLOCK_S:
-        return False
     if quantity != RATE:
         return True
+    knock = _closed_slice(time_s, Window(before.end_s, after.start_s))
+    if np.diff(time_s[knock]).max() > BLOCK_S:  # the readings do not show whether the body turned in it
+        return False
     turned_rad = np.trapezoid(read[knock] - one.mean(axis=0), time_s[knock], axis=0)
     return bool(np.linalg.norm(turned_rad) <= TURNED_RAD)
 
@@ -178,6 +180,16 @@ def _find_rest(time_s: Array, window: Window, rests: Sequence[_PlacedRest]) -> t
         return -1, nothing
     number, overlap_s, cut = max(met, key=lambda match: match[1])
     return (number, cut) if overlap_s >= MOSTLY * lasts_s else (-1, nothing)
+
+
+def _mask_inner(rest: NDArray[np.intp], windows_s: Array, starts_s: Array, ends_s: Array) -> NDArray[np.bool_]:
+    """Return which rows (N,) are far enough from the ends of their rest; all those of a rest if none is.
+
+    A reference that reports late shows the body in motion when it lies still already.
+    """
+    middles_s = windows_s.mean(axis=1)
+    inner = (middles_s >= starts_s[rest] + LATE_S) & (middles_s <= ends_s[rest] - LATE_S)
+    return inner | ~np.isin(rest, rest[inner])
 
 
 def _group_by_placement(rest: NDArray[np.intp], attitudes: Array) -> list[NDArray[np.intp]]:

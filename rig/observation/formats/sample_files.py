@@ -109,16 +109,18 @@ def attitudes_in(path: Path) -> Columns | None:
 def rows_around(time_s: Array, path: Path) -> dict[str, Array]:
     """Return intervals, `start_s` and `end_s` (n,), about the times of attitudes.
 
-    An interval reaches at most half-way to its neighbours. It is kept so short that it cannot count as a rest. Raise
-    Refused `no_attitudes` for a single attitude.
+    The times may be in any order. An interval reaches at most half-way to its neighbours and is too short to count as a
+    rest; it is empty if an earlier row has the same time. Raise Refused `no_attitudes` for a single attitude.
     """
-    if len(time_s) < 2:
+    rising_s, first = np.unique(time_s, return_index=True)
+    if len(rising_s) < 2:
         raise Refused("no_attitudes", f"{path} holds one pose", "Record the poses while the sensor is turned")
-    steps_s = np.abs(np.diff(time_s))
+    steps_s = np.diff(rising_s)
     most_s = min(LONGEST_MOMENT_S, float(np.median(steps_s))) / 2
     before_s = np.minimum(np.append(steps_s[:1], steps_s) / 2, most_s)
     after_s = np.minimum(np.append(steps_s, steps_s[-1:]) / 2, most_s)
-    half_s = np.minimum(before_s, after_s)
+    half_s = np.zeros(len(time_s))
+    half_s[first] = np.minimum(before_s, after_s)
     return {"start_s": time_s - half_s, "end_s": time_s + half_s}
 
 

@@ -41,12 +41,12 @@ def _hidden_rad(time_s: Array, readings: Array, turned: Array, gap: int) -> floa
     last = max(int(np.searchsorted(time_s, time_s[gap + 1] + size)), gap + 1 + FEWEST)
     sides = (slice(max(first, 0), gap + 1), slice(gap + 1, min(last, len(time_s))))
     bridged = [_bridge(time_s[side], readings[side], turned[side], lasts_s) for side in sides]
-    known = [errors for errors in bridged if errors is not None]
-    if not known:
+    errors = [side for side in bridged if side is not None]
+    if not errors:
         return np.inf
     change_rad_s = float(np.linalg.norm(readings[gap + 1] - readings[gap]))
-    excess_rad_s = max(change_rad_s - max(changes for _, changes in known), 0.0)
-    return float(np.hypot(max(rms for rms, _ in known), excess_rad_s * lasts_s * STEP_STD))
+    excess_rad_s = max(change_rad_s - max(changes for _, changes in errors), 0.0)
+    return float(np.hypot(max(rms for rms, _ in errors), excess_rad_s * lasts_s * STEP_STD))
 
 
 def _bridge(time_s: Array, readings: Array, turned: Array, lasts_s: float) -> tuple[float, float] | None:

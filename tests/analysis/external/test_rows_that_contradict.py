@@ -2,12 +2,14 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from rig.analysis.external.attitudes import solve_placed
 from rig.analysis.external.external_recordings import budget_of, solve_swept
+from rig.analysis.external.increment_calibration import InIncrements
 from rig.data.quantity import ACCELERATION, RATE, Quantity
 from rig.data.recording.settings import Elsewhere, Site
 from rig.errors import Fault, Refused
@@ -39,6 +41,14 @@ def test_of_two_sweeps_about_an_axis_both_are_named_for_either_may_be_wrong(row:
         solve_swept(swept(row, factor), None)
     with pytest.raises(Refused, match=both):
         solve_swept(swept(row, factor), "newton")
+
+
+def test_a_sweep_whose_axis_has_the_wrong_sign_is_no_stuck_sensor() -> None:
+    sweeps = read_sweeps(EXAMPLES / "sweeps.csv")
+    for axis in "xyz":
+        sweeps[f"axis_{axis}"][2] *= -1
+    with pytest.raises(Refused, match="bad_sweep: sweeps 1 and 3 read the other way round than their axes say"):
+        average_sweeps(read_samples(EXAMPLES / "samples.csv", [RATE]), sweeps)
 
 
 def test_half_a_turn_given_as_a_whole_one_is_refused_by_its_row_where_others_tell() -> None:
@@ -112,6 +122,25 @@ def test_rows_outside_the_recording_are_not_covered_and_lack_no_samples() -> Non
         f"120 of 600 rows, not covered by the recording; the first row 481, from {ends_s:.10g} s"
     ]
     assert placed.incomplete == ()
+
+
+def test_poses_in_any_order_and_repeated_ones_are_placed_by_their_times(tmp_path: Path) -> None:
+    samples = read_samples(EXAMPLES / "swinging_samples.csv")
+    rows = read_attitudes(EXAMPLES / "swinging_attitudes.csv")
+    names = ("qw", "qx", "qy", "qz")
+    poses = np.column_stack([(rows["start_s"] + rows["end_s"]) / 2, *(rows[name] for name in names)])
+    shuffled = np.random.default_rng(1).permutation(len(poses))
+    path, matrices = tmp_path / "poses.csv", []
+    for table in (poses, np.vstack([poses[shuffled], poses[100:110]])):
+        np.savetxt(path, table, delimiter=",", header=",".join(["time_s", *names]), comments="", fmt="%.17g")
+        placed = placed_by(samples, read_attitudes(path))
+        result = solve_placed("imu", placed, SITE, ASKED, None, second_order=False).results[RATE]
+        assert isinstance(result, InIncrements)
+        matrices.append(result.solution.matrix)
+    assert matrices[1] == pytest.approx(matrices[0], rel=1e-9)
+    assert [str(entry) for entry in placed.omitted] == [
+        "10 of 610 rows, they repeat the time of another one; the first row 601"
+    ]
 
 
 def constant(samples: Samples, quantity: Quantity, value: float) -> Samples:

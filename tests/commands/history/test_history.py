@@ -45,6 +45,16 @@ def told(capsys: pytest.CaptureFixture[str], *arguments: str | Path, status: int
     return capsys.readouterr().out
 
 
+@pytest.mark.parametrize("command", [["verify"], ["show", "1"], ["void", "1", "--reason", "x"], ["rigs"]])
+def test_a_history_that_is_not_there_is_no_empty_one(
+    place: str, capsys: pytest.CaptureFixture[str], command: list[str]
+) -> None:
+    assert main(["history", *command]) == 2
+    assert f"no_history: there is no history {place}" in capsys.readouterr().err
+    assert f"No calibration is in {place} yet" in told(capsys)
+    assert not Path(place).exists()
+
+
 @pytest.mark.slow
 def test_runs_are_imported_once_and_what_is_none_is_named(place: str, capsys: pytest.CaptureFixture[str]) -> None:
     bad = Path(place).parent / "bad"
@@ -149,6 +159,8 @@ def test_a_wrong_entry_is_voided_not_deleted(year: str, capsys: pytest.CaptureFi
 
 @pytest.mark.slow
 def test_what_was_never_entered_is_refused_by_name(place: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with open_history(place):
+        pass
     for arguments in (["nobody"], ["show", "7"], ["plot", "nobody"], ["compare", "1", "2"]):
         assert main(["history", *arguments]) == 2
         assert "not_in_history" in capsys.readouterr().err

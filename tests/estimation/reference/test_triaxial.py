@@ -181,3 +181,16 @@ def test_what_is_no_attitude_is_refused() -> None:
             solve_triaxial(m, wrong, variances, KnownNorm(1, [0, 0, -1]))
     with pytest.raises(ValueError, match="known must be"):
         solve_triaxial(m, r, variances, KnownVector(m[:9]))
+
+
+def test_one_face_stated_as_its_opposite_is_no_wrong_unit() -> None:
+    faces = [[0, 1, 0], [0, -1, 0], [1, 0, 0], [-1, 0, 0], [0, 0, 0], [2, 0, 0]]  # quarter turns about x, y, z
+    r = Rotation.from_euler("xyz", np.pi / 2 * np.array(faces, dtype=float)).as_matrix()
+    gravity = KnownNorm(9.8, np.array([0.0, 0.0, 1.0]))
+    theta = np.concatenate([np.eye(3).ravel(), [0, 0, 9.8], [0.1, -0.1, 0.1]])
+    variances = np.full((6, 3), 1e-8)
+    read = noisy(readings(r, theta=theta), variances)
+    assert solve_triaxial(read, r, variances, gravity).matrix == pytest.approx(np.eye(3), abs=1e-3)
+    r[2] = r[3]
+    with pytest.raises(Fault, match="attitude_untrustworthy: "):
+        solve_triaxial(read, r, variances, gravity)
