@@ -15,8 +15,10 @@ def explain_closed(port: str, error: OSError) -> str:
     reason = str(error) if cause is None or cause.errno is None else os.strerror(cause.errno)
     if "://" in port:
         return reason
-    from serial.tools import list_ports
-
+    try:
+        from serial.tools import list_ports
+    except ImportError:
+        return reason
     ports = [f"{available.device} ({available.description})" for available in list_ports.comports()]
     return f"{reason}; this computer has {', '.join(ports) or 'no serial port'}"
 
@@ -25,8 +27,10 @@ class SerialPort:
     """An open port; constructor, `read` and `write` raise OSError."""
 
     def __init__(self, port: str, baud: int) -> None:
-        import serial  # which a computer without serial ports may lack: to read recordings it is not needed
-
+        try:
+            import serial  # which a computer without serial ports may lack: to read recordings it is not needed
+        except ImportError as error:
+            raise OSError(f"pyserial cannot be loaded ({error})") from error
         try:
             self._serial = serial.serial_for_url(port, baudrate=baud, timeout=0, exclusive=True)
         except ValueError as error:  # an invalid name, or an unsupported baud rate

@@ -199,7 +199,8 @@ Calibrates inertial sensors on a robot arm, a servomotor or by hand. First steps
   rig report latest       its certificate
   rig history             every calibration so far
 
-rig --help names all commands, rig COMMAND --help what each takes. Step by step: docs/README.md."""
+rig --help names all commands, rig COMMAND --help what each takes."""
+PAGES = "docs/README.md"
 FAULT = Fault.exit_status
 
 
@@ -233,7 +234,9 @@ def _first_word(words: Sequence[str]) -> str | None:
 
 
 def _first_steps() -> int:
-    print(FIRST_STEPS)
+    from rig.config.files.supplied_files import supplied
+
+    print(FIRST_STEPS + (f" Step by step: {PAGES}." if supplied(PAGES).exists() else ""))
     return 0
 
 

@@ -8,6 +8,7 @@ import pytest
 
 from rig.cli import main
 from rig.commands.documents import explain
+from rig.config.files import supplied_files
 from rig.data.latest_run import note_run
 from rig.errors.catalogue import catalogue
 from rig.errors.remedies_by_method import TABLE, CalibrationMethod, remedies_by_method
@@ -51,3 +52,17 @@ def test_no_answer_ends_with_two_stops(capsys: pytest.CaptureFixture[str]) -> No
     main(["explain", "ac"])
     said = capsys.readouterr()
     assert ".." not in said.out + said.err and "?." not in said.out + said.err
+
+
+@pytest.mark.parametrize("name", ["gyro.scale_changed", "limits.scale_std", "no_port", "sweep", "estimator"])
+def test_pages_are_named_only_if_the_program_has_them(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def read_words() -> str:
+        assert explain.run(Namespace(name=[name])) == 0 and main([]) == 0
+        return capsys.readouterr().out
+
+    assert "\nMore: docs/" in (words := read_words()) and "Step by step: docs/README.md" in words
+    monkeypatch.setattr(supplied_files, "PACKAGE", tmp_path / "site-packages" / "rig")
+    (tmp_path / "site-packages" / "docs").mkdir(parents=True)  # of another package
+    assert "docs/" not in read_words()

@@ -45,7 +45,7 @@ def _explain_check(name: str) -> Iterator[str]:
     if (words := words_of_name(name)) is not None:
         yield f"{words.name}: a check of the verdict. It fails when {words.means}."
         yield f"What to do: {words.remedy.replace('`', '').rstrip('.')}."
-        yield _refer_to("docs/checks.md, docs/method.md")
+        yield from _refer_to("docs/checks.md", "docs/method.md")
 
 
 def _explain_limit(name: str) -> Iterator[str]:
@@ -57,7 +57,7 @@ def _explain_limit(name: str) -> Iterator[str]:
         kind = "a property of the sensor" if row.kind == "conformity" else "how good the measurement is"
         unit = "" if row.unit == "1" else f", in {row.unit}"
         yield f"limits.{key}: a limit on {kind}: {Limits.model_fields[key].description}{unit}."
-        yield _refer_to("docs/configuration.md")
+        yield from _refer_to("docs/configuration.md")
 
 
 def _explain_error(name: str) -> Iterator[str]:
@@ -67,7 +67,7 @@ def _explain_error(name: str) -> Iterator[str]:
         if entry.name == name:
             yield f"{entry.name}: an error. It occurs when {entry.when}."
             yield from _explain_remedies(name, entry.remedy)
-            yield _refer_to("docs/errors.md")
+            yield from _refer_to("docs/errors.md")
 
 
 def _explain_remedies(name: str, usual: str) -> Iterator[str]:
@@ -108,9 +108,9 @@ def _explain_word(name: str) -> Iterator[str]:
 
     words = [*find_words(name)]
     for word in words:
-        yield f"{word.names}: {word.plain_meaning}"
+        yield f"{word.names}: {word.plain_meaning(with_pages=_has_pages('docs/glossary.md'))}"
     if words:
-        yield _refer_to("docs/glossary.md")
+        yield from _refer_to("docs/glossary.md")
 
 
 def _list_names() -> list[str]:
@@ -123,7 +123,14 @@ def _list_names() -> list[str]:
     return [*check_words(), *LIMITS, *(entry.name for entry in catalogue()), *words]
 
 
-def _refer_to(pages: str) -> str:
-    """Return the line that names further pages, and where they are if the program was installed without them."""
-    clone = Path(__file__).parents[3] / "docs"
-    return f"More: {pages}{'' if clone.is_dir() else ', in a clone of the program'}"
+def _has_pages(*pages: str) -> bool:
+    """Return whether the program was installed with its pages."""
+    from rig.config.files.supplied_files import supplied
+
+    return all(supplied(page).exists() for page in pages)
+
+
+def _refer_to(*pages: str) -> Iterator[str]:
+    """Yield the line that names further pages, unless the program was installed without them."""
+    if _has_pages(*pages):
+        yield f"More: {', '.join(pages)}"

@@ -1,21 +1,28 @@
 """The refusal of what needs Linux: an arm, a servomotor, the simulated laboratory."""
 
 import sys
+from importlib.util import find_spec
 
 from rig.errors import Refused
 
 SYSTEMS = {"win32": "Windows", "darwin": "macOS"}
+MODULES = ("fcntl", "termios")  # without them pyserial opens no port, not even one of the simulated laboratory
 
 
 def refuse_unless_linux(what: str, system: str = sys.platform) -> None:
-    """Raise Refused `only_on_linux` unless the system is Linux.
+    """Raise Refused `only_on_linux` unless the system is Linux with its modules.
 
     Others lack prompt stops by signals, loopback addresses or pseudo-terminals.
     """
-    if system != "linux":
-        raise Refused(
-            "only_on_linux",
-            f"{what} runs on Linux, and this is {SYSTEMS.get(system, system)}",
-            "Use Linux, WSL 2 or a container. Recordings, notebooks, certificates, the history, and sensors that are "
-            "turned by hand work here",
-        )
+    missing = [name for name in MODULES if find_spec(name) is None]
+    if system == "linux" and not missing:
+        return
+    lacking = (
+        "this Python lacks " + " and ".join(missing) if system == "linux" else f"this is {SYSTEMS.get(system, system)}"
+    )
+    raise Refused(
+        "only_on_linux",
+        f"{what} runs on Linux, and {lacking}",
+        "Use Linux, WSL 2 or a container. Recordings, notebooks, certificates, the history, and sensors that are "
+        "turned by hand work here",
+    )

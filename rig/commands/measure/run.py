@@ -61,20 +61,23 @@ def prepare_run(options: Namespace) -> "Iterator[tuple[Path, Configured]]":
     """Yield a new run folder and its configuration; meanwhile a simulated laboratory has an address of its own.
 
     If the operator does not agree, no folder remains, so the same command can be given again. Raise Refused as
-    `load_configured` and `new_folder` do.
+    `load_configured` and `new_folder` do; `only_on_linux` for a simulated laboratory elsewhere.
     """
     from rig.commands.configured import open_configured
+    from rig.commands.laboratory.only_on_linux import refuse_unless_linux
     from rig.data.run_folder import discard, new_folder
     from rig.data.user_texts import note_own
     from rig.errors import Refused
 
     with open_configured(options.config, options.overrides, options.script) as configured:
+        if configured.loaded.simulated:
+            refuse_unless_linux("the simulated laboratory")
         folder = new_folder(options.out, configured.loaded, configured.script.text, configured.script.identity)
         say(f"run folder: {folder}", sys.stderr)
         note_own(configured.loaded.text, configured.script.text)
         try:
             yield folder, configured
         except Refused as refused:
-            if refused.name in ("not_confirmed", "not_mounted"):
+            if refused.name in ("not_confirmed", "not_mounted", "only_on_linux"):
                 discard(folder)
             raise

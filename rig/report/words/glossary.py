@@ -28,10 +28,9 @@ class Word:
         """The names one by one: `coverage factor, k = 2` gives also `k`."""
         return tuple(name.partition(" = ")[0] for name in self.names.split(", "))
 
-    @property
-    def plain_meaning(self) -> str:
-        """The meaning without Markdown, for a terminal."""
-        return LINK.sub(r"\1: docs/\2", self.meaning).replace("`", "")
+    def plain_meaning(self, *, with_pages: bool) -> str:
+        """Return the meaning without Markdown, for terminals; `with_pages` adds the paths of its pages."""
+        return LINK.sub(r"\1: docs/\2" if with_pages else r"\1", self.meaning).replace("`", "")
 
 
 @cache

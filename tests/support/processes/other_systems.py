@@ -1,12 +1,13 @@
 """What needs no arm, run by an interpreter that lacks the modules which only Linux has."""
 
 import os
+import shutil
 import subprocess
 from collections.abc import Sequence
 from pathlib import Path
 
 from support.external.handled_body import TWELVE, handle, write
-from support.paths import RECORDINGS
+from support.paths import CONFIGS, RECORDINGS
 from support.processes.waiting import PATIENCE_S
 
 HIDDEN = """
@@ -32,6 +33,8 @@ for words in (
     ["history"],
     ["report", frozen, "--out", folder],
     ["verify", certificate, "--history", f"{folder}/history.sqlite"],
+    ["demo"],
+    ["run", f"{folder}/configs/by_hand_lines.yaml"],
 ):
     statuses[" ".join(words[:2])] = main(words)
 result = rig.solve(rig.load(frozen))
@@ -45,9 +48,13 @@ print(*statuses.values(), file=sys.stderr)
 def run_without_linux_modules(interpreter: str | Path, folder: Path, paths: Sequence[Path] = ()) -> str:
     """Solve, show, verify and enter in the new `folder`; assert that all succeeds, and return the file of `rig`.
 
+    A simulated laboratory is refused by name, and leaves nothing behind.
+
     `paths` are where the interpreter finds what is not installed in it.
     """
     (folder / "sitecustomize.py").write_text(HIDDEN, encoding="utf-8")
+    (folder / "configs").mkdir()
+    shutil.copy(CONFIGS / "by_hand_lines.yaml", folder / "configs")
     by_hand = write(folder / "samples.csv", handle(TWELVE, 1))
     environment = {
         **os.environ,
@@ -65,5 +72,8 @@ def run_without_linux_modules(interpreter: str | Path, folder: Path, paths: Sequ
         cwd=folder,
     )
     assert done.returncode == 0, done.stderr
-    assert done.stderr.splitlines()[-1] == "0 0 0 0 0 0 0", done.stdout + done.stderr
+    assert done.stderr.splitlines()[-1] == "0 0 0 0 0 0 0 2 2", done.stdout + done.stderr
+    refusals = [line for line in done.stderr.splitlines() if line.startswith("rig: ")]
+    assert [line.split(":")[1] for line in refusals] == [" only_on_linux"] * 2, refusals
+    assert not (folder / "runs").exists()
     return done.stdout.splitlines()[-1]
