@@ -193,7 +193,7 @@ class PageState:
                 self._prompts += 1
                 question = {"announcement": list(announcement), "to_do": to_do, "to_tick": to_tick}
                 self.put("prompt", {"number": self._prompts, **question})
-                self._state("asking", "The operator is asked")
+                self._state("asking", "Nothing moves until it is given")
             case Answered(agreed):
                 self.put("prompt", None)
                 self._state("ready", "The operator agreed" if agreed else "The operator did not agree")

@@ -19,7 +19,7 @@ from rig.motion.steps import Rest
 from rig.page.server.control import STOPPED
 from rig.page.server.serving import PageAddress
 from rig.station.events import Interrupted, Progress, SamplesTaken, SensorSamples
-from support.page.browser import legible, needs_browser, picture, screen, text, type_line
+from support.page.browser import legible, needs_browser, picture, screen, set_theme, text, type_line
 from support.processes.waiting import PATIENCE_S, wait_for
 
 pytestmark = [pytest.mark.slow, needs_browser, pytest.mark.usefixtures("nothing_severe_and_nothing_from_elsewhere")]
@@ -28,6 +28,10 @@ AT = "2026-11-25T08:00:00+00:00"
 TRAY = (("G-001", "pass"), ("G-002", "fail"), ("<b>G-003</b>", "open"))
 NOW = Now("checking", "<b>G-003</b>", "", None, "A. Person", "W-17", True, {"pass": 1, "fail": 1}, TRAY)
 WORDS = ("The arm at 127.0.0.2 will move for 29 s.", "Nobody and nothing may be within its reach.")
+
+
+THEME = "return document.documentElement.dataset.theme"
+FILLED = "return document.querySelector('main').lastElementChild.getBoundingClientRect().bottom / innerHeight"
 
 
 @contextmanager
@@ -61,9 +65,16 @@ def test_a_number_is_scanned_and_go_is_typed_or_ticked(driver: Chrome) -> None:
         wait_for(lambda: "serial number" in text(driver, "text"), "the question for a number")
         assert text(driver, "part") == "<b>G-003</b>" and "A. Person" in text(driver, "who")
         assert [element.text for element in driver.find_elements(By.CSS_SELECTOR, "#tray li strong")] == ["✓", "✗", "◉"]
-        legible(driver)
+        for dark in (False, True):
+            set_theme(driver, dark=dark)
+            assert driver.execute_script(THEME) == ("dark" if dark else "light")
+            legible(driver)
         picture(driver, "station-number")
-        type_line(driver, "G-004")
+        send = driver.find_element(By.ID, "send")
+        assert send.text == "End the batch"  # what an empty answer does
+        driver.find_element(By.ID, "said").send_keys("G")
+        assert send.text == "Enter"
+        type_line(driver, "-004")
         assert answers.get(timeout=PATIENCE_S) == "G-004"
         wait_for(lambda: "Type go" in text(driver, "text"), "the question whether to go")
         assert all(word in text(driver, "lines") for word in WORDS)
@@ -93,6 +104,9 @@ def test_a_run_shows_its_progress_and_a_verdict_stands_until_the_next_number(dri
         wait_for(lambda: "200 samples, 1 lost" in text(driver, "rates"), "the samples")
         assert "25 %" in text(driver, "rates") and "60 °/s" in text(driver, "rates")
         picture(driver, "station-running")
+        for size in ((1280, 800), (1920, 1080), (768, 1024)):
+            with screen(driver, *size):
+                assert 0.9 < driver.execute_script(FILLED) <= 1, size
         begun = PartBegun("G-003", "03-G-003", AT)
         present.batch(state_of([Begun("", "", AT), begun, PartEnded("fail", AT, "gyro.bias is too large")]))
         wait_for(lambda: "FAIL" in text(driver, "verdict"), "the verdict")

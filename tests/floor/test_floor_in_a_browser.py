@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from selenium.webdriver import Chrome
+from selenium.webdriver.common.by import By
 
 from rig.batch.status import Now
 from rig.floor.floor_feed import looking
@@ -16,11 +17,15 @@ from rig.page.server.control import Control
 from rig.page.server.sections import Sections
 from rig.page.server.serving import Page, PageAddress, serving
 from support.history.past_runs import FIRST, finish_run
-from support.page.browser import legible, needs_browser, picture, screen, text
+from support.page.browser import legible, needs_browser, picture, screen, set_theme, text
 from support.processes.waiting import wait_for
 
 pytestmark = [pytest.mark.slow, needs_browser, pytest.mark.usefixtures("nothing_severe_and_nothing_from_elsewhere")]
 
+LINES = """
+return [...document.querySelectorAll(arguments[0])].map((e) =>
+  Math.round(e.clientHeight / parseFloat(getComputedStyle(e).lineHeight)));
+"""
 TRAY = (("G-001", "pass"), ("G-002", "fail"), ("G-003", "open"))
 SAID = {
     "bench 1": Now("running", "G-003", "sweep wrist_1 cw", 31.6, "A. Person", "W-17", True, {"pass": 1}, TRAY),
@@ -52,10 +57,17 @@ def test_the_floor_shows_each_rig_and_a_dead_one(driver: Chrome, feed: Sections)
         assert "fault" in cards(driver)[1] and "board_link_lost" in cards(driver)[1] and "G-104" in cards(driver)[1]
         wait_for(lambda: "in control" in text(driver, "standards"), "the check standard")
         assert "CHECK" in text(driver, "today") and "None." in text(driver, "recalls")
-        legible(driver)
         picture(driver, "floor")
+        for dark in (False, True):
+            set_theme(driver, dark=dark)
+            legible(driver)
         with screen(driver, 390, 800):
             assert driver.execute_script("return document.documentElement.scrollWidth") <= 390
+            cells = driver.find_elements(By.CSS_SELECTOR, "#today td")
+            assert [cell.get_attribute("data-label") for cell in cells][1:3] == ["Rig", "Serial number"]
+            assert driver.execute_script(LINES, "#today td") == [2] * len(
+                cells
+            )  # a heading, and a text that is not cut
 
 
 def cards(driver: Chrome, part: str = "") -> list[str]:

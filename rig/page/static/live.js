@@ -1,4 +1,4 @@
-// What the pages of a station and of the floor share: words and signs, the sections as they arrive, and whether any arrive.
+// What the pages of a station and of the floor share: words and signs, the sections as they arrive, and whether any arrive, light or dark.
 
 import { follow } from "./stream.js";
 
@@ -12,6 +12,8 @@ export const WORDS = {
 };
 export const SIGNS = { pass: "✓", fail: "✗", fault: "⚠", refused: "⊘", open: "◉" };
 export let connected = false;
+const system = window.matchMedia("(prefers-color-scheme: dark)");
+const applyTheme = () => { document.documentElement.dataset.theme = system.matches ? "dark" : "light"; };
 export const isSilent = () => performance.now() - lastNews > STALE_MS;
 
 /** Call `receive` for every section that arrives, and `showConnection` twice a second, until the page's run `isOver()`. */
@@ -30,5 +32,7 @@ export function followSections(receive, showConnection, isOver) {
     () => { lastNews = performance.now(); showConnection(); },
     isOver,
   );
+  applyTheme();
+  system.addEventListener("change", applyTheme);
   setInterval(showConnection, 500);
 }

@@ -28,16 +28,17 @@ function makeSummary(row, past, since) {
     make("span", { className: "of" }, make("strong", { textContent: row.name }), make("small", { textContent: row.part })),
     ...makeTriad("scale factor", row.scale, "", past?.scale, "scale"),
     ...makeTriad(row.scale ? "bias" : "value", row.bias, row.unit, past?.bias, "bias"),
-    make("span", { className: `since ${past?.changed.length ? "bad" : ""}`, textContent: describeComparison(past, since) }));
+    make("span", { className: `since ${past?.changed.length ? "bad" : ""}` }, ...describeComparison(past, since)));
 }
 
+/** Return the comparison with the previous calibration as texts and nodes. */
 function describeComparison(past, since) {
-  if (!since) return "";
-  if (!past) return "first calibration of this part";
-  const when = `since no ${past.number}, ${past.day}`;
+  if (!since) return [];
+  if (!past) return ["first calibration of this part"];
+  const day = make("span", { className: "day", textContent: past.day });
   const [name, error] = past.worst;
-  if (past.changed.length) return `⚠ ${past.changed.join(", ")} changed ${when}`;
-  return `nothing changed ${when} (${name}: E_n ${error.toFixed(1)})`;
+  if (past.changed.length) return [`⚠ ${past.changed.join(", ")} changed since no ${past.number}, `, day];
+  return [`nothing changed since no ${past.number}, `, day, ` (${name}: E_n ${error.toFixed(1)})`];
 }
 
 /** Make three numbers with their largest U, and their picture. */
@@ -46,7 +47,7 @@ function makeTriad(name, result, unit, past, kind) {
   const largest = result.expanded.indexOf(Math.max(...result.expanded));
   const words = make("span", { className: `numbers ${kind}` }, make("small", { textContent: `${name} ` }),
     ...result.texts.map((text) => make("b", { textContent: text })),
-    make("span", { className: "u", textContent: `± ${result.u[largest]}${unit && ` ${unit}`}` }));
+    make("wbr"), make("span", { className: "u", textContent: `± ${result.u[largest]}${unit && ` ${unit}`}` }));
   return [words, make("span", { className: `picture ${kind}` }, drawPicture(result, past, result.values.map((_, i) => i)))];
 }
 

@@ -14,16 +14,17 @@ const makeElement = (name, text, data = {}) => {
   return node;
 };
 
-function makeRow(cells) {
+function makeRow(cells, headings) {
   const node = makeElement("tr");
-  node.append(...cells.map(([text, is]) => makeElement("td", text, is ? { is } : {})));
+  node.append(...cells.map(([text, is], column) => makeElement("td", text, { label: headings[column], ...(is ? { is } : {}) })));
   return node;
 }
 
 const showRows = (id, list, listCells, textIfEmpty) => {
+  const headings = [...$(id).closest("table").querySelectorAll("th")].map((heading) => heading.textContent);
   const empty = makeElement("tr");
-  empty.append(makeElement("td", textIfEmpty));
-  $(id).replaceChildren(...(list.length ? list.map((item) => makeRow(listCells(item))) : [empty]));
+  empty.append(Object.assign(makeElement("td", textIfEmpty), { colSpan: headings.length }));
+  $(id).replaceChildren(...(list.length ? list.map((item) => makeRow(listCells(item), headings)) : [empty]));
 };
 
 function makeCard(section) {

@@ -24,10 +24,14 @@ function showPresent(section) {
   const running = typeof section.fraction === "number";
   $("run").hidden = !running;
   if (running) $("done").value = section.fraction;
-  $("rates").textContent = running ? [`${Math.round(section.fraction * 100)} %`, `turning at ${section.turn_deg_s} °/s`,
-    ...section.sensors.map(([name, samples, lost]) => `${name}: ${samples} samples, ${lost} lost`)].join(" · ") : "";
+  $("rates").replaceChildren(...(running ? listRates(section) : []).map(([name, text, isSensor]) => {
+    const pair = makeElement("div");
+    if (isSensor) pair.dataset.sensor = name;
+    pair.append(makeElement("dt", name), makeElement("dd", text));
+    return pair;
+  }));
   $("state").textContent = WORDS[section.state] ?? section.state;
-  $("doing").textContent = [section.doing, typeof section.left_s === "number" && `${Math.round(section.left_s)} s left`].filter(Boolean).join(", ");
+  $("doing").textContent = [section.doing, !running && typeof section.left_s === "number" && `${Math.round(section.left_s)} s left`].filter(Boolean).join(", ");
   $("who").textContent = [section.operator, section.work_order && `order ${section.work_order}`].filter(Boolean).join(" · ");
   $("tags").replaceChildren(...(section.simulated ? [makeElement("span", "simulated", { className: "tag" })] : []));
   $("counts").textContent = Object.entries(section.counts ?? {}).map(([state, count]) => `${count} ${state}`).join(", ");
@@ -38,6 +42,12 @@ function showPresent(section) {
     return cell;
   }));
 }
+
+/** Return names and texts of what a run reports while it measures, and whether they are of a sensor. */
+const listRates = ({ fraction, left_s: left, turn_deg_s: rate, sensors }) => [
+  ["done", `${Math.round(fraction * 100)} %`], ...(typeof left === "number" ? [["left", `${Math.round(left)} s`]] : []),
+  ["turning at", `${rate} °/s`], ...sensors.map(([name, samples, lost]) => [name, `${samples} samples, ${lost} lost`, true]),
+];
 
 function showQuestion(newQuestion) {
   question = newQuestion;
@@ -55,7 +65,13 @@ function showQuestion(newQuestion) {
     return button;
   }));
   enableGo();
+  labelSend();
   focusField();
+}
+
+/** An empty answer to the question for a number ends the batch, so the button says that. */
+function labelSend() {
+  $("send").textContent = question?.kind === "number" && !$("said").value.trim() ? "End the batch" : "Enter";
 }
 
 /** Enable the button only after the tick; an operator who types "go" needs no tick. */
@@ -82,6 +98,7 @@ $("form").addEventListener("submit", (event) => {
   event.preventDefault();
   sendAnswer($("said").value.trim());
 });
+$("said").addEventListener("input", labelSend);
 $("clear").addEventListener("change", () => { enableGo(); focusField(); });
 document.addEventListener("keydown", (event) => {
   if (event.target === document.body && event.key.length === 1) focusField();
