@@ -42,7 +42,7 @@ html_extra_path = [
     "index.html",
     "../config.schema.json",
 ]  # a way to the first page; editors fetch the schema
-html_show_sourcelink = False
+html_show_sourcelink = html_show_copyright = False
 
 SECTION = re.compile(r"^## (.+)$", re.MULTILINE)
 PAGE = re.compile(r"\]\(([^)#:]+)\.(?:md|rst|ipynb)\)")
