@@ -62,7 +62,7 @@ def configuration_text(answers: Answers, schema: str, name: str) -> str:
     sections = (
         [
             f"# yaml-language-server: $schema={schema}",
-            f"# Made by rig new. rig check {name} looks whether all is there; rig run {name} calibrates.",
+            f"# A first configuration: rig check {name} looks whether all is there; rig run {name} calibrates.",
             "# Every key, its unit and its range: docs/configuration.md.",
         ],
         _turner(answers),

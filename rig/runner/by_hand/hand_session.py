@@ -160,7 +160,7 @@ class HandSession:
             return
         self._bias_doubted = False
         self.note(HandRested(*self._board_us(rest), face))
-        if move is not None and wrong is None:
+        if move is not None and now.moves and wrong is None:  # a move after a mere pause begins at no rest
             self._take(move, now, face)
         self._lay.append(face)
         self._ask(self._next(now, face), wrong)

@@ -60,7 +60,7 @@ def section(
     rows += ["    serial:", f"      port: {port}", f"      baud: {baud}", "    lines:"]
     rows += [f"      {key}: {value}" for key, value in lines.items()]
     if "temperature" not in guess.columns:
-        rows.append("      # temperature: {stated_c: …}  it prints none: state how warm it is, or U allows for much")
+        rows.append("      # temperature: {stated_c: …}  no column is known as one: state how warm it is")
     return "\n".join(rows) + "\n"
 
 

@@ -31,6 +31,19 @@ def test_without_a_mistake_the_list_is_made_and_gives_the_truth() -> None:
     held(table)
 
 
+@pytest.mark.slow
+def test_a_device_that_is_picked_up_as_the_session_begins_is_measured_from_its_next_rest() -> None:
+    """The pause before is no rest, so the move after it begins nowhere."""
+    table = Table(seed=3, settings=SHORT, hand={"reaction_time_s": [1.4, 1.4]})
+    table.operator.instruct("lay", "+y")
+    while table.operator.time_s < 1.5:
+        table.operator.step()
+    table.time_s = 0.9  # 0.5 s before it is picked up
+    table.sit()
+    assert table.again[0] == "held_not_laid_down"
+    held(table)
+
+
 @pytest.mark.thorough
 @pytest.mark.slow
 def test_it_ends_when_u_is_as_small_as_is_wanted() -> None:
