@@ -59,10 +59,12 @@ class Desk:
     work: "Work"
     part: BatchPart
 
-    def agrees(self, announcement: Sequence[str], to_do: str, chip: Chip | None) -> bool:
-        """Return whether the run may do `to_do`. Raise Refused `same_chip`."""
-        if chip is not None:
-            self.work.refuse_same_chip(self.part, chip)
+    def confirm(self, chip: Chip) -> None:
+        """Raise Refused `same_chip` if the board that has answered belongs to another number, unless confirmed."""
+        self.work.refuse_same_chip(self.part, chip)
+
+    def agrees(self, announcement: Sequence[str], to_do: str) -> bool:
+        """Return whether the run may do `to_do`."""
         return self.work.operator.agrees(announcement, to_do)
 
 

@@ -159,9 +159,11 @@ class Rig:
         if self.warming is not None:
             self.warming.prepare()
         self.recording.station.event(PreflightPassed(self.plan, report, kind.words.short))
+        self.recording.station.confirm_part()
         if self.hand is not None:
+            ask_of_other_boards(self.devices.mounted, self.recording.station)
             self._motions = iter(())
-            return  # nothing moves by itself, so nothing is asked before
+            return  # nothing moves by itself, so nobody is asked whether it may
         away_rad = max(map(abs, find_travel_to_home(self.plan, report.state.q_rad)), default=0.0)
         if not (self.phase.agreed and away_rad <= SAME_POSE_RAD):
             self._agree()

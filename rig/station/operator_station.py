@@ -20,18 +20,24 @@ class Station(Protocol):
 
     def ask(self, prompt: Prompt) -> bool: ...
 
+    def confirm_part(self) -> None:
+        """Confirm that the devices that have answered belong to the part of this run. Raise Refused `same_chip`."""
+        ...
+
 
 @dataclass(slots=True)
 class Stations:
     """Several listeners and one answer; if not `attended`, everything was agreed to in advance.
 
-    `mount` mounts the item for a stage after agreement: the operator of a simulated laboratory does.
+    `mount` mounts the item for a stage after agreement: the operator of a simulated laboratory does. `confirm` confirms
+    the part of a batch.
     """
 
     listeners: Sequence[Listener]
     answer: Callable[[Sequence[str], str], bool]
     attended: bool = True
     mount: Callable[[int], None] | None = None
+    confirm: Callable[[], None] | None = None
 
     def event(self, event: RunEvent) -> None:
         """Send an event to all listeners, in order. Drop those that raise an error, and report it to the others."""
@@ -45,6 +51,11 @@ class Stations:
             self.listeners = [listener for listener in self.listeners if listener is not dropped]
         for dropped, why in failed:
             self.event(ListenerDropped(type(dropped).__name__, f"{type(why).__name__}: {why}"))
+
+    def confirm_part(self) -> None:
+        """Confirm the part as the protocol says; a single run has nothing to compare with."""
+        if self.confirm is not None:
+            self.confirm()
 
     def ask(self, prompt: Prompt) -> bool:
         """Return whether the operator agrees; all listeners get the question and the answer."""

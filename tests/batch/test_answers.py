@@ -12,12 +12,17 @@ from rig.batch.batch_state import BatchPart, Begun, Doubt, Entry, PartBegun, Par
 from rig.batch.operators import Operator
 from rig.batch.part_sequence import Bench, Desk, Work
 from rig.batch.status import Now, after, update_by_batch
+from rig.commands.configured import load_configured
 from rig.config.judging.station_section import StationSection
-from rig.errors import Fault
+from rig.errors import Fault, Refused
 from rig.motion.steps import Rest
+from rig.runner.announcement import mounting
+from rig.runner.mounted_sensors import CalibratedBefore, Memory, Mounted, MountedSensor, ask_of_other_boards
 from rig.station.events import PhaseRecorded, Progress, SamplesTaken, SensorSamples
+from rig.station.operator_station import Stations
 from rig.station.questions import CHOICES, Kind, Question
-from support.paths import ROOT
+from rig.turners.turner_registry import kind_of
+from support.paths import CONFIGS, ROOT
 
 AT = "2026-11-25T08:00:00+00:00"
 PART = BatchPart(1, "G-001", "01-G-001", AT)
@@ -29,7 +34,10 @@ TABLE = {
     "go": (AGAIN, AGAIN, AGAIN, YES, NO, NO, AGAIN),
     "doubt": (AGAIN, YES, YES, AGAIN, NO, NO, AGAIN),
     "again": (AGAIN, YES, YES, AGAIN, NO, NO, AGAIN),
+    "stage": (AGAIN, AGAIN, AGAIN, YES, NO, NO, AGAIN),  # of an item that is mounted several times
+    "board": (AGAIN, YES, YES, AGAIN, NO, NO, AGAIN),  # by the history the number was on another one
 }
+KINDS = {"stage": "go", "board": "doubt"}  # of questions that a run asks; the others are called as their kind
 COMES = [("",), ("y", "Y"), ("yes", "Yes"), ("go", "GO"), ("n",), ("no", "No"), NUMBERS]
 
 
@@ -52,10 +60,30 @@ def ask(kind: str, typist: Typist) -> bool:
             return operator.is_mounted(PART)
         case "go":
             return operator.agrees(("The arm will move.",), "start")
+        case "stage":
+            servo = load_configured(CONFIGS / "servo.yaml")
+            stage = mounting(servo.phase.plan(), 1, kind_of(servo.loaded.config.turner).words)
+            return operator.agrees(stage.announcement, stage.to_do)
+        case "board":
+            return ask_of_another_board(operator)
         case "doubt":
             return operator.goes_on(Doubt("G-001 is done"))
         case _:
             return operator.tries_again(PART, Fault("board_link_lost", "the cable was pulled out", "Plug it in"))
+
+
+def ask_of_another_board(operator: Operator) -> bool:
+    """Ask what a run does if the history has the sensor on another board; return whether it goes on."""
+    past = CalibratedBefore(
+        "lsm9ds1", "G-001", simulated=True, number=7, day="2026-11-20", verdict="pass", board_unique_id="0123"
+    )
+    mounted = Mounted((MountedSensor("gyro", "lsm9ds1", "G-001", "4567", past, past),), Memory((past,), None))
+    station = Stations((), operator.agrees)
+    try:
+        ask_of_other_boards(mounted, station)
+    except Refused:
+        return False
+    return True
 
 
 @pytest.mark.parametrize(
@@ -70,11 +98,11 @@ def ask(kind: str, typist: Typist) -> bool:
 def test_an_answer_means_one_question_and_anything_else_is_asked_again(
     kind: str, comes: str, meaning: bool | None
 ) -> None:
-    own_no, own_yes = "no", {"mount": "", "go": "go"}.get(kind, "yes")
+    own_no, own_yes = "no", {"mount": "", "go": "go"}.get(KINDS.get(kind, kind), "yes")
     for then, decided in ((own_no, False), (own_yes, True)):
         typist = Typist(comes, then)
         assert ask(kind, typist) is (decided if meaning is None else meaning)
-        assert {question.kind for question in typist.asked} == {kind}
+        assert {question.kind for question in typist.asked} == {KINDS.get(kind, kind)}
         assert len(typist.asked) == (2 if meaning is None else 1)
         assert all(comes in question.hint for question in typist.asked[1:])
     assert ask(kind, Typist()) is False  # the operator has left
@@ -97,6 +125,8 @@ def test_the_page_for_technicians_has_this_table() -> None:
     lines = [line.strip("| ").split(" | ") for line in page.splitlines() if line.startswith("| ")]
     rows = {name: cells for name, *cells in lines if len(cells) == len(COMES) - 2}
     names = {"mount": "mount", "go": "start", "doubt": "continue anyway?", "again": "again?"}
+    names |= {"stage": "mount for a stage", "board": "another board?"}
+    assert names.keys() == TABLE.keys()
     said = {
         YES: {"it is mounted", "the arm moves", "yes"},
         NO: {"put aside", "does not start", "no"},
@@ -136,7 +166,7 @@ def test_a_batch_loses_no_part_whatever_is_typed_or_scanned_at_each_question(tmp
     faults = {"G-002": [Fault("board_link_lost", "the cable was pulled out", "Plug it in")]}
 
     def run(part: BatchPart, folder: Path, desk: Desk) -> PartEnded:
-        assert desk.agrees(("The arm will move.",), "start", None)
+        assert desk.agrees(("The arm will move.",), "start")
         for fault in faults.pop(part.serial, []):
             raise fault
         return PartEnded("pass", AT)
@@ -148,7 +178,7 @@ def test_a_batch_loses_no_part_whatever_is_typed_or_scanned_at_each_question(tmp
     assert [(part.serial, part.ended and part.ended.outcome) for part in journal.batch.parts] == [
         ("G-001", "pass"), ("G-002", "pass"), ("G-001", "pass"),
     ]  # fmt: skip
-    assert set(voice.kinds) == {"number", *TABLE}
+    assert set(voice.kinds) == {"number", *TABLE} - KINDS.keys()
 
 
 def test_in_doubt_the_first_choice_does_not_go_on() -> None:

@@ -9,8 +9,13 @@ from pathlib import Path
 
 import pytest
 
+from rig.batch.batch_journal import open_journal
+from rig.batch.batch_state import Begun, Chip, PartBegun, PartEnded
 from support.laboratories.commands import configuration, rig, wait_for_log
+from support.laboratories.worlds import fresh_host
+from support.paths import CONFIGS
 
+AT = "2026-11-25T08:00:00+00:00"
 CHIP = {"unique_id": "0123456789abcdef01234567"}
 TRAY = {"G-003": {"plugged_in": False}, "G-001": CHIP, "G-005": CHIP}
 pytestmark = pytest.mark.slow
@@ -46,6 +51,39 @@ def test_a_series_goes_through_its_list_without_questions(tmp_path: Path) -> Non
     assert re.search("simulated truth: [4-6] of 6 values within U of it", rig("show", out / found[1]["folder"]).stdout)
     assert not (out / "truth.json").exists()
     assert "A. Person" in (out / "batch.html").read_text(encoding="utf-8")
+
+
+def at_another_address(name: str) -> list[str]:
+    """Return the words that give a configuration, its tray with one board for all numbers and an address of its own."""
+    changes = {
+        "board.port": f"socket://{(host := fresh_host())}:7321",
+        "world.tray": json.dumps({"G-2": CHIP, "G-3": CHIP}),
+    }
+    if name == "servo.yaml":
+        changes["turner.port"] = f"socket://{host}:7323"
+    return [str(CONFIGS / name), *(word for key, value in changes.items() for word in ("--set", f"{key}={value}"))]
+
+
+@pytest.mark.thorough
+def test_a_simulated_hand_turns_each_part_and_the_same_board_is_refused_under_another_number(tmp_path: Path) -> None:
+    out, short = tmp_path / "batch", ["--set", "procedure.flips=8", "--set", "procedure.turns=0"]
+    parts = series(tmp_path, "G-2", "G-3")
+    done = rig("station", *at_another_address("by_hand.yaml"), *short, "--series", parts, "--out", out)
+    assert done.returncode == 1, done.stderr + done.stdout
+    assert [row["verdict"] for row in rows(out)][1] == "refused" and rows(out)[1]["why"].startswith("same_chip")
+    assert rows(out)[0]["verdict"] in ("pass", "fail"), rows(out)  # a session this short may miss its limits
+
+
+@pytest.mark.parametrize("name", ["by_hand.yaml", "servo.yaml"])
+def test_whatever_turns_it_the_same_board_is_refused_under_another_number(name: str, tmp_path: Path) -> None:
+    """A hand is asked nothing before it begins; a servo's mounting is asked about before anything is connected."""
+    journal = open_journal(tmp_path / "batch", tmp_path, Begun("", "", AT, simulated=True))
+    journal.enter(PartBegun("G-2", "01-G-2", AT))
+    journal.enter(PartEnded("pass", AT, chip=Chip(CHIP["unique_id"], (0x68,))))
+    parts = series(tmp_path, "G-2", "G-3")
+    done = rig("station", *at_another_address(name), "--series", parts, "--out", journal.folder)
+    assert done.returncode == 1, done.stderr + done.stdout
+    assert [row["why"].split(":")[0] for row in rows(journal.folder)] == ["", "same_chip"]
 
 
 @pytest.mark.thorough

@@ -6,7 +6,7 @@ part, as a run ends with it stopped for good, but ahead of time: while the part 
 
 import json
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
@@ -21,6 +21,7 @@ from rig.commands.history.remember import remember
 from rig.commands.history.run_serials import find_other_board, recall_sensors
 from rig.commands.laboratory.claims import claim_devices
 from rig.commands.laboratory.laboratory_process import make_fitter, make_mounter, simulated_laboratory
+from rig.commands.laboratory.simulated_operator import OperatorListener
 from rig.commands.laboratory.written_truth import write_truth
 from rig.commands.page_arguments import Answer
 from rig.config.models import RigConfig
@@ -131,17 +132,22 @@ class RigBench:
         new = _prepare_folder(folder, configured)
         if new:
             self.begun.add(folder)
-        listener, began_s, was_asked = PartListener(), time.monotonic(), False
+        listener, began_s, is_confirmed = PartListener(), time.monotonic(), False
 
         def answer(announcement: Sequence[str], to_do: str) -> bool:
-            nonlocal began_s, was_asked
-            chip, was_asked = None if was_asked else listener.chip, True  # the part's number is confirmed only once
-            agreed = desk.agrees(announcement, to_do, chip)
+            nonlocal began_s
+            agreed = desk.agrees(announcement, to_do)
             began_s = time.monotonic()
             return agreed
 
+        def confirm() -> None:
+            nonlocal is_confirmed  # once, whatever the stages and repeats
+            if listener.chip is not None and not is_confirmed:
+                desk.confirm(listener.chip)
+                is_confirmed = True
+
         try:
-            outcome, repeated, truth = self._run_repeatedly(folder, configured, listener, answer)
+            outcome, repeated, truth = self._run_repeatedly(folder, configured, listener, answer, confirm)
         except (Refused, Fault) as error:
             if isinstance(error, Refused) and new and not listener.recorded:
                 discard(folder)
@@ -161,15 +167,21 @@ class RigBench:
         )
 
     def _run_repeatedly(
-        self, folder: Path, configured: Configured, listener: PartListener, answer: Answer
+        self,
+        folder: Path,
+        configured: Configured,
+        listener: PartListener,
+        answer: Answer,
+        confirm: Callable[[], None],
     ) -> tuple[Outcome, int, str]:
         """Return the part's outcome, the number of repetitions of sweeps, and the agreement with a simulated truth."""
         config = configured.loaded.config
         with log(folder / LOG) as logged, view() as terminal:
-            station = Stations(
-                (logged, terminal, listener, *self.station.listeners), answer, attended=self.station.attended
-            )
-            station.mount = None if self.control is None else make_mounter(self.control)
+            listeners = (logged, terminal, listener, *self.station.listeners)
+            station = Stations(listeners, answer, attended=self.station.attended, confirm=confirm)
+            if self.control is not None:
+                station.mount = make_mounter(self.control)
+                station.listeners = (*listeners, OperatorListener(self.control))
             memory = recall_sensors(config, frozenset())
             going_on, connected = self.station.going_on, self.ahead.connect_turner
             run = Run(folder, configured.loaded, configured.script, station, memory, connected, going_on)
