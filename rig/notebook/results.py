@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from rig.data.latest_run import meant_run
 from rig.data.recording.settings import setting
 from rig.data.result_file import CheckEntry, ResultDocument, read_result
 from rig.notebook.calibrations import HEADINGS, U_TEXT, Calibration, CharacteristicValue, rows
@@ -137,9 +138,9 @@ def solve(run: Run, estimator: str | None = None, **changes: float) -> Result:
 def load_result(path: str | Path) -> Result:
     """Load the `result.json` of a run folder, or at `path` itself, without solving again.
 
-    Raise Refused `no_result`, `not_a_result`.
+    `latest` is your last run. Raise Refused `no_result`, `not_a_result`, `no_latest_run`.
     """
-    return Result(read_result(Path(path)))
+    return Result(read_result(meant_run(path)))
 
 
 def _row(check: CheckEntry) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ from typing import Any
 from rig.analysis.outcome import Outcome
 from rig.config.column_map import AS_NAMED, ColumnMap
 from rig.config.load import load_as
+from rig.data.latest_run import meant_run
 from rig.data.recording.provenance import Provenance
 from rig.data.recording.settings import RunSettings
 from rig.notebook.html import table
@@ -93,10 +94,10 @@ class Run(Mapping[str, Readings]):
 def load(path: str | Path, script: str | Path | None = None) -> Run:
     """Load a run folder or a run file, without executing foreign code in the folder.
 
-    `script`, the script of another user's recording, is executed. Raise Refused `no_run`, and as `read_run` and
-    `load_script` do.
+    `latest` is your last run. `script`, the script of another user's recording, is executed. Raise Refused `no_run`,
+    `no_latest_run`, and as `read_run` and `load_script` do.
     """
-    return Run(open_run(Path(path), None if script is None else Path(script)))
+    return Run(open_run(meant_run(path), None if script is None else Path(script)))
 
 
 def read_log(path: str | Path, columns: str | Path | None = None) -> Readings:
