@@ -189,7 +189,7 @@ def _mask_inner(rest: NDArray[np.intp], windows_s: Array, starts_s: Array, ends_
     """
     middles_s = windows_s.mean(axis=1)
     inner = (middles_s >= starts_s[rest] + LATE_S) & (middles_s <= ends_s[rest] - LATE_S)
-    return inner | ~np.isin(rest, rest[inner])
+    return np.asarray(inner | ~np.isin(rest, rest[inner]))
 
 
 def _group_by_placement(rest: NDArray[np.intp], attitudes: Array) -> list[NDArray[np.intp]]:

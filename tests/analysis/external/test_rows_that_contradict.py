@@ -130,7 +130,8 @@ def test_poses_in_any_order_and_repeated_ones_are_placed_by_their_times(tmp_path
     names = ("qw", "qx", "qy", "qz")
     poses = np.column_stack([(rows["start_s"] + rows["end_s"]) / 2, *(rows[name] for name in names)])
     shuffled = np.random.default_rng(1).permutation(len(poses))
-    path, matrices = tmp_path / "poses.csv", []
+    path = tmp_path / "poses.csv"
+    matrices = []
     for table in (poses, np.vstack([poses[shuffled], poses[100:110]])):
         np.savetxt(path, table, delimiter=",", header=",".join(["time_s", *names]), comments="", fmt="%.17g")
         placed = placed_by(samples, read_attitudes(path))
