@@ -83,7 +83,7 @@ def refuse_duplicate_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     document = dict(pairs)
     if len(document) < len(pairs):
         keys = [key for key, _ in pairs]
-        raise ValueError(f"the key {quote(next(key for key in keys if keys.count(key) > 1))} stands there twice")
+        raise ValueError(f"the key {quote(next(key for key in keys if keys.count(key) > 1))} occurs twice")
     return document
 
 

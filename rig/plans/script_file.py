@@ -19,7 +19,7 @@ from rig.plans.script_errors import script_errors
 
 SIZE_MAX_BYTES = 1_000_000  # the longest procedure shipped has 3,000
 REMEDY = "Give a Python file that defines PROCEDURE, as procedures/six_observation.py does"
-IMPORTABLE = "Correct the script; it may import what is installed, but no file beside it"
+IMPORTABLE = "Correct the script; it may import what is installed, but no file of its folder"
 
 
 @dataclass(frozen=True, slots=True)

@@ -56,7 +56,7 @@ def study(settings: Settings) -> StudyReport:
         ),
         StudyFinding("norm of gravity", float(np.linalg.norm(estimates[0, 9:12])), "m/s²", rt.GRAVITY_M_S2),
         StudyFinding(
-            "RMS error of the drifting bias, F and reference held", rt.rms_drift_error(drift, "held", "mg"), "mg"
+            "RMS error of the drifting bias, F and reference fixed", rt.rms_drift_error(drift, "held", "mg"), "mg"
         ),
         StudyFinding(
             "RMS error of the drifting bias, all parameters estimated", rt.rms_drift_error(drift, "free", "mg"), "mg"

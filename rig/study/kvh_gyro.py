@@ -62,7 +62,7 @@ def study(settings: Settings) -> StudyReport:
             StudyFinding("printed Earth rate against 7.2921159e-5 rad/s", 100 * (printed / true_norm - 1), "%", 2.69),
             StudyFinding("printed Earth rate against 15 deg/h", 100 * (printed / 15 - 1), "%", 2.69),
             StudyFinding(
-                "RMS error of the drifting bias, F and reference held",
+                "RMS error of the drifting bias, F and reference fixed",
                 rt.rms_drift_error(drift, "held", "deg_h"),
                 "deg/h",
             ),

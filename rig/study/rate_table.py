@@ -139,7 +139,7 @@ def draw_drift(panel: "Axes", rows: list[dict[str, Any]], unit_name: str, limit:
         )
     for side in (-limit, limit):
         panel.axhline(side, color="grey", linestyle="--")
-    panel.plot([], [], "ko", label="found, F and reference held")
+    panel.plot([], [], "ko", label="found, F and reference fixed")
     panel.plot([], [], "kx", label="estimated with all parameters, ±1σ")
     panel.plot([], [], color="grey", linestyle="--", label="the maker's limit")
     panel.set(xlabel="repeat (ten attitudes, 6 min each)", ylabel=label)

@@ -1,4 +1,4 @@
-"""A history: what is entered is found again, nothing is lost, nothing stands there twice, nothing is taken away."""
+"""A history: what is entered is found again, nothing is lost, nothing occurs twice, nothing is taken away."""
 
 import json
 import os

@@ -47,7 +47,7 @@ def in_state(driver: Chrome, state: str) -> bool:
 
 WHILE_IT_RUNS = ["connecting", "connected", "ready", "moving", "measuring", "resting", "judging"]
 STOPPED = "stopped from the page; the arm stands still; the data are kept in a run. Go on with: rig resume 'a run'"
-REFUSED = Refused("speed_slider", "the speed slider stands at 50 %", "Set it to 100 %")
+REFUSED = Refused("speed_slider", "the speed slider is at 50 %", "Set it to 100 %")
 GONE = Fault("board_link_lost", "the board on /dev/ttyACM0 has gone", "Check its cable")
 TRACEBACK = "Traceback (most recent call last):\n  …\nZeroDivisionError: division by zero\n"
 ENDINGS: dict[str, tuple[str, str, Callable[[Path], Iterable[RunEvent]]]] = {

@@ -218,7 +218,7 @@ def list_uncertainties(
         clock_std=clock.std,
         clock_dof=clock.dof,
         clock_half_width=None if clock.comparisons else PPM * uncertainty.controller_clock_ppm,
-        clock_source="held against "
+        clock_source="compared with "
         + (" and ".join(comparison.by for comparison in clock.comparisons) or "no other clock"),
         state_jitter_s=surroundings.state_jitter_s,
         state_jitter_dof=surroundings.state_jitter_dof,

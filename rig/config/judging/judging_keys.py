@@ -148,7 +148,7 @@ class UncertaintyKeys(BaseModel, Generic[OfSensors]):
     bias_deg_s_k: OfSensors = _part_default_key("change of a gyroscope's bias for 1 K", "°/s/K")
     scale_ppm_k: OfSensors = _part_default_key("change of a gyroscope's scale factor for 1 K", "ppm/K")
     bias_instability_deg_h: OfSensors = _part_default_key(
-        "smallest Allan deviation of a gyroscope at rest (in-run bias stability): how much its bias wanders, even "
+        "smallest Allan deviation of a gyroscope at rest (in-run bias stability): how much its bias drifts, even "
         "with the longest average",
         "°/h",
     )

@@ -79,7 +79,7 @@ def reason(error: Exception) -> str:
     if "checksum" in text:
         return f"it is damaged: {text}"
     if isinstance(error, MemoryError) or "filter returned failure" in text or "memory allocation failed" in text:
-        return "its rows cannot be unpacked: they are damaged, or more than they are said to be"
+        return "its rows cannot be unpacked: they are damaged, or more than is stated"
     if "required filter" in text or "filter plugins disabled" in text:
         return "its rows are packed by a filter that is not one of the HDF5 library's own"
     system = re.search(r"error message = '([^']*)'", text)

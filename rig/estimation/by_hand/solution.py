@@ -213,7 +213,7 @@ def insufficient_session(session: HandRecording, expanded: Array | None) -> Faul
         start_s, end_s = session.held_in_air_s[0]
         return Fault(
             "held_not_laid_down",
-            f"from {start_s:.1f} to {end_s:.1f} s the body was held still, not laid down"
+            f"from {start_s:.1f} to {end_s:.1f} s the body was held in the hand, not laid down"
             + (f", and {len(session.held_in_air_s) - 1} times more" if len(session.held_in_air_s) > 1 else ""),
             "Lay it down and let go, for a second, after every move",
         )

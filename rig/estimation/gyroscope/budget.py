@@ -23,7 +23,7 @@ WANDERING, FLICKER = "bias instability", "flicker of the bias"
 STATES = "times of the arm's states"
 CLOCK = "controller clock"
 ENCODERS = "turner's encoders"
-AXES, REPEATABILITY, MOUNTS = "arm's axes", "arm's repeatability", "mounting anew"  # errors of directions
+AXES, REPEATABILITY, MOUNTS = "arm's axes", "arm's repeatability", "remounting"  # errors of directions
 STAMPS = "times of the samples"
 NOT_GIVEN = "is not given"  # ends the source of a value that the configuration lacks
 

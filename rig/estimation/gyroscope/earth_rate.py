@@ -259,8 +259,8 @@ def check_earth_seen(
     if free < LEAST_RATIO * worst:
         raise Fault(
             "earth_rate_not_observable",
-            f"the gyroscope finds {component} to be {free / DEG_H:.3g} deg/h and knows it to {worst / DEG_H:.2g}, "
-            f"not to a tenth",
+            f"the gyroscope finds {component} to be {free / DEG_H:.3g} deg/h, u {worst / DEG_H:.2g} deg/h, "
+            "which is more than a tenth of it",
             "Use a gyroscope with a steadier bias and less noise, or rest longer; give latitude and heading instead",
         )
     direction = free_rad_s / free

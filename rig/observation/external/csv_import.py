@@ -195,7 +195,7 @@ def _speeds(sweeps: Mapping[str, Array]) -> Array:
         elif moved > 0 and abs(norm - 1) > 1e-3:
             what = f"has an axis of length {norm:.3g}"
         elif any(sweeps[name][row - 1] <= 0 for name in STD_COLUMNS if name in sweeps and moved > 0):
-            what = "is said to be known exactly"
+            what = "is stated to be known exactly"
         if what:
             raise Refused(
                 "bad_sweep",

@@ -99,7 +99,7 @@ def attitudes_in(path: Path) -> Columns | None:
     if not columns:
         raise Refused(
             "no_attitudes",
-            f"{path} tells what sensors read, and nothing of the attitudes they were in",
+            f"{path} contains readings of sensors, and not their attitudes",
             "Give the attitudes as CSV, or as poses in a ROS 2 bag",
         )
     time_s = columns.pop(TIME)

@@ -45,7 +45,7 @@ class Kvh1775:
         self._counter: MessageCounter | None = None  # while it streams
         self._format = b""
         self._received = bytearray()
-        no_message = f"sensors.{sensor}: no whole message from the KVH 1775 on {port}"
+        no_message = f"sensors.{sensor}: no complete message from the KVH 1775 on {port}"
         faults = PortFaults(
             closed=SensorError("kvh_link_lost", f"sensors.{sensor}: the port {port} closed", _CABLE),
             silent=SensorError("kvh_link_lost", no_message, _CABLE),
@@ -201,7 +201,7 @@ class Kvh1775:
         if decoded.tests:
             raise SensorError(
                 "kvh_restarted",
-                f"{self._where} told of its built-in test while it streamed: it was switched off and on",
+                f"{self._where} reported its built-in test while it streamed: it was switched off and on",
                 "Check its supply, then run again",
             )
         if (decoded.messages["format"] != self._format).any():

@@ -226,7 +226,7 @@ def _interpret_texts(common: tuple[str, ...]) -> tuple[str, str, tuple[str, ...]
     keys = tuple(part.strip(_AROUND) for part in (before, *inside))
     if all(keys) and len(set(keys)) == len(keys) and not after.strip(_AROUND):
         return "comma", "", keys
-    raise NoShape(f"between its numbers stands {' … '.join(quote(part) for part in (before, *inside[:3], after))}")
+    raise NoShape(f"between its numbers is {' … '.join(quote(part) for part in (before, *inside[:3], after))}")
 
 
 def _find_header(others: Sequence[str], separator: str, count: int) -> tuple[str, ...]:

@@ -170,7 +170,7 @@ class MavlinkSource:
             if imu.without_reading > imu.counter.number:
                 raise SensorError(
                     "autopilot_no_reading",
-                    f"sensors.{imu.name}: by its field fields_updated {imu.line.imu} held no new reading in "
+                    f"sensors.{imu.name}: by its field fields_updated {imu.line.imu} contained no new reading in "
                     f"{imu.without_reading} of {imu.without_reading + max(imu.counter.number, 0)} messages",
                     "Lower rate_hz, or choose another message with mavlink.imu",
                 )

@@ -63,5 +63,5 @@ class ArmReport:
     @property
     def words(self) -> str:
         """The arm described in a line of text: model, serial number, software."""
-        model = "model not told" if self.model is None else f"{MAKER} {self.model}"
+        model = "model not reported" if self.model is None else f"{MAKER} {self.model}"
         return f"{model}, serial number {self.serial_number}, PolyScope {self.polyscope}"

@@ -21,7 +21,7 @@ from rig.turners.ur.identity import identify_model, is_polyscope_x, series_probl
 
 LOOK_S = 1.0  # time-out of a port that may be closed
 ANSWER_S = 5.0  # time-out of an open port while nothing moves
-NOT_TOLD = "not told"
+NOT_TOLD = "not reported"
 
 
 def stop_problem(host: str, version: tuple[int, ...]) -> Problem | None:

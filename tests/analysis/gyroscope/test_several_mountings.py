@@ -56,7 +56,7 @@ def test_how_the_item_was_mounted_off_is_found() -> None:
     assert mount.stage == 1
     assert mount.rotation_rad == pytest.approx(-np.radians(off_deg[1]), abs=4 * float(mount.std_rad.max()))
     assert mount.std_rad.max() < np.radians(OFF_DEG) / 10
-    line = next(contributor for contributor in budget.contributors if contributor.name == "mounting anew")
+    line = next(contributor for contributor in budget.contributors if contributor.name == "remounting")
     assert line.half_width == OFF_DEG
 
 
@@ -66,7 +66,7 @@ def test_what_one_axis_a_stage_does_not_tell_of_the_mounts_is_in_the_budget() ->
     off_deg = np.random.default_rng(5).uniform(-OFF_DEG, OFF_DEG, (3, 3))
     error, budget, mounts = solved(setup, 5, off_deg)
     assert min(mount.std_rad.max() for mount in mounts) > np.radians(OFF_DEG) / 3
-    assert budget.std_of("mounting anew")[:3].max() > 1e-5
+    assert budget.std_of("remounting")[:3].max() > 1e-5
     assert np.abs(error / budget.std[:3]).max() < 4
 
 

@@ -90,7 +90,7 @@ def test_a_key_that_stands_twice_is_refused(tmp_path: Path, capsys: pytest.Captu
     text = (folder / "result.json").read_text(encoding="utf-8")
     (folder / "result.json").write_text(text.replace("{", '{"verdict": "fail", ', 1), encoding="utf-8")
     assert main(["show", str(folder)]) == 2
-    assert "rig: not_a_result: " in (said := capsys.readouterr().err) and "'verdict' stands there twice" in said
+    assert "rig: not_a_result: " in (said := capsys.readouterr().err) and "'verdict' occurs twice" in said
 
 
 def test_nesting_without_end_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

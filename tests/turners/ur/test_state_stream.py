@@ -187,8 +187,8 @@ def test_a_connection_that_closes_gives_no_more_states(controllers: Controllers)
 @pytest.mark.parametrize(
     ("changed", "said"),
     [
-        ({2: 1e4}, "base stands at 1e+04 rad"),
-        ({8: -21.0}, "base stands at 0.0024 rad and turns at -21 rad/s"),
+        ({2: 1e4}, "base is at 1e+04 rad"),
+        ({8: -21.0}, "base is at 0.0024 rad and turns at -21 rad/s"),
         ({7: float("nan")}, "wrist_3 is nan"),
         ({4: float("inf")}, "elbow is inf"),
         ({14: 1.5}, "speed slider is at 150 %"),

@@ -33,7 +33,7 @@ def impossible_state(state: ArmState) -> Problem | None:
             return _impossible(f"its {name} is {numbers[0]:g}")
     for name, (angle, speed) in _joints(state):
         if abs(angle) > ANGLE_RAD or abs(speed) > SPEED_RAD_S:
-            return _impossible(f"its {name} stands at {angle:.4g} rad and turns at {speed:.4g} rad/s")
+            return _impossible(f"its {name} is at {angle:.4g} rad and turns at {speed:.4g} rad/s")
     if not 0.0 <= state.target_speed_fraction <= 1.0:
         return _impossible(f"its speed slider is at {100 * state.target_speed_fraction:.4g} %")
     for name in ("robot_mode", "safety_mode", "runtime_state"):
