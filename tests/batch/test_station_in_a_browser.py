@@ -3,6 +3,7 @@
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from queue import SimpleQueue
 
 import pytest
@@ -30,7 +31,6 @@ NOW = Now("checking", "<b>G-003</b>", "", None, "A. Person", "W-17", True, {"pas
 WORDS = ("The arm at 127.0.0.2 will move for 29 s.", "Nobody and nothing may be within its reach.")
 
 
-THEME = "return document.documentElement.dataset.theme"
 FILLED = "return document.querySelector('main').lastElementChild.getBoundingClientRect().bottom / innerHeight"
 
 
@@ -58,6 +58,10 @@ def replaced(button: WebElement) -> bool:
     return False
 
 
+def has_theme(driver: Chrome, theme: str) -> bool:
+    return bool(driver.execute_script("return document.documentElement.dataset.theme") == theme)
+
+
 def test_a_number_is_scanned_and_go_is_typed_or_ticked(driver: Chrome) -> None:
     questions = "number", "go", "go"
     with on_page(Present(NOW), PageAddress(port=0)) as (voice, url), answered(Operator(voice), *questions) as answers:
@@ -65,9 +69,9 @@ def test_a_number_is_scanned_and_go_is_typed_or_ticked(driver: Chrome) -> None:
         wait_for(lambda: "serial number" in text(driver, "text"), "the question for a number")
         assert text(driver, "part") == "<b>G-003</b>" and "A. Person" in text(driver, "who")
         assert [element.text for element in driver.find_elements(By.CSS_SELECTOR, "#tray li strong")] == ["✓", "✗", "◉"]
-        for dark in (False, True):
-            set_theme(driver, dark=dark)
-            assert driver.execute_script(THEME) == ("dark" if dark else "light")
+        for theme in ("light", "dark"):
+            set_theme(driver, dark=theme == "dark")
+            wait_for(partial(has_theme, driver, theme), f"a {theme} page")
             legible(driver)
         picture(driver, "station-number")
         send = driver.find_element(By.ID, "send")
