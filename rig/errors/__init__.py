@@ -56,7 +56,7 @@ def raised_as(kind: type[RigError]) -> Iterator[None]:
 
 
 def refuse(problems: Sequence[Problem]) -> None:
-    """Raise `Refused` under the name of the first problem, with all problems and remedies; nothing without problems."""
+    """Raise `Refused` under the first problem's name, with all problems and remedies; do nothing if there are none."""
     if not problems:
         return
     *others, last = problems

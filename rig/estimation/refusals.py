@@ -148,7 +148,7 @@ def check_reading_ratio(ratio: float, where: str) -> None:
 
 
 def is_plausible(ratio: ArrayLike) -> NDArray[np.bool_]:
-    """Return which of these ratios of reading over true value, or their inverses, a sensor can have."""
+    """Return which ratios a sensor can have, of reading to true value or of true value to reading."""
     ratios = np.asarray(ratio, dtype=np.float64)
     return (ratios < MAX_SCALE) & (ratios > 1 / MAX_SCALE)
 

@@ -110,7 +110,7 @@ class Readings:
         return self.signal(TEMPERATURE.name)
 
     def signal(self, quantity: str) -> Signal:
-        """Return the readings of the quantity `name`. Raise Refused `no_such_quantity`; as `on_arm_clock` does."""
+        """Return the readings of `quantity`. Raise Refused `no_such_quantity`; Fault as `estimate_time_base` does."""
         channel = next((channel for channel in self.sensor.channels if channel.quantity == quantity), None)
         if channel is None:
             raise Refused(

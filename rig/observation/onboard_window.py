@@ -31,8 +31,8 @@ def revolution_on_the_board(
     """Return a revolution's start and end on the board's clock, µs, and its speed by the arm's joints, rad/s.
 
     The sweep began after the state `first`. `samples` (n,) SAMPLE_DTYPE and the turner's `states` (m,) should begin
-    earlier, because the fast motion to its start determines the time base; a slow sweep alone may not. Raise Fault as
-    `estimate_time_base` and `ArmMotion.turn` do.
+    earlier, because the fast motion to its start determines the time base, for which a slow sweep may not suffice.
+    Raise Fault as `estimate_time_base` and `ArmMotion.turn` do.
     """
     names = [f"joint {number}" for number in range(kinematics.joints)]
     motion = ArmMotion(states, kinematics, names, reading_std_rad=reading_std_rad)

@@ -182,7 +182,7 @@ def _count_until(board_time_s: Array, span_s: float) -> int:
 
 
 def _search_clock(board_time_s: Array, readings: Array, motion: KnownMotion) -> TimeBase:
-    """Return the clock, offset and drift, that explains most, close enough for the fine fit to converge."""
+    """Return the clock with which the arm's motion explains most of the readings, as a start of the fine fit."""
     reference, half_s = (board_time_s[0] + board_time_s[-1]) / 2, (board_time_s[-1] - board_time_s[0]) / 2
     spacing = 2 * COARSE_REACH_S / half_s
     count = round(max(min(MAX_DRIFT, MAX_DRIFT_STEPS * spacing), MAX_DRIFT_LONG_RUN) / spacing)
@@ -348,7 +348,7 @@ def _refine_clock(
     """Return the clock after one Gauss–Newton step, and the inflation (3,) of each axis' variance due to correlation.
 
     Model: m = A r(t) + c + noise, r the flange's rate at controller time t; A (3, 3) and c (3,) are also fitted.
-    Without `inflation` it is that of the residuals.
+    Without `inflation`, estimate it from the residuals.
     """
     t, since = clock.controller_time_s(board_time_s), board_time_s - clock.reference_s
     columns = np.column_stack([motion.rate(t), np.ones(len(t))])

@@ -57,7 +57,7 @@ class Open:
 
     @property
     def done(self) -> bool:
-        """Whether the session is complete: as many flips as the list has, over all six faces."""
+        """Whether the session is complete: all turns, and all listed flips or as many others over all six faces."""
         return not self.turns and (not self.pairs or (self.flips == 0 and not self.faces))
 
 

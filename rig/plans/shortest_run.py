@@ -77,7 +77,9 @@ class Tried(Protocol):
 def shortest_run(config: RigConfig, wanted: TargetUncertainty) -> Shortest:
     """Return the shortest run of this configuration whose predicted uncertainty meets the target.
 
-    Raise Refused `not_foretold` if the uncertainty of the procedure or of the target's quantity is not predicted.
+    A family is skipped if its endless run misses the target by more than the factor `HOPELESS`. If all are, only the
+    longest run of the best family is evaluated. Raise Refused `not_foretold` if the uncertainty of the procedure or of
+    the target's quantity is not predicted.
     """
     what = find_search(config)
     _refuse_others(wanted, config)

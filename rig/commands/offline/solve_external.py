@@ -215,7 +215,7 @@ def _read_only(options: Namespace) -> tuple[str, ...]:
 
 
 def _read_turn_options(options: Namespace) -> "Columns":
-    """Return the options of a session by hand as a table's row. Raise Refused `bad_option`, `clock_unknown`."""
+    """Return the options of a session by hand as columns of one row. Raise Refused `bad_option`, `clock_unknown`."""
     import numpy as np
 
     from rig.estimation.by_hand.session_parts import FACES

@@ -48,7 +48,7 @@ class Silence:
         self.ticks += not (starved or unheard)
 
     def lasts_over(self, limit: float) -> bool:
-        """Return whether there were more than `limit` silent ticks, or far more on an overloaded machine.
+        """Return whether more than `limit` ticks were silent, or more than `spared` times as many have passed.
 
         The limit applies to a machine with a processor for every program; the machine's `crowding` extends it.
         """

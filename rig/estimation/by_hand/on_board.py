@@ -100,7 +100,7 @@ def _equations(centre: Array, move: BoardMove) -> Iterator[Equation]:
 
 
 def _vertical_on_face(centre: Array, face: int) -> tuple[Array, Array]:
-    """Return the vertical (3,) in a body on a face, and its derivative (3, 2) with respect to the face's two angles."""
+    """Return the vertical (3,) in the body's frame with `face` up, and its derivative (3, 2) by that face's angles."""
     axis, leans = face // 2, centre[FACES][2 * face : 2 * face + 2]
     up, face_axes = np.zeros(3), np.zeros((3, 2))
     face_axes[(axis + 1) % 3, 0] = face_axes[(axis + 2) % 3, 1] = 1.0

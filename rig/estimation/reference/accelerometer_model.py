@@ -270,7 +270,7 @@ def combine_effects(independent: Array, constant: Array | None, fraction: float)
 
 
 def turned(theta: Array, movement: Movement) -> Array:
-    """Return the effect of small rotations on the readings, independent for each dwell and each station."""
+    """Return the effect (3 K, P) of the arm's errors on the readings; `effects` names the columns."""
     count, sweeps = len(movement.dwells.readings_m_s2), movement.sweeps
     gravity, s = project_reference(theta[DELAY], movement), find_force(theta, movement)
     stations, indices = np.unique(sweeps.stations, return_inverse=True)

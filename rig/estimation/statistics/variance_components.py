@@ -153,7 +153,7 @@ class MixedModel:
         return _find_half_width(np.array(offsets), np.array(variances), weights)
 
     def _whiten(self, std: Array) -> tuple[Array, Array, Array, Array, float]:
-        """Return L of the covariance L Lᵀ, the whitened design and observed, the information, the log-likelihood."""
+        """Return L of the covariance L Lᵀ, whitened design, whitened observations, information and log-likelihood."""
         from scipy.linalg import solve_triangular
 
         mixed = self.mixed
@@ -210,7 +210,7 @@ class MixedModel:
 
 
 def sample_adaptively(log_density: Callable[[Array], float], middle: Array, curvature: Array) -> Array:
-    """Return the weights (s,) of the samples at which a log-density of k variables is called, in the order of calls.
+    """Draw s samples of k variables, call the log-density at each, and return their weights (s,) in the same order.
 
     Adaptive multiple importance sampling (Cornuet et al., Scand. J. Stat. 39 (2012) 798): each round draws from
     Student's t with the mean and covariance of all earlier samples. The first round uses the maximum and the curvature

@@ -130,7 +130,7 @@ class OverTemperature:
         return moved
 
     def changes(self, temperature_c: Array) -> tuple[Array, Array]:
-        """Return k over k at the reference (N, 3), and the difference (N, 3) of c from its value there."""
+        """Return k divided by its value at the reference temperature, and c minus its value there, (N, 3) each."""
         rows = np.vander(temperature_c - self.reference_c, HIGHEST + 1, increasing=True)
         return rows @ (self.scale / self.scale[0]), rows[:, 1:] @ self.bias[1:]
 
@@ -442,10 +442,10 @@ def _loop_covariance(size: Array, std: Array) -> Array:
 
 
 def _gradient(polynomials: OverTemperature, half_width_k: float) -> TemperatureLine:
-    """Return the contributor of a temperature difference between sensor and thermometer.
+    """Return the contributor of the temperature difference between sensor and thermometer.
 
-    It shifts all values along the polynomials, in two independent ways: equally everywhere, and with opposite signs at
-    both ends of the range, because a heater's power and the loss to the air grow with temperature.
+    A difference changes each value by the slope of its polynomial. One part is the same over the range; an independent
+    part has opposite signs at the ends of the range, as a heater's power and the loss to the air grow with temperature.
     """
     both = np.array([polynomials.scale, polynomials.bias])
     steep = np.arange(1, HIGHEST + 1)[:, None] * both[:, 1:]

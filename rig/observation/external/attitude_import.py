@@ -129,11 +129,11 @@ def _drop_other_rows(path: Path, table: CsvTable) -> dict[str, Array]:
 
 
 def placed_by(samples: Samples, table: Mapping[str, Array], *, find_clock: bool = False) -> PlacedReadings:
-    """Average samples in attitudes, given by the columns of their file.
+    """Average the samples of each attitude in `table`, the columns of a file of attitudes.
 
-    With `find_clock` each file has its own clock; rows without samples are left out. Raise Refused `bad_quaternion`,
-    `bad_attitude_row`, `overlapping_attitudes`; Fault `clocks_apart`, `lost_samples`, `too_few_observations`, and with
-    `find_clock` those of `find_reference_clock`.
+    With `find_clock` the table has a clock of its own, which is estimated, and its rows without samples are left out.
+    Raise Refused `bad_quaternion`, `bad_attitude_row`, `overlapping_attitudes`; Fault `clocks_apart`, `lost_samples`,
+    `too_few_observations`, and with `find_clock` those of `find_reference_clock`.
     """
     time_s, readings = samples.time_s, samples.readings
     on_arrival = samples.sampling is not None and samples.sampling.on_arrival

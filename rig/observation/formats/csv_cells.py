@@ -91,7 +91,7 @@ def strip_blank_end(headings: Sequence[str]) -> list[str]:
 
 
 def repeats(row: Sequence[str], headings: Sequence[str]) -> bool:
-    """Return whether a row is the heading again, as loggers write it when they start anew or every some rows."""
+    """Return whether a row repeats the heading, as loggers write it when they restart or at regular intervals."""
     return strip_blank_end([cell.strip().lstrip("#% ") for cell in row]) == strip_blank_end(headings)
 
 

@@ -257,10 +257,10 @@ def _spread_stalled(log: _UnorderedLog) -> _UnorderedLog:
 
 
 def _separate_equal(log: _UnorderedLog) -> _UnorderedLog:
-    """Return the log without readings that share a stamp and have no time of their own.
+    """Return the log without the second of two readings with one stamp, unless an interval beside them is free.
 
-    Coarse stamps and those of arrival are often equal, and an even series has a time for each reading. With good
-    stamps, a reading has a time of its own if an interval is missing before or after it.
+    If an interval is missing before or after the two, one of them is moved into it. A log with coarse stamps or stamps
+    of arrival is unchanged: in it equal stamps are usual, and an even series has a time for each reading.
     """
     steps_s = np.diff(log.stamps_s)
     equal = np.flatnonzero(steps_s == 0)

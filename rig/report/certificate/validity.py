@@ -36,5 +36,5 @@ def list_omitted_accelerations(entry: AccelerometerEntry) -> str:
 
 
 def list_omitted_fields() -> str:
-    """Return the errors that a magnetometer's U omits; the arm's field is stated with its bias."""
+    """Return the errors that a magnetometer's U omits; not the arm's field, which is stated with the bias."""
     return ", ".join(("nonlinearity", "iron magnetised since", *ALWAYS))

@@ -38,7 +38,7 @@ ORDER = (
 
 
 def accelerometers_elsewhere(outcome: Outcome) -> dict[str, AccelerometerEntry]:
-    """Return the accelerometers that were calibrated in attitudes of a file, by name."""
+    """Return the entries, by name, of the accelerometers that were calibrated in attitudes stated by a file."""
     return {
         name: attitudes_entry(OF_ACCELEROMETERS, result, item,
             role="calibrate",
@@ -57,7 +57,7 @@ def accelerometers_elsewhere(outcome: Outcome) -> dict[str, AccelerometerEntry]:
 
 
 def magnetometers_elsewhere(outcome: Outcome) -> dict[str, MagnetometerEntry]:
-    """Return the magnetometers that were calibrated in attitudes of a file, by name."""
+    """Return the entries, by name, of the magnetometers that were calibrated in attitudes stated by a file."""
     return {
         name: attitudes_entry(OF_MAGNETOMETERS, result, item,
             model=magnetometer.MODEL,

@@ -28,7 +28,7 @@ class CheckWords:
 
 @cache
 def check_words() -> Mapping[str, CheckWords]:
-    """Return the table by name. Raise ValueError for a line without the form `name | means | what to do`."""
+    """Return the table's rows by the check's name. Raise ValueError for a line unlike `name | means | what to do`."""
     return {cells[0]: CheckWords(*cells) for cells in read_rows(TABLE, "name | what it means | what to do")}
 
 

@@ -229,7 +229,7 @@ def _mean(values: Array) -> Array:
 def _make_triad(
     lines: LinesSection, quantity: Quantity, section: _TriadSection, full_scale: float
 ) -> tuple[Channel, _Printed]:
-    """Return a channel of three axes, with the stated step of the last printed digit if it fits 32 bits."""
+    """Return a channel of three axes, with the last digit's step or a coarser 32-bit one, and its printed columns."""
     unit = section.scale * UNITS[section.unit].size
     step = 0.0 if section.decimals is None else unit * 10.0**-section.decimals
     step = max(step, full_scale / FULL_SCALE_COUNTS)

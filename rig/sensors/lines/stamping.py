@@ -53,9 +53,10 @@ class Stamper:
     def stamp(
         self, values: Array, skipped: int, host_time_s: float
     ) -> tuple[NDArray[np.bool_], NDArray[np.int64], NDArray[np.int64]]:
-        """Return a mask (n,) of the samples in `values` (n, columns), their numbers (m,) from 0, and times (m,), µs.
+        """Return a mask (n,) of the m valid rows of `values` (n, columns), with their numbers (m,) and times (m,), µs.
 
-        They arrived at `host_time_s`, after `skipped` lines that were rejected. Raise SensorError `lines_time_jumped`.
+        Numbers count lost samples too, from 0. The rows arrived at `host_time_s`, after `skipped` rejected lines. Raise
+        SensorError `lines_time_jumped`.
         """
         if not len(values):
             return np.zeros(0, np.bool_), np.zeros(0, np.int64), np.zeros(0, np.int64)

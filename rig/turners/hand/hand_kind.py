@@ -41,7 +41,7 @@ class HandState:
         return ()
 
     def to_record(self) -> Row:
-        """Return the times."""
+        """Return the row of a run file: the state's times."""
         return self.time_s, self.host_time_s
 
 

@@ -54,7 +54,7 @@ class SimulatedTruth:
         return mean
 
     def depends_on_speed(self, name: str) -> bool:
-        """Return whether a gyroscope's scale factors between plus and minus a speed depend on that speed."""
+        """Return whether a gyroscope's scale factors from rotations at plus and minus one speed depend on the speed."""
         return self._world.sensors[name].nonlinearity_odd_per_rad_s != 0
 
     def _rates(self, name: str, windows_s: Windows, rate_rad_s: float) -> np.ndarray:

@@ -63,7 +63,7 @@ class StopOrder:
 
     @property
     def refusals(self) -> str:
-        """The paths that refused, with the controller's words; empty if none did."""
+        """The refusals of the stop, each with its path and the controller's words; empty if no path refused."""
         with self._changed:
             return ", ".join(answer for name, answer in self._answers.items() if name in self._refused)
 

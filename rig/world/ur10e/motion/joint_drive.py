@@ -48,7 +48,7 @@ class JointDrive:
     def shake(self, joint: int, u: float, v: float, a: float) -> list[Shaken]:
         """Return the ripple of a joint whose smooth angle is `u` (rad), with rate `v` and acceleration `a`.
 
-        It includes the neighbours' ripple as far as it reaches this joint.
+        With crosstalk, also return the fraction of it that reaches each neighbour with a parallel axis.
         """
         sines = cosines = bends = 0.0
         for n, amplitude, phase in self.orders[joint]:

@@ -28,7 +28,7 @@ Drawing = tuple[tuple[float, float, int], ...]  # of each link length a, offset 
 
 
 def build_drawing(a_m: tuple[float, float], d_m: tuple[float, float, float, float]) -> Drawing:
-    """Return the drawing of an arm of this maker from a2 a3 and d1 d4 d5 d6; the twists are the same for all."""
+    """Return the nominal parameters of a UR arm's links from a2 a3 and d1 d4 d5 d6; all UR arms share the twists."""
     (a2, a3), (d1, d4, d5, d6) = a_m, d_m
     return ((0.0, d1, 1), (a2, 0.0, 0), (a3, 0.0, 0), (0.0, d4, 1), (0.0, d5, -1), (0.0, d6, 0))
 
