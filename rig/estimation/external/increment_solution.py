@@ -137,19 +137,25 @@ def solve_known_increments(time_s: Array, readings: Array, fixes: Fixes, start: 
 
 @dataclass(frozen=True, slots=True)
 class _Settled:
-    """The converged fit, its model and its variance components."""
+    """The converged fit, its model, and the maxima (n, k) of its variance components' posterior."""
 
     state: DriftState
     causes: DriftModel
     model: MixedModel
-    std: Array
+    maxima: Array
     solved: MixedFit
     iterations: int
+
+    @property
+    def std(self) -> Array:
+        """The most probable standard deviations (k,)."""
+        std: Array = self.maxima[0]
+        return std
 
 
 def _settle(recorded: AttitudeSamples, state: DriftState) -> _Settled:
     """Solve by Gauss–Newton; the variances are re-estimated in the first iterations only."""
-    std: Array | None = None
+    maxima: Array | None = None
     for iteration in range(1, PASSES + 1):
         averaged = average_fixes(recorded, state)
         if iteration == 2:
@@ -160,13 +166,15 @@ def _settle(recorded: AttitudeSamples, state: DriftState) -> _Settled:
         if iteration == 1:
             conditioning = _conditioning(model.mixed)
             refusals.check_conditioning(conditioning, BIAS.stop, MAX_CONDITION, "some of F and bias", REMEDY)
-        if std is None or iteration <= SIZED:
-            std = model.estimate(std)
-        solved = model.solve(std)
+        if maxima is None or iteration == SIZED:
+            maxima = model.find_maxima()
+        elif iteration < SIZED:
+            maxima = model.find_maxima(maxima[0])
+        solved = model.solve(maxima[0])
         if not np.linalg.norm(solved.theta[MATRIX]) < LARGEST_STEP:
             raise refusals.untrustworthy_attitudes(refusals.NO_FIT)
         state = state.after_step(solved.theta)
-        settled = _Settled(state, causes, model, std, solved, iteration)
+        settled = _Settled(state, causes, model, maxima, solved, iteration)
         u = np.sqrt(np.diag(solved.covariance))[: CLOCK + 1]
         if iteration > 2 and (np.abs(solved.theta[: CLOCK + 1]) < SETTLED * u).all():
             break
@@ -246,7 +254,7 @@ def _build_result(settled: _Settled, aside_s: Array) -> KnownIncrements:
     """Return the result of a converged fit; the bias is the mean over this recording's intervals."""
     solved, state = settled.solved, settled.state
     wanted = np.eye(len(solved.theta))[np.r_[MATRIX, EARTH, BIAS]]
-    half_width = settled.model.expand(settled.std, wanted)
+    half_width = settled.model.expand(settled.maxima, wanted)
     ratio = half_width / (2 * np.sqrt(np.einsum("qi,ij,qj->q", wanted, solved.covariance, wanted)))
     causes = {name: wanted @ cause @ wanted.T * ratio[:, None] * ratio for name, cause in _causes(settled).items()}
     sizes = partial(settled.causes.std_of, std=settled.std)

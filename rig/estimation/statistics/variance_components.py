@@ -29,7 +29,8 @@ TOLERANCE, MOST_STEPS = 1e-2, 100  # of the log-posterior's gradient; Newton ste
 LONGEST_STEP = 4.0  # of ln σ
 BEYOND, APART = 3.5, 2.0  # of ln σ: one cause exceeds its prior's median, all others fall below theirs
 FEW = 240  # residuals: more of them have one maximum
-FIRST_STEPS, CLIMBED = 6, 2  # Newton steps from each of these points, and the number that is climbed to the end
+DISTINCT, NEGLIGIBLE = 1.0, 5.0  # of ln σ between two maxima; of the log-posterior below the greatest
+FIRST_STEPS = 6  # Newton steps from each of these points: the likely ones are climbed to the end
 UNLIKELY = 1e30  # negative log-posterior of what cannot be computed
 
 
@@ -81,21 +82,28 @@ class MixedModel:
         theta = covariance @ (design.T @ observed)
         return MixedFit(theta, covariance, likelihood, self.mixed.observed - self.mixed.design @ theta)
 
-    def estimate(self, start: Array | None = None) -> Array:
-        """Return the standard deviations (k,) of maximum posterior probability.
+    def find_maxima(self, start: Array | None = None) -> Array:
+        """Return the standard deviations (n, k) at the maxima of the posterior, the most probable first.
 
         Few residuals may have several maxima, in which one cause or another explains the largest. Without a `start` the
-        search begins at the priors' medians and at points where one cause exceeds all others.
+        search begins at the priors' medians and at points where one cause exceeds all others. Maxima that are less
+        probable than the first by more than `NEGLIGIBLE` are left out.
         """
         if start is not None:
-            return np.asarray(np.exp(self._climb(np.log(start)).x), dtype=np.float64)
+            return np.exp([self._climb(np.log(start)).x])
         middle = np.log(self.mixed.scales)
         if len(self.mixed.observed) > FEW:
-            return np.asarray(np.exp(self._climb(middle).x), dtype=np.float64)
+            return np.exp([self._climb(middle).x])
         begun = [self._climb(middle - APART + step, FIRST_STEPS) for step in (BEYOND + APART) * np.eye(len(middle))]
-        begun.sort(key=lambda optimum: float(optimum.fun))
-        optima = [self._climb(point) for point in (middle, *(optimum.x for optimum in begun[:CLIMBED]))]
-        return np.asarray(np.exp(min(optima, key=lambda optimum: float(optimum.fun)).x), dtype=np.float64)
+        likely = min(optimum.fun for optimum in begun) + 2 * NEGLIGIBLE  # most of them are nearly at a maximum
+        optima = [self._climb(point) for point in (middle, *(begin.x for begin in begun if begin.fun < likely))]
+        optima.sort(key=lambda optimum: float(optimum.fun))
+        distinct: list[Array] = []
+        for optimum in optima:
+            is_new = all(np.abs(optimum.x - other).max() > DISTINCT for other in distinct)
+            if is_new and optimum.fun < optima[0].fun + NEGLIGIBLE:
+                distinct.append(optimum.x)
+        return np.exp(distinct)
 
     def _climb(self, logarithms: Array, most_steps: int = MOST_STEPS) -> "OptimizeResult":
         """Return the maximum of the posterior of ln σ (k,) near a point.
@@ -127,13 +135,12 @@ class MixedModel:
             fit.covariance * self.mixed.precision @ fit.covariance,
         ]
 
-    def expand(self, std: Array, wanted: Array) -> Array:
+    def expand(self, maxima: Array, wanted: Array) -> Array:
         """Return the half-widths (q,) of 95.45 % intervals of `wanted` (q, p) combinations of θ about their estimates.
 
-        The estimates are those at the standard deviations `std` (k,). The intervals integrate over all standard
-        deviations.
+        The estimates are those at the first of `maxima` (n, k). The intervals integrate over all standard deviations.
         """
-        top = wanted @ self.solve(std).theta
+        top = wanted @ self.solve(maxima[0]).theta
         offsets = []
         variances = []
 
@@ -148,8 +155,8 @@ class MixedModel:
             variances.append(np.einsum("qi,ij,qj->q", wanted, fit.covariance, wanted))
             return fit.likelihood + self._log_prior(logarithms)
 
-        middle = np.log(std)
-        weights = sample_adaptively(evaluate, middle, self._curvature(middle))
+        begins = [(middle, self._curvature(middle)) for middle in np.log(maxima)]
+        weights = sample_adaptively(evaluate, begins)
         return _find_half_width(np.array(offsets), np.array(variances), weights)
 
     def _whiten(self, std: Array) -> tuple[Array, Array, Array, Array, float]:
@@ -209,31 +216,38 @@ class MixedModel:
         return np.asarray((np.array(rows) + np.array(rows).T) / 2, dtype=np.float64)
 
 
-def sample_adaptively(log_density: Callable[[Array], float], middle: Array, curvature: Array) -> Array:
+def sample_adaptively(log_density: Callable[[Array], float], begins: Sequence[tuple[Array, Array]]) -> Array:
     """Draw s samples of k variables, call the log-density at each, and return their weights (s,) in the same order.
 
-    Adaptive multiple importance sampling (Cornuet et al., Scand. J. Stat. 39 (2012) 798): each round draws from
-    Student's t with the mean and covariance of all earlier samples. The first round uses the maximum and the curvature
-    there.
+    Adaptive multiple importance sampling (Cornuet et al., Scand. J. Stat. 39 (2012) 798). It begins at each maximum
+    (k,) of `begins` with the curvature (k, k) there: each further round draws from Student's t with the mean and
+    covariance of the samples around this maximum. The weights are those of all samples together.
     """
     rng = np.random.default_rng(0)
-    values, directions = np.linalg.eigh(curvature)
-    root, size = directions / np.sqrt(np.maximum(values, LEAST_CURVATURE)), len(middle)
+    size = len(begins[0][0])
     proposals: list[tuple[Array, Array]] = []
     points, logs = np.zeros((0, size)), np.zeros(0)
-    for _ in range(ROUNDS):
-        proposals.append((middle, root))
-        normal = rng.standard_normal((DRAWS // 2, size)) * np.sqrt(TAILS / rng.chisquare(TAILS, size=(DRAWS // 2, 1)))
-        drawn = middle + np.concatenate([normal, -normal]) @ root.T
-        points = np.concatenate([points, drawn])
-        logs = np.concatenate([logs, [log_density(point) for point in drawn]])
-        weights = _find_weights(points, logs, proposals)
-        tempered = _temper(weights, 2 * size)
-        middle = tempered @ points
-        deviations = points - middle
-        spread = (deviations * tempered[:, None]).T @ deviations + FLOOR * np.eye(size)
-        root = np.asarray(np.linalg.cholesky(spread), dtype=np.float64)
-    return _temper(weights, size)  # pyrefly: ignore[unbound-name]  # ROUNDS > 0
+    for middle, curvature in begins:
+        first_sample, first_proposal = len(points), len(proposals)
+        values, directions = np.linalg.eigh(curvature)
+        proposal = (middle, directions / np.sqrt(np.maximum(values, LEAST_CURVATURE)))
+        for _ in range(ROUNDS):
+            proposals.append(proposal)
+            normal = rng.standard_normal((DRAWS // 2, size)) * np.sqrt(TAILS / rng.chisquare(TAILS, (DRAWS // 2, 1)))
+            drawn = proposal[0] + np.concatenate([normal, -normal]) @ proposal[1].T
+            points = np.concatenate([points, drawn])
+            logs = np.concatenate([logs, [log_density(point) for point in drawn]])
+            proposal = _adapt(points[first_sample:], logs[first_sample:], proposals[first_proposal:])
+    return _temper(_find_weights(points, logs, proposals), size)
+
+
+def _adapt(points: Array, logs: Array, proposals: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
+    """Return the mean (k,) and a root (k, k) of the covariance of weighted samples (s, k)."""
+    tempered = _temper(_find_weights(points, logs, proposals), 2 * points.shape[1])
+    mean = tempered @ points
+    deviations = points - mean
+    spread = (deviations * tempered[:, None]).T @ deviations + FLOOR * np.eye(len(mean))
+    return mean, np.asarray(np.linalg.cholesky(spread), dtype=np.float64)
 
 
 def _find_weights(points: Array, logs: Array, proposals: Sequence[tuple[Array, Array]]) -> Array:

@@ -23,11 +23,29 @@ def one_way(scales: tuple[float, float], alone: tuple[float, float] = (0.0, 0.0)
 @pytest.mark.slow
 @pytest.mark.parametrize("scales", [(5e-3, 5e-3), (1.0, 1.0), (1e-6, 1e-6)])
 def test_sizes_are_found_from_any_expectation(scales: tuple[float, float]) -> None:
-    std = one_way(scales).estimate()
+    std = one_way(scales).find_maxima()[0]
     assert std == pytest.approx([WITHIN, BETWEEN], rel=0.3)
 
 
 @pytest.mark.slow
 def test_a_size_that_was_measured_alone_is_that_of_both() -> None:
     model = one_way((5e-3, 5e-3), alone=(1e5 * (3 * BETWEEN) ** 2, 1e5))
-    assert model.estimate()[1] == pytest.approx(3 * BETWEEN, rel=0.05)
+    assert model.find_maxima()[0, 1] == pytest.approx(3 * BETWEEN, rel=0.05)
+
+
+def test_an_interval_holds_both_of_two_equally_likely_explanations() -> None:
+    apart = Mixed(
+        np.array([0.0, 1.0]),
+        np.ones((2, 1)),
+        1e-8 * np.eye(2),
+        np.array([np.diag([1.0, 0.0]), np.diag([0.0, 1.0])]),  # either reading may be wrong
+        np.zeros(1),
+        np.array([0.01, 0.01]),
+        np.zeros((2, 2)),
+    )
+    model = MixedModel(apart)
+    maxima = model.find_maxima()
+    estimates = sorted(float(model.solve(std).theta[0]) for std in maxima)
+    assert estimates == pytest.approx([0.0, 1.0], abs=0.05)
+    one, both = (float(model.expand(begins, np.eye(1))[0]) for begins in (maxima[:1], maxima))
+    assert one < 0.5 and both > 0.95
