@@ -241,13 +241,13 @@ def check_handedness(matrix: Array) -> None:
         )
 
 
-def untrustworthy_attitudes(what: str) -> Fault:
-    """Return the error for attitudes that the readings contradict."""
+def untrustworthy_attitudes(what: str, remedy: str = "") -> Fault:
+    """Return the error for attitudes that the readings contradict, with what else is to be done than to check them."""
     return Fault(
         "attitude_untrustworthy",
         what,
         "Check the attitudes: their frame, their direction (body to table), headings that were not measured, "
-        "an attitude that was not reached",
+        f"an attitude that was not reached{remedy}",
     )
 
 

@@ -52,6 +52,7 @@ Method = EqualWeights | Literal["attitude_weighted"]
 MAX_CONDITION = 1e4
 NOTICEABLE = 0.5  # √N σ/v_rms
 UNTRUSTWORTHY_RAD = 5e-3  # larger attitude errors mean that the model is wrong
+BY_GYROSCOPE = "; or calibrate only a gyroscope by them, which needs no exact attitudes"
 SUSPICIOUS_RAD = 5e-4  # above it, a single wrong attitude is searched
 OUTLIER = 6.0  # times the others' error
 REMEDY = "Take more attitudes, turned about at least two different axes"
@@ -263,4 +264,5 @@ def check_trustworthy(error_rad: float, furthest: Callable[[], tuple[int, float,
             by_others = f"say the others, which are by {1e3 * expected:.2g}"
             message = f"attitude {worst + 1} is off by {1e3 * worst_rad:.2g} mrad, {by_others}"
     if error_rad > UNTRUSTWORTHY_RAD:
-        raise refusals.untrustworthy_attitudes(message)
+        limit = f"the limit is {1e3 * UNTRUSTWORTHY_RAD:.0f} mrad"
+        raise refusals.untrustworthy_attitudes(f"{message}; {limit}", BY_GYROSCOPE)
