@@ -48,7 +48,8 @@ def _describe_file(certificate: Certificate) -> Iterator[str]:
     if certificate.gyroscopes:
         yield (
             "Scale factors, biases and axes of the gyroscope are solved for by weighted least squares "
-            f"(estimator: {_estimators(certificate)})."
+            f"(estimator: {_estimators(certificate)}). The angles between the axes are relative to the directions that "
+            "the file states, whose constant errors U does not contain."
         )
     if certificate.held_still:
         standards = " and ".join(kind.standard.quantity for kind in certificate.held_still)
