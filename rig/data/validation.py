@@ -48,6 +48,10 @@ def read_document(kind: type[Document], file: Path, limit_bytes: int, *, what: s
         raise Refused("no_result", f"{file} cannot be read: {why}", remedy) from error
     except ValidationError as error:
         first = error.errors()[0]
+        if first["loc"] == ("schema",) and isinstance(first.get("input"), str):
+            expected = first.get("ctx", {}).get("expected", "another")
+            what_else = f"{file} is of the schema {quote(first['input'])}, and this version reads {expected}"
+            raise Refused("not_a_result", what_else, "Use the version of the rig that wrote it") from error
         where = ".".join(map(str, first["loc"]))
         why = f"{where}{': ' if where else ''}{first['msg']}"
         raise Refused("not_a_result", f"{file} is no result of {what}: {why}", remedy) from error

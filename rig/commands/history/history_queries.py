@@ -196,7 +196,9 @@ def compare(options: Namespace) -> int:
 
 
 def void(options: Namespace) -> int:
-    """Mark a calibration as void. Raise Refused `not_in_history`, `already_voided`."""
+    """Mark a calibration as void. Raise Refused `bad_option`, `not_in_history`, `already_voided`."""
+    if not options.reason.strip():
+        raise Refused("bad_option", "--reason is blank", "Say in a few words why the calibration is void")
     with open_named_history(options) as history:
         history.void(options.number, options.reason)
     say(f"calibration {options.number} is void")

@@ -59,11 +59,8 @@ def run(options: Namespace) -> int:
     if options.sweeps is None and options.attitudes is None and not options.turns:
         if options.out is not None:
             raise Refused("bad_option", "--out is for samples with their motion", "Use rig report RUN --out DIR")
-        if options.columns is not None:
-            raise Refused(
-                "bad_option", "--columns is for samples of another program", "Give --attitudes, --sweeps or --turns too"
-            )
         _refuse_samples(options.run)
+        solve_external.refuse_for_recording(options)
         return _solve_recording(options)
     if options.overrides:
         raise Refused("unknown_setting", "samples of another program have no settings", "Leave out --set")

@@ -1,8 +1,8 @@
 """`rig solve SAMPLES.csv --sweeps|--attitudes FILE` or `--turns`: readings of other programs, solved like a run."""
 
 import sys
-from argparse import ArgumentParser, Namespace
-from datetime import UTC, datetime
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,6 +20,28 @@ if TYPE_CHECKING:
     from rig.data.recording.run_data import RunData
 
 AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
+FOR_OTHERS = {  # options without a meaning for a recording of the rig, and their defaults
+    "columns": None,
+    "only": [],
+    "name": "imu",
+    "part": None,
+    "serial_number": None,
+    "recorded": None,
+    "reference_c": None,
+    "clock_ppm": None,
+    "squareness_deg": 0.2,
+    "no_closure": False,
+    "first_face": None,
+    "gravity_m_s2": STANDARD_GRAVITY_M_S2,
+    "up": "+z",
+    "field_t": None,
+    "field_upwards": False,
+    "any_mounting": False,
+    "estimate_clock_offset": False,
+    "exact_rates": False,
+    "window_s": None,
+    "second_order": False,
+}
 
 
 def add(solve: ArgumentParser) -> None:
@@ -40,7 +62,7 @@ def add(solve: ArgumentParser) -> None:
     group.add_argument("--serial-number", metavar="NUMBER", help="serial number of the sensor; a history needs it")
     group.add_argument(
         "--recorded",
-        type=datetime.fromisoformat,
+        type=_read_time,
         metavar="TIME",
         help="time of the readings (2026-11-25T08:30, UTC; default: when their file was last written)",
     )
@@ -111,6 +133,22 @@ def add(solve: ArgumentParser) -> None:
     )
 
 
+def _read_time(text: str) -> datetime:
+    try:
+        return datetime.fromisoformat(text)
+    except ValueError:
+        raise ArgumentTypeError(f"{text!r} is no time; write it as 2026-11-25T08:30") from None
+
+
+def refuse_for_recording(options: Namespace) -> None:
+    """Raise Refused `bad_option` if a recording of the rig is to be solved with an option for other readings."""
+    for name, default in FOR_OTHERS.items():
+        if getattr(options, name) != default:
+            option = f"--{name.replace('_', '-')}"
+            what = f"{option} is for samples of another program; a recording has its own settings"
+            raise Refused("bad_option", what, f"Leave {option} out, or give --attitudes, --sweeps or --turns too")
+
+
 def run(options: Namespace) -> int:
     """Solve the two files and print the result; with `--out` also write a run folder and enter it in the history.
 
@@ -169,6 +207,9 @@ def _build_recording(options: Namespace) -> "RunData":
     recorded: datetime | None = options.recorded
     if recorded is not None and recorded.tzinfo is None:
         recorded = recorded.replace(tzinfo=UTC)
+    if recorded is not None and recorded > datetime.now(UTC) + timedelta(days=1):  # a day: of a clock in local time
+        what = f"--recorded is {recorded:%Y-%m-%dT%H:%M} UTC, which is in the future"
+        raise Refused("bad_option", what, "Give the time of the readings; correct this computer's clock if it is slow")
     column_map = read_column_map(options.columns)
     if options.turns:
         files = Files(options.run, _read_turn_options(options), "turns", item, recorded, column_map)

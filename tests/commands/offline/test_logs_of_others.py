@@ -24,6 +24,7 @@ from support.external.loggers import (
     write_forces,
     write_rates,
 )
+from support.paths import DOCS, RECORDINGS
 
 MAPPED = """
 samples:
@@ -429,3 +430,15 @@ def test_a_log_alone_is_told_the_options_that_say_how_it_was_turned(
     assert main(["solve", str(tmp_path / name)]) == 2
     said = capsys.readouterr().err
     assert all(option in said for option in ("bad_option", "--turns", "--sweeps", "--attitudes", "rig allan"))
+
+
+@pytest.mark.parametrize("option", [["--gravity-m-s2", "9.8"], ["--any-mounting"], ["--columns", "c.yaml"]])
+def test_an_option_for_logs_of_others_is_not_ignored_with_a_run(
+    option: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert f"bad_option: {option[0]} is for samples" in refused(capsys, RECORDINGS / "verified", *option)
+
+
+def test_readings_of_the_future_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    files = [DOCS / "examples" / "samples.csv", "--sweeps", DOCS / "examples" / "sweeps.csv"]
+    assert "bad_option: --recorded is 2999-01-01" in refused(capsys, *files, "--recorded", "2999-01-01")

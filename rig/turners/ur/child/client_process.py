@@ -340,8 +340,14 @@ def _outlive_the_parent() -> None:
 
 
 def _send_output_to(log: str | None) -> None:
-    """Redirect stdout and stderr to the log: the client prints to both, and stdout is reserved for results."""
-    sink = os.open(os.devnull, os.O_WRONLY) if log is None else open_to_append(log)
+    """Redirect stdout and stderr to the log: the client prints to both, and stdout is reserved for results.
+
+    If the run folder has been removed, nothing is logged: the parent reports that.
+    """
+    try:
+        sink = os.open(os.devnull, os.O_WRONLY) if log is None else open_to_append(log)
+    except FileNotFoundError:
+        sink = os.open(os.devnull, os.O_WRONLY)
     for stream in (sys.stdout, sys.stderr):
         stream.flush()
         os.dup2(sink, stream.fileno())
