@@ -3,7 +3,7 @@
 `condition_of` computes rank and condition number of a design.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -16,7 +16,7 @@ from rig.estimation.arrays import Array
 MAX_SCALE = 4.0  # either way: a wrong unit gives more, no sensor does
 STUCK = 0.01  # of the axis that reads most
 MIN_ALIGNMENT = 0.7  # cosine between an axis and where it should point; beyond 45° it is another axis
-CONFUSED = (  # ratios of reading over true value for wrong units
+CONFUSED_ANGLES = (  # ratios of reading over true value for wrong units
     (
         180 / np.pi,
         "the readings look like degrees per second given as rad/s",
@@ -25,6 +25,9 @@ CONFUSED = (  # ratios of reading over true value for wrong units
         np.pi / 180,
         "the readings look like rad/s declared as °/s, or the rates like degrees per second given as rad/s",
     ),
+)
+CONFUSED = (
+    *CONFUSED_ANGLES,
     (1 / 9.80665, "the readings look like g given as m/s²"),
     (9.80665, "the readings look like m/s² declared as g"),
 )
@@ -144,7 +147,7 @@ def check_unit(scale: Array) -> None:
 def check_reading_ratio(ratio: float, where: str) -> None:
     """Raise Fault `wrong_unit` if readings are more than 4 times, or less than a quarter of, the turn rate."""
     if not is_plausible(ratio).all():
-        raise _wrong_unit(f"in {where} the gyroscope reads {ratio:.3g} times the turn rate", ratio)
+        raise _wrong_unit(f"in {where} the gyroscope reads {ratio:.3g} times the turn rate", ratio, CONFUSED_ANGLES)
 
 
 def is_plausible(ratio: ArrayLike) -> NDArray[np.bool_]:
@@ -153,8 +156,8 @@ def is_plausible(ratio: ArrayLike) -> NDArray[np.bool_]:
     return (ratios < MAX_SCALE) & (ratios > 1 / MAX_SCALE)
 
 
-def _wrong_unit(what: str, ratio: float) -> Fault:
-    likely = (guess for confused, guess in CONFUSED if 0.7 < ratio / confused < 1.4)
+def _wrong_unit(what: str, ratio: float, confusions: Sequence[tuple[float, str]] = CONFUSED) -> Fault:
+    likely = (guess for confused, guess in confusions if 0.7 < ratio / confused < 1.4)
     return Fault(
         "wrong_unit",
         f"{what}: {next(likely, 'check range and sensitivity')}",

@@ -187,8 +187,8 @@ def solve_swept(data: ExternalData, estimator: BySweeps | None) -> Estimate:
     if estimator is None:
         estimator = "vector" if data.turned is None else "increments"
     if estimator != "increments":
+        check_agree(data)
         vector = _vector(data)
-        check_agree(vector, data)
         if estimator == "vector":
             return add_errors(vector, data)
         return solve_observations(data.sweeps, estimator, data.rests)

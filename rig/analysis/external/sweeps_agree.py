@@ -22,16 +22,22 @@ CHANCE = 4.0  # standard deviations that one of some dozens of means may be off 
 FEWEST_FREEDOM = 3  # with fewer, the next coarser whole number alone would make U half as large again
 
 
-def check_agree(solution: VectorSolution, data: ExternalData) -> None:
+def check_agree(data: ExternalData) -> None:
     """Check that every sweep agrees with the solution of all others (leave-one-out residuals).
+
+    Too few rows for a solution are left to that.
 
     Raise Refused `bad_sweep` for the sweep that disagrees most, for example half a turn stated as a whole one, or a
     wrong axis. If an axis has two sweeps, either may be wrong, and both are named.
     """
     means, variances, design = _equations(data)
     redundancy = _redundancy_numbers(design)
-    apart = (means - design @ (np.linalg.pinv(design) @ means)) / redundancy
-    errors = np.linalg.norm(apart @ np.linalg.inv(solution.matrix).T, axis=1)
+    coefficients = np.linalg.pinv(design) @ means
+    sensitivity = float(np.linalg.norm(coefficients[:3], 2))
+    if np.linalg.matrix_rank(design) < design.shape[1] or not sensitivity:
+        return
+    apart = (means - design @ coefficients) / redundancy
+    errors = np.linalg.norm(apart, axis=1) / sensitivity
     noise = np.linalg.norm(np.sqrt(variances) / redundancy, axis=1)
     sweeps = slice(len(data.sweeps))
     fraction = np.where(errors > BEYOND_NOISE * noise, errors, 0.0)[sweeps] / np.linalg.norm(design[sweeps, :3], axis=1)

@@ -40,7 +40,7 @@ from rig.observation.external.csv_windows import (
 from rig.observation.external.omission import Omitted
 from rig.observation.external.placement_account import AttitudeRows
 from rig.observation.external.placements import MOSTLY, Placements, find_placements
-from rig.observation.external.reference_clock import find_reference_clock
+from rig.observation.external.reference_clock import check_one_clock, find_reference_clock
 from rig.observation.external.reference_rows import Turning
 from rig.observation.formats.column_selection import Mapped
 from rig.observation.formats.csv_table import CsvTable, blank_cell, read_table
@@ -144,6 +144,10 @@ def placed_by(samples: Samples, table: Mapping[str, Array], *, find_clock: bool 
     windows = _windows(table)
     all_rows = rows_found = _ReferenceRows(windows, _rotations(table), rates, _attitude_std(table), numbers)
     clock = None
+    if RATE in readings and not find_clock:
+        check_one_clock(
+            Turning(time_s, readings[RATE], rows_found.rows_s, rows_found.attitudes, rows_found.std_rad), rates
+        )
     if find_clock:
         _check_has_rates(readings)
         clock = find_reference_clock(

@@ -52,6 +52,7 @@ AXIS_COLUMNS = ("axis_x", "axis_y", "axis_z")
 STD_COLUMNS = ("angle_std_rad", "axis_std_rad")
 MIN_DURATION_S = 1e-3  # the fewest samples take longer at any data rate
 SAME_AXIS, OPPOSITE, SENSED = 0.9, -0.5, 0.25  # cosines of axes, of readings; of a sweep's speed, as a reading
+ROUNDING = 1e-12  # of a mean: scatter that is none
 LEAST_MOTION = 1e-9  # rad or rad/s: no sweep, and its square might be 0
 SWEEPS_MB = 1  # some ten thousand sweeps
 
@@ -149,6 +150,7 @@ def average(samples: Array, sweeps: Array, axes: Array, temperature_c: Array | N
         if not gaps.is_usable:
             continue
         mean = average_bridged(readings[within], sampling.numbers[within], window, gaps.hidden_rad)
+        _check_noisy(mean, row)
         if temperature_c is not None:
             mean = replace(mean, temperature_c=float(temperature_c[within].mean()))
         if speed == 0:
@@ -220,6 +222,20 @@ def _observation(row: int, mean: Average, speed_rad_s: float, axis: Array) -> Ob
         lost=0,
         average=mean,
     )
+
+
+def _check_noisy(mean: Average, row: int) -> None:
+    """Raise Fault `stuck_sensor` if an axis has one value throughout a row: its mean is known to a step alone."""
+    quiet = np.flatnonzero(mean.noise_rad_s <= ROUNDING * np.abs(mean.mean_rad_s))
+    if len(quiet):
+        axis = int(quiet[0])
+        raise Fault(
+            "stuck_sensor",
+            f"in row {row}, from {mean.start_s:.6g} to {mean.end_s:.6g} s, the gyroscope reads "
+            f"{mean.mean_rad_s[axis]:.6g} rad/s on {RATE.axes[axis]} always: stuck, at the end of its range, or too "
+            "coarse to show its noise",
+            "Check its supply, its bus wires and its range; record with all digits",
+        )
 
 
 def _check_unit(turns: Sequence[Observation]) -> None:

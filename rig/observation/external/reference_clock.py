@@ -21,6 +21,8 @@ from rig.observation.timebase import TimeBase, estimate_coarse_offset, estimate_
 
 CLEARER = 0.9  # of what is unexplained without drift: more than that tells no drift
 CRYSTALS = 1e-4  # standard deviation of the drift between two crystals
+GAP, OF_DRIFT = 2.5, 0.2  # intervals of the readings; of what the clocks drift apart
+LARGEST_DRIFT, CERTAIN = 5e-4, 6.0  # more than crystals differ by; standard deviations that are no chance
 DOUBTFUL = 0.1  # unexplained: the rows may be inverse rotations
 EXPLAINED = 0.3  # of the readings' variance, by the coarse offset
 
@@ -45,6 +47,26 @@ def find_reference_clock(turning: Turning, rates_rad_s: Array | None) -> TimeBas
     if unexplained < 1.0:
         return steady
     return _raise_fault(estimated)
+
+
+def check_one_clock(turning: Turning, rates_rad_s: Array | None) -> None:
+    """Raise Fault `clocks_apart` if the rotation shows that the clock of the rows runs at another rate.
+
+    A gap of the readings may be a step of a clock, which looks like another rate.
+    """
+    clock = or_fault(partial(find_reference_clock, turning, rates_rad_s))
+    if isinstance(clock, Fault) or abs(clock.drift) < max(LARGEST_DRIFT, CERTAIN * clock.drift_std):
+        return
+    lasts_s = float(turning.time_s[-1] - turning.time_s[0])
+    steps_s = np.diff(turning.time_s)
+    if steps_s.max() > max(GAP * np.median(steps_s), OF_DRIFT * abs(clock.drift) * lasts_s):
+        return
+    raise Fault(
+        "clocks_apart",
+        f"the clock of the attitudes gains {100 * clock.drift:+.2g} % on that of the samples, "
+        f"{1e3 * abs(clock.drift) * lasts_s:.0f} ms over the recording: the scale factors would be wrong as much",
+        "Write both files by one clock, or let --estimate-clock-offset find the difference",
+    )
 
 
 def _find_steady_clock(turning: Turning, motion: TableMotion) -> tuple[TimeBase, float]:

@@ -51,6 +51,21 @@ def test_a_sweep_whose_axis_has_the_wrong_sign_is_no_stuck_sensor() -> None:
         average_sweeps(read_samples(EXAMPLES / "samples.csv", [RATE]), sweeps)
 
 
+def test_two_rows_that_are_exchanged_are_no_mirrored_axis() -> None:
+    sweeps = read_sweeps(EXAMPLES / "sweeps.csv")
+    for axis in "xyz":
+        sweeps[f"axis_{axis}"][[2, 6]] = sweeps[f"axis_{axis}"][[6, 2]]
+    with pytest.raises(Refused, match=r"bad_sweep: "):
+        solve_swept(average_sweeps(read_samples(EXAMPLES / "samples.csv", [RATE]), sweeps), None)
+
+
+def test_a_row_too_coarse_to_show_noise_is_named() -> None:
+    samples = read_samples(EXAMPLES / "samples.csv", [RATE])
+    coarse = replace(samples, readings={RATE: 0.2 * np.rint(samples.readings[RATE] / 0.2)})
+    with pytest.raises(Fault, match=r"stuck_sensor: in row \d+, from .* too coarse to show its noise"):
+        average_sweeps(coarse, read_sweeps(EXAMPLES / "sweeps.csv"))
+
+
 def test_half_a_turn_given_as_a_whole_one_is_refused_by_its_row_where_others_tell() -> None:
     whole = read_sweeps(EXAMPLES / "sweeps.csv")
     sweeps = {name: np.concatenate([column[:1], column]) for name, column in whole.items()}
@@ -142,6 +157,16 @@ def test_poses_in_any_order_and_repeated_ones_are_placed_by_their_times(tmp_path
     assert [str(entry) for entry in placed.omitted] == [
         "10 of 610 rows, they repeat the time of another one; the first row 601"
     ]
+
+
+def test_a_clock_that_runs_fast_is_refused_unless_its_offset_is_estimated() -> None:
+    samples = read_samples(EXAMPLES / "swinging_samples.csv")
+    rows = read_attitudes(EXAMPLES / "swinging_attitudes.csv")
+    fast = replace(samples, time_s=1.004 * samples.time_s)
+    with pytest.raises(Fault, match=r"clocks_apart: the clock of the attitudes gains -0.4 % on that of the samples"):
+        placed_by(fast, rows)
+    clock = placed_by(fast, rows, find_clock=True).clock
+    assert clock is not None and clock.drift == pytest.approx(-0.004, rel=0.01)
 
 
 def constant(samples: Samples, quantity: Quantity, value: float) -> Samples:
