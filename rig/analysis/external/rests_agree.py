@@ -23,7 +23,7 @@ TAIL = 0.1  # of the rests, at either end, that may be none
 
 
 def check_rests_agree(turning: Turning, solution: KnownIncrements) -> None:
-    """Raise Fault `bias_contradicts_rests` if the bias is not what the gyroscope reads at rest.
+    """Raise Fault `bias_contradicts_rests` if the bias is not what the gyroscope reads at rest, or `bias_jumped`.
 
     A rest counts only if both the readings and the attitudes of its rows show one. Rests may differ by their own
     scatter, by motion that the reference does not show, and by the effect of gravity on a gyroscope.
@@ -34,6 +34,7 @@ def check_rests_agree(turning: Turning, solution: KnownIncrements) -> None:
     readings, turned = at_rest.readings_rad_s, at_rest.rates_rad_s @ solution.matrix.T
     bias = np.median(readings, axis=0) - turned.mean(axis=0)
     wander = np.ptp(np.quantile(readings, (TAIL, 1 - TAIL), axis=0), axis=0) / 2
+    _check_steady(wander)
     other = G_SENSITIVITY_RAD_S**2 + EARTH_RATE_RAD_S**2
     std = np.sqrt(np.diag(solution.covariance)[BIAS] + wander**2 + _undetected_std_rad_s(turned) ** 2 + other)
     normalised = np.abs(solution.bias - bias) / std
@@ -46,6 +47,18 @@ def check_rests_agree(turning: Turning, solution: KnownIncrements) -> None:
         f"attitudes give a bias of {solution.bias[worst]:+.2g} ± {2 * std[worst]:.1g} rad/s: one of them is wrong",
         "See that both files use one clock and that no readings are missing; turn more slowly, or add rows at rest",
     )
+
+
+def _check_steady(wander_rad_s: Array) -> None:
+    """Raise Fault `bias_jumped` if the readings at rest differ by more than a bias moves, half their range (3,)."""
+    axis = int(np.argmax(wander_rad_s))
+    if wander_rad_s[axis] > RATE.steady:
+        raise Fault(
+            "bias_jumped",
+            f"where the attitudes show the body at rest, the gyroscope reads {2 * wander_rad_s[axis]:.2g} rad/s more "
+            f"on {RATE.axes[axis]} at some times than at others",
+            "Solve the parts before and after the change separately; look for a knock, or a range that was switched",
+        )
 
 
 def _critical_value(dof: float) -> float:

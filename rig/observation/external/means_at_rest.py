@@ -12,6 +12,8 @@ from rig.observation.external.reference_rows import Turning
 from rig.observation.external.still_attitudes import STILL_RAD_S, still_windows
 from rig.observation.windows import Window, inside
 
+LATE_S = 0.2  # by which the attitudes may be late or early
+SHORTEST_S, AS_QUIET = 0.4, 1.5  # of a rest with another reading; times the noise of the others
 FEWEST, FEWEST_S = 2, 1.0  # rests, for a scatter between them, and their duration in all
 
 
@@ -33,7 +35,8 @@ def means_at_rest(turning: Turning, clock_s: float) -> MeansAtRest | None:
     lasting_s = 0.0
     readings = []
     rates = []
-    for rest in _split_single(find_rests(turning.time_s, {RATE: turning.readings_rad_s}, lying=lying)):
+    rests = find_rests(turning.time_s, {RATE: turning.readings_rad_s}, lying=lying)
+    for rest in _split_single([*rests, *_find_otherwise(turning, lying, rests)]):
         rows = np.flatnonzero((rows_s >= rest.start_s) & (rows_s <= rest.end_s))
         if not len(rows):
             continue
@@ -46,6 +49,24 @@ def means_at_rest(turning: Turning, clock_s: float) -> MeansAtRest | None:
     if len(rates) < FEWEST or lasting_s < FEWEST_S:
         return None
     return MeansAtRest(np.array(readings), np.array(rates))
+
+
+def _find_otherwise(turning: Turning, lying: Sequence[Window], rests: Sequence[Window]) -> list[Window]:
+    """Return the windows in which the body lies still by its attitudes, and the readings are as quiet as in the rests.
+
+    They contain another reading than the rests, because the bias has changed.
+    """
+    if not rests:
+        return []
+    noise = np.median([turning.readings_rad_s[inside(turning.time_s, rest)].std(axis=0) for rest in rests], axis=0)
+    inner = [Window(window.start_s + LATE_S, window.end_s - LATE_S) for window in lying]
+    return [
+        window
+        for window in inner
+        if window.end_s - window.start_s >= SHORTEST_S
+        and all(rest.end_s <= window.start_s or rest.start_s >= window.end_s for rest in rests)
+        and (turning.readings_rad_s[inside(turning.time_s, window)].std(axis=0) <= AS_QUIET * noise).all()
+    ]
 
 
 def _split_single(windows: Sequence[Window]) -> Sequence[Window]:

@@ -127,3 +127,13 @@ def test_a_gap_while_the_body_rests_costs_nothing() -> None:
     kept[first : first + 15] = False
     gap = replace(recorded, time_s=recorded.time_s[kept], readings=recorded.readings[kept])
     assert not solved(gap).left_out
+
+
+def test_a_bias_that_changes_between_rests_is_not_that_of_the_later_ones() -> None:
+    recorded = record(CLEAR, 1)
+    sound = turning(recorded)
+    solve_turning(sound, None, any_mounting=False)
+    later = sound.time_s > sound.time_s[len(sound.time_s) // 2]
+    jumped = replace(sound, readings_rad_s=sound.readings_rad_s + 0.03 * later[:, None] * np.array([0.0, 0.0, 1.0]))
+    with pytest.raises(Fault, match="bias_jumped: where the attitudes show the body at rest"):
+        solve_turning(jumped, None, any_mounting=False)
