@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from rig.data.recording.run_data import RunData
 
 AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
-FOR_OTHERS = {  # options without a meaning for a recording of the rig, and their defaults
+FOR_OTHERS: dict[str, object] = {  # options without a meaning for a recording of the rig, and their defaults
     "columns": None,
     "only": [],
     "name": "imu",

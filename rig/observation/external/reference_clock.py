@@ -59,18 +59,20 @@ def check_one_clock(turning: Turning, rates_rad_s: Array | None) -> None:
 
     A gap of the readings may be a step of a clock, which looks like another rate.
     """
-    for find in (_estimate_clock, find_reference_clock):  # the first is fast, and tells that nothing is wrong
+    drift = 0.0
+    for find in (_estimate_clock, find_reference_clock):  # the first is fast, and shows that nothing is wrong
         clock = or_fault(partial(find, turning, rates_rad_s))
         if isinstance(clock, Fault) or abs(clock.drift) < max(LARGEST_DRIFT, CERTAIN * clock.drift_std):
             return
+        drift = clock.drift
     lasts_s = float(turning.time_s[-1] - turning.time_s[0])
     steps_s = np.diff(turning.time_s)
-    if steps_s.max() > max(GAP * np.median(steps_s), OF_DRIFT * abs(clock.drift) * lasts_s):
+    if steps_s.max() > max(GAP * np.median(steps_s), OF_DRIFT * abs(drift) * lasts_s):
         return
     raise Fault(
         "clocks_apart",
-        f"the clock of the attitudes gains {100 * clock.drift:+.2g} % on that of the samples, "
-        f"{1e3 * abs(clock.drift) * lasts_s:.0f} ms over the recording: the scale factors would be wrong as much",
+        f"the clock of the attitudes gains {100 * drift:+.2g} % on that of the samples, "
+        f"{1e3 * abs(drift) * lasts_s:.0f} ms over the recording: the scale factors would be wrong as much",
         "Write both files by one clock, or let --estimate-clock-offset find the difference",
     )
 
