@@ -7,6 +7,7 @@ import signal
 import tempfile
 from collections import Counter
 from collections.abc import Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
@@ -27,6 +28,9 @@ gc.disable()
 settings.register_profile("test", deadline=None, max_examples=30)
 settings.register_profile("proof", deadline=None, max_examples=300)
 settings.load_profile("test")
+
+# Rooms whose tests wait for a laboratory: first, so that at the end those that compute use every processor.
+WAITING = {"runner", "world", "turners", "page", "batch", "floor", "sensors"}
 
 # Nothing that a test runs enters the history of whoever runs the tests, or is known as a run of theirs.
 os.environ["RIG_HISTORY"] = "off"
@@ -53,6 +57,7 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """What `make test` has no time for is left to `make proof`: what is marked `thorough`, and of what is marked
     `one_in(n)` all cases but the first of every n."""
+    items.sort(key=lambda item: item.path.relative_to(Path(__file__).parent).parts[0] not in WAITING)
     if config.getoption("--proof"):
         return
     cases = Counter[str]()

@@ -183,13 +183,16 @@ def _find_rest(time_s: Array, window: Window, rests: Sequence[_PlacedRest]) -> t
 
 
 def _mask_inner(rest: NDArray[np.intp], windows_s: Array, starts_s: Array, ends_s: Array) -> NDArray[np.bool_]:
-    """Return which rows (N,) are far enough from the ends of their rest; all those of a rest if none is.
+    """Return which rows (N,) at rest are far enough from the ends of their rest; all those of a rest if none is.
 
     A reference that reports late shows the body in motion when it lies still already.
     """
-    middles_s = windows_s.mean(axis=1)
-    inner = (middles_s >= starts_s[rest] + LATE_S) & (middles_s <= ends_s[rest] - LATE_S)
-    return np.asarray(inner | ~np.isin(rest, rest[inner]))
+    at_rest = np.flatnonzero(rest >= 0)
+    middles_s, number = windows_s[at_rest].mean(axis=1), rest[at_rest]
+    is_inner = (middles_s >= starts_s[number] + LATE_S) & (middles_s <= ends_s[number] - LATE_S)
+    inner = np.zeros(len(rest), dtype=np.bool_)
+    inner[at_rest] = is_inner | ~np.isin(number, number[is_inner])
+    return inner
 
 
 def _group_by_placement(rest: NDArray[np.intp], attitudes: Array) -> list[NDArray[np.intp]]:
