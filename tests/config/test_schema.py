@@ -20,6 +20,7 @@ def read(path: Path) -> dict[str, Any]:
     return document
 
 
+@pytest.mark.slow
 def test_the_page_is_today_s() -> None:
     assert PAGE.read_text(encoding="utf-8") == schema_text(), (
         "again: python -m rig.config.config_schema > docs/config.schema.json"

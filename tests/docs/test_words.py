@@ -9,6 +9,8 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
+import pytest
+
 REPOSITORY = Path(__file__).parents[2]
 WORDS = tomllib.loads((REPOSITORY / "rig/report/words/words.toml").read_text("utf-8"))
 FIELD_TERMS = {old: term["new"] for term in WORDS["terms"] for old in term["old"]}
@@ -38,6 +40,7 @@ CAPABILITIES = frozenset(WORDS["capabilities"])
 DOCUMENTED = ast.FunctionDef | ast.AsyncFunctionDef
 
 
+@pytest.mark.slow
 def test_a_name_says_what_it_is_bound_to() -> None:
     assert [
         f"{file}:{node.lineno}: {name}: {term_for(name)}"

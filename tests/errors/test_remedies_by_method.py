@@ -46,6 +46,7 @@ def test_the_way_of_the_latest_run_comes_first(
     assert "as in your latest run" in lines[0] and not any("as in" in line for line in lines[1:])
 
 
+@pytest.mark.slow
 def test_no_answer_ends_with_two_stops(capsys: pytest.CaptureFixture[str]) -> None:
     for entry in catalogue():
         explain.run(Namespace(name=[entry.name]))

@@ -101,6 +101,7 @@ def test_nothing_that_estimates_names_the_file_of_the_truth() -> None:
         assert not any(name in text for name in ("truth.json", "TRUTH", "simulated_truth", "windowed_truth")), file
 
 
+@pytest.mark.slow
 def test_a_result_is_the_same_with_and_without_the_truth_beside_it(run: Path) -> None:
     with_truth = rig_here("solve", run, "--json").stdout
     (run / "truth.json").write_text(json.dumps(TRUE).replace("1.1", "2.5"), encoding="utf-8")
@@ -113,6 +114,7 @@ def _without_time(result: str) -> str:
     return "\n".join(line for line in result.splitlines() if '"solved_utc"' not in line)
 
 
+@pytest.mark.slow
 def test_the_truth_of_a_scale_factor_is_that_at_the_speed_and_of_a_bias_that_over_the_time() -> None:
     loaded = load(CONFIGS / "demo.yaml")
     world = read_world_section(loaded)

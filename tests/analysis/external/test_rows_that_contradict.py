@@ -139,6 +139,7 @@ def test_rows_outside_the_recording_are_not_covered_and_lack_no_samples() -> Non
     assert placed.incomplete == ()
 
 
+@pytest.mark.slow
 def test_poses_in_any_order_and_repeated_ones_are_placed_by_their_times(tmp_path: Path) -> None:
     samples = read_samples(EXAMPLES / "swinging_samples.csv")
     rows = read_attitudes(EXAMPLES / "swinging_attitudes.csv")

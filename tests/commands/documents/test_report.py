@@ -48,6 +48,7 @@ def test_a_result_alone_has_a_certificate_that_states_nothing(tmp_path: Path) ->
     assert "not stated" in (tmp_path / "new" / "folder" / "certificate.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_an_amended_certificate_names_the_customer_and_what_it_replaces(run: Path) -> None:
     said = [
         "--set",

@@ -25,6 +25,7 @@ def test_whole_turns_close() -> None:
         assert "whole turns, 2π by closure of the circle" in digital_certificate(found).decode()
 
 
+@pytest.mark.slow
 def test_of_arcs_the_encoders_tell_and_no_traceability_is_claimed() -> None:
     found = certificate(of_arcs(np.pi))
     text, xml = read(found).text, digital_certificate(found).decode()

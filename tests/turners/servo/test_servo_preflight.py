@@ -108,6 +108,7 @@ def test_of_a_run_that_goes_on_the_movements_behind_it_are_judged_too_and_nothin
         assert sorted(told) == ["no_duration", "no_travel", "servo_too_fast"]
 
 
+@pytest.mark.slow
 def test_the_latency_timer_of_an_ftdi_adapter_is_set_or_refused_by_name(tmp_path: Path) -> None:
     with servo_on_a_wire(pty=True) as wire:
         timer = tmp_path / Path(wire.port).name / "latency_timer"
