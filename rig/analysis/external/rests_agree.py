@@ -20,6 +20,9 @@ from rig.observation.external.reference_rows import Turning
 FALSE_ALARM = 1e-3  # of recordings whose bias is that at rest, for one of three axes
 G_SENSITIVITY_RAD_S = 1e-3  # of one g, of a MEMS gyroscope: it lies in one attitude, and moves through many
 TAIL = 0.1  # of the rests, at either end, that may be none
+MOST_RAD_S = (
+    2 * RATE.steady
+)  # half the range of the readings at rest: the body may move a little where it seems to rest
 
 
 def check_rests_agree(turning: Turning, solution: KnownIncrements) -> None:
@@ -52,7 +55,7 @@ def check_rests_agree(turning: Turning, solution: KnownIncrements) -> None:
 def _check_steady(wander_rad_s: Array) -> None:
     """Raise Fault `bias_jumped` if the readings at rest differ by more than a bias moves, half their range (3,)."""
     axis = int(np.argmax(wander_rad_s))
-    if wander_rad_s[axis] > RATE.steady:
+    if wander_rad_s[axis] > MOST_RAD_S:
         raise Fault(
             "bias_jumped",
             f"where the attitudes show the body at rest, the gyroscope reads {2 * wander_rad_s[axis]:.2g} rad/s more "
