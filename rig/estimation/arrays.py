@@ -1,6 +1,7 @@
 """The array type of all numeric code, and small functions of arrays."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -61,6 +62,13 @@ def divide_or_infinity(values: ArrayLike, sizes: ArrayLike) -> Array:
     none = np.where(value == 0, 0.0, np.copysign(np.inf, value))
     ratio: Array = np.divide(value, size, out=none, where=size > SMALLEST_SIZE)
     return ratio
+
+
+def equal_runs(values: NDArray[Any]) -> NDArray[np.intp]:
+    """Return the first index and the end (k, 2) of each run of equal values (n,); the end is exclusive."""
+    changes = np.flatnonzero(values[1:] != values[:-1]) + 1
+    bounds = np.unique(np.concatenate([[0], changes, [len(values)]]))
+    return np.column_stack([bounds[:-1], bounds[1:]])
 
 
 def bisect(is_too_small: Callable[[Array], Array | NDArray[np.bool_]], highest: Array) -> Array:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from rig.data.quantity import RATE, Quantity
 from rig.errors import Fault, Refused
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, equal_runs
 from rig.observation.windows import Window, inside
 
 OF_MOST = 0.1  # of the largest reading that any part has: beyond most parts' range
@@ -65,11 +65,9 @@ def find_clipped(readings: Array) -> NDArray[np.bool_]:
     for axis in readings.T:
         if np.ptp(axis) < CLIPPED_RAD_S:
             continue
-        for end in (axis.max(), axis.min()):
-            at_end = np.concatenate([[False], axis == end, [False]])
-            edges = np.flatnonzero(np.diff(at_end.astype(np.int8))).reshape(-1, 2)
-            for begin, stop in edges[np.diff(edges, axis=1)[:, 0] >= CLIPPED].tolist():
-                clipped[begin:stop] = True
+        starts, ends = equal_runs(axis).T
+        at_end = np.isin(axis[starts], [axis.min(), axis.max()])
+        clipped |= np.repeat(at_end & (ends - starts >= CLIPPED), ends - starts)
     return clipped
 
 
@@ -84,7 +82,7 @@ def check_unclipped(time_s: Array, readings: Array, windows: list[Window]) -> No
         steps = np.diff(np.unique(column))
         if not len(steps) or steps.min() > FINE * noise:
             continue
-        clipped = find_clipped(np.column_stack([column]))
+        clipped = find_clipped(column[:, None])
         for row, window in enumerate(windows, start=1):
             within = inside(time_s, window)
             if count := int(clipped[within].sum()):
@@ -101,12 +99,10 @@ def check_frozen(time_s: Array, readings: Array) -> None:
     """Raise Fault `stuck_sensor` if an axis of rates (n, 3) repeats one value while another axis turns."""
     for axis, letter in enumerate(RATE.axes):
         column = readings[:, axis]
-        equal = np.diff(column) == 0
-        ends = np.append(np.flatnonzero(~equal), len(column) - 1)
-        starts = np.append(0, ends[:-1] + 1)
-        lengths = ends - starts + 1
+        runs = equal_runs(column)
+        lengths = np.diff(runs, axis=1)[:, 0]
         longest = int(np.argmax(lengths))
-        run = slice(int(starts[longest]), int(ends[longest]) + 1)
+        run = slice(*runs[longest].tolist())
         value = column[run.start]
         is_coarse = len(lengths) > 1 and int(np.delete(lengths, longest).max()) > COARSE
         if lengths[longest] < FROZEN or is_coarse or value in {column.max(), column.min()}:

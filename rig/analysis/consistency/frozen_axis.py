@@ -3,7 +3,7 @@
 import numpy as np
 
 from rig.data.quantity import RATE
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, equal_runs
 from rig.observation.observed_run import ObservedRun
 
 FEWEST = 25  # equal readings in a row, of which the motion is looked at
@@ -24,15 +24,12 @@ def find_longest_frozen(recording: ObservedRun, name: str) -> int:
     least_rad_s = np.maximum(MOVED_STEPS * np.broadcast_to(stream.steps.unit, 3), MOVED_RAD_S)
     longest = 0
     for axis in range(3):
-        ends = np.append(np.flatnonzero(np.diff(counts[:, axis])), len(counts) - 1)
-        starts = np.append(0, ends[:-1] + 1)
-        long = ends - starts + 1 > FEWEST
-        for start, end in zip(starts[long], ends[long], strict=True):
-            if end - start + 1 > longest:
-                time_s = stream.time_s[start : end + 1]
+        for start, end in equal_runs(counts[:, axis]).tolist():
+            if end - start > max(FEWEST, longest):
+                time_s = stream.time_s[start:end]
                 inside = (time_s > time_s[0] + LAG_S) & (time_s < time_s[-1] - LAG_S)
                 if _rate_change(recording, time_s[inside], axes[axis]) > least_rad_s[axis]:
-                    longest = int(end - start + 1)
+                    longest = end - start
     return longest
 
 

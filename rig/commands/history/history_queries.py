@@ -39,10 +39,10 @@ DISAGREE = 1
 
 def list_calibrations(options: Namespace) -> int:
     """Print calibrations, and trends of a serial number. Raise `not_in_history`, and as `open_named_history` does."""
-    selection = _read_selection(options)
+    selection, address = _read_selection(options), _read_address(options)
     pasts = list[Past]()
-    if selection.serial_number is not None or is_there(_read_address(options)):
-        with open_named_history(options) as history:
+    if selection.serial_number is not None or is_there(address):
+        with _open_existing(address) as history:
             pasts = _select_pasts(history, selection)
     series = {subject: trends(past) for subject, past in subjects(pasts).items()}
     if options.csv:
@@ -52,7 +52,7 @@ def list_calibrations(options: Namespace) -> int:
         document = history_document(pasts, series if selection.serial_number is not None else None)
         print(json.dumps(document, indent=2, allow_nan=False))
     elif not pasts:
-        say(f"No calibration is in {_read_address(options).label} yet; `rig run` enters each one.")
+        say(f"No calibration is in {address.label} yet; `rig run` enters each one.")
     else:
         console = Console(highlight=False)
         console.print(calibrations_table(pasts))
@@ -211,7 +211,10 @@ def open_named_history(options: Namespace) -> AbstractContextManager[History]:
     Raise Refused `no_history` if there is none, for opening it would make an empty one; as `open_history` does, and as
     `load` does if a configuration names it.
     """
-    address = _read_address(options)
+    return _open_existing(_read_address(options))
+
+
+def _open_existing(address: HistoryAddress) -> AbstractContextManager[History]:
     if not is_there(address):
         what = f"there is no history {address.label}"
         raise Refused("no_history", what, "Name another with --history or RIG_HISTORY; `rig history import` makes one")

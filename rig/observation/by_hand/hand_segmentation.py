@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.data.quantity import RATE
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, equal_runs
 from rig.estimation.by_hand.session_parts import HandRecording, HandRest, Move
 from rig.observation.by_hand.rests import ROUNDING, find_rests
 from rig.observation.time_stamps.gaps import find_hiding_gaps
@@ -111,8 +111,10 @@ def _find_held_intervals(time_s: Array, rates: Array, rests: tuple[HandRest, ...
     slow &= np.abs(blocks).max(axis=(1, 2)) < 4 * HELD_RAD_S
     for rest in rests:
         slow &= (times[:, -1] < rest.start_s - PAUSE_S) | (times[:, 0] > rest.end_s + PAUSE_S)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], slow, [False]]).astype(np.int8))).reshape(-1, 2)
-    intervals = ((float(times[first, 0]), float(times[last - 1, -1])) for first, last in edges.tolist())
+    runs = equal_runs(slow)
+    intervals = (
+        (float(times[first, 0]), float(times[last - 1, -1])) for first, last in runs[slow[runs[:, 0]]].tolist()
+    )
     return tuple((start_s, end_s) for start_s, end_s in intervals if end_s - start_s >= HELD_S)
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from rig.data.installed_kinds import quantities
 from rig.data.quantity import RATE, Quantity
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, equal_runs
 from rig.observation.by_hand.knocks import KNOCK, smallest_steps
 from rig.observation.by_hand.steadiness import BEYOND
 from rig.observation.time_stamps.sampling import find_sampling
@@ -71,8 +71,10 @@ def find_rests(
     if quantity == RATE and still.any():
         still &= _find_unturned(means, _find_steady_blocks(still, pairs), tolerance, _mask_blocks(times, lying))
         pairs &= still[:-1] & still[1:]
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], pairs, [False]]).astype(np.int8))).reshape(-1, 2)
-    return tuple(Window(float(times[first, 0]), float(times[last, -1])) for first, last in edges.tolist())
+    runs = equal_runs(pairs)
+    return tuple(
+        Window(float(times[first, 0]), float(times[last, -1])) for first, last in runs[pairs[runs[:, 0]]].tolist()
+    )
 
 
 def _average_unknocked(blocks: Array, noise: Array) -> tuple[Array, Array]:

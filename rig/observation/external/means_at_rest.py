@@ -9,10 +9,9 @@ from rig.data.quantity import RATE
 from rig.estimation.arrays import Array, rotation_vectors
 from rig.observation.by_hand.rests import find_rests
 from rig.observation.external.reference_rows import Turning
-from rig.observation.external.still_attitudes import STILL_RAD_S, still_windows
+from rig.observation.external.still_attitudes import LATE_S, STILL_RAD_S, still_windows
 from rig.observation.windows import Window, inside
 
-LATE_S = 0.2  # by which the attitudes may be late or early
 SHORTEST_S, AS_QUIET = 0.4, 1.5  # of a rest with another reading; times the noise of the others
 FEWEST, FEWEST_S = 2, 1.0  # rests, for a scatter between them, and their duration in all
 

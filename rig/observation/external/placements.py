@@ -23,13 +23,12 @@ from rig.observation.by_hand.steadiness import BEYOND
 from rig.observation.external.csv_windows import MIN_SAMPLES, scatter_of
 from rig.observation.external.omission import Omitted
 from rig.observation.external.placement_account import Account, AttitudeRows
-from rig.observation.external.still_attitudes import DWELL_S, still_windows
+from rig.observation.external.still_attitudes import DWELL_S, LATE_S, still_windows
 from rig.observation.statistics.mean import Mean
 from rig.observation.windows import Window, inside
 
 TURNED_RAD = 0.02  # rows of one rest that are farther apart: the body was turned about the measured vector
 INTERRUPTED_S = 1.0  # longest knock after which equal readings show that the body lay still
-LATE_S = 0.2  # by which a row's attitude may be late or early
 MOSTLY = 0.5  # of a dwell: if the body lies still for as long, only the remainder is left out
 
 

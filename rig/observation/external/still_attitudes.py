@@ -7,6 +7,7 @@ from rig.observation.windows import Window
 
 DWELL_S = 0.5  # a row at least as long declares that the body lay still
 APART_S = 0.5  # between two short rows that show whether it did
+LATE_S = 0.2  # by which a row's attitude may be late or early
 STILL_RAD_S = 0.02  # largest rate between them; a camera's errors look like half of it
 
 
