@@ -24,6 +24,7 @@ SOURCES: Mapping[str, tuple[Literal["A", "B"], str]] = {
     placement.PLACEMENTS: ("A", f"scatter of the placements beyond their attitudes, {IN_U}"),
     increment_solution.DELAY: ("A", f"estimated, with the jitter of the stamps, {IN_U}"),
     increment_solution.EARTHS_RATE: ("B", "its size, whichever way it points"),
+    increment_solution.AXES: ("B", f"inclinations that F imitates, {IN_U}"),
     increment_solution.STRETCHES: ("A", f"change of F and b with attitude and time, {IN_U}"),
 }
 

@@ -37,11 +37,13 @@ from rig.estimation.external.attitude_drift import (
     AttitudeSamples,
     DriftModel,
     DriftState,
+    FixedAttitudes,
     Fixes,
     average_fixes,
     drift_model,
     find_inliers,
 )
+from rig.estimation.external.axis_directions import find_inclinations
 from rig.estimation.gyroscope.earth_rate import check_earth_seen
 from rig.estimation.statistics.variance_components import Mixed, MixedFit, MixedModel
 
@@ -56,6 +58,7 @@ LARGEST_STEP = 10.0  # of F: beyond, the fit diverges
 MAX_CONDITION = 1e4
 NOISE, ATTITUDES, DELAY = "noise", "attitudes", "delay between the files"
 EARTHS_RATE, STRETCHES = "Earth's rate", "differences between stretches"
+AXES = "directions of the reference's axes"
 REMEDY = "Turn the body about all its axes, by a right angle and more"
 
 
@@ -131,7 +134,7 @@ def solve_known_increments(time_s: Array, readings: Array, fixes: Fixes, start: 
         settled = _settle(recorded, settled.state)
     _check(fixes, recorded.fixes, settled)
     result = _build_result(settled, _times_s(fixes, fixes.joined & ~recorded.fixes.joined))
-    _check_identified(result.matrix, result.covariance)
+    _check_identified(result.matrix, result.covariance - result.causes[AXES])
     return result
 
 
@@ -140,6 +143,8 @@ class _Settled:
     """The converged fit, its model, and the maxima (n, k) of its variance components' posterior."""
 
     state: DriftState
+    fixes: Fixes
+    averaged: FixedAttitudes
     causes: DriftModel
     model: MixedModel
     maxima: Array
@@ -174,7 +179,7 @@ def _settle(recorded: AttitudeSamples, state: DriftState) -> _Settled:
         if not np.linalg.norm(solved.theta[MATRIX]) < LARGEST_STEP:
             raise refusals.untrustworthy_attitudes(refusals.NO_FIT)
         state = state.after_step(solved.theta)
-        settled = _Settled(state, causes, model, maxima, solved, iteration)
+        settled = _Settled(state, recorded.fixes, averaged, causes, model, maxima, solved, iteration)
         u = np.sqrt(np.diag(solved.covariance))[: CLOCK + 1]
         if iteration > 2 and (np.abs(solved.theta[: CLOCK + 1]) < SETTLED * u).all():
             break
@@ -257,6 +262,7 @@ def _build_result(settled: _Settled, aside_s: Array) -> KnownIncrements:
     half_width = settled.model.expand(settled.maxima, wanted)
     ratio = half_width / (2 * np.sqrt(np.einsum("qi,ij,qj->q", wanted, solved.covariance, wanted)))
     causes = {name: wanted @ cause @ wanted.T * ratio[:, None] * ratio for name, cause in _causes(settled).items()}
+    causes[AXES] = _widen_by_axes(settled, wanted, np.sum(list(causes.values()), axis=0))
     sizes = partial(settled.causes.std_of, std=settled.std)
     return KnownIncrements(
         matrix=state.matrix,
@@ -275,6 +281,12 @@ def _build_result(settled: _Settled, aside_s: Array) -> KnownIncrements:
         condition=_conditioning(settled.model.mixed).condition,
         iterations=settled.iterations,
     )
+
+
+def _widen_by_axes(settled: _Settled, wanted: Array, covariance: Array) -> Array:
+    """Return the covariance (q, q) that the reference's inclined axes add to `wanted` (q, p) combinations of θ."""
+    inclinations = find_inclinations(settled.averaged, settled.fixes, settled.state.matrix)
+    return inclinations.widen(settled.model, settled.std, settled.solved, wanted, np.diag(covariance))
 
 
 OF_CAUSES = {

@@ -157,7 +157,7 @@ class MixedModel:
 
         begins = [(middle, self._curvature(middle)) for middle in np.log(maxima)]
         weights = sample_adaptively(evaluate, begins)
-        return _find_half_width(np.array(offsets), np.array(variances), weights)
+        return find_half_width(np.array(offsets), np.array(variances), weights)
 
     def _whiten(self, std: Array) -> tuple[Array, Array, Array, Array, float]:
         """Return L of the covariance L Lᵀ, whitened design, whitened observations, information and log-likelihood."""
@@ -273,7 +273,7 @@ def _temper(weights: Array, fewest: float) -> Array:
     return tempered
 
 
-def _find_half_width(offsets: Array, variances: Array, weights: Array) -> Array:
+def find_half_width(offsets: Array, variances: Array, weights: Array) -> Array:
     """Return h (q,) so that a mixture of normals (s, q) with `weights` (s,) is within ± h with 95.45 % probability."""
     from scipy.special import ndtr
 

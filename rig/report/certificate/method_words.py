@@ -46,10 +46,16 @@ def _describe_hand(certificate: Certificate) -> str:
 def _describe_file(certificate: Certificate) -> Iterator[str]:
     yield "The readings are external, and a file states the motion of the items during them."
     if certificate.gyroscopes:
+        axes = (
+            "U contains inclinations of the axes about which the item was turned, as far as its motion does not show "
+            "them."
+            if _estimators(certificate) == "increments"
+            else "The angles between the axes are relative to the directions that the file states, whose constant "
+            "errors U does not contain."
+        )
         yield (
             "Scale factors, biases and axes of the gyroscope are solved for by weighted least squares "
-            f"(estimator: {_estimators(certificate)}). The angles between the axes are relative to the directions that "
-            "the file states, whose constant errors U does not contain."
+            f"(estimator: {_estimators(certificate)}). {axes}"
         )
     if certificate.held_still:
         standards = " and ".join(kind.standard.quantity for kind in certificate.held_still)

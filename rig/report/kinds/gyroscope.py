@@ -212,8 +212,8 @@ def _attitude_lines(attitudes: AttitudesEntry | None, clocks: Iterable[TimeBaseE
         offset_ms, expanded_ms = 1e3 * increments.clock_offset_s, 2e3 * increments.clock_offset_std_s
         yield f"the attitudes' clock is {offset_ms:+.2f} ± {expanded_ms:.2g} ms from the samples' (corrected)"
         yield (
-            "the angles between the axes are relative to the reference's rotations: an arm whose joint zeros are off "
-            "shifts them by as much, which their U does not contain"
+            "U contains inclinations of the axes about which the reference turns, as far as the motion does not show "
+            "them: those of an arm whose joint zeros are off. Moves of several joints at once reduce this part"
         )
     for method, other in attitudes.other_methods.items():
         if isinstance(other, ErrorEntry):

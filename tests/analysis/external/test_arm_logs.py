@@ -9,7 +9,9 @@ import pytest
 from rig.analysis.external.increment_calibration import InIncrements, solve_turning
 from rig.errors import Fault
 from rig.estimation.arrays import Array
+from rig.estimation.external.increment_solution import AXES
 from rig.estimation.reference.reference_budget import scale_and_bias_covariance
+from rig.estimation.sensor_axes import SensorAxes
 from rig.observation.external.reference_clock import find_reference_clock
 from support.external.arm_log import ArmLog, Recorded, draw, record, turning
 
@@ -60,6 +62,54 @@ def test_uncertainties_are_those_of_two_hundred_arm_logs() -> None:
         rms, within = float(np.sqrt(np.mean(quantity**2))), float(np.mean(np.abs(quantity) < 2))
         print(f"RMS of error / u {rms:.2f}, {100 * within:.1f} % within U, worst {np.abs(quantity).max() / 2:.2f} U")
         assert 0.8 < rms < 1.2 and 0.93 < within < 0.98 and np.abs(quantity).max() < 5
+
+
+def errors_of_directions(seeds: range) -> Array:
+    """Errors over u (draws, 6) of scale and of the angles between axes, where the arm moves one joint at a time."""
+    off = []
+    for seed in seeds:
+        log = draw(seed)
+        alone = replace(
+            log,
+            one_by_one=True,
+            form="joint zeros",
+            axes=(3, 4, 5),
+            stops=max(log.stops, 8),
+            visits=max(log.visits, 2),
+            rests_s=max(log.rests_s, 0.7),
+        )
+        recorded = record(alone, seed)
+        found = solved(recorded)
+        error, std = errors(found, recorded)
+        axes, truth = SensorAxes.from_matrix(found.solution.matrix), SensorAxes.from_matrix(recorded.matrix)
+        wrong_rad = axes.non_orthogonality_rad - truth.non_orthogonality_rad
+        axes_std_rad = axes.non_orthogonality_std_rad(found.solution.covariance[:9, :9])
+        off.append(np.concatenate([error[:3] / std[:3], wrong_rad / axes_std_rad]))
+    return np.array(off)
+
+
+def test_moves_of_one_joint_at_a_time_leave_joint_zeros_in_u() -> None:
+    off = errors_of_directions(range(732, 734))  # the errors were hundreds of u while U did not contain inclinations
+    assert np.abs(off).max() < 4
+
+
+@pytest.mark.thorough
+@pytest.mark.proof
+def test_uncertainties_hold_where_one_joint_moves_at_a_time() -> None:
+    off = errors_of_directions(range(800, 860))
+    within, worst = float(np.mean(np.abs(off) < 2)), float(np.abs(off).max())
+    print(f"one joint at a time: {100 * within:.1f} % within U, worst {worst / 2:.2f} U")
+    assert within > 0.93 and worst < 5
+
+
+def test_stated_attitudes_narrow_what_their_axes_may_be_off() -> None:
+    recorded = record(replace(CLEAR, one_by_one=True, error_rad=1e-4, stops=8), 7)
+    stated = replace(turning(recorded), std_rad=np.full(len(recorded.stamps_s), 1e-4))
+    std = [
+        np.sqrt(np.diag(solve_turning(rows, None, any_mounting=False).solution.causes[AXES])[:9]).max()
+        for rows in (turning(recorded), stated)
+    ]
+    assert std[1] < 0.05 * std[0]
 
 
 def test_rests_in_a_dense_stream_tell_the_bias() -> None:

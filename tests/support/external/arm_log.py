@@ -33,7 +33,7 @@ class ArmLog:
     - `poses_hz`, `latency_s`, `jitter_s`: of the reports, which hold for `latency_s` later than stamped.
     - `error_rad` with its `form`: RMS of the attitude error as a function of the joints; `report_rad`: new each time.
     - `noise`: a class of `NOISES`; `readings_hz`; `gaps`: of a tenth of a second each; `reading_jitter_s`.
-    - `axes`: the joints that move; `fastest_rad_s` of a joint.
+    - `axes`: the joints that move, `one_by_one` or together; `fastest_rad_s` of a joint.
     """
 
     stops: int = 10
@@ -52,6 +52,7 @@ class ArmLog:
     fastest_rad_s: float = 2.0
     axes: tuple[int, ...] = (3, 4, 5)
     scale_error: float = 0.03
+    one_by_one: bool = False
 
 
 @dataclass(frozen=True)
@@ -124,6 +125,14 @@ def _joints(log: ArmLog, rng: np.random.Generator) -> tuple[Array, Array]:
     targets[:, moved] += rng.uniform(-1, 1, size=(log.stops, len(moved))) * wide[moved]
     order = np.concatenate([rng.permutation(log.stops) for _ in range(log.visits)])
     points = targets[order]
+    if log.one_by_one:
+        points = np.tile(home, (len(order), 1))
+        points[1:-1:2] = (
+            home
+            + wide
+            * rng.choice([-1, 1], size=(len(points[1:-1:2]), 1))
+            * np.eye(6)[np.resize(moved, len(points[1:-1:2]))]
+        )
     moves = np.abs(np.diff(points, axis=0)).max(axis=1)
     lasts_s = np.maximum(1.9 * moves / log.fastest_rad_s, 0.4)
     if log.rests_s == 0:

@@ -1,0 +1,113 @@
+"""Errors of the directions about which a reference turns the body: those of an arm's joints, if their zeros are off.
+
+An inclination δ of such an axis changes the stated rate ω by δ × ω, each time alike. If the body turns about few axes,
+this looks like a matrix F with other angles between its axes, and with other scale factors where the axes of motion are
+not orthogonal. The residuals then do not show it, so F is estimated without δ, and its uncertainty contains what δ adds
+to the estimate (JCGM 100, F.2.4.5): the size of δ is as probable as prior and residuals make it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rig.estimation.arrays import Array, rotation_vectors
+from rig.estimation.external.attitude_drift import MATRIX, FixedAttitudes, Fixes
+from rig.estimation.statistics.variance_components import MixedFit, MixedModel, find_half_width
+
+PRIOR_MEDIAN = 5e-3  # rad: of the half-Cauchy prior of the inclinations' standard deviation
+REACH = 0.5  # sine of the angle between two axes: those within about this angle are inclined alike
+RATIOS = np.geomspace(1e-6, 20, 120)  # of the inclinations' size to its prior's median: none exceeds 0.1 rad
+EXPLAINED = 0.05  # of the greatest response's size: smaller ones are the noise of the axes
+LEAST_IDENTIFIED = 1e-3  # of the information: F imitates an inclination of which the residuals contain less
+LEAST_RAD2 = 1e-14  # of a fix's squared rotations: rounding
+
+
+@dataclass(frozen=True, slots=True)
+class Inclinations:
+    """Inclinations of a reference's axes of motion.
+
+    - `response` (m, r): of the m components of all increments to r independent inclinations of 1 rad.
+    - `prior_median_rad`: of their standard deviation.
+    """
+
+    response: Array
+    prior_median_rad: float
+
+    def widen(self, model: MixedModel, std: Array, fit: MixedFit, wanted: Array, variances: Array) -> Array:
+        """Return the covariance (q, q) that inclinations add to `wanted` (q, p) combinations of θ.
+
+        `variances` (q,) are those of all other errors. With both, 2 u is the half-width of the 95.45 % interval.
+        """
+        response = wanted @ self.propagate(model, std, fit)
+        added = np.sum(response**2, axis=1)
+        mixture = variances + np.square(self.prior_median_rad * RATIOS)[:, None] * added
+        half_width = find_half_width(np.zeros_like(mixture), mixture, self.weigh_sizes(model, std, fit))
+        size = np.sqrt(np.maximum(half_width**2 / 4 - variances, 0.0) / np.maximum(added, np.finfo(float).tiny))
+        return np.asarray(size[:, None] * (response @ response.T) * size, dtype=np.float64)
+
+    def propagate(self, model: MixedModel, std: Array, fit: MixedFit) -> Array:
+        """Return the response (p, r) of θ to the inclinations, by a fit whose errors have standard deviations (k,)."""
+        from scipy.linalg import cho_factor, cho_solve
+
+        factor = cho_factor(model.covariance(std), lower=True)
+        response: Array = fit.covariance @ model.mixed.design.T @ cho_solve(factor, self.response)
+        return response
+
+    def weigh_sizes(self, model: MixedModel, std: Array, fit: MixedFit) -> Array:
+        """Return the probabilities (j,) of the inclinations' standard deviations, `RATIOS` of the prior's median.
+
+        They are the prior times the restricted likelihood of the residuals, with the standard deviations (k,) of all
+        other errors fixed. In the eigenvectors of the information Hᵀ P H on the inclinations it is a product.
+        """
+        from scipy.linalg import cho_factor, cho_solve
+
+        factor = cho_factor(model.covariance(std), lower=True)
+        weighted = cho_solve(factor, self.response)
+        absorbed = weighted - cho_solve(factor, model.mixed.design) @ (
+            fit.covariance @ (model.mixed.design.T @ weighted)
+        )
+        information = self.response.T @ absorbed
+        values, directions = np.linalg.eigh((information + information.T) / 2)
+        whole = np.einsum("ij,ik,kj->j", directions, self.response.T @ weighted, directions)
+        identified = values > LEAST_IDENTIFIED * whole
+        values, directions = values[identified], directions[:, identified]
+        scores = directions.T @ (absorbed.T @ model.mixed.observed)
+        variances = np.square(self.prior_median_rad * RATIOS)[:, None]
+        ratio = 1 + variances * values
+        likelihood = 0.5 * np.sum(variances * scores**2 / ratio - np.log(ratio), axis=1)
+        relative = np.log(RATIOS)
+        logarithms = likelihood + relative - np.logaddexp(0, 2 * relative)
+        probabilities = np.exp(logarithms - logarithms.max())
+        return np.asarray(probabilities / probabilities.sum(), dtype=np.float64)
+
+
+def find_inclinations(averaged: FixedAttitudes, fixes: Fixes, matrix: Array) -> Inclinations:
+    """Return the inclinations of the axes about which the body turned between fixes, with F `matrix` (3, 3).
+
+    They vary smoothly with the axis in body coordinates: Matérn's function, ν = 3/2, of the distance between the axes.
+    """
+    joined = np.flatnonzero(fixes.joined)
+    cross_products = np.array([np.cross(np.eye(3), -axis) for axis in np.eye(3)])
+    changes = (matrix @ cross_products).reshape(3, 9)  # F changes so by an inclination δ = 1 about x, y, z: F (δ × ω)
+    sensitivities = np.diff(averaged.sensitivities[..., MATRIX], axis=0)[joined]
+    response = (sensitivities @ changes.T).reshape(-1, 3)
+    moments = _find_moments(fixes)
+    between = moments[joined] + moments[joined + 1]
+    axes = between / (between[:, ::4].sum(axis=1, keepdims=True) + LEAST_RAD2)
+    scaled = np.sqrt(3) * np.linalg.norm(axes[:, None] - axes, axis=2) / np.sqrt(2) / REACH
+    correlation = np.kron((1 + scaled) * np.exp(-scaled), np.ones((3, 3)))
+    values, vectors = np.linalg.eigh((response @ response.T) * correlation)
+    explained = values > EXPLAINED**2 * values[-1]
+    prior_median_rad = PRIOR_MEDIAN
+    if fixes.std_rad is not None and fixes.std_rad.any():
+        prior_median_rad = min(PRIOR_MEDIAN, float(np.median(fixes.std_rad[fixes.std_rad > 0])))
+    return Inclinations(vectors[:, explained] * np.sqrt(values[explained]), prior_median_rad)
+
+
+def _find_moments(fixes: Fixes) -> Array:
+    """Return the second moment (N, 9) of the rotation vectors, in body coordinates, between the samples of each fix."""
+    turns = rotation_vectors(np.swapaxes(fixes.attitudes[:-1], -1, -2) @ fixes.attitudes[1:])
+    turns = np.concatenate([turns, turns[-1:]])
+    moments = np.zeros((len(fixes.placement), 9))
+    np.add.at(moments, fixes.fix, (turns[:, :, None] * turns[:, None, :]).reshape(-1, 9))
+    return moments
