@@ -6,7 +6,7 @@ They are a logger's mark of a missing value, an axis that is frozen, or the end 
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.data.quantity import RATE, Quantity
+from rig.data.quantity import ACCELERATION, RATE, Quantity
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array, equal_runs
 from rig.observation.windows import Window, inside
@@ -15,10 +15,17 @@ OF_MOST = 0.1  # of the largest reading that any part has: beyond most parts' ra
 BEYOND, USUAL = 20.0, 0.99  # times the largest of the usual readings, which are this fraction
 CLIPPED, CLIPPED_RAD_S = 4, 1.0  # equal readings in a row at the end of an axis' readings; least range of these
 FINE = 0.5  # of the noise: steps of readings below it, so that equal ones are no chance
+GAP = 1.5  # intervals: no reading is missing
 FROZEN, COARSE = 50, 10  # equal readings in a row; more than so many a second time: a coarse axis repeats readings
 TURNED_RAD_S = 0.2  # change of another axis meanwhile
 INNER = (0.05, 0.95)  # quantiles: single readings count for nothing
 COLDEST_C, HOTTEST_C = -273.15, 1000.0
+NO_JUMP, SMOOTH = 0.8, 0.25  # of an axis' span: a jump over its end is larger, and all other steps are smaller
+SYMMETRIC = 0.1  # of the span: the ends of a signed counter differ from each other's negative by less
+FINEST_SPAN = 100  # steps of the readings: a coarse axis that toggles has fewer
+NARROWEST = {RATE: 2.0, ACCELERATION: 25.0}  # span of the smallest range; more than gravity when a body is turned over
+RISING, OUTWARDS = 4, 4.0  # readings before and after a jump; times the typical change of a step, by which they rise
+TOGGLES = 10  # readings between a jump and the one back, of a rate close to the end of the range
 
 
 def check_possible(readings: Array, rows: NDArray[np.intp], quantity: Quantity, where: str) -> None:
@@ -54,6 +61,55 @@ def check_temperatures(temperature_c: Array, rows: NDArray[np.intp], where: str)
             f"{rows[wrong[0]] + 1}, with {temperature_c[wrong[0]]:.6g}",
             "Convert counts to °C, as the data sheet says, or give the column another name, so that it is not read",
         )
+
+
+def check_unwrapped(time_s: Array, readings: Array, rows: NDArray[np.intp], quantity: Quantity, where: str) -> None:
+    """Raise Refused `readings_overflow` if an axis of readings (n, 3) jumps from one end of its span to the other.
+
+    A counter of too few bits does so, as a signed one of 16 bits after 32767. Arguments as above, with times (n,).
+    """
+    if quantity not in NARROWEST or len(readings) < 2:
+        return
+    for axis, name in enumerate(quantity.columns):
+        jumps = _find_overflows(time_s, readings[:, axis], NARROWEST[quantity])
+        if not len(jumps):
+            continue
+        first = jumps[0]
+        before, after = readings[first : first + 2, axis]
+        raise Refused(
+            "readings_overflow",
+            f"{where}: {name} jumps from {before:.6g} to {after:.6g} {quantity.unit} between two readings, as a number "
+            f"that overflows does, from one end of its range to the other: {len(jumps)} such steps, the first before "
+            f"sample {rows[first + 1] + 1}, at {time_s[first + 1]:.10g} s",
+            f"Choose a wider range of the {quantity.sensor}, or turn more slowly; or store its readings in more bits",
+        )
+
+
+def _find_overflows(time_s: Array, axis: Array, narrowest: float) -> NDArray[np.intp]:
+    """Return the indices (k,) of the readings (n,) before an overflow of the number that they are stored in.
+
+    A change of sign between two parts that somebody joined looks like it. But before an overflow the readings rise
+    towards the end of the range, and go on rising after it; close to the end, noise takes them over it and back.
+    """
+    none = np.zeros(0, dtype=np.intp)
+    span, steps, steps_s = float(np.ptp(axis)), np.diff(axis), np.diff(time_s)
+    large = np.abs(steps) > NO_JUMP * span
+    if span < narrowest or not large.any() or abs(axis.max() + axis.min()) > SYMMETRIC * span:
+        return none
+    jumps = np.flatnonzero(large & (steps_s <= GAP * np.median(steps_s)))
+    others = np.abs(steps[~large])
+    if not len(jumps) or others.max(initial=0.0) > SMOOTH * span:
+        return none
+    if span < FINEST_SPAN * float(np.diff(np.unique(axis)).min()):
+        return none
+    noise = float(np.median(np.abs(np.diff(steps))))
+    inner = jumps[(jumps >= RISING) & (jumps + RISING + 1 < len(axis))]
+    rise = np.minimum(
+        *(np.sign(-steps[inner]) * (axis[end] - axis[end - RISING]) for end in (inner, inner + 1 + RISING))
+    )
+    goes_on = bool((rise > OUTWARDS * noise).any())
+    returns = bool(((np.diff(jumps) <= TOGGLES) & (np.diff(np.sign(steps[jumps])) != 0)).any())
+    return jumps if goes_on or returns else none
 
 
 def find_clipped(readings: Array) -> NDArray[np.bool_]:

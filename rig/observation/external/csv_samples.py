@@ -23,7 +23,7 @@ from rig.errors.quoting import quote
 from rig.estimation.arrays import Array
 from rig.observation.external.csv_windows import check_times
 from rig.observation.external.omission import Omitted
-from rig.observation.false_readings import check_possible, check_temperatures
+from rig.observation.false_readings import check_possible, check_temperatures, check_unwrapped
 from rig.observation.formats.column_selection import Mapped
 from rig.observation.formats.csv_table import CsvTable, blank_cell, read_table
 from rig.observation.formats.sample_files import readings_in
@@ -53,7 +53,8 @@ class Samples:
 
     - `time_s` (n,): evened if stamps are too bad to be the times of the readings; `sampling` is that of the stamps.
     - `readings` (n, 3) by quantity; `temperature_c` (n,), None without such a column.
-    - `omitted`: rows of the file that are no readings of their own; `notes`: how stamps were read, in words.
+    - `omitted`: rows of the file that are no readings of their own.
+    - `notes`: how stamps were read, in words.
     """
 
     time_s: Array
@@ -191,21 +192,25 @@ def samples_in(table: Columns, where: str) -> Samples:
             )
     check_times(ordered.time_s, where)
     for quantity in present:
-        check_possible(np.column_stack([table[name] for name in quantity.columns])[rows], rows, quantity, where)
+        values = np.column_stack([table[name] for name in quantity.columns])[rows]
+        check_possible(values, rows, quantity, where)
+        check_unwrapped(ordered.time_s, values, rows, quantity, where)
     temperature_c = table.get(TEMPERATURE.columns[0])
     if temperature_c is not None:
         check_temperatures(temperature_c[rows], rows, where)
     total = len(table[TIME])
+    readings = {quantity: np.column_stack([table[name][rows] for name in quantity.columns]) for quantity in present}
+    omitted = [
+        Omitted("samples", finding.count, total, finding.reason, str(finding))
+        for finding in ordered.findings
+        if finding.left_out
+    ]
     return Samples(
         ordered.time_s,
-        {quantity: np.column_stack([table[name][rows] for name in quantity.columns]) for quantity in present},
+        readings,
         None if temperature_c is None else temperature_c[rows],
         ordered.sampling,
-        tuple(
-            Omitted("samples", finding.count, total, finding.reason, str(finding))
-            for finding in ordered.findings
-            if finding.left_out
-        ),
+        tuple(omitted),
         tuple(_describe_stamps(ordered, total)),
     )
 
