@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.data.installed_kinds import quantities
-from rig.data.quantity import TEMPERATURE, Quantity
+from rig.data.quantity import RATE, TEMPERATURE, Quantity
 from rig.data.recording.motion_file import TIME, Columns, samples_header
 from rig.errors import Refused
 from rig.errors.quoting import quote
@@ -27,10 +27,12 @@ from rig.observation.false_readings import check_possible, check_temperatures, c
 from rig.observation.formats.column_selection import Mapped
 from rig.observation.formats.csv_table import CsvTable, blank_cell, read_table
 from rig.observation.formats.sample_files import readings_in
+from rig.observation.statistics.spikes import bridge_spikes, find_spikes
 from rig.observation.time_stamps.sampling import Sampling
 from rig.observation.time_stamps.stamp_order import OrderedStamps, order_stamps
 
 SAMPLES_MB = 256  # an hour at 1 kHz
+SPIKES = "spikes: each stands alone, far from those before and after, as no body turns"
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +55,7 @@ class Samples:
 
     - `time_s` (n,): evened if stamps are too bad to be the times of the readings; `sampling` is that of the stamps.
     - `readings` (n, 3) by quantity; `temperature_c` (n,), None without such a column.
-    - `omitted`: rows of the file that are no readings of their own.
+    - `omitted`: rows of the file that are no readings of their own, and spikes, which are interpolated.
     - `notes`: how stamps were read, in words.
     """
 
@@ -205,6 +207,10 @@ def samples_in(table: Columns, where: str) -> Samples:
         for finding in ordered.findings
         if finding.left_out
     ]
+    if RATE in readings and len(spikes := find_spikes(ordered.time_s, readings[RATE])):
+        first = f"sample {rows[spikes[0]] + 1}, at {ordered.time_s[spikes[0]]:.10g} s"
+        omitted.append(Omitted("gyroscope readings", len(spikes), len(rows), SPIKES, first))
+        readings[RATE] = bridge_spikes(ordered.time_s, readings[RATE], spikes)
     return Samples(
         ordered.time_s,
         readings,

@@ -1,0 +1,75 @@
+"""Single readings of a gyroscope far from those before and after: bit errors, dropped digits, markers of a logger.
+
+A body needs several readings to turn there and back, if they follow each other fast enough. So a reading that stands
+alone is none, however large it is. A vibration, or a knock that rings, moves its neighbours too, and stays.
+
+A reading is compared with the cubic through two readings on either side. A spike of size 1 leaves deviations of
+1/6, −2/3, 1, −2/3, 1/6, while a step leaves −1/6, 1/2, −1/2, 1/6. What a motion or a vibration leaves is seen in the
+readings farther away.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.estimation.arrays import Array
+
+LONGEST_STEP_S = 0.02  # between readings: in a longer one a hand starts and stops
+SMALLEST_RAD_S = 0.1  # over one such step a smaller one turns by less than a body may move at rest
+BEYOND = 16.0  # times the largest deviation of the readings around, but for one other spike
+SUDDEN = 3.0  # times the change of any axis between the next readings: a body that is stopped moves about all axes
+REACH, ONE = 10, 5  # readings on either side that show the usual deviation; of these one other spike moves so many
+NEXT, ALIKE = -2 / 3, 0.2  # deviation of the next readings, as a fraction of the spike's, and its tolerance
+PASSES = 3  # spikes that are close together hide each other
+
+
+def find_spikes(time_s: Array, rates: Array) -> NDArray[np.intp]:
+    """Return the indices (k,) of the spikes in rates (n, 3), rad/s, at rising times (n,)."""
+    none = np.zeros(0, dtype=np.intp)
+    if len(rates) < 2 * REACH + 1 or np.median(np.diff(time_s)) > LONGEST_STEP_S:
+        return none
+    spikes, bridged = none, rates
+    for _ in range(PASSES):
+        changes = _changes_around(bridged)
+        more = np.concatenate([_find_lone(axis, changes) for axis in bridged.T])
+        if not len(more):
+            break
+        spikes = np.union1d(spikes, more)
+        bridged = bridge_spikes(time_s, rates, spikes)
+    return spikes
+
+
+def bridge_spikes(time_s: Array, rates: Array, spikes: NDArray[np.intp]) -> Array:
+    """Return the rates (n, 3) with those at the indices `spikes` (k,) interpolated from their neighbours."""
+    others = np.setdiff1d(np.arange(len(rates)), spikes)
+    bridged = rates.copy()
+    bridged[spikes] = np.column_stack([np.interp(time_s[spikes], time_s[others], axis[others]) for axis in rates.T])
+    return bridged
+
+
+def _changes_around(rates: Array) -> Array:
+    """Return the largest change (n,) of rates (n, 3) from one to another of the two readings before and after each."""
+    steps, across = np.abs(np.diff(rates, axis=0)).max(axis=1), np.abs(rates[2:] - rates[:-2]).max(axis=1)
+    changes = np.zeros(len(rates))
+    changes[2:-2] = np.maximum(np.maximum(steps[:-3], steps[3:]), across[1:-1])
+    return changes
+
+
+def _find_lone(axis: Array, changes: Array) -> NDArray[np.intp]:
+    """Return the indices of the readings (n,) that deviate from their neighbours as a spike does.
+
+    `changes` (n,) are those of all axes around each reading.
+    """
+    deviation = np.zeros(len(axis))
+    before, after = axis[:-4] + axis[4:], axis[1:-3] + axis[3:-1]
+    deviation[2:-2] = axis[2:-2] - (4 * after - before) / 6
+    candidates = np.flatnonzero(np.abs(deviation) > np.maximum(SMALLEST_RAD_S, SUDDEN * changes))
+    size = deviation[candidates]
+    alone = np.ones(len(candidates), dtype=np.bool_)
+    for side in (-1, 1):
+        of_next = deviation[np.clip(candidates + side, 0, len(axis) - 1)]
+        alone &= np.abs(of_next - NEXT * size) < ALIKE * np.abs(size)
+    candidates, size = candidates[alone], size[alone]
+    farther = np.r_[-REACH:-2, 3 : REACH + 1]
+    around = np.abs(deviation[np.clip(candidates[:, None] + farther, 0, len(axis) - 1)])
+    usual = np.sort(around, axis=1)[:, -1 - ONE]
+    return candidates[np.abs(size) > BEYOND * usual]
