@@ -206,12 +206,9 @@ def _solve(equations: Equations, method: Method, placements: Placements) -> Tria
     try:
         return equations.solve(method)
     except Fault as fault:
-        if not placements.left_out or fault.name not in TOO_LITTLE:
+        if not placements.omitted or fault.name not in TOO_LITTLE:
             raise
-        what = (
-            f"{fault.what}; {placements.left_out} rows in which the body moves are left out, because only rests give "
-            f"a reference{''.join(f'; {omitted}' for omitted in placements.omitted)}"
-        )
+        what = f"{fault.what}; left out, because only rests give a reference: {'; '.join(map(str, placements.omitted))}"
         raise Fault(fault.name, what, fault.remedy) from None
 
 

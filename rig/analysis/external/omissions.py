@@ -26,7 +26,7 @@ def list_omitted(
         yield from ((RATE, one) for one in (rates.omitted if isinstance(rates, InIncrements) else placed.incomplete))
     solved = [quantity for quantity in results if quantity != RATE]
     if isinstance(placed.placements, Placements) and solved:
-        yield from ((solved[0], omitted) for omitted in (*placed.unsampled, *placed.placements.omitted))
+        yield from ((solved[0], omitted) for omitted in placed.placements.omitted)
 
 
 def notes_on_reading(read: ReadElsewhere, samples: Samples) -> Iterator[str]:

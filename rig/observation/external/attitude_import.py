@@ -16,8 +16,7 @@ arm (`rig.observation.timebase`).
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -81,8 +80,8 @@ class PlacedReadings:
 
     A gyroscope's `rows`, and in `turning` its own readings and all rows, for a solution by rotation angles; for the
     other sensors `placements`, or the fault. `clock` if it had to be found. Left out are the `omitted` rows, which the
-    recording does not cover, and for missing samples the `incomplete` rows, without a mean rate, and the `unsampled`
-    ones, without a placement.
+    recording does not cover, and for missing samples the `incomplete` rows, without a mean rate. Rows without a
+    placement are omitted there.
     """
 
     quantities: tuple[Quantity, ...]
@@ -92,7 +91,6 @@ class PlacedReadings:
     clock: TimeBase | None = None
     omitted: tuple[Omitted, ...] = ()
     incomplete: tuple[Omitted, ...] = ()
-    unsampled: tuple[Omitted, ...] = ()
 
 
 def read_attitudes(
@@ -167,7 +165,12 @@ def placed_by(samples: Samples, table: Mapping[str, Array], *, find_clock: bool 
     whole = rows_found.select(_find_complete(rows_found, counts, expected))
     rate = readings.get(RATE)
     placement_rows = AttitudeRows(sampled.windows, sampled.attitudes, sampled.numbers, sampled.std_rad)
-    find = partial(find_placements, time_s, readings, placement_rows)
+    lacking = tuple(_list_omitted(covered, sampled, "lost_samples: half of their samples or more are missing"))
+
+    def find() -> Placements:
+        placements = find_placements(time_s, readings, placement_rows)
+        return replace(placements, omitted=(*lacking, *placements.omitted))
+
     return PlacedReadings(
         tuple(readings),
         None if rate is None else _rows(time_s, rate, whole),
@@ -178,7 +181,6 @@ def placed_by(samples: Samples, table: Mapping[str, Array], *, find_clock: bool 
         clock,
         (*_list_repeated(numbers, total), *_list_omitted(all_rows, covered, "not covered by the recording")),
         tuple(_list_omitted(covered, whole, "lost_samples: samples are missing in them")),
-        tuple(_list_omitted(covered, sampled, "lost_samples: half of their samples or more are missing")),
     )
 
 

@@ -42,10 +42,19 @@ class Account:
     dwells: NDArray[np.bool_]
 
     def check_mostly_at_rest(self) -> None:
-        """Raise Fault `not_at_rest` if the body moves in all rows, or in more than half of the dwells."""
+        """Raise Fault `not_at_rest` if the body moves in all rows, or in more than half of the dwells.
+
+        Raise `lost_samples` if most of these lack readings, which therefore do not show it.
+        """
         left_out, windows = int((self.rest[self.dwells] < 0).sum()), self.rows.windows
         if (self.rest >= 0).any() and 2 * left_out <= int(self.dwells.sum()):
             return
+        if 2 * int((self._find_gaps_s(self.dwells) > 0).sum()) > left_out > 0:
+            raise Fault(
+                "lost_samples",
+                f"{next(self._moving(self.dwells))}",
+                "See that the sensor's link loses nothing; give rows without a gap",
+            )
         what = f"the body moves in all of {len(windows)} rows, the first from {windows[0].start_s:.10g} s"
         if (self.rest >= 0).any():
             what = f"more rows are left out than kept: {next(self._moving(self.dwells))}"
@@ -103,18 +112,39 @@ class Account:
         return [int(row) for row in np.flatnonzero((self.rest >= 0) & self.dwells)]
 
     def _moving(self, rows: NDArray[np.bool_]) -> Iterator[Omitted]:
-        """Yield an entry for those of the given rows in which the body moves, if there are any."""
-        left_out = np.flatnonzero((self.rest < 0) & rows)
-        if len(left_out):
-            first = int(left_out[0])
+        """Yield entries for those of the given rows with a gap or in which the body moves, if there are any."""
+        left_out, gaps_s, total = (self.rest < 0) & rows, self._find_gaps_s(rows), int(rows.sum())
+        if len(lacking := np.flatnonzero(gaps_s > 0)):
+            first = int(lacking[0])
+            samples = self._inside(first)
+            at_s = self.time_s[samples[np.argmax(np.diff(self.time_s[samples]))]]
+            where = f"row {self.rows.numbers[first]}, after {at_s:.10g} s"
+            reason = f"lost_samples: readings are missing for up to {gaps_s.max():.3g} s, in which the body may move"
+            yield Omitted("rows", len(lacking), total, reason, where)
+        if len(moving := np.flatnonzero(left_out & (gaps_s == 0))):
+            first = int(moving[0])
             where = f"row {self.rows.numbers[first]}, from {self.rows.windows[first].start_s:.10g} s"
-            yield Omitted("rows", len(left_out), int(rows.sum()), "not_at_rest: the body moves in them", where)
+            yield Omitted("rows", len(moving), total, "not_at_rest: the body moves in them", where)
+
+    def _find_gaps_s(self, rows: NDArray[np.bool_]) -> Array:
+        """Return the longest gap (N,) between the readings of each of the given rows that is left out; else 0."""
+        gaps_s = np.zeros(len(rows))
+        for row in np.flatnonzero((self.rest < 0) & rows).tolist():
+            longest_s = float(np.diff(self.time_s[self._inside(row)]).max(initial=0.0))
+            gaps_s[row] = longest_s if longest_s > BLOCK_S else 0.0
+        return gaps_s
 
     def _inside(self, row: int) -> NDArray[np.intp]:
         return np.arange(*inside(self.time_s, self.rows.windows[row]).indices(len(self.time_s)))
 
     def _find_moved(self, row: int) -> NDArray[np.intp]:
-        """Return the samples of a dwell in which the body moves; the ends of a rest are uncertain by a block."""
-        window, left_out = self.rows.windows[row], np.setdiff1d(self._inside(row), self.cuts[row])
-        near = (self.time_s[left_out] < window.start_s + BLOCK_S) | (self.time_s[left_out] > window.end_s - BLOCK_S)
-        return left_out[~near]
+        """Return the samples of a dwell in which the body moves.
+
+        The ends of a rest are uncertain by a block, those of the dwell and those at a gap.
+        """
+        window, samples = self.rows.windows[row], self._inside(row)
+        gaps = np.flatnonzero(np.diff(self.time_s[samples]) > BLOCK_S)
+        ends_s = [window.start_s, window.end_s, *self.time_s[samples[gaps]], *self.time_s[samples[gaps + 1]]]
+        left_out = np.setdiff1d(samples, self.cuts[row])
+        distances_s = np.abs(self.time_s[left_out][:, None] - np.array(ends_s))
+        return np.asarray(left_out[distances_s.min(axis=1) >= BLOCK_S], dtype=np.intp)

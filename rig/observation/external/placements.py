@@ -4,7 +4,7 @@ A placement is a rest of the recording (`rig.observation.by_hand.rests`) and the
 rows that follow each other without a movement in between are one placement. Rests without a row of the reference still
 show the size of the quantity.
 
-A knock costs only the readings during it: if the readings before and after are equal, the body lay still.
+A knock, or a gap, costs only the readings during it: if the readings before and after are equal, the body lay still.
 """
 
 from collections.abc import Mapping, Sequence
@@ -28,7 +28,7 @@ from rig.observation.statistics.mean import Mean
 from rig.observation.windows import Window, inside
 
 TURNED_RAD = 0.02  # rows of one rest that are farther apart: the body was turned about the measured vector
-INTERRUPTED_S = 1.0  # longest knock after which equal readings show that the body lay still
+INTERRUPTED_S = 1.0  # longest knock after which equal readings show that the body lay still; a gap does not count
 MOSTLY = 0.5  # of a dwell: if the body lies still for as long, only the remainder is left out
 
 
@@ -129,31 +129,44 @@ def _closed_slice(time_s: Array, window: Window) -> NDArray[np.intp]:
 
 def _join_rests(time_s: Array, readings: Mapping[Quantity, Array], rests: Sequence[Window]) -> list[tuple[Window, ...]]:
     """Return rests joined across knocks: readings are equal before and after, and the body has not turned between."""
-    quantity = next(quantity for quantity in quantities().values() if quantity in readings)
     joined: list[tuple[Window, ...]] = []
     for rest in rests:
-        if joined and _same_rest(time_s, readings[quantity], quantity, joined[-1][-1], rest):
+        if joined and _same_rest(time_s, readings, joined[-1][-1], rest):
             joined[-1] = (*joined[-1], rest)
         else:
             joined.append((rest,))
     return joined
 
 
-def _same_rest(time_s: Array, read: Array, quantity: Quantity, before: Window, after: Window) -> bool:
-    if after.start_s - before.end_s > INTERRUPTED_S:
+def _same_rest(time_s: Array, readings: Mapping[Quantity, Array], before: Window, after: Window) -> bool:
+    """Return whether the body lay still between two rests.
+
+    In a gap of a gyroscope's readings it may have turned; then the other quantities must show that it lies as before.
+    """
+    between = _closed_slice(time_s, Window(before.end_s, after.start_s))
+    gap_s = float(np.diff(time_s[between]).max())
+    has_gap = gap_s > BLOCK_S
+    if after.start_s - before.end_s > INTERRUPTED_S + (gap_s if has_gap else 0.0):
         return False
-    one, other = (read[_closed_slice(time_s, window)] for window in (before, after))
+    cuts = (_closed_slice(time_s, before), _closed_slice(time_s, after))
+    first, *others = (quantity for quantity in quantities().values() if quantity in readings)
+    if not _reads_alike(readings[first], first, *cuts):
+        return False
+    if first != RATE:
+        return True
+    if has_gap:
+        return bool(others) and all(_reads_alike(readings[quantity], quantity, *cuts) for quantity in others)
+    bias = readings[RATE][cuts[0]].mean(axis=0)
+    turned_rad = np.trapezoid(readings[RATE][between] - bias, time_s[between], axis=0)
+    return bool(np.linalg.norm(turned_rad) <= TURNED_RAD)
+
+
+def _reads_alike(read: Array, quantity: Quantity, before: NDArray[np.intp], after: NDArray[np.intp]) -> bool:
+    """Return whether two parts of readings (n, 3) of a body at rest have one mean, as well as their noise shows."""
+    one, other = read[before], read[after]
     noise = np.maximum(np.minimum(one.std(axis=0), other.std(axis=0)), COUNTS * quantity.steady)
     tolerance = quantity.steady + BEYOND * noise * np.sqrt(1 / len(one) + 1 / len(other))
-    if (np.abs(one.mean(axis=0) - other.mean(axis=0)) > tolerance).any():
-        return False
-    if quantity != RATE:
-        return True
-    knock = _closed_slice(time_s, Window(before.end_s, after.start_s))
-    if np.diff(time_s[knock]).max() > BLOCK_S:  # the readings do not show whether the body turned in it
-        return False
-    turned_rad = np.trapezoid(read[knock] - one.mean(axis=0), time_s[knock], axis=0)
-    return bool(np.linalg.norm(turned_rad) <= TURNED_RAD)
+    return bool((np.abs(one.mean(axis=0) - other.mean(axis=0)) <= tolerance).all())
 
 
 def _find_rest(time_s: Array, window: Window, rests: Sequence[_PlacedRest]) -> tuple[int, NDArray[np.intp]]:
