@@ -2,6 +2,19 @@
 
 from typing import NamedTuple, Self
 
+NO_BREAK_SPACE = "\N{NO-BREAK SPACE}"
+
+
+def printable(text: str) -> str:
+    """Return the text with every invisible character, including line ends, in Python's notation: `\\x1b`, `\\n`.
+
+    A no-break space stays: it separates a number from its power of ten or its unit.
+    """
+    if text.isprintable():
+        return text
+    shows = (c.isprintable() or c == NO_BREAK_SPACE for c in text)
+    return "".join(c if s else c.encode("unicode_escape").decode("ascii") for c, s in zip(text, shows, strict=True))
+
 
 class Problem(NamedTuple):  # no dataclass: the command line imports this, and must start at once
     """A condition that prevents an operation.
@@ -16,7 +29,7 @@ class Problem(NamedTuple):  # no dataclass: the command line imports this, and m
 
     def __str__(self) -> str:
         stop = "" if self.remedy.endswith((".", "?", "!")) else "."
-        return f"{self.name}: {self.what}. {self.remedy}{stop}"
+        return printable(f"{self.name}: {self.what}. {self.remedy}{stop}")  # a path may contain a line feed
 
 
 class ProblemError(Exception):

@@ -13,7 +13,7 @@ from rig.commands.command_signals import end_by_interrupt, ignore_endings
 from rig.commands.standard_streams import keep_streams_usable, output_lost
 from rig.data.version import VERSION
 from rig.errors import INTERRUPTED, Fault, RigError, Unprinted
-from rig.errors.quoting import printable_lines
+from rig.errors.quoting import printable, printable_lines
 from rig.station.plain_text import for_file, say_on_terminal
 
 if TYPE_CHECKING:
@@ -258,7 +258,9 @@ def run_guarded(command: Callable[[], int]) -> int:
             raise Unprinted("output_lost", what, "Free some space, or redirect the output to another disk")
         return status
     except RigError as error:
-        return _print_ending("\n".join([str(error), *getattr(error, "__notes__", ())]), error.exit_status)
+        return _print_ending(
+            "\n".join([str(error), *map(printable, getattr(error, "__notes__", ()))]), error.exit_status
+        )
     except KeyboardInterrupt as interrupt:
         ignore_endings()  # all is stopped: an impatient second Ctrl-C has nothing to end
         return _print_ending(str(interrupt) or "interrupted", INTERRUPTED)
@@ -289,7 +291,7 @@ class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Print the error, the command's usage and how to get help; exit with status 2."""
         usage = self.format_usage()
-        self.exit(2, f"{self.prog}: error: {_suggest_choice(message)}\n{usage}more: {self.prog} --help\n")
+        self.exit(2, f"{self.prog}: error: {printable(_suggest_choice(message))}\n{usage}more: {self.prog} --help\n")
 
 
 def _suggest_choice(message: str) -> str:

@@ -3,21 +3,11 @@
 from collections.abc import Iterable
 from typing import Any
 
+from firmware_host.problem import printable
+
+__all__ = ["listing", "printable", "printable_lines", "quote", "shorten"]
 SHOWN_CHARACTERS = 60
 SHOWN_NAMES = 12
-NO_BREAK_SPACE = "\N{NO-BREAK SPACE}"
-
-
-def printable(text: str) -> str:
-    """Return the text with every invisible character, including line ends, in Python's notation: `\\x1b`, `\
-    `.
-
-    A no-break space stays: it separates a number from its power of ten or its unit.
-    """
-    if text.isprintable():
-        return text
-    shows = (c.isprintable() or c == NO_BREAK_SPACE for c in text)
-    return "".join(c if s else c.encode("unicode_escape").decode("ascii") for c, s in zip(text, shows, strict=True))
 
 
 def printable_lines(text: str) -> str:
