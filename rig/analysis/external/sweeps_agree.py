@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rig.analysis.external.bias_of_sweeps import bias_variance
 from rig.errors import Refused
 from rig.estimation.arrays import Array, bisect
 from rig.estimation.gyroscope.stated_motion import MotionErrors, StatedMotion, motion_errors
@@ -62,7 +63,7 @@ def _name_contradiction(worst: int, data: ExternalData) -> str:
 
 @dataclass(frozen=True, slots=True)
 class SweepErrors:
-    """The covariances that errors of the stated motion add to a solution, with `dof` degrees of freedom.
+    """The covariances that errors of the stated motion and a moving bias add to a solution, with `dof`.
 
     `covariance` (6, 6) of scale and bias; `matrix_covariance` (12, 12) and `angles_covariance_rad2` (6, 6) as in
     `VectorSolution`, so that twice a standard uncertainty is U.
@@ -75,7 +76,7 @@ class SweepErrors:
 
 
 def sweep_errors(solution: VectorSolution, data: ExternalData) -> SweepErrors | None:
-    """Return the effect of the stated motion's errors on the vector model's `solution`.
+    """Return the effect of the stated motion's errors, and of the bias's changes, on the vector model's `solution`.
 
     Return None for means corrected to one temperature: the polynomials include the contradictions of repeats.
     """
@@ -105,9 +106,11 @@ def sweep_errors(solution: VectorSolution, data: ExternalData) -> SweepErrors | 
         return np.asarray(inflation[:, None] * beyond * inflation, dtype=np.float64)
 
     dof = float(max(count_redundant_rows(data), FEWEST_FREEDOM))
+    wander = bias_variance(data)
+    of_parameters = inflate(parameter_jacobian(solution.matrix, axes.scale), dof, noise_dof(solution, data))
     return SweepErrors(
-        covariance=inflate(parameter_jacobian(solution.matrix, axes.scale), dof, noise_dof(solution, data)),
-        matrix_covariance=inflate(np.eye(12), np.inf, np.inf),
+        covariance=of_parameters + np.diag([0, 0, 0, *wander]),
+        matrix_covariance=inflate(np.eye(12), np.inf, np.inf) + np.diag([*np.zeros(9), *wander]),
         angles_covariance_rad2=inflate(to_angles, np.inf, np.inf),
         dof=dof,
     )

@@ -35,7 +35,7 @@ def means_at_rest(turning: Turning, clock_s: float) -> MeansAtRest | None:
     readings = []
     rates = []
     rests = find_rests(turning.time_s, {RATE: turning.readings_rad_s}, lying=lying)
-    for rest in _split_single([*rests, *_find_otherwise(turning, lying, rests)]):
+    for rest in _split_single([*rests, *find_rests_otherwise(turning.time_s, turning.readings_rad_s, lying, rests)]):
         rows = np.flatnonzero((rows_s >= rest.start_s) & (rows_s <= rest.end_s))
         if not len(rows):
             continue
@@ -50,21 +50,24 @@ def means_at_rest(turning: Turning, clock_s: float) -> MeansAtRest | None:
     return MeansAtRest(np.array(readings), np.array(rates))
 
 
-def _find_otherwise(turning: Turning, lying: Sequence[Window], rests: Sequence[Window]) -> list[Window]:
-    """Return the windows in which the body lies still by its attitudes, and the readings are as quiet as in the rests.
+def find_rests_otherwise(
+    time_s: Array, readings: Array, lying: Sequence[Window], rests: Sequence[Window]
+) -> list[Window]:
+    """Return the windows in which the body should lie still, and the readings are as quiet as in the rests.
 
-    They contain another reading than the rests, because the bias has changed.
+    They contain another reading than the rests, because the bias has changed. `lying` are the windows that somebody
+    states, `rests` those that the readings (n, 3) at times (n,) show.
     """
     if not rests:
         return []
-    noise = np.median([turning.readings_rad_s[inside(turning.time_s, rest)].std(axis=0) for rest in rests], axis=0)
+    noise = np.median([readings[inside(time_s, rest)].std(axis=0) for rest in rests], axis=0)
     inner = [Window(window.start_s + LATE_S, window.end_s - LATE_S) for window in lying]
     return [
         window
         for window in inner
         if window.end_s - window.start_s >= SHORTEST_S
         and all(rest.end_s <= window.start_s or rest.start_s >= window.end_s for rest in rests)
-        and (turning.readings_rad_s[inside(turning.time_s, window)].std(axis=0) <= AS_QUIET * noise).all()
+        and (readings[inside(time_s, window)].std(axis=0) <= AS_QUIET * noise).all()
     ]
 
 

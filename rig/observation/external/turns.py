@@ -3,7 +3,7 @@
 A turn is solved by the angle that the gyroscope measured, whatever its speed; a sweep by its mean.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +15,7 @@ from rig.observation.arm_rests import estimate_bias_drift
 from rig.observation.average import Average
 from rig.observation.by_hand.rests import find_rests
 from rig.observation.external.csv_windows import average_of
+from rig.observation.external.means_at_rest import find_rests_otherwise
 from rig.observation.observe import Observation
 from rig.observation.time_stamps.gaps import hidden_angles_rad
 from rig.observation.time_stamps.sampling import find_sampling
@@ -23,6 +24,7 @@ from rig.observation.windows import Window, inside
 REACH_S = 0.5  # between the marked end of a turn and the rest that it belongs to
 EDGE_SAMPLES = 2  # either side of an end
 STANDING = 0.25  # of the mean speed: a body slower at both ends started and stopped there
+OTHER_BIAS_RAD_S = 0.1  # a body that reads more in a pause turns
 MOST_HIDDEN_RAD = 0.02  # by missing readings of a turn
 BY_HAND_ANGLE_RAD = float(np.radians(0.3))  # default repeatability of a body turned by hand against its stop
 BY_HAND_AXIS_RAD = 0.02  # default tilt during the turn
@@ -32,8 +34,8 @@ BY_HAND_AXIS_RAD = 0.02  # default tilt during the turn
 class TurnedData:
     """The input of a solution by increments: the gyroscope, the turns, the numbers of their rows, and the means.
 
-    `noise_dof`, `bias_dof`: degrees of freedom of its noise, and of its bias' change between rests. `hiding`: numbers
-    of rows that are left out, for missing readings may hide a part of the turn.
+    `noise_dof`, `bias_dof`: degrees of freedom of its noise, and of its bias' change between `rests`, which are stated
+    or found. `hiding`: numbers of rows that are left out, for missing readings may hide a part of the turn.
     """
 
     gyroscope: Gyroscope
@@ -42,6 +44,7 @@ class TurnedData:
     means: tuple[RateMean, ...]
     noise_dof: int
     bias_dof: int
+    rests: tuple[Average, ...]
     hiding: tuple[int, ...] = ()
 
 
@@ -58,10 +61,11 @@ def find_turns(
     time_s: Array, readings: Array, declared: DeclaredTurns, sweeps: Sequence[Observation], rests: Sequence[Average]
 ) -> TurnedData | None:
     """Return the turns from rest to rest among sweeps, if any. `readings` (n, 3) in rad/s at `time_s`."""
-    lying = find_rests(time_s, {RATE: readings}, lying=_find_pauses(time_s, sweeps))
+    pauses = _find_pauses(time_s, sweeps)
+    lying = find_rests(time_s, {RATE: readings}, lying=pauses)
     if not lying:
         return None
-    resting = rests or [average_of(readings[inside(time_s, window)], window) for window in lying]
+    resting = [*rests, *(average_of(readings[inside(time_s, window)], window) for window in _find_others(lying, rests))]
     bias = np.median([rest.mean_rad_s for rest in resting], axis=0)
     rates = readings - bias
     sampling = find_sampling(time_s)
@@ -90,12 +94,42 @@ def find_turns(
         rows.append(sweep.sweep)
     if not turns:
         return None
+    otherwise = _find_other_bias(time_s, rates, pauses, lying)
     noise = np.sqrt(np.mean([np.square(rest.noise_rad_s) for rest in resting]) * sampling.interval_s)
     gyroscope = Gyroscope(time_s, readings, float(noise), np.sqrt(estimate_bias_drift(resting)))
     samples = sum(rest.samples - 1 for rest in resting)
     return TurnedData(
-        gyroscope, tuple(turns), tuple(rows), tuple(means), samples, max(len(resting) - 1, 1), tuple(hiding)
+        gyroscope,
+        tuple(turns),
+        tuple(rows),
+        tuple(means),
+        samples,
+        max(len(resting) - 1, 1),
+        (*resting, *(average_of(readings[inside(time_s, window)], window) for window in otherwise)),
+        tuple(hiding),
     )
+
+
+def _find_other_bias(
+    time_s: Array, rates: Array, pauses: Sequence[Window], lying: Sequence[Window]
+) -> Iterator[Window]:
+    """Yield the pauses with a quiet reading that may be another bias, by rates (n, 3) less the usual bias."""
+    middles = [
+        Window(pause.start_s + (pause.end_s - pause.start_s) / 4, pause.end_s - (pause.end_s - pause.start_s) / 4)
+        for pause in pauses
+    ]
+    for window in find_rests_otherwise(time_s, rates, middles, lying):
+        if np.linalg.norm(rates[inside(time_s, window)].mean(axis=0)) < OTHER_BIAS_RAD_S:
+            yield window
+
+
+def _find_others(lying: Sequence[Window], rests: Sequence[Average]) -> list[Window]:
+    """Return the rests that were found and do not overlap a stated one."""
+    return [
+        window
+        for window in lying
+        if all(rest.end_s <= window.start_s or rest.start_s >= window.end_s for rest in rests)
+    ]
 
 
 def _find_pauses(time_s: Array, sweeps: Sequence[Observation]) -> list[Window]:

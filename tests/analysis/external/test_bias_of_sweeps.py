@@ -1,0 +1,67 @@
+"""A bias that changes over a file of sweeps: named if it jumps, within U if it moves less."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rig.analysis.external.external_recordings import budget_of, solve_swept
+from rig.errors import Fault
+from rig.observation.external.csv_import import ExternalData
+from support.external.loggers import Log, swept, turn_slowly, write_rates
+from support.external.sweeps_as_files import average_files
+
+BIAS_RAD_S = np.array([0.01, -0.02, 0.005])
+HZ = 50
+
+
+def stepped(folder: Path, size_rad_s: float, at: float, *, rests: bool = True) -> ExternalData:
+    log = swept(HZ)
+    readings = log.readings.copy()
+    readings[int(at * len(readings)) :, 0] += size_rad_s
+    rows = log.rows if rests else log.rows[log.rows[:, -1] > 0]
+    return average_files(*write_rates(folder, Log(log.time_s, readings, rows)))
+
+
+def turned(folder: Path, size_rad_s: float) -> ExternalData:
+    log = turn_slowly(0.6, BIAS_RAD_S, rate_hz=HZ)
+    readings = log.readings.copy()
+    readings[len(readings) // 2 :, 0] += size_rad_s
+    return average_files(*write_rates(folder, Log(log.time_s, readings, log.rows), motion="angle_rad"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rests", [True, False])
+@pytest.mark.parametrize(("at", "from_s"), [(0.3, "2"), (0.5, "3")])
+def test_a_jump_is_named_with_its_time_and_axis(tmp_path: Path, at: float, from_s: str, *, rests: bool) -> None:
+    what = (
+        rf"bias_jumped: from {from_s}\d(\.\d)? s on the gyroscope reads 0\.02 rad/s more on x than"
+    )
+    with pytest.raises(Fault, match=what):
+        solve_swept(stepped(tmp_path, 0.02, at, rests=rests), None)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("at", [0.3, 0.5, 0.56, 0.8])
+def test_u_contains_a_bias_that_moves_less(tmp_path: Path, at: float) -> None:
+    data = stepped(tmp_path, -0.003, at)
+    solution = solve_swept(data, None)
+    expanded = budget_of(solution, data).expanded
+    for of_x in (-BIAS_RAD_S[0], -BIAS_RAD_S[0] + 0.003):  # at first and at the end
+        assert abs(solution.bias_rad_s[0] - of_x) < expanded[3]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("size_rad_s", [0.006, 0.02, 0.06])
+def test_a_jump_between_turns_by_angle_is_named(tmp_path: Path, size_rad_s: float) -> None:
+    with pytest.raises(Fault, match=r"bias_jumped: from 5\d\.\d+ s on the gyroscope reads 0\.\d+ rad/s more on x"):
+        solve_swept(turned(tmp_path, size_rad_s), None)
+
+
+@pytest.mark.slow
+def test_u_contains_a_bias_that_moves_less_between_turns(tmp_path: Path) -> None:
+    data = turned(tmp_path, 0.001)
+    solution = solve_swept(data, None)
+    expanded = budget_of(solution, data).expanded
+    for of_x in (BIAS_RAD_S[0], BIAS_RAD_S[0] + 0.001):  # at first and at the end
+        assert abs(solution.bias_rad_s[0] + of_x) < expanded[3]
