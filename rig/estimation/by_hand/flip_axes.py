@@ -3,33 +3,46 @@
 import numpy as np
 
 from rig.errors import Fault
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, rotation_vectors
 from rig.estimation.by_hand.session_parts import HandRecording, nearest_face
-from rig.estimation.refusals import MAX_SCALE
+from rig.estimation.sensor_axes import nearest_rotation
 
 SIDEWAYS = 0.3  # cosine between the verticals of a quarter turn
 SAME = 0.7  # of the size: an axis that is another one shows less of it
+FEWEST, UNEXPLAINED = 5, 0.2  # flips; fraction of their rotation: with more, moves were merged or rests not found
+SKEWED = 0.3  # cosine between two axes: no part's are as far from square
+TURNED_RAD = 1.1  # between the frames of gyroscope and accelerometer: from farther off no fit converges
+OTHER_UNIT = 20.0  # either way: a whole turn that is merged with a flip reads five times as much
 FASTEST_RAD_S = 150.0  # no gyroscope of this kind reads so much: it is degrees
 
 
 def check_axes(session: HandRecording) -> None:
-    """Raise Fault `wrong_unit`, `mirrored_axis` or `swapped_axes` if the flips by a quarter turn show such an error."""
+    """Raise Fault `wrong_unit`, `mirrored_axis`, `swapped_axes` or `wrong_mounting` if the quarter turns show it.
+
+    They show nothing if one map from the accelerometer's axes to the gyroscope's does not explain them: then rests were
+    not found, and several moves look like one.
+    """
     if max((move.peak_rad_s for move in session.moves), default=0.0) > FASTEST_RAD_S:
         raise Fault("wrong_unit", "the readings look like degrees per second given as rad/s", "Give them in rad/s")
     if session.acceleration is None:
         return
     about, swept = _quarters(session)
-    if len(about) < 3 or np.linalg.svd(about)[1][-1] < 0.5:
+    if len(about) < FEWEST or np.linalg.svd(about)[1][-1] < 0.5:
         return
     matrix = np.linalg.lstsq(about, swept, rcond=None)[0].T  # swept = M about
     sizes = np.linalg.norm(matrix, axis=1)
-    if sizes.max() > MAX_SCALE or sizes.min() < 1 / MAX_SCALE:
+    if sizes.max() > OTHER_UNIT or sizes.min() < 1 / OTHER_UNIT:
         raise Fault(
             "wrong_unit", f"a quarter of a turn reads {sizes.max():.3g} times as much", "Give the readings in rad/s"
         )
     unit = matrix / sizes[:, None]
     strongest = np.argmax(np.abs(unit), axis=1)
-    if (np.abs(unit[np.arange(3), strongest]) < SAME).any():
+    unexplained = np.linalg.norm(swept - about @ matrix.T) / np.linalg.norm(swept)
+    skew = np.abs(unit @ unit.T - np.eye(3)).max()
+    if unexplained > UNEXPLAINED or skew > SKEWED:
+        return
+    if sorted(strongest.tolist()) != [0, 1, 2] or (np.abs(unit[np.arange(3), strongest]) < SAME).any():
+        _check_turned(unit)
         return
     names = [nearest_face(row) for row in unit]
     if names == ["+x", "+y", "+z"]:
@@ -37,6 +50,17 @@ def check_axes(session: HandRecording) -> None:
     axes_read = f"the gyroscope's x, y, z read the turning about the accelerometer's {', '.join(names)}"
     remedy = "Correct order and signs of the columns of one of them"
     raise Fault("mirrored_axis" if strongest.tolist() == [0, 1, 2] else "swapped_axes", axes_read, remedy)
+
+
+def _check_turned(unit: Array) -> None:
+    """Raise Fault `wrong_mounting` if axes, the rows of (3, 3), are turned farther than a session's fit begins."""
+    angle_rad = float(np.linalg.norm(rotation_vectors(nearest_rotation(unit)[None])[0]))
+    if angle_rad > TURNED_RAD:
+        raise Fault(
+            "wrong_mounting",
+            f"the gyroscope's axes lie {np.degrees(angle_rad):.0f}° off the accelerometer's, as by no order of columns",
+            "Give both sensors' readings in one frame: turn those of one into the axes of the other",
+        )
 
 
 def _quarters(session: HandRecording) -> tuple[Array, Array]:

@@ -34,9 +34,7 @@ def turned(folder: Path, size_rad_s: float) -> ExternalData:
 @pytest.mark.parametrize("rests", [True, False])
 @pytest.mark.parametrize(("at", "from_s"), [(0.3, "2"), (0.5, "3")])
 def test_a_jump_is_named_with_its_time_and_axis(tmp_path: Path, at: float, from_s: str, *, rests: bool) -> None:
-    what = (
-        rf"bias_jumped: from {from_s}\d(\.\d)? s on the gyroscope reads 0\.02 rad/s more on x than"
-    )
+    what = rf"bias_jumped: from {from_s}\d(\.\d)? s on the gyroscope reads 0\.02 rad/s more on x than"
     with pytest.raises(Fault, match=what):
         solve_swept(stepped(tmp_path, 0.02, at, rests=rests), None)
 
