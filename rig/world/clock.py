@@ -41,6 +41,11 @@ class WorldClock:
         """Whether the clock stands still."""
         return self._stop_at is not None and self.tick >= self._stop_at
 
+    @property
+    def is_limited(self) -> bool:
+        """Whether the clock stands still or will soon: somebody counts its ticks."""
+        return self._stop_at is not None
+
     def hold(self) -> None:
         """Stop the clock."""
         self._stop_at = self.tick
@@ -82,6 +87,7 @@ class WorldClock:
         return max(0.0, due_s - now_s)
 
     def count(self) -> None:
-        """Count one tick, which begins now."""
+        """Count one tick, which begins now, or began a moment ago."""
         self.tick += 1
-        self._counted_s = self._wall()
+        now_s = self._wall()
+        self._counted_s = min(now_s, max(self._counted_s + self._tick_s, now_s - self._patience_s))
