@@ -10,7 +10,7 @@ from pydantic import BaseModel, Field, TypeAdapter, ValidationError
 from rig.config.files.regular_file import UnfitFile, read_regular_file
 from rig.errors import Refused
 from rig.errors.quoting import printable, quote
-from rig.motion.geometry import MAX_JOINTS
+from rig.motion.chain import MAX_JOINTS
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]

@@ -4,15 +4,15 @@ Every function takes arrays whose last axis holds the n joints, the one on the g
 others. Shoulder, elbow, forearm are those of an arm like the UR10e, with six joints, base to wrist 3.
 """
 
-from dataclasses import dataclass
 from functools import lru_cache
 from itertools import accumulate
-from math import isfinite, pi, prod
+from math import pi, prod
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rig.estimation.arrays import Array
+from rig.motion.chain import DenavitHartenberg
 
 ROUNDING = 1e-15
 WRIST_1, WRIST_2, WRIST_3 = 3, 4, 5
@@ -30,36 +30,6 @@ LENGTHS = (
     "offset of wrist 2",
     "offset of wrist 3",
 )
-
-MAX_JOINTS = 8
-Pose = tuple[float, ...]  # a controller's, (6,): m, rotation vector in rad
-
-
-@dataclass(frozen=True, slots=True)
-class DenavitHartenberg:
-    """A chain's geometry: zero θ, length a, offset d, twist α of each of n joints, from the ground on.
-
-    Raise ValueError unless their number is the same, at most `MAX_JOINTS`, and all are finite.
-    """
-
-    theta_rad: tuple[float, ...]
-    a_m: tuple[float, ...]
-    d_m: tuple[float, ...]
-    alpha_rad: tuple[float, ...]
-
-    def __post_init__(self) -> None:
-        if len({len(values) for values in (self.theta_rad, self.a_m, self.d_m, self.alpha_rad)}) > 1:
-            raise ValueError("a geometry has as many θ as a, d and α")
-        if self.joints > MAX_JOINTS:
-            raise ValueError(f"a geometry has at most {MAX_JOINTS} joints")
-        if not all(map(isfinite, (*self.theta_rad, *self.a_m, *self.d_m, *self.alpha_rad))):
-            raise ValueError("a geometry is of finite numbers")
-
-    @property
-    def joints(self) -> int:
-        """The number of joints."""
-        return len(self.theta_rad)
-
 
 NOMINAL = DenavitHartenberg(  # a UR10e's (maker's article 45257), the arm of recordings that name none
     theta_rad=(0.0,) * 6,

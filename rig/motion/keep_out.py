@@ -9,7 +9,8 @@ import numpy as np
 from rig.errors import Problem
 from rig.estimation.arrays import Array
 from rig.motion.carried import FlangeLoad
-from rig.motion.geometry import DenavitHartenberg, distance_to_forearm, distance_to_upper_arm
+from rig.motion.chain import DenavitHartenberg
+from rig.motion.geometry import distance_to_forearm, distance_to_upper_arm
 from rig.motion.model import TurnerModel
 from rig.motion.steps import Dwell, Plan, Rest, travel
 from rig.motion.turner_state import JointLimits, Joints

@@ -8,7 +8,7 @@ from math import inf, pi, radians
 from typing import TYPE_CHECKING, Any, Literal
 
 from rig.config.ranges import ModelName
-from rig.motion.geometry import DenavitHartenberg
+from rig.motion.chain import DenavitHartenberg
 from rig.motion.turner_state import JointLimits, Joints
 
 if TYPE_CHECKING:

@@ -3,51 +3,19 @@
 The states of Universal Robots' arms are defined here too, because the page shows their modes.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from enum import IntEnum
 from operator import attrgetter
-from typing import Any, Literal, Protocol
+from typing import Protocol
 
-import numpy as np
-
-from rig.motion.geometry import DenavitHartenberg, Pose
+from rig.motion.chain import DenavitHartenberg, Pose
 
 JOINT_NAMES = ("base", "shoulder", "elbow", "wrist_1", "wrist_2", "wrist_3")  # of an arm of Universal Robots
 
 Joints = tuple[float, ...]  # a value for each joint, the one that stands on the ground first
 Row = tuple[float | int | Joints, ...]
-Scalar = Literal["f4", "f8", "i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8"]  # NumPy's names of types
 
-
-@dataclass(frozen=True, slots=True)
-class StateField:
-    """A field of a turner's states besides times and joints: name, which carries the unit, and type."""
-
-    name: str
-    type: Scalar
-
-
-def state_dtype(joints: int, more: Sequence[StateField] = ()) -> np.dtype[Any]:
-    """Return the type of the rows of states, for a number of joints and `more` fields.
-
-    Without joints it has no columns for them, because HDF5 has no arrays of length 0.
-    """
-    angles = [(name, "<f8", (joints,)) for name in ("q_rad", "qd_rad_s")] if joints else []
-    others = [(field.name, f"<{field.type}" if field.type[1] != "1" else field.type) for field in more]
-    return np.dtype([("time_s", "<f8"), ("host_time_s", "<f8"), *angles, *others])
-
-
-ARM_FIELDS = (
-    StateField("target_speed_fraction", "f8"),
-    StateField("speed_scaling", "f8"),
-    StateField("robot_mode", "i4"),
-    StateField("safety_mode", "i4"),
-    StateField("runtime_state", "i4"),
-    StateField("robot_status_bits", "u4"),
-    StateField("safety_status_bits", "u4"),
-)
-ARM_STATE_DTYPE = state_dtype(len(JOINT_NAMES), ARM_FIELDS)
 
 # A slower joint is at rest: 0.3°/s, above the noise of the velocity signal.
 REST_SPEED_RAD_S = 5e-3

@@ -9,7 +9,7 @@ from rig.data.recording.recorded_events import BoardObserved
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.run_data import RunData
 from rig.data.recording.settings import ObservationThresholds
-from rig.motion.geometry import DenavitHartenberg
+from rig.motion.chain import DenavitHartenberg
 from rig.motion.steps import Sweep
 from rig.observation.average import synchronize_stream
 from rig.observation.finished_steps import finished_sweeps

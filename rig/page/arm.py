@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from rig.motion.geometry import DenavitHartenberg
+from rig.motion.chain import DenavitHartenberg
 from rig.motion.turner_state import JOINT_NAMES, ArmState, Report, RobotMode, RuntimeState, SafetyMode, State
 from rig.page.recent_readings import round_digits
 

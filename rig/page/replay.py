@@ -18,8 +18,9 @@ from rig.data.recording.recorded_events import (
 )
 from rig.data.recording.run_data import RunData
 from rig.data.result_file import ResultDocument
+from rig.motion.state_rows import ARM_STATE_DTYPE
 from rig.motion.steps import Dwell, Plan, Rest, Step, Sweep
-from rig.motion.turner_state import ARM_STATE_DTYPE, ArmState, JointState, State
+from rig.motion.turner_state import ArmState, JointState, State
 from rig.page.rows import Look, look_of
 from rig.station.events import (
     ArmSeen,

@@ -28,7 +28,8 @@ from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.run_file import RunRecorder
 from rig.errors import Fault, Refused, refuse
 from rig.estimation.arrays import Array
-from rig.motion.geometry import DenavitHartenberg, flange_attitude, flange_axes
+from rig.motion.chain import DenavitHartenberg
+from rig.motion.geometry import flange_attitude, flange_axes
 from rig.motion.preflight import find_travel_to_home
 from rig.motion.steps import Dwell, Motion, Plan, Rest, Stage, Step, Sweep, Transfer, travel
 from rig.motion.turner_state import Report

@@ -9,8 +9,9 @@ from typing import Any, Generic, TypeVar
 from rig.config.models import TurnerSection
 from rig.errors import Problem
 from rig.motion.carried import FlangeLoad
+from rig.motion.state_rows import StateField
 from rig.motion.steps import Plan
-from rig.motion.turner_state import Report, State, StateField, TurnerIdentity
+from rig.motion.turner_state import Report, State, TurnerIdentity
 from rig.turners.turner import Turner
 
 SectionT = TypeVar("SectionT", bound=TurnerSection)

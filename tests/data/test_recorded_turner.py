@@ -13,8 +13,9 @@ import pytest
 from rig.data.recording.recorded_turner import RecordedTurner, turner_of
 from rig.data.recording.run_file import RunRecorder, read_run
 from rig.errors import Refused
-from rig.motion.geometry import DenavitHartenberg
-from rig.motion.turner_state import JointState, StateField
+from rig.motion.chain import DenavitHartenberg
+from rig.motion.state_rows import StateField
+from rig.motion.turner_state import JointState
 from support.recordings.synthetic_run import SENSOR, UR, Setup, synthetic_run
 
 RUN = synthetic_run(Setup(rest_s=0.5, speed_deg_s=150))

@@ -36,8 +36,9 @@ from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.run_file import RunRecorder, make_plain, read_run
 from rig.data.recording.settings import ObservationThresholds, PlannedSweep, RunSettings, Site, uncertainty_of
 from rig.errors import Fault, Refused
+from rig.motion.state_rows import ARM_STATE_DTYPE
 from rig.motion.steps import Sweep
-from rig.motion.turner_state import ARM_STATE_DTYPE, ArmState
+from rig.motion.turner_state import ArmState
 from support.documents.results import VERIFIED
 from support.paths import CONFIGS, ROOT
 from support.processes.forked import find_fork_server

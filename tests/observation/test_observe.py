@@ -14,7 +14,7 @@ from rig.data.recording.run_data import RunData
 from rig.data.recording.settings import ObservationThresholds
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
-from rig.motion.turner_state import ARM_STATE_DTYPE
+from rig.motion.state_rows import ARM_STATE_DTYPE
 from rig.observation.motion.arm_motion import ArmMotion
 from rig.observation.observe import SensorObservations
 from rig.observation.observed_run import observe_run

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from rig.data.quantity import RATE
-from rig.motion.geometry import DenavitHartenberg
-from rig.motion.turner_state import ARM_STATE_DTYPE
+from rig.motion.chain import DenavitHartenberg
+from rig.motion.state_rows import ARM_STATE_DTYPE
 from rig.observation.motion.arm_motion import ArmMotion
 from rig.observation.timebase import TimeBase, estimate_time_base
 from support.paths import ROOT

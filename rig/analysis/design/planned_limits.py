@@ -19,7 +19,7 @@ from rig.config.sensors.sensor_catalogue import PARTS
 from rig.config.sensors.sensor_sections import SensorSection, mounting_matrix
 from rig.data.quantity import ACCELERATION, RATE
 from rig.estimation.gyroscope.nonlinearity import distinct_speeds
-from rig.motion.geometry import DenavitHartenberg
+from rig.motion.chain import DenavitHartenberg
 from rig.motion.steps import Plan, Rest
 
 

@@ -11,9 +11,11 @@ from rig.analysis.environment import BETWEEN_TWO
 from rig.config.models import RigConfig
 from rig.data.recording.settings import RunSettings, Site, Uncertainty, settings_of, site_of, uncertainty_of
 from rig.estimation.arrays import Array
-from rig.motion.geometry import DenavitHartenberg, axis_errors, flange_arm, flange_attitude, flange_axes
+from rig.motion.chain import DenavitHartenberg
+from rig.motion.geometry import axis_errors, flange_arm, flange_attitude, flange_axes
+from rig.motion.state_rows import state_dtype
 from rig.motion.steps import Dwell, Plan, Rest, Step, Sweep, Transfer, progress
-from rig.motion.turner_state import Joints, state_dtype
+from rig.motion.turner_state import Joints
 from rig.observation.motion.arm_motion import ATTITUDES, ArmMotion
 from rig.observation.motion.revolution import Revolution
 

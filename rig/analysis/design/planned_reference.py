@@ -19,7 +19,8 @@ from rig.estimation.earth import MICRO_G_M_S2
 from rig.estimation.reference.accelerometer_model import PARAMETERS, Dwells, Movement, predicted
 from rig.estimation.reference.reference_model import REFERENCE
 from rig.estimation.reference.sweep_harmonics import FirstHarmonic, evenly_turning
-from rig.motion.geometry import WRIST_1, DenavitHartenberg
+from rig.motion.chain import DenavitHartenberg
+from rig.motion.geometry import WRIST_1
 from rig.motion.steps import Dwell, Sweep
 from rig.observation.reference.swept_acceleration import SweptAcceleration, of_turn
 

@@ -20,7 +20,7 @@ from rig.estimation.reference.imu_fit import covariance_bound
 from rig.estimation.reference.reference_budget import Spread, scale_and_bias
 from rig.estimation.reference.reference_model import matrix
 from rig.estimation.statistics.expected_variances import OWN_SHARES
-from rig.motion.geometry import DenavitHartenberg
+from rig.motion.chain import DenavitHartenberg
 from rig.motion.steps import Plan
 
 

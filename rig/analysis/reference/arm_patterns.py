@@ -8,7 +8,8 @@ import numpy as np
 from rig.analysis.gyroscope.vector_inputs import WAVE_FRACTION
 from rig.estimation.arrays import Array
 from rig.estimation.reference.accelerometer_model import OWN_ERRORS, SHARE, SHARED_ERRORS, TURNS, Movement, turned
-from rig.motion.geometry import WRIST_1, DenavitHartenberg, angle_waves, flange_attitude, flange_errors
+from rig.motion.chain import DenavitHartenberg
+from rig.motion.geometry import WRIST_1, angle_waves, flange_attitude, flange_errors
 
 ERRORS, STEADY = 6, 2  # of each wrist; of these, its twist and its zero; the others are waves of its angle
 

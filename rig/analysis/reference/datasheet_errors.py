@@ -25,7 +25,8 @@ from rig.estimation.reference.accelerometer_errors import AccelerometerErrors
 from rig.estimation.reference.accelerometer_model import Movement
 from rig.estimation.reference.reading_errors import bending, bias_warming, flickering, scale_warming, wandering
 from rig.estimation.reference.reference_budget import Spread
-from rig.motion.geometry import WRIST_1, DenavitHartenberg
+from rig.motion.chain import DenavitHartenberg
+from rig.motion.geometry import WRIST_1
 from rig.observation.average import Average
 from rig.observation.observed_run import ObservedRun
 from rig.observation.reference.dwell_acceleration import DwellReading

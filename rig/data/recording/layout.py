@@ -24,7 +24,7 @@ from rig.data.recording.layout_keys import EVENTS_DTYPE, SCHEMA
 from rig.data.recording.recorded_sensor import RecordedSensor, sensor_of
 from rig.data.recording.recorded_turner import RecordedTurner, turner_of
 from rig.data.validation import parse_json, sanitize
-from rig.motion.turner_state import ARM_STATE_DTYPE
+from rig.motion.state_rows import ARM_STATE_DTYPE
 
 CHUNK_ROWS = 1024
 CHUNK_BYTES = 65536

@@ -18,7 +18,7 @@ from rig.data.result_file import FileEntry, StoredCalibrationEntry
 from rig.data.run_folder import ScriptIdentity
 from rig.data.validation import Finite, validate
 from rig.data.version import VERSION
-from rig.motion.geometry import DenavitHartenberg
+from rig.motion.chain import DenavitHartenberg
 from rig.motion.turner_state import Report, TurnerIdentity
 
 if TYPE_CHECKING:

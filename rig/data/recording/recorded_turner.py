@@ -12,8 +12,9 @@ from pydantic import Field
 from rig.data.recording.recorded_events import DwellFinished, DwellStarted, SweepFinished, SweepStarted, TimedEvent
 from rig.data.recording.settings import RunSettings
 from rig.data.validation import parse_json, validate
-from rig.motion.geometry import MAX_JOINTS, DenavitHartenberg
-from rig.motion.turner_state import Joints, StateField, TurnerIdentity, state_dtype
+from rig.motion.chain import MAX_JOINTS, DenavitHartenberg
+from rig.motion.state_rows import StateField, state_dtype
+from rig.motion.turner_state import Joints, TurnerIdentity
 
 MAX_FIELDS = 32
 ALWAYS = ("time_s", "host_time_s", "q_rad", "qd_rad_s")

@@ -16,7 +16,7 @@ from rig.data.recording.run_data import RunData
 from rig.data.recording.settings import Elsewhere, ObservationThresholds, RunSettings, Site
 from rig.errors import Refused
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
-from rig.motion.turner_state import ARM_STATE_DTYPE
+from rig.motion.state_rows import ARM_STATE_DTYPE
 from rig.observation.external.attitude_import import read_attitudes
 from rig.observation.external.csv_import import read_sweeps
 from rig.observation.external.csv_samples import read_sample_table, samples_in

@@ -11,9 +11,9 @@ from rig.data.recording.settings import ObservationThresholds
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
 from rig.estimation.cubic_spline import CubicSpline
+from rig.motion.chain import DenavitHartenberg
 from rig.motion.geometry import (
     NOMINAL,
-    DenavitHartenberg,
     axis_errors,
     flange_arm,
     flange_attitude,

@@ -12,7 +12,7 @@ from pathlib import Path
 from rig.config.procedures.hand_sections import HandSection
 from rig.errors import Fault, Problem
 from rig.motion.carried import FlangeLoad
-from rig.motion.geometry import DenavitHartenberg
+from rig.motion.chain import DenavitHartenberg
 from rig.motion.steps import Motion, Plan
 from rig.motion.turner_state import Joints, Row, TurnerIdentity
 from rig.turners.turner import Turner

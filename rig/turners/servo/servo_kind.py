@@ -8,7 +8,7 @@ from pathlib import Path
 from rig.config.procedures.servo_section import ServoSection
 from rig.errors import Problem
 from rig.motion.carried import FlangeLoad
-from rig.motion.geometry import DenavitHartenberg
+from rig.motion.chain import DenavitHartenberg
 from rig.motion.preflight import find_step_problems
 from rig.motion.steps import Plan
 from rig.motion.turner_state import TurnerIdentity

@@ -4,8 +4,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from operator import attrgetter
 
-from rig.motion.geometry import DenavitHartenberg
-from rig.motion.turner_state import Row, StateField, state_dtype
+from rig.motion.chain import DenavitHartenberg
+from rig.motion.state_rows import StateField, state_dtype
+from rig.motion.turner_state import Row
 from rig.turners.servo.servo_models import MAKER, PULSE_RAD, SPEED_RAD_S, ServoModel
 from rig.turners.servo.servo_registers import STATE
 

@@ -8,7 +8,8 @@ import numpy as np
 from rig.config.models import ArmSection
 from rig.errors import Problem, refuse
 from rig.motion.carried import read_load
-from rig.motion.geometry import DenavitHartenberg, flange_axes
+from rig.motion.chain import DenavitHartenberg
+from rig.motion.geometry import flange_axes
 from rig.motion.model import find_home, model_of
 from rig.motion.preflight import find_travel_to_home
 from rig.motion.steps import Plan

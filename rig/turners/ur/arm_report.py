@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from rig.motion.geometry import DenavitHartenberg, Pose
+from rig.motion.chain import DenavitHartenberg, Pose
 from rig.motion.turner_state import JOINT_NAMES, ArmState, JointLimits
 
 MAKER = "Universal Robots"

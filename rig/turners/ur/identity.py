@@ -8,11 +8,9 @@ same construction; so the lengths decide as well, and the series, by the version
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, get_args
 
-import numpy as np
-
 from rig.config.ranges import ModelName
 from rig.errors import Problem
-from rig.motion.geometry import LENGTHS, DenavitHartenberg, lengths_m
+from rig.motion.chain import DenavitHartenberg
 from rig.motion.model import TurnerModel, load_turner_model, model_of
 from rig.turners.ur.arm_report import ArmReport
 
@@ -126,6 +124,10 @@ def _robot_type(report: ArmReport) -> int | None:
 
 def _other_length(arm: DenavitHartenberg, model: TurnerModel) -> str | None:
     """Return a sentence on the length that differs most from the model's; None if all are within tolerance."""
+    import numpy as np  # here, because the process of the arm's client must start fast and needs no arrays
+
+    from rig.motion.geometry import LENGTHS, lengths_m
+
     lengths, nominal = lengths_m(arm), lengths_m(model.drawing)
     worst = int(np.argmax(np.abs(lengths - nominal)))
     if abs(lengths[worst] - nominal[worst]) <= LENGTH_TOLERANCE_M:

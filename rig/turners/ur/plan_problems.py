@@ -2,7 +2,7 @@
 
 from rig.errors import Problem
 from rig.motion.carried import FlangeLoad
-from rig.motion.geometry import DenavitHartenberg
+from rig.motion.chain import DenavitHartenberg
 from rig.motion.keep_out import find_clearance_problems
 from rig.motion.model import TurnerModel
 from rig.motion.preflight import find_step_problems, travels

@@ -10,8 +10,9 @@ from rig.config.models import ArmSection
 from rig.errors import Problem, refuse
 from rig.motion.carried import read_load
 from rig.motion.model import model_of
+from rig.motion.state_rows import ARM_FIELDS
 from rig.motion.steps import Plan
-from rig.motion.turner_state import ARM_FIELDS, TurnerIdentity
+from rig.motion.turner_state import TurnerIdentity
 from rig.turners.turner import Turner
 from rig.turners.turner_kind import OnState, TurnerKind, Wording
 from rig.turners.ur.plan_problems import plan_problems

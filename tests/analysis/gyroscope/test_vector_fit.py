@@ -11,7 +11,8 @@ from rig.analysis.analyses import calibrate
 from rig.analysis.gyroscope.calibration import SensorResult
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.vector_model import VectorSolution
-from rig.motion.geometry import NOMINAL, DenavitHartenberg
+from rig.motion.chain import DenavitHartenberg
+from rig.motion.geometry import NOMINAL
 from support.recordings.synthetic_run import Setup, synthetic_run, truth
 
 

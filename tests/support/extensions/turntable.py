@@ -19,9 +19,10 @@ from rig.config.section import Direction
 from rig.data.meaning import Meaning
 from rig.errors import Problem
 from rig.motion.carried import FlangeLoad
-from rig.motion.geometry import DenavitHartenberg
+from rig.motion.chain import DenavitHartenberg
+from rig.motion.state_rows import StateField
 from rig.motion.steps import Motion, progress, travel
-from rig.motion.turner_state import Joints, Row, StateField, TurnerIdentity
+from rig.motion.turner_state import Joints, Row, TurnerIdentity
 from rig.observation.observed_run import observe_runs
 from rig.procedure import (
     Outcome,

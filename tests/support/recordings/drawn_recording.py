@@ -19,7 +19,8 @@ from rig.data.recording.settings import Uncertainty
 from rig.estimation.arrays import Array
 from rig.estimation.earth import EARTH_RATE_RAD_S, STANDARD_GRAVITY_M_S2
 from rig.estimation.gyroscope.nonlinearity import CUBE_MISSED
-from rig.motion.geometry import NOMINAL, DenavitHartenberg, flange_attitude, flange_pose, flange_rate
+from rig.motion.chain import DenavitHartenberg
+from rig.motion.geometry import NOMINAL, flange_attitude, flange_pose, flange_rate
 from rig.motion.steps import Sweep, Transfer
 from support.recordings.drawn_ripple import Ripple
 from support.recordings.synthetic_run import (

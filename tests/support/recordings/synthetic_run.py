@@ -24,9 +24,11 @@ from rig.data.recording.recorded_turner import RecordedTurner
 from rig.data.recording.run_data import RunData
 from rig.data.recording.settings import settings_of
 from rig.estimation.arrays import Array
-from rig.motion.geometry import NOMINAL, DenavitHartenberg, flange_rate
+from rig.motion.chain import DenavitHartenberg
+from rig.motion.geometry import NOMINAL, flange_rate
+from rig.motion.state_rows import ARM_FIELDS, ARM_STATE_DTYPE
 from rig.motion.steps import Dwell, Plan, Rest, Step, Sweep, Transfer
-from rig.motion.turner_state import ARM_FIELDS, ARM_STATE_DTYPE, JOINT_NAMES
+from rig.motion.turner_state import JOINT_NAMES
 from rig.plans.motions.six_sweeps import plan_six_observation
 from rig.world.site import SiteTruth
 from rig.world.ur10e.motion.flange_motion import find_motion, transfer_force

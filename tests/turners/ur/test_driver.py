@@ -24,8 +24,9 @@ from rig.config.models import ArmSection
 from rig.config.procedures.procedure_sections import SixObservationSection
 from rig.errors import Fault, Refused
 from rig.motion.carried import FlangeLoad
+from rig.motion.state_rows import ARM_STATE_DTYPE
 from rig.motion.steps import Transfer, trapezoid_duration
-from rig.motion.turner_state import ARM_STATE_DTYPE, ArmState, Joints
+from rig.motion.turner_state import ArmState, Joints
 from rig.plans.motions.six_sweeps import plan_six_observation
 from rig.turners.ur.arm_driver import Arm, look
 from rig.turners.ur.arm_preflight import arm_problems

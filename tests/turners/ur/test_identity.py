@@ -14,7 +14,8 @@ from rig.commands.configured import load_configured
 from rig.config.models import ArmSection
 from rig.config.ranges import ModelName
 from rig.errors import Problem, Refused
-from rig.motion.geometry import NOMINAL, DenavitHartenberg, distance_to_forearm, distance_to_upper_arm, lengths_m
+from rig.motion.chain import DenavitHartenberg
+from rig.motion.geometry import NOMINAL, distance_to_forearm, distance_to_upper_arm, lengths_m
 from rig.motion.turner_state import JointLimits
 from rig.turners.ur.arm_driver import look
 from rig.turners.ur.arm_preflight import preflight_problems

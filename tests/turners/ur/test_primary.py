@@ -11,7 +11,8 @@ from math import inf
 import numpy as np
 import pytest
 
-from rig.motion.geometry import DenavitHartenberg, flange_axes
+from rig.motion.chain import DenavitHartenberg
+from rig.motion.geometry import flange_axes
 from rig.motion.turner_state import JointLimits
 from rig.turners.ur.arm_driver import look
 from rig.turners.ur.arm_report import ArmSetup

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from math import isnan
 
 from rig.errors.quoting import printable
-from rig.motion.geometry import DenavitHartenberg, Pose
+from rig.motion.chain import DenavitHartenberg, Pose
 from rig.motion.turner_state import JointLimits
 from rig.turners.ur.arm_report import ArmSetup
 
