@@ -10,7 +10,8 @@ from rig.data.meaning import Meaning
 from rig.errors import Fault
 from rig.estimation.statistics.coverage import COVERAGE_FACTOR, beyond
 
-ONLY_RECORDED = ("no_attitudes", "field_strength_unknown")  # why a sensor was not to be calibrated
+# Faults of sensors that were only recorded, not to be calibrated.
+ONLY_RECORDED = ("no_attitudes", "field_strength_unknown")
 
 
 @dataclass(frozen=True, slots=True)

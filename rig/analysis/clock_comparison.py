@@ -15,9 +15,10 @@ from rig.observation.consistency.arm_clock import compare_with_computer
 from rig.observation.observed_run import ObservedRun
 from rig.observation.timebase import NOMINAL_DRIFT
 
-# A simulated controller goes as fast as it can: a computer that is farther off counts no seconds of it.
+# Largest relative difference between a simulated controller's clock and another one. Such a controller runs as fast as
+# it can: if its pace differs by more, the other clock does not count its seconds.
 ONE_PACE = 1e-2
-CERTAIN = 4.0  # standard deviations of the measured part of a difference
+CERTAIN = 4.0  # allowed difference, in standard deviations of its measured part
 PPM = 1e-6
 
 BY_COMPUTER, BY_CRYSTAL = "the computer's clock", "the board's crystal"
@@ -93,7 +94,8 @@ class ClockCheck:
 
 def check_clock(recording: ObservedRun, uncertainty: Uncertainty) -> ClockCheck:
     """Return the error of the controller's clock in one recording, relative to every other clock."""
-    from rig.data.recording.provenance import calls_itself_simulated  # with a tenth of a plan's imports
+    # Imported here: it takes a tenth of the time of a plan's imports.
+    from rig.data.recording.provenance import calls_itself_simulated
 
     compared = (_compare_to_computer(recording, uncertainty), _compare_to_crystal(recording, uncertainty))
     pace = ONE_PACE if calls_itself_simulated(recording.run.provenance.arm_software) else np.inf

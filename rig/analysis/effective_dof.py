@@ -76,7 +76,7 @@ def of_reversal(reversal: "MagnetometerReversal") -> tuple[Array, Array]:
     The latter are the fewest of any run's bias: a lower bound for a sum of independent parts.
     """
     budgets = [run.result.budget for run in reversal.runs]
-    # (Σ u_i²)² / ν of each run is Σ u_i⁴ / ν_i: what the runs share is known, and adds nothing to it.
+    # (Σ u_i²)² / ν of one run is Σ u_i⁴ / ν_i: errors common to the runs have infinite ν and add nothing.
     scarce = np.sum([budget.std[:3] ** 4 / budget.dof[:3] for budget in budgets], axis=0) / len(budgets) ** 4
     with np.errstate(divide="ignore"):
         scale: Array = reversal.scale_std**4 / scarce

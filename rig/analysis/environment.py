@@ -9,9 +9,9 @@ from rig.data.recording.settings import RunSettings, Site, Uncertainty
 from rig.observation.consistency.arm_clock import find_encoder_noise_rad, state_jitter
 from rig.observation.observed_run import ObservedRun
 
-# Of the jitter of one state, by that of a moment between two: √(f² + (1 − f)²), in the mean over all shares f.
+# Jitter of a time between two states, relative to that of one state: √(f² + (1 − f)²), averaged over the fractions f.
 BETWEEN_TWO = sqrt(2 / 3)
-BY_SPLINE = 0.935  # the same of an angle between two readings, by the cubic spline through all
+BY_SPLINE = 0.935  # the same for an angle between two readings, by the cubic spline through all readings
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ def solvable() -> Iterator[None]:
     """Raise Fault `not_solvable` if NumPy or SciPy raises ValueError in the block; let errors of our own code pass."""
     try:
         yield
-    except ValueError as error:  # of which NumPy's LinAlgError is one
+    except ValueError as error:  # includes NumPy's LinAlgError
         if not _is_of_library(error):
             raise
         raise Fault(

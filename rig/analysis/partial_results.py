@@ -101,7 +101,7 @@ def _observe(run: RunData, name: str, motion: ArmMotion) -> _RecordedPart:
     sensor = run.sensors[name]
     try:
         stream = synchronize_stream(run.samples[name], sensor, motion)
-    except Fault as fault:  # of the sensor as a whole: its clock is not found
+    except Fault as fault:  # a fault of the sensor as a whole: its clock is not found
         dwells = finished_dwells(run) if sensor.measures(ACCELERATION) else ()
         return _RecordedPart(None, all_failed(finished_sweeps(run), fault), all_failed(dwells, fault), ())
     sweeps, rests = _observe_sweeps(run, name, stream, motion)
@@ -152,7 +152,7 @@ def _observe_sweeps(
     dwells = {dwell.index for dwell in run.settings.planned_dwells}
     try:
         sensor = observe_sensor(run, name, motion, thresholds, sweeps.faults.keys() | dwells)
-    except Fault as fault:  # of the sensor as a whole
+    except Fault as fault:  # a fault of the sensor as a whole
         return all_failed(finished_sweeps(run), fault), ()
     return sweeps.updated(Attempts({turn.sweep: turn for turn in sensor.revolutions})), sensor.rests
 

@@ -21,7 +21,7 @@ from rig.observation.motion.arm_motion import motion_of
 from rig.observation.reference.dwell_acceleration import accelerations
 from rig.observation.time_stamps.sampling import find_sampling
 
-FEWEST_TO_JUDGE = 20  # readings: fewer may be alike
+FEWEST_TO_JUDGE = 20  # readings: fewer may be equal by chance
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,7 +17,7 @@ from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.by_hand.on_board import BoardMove, BoardRest, BoardSolution, solve_like_board
 
-SCALE_LIMIT = 1e-5  # of an element of the matrix
+SCALE_LIMIT = 1e-5  # largest difference of an element of the matrix
 BIAS_LIMIT_RAD_S = 1e-6
 
 

@@ -21,20 +21,22 @@ from rig.observation.sound_steps import SPIKE
 
 Statistics = dict[str, tuple[float, float]]
 
-CHECKS = ("clipping", "repeated_readings", "skewed_noise", "spikes", "stuck_axis", "stuck_bit")  # of a sensor, at most
-SKEWNESS = 0.15  # below, hardly a fiftieth of the noise's deviation is left in a mean
-LONGEST_RUN = 25  # equal readings of one axis: at one step of noise every fourth reading equals the one before
-STRETCH = 8  # readings on three axes, some 50 bits at one step of noise
-FEWEST_VALUES = 24  # of an axis, to say that a bit ought to have changed
-ONE_BIT = 0.8  # of the spikes off by the same power of two: they are a bit's doing
+# The checks of one sensor, at most.
+CHECKS = ("clipping", "repeated_readings", "skewed_noise", "spikes", "stuck_axis", "stuck_bit")
+SKEWNESS = 0.15  # allowed in any case: it shifts a mean by hardly a fiftieth of the noise's standard deviation
+LONGEST_RUN = 25  # equal readings of one axis: if the noise is one step, every fourth reading equals the one before
+STRETCH = 8  # readings on three axes: they have some 50 random bits if the noise is one step
+FEWEST_VALUES = 24  # different readings of an axis from which on every bit should have changed
+ONE_BIT = 0.8  # fraction of the spikes with the same power of two from which on one bit causes them
 FEWEST_SPIKES = 5
-SINGLE = 21  # bits that a number in single precision sets as often as not; its last three it rounds
-FEWEST_OF_NOISE = 4 * MEMORY  # readings of a window that tell their noise
-VIBRATION_LEFT = 0.1  # of the arm's vibration, which the sensor's filter changes and the arm's states tell in part
-HEAP = 10  # readings
-SETTLING = 5  # readings at a window's beginning, in which a low-pass filter may still follow the arm
-LEAST_TO_SKEW = 0.7  # steps of noise: less falls on so few numbers that a mean between two of them makes it skewed
-BETWEEN_COUNTS = 1.5  # counts: readings that are farther apart are not a converter's
+SINGLE = 21  # bits of a number in single precision that are random; the last three are rounded
+FEWEST_OF_NOISE = 4 * MEMORY  # the fewest readings of a window from which its noise is estimated
+# Fraction of the arm's vibration that may remain: the sensor's filter changes it, and the arm's states show it in part.
+VIBRATION_LEFT = 0.1
+HEAP = 10  # the fewest readings at one end of the range that may be clipped
+SETTLING = 5  # first readings of a window, during which a low-pass filter may still follow the arm
+LEAST_TO_SKEW = 0.7  # steps: smaller noise takes so few numbers that a mean between two of them makes it skewed
+BETWEEN_COUNTS = 1.5  # counts: readings in larger steps are not those of a converter
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,9 +86,8 @@ def judge_readings(
     """
     from scipy.special import ndtri
 
-    critical_value = -float(
-        ndtri(false_alarm_probability / (2 * 3 * 16))
-    )  # of a normal variable, over three axes and their bits
+    # For a normal variable, two-sided, over three axes and their bits.
+    critical_value = -float(ndtri(false_alarm_probability / (2 * 3 * 16)))
     at_rest = [window for window in windows if window.sweep < 0] or windows
     noises = [innovation_std(window.counts) for window in at_rest]
     noise = np.asarray(np.median(noises, axis=0), dtype=np.float64)
@@ -158,7 +159,7 @@ def _find_spikes(windows: Sequence[RawReadings], step_counts: Array) -> tuple[fl
         for deviations, noise in zip(deviations_by_window, noises, strict=True)
         if len(deviations) >= FEWEST_OF_NOISE
     ]
-    least = np.min(informative or [half], axis=0)  # a short rest, as of an interrupted run, tells too little
+    least = np.min(informative or [half], axis=0)  # a short rest, such as that of an interrupted run, shows too little
     for window, deviations, noise_of_window in zip(windows, deviations_by_window, noises, strict=True):
         noise = np.maximum(noise_of_window, least)
         deviation = np.maximum(noise, VIBRATION_LEFT * window.vibration_counts)

@@ -4,9 +4,9 @@ from rig.analysis.consistency import converter_tests, gyroscope_checks
 from rig.analysis.consistency.gyroscope_checks import DISTURBED_SWEEP
 from rig.estimation.statistics.coverage import false_alarm_of_each
 
-FALSE_ALARMS = 0.001  # how often one of these checks, of any sensor, fails an undamaged run, at most
+FALSE_ALARMS = 0.001  # probability that any of these checks, of any sensor, fails a run without a fault
 NON_ORTHOGONALITY = "non_orthogonality"
-# Of a gyroscope: they share the false alarms. Other kinds of readings count as many.
+# The checks of a gyroscope, which share the false-alarm probability. Other kinds of readings have as many.
 CHECKS = (*gyroscope_checks.CHECKS, DISTURBED_SWEEP, *converter_tests.CHECKS, NON_ORTHOGONALITY)
 
 

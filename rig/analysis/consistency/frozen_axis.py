@@ -6,10 +6,11 @@ from rig.data.quantity import RATE
 from rig.estimation.arrays import Array, equal_runs
 from rig.observation.observed_run import ObservedRun
 
-FEWEST = 25  # equal readings in a row, of which the motion is looked at
-LAG_S = 0.15  # at either end of them: a sensor's filter is late, and the clock's offset is known to milliseconds
+FEWEST = 25  # equal readings in a row from which on the motion is examined
+# Time left out at either end of them: a sensor's filter lags, and the clock's offset is known to milliseconds only.
+LAG_S = 0.15
 SMOOTHED_S = 0.1
-MOVED_STEPS, MOVED_RAD_S = 10.0, 0.02  # by which the rate along the axis must have changed, in the nominal mounting
+MOVED_STEPS, MOVED_RAD_S = 10.0, 0.02  # the least change of the rate about the axis, in the nominal mounting
 
 
 def find_longest_frozen(recording: ObservedRun, name: str) -> int:

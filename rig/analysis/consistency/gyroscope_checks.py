@@ -52,7 +52,7 @@ from rig.observation.consistency.raw_readings import REST
 
 DISTURBED_SWEEP = "disturbed_sweep"
 
-# At most these of one gyroscope, besides the check of its worst sweep.
+# At most these checks for one gyroscope, and the check of its worst sweep.
 CHECKS = (
     "axis_changed",
     "bias_jumped",
@@ -63,7 +63,7 @@ CHECKS = (
     "sweeps_against_rests",
 )
 
-MOST, TRIED = 16.0, 7  # largest variance inflation by a synchronous ripple; factors that are tried
+MOST, TRIED = 16.0, 7  # largest variance inflation by a synchronous ripple; number of factors that are tried
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +108,7 @@ def check_gyroscope(
     allowance = replace(allowance, transfers=_steady_rates(allowance.transfers, matrix))
     axis_rates = segments.rates_rad_s @ matrix.T
     scatter = _build_scatter(segments, allowance.patterns_rad_s, allowance)
-    # Encoders that err more than stated would else be taken for a bias that drifts as much, and go unnoticed.
+    # Otherwise encoder errors beyond the stated ones would be taken for a drift of the bias, and go unnoticed.
     encoders = np.moveaxis(allowance.encoders_rad_s, 0, -1)
     steady_columns = _steady_columns(segments, encoders.reshape(len(encoders), -1))
     bias = _estimate_bias_process(segments, axis_rates, steady_columns, scatter)

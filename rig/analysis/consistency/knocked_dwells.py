@@ -10,7 +10,7 @@ from rig.estimation.statistics.rounding import Steps
 from rig.observation.consistency.dwell_halves import compare_halves
 from rig.observation.consistency.raw_dwells import RawDwell
 
-FEWEST_IN_HALF = 20  # readings: fewer do not tell how their mean scatters
+FEWEST_IN_HALF = 20  # readings: fewer do not show how their mean scatters
 
 
 def compare_dwell_halves(
@@ -30,7 +30,8 @@ def compare_dwell_halves(
         return {}
     halves = [compare_halves(dwell, steps) for dwell in long_dwells]
     differences, variances = (np.array(part) for part in zip(*halves, strict=True))
-    # Not each dwell's own: half a cycle of a swing looks like a colour, and a colour explains a step as well.
+    # One noise for all dwells: in a single dwell, half a cycle of an oscillation looks like coloured noise, which would
+    # explain a step as well.
     noise = np.median(variances, axis=0) + 2 * flicker_counts**2
     swing = _swing_variances(differences, noise)
     dof_of_noise = min(len(dwell.counts) for dwell in long_dwells) - 2

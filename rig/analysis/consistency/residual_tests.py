@@ -13,10 +13,10 @@ import numpy as np
 
 from rig.estimation.arrays import Array
 
-INDEPENDENT = 1e-3  # of a column's norm: the least that must lie outside the model
-VISIBLE = 1e-6  # of a fault's norm: a smaller projection is rounding
-DETECTION_PROBABILITY = 0.95  # of recordings with a fault of the minimal detectable size
-ALIKE = 10.0  # of χ²: an alternative within this of the best may be the cause, too
+INDEPENDENT = 1e-3  # least part of a unit column outside the model
+VISIBLE = 1e-6  # least projection of a fault, relative to its norm: a smaller one is rounding
+DETECTION_PROBABILITY = 0.95  # for a fault of the minimal detectable size
+ALIKE = 10.0  # difference of χ² to the best alternative up to which another one may also be the cause
 
 Subject = TypeVar("Subject")
 Statistic = tuple[float, float]  # a value and its critical value

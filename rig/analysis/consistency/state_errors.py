@@ -14,7 +14,7 @@ from rig.estimation.arrays import Array
 from rig.observation.consistency.raw_readings import REST
 from rig.observation.consistency.transfers import STANDS_RAD
 
-SAME_S = 1e-5  # farther apart, two times are two edges
+SAME_S = 1e-5  # times that differ by more belong to different edges
 
 
 def build_time_patterns(segments: Segments, jitter_s: float) -> Array:

@@ -32,12 +32,15 @@ if TYPE_CHECKING:
     from rig.analysis.gyroscope.calibration import SensorResult
     from rig.estimation.gyroscope.earth_rate import EarthRate
 
-ANGLES = (*AXIS_ERRORS, *(f"{wave} of wrist_1" for wave in WAVES))  # those of wrist 1 turn no axis, but its own speed
+# The waves of wrist 1 rotate no axis, but change its own speed.
+ANGLES = (*AXIS_ERRORS, *(f"{wave} of wrist_1" for wave in WAVES))
 WAVES_OF = {WRIST_1: ANGLES.index("cos of wrist_1"), WRIST_2: ANGLES.index("cos of wrist_2"),
             WRIST_3: ANGLES.index("cos of wrist_3")}  # fmt: skip
-ZEROS = {ANGLES.index("zero of wrist_2"): -2, ANGLES.index("zero of wrist_3"): -1}  # and which joint's, from the end
-CURVE: tuple[OfSensor, OfSensor] = ("nonlinearity_percent", "asymmetry_percent")  # its odd and its even part
-STEPS = 24  # of a way, in which directions are taken to stand still
+# The joint of each zero, counted from the last.
+ZEROS = {ANGLES.index("zero of wrist_2"): -2, ANGLES.index("zero of wrist_3"): -1}
+# The odd and the even part of the nonlinearity.
+CURVE: tuple[OfSensor, OfSensor] = ("nonlinearity_percent", "asymmetry_percent")
+STEPS = 24  # steps of a transfer within which directions count as constant
 
 
 @dataclass(frozen=True, slots=True)

@@ -43,13 +43,13 @@ from rig.observation.average import Average
 from rig.observation.motion.even_turn import GUARD_RAD
 from rig.observation.observe import Observation, nearest_axis
 
-ROOM_C = 22.0  # at one temperature all the time: what a run warms is not known beforehand
-STEP_K = 1 / 16  # of a thermometer, assumed
-REMOUNTING_S = 60.0  # between two stages, assumed
-# How far off its nominal mounting a sensor sits, in all, where no `uncertainty.mount_deg` says it of an item that is
-# mounted anew; assumed. The farther it does, the more do the axes of arm and sensor matter.
+ROOM_C = 22.0  # constant: how much a run warms the sensor is not known beforehand
+STEP_K = 1 / 16  # resolution of a thermometer, assumed
+REMOUNTING_S = 60.0  # duration between two stages, assumed
+# Angle between a sensor and its nominal mounting, assumed if no `uncertainty.mount_deg` states it for an item that is
+# remounted. The larger it is, the more the axes of arm and sensor matter.
 MOUNTING_OFFSET_DEG = 5.0
-ASKING_STD_S = 0.9e-3  # of the moment of a reading within the 3 ms that asking a servo takes
+ASKING_STD_S = 0.9e-3  # standard deviation of the time of a reading within the 3 ms of a servo's reply
 
 
 def predict_budgets(config: RigConfig, plan: Plan, turner: TurnerIdentity) -> dict[str, Budget]:
@@ -65,7 +65,8 @@ def predict_budgets(config: RigConfig, plan: Plan, turner: TurnerIdentity) -> di
 def _budget(config: RigConfig, run: PlannedRun, turner: TurnerIdentity, name: str, sensor: SensorSection) -> Budget:
     uncertainty, mounting = run.uncertainty, mounting_matrix(sensor.mounting)
     scatters = turner.reading_std_rad > 0
-    jitter_s = 0.0 if scatters else predict_state_jitter(run.plan)  # what scatters tells no jitter beside
+    # The scatter of the readings already includes the jitter.
+    jitter_s = 0.0 if scatters else predict_state_jitter(run.plan)
     surroundings = Surroundings(
         run.site, uncertainty, _clock(uncertainty, on_board=sensor.on_board), jitter_s, run.settings.extension_m
     )

@@ -77,7 +77,7 @@ def target_of(section: SixObservationSection) -> TargetUncertainty | None:
     return None if scale is bias_rad_s is None else TargetUncertainty(scale or inf, bias_rad_s or inf)
 
 
-SIZES = tuple(ReachedUncertainty.__dataclass_fields__)  # what may be wanted, as the fields of both are called
+SIZES = tuple(ReachedUncertainty.__dataclass_fields__)  # the possible targets: fields of both classes
 
 
 @dataclass(frozen=True, slots=True)

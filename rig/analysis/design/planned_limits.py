@@ -44,7 +44,7 @@ def predict_limits(config: RigConfig, plan: Plan, turner: DenavitHartenberg) -> 
     false_alarm_probability = false_alarm_per_check(kinds + len(config.all_sensors) - len(config.sensors))
     rates: dict[str, tuple[DetectionLimit, ...]] = {}
     by_arm = isinstance(config.turner, ArmSection)
-    if run.plan.sweeps and not run.plan.stages:  # what several mountings tell together is not foretold
+    if run.plan.sweeps and not run.plan.stages:  # the limits of several mountings together are not predicted
         segments = plan_segments(run)
         rates = {
             name: _gyroscope_limits(run, name, sensor, segments, false_alarm_probability, by_arm=by_arm)

@@ -20,9 +20,9 @@ from rig.observation.motion.arm_motion import ATTITUDES, ArmMotion
 from rig.observation.motion.revolution import Revolution
 
 STATE_RATE_HZ = 125.0
-STATE_JITTER_S = 2e-6  # of the times of an arm's states, as runs with controllers of real time find it
-ENCODER_NOISE_RAD = 2.4e-5  # of one reading of a joint's angle, as in logs of UR arms (docs/simulated-arm.md)
-STANDING_S = 1.0  # before the first step and after the last
+STATE_JITTER_S = 2e-6  # jitter of an arm's state times, as runs with real-time controllers show it
+ENCODER_NOISE_RAD = 2.4e-5  # noise of one reading of a joint's angle, as in logs of UR arms (docs/simulated-arm.md)
+STANDING_S = 1.0  # rest before the first step and after the last
 StepT = TypeVar("StepT", Sweep, Dwell)
 StepT_co = TypeVar("StepT_co", bound=Step, covariant=True)
 

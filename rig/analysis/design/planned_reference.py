@@ -98,7 +98,7 @@ def _segment(timed_step: Timed[Dwell] | Timed[Sweep]) -> ReferenceWindow:
 
 def _predict_sweep(timed_step: Timed[Sweep], arm: DenavitHartenberg, noise_m_s2_sqrt_hz: float) -> SweptAcceleration:
     turn = predict_revolution(timed_step, arm, np.eye(3))
-    waves = np.diag(np.repeat([1.0, 2.0, 2.0], 3))  # mean, cosine and sine of so many readings
+    waves = np.diag(np.repeat([1.0, 2.0, 2.0], 3))  # weights of the mean, the cosine and the sine over a revolution
     harmonic = FirstHarmonic(
         harmonic_m_s2=np.zeros((3, 3)),
         covariance_m2_s4=noise_m_s2_sqrt_hz**2 / turn.duration_s * waves,

@@ -22,7 +22,7 @@ def assess_reached(runs: Sequence[RunData], estimator: str) -> ReachedUncertaint
             surroundings = surroundings_of(recordings, settings)
             sensors = runs[0].measuring(RATE)
             results = solve_observed(sensors, recordings, surroundings, estimator, settings.matrix_corrected)
-    except Fault:  # what is wrong with it, the end of the run will say
+    except Fault:  # the end of the run reports the fault
         return None
     budgets = {name: results[name].uncertainty for name in settings.to_calibrate}
     known_budgets = {name: budget for name, budget in budgets.items() if budget is not None}

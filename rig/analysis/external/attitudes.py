@@ -37,7 +37,7 @@ METHODS: tuple[Method, ...] = (*get_args(EqualWeights), "attitude_weighted")
 CHOICES: tuple[Chosen, ...] = ("increments", *METHODS)
 TOO_LITTLE = ("too_few_observations", "rank_deficient", "ill_conditioned")
 NOT_IDENTIFIABLE = "Leave out --second-order: it would triple the uncertainty of the bias for nothing; or dwell longer"
-ROUNDING = 1e-9  # of a mean: all readings of it were the same
+ROUNDING = 1e-9  # standard deviation over mean, below which all readings were the same
 
 
 @dataclass(frozen=True, slots=True)

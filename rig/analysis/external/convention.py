@@ -18,11 +18,12 @@ from rig.estimation.sensor_axes import nearest_rotation
 from rig.observation.external.csv_samples import Samples
 
 COARSE_S, FINE_S = np.arange(-0.5, 0.501, 0.02), np.arange(-0.02, 0.0201, 0.002)  # lags to try
-FEWEST, MOST = 30, 3000  # pairs of rows
-LONGEST_S = 1.0  # between two rows of a pair
-LEAST_RAD_S = 0.05  # rms of the rate: less shows nothing
-EXPLAINED, MARGIN = 0.7, 0.1  # least fraction of the rates' variance, and lead over the other direction
-UPRIGHT = 0.97  # component of gravity along an axis of the room that is upright
+FEWEST, MOST = 30, 3000  # the fewest and the most pairs of rows
+LONGEST_S = 1.0  # longest time between the two rows of a pair
+LEAST_RAD_S = 0.05  # RMS of the rate: a smaller one shows nothing
+# Least fraction of the rates' variance that is explained, and its lead over the other direction.
+EXPLAINED, MARGIN = 0.7, 0.1
+UPRIGHT = 0.97  # least component of gravity along the vertical axis of the room
 
 
 @dataclass(frozen=True, slots=True)

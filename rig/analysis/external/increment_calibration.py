@@ -18,7 +18,7 @@ from rig.observation.external.reference_rows import Turning, select_covered
 from rig.observation.external.robust_start import find_start
 
 CONTRADICTING = ("attitude_untrustworthy", "mirrored_axis", "wrong_unit", "ill_conditioned")
-PASSES = 3  # by the clock of the one before
+PASSES = 3  # iterations: the clock of one determines the increments of the next
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,12 +17,11 @@ from rig.estimation.statistics.coverage import false_alarm_of_each
 from rig.observation.external.means_at_rest import means_at_rest
 from rig.observation.external.reference_rows import Turning
 
-FALSE_ALARM = 1e-3  # of recordings whose bias is that at rest, for one of three axes
-G_SENSITIVITY_RAD_S = 1e-3  # of one g, of a MEMS gyroscope: it lies in one attitude, and moves through many
-TAIL = 0.1  # of the rests, at either end, that may be none
-MOST_RAD_S = (
-    2 * RATE.steady
-)  # half the range of the readings at rest: the body may move a little where it seems to rest
+FALSE_ALARM = 1e-3  # probability for the worst of three axes, if the recording's bias is that at rest
+G_SENSITIVITY_RAD_S = 1e-3  # effect of 1 g on a MEMS gyroscope, which rests in one attitude and moves through many
+TAIL = 0.1  # fraction of the readings at either end of their range that may not belong to a rest
+# Largest half of the range of the readings at rest: the body may move a little although it seems to rest.
+MOST_RAD_S = 2 * RATE.steady
 
 
 def check_rests_agree(turning: Turning, solution: KnownIncrements) -> None:

@@ -15,12 +15,12 @@ from rig.estimation.statistics.coverage import coverage_factors, effective_dof
 from rig.observation.external.csv_import import ExternalData
 from rig.observation.statistics.mean import by_axis
 
-WRONG = 0.1  # of a sweep's rate, as its leave-one-out residual: no table has it, a wrong row has
-BEYOND_NOISE = 6.0  # standard deviations of its mean
-LEAST_REDUNDANCY = 0.05  # the least redundancy number of a row: below it nothing can contradict it
-SAME_AXIS = 0.9  # cosine of two rows' axes, either way
-CHANCE = 4.0  # standard deviations that one of some dozens of means may be off by chance
-FEWEST_FREEDOM = 3  # with fewer, the next coarser whole number alone would make U half as large again
+WRONG = 0.1  # leave-one-out residual relative to the sweep's rate: no rate table errs by this much, a wrong row does
+BEYOND_NOISE = 6.0  # residual in standard deviations of the sweep's mean
+LEAST_REDUNDANCY = 0.05  # least redundancy number of a row: below it, nothing can contradict the row
+SAME_AXIS = 0.9  # cosine between the axes of two rows, in either direction
+CHANCE = 4.0  # standard deviations: one of some dozens of means may deviate as much by chance
+FEWEST_FREEDOM = 3  # with fewer, rounding down to the next integer would alone increase U by half
 
 
 def check_agree(data: ExternalData) -> None:

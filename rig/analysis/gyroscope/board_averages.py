@@ -10,7 +10,7 @@ from rig.observation.consistency.board_means import compare_board_means
 from rig.observation.observed_run import ObservedRun
 
 NAME = "board_average"
-LIMIT = 6.0  # standard deviations of the mean; both have its noise in common, and differ by a tenth of it as a rule
+LIMIT = 6.0  # standard deviations of the mean: the two averages share its noise, and usually differ by a tenth of it
 
 
 def board_averages(sensor: str, recordings: Sequence[ObservedRun]) -> tuple[Check, ...]:

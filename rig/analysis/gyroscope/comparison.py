@@ -21,9 +21,10 @@ from rig.observation.consistency.movement_masks import mask_movement
 from rig.observation.observe import Observation
 from rig.observation.observed_run import Delay, ObservedRun
 
-MAX_DELAY_S = 0.2  # between the filters of two sensors; more means that their time stamps do not belong together
-MAX_GAP = 2.5  # sampling intervals of the reference across which it is interpolated
-MIN_COVERED = 0.9  # of the samples of the movement
+# Largest delay between the filters of two sensors: if it is larger, their time stamps do not belong together.
+MAX_DELAY_S = 0.2
+MAX_GAP = 2.5  # longest gap of the reference that is interpolated, in sampling intervals
+MIN_COVERED = 0.9  # least fraction of the samples in motion that the reference covers
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,8 +22,9 @@ from rig.observation.observed_run import ObservedRun
 from rig.observation.statistics.mean import by_axis
 
 ZEROS = tuple(index for index, name in enumerate(AXIS_ERRORS) if name.startswith("zero"))
-SAME_AXIS = 1 - 1e-6  # of the scalar product: other joints returned to 1.4 mrad
-WAVE_FRACTION = 0.3  # of the error of a joint's zero: an encoder's error once or twice a revolution; assumed
+SAME_AXIS = 1 - 1e-6  # cosine between two axes: the other joints return to 1.4 mrad
+# Size of an encoder's error once or twice a revolution, relative to that of the joint's zero; assumed.
+WAVE_FRACTION = 0.3
 
 
 @dataclass(frozen=True, slots=True)

@@ -164,7 +164,7 @@ def _calibrate(
     other_methods = attempt_each({method: partial(solve, method=method) for method in methods})
     if weighted := other_methods.results.get("attitude_weighted"):
         check_mounted(weighted.matrix)
-    elif movement.sensor_errors is None:  # with nonlinearity `solve_imu` decides
+    elif movement.sensor_errors is None:  # if there is nonlinearity, `solve_imu` decides
         raise other_methods.faults["attitude_weighted"]
     solution = solve_imu(
         measured,
@@ -268,7 +268,7 @@ def _align_to_gyroscope(gyroscope: SensorResult, solution: ImuSolution, mounting
     vector = gyroscope.vector_model
     if vector is None:
         return None
-    to_flange = np.kron(np.eye(3), mounting.T)  # of the rows of F
+    to_flange = np.kron(np.eye(3), mounting.T)  # acts on the rows of F
     return align_triads(
         vector.matrix,
         solution.matrix @ mounting,

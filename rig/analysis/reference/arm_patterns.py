@@ -11,7 +11,8 @@ from rig.estimation.reference.accelerometer_model import OWN_ERRORS, SHARE, SHAR
 from rig.motion.chain import DenavitHartenberg
 from rig.motion.geometry import WRIST_1, angle_waves, flange_attitude, flange_errors
 
-ERRORS, STEADY = 6, 2  # of each wrist; of these, its twist and its zero; the others are waves of its angle
+# Errors of each wrist; the first two are its twist and its zero, the others are waves of its angle.
+ERRORS, STEADY = 6, 2
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,13 +25,13 @@ from rig.estimation.reference.reference_budget import (
 )
 from rig.estimation.reference.triaxial import TriaxialSolution
 
-# Half-width of gravity by latitude and height alone: the anomalies of rocks and terrain, 50 mGal.
+# Half-width of gravity that is computed from latitude and height alone: anomalies by rocks and terrain, 50 mGal.
 LOCAL_GRAVITY_M_S2: Final = 0.0005
-# Half-width about the standard value: 9.780 at the equator to 9.832 at the poles, less in the mountains.
+# Half-width about the standard value: 9.780 at the equator to 9.832 at the poles, less on mountains.
 ANY_GRAVITY_M_S2: Final = 0.03
-UNSTATED_FIELD: Final = 0.01  # of the field: an ordinary fluxgate
-UNTESTED_DRIFT_T: Final = 1e-7  # in a run: a magnetic storm, a lift some floors away
-TESTED_AXES: Final = 3  # of one change of the field: the degrees of freedom of its standard deviation
+UNSTATED_FIELD: Final = 0.01  # relative half-width of an unstated field: that of an ordinary fluxgate
+UNTESTED_DRIFT_T: Final = 1e-7  # change of the field in a run: a magnetic storm, a lift some floors away
+TESTED_AXES: Final = 3  # axes of one measured change of the field: the degrees of freedom of its standard deviation
 SIZE_OF_FIELD: Final = "size of the field"
 
 

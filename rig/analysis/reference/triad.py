@@ -19,7 +19,7 @@ from rig.observation.reference.dwell_acceleration import DwellReading
 from rig.observation.statistics.mean import StaticReading
 
 COMPARED: tuple[Method, ...] = ("maximum_likelihood", "as_published")  # reported with the chosen one
-IDENTIFIABLE = 3.0  # standard deviations that the largest second-order term must have
+IDENTIFIABLE = 3.0  # least size of the largest second-order term, in its standard deviations
 
 
 @dataclass(frozen=True, slots=True)
