@@ -59,7 +59,7 @@ def open_journal(out: Path | None, parent: Path, entry: Begun) -> Journal:
     try:
         _append(folder / JOURNAL, entry)
     except OSError as error:
-        (folder / JOURNAL).unlink(missing_ok=True)  # an incomplete entry begins no batch, and would prevent one
+        (folder / JOURNAL).unlink(missing_ok=True)  # an incomplete entry starts no batch, and would prevent one
         raise Refused("run_folder", f"{folder} cannot be written: {error}", "Choose another with --out") from error
     return Journal(folder, state_of([entry]))
 

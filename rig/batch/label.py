@@ -13,7 +13,7 @@ from rig.errors.extras import requiring
 if TYPE_CHECKING:
     from segno import QRCode
 
-DOTS = 8  # of a printer, per millimetre (203 dpi)
+DOTS = 8  # resolution of a printer, dots per millimetre (203 dpi)
 _PLAIN = frozenset(b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789 .-:/")
 
 

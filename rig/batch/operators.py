@@ -42,7 +42,7 @@ class Operator:
         text = f"part {len(done) + 1}, serial number (Enter alone ends):"
         question = Question("number", text, (f"{why}.",) if why else ())
         while (answer := self._answer(question)) is not None and answer.lower() in COMMAND_WORDS:
-            question = question.after_no_answer(answer)  # an answer to another question is no part
+            question = question.after_no_answer(answer)  # an answer to another question names no part
         return answer or None
 
     def is_mounted(self, part: BatchPart) -> bool:

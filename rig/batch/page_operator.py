@@ -18,8 +18,8 @@ from rig.page.server.sections import Sections
 from rig.page.server.serving import Page, PageAddress, serving
 from rig.station.questions import Question
 
-LONGEST = 200  # characters of an answer
-LOOK_S = 0.5  # between two tests whether the page still exists
+LONGEST = 200  # largest number of characters of an answer
+LOOK_S = 0.5  # interval of checking that the page still exists
 
 
 class OnPage:

@@ -24,7 +24,7 @@ from rig.station.events import (
 )
 
 State = Literal["waiting", "checking", "asking", "running", "solving", "refused", "fault", "stopped", "ended"]
-NEWEST = 60  # parts in the state: a tray has fewer
+NEWEST = 60  # parts in the status: a tray has fewer
 ENDINGS = ("fault", "stopped", "ended")  # final states of a station
 
 
