@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 Answer = Callable[[Sequence[str], str], bool]
 TOKEN_VARIABLE = "RIG_PAGE_TOKEN"
-LONGEST_TOKEN = 1000  # bytes of its file
+LONGEST_TOKEN = 1000  # bytes of the file that contains the token
 
 
 @dataclass(frozen=True, slots=True)

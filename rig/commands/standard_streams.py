@@ -70,7 +70,7 @@ def keep_streams_usable() -> None:
     for descriptor, name in enumerate(("stdin", "stdout", "stderr")):
         if getattr(sys, name) is None:
             nothing = os.open(os.devnull, os.O_RDWR)  # the lowest free number, which is `descriptor`
-            os.set_inheritable(nothing, True)  # the processes we start need the same
+            os.set_inheritable(nothing, True)  # the processes we start need them too
             setattr(sys, name, os.fdopen(descriptor, "r" if name == "stdin" else "w", encoding="utf-8"))
     if isinstance(sys.stdout, _Unbroken) or isinstance(sys.stderr, _Unbroken):
         return

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 SIZE_MAX_BYTES = 256_000_000
 SCHEMA = "rig.verification/1"
 WRONG, NOT_TRUSTED = 1, 4
-# The file is unchanged, but its signer is not trusted.
+# Problems of a file that is unchanged, but whose signer is not trusted.
 TRUST_PROBLEMS = {"not_signed", "signer_unknown", "signer_not_trusted"}
 STATUSES = (
     "exit status: 0 every file is valid: unchanged, and signed by a signer that --trust and --signer accept, or "

@@ -15,11 +15,11 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-# docs/how-to/finished-runs/shared-history.md promises five until the verdict. A file takes a share of this computer's
-# processors, so on a busy one it is given longer.
+# docs/how-to/finished-runs/shared-history.md promises the verdict within five seconds. A file uses this computer's
+# processors, so on a busy computer it is given longer.
 ANSWER_S = 4.0
-# Modules imported before the time begins, as on a busy computer the import alone takes longer: for any question, and
-# to enter a run.
+# Modules that are imported before the time starts, because the import alone is slow on a busy computer: for any
+# question, and to enter a run.
 TO_ASK = ("rig.history.store",)
 TO_ENTER = ("rig.history.entered.index", "rig.report.kinds.kind_registry", "rig.history.series", "scipy.special")
 TO_CONNECT = {

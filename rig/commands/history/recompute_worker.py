@@ -11,7 +11,7 @@ from rig.errors import RigError
 from rig.history.entered.finished_run import EnteredRecording, recording_of
 from rig.history.recompute.result_comparison import Answer, RecomputedResult, State, Unsolved
 
-# Refusals that are no verdict on a recording: it has no such setting or estimator, or this computer cannot solve it.
+# Refusals that do not judge a recording: it has no such setting or estimator, or this computer cannot solve it.
 UNJUDGED = ("unknown_setting", "wrong_setting", "unknown_estimator")
 NOT_HERE = (
     "missing_extra",

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from distributed import Client
 
 LOOK_S = 1.0  # between two polls of a cluster that does not answer
-WITHOUT_WORKERS_S = 30.0  # to start new ones takes a while
+WITHOUT_WORKERS_S = 30.0  # time to start new ones
 AHEAD = 2  # recordings per thread of a cluster: one in progress, and one that waits
 
 Solve = Callable[[Task], Answer]

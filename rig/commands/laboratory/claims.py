@@ -23,7 +23,7 @@ from rig.config.models import RigConfig
 from rig.errors import Refused
 from rig.errors.quoting import shorten
 
-CREDENTIALS = struct.Struct("3i")  # of the far end: process, user, group (unix(7), SO_PEERCRED)
+CREDENTIALS = struct.Struct("3i")  # credentials of the far end: process, user, group (unix(7), SO_PEERCRED)
 
 
 @contextmanager

@@ -6,7 +6,7 @@ from importlib.util import find_spec
 from rig.errors import Refused
 
 SYSTEMS = {"win32": "Windows", "darwin": "macOS"}
-MODULES = ("fcntl", "termios")  # without them pyserial opens no port, not even one of the simulated laboratory
+MODULES = ("fcntl", "termios")  # without them pyserial opens no port, not even a simulated one
 
 
 def refuse_unless_linux(what: str, system: str = sys.platform) -> None:

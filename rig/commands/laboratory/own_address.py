@@ -14,7 +14,7 @@ from rig.config.models import RigConfig, SensorsConfig
 from rig.errors import Refused
 from rig.station.plain_text import say
 
-ARM_PORT = 30004  # a port at which every controller listens, whoever has started it
+ARM_PORT = 30004  # a port at which every controller listens, whoever started it
 CANDIDATES = 250
 
 

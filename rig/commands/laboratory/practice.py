@@ -74,7 +74,7 @@ def practise(control: str, words: str) -> str:
         reply = send_request(control, incident.request)
     except (OSError, ValueError) as error:
         raise Fault("world_ended", f"the simulated laboratory has ended ({error})", "Start it again") from error
-    if "known" in reply:  # the requests that it carries out
+    if "known" in reply:  # the requests that it knows
         return "this cannot happen in this laboratory"
     if not reply["ok"]:
         reason = str(reply["error"]).removeprefix(f"{incident.request['do']}: ")

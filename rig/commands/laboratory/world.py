@@ -41,7 +41,7 @@ def _practise(control: str) -> int:
     from rig.commands.laboratory.practice import opening_text, practise
     from rig.station.plain_text import say
 
-    send_request(control, {"do": "pace", "time_scale": 1.0})  # a servo's has no other
+    send_request(control, {"do": "pace", "time_scale": 1.0})  # a servo runs in real time only
     print(opening_text(), flush=True)
     while True:
         try:

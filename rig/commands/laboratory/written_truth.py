@@ -26,7 +26,7 @@ def write_truth(
     if outcome.polynomials or not (outcome.results or outcome.accelerometers):
         return
     windows = _windows(outcome, follows_arm=kind_of(loaded.config.turner).name == "ur")
-    with suppress(OSError, ValueError):  # a laboratory that is gone: the run needs no truth
+    with suppress(OSError, ValueError):  # the laboratory is gone: the run needs no truth
         if send_request(control, {"do": "write_truth", "windows": windows}).get("ok"):
             yield DocumentWritten(written.replace(folder / TRUTH))
 

@@ -55,7 +55,7 @@ def carry_out(
             with run.report_end():
                 stack.enter_context(claim_devices(configured.loaded.config))
                 if configured.loaded.simulated:
-                    # Of a resumed run, the windows of the first part are those of another laboratory's clock.
+                    # In a resumed run, the windows of the first part belong to the clock of an earlier laboratory.
                     resumed = bool(recordings(folder, "raw"))
                     (folder / TRUTH).unlink(missing_ok=True)
                     control = stack.enter_context(

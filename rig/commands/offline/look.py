@@ -50,7 +50,7 @@ def run(options: Namespace) -> int:
     stated = None if options.columns is None else read_column_map(options.columns)
     looks = [look_at(path, stated) for path in options.files]
     columns: dict[str, Any] = {}
-    for looked in reversed(looks):  # of two files the first has the readings
+    for looked in reversed(looks):  # if there are two files, the first has the readings
         columns |= looked.columns
     _print(looks, columns, stated, options.write or options.columns)
     if options.write is not None:
@@ -85,7 +85,7 @@ def _print(
     needs_map = bool(columns) or stated is not None
     name = (named or Path("columns.yaml")) if needs_map else None
     for line in describe_solutions(log, reference, replace(tried, columns=name)):
-        print(printable(line))  # a command is not broken
+        print(printable(line))  # not wrapped: a command must stay in one line
     if needs_map and named is None:
         say("--write columns.yaml writes the map of these columns")
 

@@ -9,7 +9,7 @@ from rig.commands.offline import solve_external
 from rig.errors import Refused
 from rig.station.plain_text import say, say_on_terminal
 
-SAMPLES = {".csv", ".tsv", ".txt", ".ulg", ".db3", ".mcap"}  # of files that are no recordings of the rig
+SAMPLES = {".csv", ".tsv", ".txt", ".ulg", ".db3", ".mcap"}  # suffixes of files that are no recordings of the rig
 
 
 def add(solve: ArgumentParser) -> None:

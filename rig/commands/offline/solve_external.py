@@ -207,7 +207,8 @@ def _build_recording(options: Namespace) -> "RunData":
     recorded: datetime | None = options.recorded
     if recorded is not None and recorded.tzinfo is None:
         recorded = recorded.replace(tzinfo=UTC)
-    if recorded is not None and recorded > datetime.now(UTC) + timedelta(days=1):  # a day: of a clock in local time
+    # A day is allowed for a clock in local time.
+    if recorded is not None and recorded > datetime.now(UTC) + timedelta(days=1):
         what = f"--recorded is {recorded:%Y-%m-%dT%H:%M} UTC, which is in the future"
         raise Refused("bad_option", what, "Give the time of the readings; correct this computer's clock if it is slow")
     column_map = read_column_map(options.columns)

@@ -141,7 +141,7 @@ class RigBench:
             return agreed
 
         def confirm() -> None:
-            nonlocal is_confirmed  # once, whatever the stages and repeats
+            nonlocal is_confirmed  # once for all stages and repeats
             if listener.chip is not None and not is_confirmed:
                 desk.confirm(listener.chip)
                 is_confirmed = True

@@ -32,7 +32,7 @@ def run(options: Namespace) -> int:
         what = "the history is off" if shared is None else f"there is no history {shared.label}"
         raise Refused("no_history", what, "Name the history that the rigs share: rig floor --history URL")
     with open_history(shared):
-        pass  # refuse an unreadable history before there is a page
+        pass  # an unreadable history is refused before there is a page
     address = PageWish(options.page_address, read_page_token(options)).address()
     with (
         looking(shared) as feed,

@@ -99,7 +99,7 @@ def _carry_out_batch(options: Namespace, configured: "Configured", operator: "Op
             except KeyboardInterrupt as interrupt:
                 if present.now.state == "stopped":
                     raise
-                why = str(interrupt) or "interrupted"  # between two parts no run reports it
+                why = str(interrupt) or "interrupted"  # between two parts no run reports the interrupt
                 text = f"{why} between two parts; the batch is kept in {folder}. Go on with: {command}"
                 present.event(Interrupted(text))
                 raise KeyboardInterrupt(text) from None

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from rig.page.server.feed import Feed
     from rig.station.events import RunEvent
 
-LOG_TAIL = 3  # lines of the log that say how a run without a result ended
+LOG_TAIL = 3  # lines of the log that show how a run without a result ended
 LARGEST_LOG = 50_000_000  # bytes
 
 
