@@ -7,7 +7,7 @@ from pydantic import Field, field_validator, model_validator
 from rig.config.section import Positive, Section
 from rig.config.units import ACCELERATION, ANGLE, FIELD, NUMBER, PRESSURE, RATE, TEMPERATURE, TIME, UNITS
 
-# Files tell no pressure, and a column of theirs is multiplied by its unit alone.
+# Files contain no pressure, and their columns are only multiplied: units with an offset, such as °F, are excluded.
 ALLOWED = tuple(name for name, unit in UNITS.items() if unit.quantity != PRESSURE and not unit.zero)
 TIMES = ("time_s", "start_s", "end_s")
 SUFFIXES = (

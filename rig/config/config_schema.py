@@ -20,7 +20,7 @@ from rig.config.procedures.shortest_procedure import SHORTEST, TargetUncertainty
 from rig.config.world.laboratory import WorldSection
 
 LEFT_OUT = ("title", "required", "default")
-NOTHING = {"type": "null"}  # what a key may have that the section does not know: it leaves out what the base says
+NOTHING = {"type": "null"}  # value of a key that the section does not know: it removes what the base states
 OBJECT = ["object", "null"]
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
@@ -97,7 +97,7 @@ def _as_written(schema: Any) -> Any:
     if not isinstance(schema, dict):
         return schema
     written = {key: _as_written(value) for key, value in schema.items() if key not in LEFT_OUT}
-    if "properties" in schema:  # in which a key may be called as a word of the schema
+    if "properties" in schema:  # its keys are names of a section, which may equal a word of the schema
         written["properties"] = {key: _as_written(value) for key, value in schema["properties"].items()}
     if schema.get("additionalProperties") is False:
         written["additionalProperties"] = NOTHING

@@ -11,7 +11,7 @@ Source = Literal["board", "lines", "autopilot", "kvh1775"]
 
 PROCEDURES: dict[Turner, str] = {"hand": "by_hand", "arm": "six_observation", "servo": "servo_six_observation"}
 CONDITIONS: dict[Turner, int] = {"hand": 100, "arm": 10, "servo": 25}
-# Arduino's usual: a hand reaches 300 °/s, so a full scale of 500 °/s is the least for it.
+# Arduino's usual sensor: a hand reaches 300 °/s, so its full scale must be at least 500 °/s.
 MATRIX = "    correction: matrix     # the right angles of the axes are found too"
 LINES_TEMPLATE = """\
 sensors:

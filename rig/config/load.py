@@ -32,11 +32,11 @@ from rig.errors import Refused
 from rig.errors.quoting import printable, quote
 
 Model = TypeVar("Model", bound=BaseModel)
-Sections = Mapping[str, type[ProcedureSection]] | None  # None: the procedure is no matter of the reader's
-Turners = Mapping[str, type[TurnerSection]] | None  # None: no matter of the reader's but for those in stock
-# The kinds of turners in stock, each a room of `rig.turners` by its name; `arm` is the section of the first.
+Sections = Mapping[str, type[ProcedureSection]] | None  # None: the reader does not need the procedure
+Turners = Mapping[str, type[TurnerSection]] | None  # None: the reader needs only the stock turners
+# The stock kinds of turners, each a room of `rig.turners`, by name; `arm` is the section of the first.
 STOCK_TURNERS: Mapping[str, type[TurnerSection]] = {"ur": ArmSection, "hand": HandSection, "servo": ServoSection}
-TURNS = frozenset({"arm", "turner"})  # the sections of which one says what turns
+TURNS = frozenset({"arm", "turner"})  # the sections of the turner, of which a configuration has one
 PROBLEMS_SHOWN = 25
 
 
@@ -200,7 +200,7 @@ def _validate_procedure(data: Any, sections: Sections, layered: Layered) -> tupl
     short = name == SHORTEST and SHORTEST not in sections
     if isinstance(data, dict) and (
         short or (name == CARRIED_OUT and "target_uncertainty" in data)
-    ):  # a script's name stands there
+    ):  # the name is that of a script
         if (otherwise := alternative_procedure(layered.document)) is not None:
             return None, [f"{_describe_location(name_location, layered.places)}: {otherwise}"]
         wanted, problems = _validate(

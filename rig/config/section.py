@@ -20,8 +20,8 @@ Words = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, ma
 Offset = Annotated[float, Field(ge=-1000, le=1000)]
 # A name becomes that of a dataset, of files and of C arrays.
 SensorName = Annotated[str, Field(pattern=r"^\w[\w -]*$", max_length=40)]
-DEFAULT_REST_S = 3.0  # of standing still after a sweep, and in an attitude (SIX, section IV)
-RATIO: dict[str, Any] = {"unit": "1"}  # a number without a unit, where the key cannot say so
+DEFAULT_REST_S = 3.0  # duration of a rest after a sweep, and in an attitude (SIX, section IV)
+RATIO: dict[str, Any] = {"unit": "1"}  # a number without a unit, if the key cannot show this
 
 
 def no_number_is_true(cls: type[BaseModel], value: Any, info: ValidationInfo) -> Any:

@@ -8,7 +8,7 @@ from typing import Final
 
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 
-# As the rows of `rig.data.quantity` are called, where there is one.
+# Named as the rows of `rig.data.quantity`, if there is one.
 TIME, ANGLE, RATE, ACCELERATION, FIELD, TEMPERATURE, PRESSURE, NUMBER = (
     "time", "angle", "rate", "acceleration", "field", "temperature", "pressure", "plain number",
 )  # fmt: skip

@@ -10,9 +10,9 @@ from rig.errors.quoting import quote, shorten
 
 BASE = "base"
 SET = "--set"
-FILES_MAX = 8  # one on another
+FILES_MAX = 8  # files based on one another
 
-Places = Mapping[Location, str]  # where each key stands, in words: "line 3", "demo.yaml, line 3", "--set"
+Places = Mapping[Location, str]  # position of each key, in words: "line 3", "demo.yaml, line 3", "--set"
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,8 +7,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO, Final
 
-RECORDING_MAX_BYTES: Final = 1 << 40  # more than a disk full of days
-FileIdentity = tuple[int, int]  # device and inode: the file, by whatever name and through whatever link
+RECORDING_MAX_BYTES: Final = 1 << 40  # more than a disk that is full of recordings of days
+FileIdentity = tuple[int, int]  # device and inode: they identify the file, whatever name or link it is opened by
 _shut: list[Callable[[], Iterable[FileIdentity]]] = []
 
 
@@ -45,9 +45,10 @@ def open_regular_file(path: Path, max_bytes: int, *, follow_links: bool = True) 
     Raise `UnfitFile`, and OSError as `open` does. In another user's folder a link is not followed, because it leads out
     of the folder.
     """
-    _check(path.stat() if follow_links else path.lstat(), max_bytes)  # before: to open a device may do something
+    # Checked before opening: to open a device may have effects.
+    _check(path.stat() if follow_links else path.lstat(), max_bytes)
     with open(path, "rb", opener=_open_nonblocking if follow_links else _open_nofollow) as file:
-        _check(os.fstat(file.fileno()), max_bytes)  # another may have come to lie there meanwhile
+        _check(os.fstat(file.fileno()), max_bytes)  # another file may have taken its place meanwhile
         yield file
 
 
@@ -55,7 +56,7 @@ def read_regular_file(path: Path, max_bytes: int, *, follow_links: bool = True) 
     """Read the content of a regular file. Raise as `open_regular_file` does."""
     with open_regular_file(path, max_bytes, follow_links=follow_links) as file:
         content = file.read(max_bytes + 1)
-    if len(content) > max_bytes:  # it has grown meanwhile, or its size is not told (those of /proc say 0)
+    if len(content) > max_bytes:  # it has grown meanwhile, or its size is not stated (files of /proc state 0)
         raise UnfitFile(f"it is longer than {max_bytes} bytes")
     return content
 

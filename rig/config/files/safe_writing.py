@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import BinaryIO
 
 PART = ".part"
-_held_back: ContextVar[dict[Path, Path] | None] = ContextVar("held_back", default=None)  # parts by their places
+# Temporary files by their final paths.
+_held_back: ContextVar[dict[Path, Path] | None] = ContextVar("held_back", default=None)
 NO_LINK = getattr(os, "O_NOFOLLOW", 0)
 
 
@@ -53,7 +54,7 @@ def new_file(path: Path) -> Iterator[BinaryIO]:
         with suppress(OSError):
             part.unlink()
         if isinstance(error, OSError) and error.filename is None:
-            error.filename = str(path)  # a full disk does not say of which file
+            error.filename = str(path)  # the error of a full disk does not name the file
         raise
 
 

@@ -13,7 +13,7 @@ def own_folder() -> Path:
         folder = user_data_path("calibration-rig", appauthor=False)
     except RuntimeError as error:
         raise _no_home(str(error)) from None
-    if not folder.is_absolute():  # so older versions of the library answer: a folder that is called `~`
+    if not folder.is_absolute():  # older versions of the library return this: a folder that is called `~`
         raise _no_home(f"there is no folder {folder}")
     return folder
 

@@ -18,7 +18,7 @@ from rig.errors.quoting import printable, quote, shorten
 Location = tuple[int | str, ...]
 
 SIZE_MAX_BYTES = 65_536  # the longest configuration shipped has 2,500
-NODES_MAX = 5_000  # keys and values, an alias counted as all it stands for
+NODES_MAX = 5_000  # keys and values; an alias counts as often as the nodes it stands for
 DEPTH_MAX = 16  # sections within sections
 NUMBER_MAX_CHARACTERS = 40
 
@@ -26,12 +26,13 @@ NUMBERS = ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float")
 TEXT = "tag:yaml.org,2002:str"
 NOTHING = "tag:yaml.org,2002:null"
 MERGE = "tag:yaml.org,2002:merge"
-OTHER_FILES = {  # what is given for a configuration by mistake, and where it belongs
+OTHER_FILES = {  # files given for a configuration by mistake, and where they belong
     ".py": "a Python script, no configuration; a procedure of your own is run by `rig run CONFIG --script FILE.py`",
     ".h5": "a recording, no configuration; it is solved by `rig solve FILE.h5`",
     ".csv": "a table of readings, no configuration; it is solved by `rig solve FILE.csv`",
 }
-UNSEEN = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})  # control, format, half a pair, breaks of lines and paragraphs
+# Invisible characters: control, format, surrogates, breaks of lines and paragraphs.
+UNSEEN = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})
 
 
 class Unreadable(Exception):
@@ -104,7 +105,7 @@ class _Loader(yaml.SafeLoader):
     def __init__(self, text: str) -> None:
         super().__init__(text)
         self._depth = self._nodes = 0
-        self._size_of: dict[str, int] = {}  # nodes that an alias stands for, once all of them are known
+        self._size_of: dict[str, int] = {}  # number of nodes that an alias stands for, once all of them are known
 
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
         event: Any = self.peek_event()

@@ -6,8 +6,8 @@ if TYPE_CHECKING:
     from sqlalchemy import URL
 
 SCHEMES = ("postgresql", "sqlite")
-# What a URL may say beside user, host and name. Everything else of libpq's (passwords and where they lie, keys,
-# services, options of the session) is for the files and variables of whoever runs the rig: recordings keep the URL.
+# The parameters that a URL may have in addition to user, host and name. All other parameters of libpq (passwords, keys,
+# services, session options) belong in the files and variables of the user, because recordings store the URL.
 ALLOWED = {"postgresql": ("host", "port", "sslmode", "sslrootcert"), "sqlite": ()}
 ENCRYPTED = ("require", "verify-ca", "verify-full")
 

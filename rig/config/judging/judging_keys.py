@@ -27,7 +27,8 @@ OfSensor = Literal[
     "acceleration_bias_instability_ug",
 ]
 OF_SENSORS: tuple[OfSensor, ...] = get_args(OfSensor)
-OfSensors = TypeVar("OfSensors")  # a size that a configuration states of all sensors, a recording of each by its name
+# A size that a configuration states for all sensors, and a recording for each by its name.
+OfSensors = TypeVar("OfSensors")
 
 
 def _part_default_key(what: str, unit: str | None = None) -> Any:

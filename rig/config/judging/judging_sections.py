@@ -9,8 +9,8 @@ from pydantic import Field, field_validator, model_validator
 from rig.config.judging.history_address import history_url
 from rig.config.section import RATIO, Section, Vector3, Words
 
-# Sine of the angle between the vertical and what a heading is given of: that of `rig.estimation.gyroscope.earth_rate`,
-# which the world must not reach through a section.
+# Sine of the angle between the vertical and the axis whose heading is given: equals that of
+# `rig.estimation.gyroscope.earth_rate`, which the world must not import through a section.
 MIN_LEVEL = 0.1
 
 

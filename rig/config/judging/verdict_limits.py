@@ -37,7 +37,7 @@ class Limit:
 class Limits(BaseModel):
     """The verdict's limits; None where what needs one was not asked for."""
 
-    # What a later version limits too is ignored when a recording is read.
+    # Limits that a later version adds are ignored when a recording is read.
     model_config = ConfigDict(frozen=True, allow_inf_nan=False, defer_build=True)
 
     scale_deviation: Annotated[Positive, Limit("rate", "scale_deviation", "1", "conformity", "scale")] = Field(

@@ -10,7 +10,7 @@ from types import MappingProxyType
 
 WristAngles = tuple[float, float, float]
 
-# D-optimal on the grid of 45°, for attitudes known to 1 mrad: an exchange search finds no eighteen that tell more by a
+# D-optimal on the grid of 45°, for attitudes known to 1 mrad: an exchange search finds no eighteen that are better by a
 # thousandth (tests/estimation/test_attitude_design.py).
 EIGHTEEN: tuple[WristAngles, ...] = (
     *((-180, -90, wrist_3) for wrist_3 in (-135, -90, -45, 90, 135)),
@@ -20,8 +20,8 @@ EIGHTEEN: tuple[WristAngles, ...] = (
     *((45, -90, wrist_3) for wrist_3 in (-90, 90)),
     *((90, -90, 45), (135, -90, -180), (135, -90, 0)),
 )
-# The same and eight with wrist 2 turned away from the forearm. While it stands at one angle, what the arm's iron adds
-# along wrist 1's axis looks like a part of the room's field, and what it adds along the flange's like a bias.
+# The same, and eight with wrist 2 turned away from the forearm. If wrist 2 has only one angle, the field of the arm's
+# iron along wrist 1's axis looks like a part of the room's field, and that along the flange's axis like a bias.
 MAGNETIC: tuple[WristAngles, ...] = (
     *EIGHTEEN,
     *((wrist_1, -45, wrist_3) for wrist_1, wrist_3 in zip((-180, -90, 0, 90), (0, 90, -180, -90), strict=True)),

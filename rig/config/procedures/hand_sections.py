@@ -7,8 +7,8 @@ from pydantic import Field
 from rig.config.models import ProcedureSection, RigConfig, TurnerSection
 from rig.config.section import RATIO
 
-LEAST_RATE_HZ = 50.0  # of readings that follow a hand; its tremor is at 6 to 12 Hz
-STAMPED_THERE = ("lines", "mavlink")  # parts with a port of their own, whose device tells the time of a sample
+LEAST_RATE_HZ = 50.0  # lowest rate of readings that follow a hand, whose tremor is at 6 to 12 Hz
+STAMPED_THERE = ("lines", "mavlink")  # parts with a port of their own, whose device states the time of a sample
 
 
 class HandSection(TurnerSection):

@@ -30,12 +30,13 @@ __all__ = [
     "VerifySection",
 ]
 
-Speed = Annotated[float, Field(ge=0.5, le=SPEED_RANGE_DEG_S)]  # slower, and the board cannot keep a sweep's readings
+# At a lower speed the board cannot store a sweep's readings.
+Speed = Annotated[float, Field(ge=0.5, le=SPEED_RANGE_DEG_S)]
 DEFAULT_PROCEDURE = "six_observation"
-LONGEST_SWEEP_S = 720  # once round at the slowest speed
-HOTTEST_HEATED_C = 65.0  # the heater overshoots the range a little
-# What polynomials need: that of `rig.estimation.temperature.over_temperature`, which the world must not reach through a
-# section.
+LONGEST_SWEEP_S = 720  # one revolution at the lowest speed
+HOTTEST_HEATED_C = 65.0  # below the part's limit, because the heater overshoots the range a little
+# Required by polynomials: equals that of `rig.estimation.temperature.over_temperature`, which the world must not import
+# through a section.
 MIN_RANGE_C = 10.0
 
 
@@ -483,7 +484,8 @@ class ThermalSection(SixSweepsSection, AttitudesSection):
             )
 
 
-# By the names of the procedures, which say their sections too but lie above: a file is read without them.
+# By the names of the procedures. The procedures state their sections too, but are in a higher layer: a file is read
+# without them.
 STOCK_SECTIONS: Mapping[str, type[ProcedureSection]] = MappingProxyType(
     {
         "six_observation": SixObservationSection,

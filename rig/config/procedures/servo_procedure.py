@@ -12,8 +12,8 @@ from rig.config.procedures.stage_section import Instruction, StageMountSection, 
 from rig.config.ranges import ACCELERATION_RANGE_DEG_S2
 from rig.config.section import DEFAULT_REST_S, RATIO, Direction, Section
 
-SPEED_TO_RANGE = 1.5  # scale error, bias, ripple and noise come on top of a sweep's speed
-AXES_SPAN = 0.5  # the smallest singular value of the directions that are swept; 1 where they are orthogonal
+SPEED_TO_RANGE = 1.5  # ratio of speed to range: scale error, bias, ripple and noise add to a sweep's speed
+AXES_SPAN = 0.5  # least singular value of the directions of the sweeps; 1 if they are orthogonal
 HANDS = "switch the servo's supply off with a hand on the item, screw it on with its {axis} axis along the shaft, away "
 REST = "from the servo, and switch the supply on"
 

@@ -11,7 +11,7 @@ from rig.config.ranges import PAYLOAD_RANGE_KG
 from rig.config.section import RATIO, JointAngle, Offset, Port
 
 ServoName = Literal["xl430_w250", "xm430_w350", "xm430_w210"]
-FASTEST_DEG_S = 460.0  # no load, of the fastest of them
+FASTEST_DEG_S = 460.0  # speed of the fastest servo without load
 
 
 class ServoSection(TurnerSection):

@@ -9,9 +9,9 @@ from rig.config.section import RATIO, Section
 
 SHORTEST = "shortest"
 CARRIED_OUT = "six_observation"
-REPEATS = 16  # at most, where the section says nothing
+REPEATS = 16  # largest number, if the section states none
 IN_ADVANCE = "`rig plan CONFIG --target-uncertainty scale=U --write FILE` writes the shortest run for the target"
-# What does not end after a repeat, by the kind of turner, and the procedure to name in its place.
+# Procedures that do not end after a repeat, by the kind of turner, and the procedure that the message suggests.
 OTHERS: Mapping[str, tuple[str, str]] = {
     "servo": ("with a servo the repeats are made in each mounting, so no run ends early", "servo_six_observation"),
     "hand": ("nothing turns whole revolutions by hand", "by_hand"),

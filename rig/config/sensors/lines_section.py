@@ -13,7 +13,7 @@ from rig.errors.quoting import quote
 GYROSCOPE, ACCELEROMETER, MAGNETOMETER = ("gx", "gy", "gz"), ("ax", "ay", "az"), ("mx", "my", "mz")
 COLUMNS = ("time", "sequence", *GYROSCOPE, *ACCELEROMETER, *MAGNETOMETER, "temperature", "-")
 SEPARATORS = {"comma": b",", "semicolon": b";", "tab": b"\t", "space": b" "}
-GAP = "?"  # what `rig lines` writes where the readings do not tell it
+GAP = "?"  # what `rig lines` writes for values that the readings do not determine
 LONGEST_GAP_S = 2.0  # a device that is silent for longer is lost
 PRINTABLE = r"^[ -~]*$"
 NOTHING: dict[str, Any] = {"usual": "none"}

@@ -7,7 +7,7 @@ from firmware_host.protocol import BATCH_AGE_US, COBS_BYTES, MESSAGE_BY_NAME, OV
 
 BITS_PER_BYTE = 10  # start bit, eight data bits, stop bit
 KVH1775_MESSAGE_BYTES = {"A": 36, "B": 40, "C": 38}  # ICD 56-0298 Rev. B, tables 5-1, 5-3, 5-5
-MARGIN = 0.1  # of the link stays free: answers, and a clock that is a little off
+MARGIN = 0.1  # fraction of the link that remains free: for replies, and for a clock that is slightly wrong
 
 
 @dataclass(frozen=True, slots=True)

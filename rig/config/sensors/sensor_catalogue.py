@@ -146,7 +146,7 @@ PARTS: Mapping[str, PartSpec] = MappingProxyType(
             default_rate_hz=238,
             default_range_deg_s=245,
             g_sensitivity_deg_s_g=0.1,  # not stated; that of the MPU-6050, a part of the same kind, PS-MPU-6000A 6.1
-            nonlinearity_percent=0.1,  # not stated; that of the MPU-9250, as what follows
+            nonlinearity_percent=0.1,  # not stated; this and the following are those of the MPU-9250
             asymmetry_percent=0.02,
             bias_deg_s_k=30 / 65,
             scale_ppm_k=4e4 / 65,
@@ -170,10 +170,10 @@ PARTS: Mapping[str, PartSpec] = MappingProxyType(
             default_range_deg_s=250,
             g_sensitivity_deg_s_g=0.1,  # not stated; that of the MPU-6050, PS-MPU-6000A 6.1
             nonlinearity_percent=0.1,  # PS-MPU-9250A-01, table 1
-            asymmetry_percent=0.02,  # not stated; assumed: what vibrates to and fro does so alike
+            asymmetry_percent=0.02,  # not stated; assumed: a vibrating element vibrates alike in both directions
             bias_deg_s_k=30 / 65,  # ±30 °/s from −40 to 85 °C (table 1), straight from 25 °C
             scale_ppm_k=4e4 / 65,  # ±4 % (table 1)
-            angle_random_walk_deg_sqrt_h=0.42,  # 0.01 °/s/√Hz, of one side (table 1): 60 / √2 times that
+            angle_random_walk_deg_sqrt_h=0.42,  # 0.01 °/s/√Hz, one-sided (table 1): times 60 / √2
             bias_instability_deg_h=10,  # not stated; assumed, as that of the LSM9DS1
             non_orthogonality_deg=1.15,  # cross-axis sensitivity ±2 % (table 1)
             ranges_g=(2, 4, 8, 16),
@@ -192,16 +192,17 @@ PARTS: Mapping[str, PartSpec] = MappingProxyType(
             default_rate_hz=200,
             default_range_deg_s=500,
             g_sensitivity_deg_s_g=0.015,  # as the datasheet of the ADIS16445 states
-            nonlinearity_percent=0.2,  # assumed, as what follows: the data sheet of the part has it, not looked up
+            # This and the following are assumed: the part's data sheet states them, but was not looked up.
+            nonlinearity_percent=0.2,
             asymmetry_percent=0.004,
             bias_deg_s_k=0.2 / 60,
             scale_ppm_k=3e3 / 60,
             angle_random_walk_deg_sqrt_h=0.15,  # data sheet, features
-            bias_instability_deg_h=2,  # data sheet, features: of the -1 (±125 °/s); taken for the others
-            non_orthogonality_deg=0.15,  # axis to axis ±0.05° (data sheet, features), taken for a standard deviation
+            bias_instability_deg_h=2,  # data sheet, features: that of the -1 (±125 °/s), assumed for the others
+            non_orthogonality_deg=0.15,  # axis to axis ±0.05° (data sheet, features), used as a standard deviation
             ranges_g=(8,),
-            acceleration_noise_ug_sqrt_hz=23,  # assumed: the data sheet of the part has it, not looked up
-            # of the accelerometer, assumed: the data sheet of the part has it, not looked up
+            acceleration_noise_ug_sqrt_hz=23,  # assumed: the part's data sheet states it, but was not looked up
+            # Of the accelerometer, assumed: the part's data sheet states it, but was not looked up.
             acceleration_nonlinearity_percent=0.25,
             acceleration_nonlinear_over_g=2,
             acceleration_bias_mg_k=0.05,
@@ -219,11 +220,11 @@ PARTS: Mapping[str, PartSpec] = MappingProxyType(
             asymmetry_percent=0.02,  # not stated; assumed, as of the MPU-9250
             bias_deg_s_k=0.005,  # table 1, 0 to 70 °C
             scale_ppm_k=50,  # table 1, ±0.005 %/°C
-            angle_random_walk_deg_sqrt_h=0.119,  # 0.0028 °/s/√Hz, of one side (table 1): 60 / √2 times that
+            angle_random_walk_deg_sqrt_h=0.119,  # 0.0028 °/s/√Hz, one-sided (table 1): times 60 / √2
             bias_instability_deg_h=10,  # not stated; assumed, as of the MPU-9250
             non_orthogonality_deg=0.72,  # cross-axis sensitivity ±1.25 % (table 1)
             ranges_g=(2, 4, 8, 16),
-            acceleration_noise_ug_sqrt_hz=70,  # table 2: of z; x and y have 65
+            acceleration_noise_ug_sqrt_hz=70,  # table 2: that of z; x and y have 65
             # of the accelerometer: table 2
             acceleration_nonlinearity_percent=0.1,
             acceleration_nonlinear_over_g=2,
@@ -251,7 +252,7 @@ PARTS: Mapping[str, PartSpec] = MappingProxyType(
             asymmetry_percent=0.02,  # not stated; assumed, as of the MPU-9250
             bias_deg_s_k=0.006,  # table 3
             scale_ppm_k=70,  # table 3, ±0.007 %/°C
-            angle_random_walk_deg_sqrt_h=0.119,  # 2.8 mdps/√Hz, of one side (table 3): 60 / √2 times that
+            angle_random_walk_deg_sqrt_h=0.119,  # 2.8 mdps/√Hz, one-sided (table 3): times 60 / √2
             bias_instability_deg_h=10,  # not stated; assumed, as of the MPU-9250
             non_orthogonality_deg=0.72,  # not stated; assumed, as of the ICM-42688-P
             ranges_g=(2, 4, 8, 16),
@@ -270,17 +271,18 @@ PARTS: Mapping[str, PartSpec] = MappingProxyType(
             ranges_deg_s=(490,),  # of the maker's data sheet
             default_rate_hz=1000,
             default_range_deg_s=490,
-            g_sensitivity_deg_s_g=0.0003,  # not stated; assumed: 1 °/h/g, light does not feel force
-            nonlinearity_percent=0.005,  # assumed: 50 ppm, as of a scale factor of light
+            # Not stated; assumed: 1 °/h/g, because light is not sensitive to acceleration.
+            g_sensitivity_deg_s_g=0.0003,
+            nonlinearity_percent=0.005,  # assumed: 50 ppm, as usual for an optical scale factor
             asymmetry_percent=0.0005,
             bias_deg_s_k=1 / 3600 / 60,  # assumed: 1 °/h over 60 K
-            scale_ppm_k=200 / 60,  # assumed: 200 ppm over as much
+            scale_ppm_k=200 / 60,  # assumed: 200 ppm over 60 K
             angle_random_walk_deg_sqrt_h=0.012,  # TRIAX, table 1
-            bias_instability_deg_h=0.05,  # assumed: as its maker has it of the typical one
+            bias_instability_deg_h=0.05,  # assumed: the maker's typical value
             non_orthogonality_deg=0.06,  # assumed: 1 mrad
             ranges_g=(10, 25),
             acceleration_noise_ug_sqrt_hz=119,  # TRIAX, table 1: 0.0701 m/s/√h
-            # of the accelerometer, assumed: the maker's data sheet has it, not looked up
+            # Of the accelerometer, assumed: the maker's data sheet states it, but was not looked up.
             acceleration_nonlinearity_percent=0.9,
             acceleration_nonlinear_over_g=10,
             acceleration_bias_mg_k=0.05,
@@ -288,8 +290,8 @@ PARTS: Mapping[str, PartSpec] = MappingProxyType(
             acceleration_bias_instability_ug=50,
             own_port=True,
         ),
-        # IMUs of autopilots are of many kinds: what follows is what the ICM-42688-P of TDK states, DS-000347, table 1
-        # and 2, which most flight controllers of today have; where it is silent, that of the MPU-9250.
+        # Autopilots have many kinds of IMUs: the values below are those of TDK's ICM-42688-P (DS-000347, tables 1 and
+        # 2), which most present flight controllers have; what it does not state is that of the MPU-9250.
         "mavlink": PartSpec(
             rates_hz=tuple(range(5, 401)),
             rates_rule="5, 6, … 400",
@@ -301,7 +303,7 @@ PARTS: Mapping[str, PartSpec] = MappingProxyType(
             asymmetry_percent=0.02,
             bias_deg_s_k=0.005,
             scale_ppm_k=50,
-            angle_random_walk_deg_sqrt_h=0.12,  # 0.0028 °/s/√Hz, of one side: 60 / √2 times that
+            angle_random_walk_deg_sqrt_h=0.12,  # 0.0028 °/s/√Hz, one-sided: times 60 / √2
             bias_instability_deg_h=10,
             non_orthogonality_deg=0.72,  # cross-axis sensitivity ±1.25 %
             ranges_g=(16, 8, 4),
@@ -352,6 +354,6 @@ CATALOGUE: Mapping[str, PartSpec | MagnetometerPart] = MappingProxyType({**PARTS
 if TYPE_CHECKING:
     PartName = str
     MagnetometerName = str
-else:  # what a configuration may name: a misspelt one is told with these
+else:  # the names that a configuration may use, for the message about a misspelt one
     PartName = Literal[tuple(PARTS)]
     MagnetometerName = Literal[tuple(MAGNETOMETERS)]

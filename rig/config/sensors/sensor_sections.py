@@ -20,7 +20,7 @@ from rig.config.sensors.sensor_catalogue import (
 )
 
 AxisName = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
-SERIAL_NUMBER_MAX = 24  # of the kind "text24" in the board's protocol
+SERIAL_NUMBER_MAX = 24  # length of a "text24" in the board's protocol
 OF_THE_PART: dict[str, Any] = {"allowed": "what the part has, see below", "usual": "the part's usual one"}
 
 
@@ -43,7 +43,7 @@ def scalar_name(sensor: str, scalar: str) -> str:
     return f"{sensor}_{scalar}"
 
 
-# The speeds that a KVH 1775 knows, and those that microcontrollers are set to beside them.
+# The speeds of a KVH 1775, and those that microcontrollers are usually set to.
 KVH1775_BAUDS = (9600, 19200, 38400, 57600, 115200, 460800, 576000, 921600, 4147200)
 Baud = Literal[
     9600, 19200, 38400, 57600, 115200, 230400, 250000, 460800, 500000, 576000, 921600, 1000000, 1500000, 2000000,
@@ -211,9 +211,9 @@ class SensorSection(Section):
         if not isinstance(data, Mapping):
             return data
         name = data.get("part")
-        # A part that is not known is an error of its own, whatever stands in for it here.
+        # An unknown part is a separate error; any part stands in for it here.
         part = PARTS[name] if isinstance(name, str) and name in PARTS else next(iter(PARTS.values()))
-        if part.any_rate:  # nothing is usual of a part that may be any
+        if part.any_rate:  # a part that may be any device has no usual values
             return data
         usual = {"rate_hz": part.default_rate_hz, "range_deg_s": part.default_range_deg_s}
         whole = {**data, **{key: value for key, value in usual.items() if data.get(key) is None}}

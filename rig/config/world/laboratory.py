@@ -295,7 +295,7 @@ class SimulatedBoardSection(Section):
     pty: bool = Field(default=False, description="also offer the serial port as a pseudo-terminal (POSIX)")
 
 
-# Of a gyroscope and an accelerometer alike.
+# For a gyroscope and for an accelerometer.
 Bandwidth = Annotated[
     float | None,
     Field(
