@@ -9,7 +9,7 @@ from rig.config.files.user_folder import own_folder
 from rig.errors import Refused
 
 LATEST = "latest"
-KEPT = 20  # folders, as the newest may be removed
+KEPT = 20  # number of folders: the newest may be removed
 _LIST_MAX_BYTES = 1_000_000
 
 

@@ -20,11 +20,11 @@ if TYPE_CHECKING:
 
 CONFIG, SCRIPT, RESULT, CERTIFICATE = "config.yaml", "script.py", "result.json", "certificate.html"
 SCRIPT_IDENTITY = "script.json"
-TRUTH = "truth.json"  # of a simulated laboratory, which writes it for people; nothing that estimates reads it
+TRUTH = "truth.json"  # a file of a simulated laboratory, for people; no estimator reads it
 WORLD_LATE = "world_late.txt"  # the causes of late steps of the simulated laboratory
 LOG, ARM_LOG = "log.txt", "arm_client.log"
 IDENTITY_MAX_BYTES = 10_000
-_BEGINNINGS = {"raw": "run", "calibrated": "verify"}  # of the names of recordings, by what is streamed
+_BEGINNINGS = {"raw": "run", "calibrated": "verify"}  # beginnings of the names of recordings, by what is streamed
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +84,8 @@ def _write_all(folder: Path, texts: Mapping[str, str]) -> None:
     begun: list[Path] = []
     try:
         for name, text in texts.items():
-            with (folder / name).open("x", encoding="utf-8", newline="") as file:  # of two runs at once, one has it
+            # If two runs create it simultaneously, only one succeeds.
+            with (folder / name).open("x", encoding="utf-8", newline="") as file:
                 begun.append(folder / name)
                 file.write(text)
     except OSError:

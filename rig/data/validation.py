@@ -14,13 +14,14 @@ from rig.motion.chain import MAX_JOINTS
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-OfJoints = Annotated[tuple[Finite, ...], Field(max_length=MAX_JOINTS)]  # the one that stands on the ground first
+OfJoints = Annotated[tuple[Finite, ...], Field(max_length=MAX_JOINTS)]  # beginning with the joint on the ground
 Kind = TypeVar("Kind")
 Document = TypeVar("Document", bound=BaseModel)
-MOST_VALUES = 200_000  # the largest of a run has 3,000; the message on each wrong one takes a thousand bytes
-MOST_RECORDED = 50_000  # in a text or an event of a recording, with the same cost
-SEPARATORS = (b",", b"[", b"{")  # in JSON, before each value but the first
-LARGEST_NUMBER = 1e100  # in SI units: a larger one overflows if it is squared, and no measured value is as large
+# Values in a file: the largest of a run has 3,000; the message about each wrong one takes a kilobyte.
+MOST_VALUES = 200_000
+MOST_RECORDED = 50_000  # values in a text or an event of a recording, with the same cost
+SEPARATORS = (b",", b"[", b"{")  # characters before a value in JSON
+LARGEST_NUMBER = 1e100  # in SI units: larger than any measured value; the square of a larger one might overflow
 UNSEEN = re.compile("[\\x00-\\x1f\\x7f-\\x9f\\u061c\\u200e\\u200f\\u2028-\\u202e\\u2066-\\u2069\\ud800-\\udfff]")
 _adapters: dict[type[Any], TypeAdapter[Any]] = {}
 

@@ -23,7 +23,7 @@ from rig.data.entries.result_types import (
 )
 from rig.data.validation import read_document
 
-REVERSAL_MAX_BYTES: Final = 4_000_000  # of two runs it has 4,000
+REVERSAL_MAX_BYTES: Final = 4_000_000  # a file of two runs has 4,000
 
 
 class FieldSolutionEntry(Entry):

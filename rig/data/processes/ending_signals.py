@@ -31,9 +31,10 @@ OTHER_SIGNALS: Final = _numbers(_BY_PROGRAMS) + _real_time_signals()  # which me
 ENDING_SIGNALS: Final = (*MEANT_SIGNALS, *OTHER_SIGNALS)
 
 
-BURST_S = 1.0  # a stop takes less: further signals within it ask for the same
+BURST_S = 1.0  # a stop takes less time: further signals within it request the same stop
 LATER_S = 0.001
-_LOCK_METHODS = ("__enter__", "__exit__", "_acquire_restore", "_release_save")  # of `threading`, written in Python
+# Methods of the locks of `threading`, which are written in Python.
+_LOCK_METHODS = ("__enter__", "__exit__", "_acquire_restore", "_release_save")
 
 
 class Interrupts:
@@ -49,7 +50,7 @@ class Interrupts:
     def allow(self) -> None:
         """Permit the next signal to raise, however soon after the last one."""
         self._raised_s = float("-inf")
-        self._first_s: float | None = None  # when the signal came that waits for a lock
+        self._first_s: float | None = None  # arrival of the signal that waits for a lock
 
     def hear(self, number: int, frame: FrameType | None, text: str = "") -> None:
         """Raise an exception for a signal, except within a burst of signals.

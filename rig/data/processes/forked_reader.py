@@ -15,7 +15,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import BinaryIO, NoReturn
 
-HDF5_PLUGINS = {"HDF5_PLUGIN_PRELOAD": "::"}  # none: a foreign file must load none
+HDF5_PLUGINS = {"HDF5_PLUGIN_PRELOAD": "::"}  # no plugins: a foreign file must load none
 
 
 def can_fork() -> bool:

@@ -5,9 +5,9 @@ from pathlib import Path
 
 from firmware_host import computer_load
 
-STARVED = 0.5  # of a tick spent waiting for a processor: more, and a silence in it says nothing about the process
-STANDS = 0.05  # … or without having run for more than this, and still ready to run
-HELD_UP = ("R", "D")  # states of a thread: ready to run, or waiting for memory that the system has put away
+STARVED = 0.5  # fraction of a tick spent waiting for a processor: above it, silence says nothing about the process
+STANDS = 0.05  # … or fraction of a tick in which a thread that is ready to run has run, at most
+HELD_UP = ("R", "D")  # states of a thread: ready to run, or waiting for swapped memory
 NS_PER_S = 1e9
 
 _Times = dict[str, tuple[float, float]]  # by thread: seconds on a processor, seconds waiting for one

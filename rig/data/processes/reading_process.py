@@ -31,19 +31,22 @@ if TYPE_CHECKING:
 
 Reader = Callable[..., Iterator[Part]]
 
-MOST_FILES = 10_000  # in a folder: a bag is split into one for every minute or gigabyte
-MAX_UNPACKED = 20  # times the size on disk: readings with noise unpack to a quarter of that, zeros to a thousand times
-SPARE_BYTES = 32_000_000  # … and the allowance of a small file
-MEMORY_BYTES, MEMORY_TIMES_STORED = 320 << 20, 2  # address space: half of the first are the libraries
+MOST_FILES = 10_000  # largest number of files in a folder: a bag is split into one for every minute or gigabyte
+# Largest ratio of unpacked to stored size: noisy readings unpack to a quarter of that, zeros to a thousand times.
+MAX_UNPACKED = 20
+SPARE_BYTES = 32_000_000  # … and a margin for small files
+# Address space, half of which the libraries take; and more per byte of the file.
+MEMORY_BYTES, MEMORY_TIMES_STORED = 320 << 20, 2
 PROCESSOR_S, PROCESSOR_S_PER_BYTE = 8.0, 1e-6  # a slow computer reads 3 MB of readings a second, packed 1 MB
-IDLE_TIMES_PROCESSOR = 1.5  # duration in all, on an otherwise idle processor, over the time on it
+IDLE_TIMES_PROCESSOR = 1.5  # total duration on an idle computer, relative to the processor time
 TICK_S, GONE_S = 0.1, 1.0
-SPARED = 6  # factor on that, at most, if the reading process gets no processor
+SPARED = 6  # largest factor on that duration while the reading process gets no processor
 # A foreign file must load no plugin of HDF5; and threads for linear algebra would reserve gigabytes of memory.
 ENVIRONMENT = {f"{library}_NUM_THREADS": "1" for library in ("OPENBLAS", "OMP", "MKL")} | HDF5_PLUGINS
 COMPLAINT_BYTES = 65_536
 LONGEST_REASON = 300  # characters
-OUT_OF_TIME = getattr(signal, "SIGXCPU", None)  # which the system sends to a process that has used up its time
+# The signal that the system sends to a process that has used up its time.
+OUT_OF_TIME = getattr(signal, "SIGXCPU", None)
 
 
 @dataclass(frozen=True, slots=True)

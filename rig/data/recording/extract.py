@@ -17,11 +17,12 @@ from rig.data.processes.reading_process import MAX_UNPACKED, size_without_holes
 from rig.data.recording.layout_keys import SCHEMA, SCHEMA_ELSEWHERE, TABLES, TEXTS
 from rig.data.recording.run_reading import MAX_UNWRITTEN_BYTES
 
-OPEN_FOR_WRITING = 0x01  # of the superblock's consistency flags
+OPEN_FOR_WRITING = 0x01  # a consistency flag of the superblock
 MAX_SENSORS = 64
-MAX_COLUMNS = 40  # of states: times, joints, and 32 fields
-LONGEST_TEXT, LONGEST_ATTRIBUTE = 1_000_000, 1000  # characters: configurations have 65,536 at most; numbers
-MAX_UNWRITTEN_ROWS = 100_000  # announced and missing: more than a kill leaves of one flush
+MAX_COLUMNS = 40  # columns of states: times, joints, and 32 fields
+# Characters of a text (configurations have 65,536 at most); elements of an attribute.
+LONGEST_TEXT, LONGEST_ATTRIBUTE = 1_000_000, 1000
+MAX_UNWRITTEN_ROWS = 100_000  # rows that are announced but missing: more than a kill can lose of one flush
 
 
 def contents(path: Path) -> Iterator[dict[str, Any] | NDArray[Any]]:
@@ -70,7 +71,7 @@ def extract(path: Path) -> Iterator[dict[str, Any] | NDArray[Any]]:
 def reason(error: Exception) -> str:
     """Return the reason why a file cannot be read, in one line, without HDF5's wrapping of the system's message."""
     if isinstance(error, OSError) and error.filename is not None:
-        error = OSError(error.strerror)  # whoever tells it names the file
+        error = OSError(error.strerror)  # the caller names the file
     text = " ".join(str(error).split())
     if cut := re.search(r"truncated file: eof = (\d+),.* stored_eof = (\d+)", text):
         return f"it is cut short: {cut[1]} of its {cut[2]} bytes are there"
@@ -109,7 +110,8 @@ def _member(group: Any, name: str, kind: type) -> Any:
 
 def _check(dataset: Any, name: str) -> None:
     """Raise ValueError unless the dataset holds rows of numbers that the file has space for."""
-    if dataset.is_virtual or dataset.external:  # first: to tell the shape of the former, the library opens the others
+    # First, because the library opens external files to determine a dataset's shape.
+    if dataset.is_virtual or dataset.external:
         raise ValueError(f"the rows of {name} lie somewhere else")
     columns = [dataset.dtype[column] for column in dataset.dtype.names or ()] or [dataset.dtype]
     if dataset.ndim != 1 or len(columns) > MAX_COLUMNS or any(column.base.kind not in "iuf" for column in columns):
@@ -149,7 +151,7 @@ def _convert(value: Any) -> Any:
 
     Raise ValueError for one that no run file has. `_encode` raises TypeError for types that JSON does not have.
     """
-    size = getattr(value, "size", 1) or 0  # an attribute of nothing has None
+    size = getattr(value, "size", 1) or 0  # an empty attribute has None
     if size > LONGEST_ATTRIBUTE or (isinstance(value, str | bytes) and len(value) > LONGEST_TEXT):
         raise ValueError("an attribute of it is longer than any a run has")
     return value.tolist() if isinstance(value, np.ndarray | np.generic) else value

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 OF_FILES = ("readings_file", "motion_file")
 OPTIONAL = ("arm_kinematics", "tcp_offset", "arm_maker", "arm_model", "turner_kind", "board_follows_crystal")
-SIMULATED = "(simulated)"  # so ends the version of a controller that is none
+SIMULATED = "(simulated)"  # ends the version of a simulated controller
 PACKAGES = ("ur-rtde", "numpy", "h5py", "pyserial")
 
 

@@ -24,7 +24,8 @@ from rig.errors.quoting import quote
 from rig.motion.steps import Dwell, Sweep
 
 LARGEST_INTEGER = 2**63 - 1
-LARGEST = 1e6  # of a sweep or a dwell in rad, rad/s, rad/s² or s: ten days, and turns that no joint makes
+# Largest number of a sweep or dwell in rad, rad/s, rad/s² or s: ten days, and more turns than any joint makes.
+LARGEST = 1e6
 
 
 @dataclass(frozen=True, slots=True)

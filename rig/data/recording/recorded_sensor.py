@@ -18,8 +18,8 @@ from rig.errors.quoting import quote
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 
 MOUNTING_TOLERANCE = 1e-6
-# K by which a sensor's unknown temperature may change in a run: a flight controller in its case warms by as much after
-# it gets power. Assumed.
+# Change of a sensor's unknown temperature in a run, K: a flight controller in its case warms up by as much when it gets
+# power. Assumed.
 UNKNOWN_CHANGE_K = 20.0
 
 Axis = Annotated[tuple[Finite, ...], Field(min_length=3, max_length=3)]

@@ -20,7 +20,7 @@ MAX_FIELDS = 32
 ALWAYS = ("time_s", "host_time_s", "q_rad", "qd_rad_s")
 Kind = Annotated[str, Field(pattern=r"^\w[\w.-]*$", max_length=40)]
 Word = Annotated[str, Field(max_length=200)]
-JointName = Annotated[str, Field(pattern=r"^\w[\w -]*$", max_length=40)]  # becomes that of a column
+JointName = Annotated[str, Field(pattern=r"^\w[\w -]*$", max_length=40)]  # becomes the name of a column
 
 
 @dataclass(frozen=True)

@@ -38,7 +38,7 @@ from rig.errors.quoting import quote
 from rig.motion.turner_state import State
 
 FLUSH_PERIOD_S = 0.25  # half of the promised time, so that a slow flush still keeps the promise
-LARGEST_STATE = 1e12  # of a turner's states, in SI units; times are among them
+LARGEST_STATE = 1e12  # largest value of a turner's state in SI units, times included
 
 
 class RunRecorder:
@@ -127,9 +127,10 @@ class RunRecorder:
             while not closing:
                 closing = self._closing.wait(FLUSH_PERIOD_S)
                 self._flush()
-                self.removed = not self.path.exists()  # asked here: a disk that hangs may hold up this thread, no other
+                # Checked here: a disk that hangs may block this thread, but no other.
+                self.removed = not self.path.exists()
             self._file.close()
-        except Exception as error:  # of any kind: the run must be informed
+        except Exception as error:  # any error: the run must be informed
             self._failure = error
             self._abandon()
 

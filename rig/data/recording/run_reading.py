@@ -9,9 +9,9 @@ from rig.data.processes.reading_process import MAX_UNPACKED, ReadingLimits, Read
 from rig.errors import Refused
 
 FIRST_RECORDING = "run.h5"
-READ_TIMEOUT_S, READ_BYTES_PER_S = 20.0, 5e6  # for a file of no size, and more for each byte
-MAX_UNWRITTEN_BYTES = 50_000_000  # of all rows that are announced and not there
-LIBRARIES_BYTES = 1 << 29  # of memory, and more than the libraries and the structures of any file take
+READ_TIMEOUT_S, READ_BYTES_PER_S = 20.0, 5e6  # time for an empty file, and speed of reading the rest
+MAX_UNWRITTEN_BYTES = 50_000_000  # bytes of all rows that are announced but missing
+LIBRARIES_BYTES = 1 << 29  # memory: more than the libraries and the structures of any file take
 
 
 def begin_reading(path: Path, timeout_s: float | None = None) -> ReadingTask:
