@@ -12,7 +12,7 @@ KINDS = (
     "either",
     "unprinted",
     "simulated",
-)  # how the source raises an error; catalogue.txt explains them
+)  # how the source raises an error; catalogue.txt explains the errors
 
 
 @dataclass(frozen=True, slots=True)
