@@ -5,7 +5,7 @@ from numpy.typing import ArrayLike
 
 from rig.estimation.arrays import Array
 
-NEGLIGIBLE = 1e-18  # of a slope, what a neighbour's adds to it: far below what a double resolves
+NEGLIGIBLE = 1e-18  # weight of a distant neighbour in a slope: far below the resolution of a double
 
 
 class CubicSpline:
@@ -31,7 +31,7 @@ class CubicSpline:
         slopes = _slopes(step, secants)
         cubic = (slopes[:-1] + slopes[1:] - 2 * secants) / steps
         quadratic = (secants - slopes[:-1]) / steps - cubic
-        # (n − 1, 4, k): what one interval needs lies together
+        # (n − 1, 4, k): the coefficients of one interval are adjacent in memory.
         self._coefficients = np.stack([cubic / steps, quadratic, slopes[:-1], flat[:-1]], axis=1)
 
     def __call__(self, x: ArrayLike, derivative: int = 0) -> Array:

@@ -13,10 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 
-MAX_SCALE = 4.0  # either way: a wrong unit gives more, no sensor does
-STUCK = 0.01  # of the axis that reads most
-MIN_ALIGNMENT = 0.7  # cosine between an axis and where it should point; beyond 45° it is another axis
-CONFUSED_ANGLES = (  # ratios of reading over true value for wrong units
+MAX_SCALE = 4.0  # largest ratio, or its inverse: a wrong unit gives more, a sensor's scale error less
+STUCK = 0.01  # fraction of the reading of the most sensitive axis, below which an axis is stuck
+MIN_ALIGNMENT = 0.7  # least cosine between an axis and its nominal direction; beyond 45° it is another axis
+CONFUSED_ANGLES = (  # ratios of reading to true value if the unit is wrong
     (
         180 / np.pi,
         "the readings look like degrees per second given as rad/s",
@@ -31,9 +31,9 @@ CONFUSED = (
     (1 / 9.80665, "the readings look like g given as m/s²"),
     (9.80665, "the readings look like m/s² declared as g"),
 )
-MIN_SIDE = 0.05  # cosine between the reference and the direction that determines its sign
+MIN_SIDE = 0.05  # least cosine between the reference and the direction that determines its sign
 NO_FIT = "the readings contradict the attitudes so much that no fit converges"
-CONSISTENT = 3.0  # ratio of residuals to their standard deviations that is worth a warning
+CONSISTENT = 3.0  # ratio of residuals to their standard deviations, from which on a warning is given
 
 
 def require_shape(name: str, array: Array, shape: tuple[int, ...]) -> None:

@@ -13,8 +13,8 @@ from rig.estimation.by_hand.fit import GraphFit, estimate_stds, solve_step
 from rig.estimation.by_hand.graph import REST, RESTS, Factor
 from rig.estimation.by_hand.session_parts import STATED
 
-RATIO = 3.0  # of the bias' random walk with and without them, if it is their effect
-MOST = 0.125  # of the rests: if more stand out, the bias itself jumps
+RATIO = 3.0  # ratio of the bias' random walk with the creeping rests to that without them
+MOST = 0.125  # largest fraction of the rests: if more stand out, the bias itself jumps
 
 
 def find_creeping_rests(fit: GraphFit) -> tuple[int, ...]:

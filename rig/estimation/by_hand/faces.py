@@ -7,10 +7,11 @@ from rig.estimation.arrays import Array, axis_of
 from rig.estimation.by_hand.move_rotations import MoveIntegrals
 from rig.estimation.by_hand.session_parts import FACES, HandRecording, RestFaces, SessionConditions
 
-ON_FACE = float(np.cos(np.radians(10.0)))  # by accelerometer: its offset makes up to 4°
-RECKONED = float(np.cos(np.radians(30.0)))  # by dead reckoning: a scale error of 10 % makes 18° in half a turn
-MOST = 0.7  # of the rests are on faces, if the body is laid on faces at all
-WHOLE_RAD = float(np.radians(40.0))  # a turn that ends so near its beginning was to be a whole one
+# Limit if there is an accelerometer: its offset tilts the vertical by up to 4°.
+ON_FACE = float(np.cos(np.radians(10.0)))
+RECKONED = float(np.cos(np.radians(30.0)))  # limit for dead reckoning: a scale error of 10 % makes 18° in half a turn
+MOST = 0.7  # least fraction of the rests on faces, if the body is laid on faces at all
+WHOLE_RAD = float(np.radians(40.0))  # a turn that ends so near its beginning was meant to be a whole one
 AXES = np.array([axis_of(face) for face in FACES])
 
 

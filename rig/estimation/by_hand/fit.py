@@ -27,10 +27,11 @@ from rig.estimation.by_hand.graph import (
 from rig.estimation.by_hand.move_rotations import GyroscopeModel, MoveIntegrals, integrate_moves
 from rig.estimation.by_hand.session_parts import LARGEST, STATED, HandRecording, HandStds, RestFaces, SessionConditions
 
-PASSES, SIZED = 30, 4  # iterations of the fit, many with few moves; of the variance components in each but the first
-SETTLED = 1e-2  # of the standard uncertainty
+# Iterations of the fit, many if there are few moves; iterations for the variance components in each but the first.
+PASSES, SIZED = 30, 4
+SETTLED = 1e-2  # largest step, relative to the standard uncertainty, at which the fit has converged
 PRIOR_DOF = 5.0  # degrees of freedom of the stated values
-LEAST = 0.4  # of the stated value: no hand is better
+LEAST = 0.4  # least fraction of the stated value: no hand is better
 CAUSE_OF_STD = {
     "repeat_rad": (FLAT, "repeat"),
     "closure_rad": (CLOSURE, "closure"),
@@ -38,7 +39,8 @@ CAUSE_OF_STD = {
     "walk_rad_s_sqrt_s": (WALK, "walk"),
     "acceleration_m_s2": (ACCELERATION, "acceleration"),
 }
-NEVER_LESS = ("of_angle", "walk_rad_s_sqrt_s")  # errors outside the model exist even if residuals do not show them
+# Not reduced: errors outside the model exist even if residuals do not show them.
+NEVER_LESS = ("of_angle", "walk_rad_s_sqrt_s")
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,13 +7,13 @@ from rig.estimation.arrays import Array, rotation_vectors
 from rig.estimation.by_hand.session_parts import HandRecording, nearest_face
 from rig.estimation.sensor_axes import nearest_rotation
 
-SIDEWAYS = 0.3  # cosine between the verticals of a quarter turn
-SAME = 0.7  # of the size: an axis that is another one shows less of it
+SIDEWAYS = 0.3  # largest cosine between the verticals before and after a quarter turn
+SAME = 0.7  # least component of a unit axis: another axis has less of it
 FEWEST, UNEXPLAINED = 5, 0.2  # flips; fraction of their rotation: with more, moves were merged or rests not found
-SKEWED = 0.3  # cosine between two axes: no part's are as far from square
-TURNED_RAD = 1.1  # between the frames of gyroscope and accelerometer: from farther off no fit converges
-OTHER_UNIT = 20.0  # either way: a whole turn that is merged with a flip reads five times as much
-FASTEST_RAD_S = 150.0  # no gyroscope of this kind reads so much: it is degrees
+SKEWED = 0.3  # largest cosine between two axes: those of a part are nearer to a right angle
+TURNED_RAD = 1.1  # angle between the frames of gyroscope and accelerometer: no fit converges from a larger one
+OTHER_UNIT = 20.0  # ratio of scales: a whole turn that is merged with a flip reads only five times as much
+FASTEST_RAD_S = 150.0  # no gyroscope of this kind reads as much: the unit is degrees
 
 
 def check_axes(session: HandRecording) -> None:

@@ -24,22 +24,24 @@ from rig.estimation.by_hand.session_parts import FACES, HandRecording, HandStds,
 MATRIX, GRAVITY, LEVEL, OFFSET, TABLE, BOX, BENDS = (
     slice(0, 9), slice(9, 18), slice(18, 27), slice(27, 30), slice(30, 32), slice(32, 44), slice(44, 50),
 )  # fmt: skip
-RESTS = 50  # six of each rest from here on: attitude, bias
+RESTS = 50  # index of the first rest's parameters; each rest has six: attitude, bias
 
-MATRIX_STD = 0.2  # of an element of F
-SENSITIVITY_STD = float(np.radians(0.1))  # rad/s per g, of an element of G
+MATRIX_STD = 0.2  # prior of an element of F
+SENSITIVITY_STD = float(np.radians(0.1))  # prior of an element of G, rad/s per g
 LEVEL_STD, OFFSET_STD_M_S2 = 0.05, 1.0
 TABLE_STD_RAD = 0.02
 BIAS_STD_RAD_S = 1.0
-EARTH_STD_RAD_S = 5e-5  # of each axis: on the same face the Earth's rate is read again
+EARTH_STD_RAD_S = 5e-5  # prior of each axis: on the same face the Earth's rate is sensed alike
 LEAN_RAD = 0.02
-HAND_RAD_S = float(np.radians(150))  # the rate of a hand over half of a move
-NONLINEARITY = 7e-5  # of the angle of a move at that speed, even and odd, of each axis: as data sheets have it
+HAND_RAD_S = float(np.radians(150))  # usual rate of a hand during half of a move
+NONLINEARITY = 7e-5  # relative error of a move's angle at that rate, even and odd, for each axis: as in data sheets
 BUT_GAPS = 0.95
-QUARTER_RAD = np.pi / 2  # the angle of `HandStds.of_angle`; the error of many pushes grows with the root of the angle
+# The angle to which `HandStds.of_angle` refers; the error of many pushes grows with the root of the angle.
+QUARTER_RAD = np.pi / 2
 ALONG_M_S2 = 0.1  # standard deviation of an accelerometer's own errors along the vertical
 HEADING_STD_RAD = 1.0
-TREMOR_HZ, AS_QUIET = 4.0, 1.5  # bandwidth of a hand that holds it; scatter over the quiet rests' that needs no hand
+# Bandwidth of a hand that holds the body; ratio to the scatter of quiet rests up to which no hand holds it.
+TREMOR_HZ, AS_QUIET = 4.0, 1.5
 
 MOVE, REST, WALK, FLAT, CLOSURE, LEANING, ACCELERATION, PRIOR = (
     "move", "rest", "walk", "flat", "closure", "lean", "acceleration", "prior",

@@ -20,8 +20,8 @@ from rig.estimation.by_hand.solution import (
 )
 from rig.estimation.sensor_axes import SensorAxes, parameter_jacobian
 
-UNKNOWN = 0.4  # U (k = 2) of a scale of which nothing is known
-FEWEST_TO_COMPARE = 4  # moves: from here on one of them can be compared with the others
+UNKNOWN = 0.4  # U (k = 2) of a scale factor before any measurement
+FEWEST_TO_COMPARE = 4  # number of moves from which on one of them can be compared with the others
 
 
 @dataclass(frozen=True, slots=True)

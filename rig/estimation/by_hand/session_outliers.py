@@ -18,20 +18,20 @@ from rig.estimation.by_hand.fit import GraphFit, estimate_stds, replace_stds, so
 from rig.estimation.by_hand.graph import ACCELERATION, CLOSURE, FLAT, LEANING, MOVE, TABLE, WALK, Factor
 from rig.estimation.by_hand.session_parts import LARGEST, STATED, HandRest, HandStds
 
-A_ROW = 4.0  # of chi square for each equation left out
-BY_MUCH = 16.0  # of chi square beyond that: false-alarm probability 1 in 10^5
-NEARLY = 0.99  # of the largest size
+A_ROW = 4.0  # decrease of χ² that is expected for each equation left out
+BY_MUCH = 16.0  # decrease of χ² beyond that: false-alarm probability 1 in 10^5
+NEARLY = 0.99  # fraction of the largest size from which on a size is at its limit
 FACTORS_OF = {
     "turn_not_closed": (CLOSURE, LEANING),
     "lost_in_move": (MOVE, CLOSURE, LEANING),
     "bias_jumped": (WALK,),
     "not_flat": (FLAT, ACCELERATION),
 }
-JUMP_RAD_S = 1e-3  # no bias drifts so far from one rest to the next
-OF_ONE, HIDING = 3.0, ("repeat_rad", "closure_rad")  # a ratio, and standard deviations that one outlier inflates
+JUMP_RAD_S = 1e-3  # change of the mean reading between two rests: no bias drifts by as much
+OF_ONE, HIDING = 3.0, ("repeat_rad", "closure_rad")  # a ratio, and the standard deviations that one outlier inflates
 HIDDEN = ("not_flat", "table_moved", "turn_not_closed")
-FREE = 1e-9  # redundancy below which an equation is not checked by the others
-AT_ONCE = 8.0  # the same during the session, when a move can be repeated: 1 in 10^3
+FREE = 1e-9  # redundancy below which the other equations do not check an equation
+AT_ONCE = 8.0  # the same during the session, in which a move can be repeated: 1 in 10^3
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 
 BOX_RAD = float(np.radians(0.2))
-LONGEST_S = 10.0  # of a move with a pause in it, whose bias and tilt enter the move
+LONGEST_S = 10.0  # duration of a move with a pause, beyond which bias and tilt of the pause affect it
 FACES = ("+x", "-x", "+y", "-y", "+z", "-z")
 
 
@@ -102,7 +102,8 @@ class HandStds:
 
 
 STATED = HandStds()
-LARGEST = HandStds(5e-3, 2e-2, 3e-3, 1e-3, 0.05)  # beyond, something else happened
+# The largest plausible errors of handling: beyond them, something else happened.
+LARGEST = HandStds(5e-3, 2e-2, 3e-3, 1e-3, 0.05)
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,10 +20,11 @@ from rig.estimation.gyroscope.budget import Budget, Contributor
 from rig.estimation.gyroscope.rotations_by_angle import TurnedSolution
 from rig.estimation.sensor_axes import SensorAxes, parameter_jacobian
 
-LOOSE = 3.0  # times the stated value: faces that repeat no better may be other faces
-MOST_RESTS = 300  # their equations together fill a gigabyte; a session has some twenty
-ENOUGH = 0.02  # U (k = 2) of the scale, beyond which there is no result
-REAL_HANDS = 5e-4  # of the scale: by so much (1 u) recordings of real hands have been seen to disagree with themselves
+LOOSE = 3.0  # ratio to the stated value: faces that repeat worse may be different faces
+MOST_RESTS = 300  # their equations fill a gigabyte; a session has some twenty rests
+ENOUGH = 0.02  # U (k = 2) of the scale factor, above which there is no result
+# Standard uncertainty of the scale factor: recordings of real hands differ by as much between their parts.
+REAL_HANDS = 5e-4
 CLOCK, RECORDED_HANDS = "clock", "recordings of real hands"
 LINES: dict[str, tuple[Literal["A", "B"], tuple[str, ...], str]] = {
     "noise": ("A", ("noise", "acceleration noise", "stamps"), "scatter at rest, and of the time stamps"),

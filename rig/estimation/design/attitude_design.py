@@ -28,7 +28,7 @@ from rig.estimation.refusals import condition_of
 
 Order = Literal[1, 2]
 PARAMETER_COUNT = {1: 14, 2: 17}
-ROUNDING = 1e-6  # of a unit vector: a smaller component in the undetermined directions is rounding
+ROUNDING = 1e-6  # least component of a unit vector in the undetermined directions: a smaller one is rounding
 PARTS = (  # the parameter of each element of θ
     *("scale of x", "angle x y", "angle x z", "angle x y", "scale of y"),
     *("angle y z", "angle x z", "angle y z", "scale of z"),

@@ -24,10 +24,10 @@ from rig.estimation.statistics.bias_process import walk_covariance
 from rig.estimation.statistics.variance_components import Mixed
 
 MATRIX, BIAS, CLOCK, EARTH, COMMON = slice(0, 9), slice(9, 12), 12, slice(13, 16), 16
-CLOCK_STD_S = 0.1  # prior std of the offset of a common clock: a controller's reports, cameras' exposure
-MATRIX_PRECISION = 1.0  # of F's elements: keeps those finite that no turn tells
-EARTH_PRECISION = 3 / EARTH_RATE_RAD_S**2  # its norm is known, its direction is not
-INTERVALS = 6  # of a recording, over which a bias is alike
+CLOCK_STD_S = 0.1  # prior std of the offset of a common clock: delays of a controller's reports, of cameras' exposure
+MATRIX_PRECISION = 1.0  # prior of F's elements: keeps elements finite that no turn determines
+EARTH_PRECISION = 3 / EARTH_RATE_RAD_S**2  # its norm is known, its direction is unknown
+INTERVALS = 6  # number of intervals of a recording within which the bias is correlated
 FIELD, VISIT = "error with attitude", "error with attitude, of each visit"
 NEW_AT_REST, NEW_IN_MOTION = "error of each rest", "error of each fix in motion"
 JITTER, LOSSES = "jitter of the stamps", "times between the readings"
@@ -43,14 +43,15 @@ SCALES = {  # medians of the half-Cauchy priors: rad, s, 1, rad/s, rad/√s
     BIAS_CHANGES: 5e-5,
     WALK: 3e-4,
 }
-REACH = 1.5  # rad: over which an error with attitude is alike
-FEWEST_S = 0.5  # of rests, whose mean is the bias
-VISIT_S = 5.0  # over which what an attitude does not tell of an arm is alike: its elbow, its load
-WANDER = 0.1  # of the variance of the jitter: that which a fix's samples have in common
-LOOKS_AT = np.array([0.0, 0.34, 0.67])  # of a fix's samples, at which its error with attitude is averaged
-LEAST_RAD = 1e-7  # of an increment: rounding
-OUTLYING, FEWEST_SAMPLES = 6.0, 10  # times a fix's median error: an outlier; fewest samples to judge by
-LEAST = 1e-3  # of the usual std: the least of a sample stated to be exact
+REACH = 1.5  # rad: correlation length of an error that depends on the attitude
+FEWEST_S = 0.5  # least total duration of the rests whose mean is the bias
+VISIT_S = 5.0  # correlation time of errors that depend on more than the attitude: an arm's elbow, its load
+WANDER = 0.1  # fraction of the jitter's variance that the samples of one fix have in common
+# Fractions of a fix's samples, at which its attitude-dependent error is averaged.
+LOOKS_AT = np.array([0.0, 0.34, 0.67])
+LEAST_RAD = 1e-7  # least error of an increment: rounding
+OUTLYING, FEWEST_SAMPLES = 6.0, 10  # ratio of an outlier to the fix's median error; fewest samples to decide
+LEAST = 1e-3  # least ratio to the usual std, for a sample that is stated to be exact
 
 
 @dataclass(frozen=True, slots=True)

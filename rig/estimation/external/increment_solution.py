@@ -47,14 +47,15 @@ from rig.estimation.external.axis_directions import find_inclinations
 from rig.estimation.gyroscope.earth_rate import check_earth_seen
 from rig.estimation.statistics.variance_components import Mixed, MixedFit, MixedModel
 
-PASSES, SIZED = 12, 3  # iterations of the fit; those that estimate the variances
-SETTLED = 1e-2  # of the standard uncertainty
-OUTLIER, OUTLIER_RAD = 4.0, 1e-3  # an increment with errors above both is an outlier: ratio to the ninth decile; rad
-SOME_OUTLIERS, MOST_OUTLIERS, SETTINGS_ASIDE = 4, 0.1, 3  # outliers, at most, and their fraction; passes
-UNTRUSTWORTHY_RAD = 0.1  # larger errors: the attitudes are those of another body
-MOST_CLOCK = 3.0  # prior standard deviations of a common clock's offset
-UNIDENTIFIED = 0.1  # standard deviation of an unidentified element of F
-LARGEST_STEP = 10.0  # of F: beyond, the fit diverges
+PASSES, SIZED = 12, 3  # iterations of the fit; the last iteration that estimates the variances
+SETTLED = 1e-2  # largest step, relative to the standard uncertainty, at which the fit has converged
+OUTLIER, OUTLIER_RAD = 4.0, 1e-3  # an outlier exceeds both: the ratio to the ninth decile, and rad
+# Most outliers: number, or fraction if more; passes that leave out outliers.
+SOME_OUTLIERS, MOST_OUTLIERS, SETTINGS_ASIDE = 4, 0.1, 3
+UNTRUSTWORTHY_RAD = 0.1  # with larger errors, the attitudes are those of another body
+MOST_CLOCK = 3.0  # largest offset of a common clock, in its prior standard deviations
+UNIDENTIFIED = 0.1  # least standard deviation of an element of F that is not identifiable
+LARGEST_STEP = 10.0  # change of F: beyond it, the fit diverges
 MAX_CONDITION = 1e4
 NOISE, ATTITUDES, DELAY = "noise", "attitudes", "delay between the files"
 EARTHS_RATE, STRETCHES = "Earth's rate", "differences between stretches"

@@ -19,8 +19,8 @@ from rig.estimation.arrays import Array
 from rig.estimation.reference.attitude_error import AttitudeError, Placed, effects
 from rig.estimation.reference.reference_model import BIAS, REFERENCE, F, free_directions, jacobian, predicted
 
-SMALLEST_RAD, LARGEST_RAD, GRID = 1e-6, 0.1, 24  # of δ, and of ζ relative to the reference
-USUAL = 1e-3  # of the reference: median repeatability of a placement (a milli-g)
+SMALLEST_RAD, LARGEST_RAD, GRID = 1e-6, 0.1, 24  # grid of δ, and of ζ relative to the reference
+USUAL = 1e-3  # median repeatability of a placement, relative to the reference (a milli-g)
 ANY_RAD = 1.0  # standard deviation of an unknown attitude
 
 

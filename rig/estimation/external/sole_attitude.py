@@ -12,10 +12,10 @@ from rig.estimation.reference.attitude_error import Placed, effects, find_whiten
 from rig.estimation.reference.reference_model import REFERENCE, F, weighted_jacobian
 from rig.estimation.reference.reference_model import free_directions as directions
 
-NEAR_RAD = 0.2  # between the directions of the reference in the body: one attitude, for the reading
-USUAL_RAD = 0.02  # error of an attitude about each axis: of an arm or a table by hand
-UNDETERMINED = 0.1  # standard deviation of a scale factor
-SMALLEST = 1e-9  # of the information: nothing
+NEAR_RAD = 0.2  # largest angle between reference directions in the body that count as one attitude
+USUAL_RAD = 0.02  # usual attitude error about each axis: an arm, or a table turned by hand
+UNDETERMINED = 0.1  # standard deviation of a scale factor, above which it counts as undetermined
+SMALLEST = 1e-9  # least eigenvalue of the information: a smaller one is none
 
 
 def find_sole_attitude(theta: Array, placed: Placed) -> tuple[int, int] | None:

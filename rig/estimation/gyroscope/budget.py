@@ -25,7 +25,7 @@ CLOCK = "controller clock"
 ENCODERS = "turner's encoders"
 AXES, REPEATABILITY, MOUNTS = "arm's axes", "arm's repeatability", "remounting"  # errors of directions
 STAMPS = "times of the samples"
-NOT_GIVEN = "is not given"  # ends the source of a value that the configuration lacks
+NOT_GIVEN = "is not given"  # ends the source of a value that the configuration does not state
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,7 +175,8 @@ def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributo
     clock_half_width, clock_source = unknown.clock_half_width, unknown.clock_source
     if clock_half_width is None:
         timed = evaluate_a(CLOCK, clock_source, propagate(unknown.clock_std * turned[None]), unknown.clock_dof)
-        yield timed if np.isfinite(timed.dof) else replace(timed, kind="B")  # by the statement about clocks alone
+        # Kind B if only the statement about clocks determines it.
+        yield timed if np.isfinite(timed.dof) else replace(timed, kind="B")
     else:
         yield evaluate_b(CLOCK, 1e6 * clock_half_width, "ppm", clock_source, clock_half_width * turned[None])
     yield from _evaluate_times(inputs, unknown, turned, propagate)
@@ -189,11 +190,12 @@ def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributo
     yield from _evaluate_mounts(explained, unknown, propagate)
     if unknown.earth_covariance_rad2_s2 is not None:
         variances, directions = np.linalg.eigh(unknown.earth_covariance_rad2_s2)
-        spread = inputs.attitudes @ (directions * np.sqrt(variances.clip(min=0.0)))  # principal axes
+        spread = inputs.attitudes @ (directions * np.sqrt(variances.clip(min=0.0)))  # principal axes of the errors
         source, patterns = "found from sweeps and rests", np.moveaxis(spread, -1, 0) @ matrix.T
         yield evaluate_a("Earth's rate", source, propagate(patterns), unknown.earth_dof)
     elif unknown.earth_rate:
-        base_axes = EARTH_RATE_RAD_S * np.moveaxis(inputs.attitudes, -1, 0) @ matrix.T  # for each axis of the base
+        # One pattern for each axis of the base.
+        base_axes = EARTH_RATE_RAD_S * np.moveaxis(inputs.attitudes, -1, 0) @ matrix.T
         yield evaluate_b("Earth's rate", EARTH_RATE_RAD_S, "rad/s", f"site.latitude_deg {NOT_GIVEN}", base_axes)
     for error in inputs.own_errors(matrix):
         yield evaluate_b(error.name, error.half_width, error.unit, error.source, error.patterns)
@@ -242,7 +244,7 @@ def _evaluate_times(
     source = "scatter of the joint angles"
     yield evaluate_a(STATES, source, propagate(jitter), unknown.state_jitter_dof)
     if unknown.stamp_std_s:
-        # A window moved in time covers other rates at its ends: those of the ripple.
+        # A window that is shifted in time has other rates at its ends, because of the ripple.
         moved = per_sweep * ((unknown.stamp_std_s * per_s * inputs.ripples)[:, None] * turned)[None]
         source, half_width = "how the lines of the sensor are timed", 1e3 * np.sqrt(3) * unknown.stamp_std_s
         yield Contributor(STAMPS, "B", "rectangular", float(half_width), "ms", source, np.inf, propagate(moved))

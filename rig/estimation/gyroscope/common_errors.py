@@ -26,7 +26,7 @@ from rig.estimation.gyroscope.vector_model import (
 )
 from rig.estimation.sensor_axes import angle_jacobian, parameter_jacobian
 
-PASSES = 2  # B depends on F, which has errors below one percent before the first
+PASSES = 2  # iterations: B depends on F, whose error is below one percent before the first
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +93,7 @@ def solve_with_common_errors(
     solution = solve(errors.readings_rad_s)
     noise = np.array([np.diag(axis) for axis in variances.T]) + shared
     _, inverse = regress(design, means, variances + speed_noise**2, shared_covariance_rad2_s2)
-    shifts = np.einsum("ipn,kni->ipk", inverse, error_patterns)  # of the coefficients, per standard deviation
+    shifts = np.einsum("ipn,kni->ipk", inverse, error_patterns)  # changes of the coefficients, per standard deviation
     total_gain = -np.einsum("ipk,knj->ipjn", shifts, gain)
     for axis in range(3):
         total_gain[axis, :, axis] += inverse[axis]
@@ -105,7 +105,7 @@ def _gain(design: Array, effects: Array, noise: Array) -> tuple[Array, Array]:
     """Return the gain (P, N, 3) from readings to the estimated errors, and the posterior covariance (P, P) of these."""
     weights = np.linalg.inv(noise)
     weighted = weights @ design
-    # The weights without what F, c and G explain (Frisch and Waugh, Econometrica 1 (1933) 387; Lovell 1963).
+    # The weights after removing what F, c and G explain (Frisch and Waugh, Econometrica 1 (1933) 387; Lovell 1963).
     reduced = weights - weighted @ np.linalg.solve(design.T @ weighted, np.swapaxes(weighted, -1, -2))
     patterns = np.moveaxis(effects, 2, 0)
     projected = patterns @ reduced  # (3, P, N)

@@ -34,10 +34,10 @@ from rig.estimation.gyroscope.vector_fit import VectorInputs, solver
 from rig.estimation.gyroscope.vector_model import MAX_CONDITION, VectorSolution, design_matrix, propagate_speed_std
 from rig.estimation.statistics.bias_process import bias_process
 
-PRIOR_STD_RAD_S = 100 * EARTH_RATE_RAD_S  # so wide that only the readings count
-LEAST_RATIO = 10.0  # of the estimate to its largest standard deviation
-MAX_DEVIATION = 4.0  # from the Earth's rate, in standard deviations
-MIN_LEVEL = 0.1  # sine of the angle between the vertical and the base's x axis
+PRIOR_STD_RAD_S = 100 * EARTH_RATE_RAD_S  # so wide that only the readings determine the rate
+LEAST_RATIO = 10.0  # least ratio of the estimate to its largest standard deviation
+MAX_DEVIATION = 4.0  # largest deviation from the Earth's rate, in standard deviations
+MIN_LEVEL = 0.1  # least sine of the angle between the vertical and the base's x axis
 REMEDY = "Add rests in attitudes turned about two axes (procedure imu), or leave procedure.earth_rate at known"
 
 

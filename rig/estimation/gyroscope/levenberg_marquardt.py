@@ -15,8 +15,8 @@ from rig.estimation import refusals
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.six_observation import design, negative_square
 
-MAX_CONDITION = 40.0  # above `accumulator`'s 30: directions of pure noise are excluded before
-VANISHED = 0.05  # of the largest scale factor
+MAX_CONDITION = 40.0  # above `accumulator`'s 30: directions that contain only noise are excluded before
+VANISHED = 0.05  # ratio to the largest scale factor, below which a scale factor is that of a negative square
 REMEDY = "Sweep every wrist in both directions; a second sweep in one direction cannot replace the other direction"
 
 
@@ -90,7 +90,7 @@ def solve_levenberg_marquardt(
     theta = np.concatenate([np.abs(minimum.x[:3]), minimum.x[3:]])  # only k² is identifiable
     weakest = int(np.argmin(theta[:3]))
     if theta[weakest] < VANISHED * theta[:3].max():
-        raise negative_square(weakest)  # k = 0 is the bound of a negative square
+        raise negative_square(weakest)  # the best k² is negative, so the fit ends at its bound k = 0
     refusals.check_unit(theta[:3])
     weighted_jacobian = slope(theta)
     gain = np.linalg.solve(weighted_jacobian.T @ weighted_jacobian, weighted_jacobian.T) / std

@@ -11,9 +11,9 @@ import numpy as np
 
 from rig.estimation.arrays import Array
 
-FREE_PER_RAD_S = 1.0  # far above any sensor's nonlinearity: only the sweeps count
+FREE_PER_RAD_S = 1.0  # prior far above any sensor's nonlinearity, so that only the sweeps determine it
 CUBE_MISSED, SQUARE_MISSED = 0.25, 0.5
-DISTINCT = 1.05  # ratio of two speeds that are not the same
+DISTINCT = 1.05  # ratio from which on two speeds count as different
 
 
 @dataclass(frozen=True, slots=True)

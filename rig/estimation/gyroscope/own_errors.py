@@ -17,7 +17,7 @@ NONLINEARITY = "nonlinearity"
 BIAS_OVER_TEMPERATURE, SCALE_OVER_TEMPERATURE = "bias over temperature", "scale over temperature"
 OF_THE_PART = "stated properties of the part"
 ROUNDING = "rounding of the readings"
-NEGLIGIBLE = 1e-3  # of a mean's variance: a smaller common rounding error
+NEGLIGIBLE = 1e-3  # fraction of a mean's variance below which a common rounding error is ignored
 
 
 @dataclass(frozen=True, slots=True)

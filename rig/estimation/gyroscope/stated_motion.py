@@ -18,9 +18,9 @@ import numpy as np
 from rig.estimation.arrays import Array, bisect, perpendicular_unit_vectors
 from rig.estimation.statistics.coverage import PROBABILITY
 
-SMALLEST_OF_NOISE = 0.1  # of a sweep's noise: a smaller size adds half a percent to it
-PRIOR_KNEE, LARGEST = 1e-2, 0.1  # of the rate, and rad: no table is worse
-SIZES = 20  # of each kind
+SMALLEST_OF_NOISE = 0.1  # smallest error relative to a sweep's noise: it increases the noise by half a percent
+PRIOR_KNEE, LARGEST = 1e-2, 0.1  # relative rate error, and axis error in rad: no rate table is worse than the second
+SIZES = 20  # grid points for each kind of error
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +121,7 @@ def _likelihoods(motion: StatedMotion, axis_rad: float, rates: Array) -> Array:
     count, columns = design.shape
     parameters = 3 * columns
     weighted = (precision @ motion.rate_patterns[..., None])[..., 0]
-    of_rate = np.sum(motion.rate_patterns * weighted, axis=1)  # per sweep: its squared rate error over its noise
+    of_rate = np.sum(motion.rate_patterns * weighted, axis=1)  # for each sweep: its squared rate error over its noise
     gains = (weighted[:, :, None] * design[:, None, :]).reshape(count, parameters)
     products = (design[:, :, None] * design[:, None, :]).reshape(count, -1)
     blocks = (precision.reshape(count, 9).T @ products).reshape(3, 3, columns, columns)

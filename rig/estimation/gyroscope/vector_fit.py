@@ -21,8 +21,10 @@ from rig.estimation.gyroscope.own_errors import KnownSensor, OwnError, own_error
 from rig.estimation.gyroscope.vector_model import VectorSolution, check_identifiable, design_matrix, propagate_speed_std
 from rig.estimation.statistics.bias_process import BiasProcess, bias_process
 
-UNIDENTIFIABLE = ("rank_deficient", "ill_conditioned", "too_few_observations")  # faults of too many columns
-LEAST_LOAD = 0.25  # of the largest rate: a smaller one has less than a sixteenth of its weight in the scale
+# Faults of a design with too many columns.
+UNIDENTIFIABLE = ("rank_deficient", "ill_conditioned", "too_few_observations")
+# Fraction of the largest rate: a smaller one has less than a sixteenth of its weight in the scale factor.
+LEAST_LOAD = 0.25
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,7 +173,8 @@ def explain(inputs: VectorInputs, nominal_mounting: Array, process: BiasProcess 
     """
     try:
         fit = _explain(inputs, nominal_mounting, inputs.apparent_gravity_m_s2, process)
-        # By attitudes alone: centripetal accelerations, a fiftieth of gravity, are worse than the data sheet.
+        # Only the attitudes determine it: centripetal accelerations, a fiftieth of gravity, are worse than the data
+        # sheet.
         check_identifiable(inputs.rates_rad_s, inputs.gravity_m_s2)
         return fit
     except Fault as fault:

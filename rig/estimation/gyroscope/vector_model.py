@@ -39,7 +39,7 @@ from rig.estimation.sensor_axes import SensorAxes, parameter_jacobian
 
 MODEL = "m = F ω − b, k_i = 1/‖F_i‖"
 MATRIX_PARAMETERS = (*(f"f{i}{j}" for i in "xyz" for j in "xyz"), "cx", "cy", "cz")
-MAX_CONDITION = 100.0  # six sweeps stay below 3; with g-sensitivity, rests at three attitudes below 30
+MAX_CONDITION = 100.0  # six sweeps have less than 3; with g-sensitivity, rests in three attitudes have less than 30
 REMEDY = "Sweep about three different axes, and turn the flange against gravity if g-sensitivity is wanted"
 
 

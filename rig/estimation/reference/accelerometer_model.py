@@ -34,12 +34,13 @@ from rig.estimation.reference.reference_model import BIAS, REFERENCE, matrix
 
 LEVER, DELAY, SECOND = slice(15, 18), 18, slice(19, 22)
 PARAMETERS = 22
-OWN_ERRORS = 3  # of a dwell: a small rotation of the flange
-SHARED_ERRORS = 10  # of a station: a small rotation in the flange's frame, one in the base's, four waves of the angle
-TURNS = 6  # of these ten: both rotations
-OWN_SHARE = 0.2  # of δ²: errors independent in each dwell; the others are constant errors of the wrists
+OWN_ERRORS = 3  # errors of a dwell: a small rotation of the flange
+# Errors of a station: a small rotation in the flange's frame, one in the base's, four waves of the angle.
+SHARED_ERRORS = 10
+TURNS = 6  # the first six of these ten: both rotations
+OWN_SHARE = 0.2  # fraction of δ² for errors independent in each dwell; the rest is for constant errors of the wrists
 CROSS = np.swapaxes(np.cross(np.eye(3)[:, None], np.eye(3)), 1, 2)  # [v]× of the axes
-SHARE = 0.5**0.5  # of δ, in each: both rotations together, and all waves, have the size of a dwell's error
+SHARE = 0.5**0.5  # size of both rotations together, and of all waves, relative to δ: each equals a dwell's error
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,10 +26,10 @@ from rig.estimation.reference.reference_model import (
 )
 from rig.estimation.reference.reference_model import matrix as matrix_of
 
-SMALLEST_RAD, LARGEST_RAD = 1e-7, 0.3  # of the attitude errors
+SMALLEST_RAD, LARGEST_RAD = 1e-7, 0.3  # range of the attitude errors
 GRID = 40
 PASSES = 20
-SETTLED = 1e-3  # of δ
+SETTLED = 1e-3  # relative change of δ at convergence
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,7 +190,7 @@ def maximise_likelihood(
     values = negative_logs(grid)
     best = int(np.argmin(values))
     if best == 0 or values[0] - values[best] < 1e-6:
-        return 0.0, negative_log(-np.inf)  # exact attitudes are as likely
+        return 0.0, negative_log(-np.inf)  # attitude errors are not more likely than exact attitudes
     bounds = grid[best - 1], grid[min(best + 1, GRID - 1)]
     minimum = minimize_scalar(negative_log, bounds=bounds, method="bounded", options={"xatol": 1e-5})
     return float(np.exp(minimum.x)), float(minimum.fun)

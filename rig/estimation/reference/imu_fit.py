@@ -26,7 +26,7 @@ from rig.estimation.reference.reference_model import REFERENCE, STEP_LIMIT, STEP
 from rig.estimation.reference.shared_errors import Decorrelation, decorrelate, estimate_common_error
 from rig.estimation.statistics.expected_variances import ResidualInputs, expected_disturbances, expected_sizes
 
-# Prior odds of one disturbed dwell or sweep in a run against none, and of another bias in all sweeps.
+# Prior odds that one dwell or sweep of a run is disturbed, or that all sweeps have another bias, against neither.
 ODDS = 1 / 19
 
 

@@ -20,7 +20,7 @@ from rig.estimation.refusals import convergence_required
 from rig.estimation.statistics.coverage import false_alarm_of_each
 
 MODEL = "m_m = F Rᵀ m + b"
-FREE = 14  # F and b, and the field's direction: its size is given
+FREE = 14  # parameters: F, b, and the field's direction, as its size is given
 FALSE_ALARM = 1e-3  # probability that a steady, uniform field fails one of the two tests
 
 

@@ -23,7 +23,7 @@ from rig.estimation.reference.accelerometer_model import (
 from rig.estimation.reference.reference_model import matrix
 from rig.estimation.statistics.bias_process import flicker_covariance, walk_covariance
 
-ANGLES = 72  # of a revolution, over which nonlinear functions of the acceleration are averaged
+ANGLES = 72  # angles of a revolution at which nonlinear functions of the acceleration are averaged
 
 
 def noise(theta: Array, movement: Movement) -> Array:

@@ -159,7 +159,7 @@ def most_likely(
         if norm_known:
             reference = theta[..., REFERENCE]
             theta[..., REFERENCE] = reference * (norm / np.linalg.norm(reference, axis=-1, keepdims=True))
-        # In standard deviations of a reading, plus rounding, which is large in this unit if variances are small.
+        # In standard deviations of a reading. The term for rounding is large in this unit if the variances are small.
         rounding = 1e-13 * np.linalg.norm(whitened(whiteners, readings))
         if np.max(np.linalg.norm(step, axis=-1)) <= STEP_TOLERANCE + rounding:
             break

@@ -19,7 +19,7 @@ from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
 from rig.estimation.reference.magnetometer import FALSE_ALARM
 
-SAME = 1e-6  # of mountings, which are nominal and exact
+SAME = 1e-6  # tolerance of mountings, which are nominal and exact
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,11 +19,11 @@ from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.refusals import check_finite, require_shape
 
-WHOLE_TURN = 0.05  # of a revolution: allowed deviation of the samples
+WHOLE_TURN = 0.05  # allowed deviation of the samples from one revolution
 WAVES = 3  # harmonics of the angle; only the first is used
-VIBRATION_WAVES = 100  # per revolution: 17 Hz at 60°/s
+VIBRATION_WAVES = 100  # harmonics per revolution: up to 17 Hz at 60°/s
 MIN_SAMPLES = 50
-EMPTY = 1e-9  # the columns of an arm without vibration are zero
+EMPTY = 1e-9  # relative size below which a column is zero, as for an arm without vibration
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,7 +168,8 @@ def _smooth(time_s: Array, speed_rad_s: Array, mean_speed_rad_s: float) -> _Unev
     normal = waves.T @ waves  # nearly diagonal: over a turn the waves are orthogonal
     excess = np.asarray(np.linalg.solve(normal, waves.T @ (speed_rad_s - mean_speed_rad_s)), dtype=np.float64)
     fast = excess.copy()
-    fast[: 1 + 2 * (WAVES + 1)] = 0.0  # times cos θ, a slower one is the mean or a used harmonic
+    # Multiplied by cos θ, these slow waves would become the mean or a harmonic of the model.
+    fast[: 1 + 2 * (WAVES + 1)] = 0.0
     derivatives = [fast]
     for _ in range(3):
         derivatives.append(mean_speed_rad_s * _differentiate(derivatives[-1]))

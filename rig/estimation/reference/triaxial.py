@@ -50,11 +50,11 @@ EqualWeights = Literal["as_published", "maximum_likelihood"]
 Method = EqualWeights | Literal["attitude_weighted"]
 
 MAX_CONDITION = 1e4
-NOTICEABLE = 0.5  # √N σ/v_rms
-UNTRUSTWORTHY_RAD = 5e-3  # larger attitude errors mean that the model is wrong
+NOTICEABLE = 0.5  # √N σ/v_rms, above which the noise biases the published method noticeably
+UNTRUSTWORTHY_RAD = 5e-3  # with larger attitude errors, the model is wrong
 BY_GYROSCOPE = "; or calibrate only a gyroscope by them, which needs no exact attitudes"
-SUSPICIOUS_RAD = 5e-4  # above it, a single wrong attitude is searched
-OUTLIER = 6.0  # times the others' error
+SUSPICIOUS_RAD = 5e-4  # attitude error above which a single wrong attitude is searched for
+OUTLIER = 6.0  # ratio to the other attitudes' error
 REMEDY = "Take more attitudes, turned about at least two different axes"
 
 

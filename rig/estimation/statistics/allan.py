@@ -23,15 +23,16 @@ from rig.estimation.refusals import check_finite
 
 Noise = Literal["white", "flicker", "random_walk"]
 
-COVERAGE = 0.95  # of the confidence intervals
-RANDOM_WALK_TAU_S = 1.0  # at which random walk is read: beyond the sensor's filter, before its bias drifts
+COVERAGE = 0.95  # probability of the confidence intervals
+# Averaging time at which random walk is read: beyond the sensor's filter, before its bias drifts.
+RANDOM_WALK_TAU_S = 1.0
 RANDOM_WALK_STD = 0.1  # relative standard deviation
-SLOPE_ALLOWED = 0.05  # deviation of the slope from −1/2, besides its uncertainty: an error of N of 5 %
+SLOPE_ALLOWED = 0.05  # allowed deviation of the slope from −1/2 in addition to its uncertainty: an error of N by 5 %
 INSTABILITY_STD = 0.2
-FLICKER = float(np.sqrt(2 * np.log(2) / np.pi))  # 0.664: least σ over bias instability
-BEYOND = 3.0  # standard deviations by which the least σ must exceed what white noise alone gives there
-FEWEST = 3  # readings of an interval
-ENOUGH_S = 40.0  # white noise gives a random walk to `RANDOM_WALK_STD` from then on
+FLICKER = float(np.sqrt(2 * np.log(2) / np.pi))  # 0.664: ratio of the least σ to the bias instability
+BEYOND = 3.0  # standard deviations by which the least σ must exceed that of white noise alone
+FEWEST = 3  # fewest readings of an interval
+ENOUGH_S = 40.0  # duration from which on white noise determines a random walk to `RANDOM_WALK_STD`
 ENOUGH_FOR_A_FLOOR_S = 600.0  # few gyroscopes reach their least deviation sooner
 
 

@@ -15,12 +15,12 @@ from numpy.typing import ArrayLike
 
 from rig.estimation.arrays import Array
 
-STEPS = 25  # of either standard deviation on its grid
-PRICE = 1.0  # of a parameter, in the log-likelihood (Akaike, IEEE Trans. Autom. Control 19 (1974) 716)
-SPAN = 300.0  # largest over smallest standard deviation of the grid
-CHANGED = float(np.sqrt(2))  # change of flicker between adjacent means over its Allan deviation
+STEPS = 25  # grid points of each standard deviation
+PRICE = 1.0  # cost of a parameter in the log-likelihood (Akaike, IEEE Trans. Autom. Control 19 (1974) 716)
+SPAN = 300.0  # ratio of the largest to the smallest standard deviation of the grid
+CHANGED = float(np.sqrt(2))  # change by flicker between adjacent means, relative to its Allan deviation
 
-# Walk and scatter (2,) by pairs of sizes (K, 2) and their log-likelihoods (K,).
+# Walk and scatter (2,) from pairs of sizes (K, 2) and their log-likelihoods (K,).
 Chosen = Callable[[Array, Array], Array]
 
 

@@ -15,7 +15,7 @@ from rig.estimation.arrays import Array
 
 COVERAGE_FACTOR = 2.0  # for ν → ∞, and if ν is not given
 PROBABILITY = math.erf(COVERAGE_FACTOR / math.sqrt(2))
-ROUNDING = 1e-9  # of ν, which may be a whole number but for rounding
+ROUNDING = 1e-9  # tolerance of ν, which would be an integer without rounding
 
 
 def coverage_factors(dof: ArrayLike) -> Array:

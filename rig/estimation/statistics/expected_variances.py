@@ -13,12 +13,12 @@ import numpy as np
 
 from rig.estimation.arrays import Array
 
-WALKS = 12  # on their grid
-SPAN = 100.0  # largest walk over the smallest
-SMALLEST_RAD, LARGEST_RAD, SIZES = 1e-5, 0.03, 25  # of δ: no arm is better than the smallest
+WALKS = 12  # grid points of the walk
+SPAN = 100.0  # ratio of the largest to the smallest walk
+SMALLEST_RAD, LARGEST_RAD, SIZES = 1e-5, 0.03, 25  # grid of δ: no arm is better than the smallest
 
-OWN_SHARES = (0.001, 0.01, 0.1, 0.5)  # of δ²: nearly all of an arm's errors may be constant, or half
-LOUDEST, VOLUMES = 30.0, 8  # of a disturbance, in standard deviations of the noise
+OWN_SHARES = (0.001, 0.01, 0.1, 0.5)  # fractions of δ²: between nearly all and half of an arm's errors may be constant
+LOUDEST, VOLUMES = 30.0, 8  # grid of a disturbance's size, in standard deviations of the noise
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rig.estimation.arrays import Array
 
-ALIKE = 1e-2  # unit columns that differ by less are collinear
+ALIKE = 1e-2  # unit columns whose difference is smaller are collinear
 
 
 def mean_weights(groups: Array, nuisance: Array) -> Array:

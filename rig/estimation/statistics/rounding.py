@@ -13,16 +13,17 @@ from numpy.typing import NDArray
 
 from rig.estimation.arrays import Array
 
-FEWEST_LEVELS = 3  # numbers, of an axis that is not constant
-OCCUPIED = 0.01  # fraction of readings beyond the two most frequent numbers that determines the noise
-REPEATED, REPEATED_FRACTION = 3, 0.25  # occurrences of a repeated number; fraction of such readings if there are steps
-LARGE_NOISE = 4.0  # steps: such noise averages all rounding out
-MOST_READINGS = 20_000  # used to find the steps
-SAME = 1e-3  # of a step: numbers closer than this are equal
-A_QUARTER = 0.25  # of a step: the tolerance of a number, less than half-way to another kind
-NEAR = 0.2  # of a unit: the possible change by a scale factor
-FEWEST_TO_TELL_ZERO = 8  # numbers, of which at most one is zero
-ALIKE = 0.5  # length of the mean of unit vectors in one direction
+FEWEST_LEVELS = 3  # fewest different readings of an axis that is not constant
+OCCUPIED = 0.01  # fraction of readings beyond the two most frequent values, from which on they determine the noise
+# Occurrences of a value that count as repeated; fraction of such readings from which on the readings have steps.
+REPEATED, REPEATED_FRACTION = 3, 0.25
+LARGE_NOISE = 4.0  # noise in steps, from which on all rounding averages out
+MOST_READINGS = 20_000  # readings used to find the steps
+SAME = 1e-3  # fraction of a step: values closer than this are equal
+A_QUARTER = 0.25  # tolerance of a value as a fraction of a step: less than half-way to another kind of value
+NEAR = 0.2  # fraction of a unit by which a scale factor may change it
+FEWEST_TO_TELL_ZERO = 8  # fewest different values that determine which of them is zero
+ALIKE = 0.5  # least length of the mean of unit vectors that have one direction
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,8 +109,8 @@ def bound_rounding_variance(readings: Array, steps: Steps, smooth: Array, scatte
     for axis in coarse.tolist():
         shares = np.sort(_count_fractions(readings[:, axis], units[axis]))
         if shares[:-2].sum() < OCCUPIED:
-            # Between two numbers, half-way is where readings change from one to the other: a mean of p times one and
-            # 1 - p times the other is off by less than p - 1/2 of a step, of one number alone by half of one.
+            # Readings change from one value to the next half-way between them. A mean of p times one value and 1 - p
+            # times the other errs by less than p - 1/2 of a step; if there is only one value, by at most half a step.
             half = 0.5 if widths[axis] > units[axis] else float(shares[-1]) - 0.5
             bounds[axis] = (half * widths[axis]) ** 2 / 3
             continue
@@ -137,7 +138,7 @@ def _find_unit(axis: Array) -> float:
 def _count_fractions(axis: Array, unit: float) -> Array:
     """Return the fraction of readings (n,) at each distinct value."""
     values, often = np.unique(np.rint(axis / (SAME * unit)), return_counts=True)
-    first = np.flatnonzero(np.diff(values, prepend=-np.inf) > 2)  # rounding of a record makes no other number
+    first = np.flatnonzero(np.diff(values, prepend=-np.inf) > 2)  # a record's rounding changes no value by more
     shares: Array = np.add.reduceat(often, first) / len(axis)
     return shares
 

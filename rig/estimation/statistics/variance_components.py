@@ -21,17 +21,19 @@ from rig.estimation.statistics.coverage import COVERAGE_FACTOR, PROBABILITY
 if TYPE_CHECKING:
     from scipy.optimize import OptimizeResult
 
-DRAWS, ROUNDS, TAILS = 40, 3, 5.0  # samples of a round of importance sampling; dof of the t that proposes them
-FLOOR, LEAST_POWER = 0.02, 0.05  # of the variance of a proposal; of the power that evens out weights
-STEP = 0.1  # of ln σ, for the curvature at the maximum
-LEAST_CURVATURE = 0.1  # of the negative log-posterior over (ln σ)²: the priors have about this themselves
-TOLERANCE, MOST_STEPS = 1e-2, 100  # of the log-posterior's gradient; Newton steps
-LONGEST_STEP = 4.0  # of ln σ
-BEYOND, APART = 3.5, 2.0  # of ln σ: one cause exceeds its prior's median, all others fall below theirs
-FEW = 240  # residuals: more of them have one maximum
-DISTINCT, NEGLIGIBLE = 1.0, 5.0  # of ln σ between two maxima; of the log-posterior below the greatest
-FIRST_STEPS = 6  # Newton steps from each of these points: the likely ones are climbed to the end
-UNLIKELY = 1e30  # negative log-posterior of what cannot be computed
+# Samples of a round of importance sampling, rounds, and degrees of freedom of the proposal, a t distribution.
+DRAWS, ROUNDS, TAILS = 40, 3, 5.0
+FLOOR, LEAST_POWER = 0.02, 0.05  # least variance of a proposal; least power, which makes weights more equal
+STEP = 0.1  # step of ln σ, for the curvature at the maximum
+LEAST_CURVATURE = 0.1  # least curvature of the negative log-posterior over ln σ: about that of the priors
+TOLERANCE, MOST_STEPS = 1e-2, 100  # largest gradient of the log-posterior at a maximum; most Newton steps
+LONGEST_STEP = 4.0  # longest step of ln σ
+BEYOND, APART = 3.5, 2.0  # starting points of ln σ: one cause above the median of its prior, all others below theirs
+FEW = 240  # residuals: with more of them there is only one maximum
+# Least distance of two maxima in ln σ; a maximum lower than the greatest by more than this is ignored.
+DISTINCT, NEGLIGIBLE = 1.0, 5.0
+FIRST_STEPS = 6  # Newton steps from each starting point: only the likely ones are continued
+UNLIKELY = 1e30  # negative log-posterior if it cannot be computed
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,7 +17,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.refusals import check_count, check_finite, check_variances, require_shape
 from rig.estimation.statistics.coverage import false_alarm_of_each
 
-FALSE_ALARM = 0.02  # of a run whose bias is steady
+FALSE_ALARM = 0.02  # probability for a run whose bias is steady
 
 
 @dataclass(frozen=True, slots=True)

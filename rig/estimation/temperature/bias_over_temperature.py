@@ -14,8 +14,8 @@ from rig.estimation.arrays import Array
 from rig.estimation.refusals import check_count
 
 MIN_RANGE_C = 3.0
-MAX_CORRELATION = 0.9  # of temperature and time: beyond, their confusion more than doubles the slope's σ
-FEWEST = 4  # repeats, for three parameters
+MAX_CORRELATION = 0.9  # correlation of temperature and time, beyond which it more than doubles the slope's σ
+FEWEST = 4  # fewest repeats, for three parameters
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,15 +26,15 @@ from rig.estimation.refusals import check_finite
 from rig.estimation.statistics.bias_process import BiasProcess, average_walks, bias_process
 from rig.estimation.statistics.coverage import coverage_factors, effective_dof
 
-HIGHEST = 3  # order: that of the autopilots
-FEWEST = 4  # repeats of each pose
+HIGHEST = 3  # highest order, as in autopilots
+FEWEST = 4  # fewest repeats of a pose
 MIN_RANGE_C = 10.0
-LAG_STD_S = 10.0  # prior of a thermometer's lag behind its surroundings; assumed
-EACH_WAY = 0.2  # of the observations, both warming and cooling, that determine a loop
-STANDING_K_S = 0.1 / 60  # slower changes keep the previous direction
-AS_GOOD_AS_EQUAL = 0.03  # difference of one pose's inputs, of the largest of all
+LAG_STD_S = 10.0  # prior of a thermometer's lag; assumed
+EACH_WAY = 0.2  # least fraction of the observations during warming, and during cooling, that determine a hysteresis
+STANDING_K_S = 0.1 / 60  # a slower change counts as one in the previous direction
+AS_GOOD_AS_EQUAL = 0.03  # largest difference between inputs of one pose, relative to the largest input
 STEPS = 6  # Gauss–Newton steps: the model is linear except for products of small numbers
-COEFFICIENTS = 6 * (HIGHEST + 1)  # scale of order 0 xyz, of order 1 xyz, …, then the bias
+COEFFICIENTS = 6 * (HIGHEST + 1)  # scale of order 0 xyz, of order 1 xyz, …, then the bias in the same order
 
 NOISE, ORDER, LAG = "noise and bias drift", "order of the polynomials", "thermometer's lag"
 HYSTERESIS, GRADIENT = "warming against cooling", "temperature gradient"
@@ -384,7 +384,7 @@ class _ParameterFits:
             for n in range(of_bias):
                 take[3 * HIGHEST + 3 * n + axis, axis * per_axis + of_scale + n] = size[n]
         loop = None
-        if self.both_ways:  # a share of the reading is one of k with the other sign
+        if self.both_ways:  # a fraction of the reading equals one of k with the opposite sign
             stds = np.sqrt(np.diag(covariance))[:-1].reshape(3, per_axis)[:, -2:]
             loop = (by_axis[:, -2:] * [-1.0, 1.0]).T.ravel(), stds.T.ravel()
         lag_std_s = float(np.sqrt(covariance[-1, -1]))
