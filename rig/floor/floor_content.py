@@ -13,11 +13,11 @@ from rig.history.stations import LONGEST, StationState
 from rig.history.stations import MOST as MOST_RIGS
 from rig.history.store import Past
 
-DEAD_S = 3.5  # without a heartbeat, which comes every second
+DEAD_S = 3.5  # time without a heartbeat, which comes every second
 RECALLED_AHEAD = timedelta(days=30)
-MOST = 200  # rows of a table
+MOST = 200  # rows of a table, at most
 LONGEST_DOING = 300  # characters: an error with its remedy
-MOST_STATES = 12  # counted states of parts; there are six
+MOST_STATES = 12  # counted states of parts, at most; there are six
 UNITS_OF_AGE = ((86_400, "days"), (3600, "h"), (60, "min"), (1, "s"))
 
 

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from sqlalchemy import Engine
 
 BEAT_S = 1.0
-RETRY_S = 5.0  # after a history that did not answer
-LAST_BEAT_S = 2.0  # for the last state
+RETRY_S = 5.0  # wait after a history that did not answer
+LAST_BEAT_S = 2.0  # time for writing the last state
 
 
 class Heartbeat:
@@ -56,7 +56,7 @@ class Heartbeat:
                     stations.make_table(history.engine)
                     if self._write_until_over(history.engine):
                         return
-            except Exception:  # any error: nothing of the station depends on it
+            except Exception:  # any error: no part of the station depends on it
                 if self._over.wait(RETRY_S):
                     return
 
