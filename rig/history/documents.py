@@ -14,7 +14,7 @@ from rig.history.store import Past
 from rig.report.findings.history_records import Parameter
 
 SCHEMA = "rig.history/1"
-FORMULA = ("=", "+", "-", "@")  # first characters of a formula in common spreadsheets, after white space too
+FORMULA = ("=", "+", "-", "@")  # first characters of a formula in common spreadsheets, even after white space
 COLUMNS = (
     "calibration",
     "run",

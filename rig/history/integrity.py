@@ -21,7 +21,7 @@ from rig.station.words import calibrations_in_words
 State = Literal["ok", "changed", "missing", "elsewhere", "unknown"]
 STATES: Sequence[State] = get_args(State)
 WRONG: Sequence[State] = ("changed", "missing", "unknown")
-MOST_TOLD = 3  # contradictions of a run that are listed
+MOST_TOLD = 3  # contradictions of a run that are reported, at most
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,7 +23,8 @@ YEAR_DAYS = 365.25
 # The probability that no change is reported for an unchanged sensor. The comparisons of a part's calibrations share
 # results: at 95 %, more than 5 of the 105 among 15 are significant in a third of all cases; at 98 % in 7 of 100.
 UNCHANGED = 0.98
-DRIFT_DAYS = 10.0  # from the first result to the last: a shorter span gives a drift per year of scatter only
+# Least span from the first result to the last: a shorter one would give a drift per year that is only scatter.
+DRIFT_DAYS = 10.0
 DAY_S = 86400.0
 
 Subject = tuple[str, str, str, float, bool]

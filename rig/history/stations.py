@@ -33,7 +33,7 @@ from rig.history.storage.engine import WRITES
 
 LONGEST = 20_000  # characters of a station's state
 NAME = 200
-MOST = 100  # stations that are read
+MOST = 100  # stations that are read, at most
 SOONEST_S, LATEST_S = -1.0, 3e9  # plausible ages: clocks may be corrected, and no station is a century old
 metadata = MetaData()
 station = Table(
@@ -41,7 +41,7 @@ station = Table(
     metadata,
     Column("rig", String(NAME), primary_key=True),
     Column("computer", String(NAME), primary_key=True),
-    Column("heard_s", Float, nullable=False),  # since 1970, by the database's clock
+    Column("heard_s", Float, nullable=False),  # seconds since 1970, by the database's clock
     Column("told", String(LONGEST), nullable=False),  # JSON
 )
 _NOW: Mapping[str, str] = {
@@ -70,7 +70,7 @@ def make_table(engine: Engine) -> None:
     try:
         with _writing(engine) as connection, connection.begin():
             metadata.create_all(connection)
-    except (IntegrityError, ProgrammingError):  # another station has made it at the same moment
+    except (IntegrityError, ProgrammingError):  # another station has created the table at the same time
         if not inspect(engine).has_table(station.name):
             raise
 

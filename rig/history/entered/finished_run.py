@@ -23,7 +23,7 @@ PAGE, HEADER = "certificate.html", "calibration.h"
 DOCUMENTS = (RESULT, CONFIG, SCRIPT, SCRIPT_IDENTITY, HEADER)
 CERTIFICATES = (PAGE, "certificate.pdf", "certificate.xml")
 CHUNK_BYTES = 1 << 20
-PAGE_MAX_BYTES = 64_000_000  # that of six sweeps has 30,000
+PAGE_MAX_BYTES = 64_000_000  # the page of six sweeps has 30,000
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from rig.data.result_file import ResultDocument
 from rig.report.findings.history_records import HistoryRecord, Parameter
 from rig.report.kinds.kind_registry import followed
 
-SAME = 1e-6  # of the standard uncertainty: more than the rounding of another processor
+SAME = 1e-6  # difference relative to the standard uncertainty: more than by the rounding of another processor
 
 
 def run_row(document: ResultDocument) -> dict[str, str | bool]:

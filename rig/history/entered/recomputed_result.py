@@ -11,8 +11,8 @@ from rig.history.entered.index import SAME, unlike
 from rig.report.findings.history_records import BIASES, SCALES, HistoryRecord
 from rig.report.kinds.kind_registry import followed
 
-ROUNDING = 1e-15  # of values that are zero except for rounding: no quantity of a result is so small
-# The same numbers may be reached with other iterations, at another time.
+ROUNDING = 1e-15  # values that are zero except for rounding: no quantity of a result is as small
+# The same result may take other iterations, and has another time.
 AS_IT_COMES = ("iterations", "solved_utc")
 
 

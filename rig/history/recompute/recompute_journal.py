@@ -19,7 +19,7 @@ from rig.history.recompute.result_comparison import Answer, RecomputedResult
 
 JOURNAL = "recomputed.jsonl"
 SCHEMA: Final = "rig.recomputation/1"
-SIZE_MAX_BYTES = 1 << 32  # a recording has some thousand
+SIZE_MAX_BYTES = 1 << 32  # a recording has some thousand bytes
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +63,7 @@ class RecomputeJournal(AbstractContextManager["RecomputeJournal"]):
     def _write(self, line: str) -> None:
         rest = f"{line}\n".encode()
         try:
-            while rest:  # a nearly full disk takes a part of it
+            while rest:  # a nearly full disk accepts only a part
                 rest = rest[os.write(self._descriptor, rest) :]
         except OSError as error:
             raise self._unusable(error) from error

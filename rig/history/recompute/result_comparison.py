@@ -12,10 +12,10 @@ from rig.history.entered.issued_certificate import Issued
 from rig.history.store import Past
 from rig.report.findings.history_records import HistoryRecord, Parameter
 
-OF_U = 0.1  # of U: a smaller shift changes at most the second digit of a stated uncertainty
+OF_U = 0.1  # fraction of U: a smaller shift changes at most the second digit of a stated uncertainty
 
-# Why there is no present result: the method refuses the recording; the requested setting or estimator does not fit it;
-# the recording is missing; it is not as it was entered; the worker that solved it died; the program failed.
+# Reasons for a missing present result: the method refuses the recording; the requested setting or estimator does not
+# suit it; the recording is missing; it has changed since it was entered; its worker died; the program failed.
 State = Literal["refused", "unjudged", "missing", "damaged", "lost", "failed"]
 
 

@@ -15,11 +15,12 @@ from rig.estimation.arrays import Array
 
 Alarms = NDArray[np.bool_]
 
-FEWEST = 5  # results before the first judgement: the scatter of fewer is poorly known
+FEWEST = 5  # results before the first judgement: fewer do not determine the scatter
 SMOOTHING = 0.15  # λ: weight of the newest deviation
-EWMA_LIMIT = 2.8  # in standard deviations of the average; both limits give an alarm in about 340 runs in control
-SHEWHART_LIMIT = 4.0  # in standard deviations: 3 with an EWMA would halve the time between false alarms
-SPREAD_MIN = 1e-12  # of a value's own size: the rounding of equal values is not scatter
+# Standard deviations of the average; together with the other limit, an alarm in about 340 runs in control.
+EWMA_LIMIT = 2.8
+SHEWHART_LIMIT = 4.0  # standard deviations: 3 together with an EWMA would halve the time between false alarms
+SPREAD_MIN = 1e-12  # least scatter relative to a value: the rounding of equal values is not scatter
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,7 @@ import numpy as np
 from rig.estimation.arrays import Array
 from rig.history.statistics.random_effects import Fitted
 
-HORIZON_DAYS = 3653  # ten years; a drift cannot be extrapolated further
+HORIZON_DAYS = 3653  # ten years: a drift cannot be extrapolated further
 
 
 def days_to_limit(line: Fitted, last_days: float, expanded: float, max_deviation: float, nominal: float) -> int | None:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from sqlalchemy import URL
 
 CONNECT_S = 5
-SILENCE_S = 5  # until an unresponsive connection is given up
+SILENCE_S = 5  # time after which an unresponsive connection is closed
 
 
 def connect_arguments(server: "URL", environment: Mapping[str, str] = os.environ) -> dict[str, str | int]:
@@ -54,6 +54,6 @@ def _is_at_hand(host: str) -> bool:
     try:
         return ip_address(host).is_loopback
     except ValueError:
-        # Of several hosts in a query each may have a port.
+        # If there are several hosts in a query, each may have a port.
         name, _, port = host.rpartition(":")
         return port.isdecimal() and _is_at_hand(name)

@@ -14,9 +14,9 @@ from rig.history.storage import journal, schema
 from rig.history.storage.triggers import create_triggers
 
 VERSION_KEY = "schema_version"
-DEVELOPMENT_KEY = "version"  # of the tables before 0.1.0, which are not migrated
+DEVELOPMENT_KEY = "version"  # key in tables before 0.1.0, which are not migrated
 
-# From each version to the next one: version 1 is the first released one.
+# From each version to the next one: version 1 is the first released version.
 MIGRATIONS: Mapping[int, Callable[[Connection], None]] = {}
 
 

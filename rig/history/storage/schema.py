@@ -55,7 +55,7 @@ run = Table(
     Column("fit", Boolean, nullable=False),  # whether the measurement passed its own checks
     Column("simulated", Boolean, nullable=False),
     Column("result", Text, nullable=False),
-    Column("operator", String(NAME)),  # null if the configuration does not name one; so is the note
+    Column("operator", String(NAME)),  # null if the configuration does not state it, as for the note
     Column("note", String(NOTE)),
 )
 
@@ -105,8 +105,8 @@ parameter = Table(
     Column("std_statistical", Float, nullable=False),
     Column("std_combined", Float),  # null if only the noise is known
     Column("unit", String(40), nullable=False),
-    Column("max_deviation", Float),  # from the nominal value, by the limits of that run
-    Column("coverage_factor", Float, nullable=False),  # of U
+    Column("max_deviation", Float),  # deviation from the nominal value, by the limits of that run
+    Column("coverage_factor", Float, nullable=False),  # coverage factor of U
 )
 
 # A wrong entry is not removed but marked as wrong, with the reason.
@@ -152,7 +152,7 @@ document = Table(
     Column("sha256", String(HASH), nullable=False),
 )
 
-# Every entry a second time, as the hash of its rows, numbered without gaps.
+# Every entry again, as the hash of its rows, numbered without gaps.
 journal = Table(
     "journal",
     metadata,
@@ -161,6 +161,7 @@ journal = Table(
     Column("key", String(1000), nullable=False),  # the row's primary key, as JSON
     Column("sha256", String(HASH), nullable=False),
     Column("entered_utc", String(TIME), nullable=False),
-    Column("chain_sha256", String(HASH), nullable=False),  # of this line and, by the one before it, of all earlier
+    # Hash of this line and of the line before, and so of all earlier lines.
+    Column("chain_sha256", String(HASH), nullable=False),
     UniqueConstraint("kind", "key"),
 )

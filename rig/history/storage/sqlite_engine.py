@@ -17,7 +17,7 @@ from rig.history.storage.continuity import refuse_unlike
 from rig.history.storage.forks import kept_from_children
 from rig.history.storage.sqlite_file import address_of, identities, refuse_unmarked
 
-WAIT_S = 30  # for other writers; far more than an entry takes
+WAIT_S = 30  # wait for other writers: far longer than an entry takes
 WRITES = "rig_writes"  # execution option of a connection that will write
 
 
@@ -109,7 +109,7 @@ def _connect_to_read(file: Path) -> sqlite3.Connection:
 
 
 def _connect(file: Path, options: str) -> sqlite3.Connection:
-    # For any thread: the engine's pool gives a connection to one at a time.
+    # For any thread: the engine's pool gives a connection to one thread at a time.
     return sqlite3.connect(address_of(file, options), uri=True, timeout=WAIT_S, check_same_thread=False)
 
 

@@ -18,7 +18,8 @@ from rig.errors import Refused
 from rig.history.storage.migrations import DEVELOPMENT_KEY, too_old
 from rig.history.storage.schema import APPLICATION_ID
 
-SUFFIXES = ("-wal", "-shm")  # of SQLite's companion files: its log, and the log's index with locks of its own
+# Suffixes of SQLite's companion files: its log, and the log's index, which has separate locks.
+SUFFIXES = ("-wal", "-shm")
 
 
 def history_is_there(file: Path) -> bool:
@@ -71,7 +72,7 @@ def new_file_in_place(file: Path) -> Iterator[Path]:
             os.link(temporary, file)
         except FileExistsError:
             pass
-        except OSError:  # a file system without links: of two simultaneous files the later one stays
+        except OSError:  # a file system without links: if two files are created simultaneously, the later one remains
             if not file.exists():
                 temporary.replace(file)
 

@@ -22,7 +22,7 @@ FUNCTION = "history_keeps_its_rows"
 _BODY = f" BEGIN RAISE EXCEPTION USING MESSAGE = '{NO}: ' || TG_OP || ' of ' || TG_TABLE_NAME; END "
 # Bits of pg_trigger.tgtype for the properties of a trigger (PostgreSQL's catalog/pg_trigger.h).
 _BITS: Mapping[str, int] = {"ROW": 1, "BEFORE": 2, "DELETE": 8, "UPDATE": 16, "TRUNCATE": 32}
-_FIRES = ("O", "A")  # pg_trigger.tgenabled: in sessions without replication, or in all
+_FIRES = ("O", "A")  # pg_trigger.tgenabled: fires in sessions without replication, or in all
 _MADE_BY_SERVER = text(
     "SELECT c.relname, t.tgname, t.tgenabled, t.tgtype, t.tgqual IS NOT NULL, p.prosrc FROM pg_trigger t "
     "JOIN pg_class c ON c.oid = t.tgrelid JOIN pg_proc p ON p.oid = t.tgfoid "

@@ -10,7 +10,7 @@ from rich.table import Table
 from rig.history.terminal.spark import PLAIN
 from rig.station.plain_text import plain
 
-STROKES, ROUND_A_CELL = 1, 3  # of the frame: a stroke, and for each cell two spaces and a stroke
+STROKES, ROUND_A_CELL = 1, 3  # width of the frame: one stroke, and for each cell two spaces and a stroke
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +62,7 @@ class FittingTable:
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         """Yield the table that rich prints."""
         columns = self.fitting(options.max_width)
-        fits = _total_width(columns) <= options.max_width  # else it is folded, never cut
+        fits = _total_width(columns) <= options.max_width  # otherwise it is folded, never cut
         table = Table(title=plain(self.title, "table.title"), title_justify="left")
         for column in columns:
             side: JustifyMethod = "right" if column.number else "left"

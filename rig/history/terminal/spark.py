@@ -6,7 +6,7 @@ from rig.history.series import Trend
 
 BLOCKS = "▁▂▃▄▅▆▇█"
 PLAIN = str.maketrans(BLOCKS, "__..--''")  # for a terminal without blocks
-MOST = 16  # of the newest results
+MOST = 16  # number of the newest results
 
 
 def picture(trend: Trend) -> str:
