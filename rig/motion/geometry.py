@@ -16,8 +16,8 @@ from rig.motion.chain import DenavitHartenberg
 
 ROUNDING = 1e-15
 WRIST_1, WRIST_2, WRIST_3 = 3, 4, 5
-WAVES = ("cos", "sin", "cos 2", "sin 2")  # an eccentric or tilted graduation errs once and twice a turn
-AXIS_ERRORS = (  # all errors of the angles between the wrists' axes
+WAVES = ("cos", "sin", "cos 2", "sin 2")  # an eccentric or tilted encoder disc errs once and twice per revolution
+AXIS_ERRORS = (  # all errors that change the angles between the wrists' axes
     *(f"twist of wrist_{number}" for number in (1, 2, 3)),
     *(name for wrist in ("wrist_2", "wrist_3") for name in (f"zero of {wrist}", *(f"{w} of {wrist}" for w in WAVES))),
 )

@@ -16,9 +16,9 @@ from rig.motion.steps import Dwell, Plan, Rest, travel
 from rig.motion.turner_state import JointLimits, Joints
 
 # A plan keeps the centres of flange and payload away from the middle of a link by its radius (`Tube`) and a clearance,
-# because the payload's size is unknown. Attitudes keep `dwell_room_m`. Sweeps and the motions between them cannot:
-# about a UR10e's usual home a sweep of wrist 2 takes the flange within 0.133 m and a fixture's middle within 0.120 m of
-# the forearm, and a motion between sweeps within 0.118 m. They keep `sweep_room_m`, half a flange or half a fixture.
+# because the payload's size is unknown. Attitudes have the clearance `dwell_room_m`. Sweeps and transfers cannot: near
+# a UR10e's usual home a sweep of wrist 2 takes the flange within 0.133 m and a fixture's middle within 0.120 m of the
+# forearm, and a transfer within 0.118 m. They have `sweep_room_m`, half a flange or half a fixture.
 POSE_STEP_RAD = radians(2)
 EXTENSION_STEP_M = 0.05
 OTHER_ATTITUDES = "Bring wrist 2 nearer to -90 or 90 in procedure.attitudes, or turn wrist 1 so that it points away"

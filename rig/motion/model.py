@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from rig.config.models import ArmSection
 
 Series = Literal["e-Series", "CB3"]
-CLIENT_SPEED_RAD_S = 3.14  # the greatest speed that `ur_rtde` accepts, a little below 180°/s
+CLIENT_SPEED_RAD_S = 3.14  # the highest speed that `ur_rtde` accepts, slightly below 180°/s
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +56,7 @@ class TurnerModel:
 @lru_cache
 def load_turner_model(key: ModelName) -> TurnerModel:
     """Return the model called `key` in a configuration. Raise FileNotFoundError if there is none."""
-    import yaml  # here, because the process of the arm's client must start fast and needs no model
+    import yaml  # imported here: the process of the arm's client must start fast and needs no model
 
     text = files("rig.motion").joinpath("models", f"{key}.yaml").read_text(encoding="utf-8")
     row: dict[str, Any] = yaml.safe_load(text)

@@ -4,7 +4,7 @@ import math
 
 from rig.motion.steps import Plan, Transfer
 
-# °/s. A smaller number may be a speed in rad/s: no joint of the arm is faster than this in rad/s.
+# °/s. A lower number may be a speed in rad/s: no joint of the arm is faster than this in rad/s.
 SLOW_DEG_S = math.pi
 
 

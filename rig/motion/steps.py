@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rig.config.section import Direction, Vector3
 from rig.motion.turner_state import Joints
 
-# Joint angles closer than this are equal: well above the encoder's step, well below anything that matters.
+# Joint angles closer than this are equal: well above the encoder's step, well below any relevant difference.
 SAME_PLACE_RAD = 1e-4
 TURN_RAD = 2 * math.pi
 CLOSED_RAD = 1e-6  # tolerance of a whole turn, for rounding

@@ -11,9 +11,9 @@ from typing import Protocol
 
 from rig.motion.chain import DenavitHartenberg, Pose
 
-JOINT_NAMES = ("base", "shoulder", "elbow", "wrist_1", "wrist_2", "wrist_3")  # of an arm of Universal Robots
+JOINT_NAMES = ("base", "shoulder", "elbow", "wrist_1", "wrist_2", "wrist_3")  # joints of an arm of Universal Robots
 
-Joints = tuple[float, ...]  # a value for each joint, the one that stands on the ground first
+Joints = tuple[float, ...]  # a value for each joint, beginning with the joint on the ground
 Row = tuple[float | int | Joints, ...]
 
 

@@ -6,8 +6,8 @@ from math import degrees, pi
 from rig.motion.steps import Plan
 from rig.motion.turner_state import Joints
 
-SLACK_RAD = pi / 2  # smaller travels need no warning
-OTHER_TURN_RAD = pi  # from home: beyond this a joint is in another revolution than when its cable was laid
+SLACK_RAD = pi / 2  # a smaller rotation needs no warning
+OTHER_TURN_RAD = pi  # angle from home, beyond which a joint is in another revolution than when its cable was laid
 
 
 def windings_rad(plan: Plan, q_rad: Joints) -> list[tuple[float, float]]:
