@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from math import isfinite
 
 MAX_JOINTS = 8
-Pose = tuple[float, ...]  # a controller's, (6,): m, rotation vector in rad
+Pose = tuple[float, ...]  # a controller's pose, (6,): m, rotation vector in rad
 
 
 @dataclass(frozen=True, slots=True)
