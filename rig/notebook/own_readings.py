@@ -7,7 +7,7 @@ from rig.data.quantity import ACCELERATION, Quantity
 from rig.errors import Refused
 from rig.estimation.arrays import Array
 
-BEYOND = 2.0  # times the nominal range: a part may exceed its range, but not twice
+BEYOND = 2.0  # ratio to the nominal range: a part may exceed its range, but not twice
 
 
 def own_readings(readings: ArrayLike, quantity: Quantity, limit: float | None, whose: str) -> Array:
