@@ -14,9 +14,9 @@ from rig.observation.oscillation import MAX_TRAVEL_AT_REST_RAD
 from rig.observation.statistics.vibration_noise import average_standstill
 from rig.observation.windows import Window, rested
 
-REST_SETTLING_S = 0.2  # cut off at either end of a rest
+REST_SETTLING_S = 0.2  # time removed at either end of a rest
 MIN_SAMPLES_AT_REST = 20
-MIN_RESTS = 3  # the fewest that show a drift of the bias
+MIN_RESTS = 3  # fewest rests that show a drift of the bias
 
 
 def average_rests(

@@ -11,13 +11,13 @@ from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array, equal_runs
 from rig.observation.windows import Window, inside
 
-OF_MOST = 0.1  # of the largest reading that any part has: beyond most parts' range
-BEYOND, USUAL = 20.0, 0.99  # times the largest of the usual readings, which are this fraction
-CLIPPED, CLIPPED_RAD_S = 4, 1.0  # equal readings in a row at the end of an axis' readings; least range of these
-FINE = 0.5  # of the noise: steps of readings below it, so that equal ones are no chance
+OF_MOST = 0.1  # fraction of the largest reading that any part has: beyond most parts' range
+BEYOND, USUAL = 20.0, 0.99  # ratio to the largest of the usual readings; the fraction of readings that are usual
+CLIPPED, CLIPPED_RAD_S = 4, 1.0  # equal readings in a row at the end of an axis' range; least range of the readings
+FINE = 0.5  # largest step of the readings relative to their noise, for which equal readings are no chance
 GAP = 1.5  # intervals: no reading is missing
-FROZEN, COARSE = 50, 10  # equal readings in a row; more than so many a second time: a coarse axis repeats readings
-TURNED_RAD_S = 0.2  # change of another axis meanwhile
+FROZEN, COARSE = 50, 10  # equal readings in a row; if more than so many occur a second time, the axis is coarse
+TURNED_RAD_S = 0.2  # change of another axis during them
 INNER = (0.05, 0.95)  # quantiles: single readings count for nothing
 COLDEST_C, HOTTEST_C = -273.15, 1000.0
 NO_JUMP, SMOOTH = 0.8, 0.25  # of an axis' span: a jump over its end is larger, and all other steps are smaller

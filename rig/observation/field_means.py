@@ -18,8 +18,8 @@ from rig.observation.reference.dwell_acceleration import DwellReading, check_com
 from rig.observation.statistics.mean import Mean, StaticReading, even_mean
 from rig.observation.windows import Window, inside, rested
 
-AT_HOME_RAD = 1e-3  # of any joint
-SETTLING_S = 0.2  # cut off at either end of a rest
+AT_HOME_RAD = 1e-3  # angle from home, of any joint
+SETTLING_S = 0.2  # time removed at either end of a rest
 
 
 def find_companion(recording: ObservedRun, name: str) -> str | None:

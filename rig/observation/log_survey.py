@@ -13,8 +13,8 @@ from rig.observation.external.csv_samples import Samples
 from rig.observation.time_stamps.sampling import Sampling, find_sampling
 from rig.observation.windows import Window, inside
 
-LEAST_TURN_RAD = 0.3  # between two rests: less is no turn
-MOSTLY = 0.9  # of a turn's angle about one axis
+LEAST_TURN_RAD = 0.3  # angle between two rests: a smaller one is no turn
+MOSTLY = 0.9  # fraction of a turn's angle about one axis
 
 
 @dataclass(frozen=True, slots=True)

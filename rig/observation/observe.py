@@ -35,9 +35,9 @@ from rig.observation.timebase import TimeBase
 from rig.observation.turn_mean import SampledTurn, turn_mean
 from rig.observation.windows import FinishedSweep, Window, swept
 
-ABOUT_ALL_AXES = 0.05  # least singular value, relative to the design's norm, from which a response is fitted
-STUCK_REPEATS = 10  # equal readings in a row, of a sensor whose noise exceeds one count
-FROZEN = 0.5  # of a sweep's rate: an axis that repeats one reading is stuck if it misreads by more
+ABOUT_ALL_AXES = 0.05  # least singular value, relative to the design's norm, for which a response is fitted
+STUCK_REPEATS = 10  # equal readings in a row of a sensor whose noise exceeds one count
+FROZEN = 0.5  # fraction of a sweep's rate: an axis with equal readings is stuck if its error is larger
 MISREAD = {"wrong_axis", "wrong_sign", "wrong_unit"}  # a stuck sensor causes these faults too
 
 
@@ -229,7 +229,7 @@ def _sample_turn(time_s: Array, motion: ArmMotion, turn: Revolution, covered: ND
     fraction = (time_s - turn.start_s) / turn.duration_s
     waves = harmonics(turn.angle_rad * fraction, 2 * turn.beats)[covered]
     if not turn.closed:
-        waves -= waves.mean(axis=0)  # over an arc gravity's part stays in the mean; the attitudes account for it
+        waves -= waves.mean(axis=0)  # over an arc, gravity's part remains in the mean; the attitudes account for it
     rates = motion.rates_at_samples(time_s)[covered]
     return SampledTurn(
         share=fraction[covered],

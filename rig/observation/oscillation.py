@@ -4,10 +4,11 @@ import numpy as np
 
 from rig.estimation.arrays import Array
 
-MAX_TRAVEL_AT_REST_RAD = 1e-3  # of any joint, while it stands
-# Cycles in a window. A slower oscillation cannot be told from a joint that creeps; 0.75 cycles leave half of a creep.
+MAX_TRAVEL_AT_REST_RAD = 1e-3  # largest travel of a joint that does not move
+# Cycles in a window. A slower oscillation cannot be distinguished from a joint that creeps; 0.75 cycles leave half of a
+# creep.
 SLOWEST, FASTEST, STEP = 0.75, 12.0, 0.05
-FEWEST_OF_SWING = 8  # angles; the oscillation itself takes three parameters in each joint
+FEWEST_OF_SWING = 8  # fewest angles; the oscillation itself takes three parameters for each joint
 
 
 def remove_oscillation(q_rad: Array) -> Array:

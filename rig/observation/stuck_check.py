@@ -13,10 +13,10 @@ from rig.motion.steps import Sweep
 from rig.observation.average import Average
 from rig.observation.reference.dwell_acceleration import DwellReading
 
-OF_A_SWEEP = 0.5  # of the slowest sweep's speed: no bias changes by as much from rest to rest
-TURNED = 0.5  # of gravity: the least difference between two attitudes in a row that is judged
-SENSED = 0.05  # of the expected difference; readings in g that are declared as m/s² show twice that
-WITHOUT_NOISE = 0.01  # of the noise of the other axes
+OF_A_SWEEP = 0.5  # fraction of the slowest sweep's speed: no bias changes by as much from rest to rest
+TURNED = 0.5  # fraction of gravity: the least difference between two consecutive attitudes that is judged
+SENSED = 0.05  # fraction of the expected difference; readings in g that are declared as m/s² show twice as much
+WITHOUT_NOISE = 0.01  # fraction of the noise of the other axes
 REMEDY = "Check the sensor's supply and its bus wiring, then repeat the run"
 
 

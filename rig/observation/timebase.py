@@ -22,23 +22,27 @@ from rig.observation.statistics.coloured_noise import correlation_inflation
 # The board's counter runs from its 32768 Hz crystal by way of a PLL, 576 ppm below the nominal rate (docs/board.md).
 NOMINAL_DRIFT = 4e6 / (122 * 32768) - 1
 MIN_SAMPLES = 100
-COARSE_STEP_S = 0.02  # far below the ramps of a sweep, so that the fine fit starts inside its reach
+COARSE_STEP_S = 0.02  # far shorter than the ramps of a sweep, so that the fine fit converges
 COARSE_REACH_S = 0.15  # largest clock error at either end of the data from which the fine fit converges
-CANDIDATES = 12  # peaks of the correlation looked at: six equal sweeps give eleven
+CANDIDATES = 12  # peaks of the correlation that are tried: six equal sweeps make eleven
 MIN_EXPLAINED = 0.5  # fraction of the readings' variance that the arm's motion must explain
 LONG_RUN_S = 1800.0  # the part of a recording that the coarse search uses first; it takes more only if that fails
 MAX_DRIFT = 0.03  # an oscillator without a crystal is within 2 %
 MAX_DRIFT_LONG_RUN = 1e-3  # one with a crystal is within 600 ppm
-MAX_DRIFT_STEPS = 20  # to either side
+MAX_DRIFT_STEPS = 20  # steps to either side
 TURNED_RAD_S = 0.05  # RMS over a recording, of an axis that was turned
-NO_TURNING = 1e-12  # of the square of the fastest: a body that turns about one axis has only rounding about others
-SETTLED, UNDERWAY = 1e-3, 0.1  # standard deviations; an offset may turn back, standing still, while the drift goes on
-FINE_STEPS = 400  # if the arm vibrates and hardly turns, a step may be nearly as long as the last
-WEIGHED_STEPS = 60  # after which weights stay: noise that seems correlated at one step and not at the next has no end
-SLOW_S, FINE_S = 0.1, 0.02  # over which rates are averaged, first and second
-AVERAGED, EVERY = 10, 2  # rates in one average; stride of the averages that the spline takes
-LEAST_GAP = 0.5  # of the time between samples
-SLOW_STEPS, LEAP_STEPS, FARTHEST = 300, 20, 100.0  # from which step and how often to extrapolate; at most so many steps
+# Ratio to the square of the fastest axis: a body that turns about one axis shows only rounding about others.
+NO_TURNING = 1e-12
+# Steps in standard deviations; an offset may turn around with a small step while the drift still changes.
+SETTLED, UNDERWAY = 1e-3, 0.1
+FINE_STEPS = 400  # many: if the arm vibrates and hardly turns, a step may be nearly as long as the one before
+# Steps after which weights are kept: noise that seems correlated only at every second step would never settle.
+WEIGHED_STEPS = 60
+SLOW_S, FINE_S = 0.1, 0.02  # times over which rates are averaged, first and second
+AVERAGED, EVERY = 10, 2  # rates in one average; stride of the averages in the spline
+LEAST_GAP = 0.5  # in intervals between samples
+# Step from which on, and interval at which, the fit extrapolates; largest number of steps it skips.
+SLOW_STEPS, LEAP_STEPS, FARTHEST = 300, 20, 100.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +94,7 @@ def estimate_time_base(board_time_s: Array, readings_rad_s: Array, motion: Known
     _check_samples(board_time_s, readings_rad_s, motion)
     clock, count = _find_first_clock(board_time_s, readings_rad_s, motion)
     while True:
-        # The clock so far says which samples to use; a choice that followed the fine one might never settle.
+        # The samples are chosen by the present clock: a choice that followed the fitted clock might never settle.
         used = motion.covered(clock.controller_time_s(board_time_s[:count]))
         if used.sum() < MIN_SAMPLES:
             raise _not_found("board and arm were hardly recorded at the same time")

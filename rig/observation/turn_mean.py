@@ -30,7 +30,7 @@ from rig.observation.statistics.spectral_lines import (
 )
 from rig.observation.statistics.vibration_noise import BRIEF, FEWEST, estimate_noise
 
-SLOW = 8.0  # cycles in a turn: slower lines are hard to separate from what comes once and twice in it
+SLOW = 8.0  # cycles per revolution: slower lines are hard to separate from waves once and twice per revolution
 NOT_ENCODED = LineSearch(slowest=5.0)
 ENCODED = LineSearch(slowest=2.5, beats=0, most=5)
 
@@ -148,7 +148,7 @@ def _find_turn_lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines
     fast = np.repeat(ripple >= SLOW, column_count(ENCODED.beats))
     slow = ripple_rate - columns[:, fast] @ sizes[fast]
     smooth = slow_part(slow, turn.share)
-    late = _changes(smooth) if turn.closed else none  # over an arc it looks like what encoders err
+    late = _changes(smooth) if turn.closed else none  # over an arc it resembles encoder errors
     encoded = np.column_stack([smooth, late, slow - smooth])
     residuals = _fit_residuals(np.column_stack([steady, encoded, columns[:, fast]]), readings)
     encoded_lines = ripple[ripple >= SLOW]

@@ -19,13 +19,14 @@ from rig.observation.time_stamps.gaps import find_hiding_gaps
 from rig.observation.time_stamps.sampling import find_sampling
 from rig.observation.windows import Window
 
-MARGIN_S = 0.1  # of a rest at either end that belongs to the adjacent moves
-GAP = 2  # readings that are missing
-AT_THE_TOP = 3  # equal readings in a row at the largest value
+MARGIN_S = 0.1  # time at either end of a rest that is assigned to the adjacent moves
+GAP = 2  # missing readings, from which on there is a gap
+AT_THE_TOP = 3  # equal readings in a row at the largest value, from which on they are saturated
 NEAR_RANGE = 0.995
-FIRST_S, STILL_RAD_S = 1.0, 0.03  # scatter of a body in a steady hand
-SETTLED_S, LOOKS_S = 1.0, 0.25  # a rest of a session in progress; interval of the evaluations
-HELD_S, HELD_RAD_S, PAUSE_S = 0.75, 0.15, 0.25  # a body held in hand: least duration, largest rate; blocks
+FIRST_S, STILL_RAD_S = 1.0, 0.03  # beginning of a recording, and the scatter of a body in a steady hand in it
+SETTLED_S, LOOKS_S = 1.0, 0.25  # least duration of a rest during a session; interval of the evaluations
+# A body held in the hand: least duration, largest rate; length of the blocks.
+HELD_S, HELD_RAD_S, PAUSE_S = 0.75, 0.15, 0.25
 
 
 def segment_session(

@@ -7,11 +7,11 @@ from rig.data.quantity import Quantity
 from rig.estimation.arrays import Array
 from rig.observation.by_hand.steadiness import NORMAL
 
-KNOCK = 8.0  # standard deviations: a larger deviation is not noise
-COARSE = 2.0  # steps of the readings: noise below the resolution deviates as far
-COUNTS = 0.05  # of a quantity's steadiness: a smaller knock does not matter
-MOST = 0.1  # of the readings: more outliers are noise of another kind
-FEWEST = 5  # readings, most of which are undisturbed
+KNOCK = 8.0  # deviation in standard deviations, beyond which it is not noise
+COARSE = 2.0  # deviation in steps of the readings: noise below the resolution deviates by as much
+COUNTS = 0.05  # fraction of `Quantity.steady`, below which a knock is ignored
+MOST = 0.1  # largest fraction of outliers: more of them are noise of another kind
+FEWEST = 5  # fewest readings that show which of them are undisturbed
 
 
 def mask_knocks(readings: Array, quantity: Quantity) -> NDArray[np.bool_]:

@@ -23,15 +23,16 @@ from rig.observation.by_hand.steadiness import BEYOND
 from rig.observation.time_stamps.sampling import find_sampling
 from rig.observation.windows import Window
 
-BLOCK_S, FEWEST = 0.25, 5  # samples of a block
+BLOCK_S, FEWEST = 0.25, 5  # duration of a block, and the fewest samples in it
 ROUNDING = 1e-6  # tolerance of a whole number of intervals
-QUIETEST, AS_QUIET = 0.1, 3.0  # fraction of the blocks that show the noise; factor up to which others are at rest
-COUNTS = 0.2  # of a quantity's steadiness: scatter that is always allowed, if the noise is below the resolution
-TOGGLES = 0.5  # of a step of the readings: their scatter between two values
-FIRST = 4  # blocks of the first second
-GAP = 2.5  # intervals: no reading is missing, or one
-NEARLY = 0.5  # of the blocks of the most frequent reading
-CANDIDATES = 400  # blocks whose readings may be that at rest
+# Fraction of the blocks that determine the noise; ratio to that noise up to which a block is at rest.
+QUIETEST, AS_QUIET = 0.1, 3.0
+COUNTS = 0.2  # fraction of `Quantity.steady`: scatter that is always allowed, because noise may be below the resolution
+TOGGLES = 0.5  # scatter of readings that alternate between two values, in steps
+FIRST = 4  # blocks in the first second
+GAP = 2.5  # in intervals: longer than one missing reading
+NEARLY = 0.5  # fraction of the blocks of the most frequent reading
+CANDIDATES = 400  # blocks whose readings are tried as that of a rest
 
 
 def find_rests(
@@ -64,7 +65,7 @@ def find_rests(
     if quantity != RATE:
         means, scatter = _average_unknocked(blocks, noise)
     tolerance = quantity.steady + BEYOND * noise * np.sqrt(2 / width)
-    gap_s = max(GAP * interval_s, BLOCK_S)  # a body is not moved away and back in a shorter one
+    gap_s = max(GAP * interval_s, BLOCK_S)  # a body is not moved away and back within a shorter gap
     still = (scatter <= AS_QUIET * noise).all(axis=1) & (np.diff(times, axis=1).max(axis=1) <= gap_s)
     follows = (times[1:, 0] - times[:-1, -1] <= gap_s) & (np.abs(np.diff(means, axis=0)) <= tolerance).all(axis=1)
     pairs = still[:-1] & still[1:] & follows

@@ -12,9 +12,9 @@ from rig.estimation.arrays import Array, interpolate
 from rig.observation.time_stamps.sampling import Sampling
 
 BLOCK_S = 1.0
-BEYOND = 6.0  # standard deviations of the noise of a difference
-BRIDGED_S, FILLED = 0.25, 0.01  # longest gap of a sensor at rest that is no gap; fraction of readings missing in such
-NORMAL = 1.4826  # standard deviation over median deviation
+BEYOND = 6.0  # in standard deviations of the noise of a difference
+BRIDGED_S, FILLED = 0.25, 0.01  # longest gap at rest that is ignored; largest fraction of readings missing in such gaps
+NORMAL = 1.4826  # standard deviation over median absolute deviation
 
 
 def contiguous_slices(time_s: Array, sampling: Sampling) -> Iterator[slice]:

@@ -14,7 +14,7 @@ from rig.observation.statistics.coloured_noise import correlation_inflation
 from rig.observation.windows import inside, swept
 
 ORDER = 6
-SQUARED = comb(2 * ORDER, ORDER)  # variance of a difference of this order, by that of one reading
+SQUARED = comb(2 * ORDER, ORDER)  # variance of a difference of this order, relative to that of one reading
 EVEN_S = 1e-4  # states count as evenly spaced if their time steps differ by less
 
 

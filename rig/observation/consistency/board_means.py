@@ -17,7 +17,7 @@ from rig.observation.observed_run import ObservedRun
 from rig.observation.statistics.spectral_lines import fit_columns, harmonics, waves
 from rig.observation.turn_mean import lag_columns
 
-NEXT_S = 1e-7  # rounding of a sample's time
+NEXT_S = 1e-7  # rounding of a sample's time, at most
 
 
 def compare_board_means(sensor: str, recordings: Sequence[ObservedRun]) -> dict[int, float]:

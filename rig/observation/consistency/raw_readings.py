@@ -13,7 +13,7 @@ from rig.observation.statistics.coloured_noise import innovations
 
 REST = -1  # instead of the index of a revolution
 MEMORY = 12  # earlier readings from which a reading is predicted
-NORMAL = 1.4826  # standard deviation over median deviation
+NORMAL = 1.4826  # standard deviation over median absolute deviation
 
 
 @dataclass(frozen=True, slots=True)

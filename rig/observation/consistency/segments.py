@@ -32,12 +32,13 @@ from rig.observation.statistics.spectral_lines import (
 from rig.observation.statistics.tapered_weights import noise_at_zero
 from rig.observation.turn_mean import SLOW
 
-# Not four: at the ends of quarters one of an encoder's waves that come twice a turn is zero, and no segment shows it.
-OF_REVOLUTION, OF_REST, MOST = 6, 3, 72  # segments of one revolution; times fewer in a rest; of all revolutions
-FEWEST_SAMPLES = 20  # of a segment
-FEWEST_AT_REST = 60  # of a whole rest: fewer do not show its noise well enough for a weight
-PREVAILS = 0.7  # of the residuals' variance: below it the noise of a long mean is that at zero frequency
-AT_REST = LineSearch(stands_out=30.0, beats=0)  # of noise alone one bin in 10⁹ stands out so far
+# Not four segments: one of an encoder's waves with two periods per revolution is zero at the ends of quarters, and no
+# segment would show it.
+OF_REVOLUTION, OF_REST, MOST = 6, 3, 72
+FEWEST_SAMPLES = 20  # fewest samples of a segment
+FEWEST_AT_REST = 60  # fewest samples of a rest: fewer do not determine its noise well enough for a weight
+PREVAILS = 0.7  # fraction of the residuals' variance, below which the noise of a long mean is that at zero frequency
+AT_REST = LineSearch(stands_out=30.0, beats=0)  # noise alone exceeds this in one bin of 10⁹
 
 
 def segment_counts(revolutions: int) -> tuple[int, int]:

@@ -30,20 +30,22 @@ from rig.observation.statistics.spectral_lines import unit_columns
 from rig.observation.statistics.tapered_weights import noise_at_zero
 from rig.observation.windows import rested, swept
 
-BEYOND_S = 0.1  # before and after the motion: an arm this slow may still be moving
+BEYOND_S = 0.1  # time before and after the motion: an arm at this speed may still be moving
 SHORTEST_S, LONGEST_S = 0.5, 30.0
-SPARSE_S = 0.0105  # samples that are farther apart miss the servo's vibration while it speeds up
-# Samples add up to a transfer but for the corners of its rate: each by its change of slope times dt² B₂(x) / 2, at x
-# of an interval (Euler and Maclaurin). B₂, Bernoulli's second polynomial, is √(1/180) RMS; either end has two corners.
+SPARSE_S = 0.0105  # longest interval of samples that show the servo's vibration while it accelerates
+# The sum of samples equals a transfer except at the corners of its rate: each adds its change of slope times dt² B₂(x)
+# / 2, at the fraction x of an interval (Euler and Maclaurin). B₂, the second Bernoulli polynomial, has the RMS
+# √(1/180); either end has two corners.
 CORNERS = (2 / 180) ** 0.5 / 2
-SMOOTHED_S = 0.05  # in which noise of the encoders is no rate: 24 µrad make 4 mrad/s of angles that are 8 ms apart
-LOST = 0.01  # largest fraction of missing samples, by the nominal rate, which a board keeps as well
-GAP = 1.5  # of the interval between samples: a longer step misses one
+# Time over which rates are averaged against encoder noise: 24 µrad make 4 mrad/s from angles 8 ms apart.
+SMOOTHED_S = 0.05
+LOST = 0.01  # largest fraction of missing samples, by the nominal rate, which boards keep to about 1 %
+GAP = 1.5  # in intervals between samples: a longer step misses one
 STEPS = 48
-FILTERED = range(-2, 3)  # samples whose rates a sensor's filter combines into one reading
+FILTERED = range(-2, 3)  # samples that a sensor's filter combines into one reading
 WRISTS = 3  # the last joints, whose transfers count
-STANDS_RAD = 1e-3  # apparent travel of a joint that does not turn
-LOW = 0.0  # of the data rate: as few low frequencies as possible, for a servo's vibration is near
+STANDS_RAD = 1e-3  # apparent rotation of a joint that does not move
+LOW = 0.0  # fraction of the data rate: as few low frequencies as possible, because a servo's vibration is near
 
 
 @dataclass(frozen=True, slots=True)

@@ -52,7 +52,7 @@ RATE_COLUMNS = ("rate_x_rad_s", "rate_y_rad_s", "rate_z_rad_s")
 STD_COLUMN = "attitude_std_rad"
 ATTITUDES_MB = 32  # an hour's table at 50 Hz
 NORM_TOLERANCE = 1e-3
-MOMENTS = Header(  # as a file may have them: rows that last, or a moment in each
+MOMENTS = Header(  # forms of a file: rows with a duration, or with a moment each
     QUATERNION, (TIME, "start_s"), (("start_s", "end_s"), *MOTIONS["attitudes"].optional)
 )
 

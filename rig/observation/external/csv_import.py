@@ -51,10 +51,11 @@ from rig.observation.windows import Window, inside
 AXIS_COLUMNS = ("axis_x", "axis_y", "axis_z")
 STD_COLUMNS = ("angle_std_rad", "axis_std_rad")
 MIN_DURATION_S = 1e-3  # the fewest samples take longer at any data rate
-SAME_AXIS, OPPOSITE, SENSED = 0.9, -0.5, 0.25  # cosines of axes, of readings; of a sweep's speed, as a reading
-ROUNDING = 1e-12  # of a mean: scatter that is none
-LEAST_MOTION = 1e-9  # rad or rad/s: no sweep, and its square might be 0
-SWEEPS_MB = 1  # some ten thousand sweeps
+# Cosine between two axes, and between their readings; least reading relative to a sweep's speed.
+SAME_AXIS, OPPOSITE, SENSED = 0.9, -0.5, 0.25
+ROUNDING = 1e-12  # scatter relative to the mean, below which there is none
+LEAST_MOTION = 1e-9  # rad or rad/s: a smaller motion is no sweep, and its square might be 0
+SWEEPS_MB = 1  # enough for some ten thousand sweeps
 
 
 @dataclass(frozen=True, slots=True)

@@ -31,7 +31,7 @@ from rig.observation.statistics.spikes import bridge_spikes, find_spikes
 from rig.observation.time_stamps.sampling import Sampling
 from rig.observation.time_stamps.stamp_order import OrderedStamps, order_stamps
 
-SAMPLES_MB = 256  # an hour at 1 kHz
+SAMPLES_MB = 256  # enough for an hour at 1 kHz
 SPIKES = "spikes: each stands alone, far from those before and after, as no body turns"
 
 
@@ -144,7 +144,7 @@ def _drop_blanks(
         if (read[quantity] != kept).any():
             raise _refuse_separate_rows(path, quantity, wanted, read)
     for quantity in read:
-        if not read[quantity][kept].all():  # it was read in other rows, and is not wanted
+        if not read[quantity][kept].all():  # it is in other rows, and not requested
             for name in quantity.columns:
                 del columns[name]
     if len(blank := np.flatnonzero(np.isnan(time_s) & kept)):
@@ -154,7 +154,7 @@ def _drop_blanks(
         valid = ~np.isnan(columns[temperature]) & ~np.isnan(time_s)
         if not valid.any():
             del columns[temperature]
-        elif not valid[kept].all():  # nothing is as slow as a temperature
+        elif not valid[kept].all():  # a temperature changes slowly, so missing ones are interpolated
             columns[temperature] = np.interp(time_s, time_s[valid], columns[temperature][valid])
     return SampleTable({name: column[kept] for name, column in columns.items()}, table.origin_s, int((~kept).sum()))
 

@@ -17,7 +17,7 @@ from rig.observation.windows import Window, inside
 
 MIN_SAMPLES = 20
 MAX_LOST_FRACTION = 0.01
-MOSTLY = 0.5  # of a row's readings: the least that tell its mean
+MOSTLY = 0.5  # least fraction of a row's readings that determines its mean
 
 
 def check_times(time_s: Array, where: str = "the samples") -> None:

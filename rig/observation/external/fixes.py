@@ -22,17 +22,17 @@ from rig.observation.false_readings import find_clipped
 from rig.observation.time_stamps.gaps import hidden_angles_rad
 from rig.observation.time_stamps.sampling import find_sampling
 
-WINDOW_S, SHORTEST_S = (
-    1.0,
-    0.5,
-)  # cameras' errors are coloured over tenths of a second; a short recording needs windows too
-WINDOWS, MOST = 40, 120  # at least, while they are longer than the shortest; at most
-GAP = 2  # missing readings: a cubic through the others bridges one
-MAX_STEP_RAD = 0.35  # between two readings: up to here a cubic through rates is right to microradians
-MOST_HIDDEN_RAD, UNKNOWN_RAD = 0.05, 10.0  # std of a rotation that is no increment any more; of one that nothing tells
-BATCH_S = 0.1  # of readings at rest: colour over a few samples averages out
-FEWEST = 6  # increments in which the body moves: 18 numbers for 12 parameters
-THIN = 0.25  # of a fix's usual number of rows
+# Usual and shortest window: the errors of cameras are correlated over tenths of a second.
+WINDOW_S, SHORTEST_S = 1.0, 0.5
+WINDOWS, MOST = 40, 120  # number of windows, at least, if they can be as short; at most
+GAP = 2  # missing readings that make a gap: a cubic spline through the others bridges a single one
+# Largest angle between two readings for which a cubic spline through the rates is correct to microradians.
+MAX_STEP_RAD = 0.35
+# Std of a hidden rotation, above which there is no increment; std of an unknown one.
+MOST_HIDDEN_RAD, UNKNOWN_RAD = 0.05, 10.0
+BATCH_S = 0.1  # length of means at rest, over which correlated noise averages out
+FEWEST = 6  # increments in motion: 18 numbers for 12 parameters
+THIN = 0.25  # least fraction of a fix's usual number of rows
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +96,7 @@ def _fixes(turning: Turning, still: NDArray[np.bool_], window_s: float) -> Fixes
     """
     rows_s = turning.rows_s
     passed = np.cumsum(still)
-    interval = 2 * passed - still  # odd: a row at rest; even: what lies between two of these
+    interval = 2 * passed - still  # odd: a row at rest; even: the interval between two such rows
     middles_s = rows_s.mean(axis=1)
     elapsed_s = middles_s - middles_s[np.searchsorted(interval, interval)]
     window = np.floor(elapsed_s / window_s).astype(np.intp)

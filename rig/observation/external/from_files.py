@@ -25,7 +25,7 @@ from rig.observation.formats.column_selection import map_motion, map_samples
 from rig.observation.formats.sample_files import entry_of, whole
 
 UNNAMED = Item("imu")
-USED: Mapping[MotionKind, tuple[str, ...]] = {  # the sensors that the solution uses; all if none is named
+USED: Mapping[MotionKind, tuple[str, ...]] = {  # the sensors that the solution uses; all, if none is named
     "sweeps": (RATE.sensor,),
     "turns": (RATE.sensor, ACCELERATION.sensor),
     "attitudes": (),
@@ -60,7 +60,7 @@ def build_recording(
     needed = () if files.tells == "attitudes" else [RATE]
     mapped = map_samples(column_map)
     table = read_sample_table(files.readings, needed, mapped, request.only or USED[files.tells])
-    samples = samples_in(table.columns, str(files.readings))  # as they will be solved
+    samples = samples_in(table.columns, str(files.readings))  # as the solution will use them
     if missing := [
         sensor for sensor in request.only if sensor not in {quantity.sensor for quantity in samples.readings}
     ]:

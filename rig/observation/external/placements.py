@@ -27,9 +27,9 @@ from rig.observation.external.still_attitudes import DWELL_S, LATE_S, still_wind
 from rig.observation.statistics.mean import Mean
 from rig.observation.windows import Window, inside
 
-TURNED_RAD = 0.02  # rows of one rest that are farther apart: the body was turned about the measured vector
-INTERRUPTED_S = 1.0  # longest knock after which equal readings show that the body lay still; a gap does not count
-MOSTLY = 0.5  # of a dwell: if the body lies still for as long, only the remainder is left out
+TURNED_RAD = 0.02  # angle between rows of one rest, beyond which the body was turned about the measured vector
+INTERRUPTED_S = 1.0  # longest knock, after which equal readings show that the body did not move
+MOSTLY = 0.5  # fraction of a dwell: if the body lies still for longer, only the remainder is left out
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,7 +236,8 @@ def _read(
     knocked = np.zeros(0, dtype=np.intp)
     for quantity, values in readings.items():
         axes = values.shape[1]
-        unknown = (np.full(axes, np.nan), np.full(axes, np.nan))  # variances and their freedom, of too few samples
+        # Too few samples for variances and their degrees of freedom.
+        unknown = (np.full(axes, np.nan), np.full(axes, np.nan))
         kept = [cut[mask_knocks(values[cut], quantity)] for cut in cuts]
         knocked = np.unique(np.concatenate([knocked, *map(np.setdiff1d, cuts, kept)]))
         means[quantity] = np.array([values[cut].mean(axis=0) for cut in kept]).reshape(-1, axes)

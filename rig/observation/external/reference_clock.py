@@ -19,12 +19,12 @@ from rig.observation.external.robust_start import COARSE_S, find_start
 from rig.observation.external.table_motion import TableMotion
 from rig.observation.timebase import TimeBase, estimate_coarse_offset, estimate_time_base
 
-CLEARER = 0.9  # of what is unexplained without drift: more than that tells no drift
+CLEARER = 0.9  # largest ratio of the unexplained part with drift to that without, for a drift
 CRYSTALS = 1e-4  # standard deviation of the drift between two crystals
-GAP, OF_DRIFT = 2.5, 0.2  # intervals of the readings; of what the clocks drift apart
-LARGEST_DRIFT, CERTAIN = 5e-4, 6.0  # more than crystals differ by; standard deviations that are no chance
-DOUBTFUL = 0.1  # unexplained: the rows may be inverse rotations
-EXPLAINED = 0.3  # of the readings' variance, by the coarse offset
+GAP, OF_DRIFT = 2.5, 0.2  # in intervals of the readings; in the total change by the drift
+LARGEST_DRIFT, CERTAIN = 5e-4, 6.0  # largest drift between crystals; drift in standard deviations that is no chance
+DOUBTFUL = 0.1  # unexplained fraction, above which the rows may be inverse rotations
+EXPLAINED = 0.3  # fraction of the readings' variance that the coarse offset explains
 
 
 def find_reference_clock(turning: Turning, rates_rad_s: Array | None) -> TimeBase:

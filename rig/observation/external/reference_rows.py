@@ -15,9 +15,10 @@ from rig.estimation.sensor_axes import nearest_rotation
 from rig.observation.by_hand.rests import find_rests
 from rig.observation.external.still_attitudes import still_windows
 
-STILL_S, STILL_SAMPLES, STILL_RAD_S = 0.5, 20, 5e-3  # a row that may be a rest; largest difference between rests
-MARGIN_S = 0.05  # at either end of a rest, which may be that of a motion on the reference's clock
-TURNED_RAD_S = 0.02  # of a rest by its rows
+# Least duration and samples of a row that may be a rest; largest difference between rests.
+STILL_S, STILL_SAMPLES, STILL_RAD_S = 0.5, 20, 5e-3
+MARGIN_S = 0.05  # time at either end of a rest in which the body may move on the reference's clock
+TURNED_RAD_S = 0.02  # rate of a rest by its rows, above which the body was turned
 
 
 @dataclass(frozen=True, slots=True)

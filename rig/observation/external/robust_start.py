@@ -16,13 +16,14 @@ from rig.estimation.arrays import Array, integrate_rates, interpolate, rotation_
 from rig.estimation.external.attitude_drift import DriftState
 from rig.observation.external.reference_rows import Turning
 
-APART_S = 0.1  # between the rows of a pair, or one row
-MOST_RAD, LEAST_RAD = 2.6, 0.03  # rotation of a pair: below π; beyond the errors of most references
-MOVING = 0.2  # of the ninth decile of rotations: pairs that turn less count as rests
-PAIRS, FEWEST = 600, 12  # pairs used at most; at least
-REACH_S, COARSE_S, FINE_S = 0.5, 0.02, 0.004  # of the search for τ, and its steps
+APART_S = 0.1  # least time between the rows of a pair, or one row
+MOST_RAD, LEAST_RAD = 2.6, 0.03  # rotation of a pair: less than π, and more than the errors of most references
+MOVING = 0.2  # fraction of the ninth decile of rotations, below which a pair counts as a rest
+PAIRS, FEWEST = 600, 12  # most and fewest pairs
+REACH_S, COARSE_S, FINE_S = 0.5, 0.02, 0.004  # range of the search for τ, and its steps
 REWEIGHTINGS = 4
-HARDLY = 1e-4  # of the squared rotation about all axes: F stays that of an aligned sensor about an axis with less
+# Fraction of the squared rotation about all axes: if an axis has less, F remains that of an aligned sensor about it.
+HARDLY = 1e-4
 EXPLAINED = 0.5  # least fraction of the readings' variance that F explains
 
 

@@ -5,10 +5,10 @@ import numpy as np
 from rig.estimation.arrays import Array, rotation_vectors
 from rig.observation.windows import Window
 
-DWELL_S = 0.5  # a row at least as long declares that the body lay still
-APART_S = 0.5  # between two short rows that show whether it did
-LATE_S = 0.2  # by which a row's attitude may be late or early
-STILL_RAD_S = 0.02  # largest rate between them; a camera's errors look like half of it
+DWELL_S = 0.5  # duration from which on a row declares that the body lay still
+APART_S = 0.5  # time between two short rows that show whether it did
+LATE_S = 0.2  # largest time error of a row's attitude
+STILL_RAD_S = 0.02  # largest rate between them; a camera's errors amount to half of it
 
 
 def still_windows(windows_s: Array, attitudes: Array) -> list[Window]:

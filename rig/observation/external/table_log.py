@@ -40,7 +40,7 @@ def _attitudes(log: Columns, table: TableSection) -> dict[str, Array]:
     first, last = (2 * time_s[0] - middles_s[:1], 2 * time_s[-1] - middles_s[-1:])
     edges = np.concatenate([first, middles_s, last])
     carried, rates = Rotation.identity(len(time_s)), np.zeros((len(time_s), 3))
-    for index, axis in reversed(list(enumerate(table.axes))):  # from the item outwards
+    for index, axis in reversed(list(enumerate(table.axes))):  # from the innermost axis outwards
         if axis.rate is not None:
             rates += carried.inv().apply(log[f"rate_{index}"][:, None] * _unit_vector(axis))
         carried = Rotation.from_rotvec(log[f"angle_{index}"][:, None] * _unit_vector(axis)) * carried

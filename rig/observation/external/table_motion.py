@@ -8,9 +8,11 @@ from rig.estimation.arrays import Array, rotation_vectors
 from rig.estimation.cubic_spline import CubicSpline
 from rig.observation.motion.reference_motion import MIN_RATE_RAD_S, closely_followed
 
-MAX_STEP_S, MAX_STEP_RAD = 0.3, 2.6  # between rows that still show how the table turned: below half a turn
+# Longest step and largest angle between rows that show how the table turned: below half a turn.
+MAX_STEP_S, MAX_STEP_RAD = 0.3, 2.6
 MIN_ROWS = 20
-UNEVEN, EVEN_S = 0.2, 0.05  # of the median step: stamps whose errors matter in a rate; rows for which they do not
+# Scatter of the steps relative to their median, above which it matters in a rate; median from which on it does not.
+UNEVEN, EVEN_S = 0.2, 0.05
 
 
 class TableMotion:

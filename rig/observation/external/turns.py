@@ -21,12 +21,12 @@ from rig.observation.time_stamps.gaps import hidden_angles_rad
 from rig.observation.time_stamps.sampling import find_sampling
 from rig.observation.windows import Window, inside
 
-REACH_S = 0.5  # between the marked end of a turn and the rest that it belongs to
-EDGE_SAMPLES = 2  # either side of an end
-STANDING = 0.25  # of the mean speed: a body slower at both ends started and stopped there
+REACH_S = 0.5  # longest time between the marked end of a turn and the adjacent rest
+EDGE_SAMPLES = 2  # samples on either side of an end
+STANDING = 0.25  # fraction of the mean speed: a body slower at both ends started and stopped there
 OTHER_BIAS_RAD_S = 0.1  # a body that reads more in a pause turns
-MOST_HIDDEN_RAD = 0.02  # by missing readings of a turn
-BY_HAND_ANGLE_RAD = float(np.radians(0.3))  # default repeatability of a body turned by hand against its stop
+MOST_HIDDEN_RAD = 0.02  # largest rotation hidden by missing readings of a turn
+BY_HAND_ANGLE_RAD = float(np.radians(0.3))  # default repeatability of a body turned by hand to a stop
 BY_HAND_AXIS_RAD = 0.02  # default tilt during the turn
 
 

@@ -25,13 +25,13 @@ POSES = (
     "geometry_msgs/msg/PoseWithCovarianceStamped",
     "geometry_msgs/msg/TransformStamped",
 )
-NOT_PROVIDED = -1.0  # sensor_msgs/Imu: first element of the covariance of a quantity that a message does not hold
+NOT_PROVIDED = -1.0  # sensor_msgs/Imu: first element of the covariance of a quantity that a message does not contain
 SUFFIXES = (".mcap", ".db3")
 ROS_1 = ".bag"
 METADATA = "metadata.yaml"
-METADATA_BYTES = 4_000_000  # of two thousand topics with all their settings of quality of service
-METADATA_VALUES = 50_000  # of a thousand topics; rosbags takes 50 µs for each
-DEFINITION_CHARACTERS = 100_000  # ten times what ROS 2 writes of a message, with all comments
+METADATA_BYTES = 4_000_000  # metadata of two thousand topics with all their quality-of-service settings
+METADATA_VALUES = 50_000  # metadata of a thousand topics; rosbags takes 50 µs for each
+DEFINITION_CHARACTERS = 100_000  # ten times what ROS 2 writes about a message, including all comments
 NANO = 10**9
 
 

@@ -15,8 +15,8 @@ TIME_OF_DAY = re.compile(
     r"(?:(?P<date>\d{4}[-/]\d\d[-/]\d\d)[T ])?\s*(?:(?P<h>\d{1,2}):)?(?P<m>\d{1,2}):(?P<s>\d{1,2}(?:[.,]\d+)?)"
     r"\s*(?P<half>[AaPp][Mm])?\s*(?P<zone>Z|[+-]\d\d:?\d\d)?"
 )
-LONG_AGO_S = 1e6  # a clock that shows more began long before the recording: a float may lose microseconds
-SPELLINGS = (("^", ""), ("sec", "s"), ("²", "2"))  # of units, in addition to those of the table
+LONG_AGO_S = 1e6  # a clock with a larger time started long before the recording: a float may lose microseconds
+SPELLINGS = (("^", ""), ("sec", "s"), ("²", "2"))  # spellings of units, in addition to those of the table
 
 
 def is_number(cell: str) -> bool:

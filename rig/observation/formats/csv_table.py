@@ -33,7 +33,7 @@ from rig.observation.formats.mat_table import is_mat, read_mat_rows
 from rig.observation.formats.table_parts import columns_of, in_blocks, parts_read_apart
 
 BLANK = float("nan")
-LINE = "line"  # an additional column: the line of each row
+LINE = "line"  # an additional column: the number of each row's line
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,11 +16,11 @@ from rig.config.files.regular_file import UnfitFile, open_regular_file
 from rig.errors import Refused
 from rig.observation.formats.csv_cells import is_value
 
-HARMLESS_BYTES = 1_000_000  # some ten thousand rows, which take four times that in memory
-LONGEST_LINE = 10_000  # characters: a hundred columns, while there are at most twenty
+HARMLESS_BYTES = 1_000_000  # some ten thousand rows, which take four times as much memory
+LONGEST_LINE = 10_000  # characters: enough for a hundred columns, of which there are at most twenty
 GZIP, UTF_16 = b"\x1f\x8b", (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 MARKS = ";\t"
-COMMENT_MARKS = "#%"  # before the heading of a table that NumPy or MATLAB wrote
+COMMENT_MARKS = "#%"  # characters before the heading of a table by NumPy or MATLAB
 
 
 def read_rows(path: Path, largest_mb: int, skipped: int = 0) -> Iterator[list[str]]:

@@ -20,10 +20,10 @@ from rig.observation.formats.column_selection import Mapped
 
 SUFFIX = ".mat"
 HDF5_HEADER = b"MATLAB 7.3"
-DEEPEST = 4  # structs inside structs
+DEEPEST = 4  # depth of structs inside structs
 MOST_COLUMNS = 1000
-BLOCK_ROWS = 8192  # whose cells are in memory at a time
-OBJECT = ("s0", "s1", "s2", "arr")  # fields of what SciPy reads of a MATLAB object
+BLOCK_ROWS = 8192  # rows whose cells are in memory at a time
+OBJECT = ("s0", "s1", "s2", "arr")  # fields by which SciPy represents a MATLAB object
 
 
 def is_mat(path: Path) -> bool:

@@ -21,7 +21,7 @@ from rig.observation.formats.table_parts import columns_of, count_omitted_rows, 
 from rig.observation.formats.ulog_samples import is_ulog
 
 INSIDE = "::"
-LONGEST_MOMENT_S = 0.4  # a row of attitudes that lasts longer declares a rest
+LONGEST_MOMENT_S = 0.4  # a row of attitudes with a longer duration declares a rest
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +134,7 @@ def entry_of(path: Path) -> FileEntry:
             while block := stream.read(1 << 20):
                 digest.update(block)
     name = path.name if INSIDE not in str(path) else source.name
-    return FileEntry(name=printable(name), sha256=digest.hexdigest())  # a name may be no UTF-8, which no document takes
+    return FileEntry(name=printable(name), sha256=digest.hexdigest())  # a name that is not UTF-8 fits into no document
 
 
 def _read(form: Format, reader: str, path: Path) -> FormatColumns:

@@ -19,7 +19,7 @@ from rig.observation.formats.csv_text import is_harmless, read_rows
 from rig.observation.formats.mat_table import is_mat, read_mat_columns
 from rig.observation.formats.table_parts import parts_read_apart
 
-MOST_SKIPPED = 100  # lines before the heading
+MOST_SKIPPED = 100  # lines before the heading, at most
 SAMPLED_ROWS = 400
 MISSING = frozenset({"NaN", "nan", "NAN", "NA", "N/A", "null", "None", "-", "--"})
 TIME_NAME = re.compile(
@@ -28,7 +28,7 @@ TIME_NAME = re.compile(
 IN_BRACKETS = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]\s*$")
 AFTER_UNDERSCORE = re.compile(r"_(deg_s|dps|mdps|rad_s|m_s2|mg|g|ms|us|ns|s|deg|rad|t|ut|c)$", re.IGNORECASE)
 UNDERSCORED = {"deg_s": "deg/s", "rad_s": "rad/s", "m_s2": "m/s2", "t": "T", "ut": "uT", "c": "C"}
-LIKELY_HZ = 100.0  # the sample rate that a unit of time is chosen for
+LIKELY_HZ = 100.0  # the sample rate by which a unit of time is chosen
 EPOCH_S = (9e8, 4.2e9)  # seconds since 1970: from 1998 to 2103
 
 
@@ -53,7 +53,7 @@ class TableLayout:
     time_unit: str | None
     missing: tuple[str, ...]
     rows: int
-    is_shifted: bool = False  # rows have a cell more than the heading has names
+    is_shifted: bool = False  # rows have one cell more than the heading has names
 
     @property
     def has_heading(self) -> bool:
@@ -110,7 +110,8 @@ def layout_parts(path: Path, largest_mb: int) -> Iterator[Part]:
         if len(sampled) < SAMPLED_ROWS:
             sampled.append(row)
     width = max([len(heading), *(len(row) for row in sampled[:2])])
-    shift = width - len(heading) if heading and len(heading) == width - 1 else 0  # R names no column of row numbers
+    # R writes no heading for the column of row numbers.
+    shift = width - len(heading) if heading and len(heading) == width - 1 else 0
     headings = [""] * shift + [name.strip() for name in heading]
     headings += [""] * (width - len(headings))
     units = [""] * shift + units + [""] * (width - shift - len(units))

@@ -16,7 +16,7 @@ from rig.estimation.arrays import Array
 BLOCK_ROWS = 16_384
 
 
-LEFT_OUT = "left_out"  # the number of rows of the file that hold none of the columns
+LEFT_OUT = "left_out"  # number of rows of the file that contain none of the columns
 NOTE = "note"  # what the readings lack, in words
 
 

@@ -27,7 +27,8 @@ SUFFIX = ".ulg"
 TOPICS: dict[str, Quantity] = {"sensor_gyro": RATE, "sensor_accel": ACCELERATION}
 COMBINED = "sensor_combined"
 COMBINED_FIELDS = {RATE: "gyro_rad", ACCELERATION: "accelerometer_m_s2"}
-RARE = 0.5  # of the rate of `sensor_combined`: a raw topic that is logged less often is a sample of it
+# Fraction of the rate of `sensor_combined`: a raw topic with a lower rate contains only some of the readings.
+RARE = 0.5
 COMBINED_NOTE = (
     "sensor_combined of PX4: the selected sensor, which may change in flight, averaged, and corrected by the "
     "autopilot's own calibration (CAL_GYRO, CAL_ACC): the result is relative to that"

@@ -31,12 +31,13 @@ from rig.observation.windows import Window
 if TYPE_CHECKING:
     from rig.data.recording.recorded_turner import RecordedTurner
 
-RATE_STEP_S = 0.008  # the difference of joint angles closer in time shows their encoders' noise more than a rate
-KNOT_S = 0.004  # between the knots of the rate: a ripple too fast for them would alias to a slower one
+# Shortest step of a rate from joint angles: a shorter one shows the encoders' noise more than the rate.
+RATE_STEP_S = 0.008
+KNOT_S = 0.004  # interval between the knots of the rate: a ripple too fast for them would alias to a slower one
 SPARSE_S = 0.025  # samples that are farther apart alias a ripple of the servo
-PARTS = 5  # of a rest: their means show whether a joint moved, if single readings scatter
-SWINGS = 8.0  # times the difference of neighbouring angles: a noise of ten thousand readings has a smaller range
-ATTITUDES = 72  # in a mean: over whole turns the part perpendicular to the axis averages out
+PARTS = 5  # parts of a rest: if single readings scatter, the parts' means show whether a joint moved
+SWINGS = 8.0  # range relative to the difference of adjacent angles: noise of ten thousand readings has a smaller range
+ATTITUDES = 72  # attitudes in a mean: over whole turns the part perpendicular to the axis averages out
 
 
 class ArmMotion:

@@ -18,11 +18,12 @@ from rig.motion.steps import TURN_RAD, Sweep
 from rig.observation.motion.revolution import MAX_STATE_GAP_S, Ends, arm_states_lost, describe, not_constant
 from rig.observation.motion.turn_speed import FEWEST_PAIRS, turn_speed
 
-SMOOTHED_S = 0.12  # a window in which a straight line fits the angle: the gear's ripple is longer
+SMOOTHED_S = 0.12  # window in which a straight line fits the angle: shorter than the gear's ripple
 FEWEST = 5
-USUAL, HELD_UP = 0.25, 4.0  # quantile of the requests' durations, as usual; a delayed one takes this many times longer
-KNOTS = 3  # stride of the smoothed angles that are knots of a spline: neighbours share nearly all readings
-GUARD_RAD = float(np.radians(1.5))  # distance from the ramps: the shaft's lag, and its encoder's error
+# Quantile of the requests' durations that is usual; a delayed request takes this many times longer.
+USUAL, HELD_UP = 0.25, 4.0
+KNOTS = 3  # stride of the smoothed angles that are knots of a spline: adjacent ones share nearly all readings
+GUARD_RAD = float(np.radians(1.5))  # angle left out next to the ramps: the shaft's lag and its encoder's error
 
 
 def well_timed(states: NDArray[Any]) -> NDArray[Any]:

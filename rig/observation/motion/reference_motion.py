@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 
-MIN_RATE_RAD_S = 0.01  # a turner that never exceeds it stood still
-MAX_SPAN_S = 48 * 3600.0  # of a recording; times farther apart are damage, and would fill the memory
+MIN_RATE_RAD_S = 0.01  # a turner that is never faster did not move
+MAX_SPAN_S = 48 * 3600.0  # longest recording: times farther apart are damage, and would fill the memory
 
 
 class RateFunction(Protocol):

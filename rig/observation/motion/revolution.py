@@ -12,9 +12,9 @@ from rig.estimation.arrays import Array
 from rig.motion.steps import TURN_RAD, Sweep, closes, turn_words
 from rig.observation.statistics.spectral_lines import BEATS
 
-MAX_STATE_STEP_S = 0.02  # between arm states that still show the servo's vibration
-SMOOTHING_S = 0.05  # of the joint's rate before it is judged constant or not
-MAX_STATE_GAP_S = 1.0  # in a shorter gap, a halt shows in the angle that is missing afterwards
+MAX_STATE_STEP_S = 0.02  # longest interval of arm states that show the servo's vibration
+SMOOTHING_S = 0.05  # time over which the joint's rate is averaged before it is judged constant or not
+MAX_STATE_GAP_S = 1.0  # longest gap after which a halt shows as a missing angle
 MAX_OTHER_TRAVEL_RAD = 0.01
 MIN_SPEED_FRACTION = 0.995
 

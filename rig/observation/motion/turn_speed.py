@@ -14,8 +14,8 @@ from rig.errors import Fault
 
 TURN_RAD = 2 * np.pi
 FEWEST_PAIRS = 20
-STEPS = 50  # of the search for the period by secants; three or four are enough
-CLOSE = 1e-12  # of the period, between two steps
+STEPS = 50  # steps of the search for the period by secants; three or four are enough
+CLOSE = 1e-12  # relative change of the period between two steps, at convergence
 
 
 @dataclass(frozen=True, slots=True)

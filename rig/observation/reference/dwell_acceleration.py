@@ -24,7 +24,8 @@ from rig.observation.statistics.mean import Mean
 from rig.observation.statistics.vibration_noise import average_standstill
 from rig.observation.windows import Dwelt, Window, dwelt
 
-LEAVING_S = 0.05  # before a dwell's end: the board's times include the gyroscope's delay, the longer of the two
+# Time removed before a dwell's end: the board's times include the gyroscope's delay, which is the longer one.
+LEAVING_S = 0.05
 
 
 @dataclass(frozen=True, slots=True)

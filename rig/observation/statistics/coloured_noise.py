@@ -9,9 +9,9 @@ from rig.estimation.arrays import Array
 
 LAGS = 20
 WHITE = 45.3  # χ² of 20 degrees of freedom at 0.999
-MEMORIES = (1, 2, 4, 8, 16, 32)  # orders of the autoregression; 32: a whole wave of 7 Hz at 238 samples a second
-SAMPLES_EACH = 12  # needed per coefficient
-PREDICTED = 1e-12  # of the sum of squares: less remains only of residuals that repeat; then 1 − Σ a is as small
+MEMORIES = (1, 2, 4, 8, 16, 32)  # orders of the autoregression; 32 cover a whole wave of 7 Hz at 238 Hz
+SAMPLES_EACH = 12  # samples needed for each coefficient
+PREDICTED = 1e-12  # fraction of the sum of squares: less remains only if residuals repeat; then 1 − Σ a is as small
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +78,8 @@ def _autoregression(products: Array, count: int, memory: int) -> tuple[float, fl
     damped = (1 - float(coefficients.sum())) ** 2
     if power <= PREDICTED * products[-1, -1] and damped <= PREDICTED:
         return np.inf, np.nan, memory
-    return criterion, power / (count - memory) / damped if damped else np.inf, memory  # what never returns has no mean
+    # A process that never returns has no mean.
+    return criterion, power / (count - memory) / damped if damped else np.inf, memory
 
 
 def _products(residuals: Array, memory: int) -> Array:

@@ -13,19 +13,17 @@ from rig.estimation.statistics.mean_weights import ALIKE
 from rig.observation.statistics.tapered_weights import MAIN_LOBE, apply_window
 
 AROUND = 161  # bins of the running median
-MOST_LINES = 8  # three of a servo, and vibrations in the room, each of which a turning sensor may read as two
-APART = 2.5  # cycles in all the readings: least distance from a line that was found
-SAME = 1.5  # cycles in all the readings: lines that are nearer to each other are a jerk
-SIDEBANDS_APART = (
-    0.5  # cycles in all the readings: sidebands nearer to each other, of slow lines, resemble the turn's own waves
-)
+MOST_LINES = 8  # three lines of a servo, and vibrations of the room, each of which a turning sensor may sense as two
+APART = 2.5  # least distance from a line found before, in cycles of all readings
+SAME = 1.5  # lines that are nearer to each other, in cycles of all readings, are a jerk
+SIDEBANDS_APART = 0.5  # cycles of all readings: closer sidebands of slow lines resemble the turn's own waves
 PASSES = 1
 WIDE = 4  # columns of a line, and of each of its sidebands
 BEATS = 1  # sidebands of a vibration in the room for a sensor that makes a turn
 SAMPLES_EACH = 5  # needed per column
-NEARER = 1.02  # times as much must a line explain to be chosen instead of its sideband that stands out
-LEAST_GAP = 1.5  # steps between samples: over a longer one some are missing
-ROUNDING = 1e-12  # of the longest column: shorter ones hold rounding errors alone
+NEARER = 1.02  # a line is chosen instead of its prominent sideband if it explains this many times more
+LEAST_GAP = 1.5  # interval between samples in steps: after a longer one, samples are missing
+ROUNDING = 1e-12  # fraction of the longest column: shorter ones contain only rounding errors
 NONE: Array = np.zeros(0)
 
 
@@ -39,7 +37,7 @@ class LineSearch:
     """
 
     stands_out: float = 16.0  # one false line in seventy recordings costs nothing
-    slowest: float = 8.0  # slower ones are hard to separate from what comes once and twice in a turn
+    slowest: float = 8.0  # slower lines are hard to separate from waves once and twice per revolution
     beats: int = BEATS
     most: int = MOST_LINES
     floor: float = 0.0
@@ -155,7 +153,7 @@ def _find_strongest(residuals: Array, previous: Array, fraction: Array, search: 
 
     powers = np.abs(np.fft.rfft(apply_window(residuals).T)) ** 2
     powers[:, :MAIN_LOBE] = powers[:, MAIN_LOBE, None]
-    around = np.array([median_filter(axis, AROUND) for axis in powers])  # in one dimension: a tenth of the time
+    around = np.array([median_filter(axis, AROUND) for axis in powers])  # one-dimensional: it takes a tenth of the time
     powers /= np.maximum(around, search.floor) + np.finfo(np.float64).tiny  # noise may have a colour
     bins, last = np.arange(powers.shape[1]), powers.shape[1] - 1
     cycles = bins / len(fraction) / _sampling_step(fraction)

@@ -17,7 +17,7 @@ from rig.observation.statistics.tapered_weights import weights
 from rig.observation.windows import Window
 
 FEWEST = 120  # readings that separate lines from noise
-BRIEF = (1, 2)  # memories that fit a colour, but not the remainder of a line
+BRIEF = (1, 2)  # orders that fit coloured noise, but not the remainder of a line
 
 
 def average_rest(readings: Array, time_s: Array, window: Window, steps: Steps) -> Mean:

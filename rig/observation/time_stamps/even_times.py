@@ -6,7 +6,7 @@ from rig.estimation.arrays import Array
 from rig.observation.time_stamps.moving_values import average_around, find_least_around
 from rig.observation.time_stamps.sampling import Sampling
 
-AVERAGED = 32  # readings whose stamps err either way
+AVERAGED = 32  # readings whose time stamps err in either direction
 
 
 def find_taken_times(time_s: Array, sampling: Sampling) -> Array:

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from rig.estimation.arrays import Array, integrate_rates
 
-HIDDEN_RAD = 2e-3  # as references of attitude err: a gap that may hide more is not bridged
-LONGEST_S = 1.0  # of a gap: in a longer one a body may be taken up and laid back
-STEP_STD = 12**-0.5  # of the moment of a sudden change, uniform in a gap of length 1
-REACH, FEWEST = 4, 12  # lengths of a gap on either side, and at least so many readings
+HIDDEN_RAD = 2e-3  # as large as the errors of attitude references: a gap that may hide more is not bridged
+LONGEST_S = 1.0  # longest gap that is bridged: in a longer one a body may be lifted and laid back
+STEP_STD = 12**-0.5  # standard deviation of the time of a sudden change, uniform in a gap of length 1
+REACH, FEWEST = 4, 12  # time on either side of a gap, in its lengths, and the fewest readings there
 
 
 def hidden_angles_rad(time_s: Array, readings: Array, gaps: NDArray[np.intp]) -> Array:

@@ -24,27 +24,31 @@ from numpy.typing import NDArray
 from rig.estimation.arrays import Array
 from rig.observation.time_stamps.moving_values import find_least_ahead, find_least_around, find_least_behind
 
-WIDTHS = (1, 2, 4, 8, 16, 32, 64, 128, 256, 512)  # readings
-MEDIAN, UNDISTURBED = 0.5, 0.1  # quantiles of the interval to begin with: for few losses, and for many
+WIDTHS = (1, 2, 4, 8, 16, 32, 64, 128, 256, 512)  # readings over which the interval is tried
+MEDIAN, UNDISTURBED = 0.5, 0.1  # quantiles of the interval with which the search begins: for few losses, and for many
 LONG = (64, 512)  # readings over which the interval is estimated first: more than a burst, less than between two gaps
-LONG_STEP = 6.0  # intervals: a longer step is a gap, a later reading was buffered, if all stamps are uneven
+LONG_STEP = 6.0  # in intervals: a longer step is a gap, a later reading was buffered if all stamps are uneven
 PACKET_S = 0.5  # readings that follow each other evenly for longer have not arrived at once
-NEAR, MOSTLY = 0.25, 0.8  # of an interval: tolerance of a whole multiple; fraction of differences that must be one
-LOST = 0.6  # of an interval: a larger difference is a lost reading
-COARSE = 1 / 3  # of the interval: with a coarser resolution the stamps are worse than `NEAR`
-SHORT, SOME_SHORT = 0.6, 0.05  # of the interval; if this fraction of steps is shorter, readings are stamped on arrival
-LATE = 0.1  # of the long steps: if as many are short, readings were late and not lost
-MORE = 1.5  # times the resolution: stamps that are later than this are not only rounded
-SMALLER, OF_NORMAL = 0.85, 0.5204  # quantile of squared normal deviates; mean of those below it over the mean of all
+# Tolerance of a whole multiple, in intervals; fraction of differences that must be whole multiples.
+NEAR, MOSTLY = 0.25, 0.8
+LOST = 0.6  # in intervals: a larger difference is a lost reading
+COARSE = 1 / 3  # resolution in intervals, above which the stamps are worse than `NEAR`
+# Fraction of the interval; if this fraction of steps is shorter, readings are stamped on arrival.
+SHORT, SOME_SHORT = 0.6, 0.05
+LATE = 0.1  # ratio of short steps to long ones, above which readings were late and not lost
+MORE = 1.5  # ratio to the resolution, above which stamps are not only rounded
+# Quantile of squared normal deviates; mean of those below it, relative to the mean of all.
+SMALLER, OF_NORMAL = 0.85, 0.5204
 PASSES, SETTLED = 6, 1e-9
-DECIMALS, BITS = 7, 16  # of a second, to which stamps may be rounded
-COUNTED = 50  # missing readings: the number in a longer gap is too inexact to refine the interval
-SEGMENTS, FARTHEST = 24, 1024  # the fewest segments of a log that show a random walk; readings of one at most
+DECIMALS, BITS = 7, 16  # powers of a second to which stamps may be rounded
+COUNTED = 50  # missing readings: the number in a longer gap is too uncertain to improve the interval
+SEGMENTS, FARTHEST = 24, 1024  # fewest segments of a log that show a random walk; most readings of a segment
 GROWN = (2.5, 12.0)  # range of the factor by which a random walk's variance grows over four segments
-WIDEST_BURST = 16  # readings: at least one of them in a row must be on time
-POLLED = 0.045  # fraction of steps over one more period of polling, at least
-WHOLE = 0.01  # of a coarse resolution: tolerance of an interval that is a whole multiple of it
-BEAT, IN_BLOCK, BLOCKS = 0.35, 8, 20  # variance over mean of missing readings; expected ones in a block; fewest blocks
+WIDEST_BURST = 16  # readings in a row, of which at least one must be on time
+POLLED = 0.045  # least fraction of steps that take one more period of polling
+WHOLE = 0.01  # tolerance of an interval that is a whole multiple of a coarse resolution
+# Ratio of variance to mean of missing readings; expected ones in a block; fewest blocks.
+BEAT, IN_BLOCK, BLOCKS = 0.35, 8, 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,7 +190,7 @@ def _count_missing(time_s: Array, width: int, quantile: float) -> _PeriodCandida
         missing = whole.astype(np.intp)
         if width > 1:
             ending = missing[-width:]
-            ending[ending <= width] = 0  # the last packet may be a part of one
+            ending[ending <= width] = 0  # the last packet may be incomplete
             missing = _merge_at_longest(missing, steps_s)
         if abs(interval_s - last_s) <= SETTLED * interval_s:
             break
@@ -200,7 +204,7 @@ def _is_beat(missing: NDArray[np.intp]) -> bool:
     Such a beat is caused by stamps of a polled port, multiples of a time shorter than the interval. A logger that loses
     every n-th reading looks the same, but hardly loses so many.
     """
-    missing = np.minimum(missing, 1)  # a gap is one
+    missing = np.minimum(missing, 1)  # a gap counts once
     lost = int(missing.sum())
     size = max(len(missing) * IN_BLOCK // lost, 1) if lost else len(missing) + 1
     blocks = len(missing) // size

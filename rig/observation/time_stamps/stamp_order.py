@@ -30,20 +30,20 @@ from rig.observation.time_stamps.sampling import (
     find_typical_interval_s,
 )
 
-# Seconds after which counters begin anew: 16, 24 and 32 bits of ms and µs; midnight and the GPS week.
+# Periods after which counters restart: 16, 24 and 32 bits of ms and µs; a day and the GPS week.
 WRAPS_S = (*(2.0**bits * unit_s for unit_s in (1e-3, 1e-6) for bits in (16, 24, 32)), 86_400.0, 604_800.0)
-LONGEST_STEP = 0.25  # of a counter's period: a longer step over its end is none
-FIRST_ROWS = 5  # at most: rows of zeros before the first reading
-REPEATS = 0.01  # of neighbouring readings that are equal: a sensor with as few does not repeat itself by chance
-DENSER = 1.5  # readings per interval where two parts of a log overlap, instead of rows in another order
-FARTHEST_S = 1.0  # that a row in another order is off; beyond, a clock was set back
+LONGEST_STEP = 0.25  # fraction of a counter's period: a longer step over its end is no restart
+FIRST_ROWS = 5  # rows of zeros before the first reading, at most
+REPEATS = 0.01  # largest fraction of adjacent readings that are equal, for which a repeat is no chance
+DENSER = 1.5  # readings per interval, above which two parts of a log overlap; below, rows are in another order
+FARTHEST_S = 1.0  # largest time by which a row is out of order; beyond, a clock was set back
 STALE_S, FASTER = 0.1, 0.8  # least delay of a stale reading; largest step of stale readings, in intervals
-ON_TIME = 1.0  # intervals: a reading that is later than another one soon after it is late
-USUAL = 3.0  # medians of the delay
-EXACT = 1e-6  # tolerance of a whole multiple of a resolution: no rounding makes equal stamps then
-FEW_EQUAL = 2  # pairs of equal coarse stamps: more are made by rounding
-WAITING = 0.5  # fraction of the readings of a long step that come after it, if they waited and were not lost
-REACH = 6  # steps' lengths, in readings, within which a link has caught up after it stalled
+ON_TIME = 1.0  # in intervals: a reading that is later than one soon after it is late
+USUAL = 3.0  # in medians of the delay
+EXACT = 1e-6  # tolerance of a whole multiple of a resolution, for which rounding makes no equal stamps
+FEW_EQUAL = 2  # pairs of equal coarse stamps: rounding makes more
+WAITING = 0.5  # fraction of the readings of a long step that come after it, if they were delayed and not lost
+REACH = 6  # number of readings, in lengths of the step, within which a link has caught up after a stall
 
 
 @dataclass(frozen=True, slots=True)
