@@ -16,8 +16,8 @@ from rig.page.server.feed import Feed
 from rig.station.events import PhaseStarted, RunEvent, StepFinished
 from rig.station.plain_text import say
 
-WRITTEN_S = 0.6  # delay until an event is in the file
-FRACTION = 0.1  # of the time for analysis at most: a recording of hours takes long to read
+WRITTEN_S = 0.6  # delay until an event is written to the file
+FRACTION = 0.1  # largest fraction of the time for analysis: a recording of hours takes long to read
 ENDING_S = 5.0
 
 
@@ -46,7 +46,7 @@ def looking_out(folder: Path, feed: Feed) -> Iterator[Lookout]:
     """
     lookout = Lookout()
     command = [sys.executable, "-P", "-m", "rig.page.live_analysis", str(folder)]
-    try:  # In a session of its own: Ctrl-C is the run's.
+    try:  # In a session of its own, so that Ctrl-C reaches only the run.
         process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True
         )

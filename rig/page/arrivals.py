@@ -13,8 +13,8 @@ class Arrivals:
 
     def __init__(self) -> None:
         self._arrived_s: dict[str, float] = {}
-        self._state_s: float | None = None  # the newest state's time, by the turner's own clock
-        self._samples: dict[str, int] = {}  # their number, by sensor
+        self._state_s: float | None = None  # time of the newest state, by the turner's clock
+        self._samples: dict[str, int] = {}  # number of samples, by sensor
 
     def take(self, event: RunEvent, now_s: float) -> bool:
         """Handle an event at the time `now_s`, s; return whether it brought newer data."""

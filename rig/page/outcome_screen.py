@@ -30,7 +30,7 @@ def outcome_rows(result: ResultDocument, parts: Mapping[str, str], true_rows: Se
     for row in shown(result):
         names = row.sensor, row.quantity.name
         scale, bias = (limit_held(result.checks, *names, parameter) for parameter in JUDGED_PARAMETERS)
-        if row.scale is None:  # limits apply to calibrations
+        if row.scale is None:  # only calibrations have limits
             bias = None
         rows.append(
             {

@@ -57,7 +57,7 @@ from rig.station.events import (
 )
 from rig.station.words import line
 
-LINES = 40  # newest lines of the log
+LINES = 40  # newest lines of the log that are shown
 ENDINGS = (VerdictReached, Failed, Interrupted, Crashed)
 
 
@@ -95,8 +95,8 @@ class PageState:
         self._stored = False
         self._modes: dict[str, str] = {}
         self._samples: tuple[SensorSamples, ...] = ()
-        self._fresh = False  # the samples are newer than the arm's state
-        self._newest: dict[type, SamplesTaken | ArmSeen | Progress | HandSeen] = {}  # not in the sections yet
+        self._fresh = False  # whether samples have come since the arm's newest state
+        self._newest: dict[type, SamplesTaken | ArmSeen | Progress | HandSeen] = {}  # not yet in the sections
         self._observations: dict[tuple[str, int], dict[str, Any]] = {}
         self._turns: dict[int, dict[str, Any]] = {}
         self._prompts = 0
@@ -141,7 +141,7 @@ class PageState:
                 self._samples, self._fresh = sensors, True
             case ArmSeen(state):
                 self._newest[ArmSeen] = event
-                # One more state comes when the arm is released, without samples.
+                # When the arm is released, one more state comes, without samples.
                 if self._fresh and self.history.due(state.time_s):
                     self.history.add(state.time_s, _values(self._samples))
                 self._fresh = False

@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 SPAN_S = 60.0
-STEP_S = 0.1  # between two points, in the controller's time
-SOON_S = 0.95 * STEP_S  # rounded times are not early
+STEP_S = 0.1  # interval of the points, in the controller's time
+SOON_S = 0.95 * STEP_S  # shorter, so that a rounded time does not look too early
 POINTS = round(SPAN_S / STEP_S)
 
-Values = Mapping[str, tuple[float, ...]]  # by the name of a line, such as "gyro.rate"
+Values = Mapping[str, tuple[float, ...]]  # by the name of a curve, such as "gyro.rate"
 
 
 @dataclass(slots=True)

@@ -35,8 +35,8 @@ from rig.station.events import (
     VerdictReached,
 )
 
-FRAME_S = 0.1  # between two frames of the recording
-NEWEST = 8  # samples in a shown mean
+FRAME_S = 0.1  # interval of the frames, in the recording's time
+NEWEST = 8  # samples in a displayed mean
 
 
 @dataclass(frozen=True, slots=True)

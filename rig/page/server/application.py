@@ -19,7 +19,7 @@ from rig.page.server.guard import CERTIFICATE_POLICY, COOKIE, Door, Guard
 
 STATIC = Path(__file__).parents[1] / "static"
 MEDIA = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
-LARGEST_BODY = 1000  # bytes
+LARGEST_BODY = 1000  # bytes of a request
 LARGEST_CERTIFICATE = 8_000_000
 Handler = Callable[[Request], Awaitable[Response]]
 

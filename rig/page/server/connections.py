@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from uvicorn.protocols.http.h11_impl import H11Protocol
 
-STRANGERS = 96  # connections that have not shown the token
-TRUSTED = 64  # connections that have
-REQUEST_S = 5.0  # for the complete headers of a request
+STRANGERS = 96  # connections that have not shown the token, at most
+TRUSTED = 64  # connections that have, at most
+REQUEST_S = 5.0  # time for the complete headers of a request
 Client = tuple[str, int]  # address and port
 
 

@@ -18,8 +18,8 @@ from rig.page.rows import Look
 from rig.station.events import RunEvent
 
 FRAME_S = 0.1
-SIGN_OF_LIFE_S = 0.8  # without news: a browser reports silence after 2 s
-CLIENTS = 32  # browsers with the token at a time
+SIGN_OF_LIFE_S = 0.8  # interval of messages if there is no news: a browser reports silence after 2 s
+CLIENTS = 32  # browsers with the token, at most
 STRANGERS = 16  # … and without
 
 
@@ -41,8 +41,8 @@ class Feed:
         self._shown, self._now = shown, now
         self._arrivals = Arrivals()
         self._lock = threading.Lock()
-        self._sent = 0  # points that were in a frame
-        self._seen_at = ""  # the time of the last arrival, by this computer's clock, for people
+        self._sent = 0  # number of points already sent
+        self._seen_at = ""  # wall-clock time of the last arrival, for people
 
     def event(self, event: RunEvent) -> None:
         """Handle an event, as a Listener does: change the state without waiting."""
@@ -90,7 +90,7 @@ class Mailbox:
 
     def __init__(self) -> None:
         self._frame: bytes | None = None
-        self._behind = True  # it has nothing yet
+        self._behind = True  # nothing has been sent yet
         self._news = asyncio.Event()
         self._news.set()
         self.closed = False

@@ -33,7 +33,8 @@ HEADERS = {
     "cross-origin-resource-policy": "same-origin",
     "cache-control": "no-store",
 }
-OPENER = {"cross-origin-opener-policy": "same-origin"}  # browsers obey it for loopback, and warn without TLS otherwise
+# Browsers obey it for loopback addresses; for others without TLS they warn.
+OPENER = {"cross-origin-opener-policy": "same-origin"}
 
 
 def new_token() -> str:
@@ -73,7 +74,8 @@ class Door:
         origin = headers.get(b"origin")
         if origin is not None and origin.decode("latin-1").lower() not in {f"http://{host}" for host in self.hosts}:
             return 403, "this request comes from another page"
-        followed = path == "/" and headers.get(b"sec-fetch-dest") == b"document"  # a link to the page, which is empty
+        # A link to the page, which itself contains no data.
+        followed = path == "/" and headers.get(b"sec-fetch-dest") == b"document"
         if headers.get(b"sec-fetch-site", b"none") not in OWN_SITE and not followed:
             return 403, "this request comes from another page"
         return None

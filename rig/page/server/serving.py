@@ -23,13 +23,13 @@ if TYPE_CHECKING:
     from starlette.routing import Route
 
 ADDRESS, PORT = "127.0.0.1", 8137
-LAST_NEWS_S = 4.0  # for browsers to take the last news
+LAST_NEWS_S = 4.0  # time for browsers to receive the last news
 ENDING_S = 8.0
-SHORTEST_TOKEN = 22  # characters of base64, 128 bits
+SHORTEST_TOKEN = 22  # characters of base64, for 128 bits
 AT_ONCE = 8  # connections accepted in one cycle of the event loop
 WAITING = 128  # … and those that may wait for it
-IDLE_S = 3  # a browser's connection is kept for its next request
-LARGEST_HEADERS = 8192  # bytes
+IDLE_S = 3  # duration for which a browser's connection waits for another request
+LARGEST_HEADERS = 8192  # bytes of the headers
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +85,7 @@ def serving(
         served = asyncio.create_task(server.serve([listening]))
         while not server.started and not served.done():
             await asyncio.sleep(0.01)
-        listening.listen(WAITING)  # the server has set it to AT_ONCE
+        listening.listen(WAITING)  # the server has already set it to AT_ONCE
         ending = asyncio.create_task(over.wait())
         await asyncio.wait((ending, served, posting), return_when=asyncio.FIRST_COMPLETED)
         ending.cancel()
@@ -115,7 +115,7 @@ def serving(
     try:
         yield f"http://{host}:{port}/#{token}"
     finally:
-        with suppress(RuntimeError):  # its loop is closed: it has ended already
+        with suppress(RuntimeError):  # its loop is closed: the server has already ended
             loop.call_soon_threadsafe(over.set)
         thread.join(ENDING_S)  # it closes its socket; a starved one ends with the process
 
@@ -135,7 +135,7 @@ def _server(broadcast: Broadcast, control: Control, door: Door, folder: Path | N
         h11_max_incomplete_event_size=LARGEST_HEADERS,
         backlog=AT_ONCE,
         timeout_keep_alive=IDLE_S,
-        proxy_headers=False,  # anyone can send one; a connection is identified by its own address
+        proxy_headers=False,  # anyone can send such headers; a connection is identified by its own address
         log_config=None,
         log_level="critical",  # requests of strangers must not fill the terminal
         access_log=False,
