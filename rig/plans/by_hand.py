@@ -12,9 +12,10 @@ from rig.motion.by_hand import FACES, Face, HandMove, Instruction
 from rig.motion.steps import Plan
 from rig.motion.turner_state import Joints
 
-ROUND: tuple[Face, ...] = ("+z", "+x", "+y", "-z", "-x", "-y", "+z", "+y", "-x", "-z", "+x", "-y")  # and from the start
-TURNS_FROM = 8  # flips: after them the scale is known well enough for a turn to show where it ends
-AXES = ("z", "x", "y")  # of the requested whole turns, one after the other
+# The faces up, beginning with the one at the start.
+ROUND: tuple[Face, ...] = ("+z", "+x", "+y", "-z", "-x", "-y", "+z", "+y", "-x", "-z", "+x", "-y")
+TURNS_FROM = 8  # flips after which the scale factor is known well enough to recognise the end of a whole turn
+AXES = ("z", "x", "y")  # axes of the requested whole turns, in this order
 
 Pair = tuple[Face, Face]
 

@@ -38,7 +38,7 @@ class Planner(Protocol[SectionT_contra]):
 
     def __call__(
         self,
-        turner: Any,  # of the section that `Procedure.turner` names
+        turner: Any,  # is of the section named by `Procedure.turner`
         procedure: SectionT_contra,
         start_q_rad: Joints | None = None,
         done: Collection[int] = (),

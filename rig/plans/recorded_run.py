@@ -15,7 +15,7 @@ from rig.errors import Refused
 from rig.plans.procedure_registry import AnyProcedure, installed
 from rig.plans.script_file import ScriptFile, kept_script, load_script
 
-RAW, CORRECTED = "six_observation", "verify"  # procedures that judge any recording of raw, of corrected readings
+RAW, CORRECTED = "six_observation", "verify"  # procedures that judge any recording: of raw readings, of corrected ones
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +64,7 @@ def open_run(
         run = read_run(path, begun=begun.get(path))
         corrected = _is_corrected(run)
         return RecordedRun(path, () if corrected else (run,), (run,) if corrected else (), alone=True, script=named)
-    # Corrected readings are compared as one whole movement: what was interrupted before it does not count.
+    # Corrected readings are compared as one complete movement: interrupted ones before it do not count.
     raw_files, repeated_files = (
         [file for file in recordings(path, readings) if only is None or file.name in only]
         for readings in ("raw", "calibrated")

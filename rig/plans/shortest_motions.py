@@ -9,11 +9,11 @@ from rig.config.procedures.procedure_sections import LONGEST_SWEEP_S, AttitudesS
 from rig.config.procedures.servo_procedure import SPEED_TO_RANGE
 
 SPEEDS_DEG_S = (15.0, 30.0, 45.0, 60.0, 90.0, 120.0, 150.0)
-ARCS_DEG = (90.0, 180.0, 270.0)  # if the encoders' uncertainty is stated
+ARCS_DEG = (90.0, 180.0, 270.0)  # arcs that are tried if the encoders' uncertainty is stated
 TURNS_DEG = (360.0, 720.0, 1080.0)
-BEYOND_DEG = (45.0, 90.0, 180.0)  # overtravel of a servo
+BEYOND_DEG = (45.0, 90.0, 180.0)  # overtravels of a servo that are tried
 
-# Its family, its angle in degrees, and its keys of the procedure.
+# Family, angle in degrees, and keys of the procedure.
 Motion = tuple[tuple[object, ...], float, Mapping[str, object]]
 
 

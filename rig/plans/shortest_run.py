@@ -46,14 +46,14 @@ from rig.turners.turner_registry import kind_of
 
 SectionT = TypeVar("SectionT", bound=Section)
 REPEATS = (1, 2, 3, 4, 6, 8, 12, 16)
-MOST = 100  # sweeps or dwells of one plan
-RESTS_S = (1.0, 2.0, 3.0, 5.0, 10.0, 20.0)  # of a rest, and of a dwell
-# The endless run is predicted from a plan of two repeats: in one alone, noise weighs too much beside the errors that
-# repeats share. Other rests and more repeats reduce its U further, but by no more than this factor.
+MOST = 100  # sweeps or dwells of one plan, at most
+RESTS_S = (1.0, 2.0, 3.0, 5.0, 10.0, 20.0)  # durations of a rest, and of a dwell, that are tried
+# The endless run is predicted from a plan of two repeats, because in a single one noise is too large relative to the
+# errors that repeats share. Other rests and more repeats reduce its U further, but by no more than this factor.
 TWICE, HOPELESS = 2, 2.0
 ANEW = NOISE, WANDERING, FLICKER, STATES  # the budget lines that repeats reduce, also for accelerometers
 FLIPS, TURNS_BY_HAND = (8, 10, 12, 16, 24, 36, 48), (0, 3, 6)
-REST_STEP_S = 0.1  # of the last, fine search
+REST_STEP_S = 0.1  # step of the last, fine search
 
 
 class Tried(Protocol):
@@ -161,7 +161,7 @@ def _change(section: SectionT, **keys: object) -> SectionT:
 def _add_target(planned: Planned, keys: Mapping[str, float]) -> Planned:
     """Return the planned run with `keys` set in its procedure, which make the run end when it reaches the target."""
     procedure = planned.candidate.procedure
-    with suppress(ValidationError):  # the target is larger than a file may have
+    with suppress(ValidationError):  # the target is larger than a configuration may state
         procedure = _change(procedure, **keys)
     return replace(planned, candidate=replace(planned.candidate, procedure=procedure))
 
@@ -229,7 +229,7 @@ class _Swept:
         For such small steps a longer wait is assumed to give a smaller uncertainty.
         """
         waits_s = {key: float(getattr(best.procedure, key)) for key in self.waits}
-        counts = self._counts(plan_of(self.config, best.procedure))  # of all repeats
+        counts = self._counts(plan_of(self.config, best.procedure))  # those of all repeats
         candidates = []
         for values_s in product(*map(_down_from, waits_s.values())):
             shorter_s = dict(zip(waits_s, values_s, strict=True))

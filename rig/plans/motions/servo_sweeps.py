@@ -10,8 +10,8 @@ from rig.motion.turner_state import Joints
 from rig.plans.motions.sweeps import Profile, SweepPose, build_stages, connect_sweeps, sweep_about, trial
 from rig.plans.motions.transfer_steps import approach, pace_of
 
-MARGIN_RAD = math.radians(3)  # of constant speed at either end, for a shaft that lags
-# Of the mounting: far enough to stand out from any gyroscope's noise and a gear's play.
+MARGIN_RAD = math.radians(3)  # angle of constant speed at either end, because the shaft lags
+# Trial of the mounting: large enough to exceed any gyroscope's noise and a gear's play.
 TRIAL_RAD, TRIAL_PACE = math.radians(15), pace_of(20, 80)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from rig.estimation.arrays import Array
 
-WORTH_S = 1e-9  # a change that gains less is rounding, and might repeat for ever
+WORTH_S = 1e-9  # a smaller gain is rounding, and might repeat forever
 
 
 def shortest_way(between_s: Array) -> tuple[int, ...]:

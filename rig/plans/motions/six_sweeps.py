@@ -25,12 +25,12 @@ from rig.plans.motions.steady_drift import drift_effect
 from rig.plans.motions.sweeps import Mounted, Profile, SweepPose, build_stages, connect_sweeps, sweep_about, trial
 from rig.plans.motions.transfer_steps import append_steps, approach, pace_of
 
-USUAL_ORDER: tuple[Wrist, ...] = ("wrist_3", "wrist_1", "wrist_2")  # that of the paper
+USUAL_ORDER: tuple[Wrist, ...] = ("wrist_3", "wrist_1", "wrist_2")  # the order in the paper
 BOTH_WAYS: tuple[Direction, Direction] = ("cw", "ccw")
-WORTHWHILE = 2 / 3  # an order that is not better by a third does not replace the paper's
-# Of a stage's mounting: far enough to stand out from any gyroscope's noise, and slow enough to take a hand away.
+WORTHWHILE = 2 / 3  # an order must be better by a third to replace the paper's
+# Trial of a stage's mounting: large enough to exceed any gyroscope's noise, and slow enough to take a hand away.
 TRIAL_RAD, TRIAL_PACE = math.radians(10), pace_of(15, 60)
-DIGITS = 9  # orders that differ by rounding alone are equal: the first of them is chosen, on every machine
+DIGITS = 9  # orders that differ only by rounding are equal: the first of them is chosen, on every machine
 WRIST_1, WRIST_2, WRIST_3 = (JOINT_NAMES.index(name) for name in ("wrist_1", "wrist_2", "wrist_3"))
 
 
@@ -106,7 +106,7 @@ def _order_sweeps(arm: ArmSection, procedure: SixSweepsSection) -> tuple[Sweep, 
     home = find_home(arm)
 
     def harm(order: Order) -> float:
-        sweeps = _sweeps(order, procedure, min(procedure.repeats, 2))  # more of them repeat these
+        sweeps = _sweeps(order, procedure, min(procedure.repeats, 2))  # further repeats are the same
         return round(drift_effect(tuple(_connect(sweeps, arm, procedure))), DIGITS)
 
     def best(orders: Sequence[Order]) -> Order:

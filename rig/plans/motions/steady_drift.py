@@ -11,7 +11,7 @@ from rig.motion.steps import Dwell, Rest, Step, Sweep, Transfer, closes
 from rig.motion.turner_state import Joints
 
 ARC_POSES = 24
-NEGLIGIBLE = 1e-6  # of the largest singular value: directions that attitudes do not determine are left out
+NEGLIGIBLE = 1e-6  # ratio to the largest singular value: directions that attitudes do not determine are omitted
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ from rig.motion.steps import Plan, Rest, Stage, Step, Sweep, Transfer, trapezoid
 from rig.motion.turner_state import Joints
 from rig.plans.motions.transfer_steps import Pace, transfer
 
-Mounted = tuple[StageSection | ServoStageSection, Sequence[Sweep]]  # a stage of the file, and its sweeps
+Mounted = tuple[StageSection | ServoStageSection, Sequence[Sweep]]  # a stage of the configuration, and its sweeps
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,10 +10,10 @@ from itertools import pairwise, zip_longest
 
 from rig.data.recording.thermal_events import SetMeasured
 
-NEXT_AFTER = 0.5  # of a gap, after which a set begins: its own change of temperature is added
-AT_THE_END = 0.25  # of a gap, from an end of the range
+NEXT_AFTER = 0.5  # fraction of the largest step from which on a set begins: its own change of temperature is added
+AT_THE_END = 0.25  # largest distance from an end of the range, as a fraction of the largest step
 FULL_POWER_K = 2.0  # control error at which the heater has full power
-FOLLOWS_K = 3.0  # largest distance of the ramp from the heated sensor
+FOLLOWS_K = 3.0  # largest difference between the ramp and the heated sensor
 REMEMBERS_S = 30.0  # integral time of the controller
 
 
@@ -125,6 +125,7 @@ class Ramp:
         self.wanted_c = min(max(self.wanted_c, now_c - FOLLOWS_K), now_c + FOLLOWS_K)
         off_k = self.wanted_c - now_c
         wanted = off_k / FULL_POWER_K + self._sum_k_s / (FULL_POWER_K * REMEMBERS_S)
-        if 0.0 < wanted < 1.0 or (wanted >= 1.0) != (off_k > 0):  # at its limit the integral must not wind up
+        # The integral must not wind up while the power is at its limit.
+        if 0.0 < wanted < 1.0 or (wanted >= 1.0) != (off_k > 0):
             self._sum_k_s += off_k * dt_s
         return self.most_power * min(max(wanted, 0.0), 1.0)

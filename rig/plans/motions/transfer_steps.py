@@ -21,7 +21,7 @@ def pace_of(speed_deg_s: float, acceleration_deg_s2: float) -> Pace:
     return Pace(math.radians(speed_deg_s), math.radians(acceleration_deg_s2))
 
 
-# The first motion may swing the large joints from any pose, so it is slow.
+# The first motion is slow, because it may move the large joints from any pose.
 LEISURE = pace_of(30, 60)
 
 
