@@ -33,7 +33,8 @@ def _row(*classes: str, same: str = "", **renamed: str) -> Row:
     return Row(classes, {**{name: name for name in same.split()}, **renamed})
 
 
-_ESTIMATES = ("VectorSolution", "TurnedSolution", "Solution", "LevenbergMarquardtSolution")  # of `Estimate`
+# Classes with the fields of `Estimate`.
+_ESTIMATES = ("VectorSolution", "TurnedSolution", "Solution", "LevenbergMarquardtSolution")
 _ESTIMATE = "estimator iterations scale bias_rad_s covariance rank condition"
 _ITEM = _row("RecordedSensor", "Item", same="part serial_number")
 _TRIAD = _row("Triad", same="scale covariance non_orthogonality_rad non_orthogonality_std_rad correction_matrix")

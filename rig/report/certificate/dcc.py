@@ -98,7 +98,7 @@ def _core(c: Certificate) -> Element:
         None if order.received is None else words("receiptDate", order.received),
         words("beginPerformanceDate", begin),
         words("endPerformanceDate", end),
-        words("performanceLocation", "other"),  # the schema's value for a place that is not stated
+        words("performanceLocation", "other"),  # the schema's value for an unstated place
         words("issueDate", c.issued),
         amended or None,
     )

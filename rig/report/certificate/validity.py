@@ -4,7 +4,7 @@ from rig.data.entries.accelerometer import AccelerometerEntry
 from rig.data.entries.budget import BudgetEntry
 from rig.data.result_file import GyroscopeEntry
 
-# A budget covers the run alone: one temperature, one power-up and one mounting.
+# Statements for every run: a budget covers one temperature, one power-up and one mounting.
 ALWAYS = (
     "other temperatures",
     "power cycling",
@@ -13,7 +13,7 @@ ALWAYS = (
     "ageing and transport",
 )
 
-# Of a motion that a file states.
+# Statement for a motion that a file describes.
 OF_THE_FILE = ("the scale of the file's angles and of its time",)
 
 

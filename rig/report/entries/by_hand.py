@@ -57,7 +57,7 @@ def by_hand_lines(entry: ByHandEntry) -> Iterator[str]:
     used = {"closure_error_rad": any(move.closure_error_rad is not None for move in entry.moves)}
     phrases = [
         WORDS[name].format(UNITS.get(name, 1.0) * estimates[name].estimate)
-        for name in WORDS  # what a later version may add has no words here
+        for name in WORDS  # a name that a later version adds has no words here
         if name in estimates and used.get(name, True)
     ]
     yield f"estimated errors of handling (one standard deviation): {'; '.join(phrases)}"

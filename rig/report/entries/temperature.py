@@ -9,7 +9,7 @@ from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.estimation.temperature.over_temperature import COEFFICIENTS, OverTemperature, powers_at
 from rig.report.entry import entry, list_dof
 
-ROWS = 17  # of the table; a certificate shows every fourth
+ROWS = 17  # rows of the table; a certificate shows every fourth
 
 
 def temperature_entry(

@@ -38,7 +38,7 @@ IMU = (RATE, ACCELERATION)
 Parameters = Iterator[tuple[str, float]]
 
 
-# The parameters of an autopilot for its sensor of a number from 0.
+# Returns the parameters for the autopilot's sensor of this number, from 0.
 Autopilot = Mapping[Quantity, Callable[[int, Corrected], Parameters]]
 
 

@@ -14,14 +14,14 @@ if TYPE_CHECKING:  # the command line asks for the names alone
     ReadingsWriter = Callable[[Sequence[Exported], Path], list[Path]]
     CalibrationTexts = Callable[[ExportedCalibrations], Mapping[str, str]]
 
-# `module:function`. Of readings: (recordings, folder) → the files written.
+# `module:function` of formats of readings: (recordings, folder) → the files written.
 OF_READINGS: Final[Mapping[str, str]] = {
     "csv": "rig.report.exports.reading_tables:write_csv",
     "parquet": "rig.report.exports.reading_tables:write_parquet",
     "mat": "rig.report.exports.reading_tables:write_mat",
     "ros2": "rig.report.exports.ros2:write_bag",
 }
-# Of calibrations: (those of a run) → texts by name of the file.
+# Formats of calibrations: (those of a run) → texts by the name of the file.
 OF_CALIBRATIONS: Final[Mapping[str, str]] = {
     "imucal": "rig.report.exports.imucal:imucal_files",
     "px4": "rig.report.exports.autopilots:px4_files",

@@ -16,7 +16,7 @@ from rig.report.exports.exported_recording import Exported
 from rig.report.exports.names import plain_names
 
 BAG = "bag"
-FORMAT: Final = 9  # of ROS 2 Jazzy and later
+FORMAT: Final = 9  # version in ROS 2 Jazzy and later
 NANO = 10**9
 CONVENTION = (
     "angular_velocity in rad/s and linear_acceleration in m/s^2 (upwards at rest) as recorded, in each "

@@ -94,7 +94,7 @@ def draw_comparison(figure: "Figure", comparison: Comparison, sensor: str, refer
     rows = figure.subplots(3, 2, sharex=True, sharey="col", width_ratios=(3, 2), gridspec_kw=MARGINS)
     elapsed_s = comparison.time_s - comparison.time_s[0]
     error = comparison.reading_rad_s - comparison.reference_rad_s
-    # Titles say their height `y`: matplotlib would measure all labels for it, a sixth of the time of drawing.
+    # Titles have a given height `y`: matplotlib would measure all labels for it, a sixth of the time of drawing.
     for i, (readings, difference) in enumerate(rows):
         readings.plot(*envelope(elapsed_s, comparison.reading_rad_s[:, i]), lw=0.7, color="C0", label=sensor)
         readings.plot(*envelope(elapsed_s, comparison.reference_rad_s[:, i]), lw=0.7, color="C1", label=reference)

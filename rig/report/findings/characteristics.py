@@ -25,7 +25,7 @@ from rig.report.findings.characteristic import (
 )
 
 AXES, ANGLES = ("x", "y", "z"), ("yz", "zx", "xy")
-SCALE_SLOPE, BIAS_SLOPE = slice(3, 6), slice(15, 18)  # of the covariance of polynomials over temperature
+SCALE_SLOPE, BIAS_SLOPE = slice(3, 6), slice(15, 18)  # elements in the covariance of polynomials over temperature
 
 
 def _bias_units(quantity: Quantity) -> Units:

@@ -25,7 +25,7 @@ from rig.report.words.validity_words import when_words
 if TYPE_CHECKING:
     from rig.analysis.reference.magnetometer import MagnetometerResult
 
-FAR_ENOUGH_M = 0.3  # from the flange: a housing of 0.2 A m² is 0.4 to 1.2 µT at 20 to 40 cm
+FAR_ENOUGH_M = 0.3  # distance from the flange: a housing of 0.2 A m² makes 0.4 to 1.2 µT at 20 to 40 cm
 
 
 def _entries(outcome: Outcome) -> dict[str, MagnetometerEntry | ErrorEntry]:

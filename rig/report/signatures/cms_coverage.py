@@ -50,7 +50,7 @@ def certificates_with(der: bytes) -> list[list[Certificate]]:
 
 
 def _certificates(content: Any) -> list[Certificate]:
-    signer = extract_certificate_info(content).signer_cert  # of two that claim to be the signer's, the last
+    signer = extract_certificate_info(content).signer_cert  # if two claim to be the signer's, the last one
     certificates = (signer, *(choice.chosen for choice in content["certificates"]))
     return [load_der_x509_certificate(one.dump()) for one in certificates]
 

@@ -103,7 +103,7 @@ def _inspect_signature(
         time_server=_name(stamp.signing_cert.dump()) if stamped else None,
         reason=Reason(str(signature.sig_object.get("/Reason", ""))),
         trusted=not why if trust.certificates else None,
-        # a certificate that is trusted itself is not looked up in lists
+        # A certificate that is itself trusted is not looked up in lists.
         long_term=bool(lists and trust.certificates) and not why and chain[0] not in trust.certificates,
     )
     if not trust.certificates:

@@ -87,7 +87,7 @@ def _open_file(file: Path) -> Iterator[Signatory]:
     ordered = _order_chain(certificates, key)
     if key is None or not ordered:
         raise _unfit(str(file), "it does not contain a key and the certificate of this key")
-    store = SimpleCertificateStore()  # for those above it; pyHanko adds its own
+    store = SimpleCertificateStore()  # for the certificates above it; pyHanko adds the first
     store.register_multiple(map(translate_pyca_cryptography_cert_to_asn1, ordered[1:]))
     try:
         own_key = translate_pyca_cryptography_key_to_asn1(key)

@@ -40,7 +40,7 @@ def why_untrusted(
 
     leaf = load_der_x509_certificate(chain[0])
     begin, end = leaf.not_valid_before_utc, leaf.not_valid_after_utc
-    if not begin <= moment <= end:  # path validation does not test this for a certificate that is trusted itself
+    if not begin <= moment <= end:  # path validation does not test this for a certificate that is itself trusted
         return f"the certificate is valid from {begin:%Y-%m-%d} to {end:%Y-%m-%d}, not on {moment:%Y-%m-%d}"
     return (
         _no_path(chain, trust, moment, lists) or next(unfit_for_documents(leaf), "") or _other_name(leaf, trust.signer)

@@ -25,7 +25,7 @@ from rig.report.words.validity_words import load_words, speed_words, when_words
 
 ONE, ANGLE = r"\one", r"\radian"
 ValuesAndStds = tuple[Sequence[float], Sequence[float], Sequence[Freedom] | None]
-# Of three values at once: √χ² of three degrees of freedom at 95 %.
+# For three values at once: √χ² of three degrees of freedom at 95 %.
 JOINT_FACTOR_3 = 2.795
 SOLUTION = "± U of the solution"
 

@@ -9,8 +9,8 @@ from rig.report.words.expanded_uncertainty import Expanded
 
 DCC, SI = "https://ptb.de/dcc", "https://ptb.de/si"
 XSI = "http://www.w3.org/2001/XMLSchema-instance"
-JOINT_PROBABILITY = 0.95  # of an ellipsoid
-DIGITS = 4  # of a probability
+JOINT_PROBABILITY = 0.95  # probability of an ellipsoid
+DIGITS = 4  # decimals of a probability
 UNSAID = "not stated"
 for _prefix, _name in (("dcc", DCC), ("si", SI), ("xsi", XSI)):
     register_namespace(_prefix, _name)

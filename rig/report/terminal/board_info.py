@@ -20,7 +20,7 @@ from firmware_host.answers import (
 from firmware_host.protocol import FIRMWARE_VERSION
 from rig.station.plain_text import plain
 
-NO_ANSWER = (0x00, 0xFF, 0xFFFF)  # readings of a bus without an answer, of one byte and of two
+NO_ANSWER = (0x00, 0xFF, 0xFFFF)  # readings of a bus that does not answer, of one byte and of two
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,7 +25,7 @@ COLUMNS = (
     ("temperature", "temperature_c"),
     ("quaternion", "qw", "qx", "qy", "qz"),
 )
-NAMES_SHOWN = 46  # characters
+NAMES_SHOWN = 46  # characters of the names
 PLACEHOLDER = "ATTITUDES.csv"
 LEAST_LAG_S = 0.004
 

@@ -8,7 +8,7 @@ from rig.config.section import Vector3
 from rig.motion.steps import Plan, Rest, Sweep
 
 HEADINGS = ("axis", "at_s", "angle_deg", "rate_deg_s", "what")
-SAME = 1e-6  # of directions, which are rounded
+SAME = 1e-6  # tolerance of directions, which are rounded
 
 
 @dataclass(frozen=True, slots=True)

@@ -123,7 +123,7 @@ def _print_steps(planned: DryRun, console: Console) -> None:
         box=SIMPLE,
     )
     for heading in ("start s", "step", "duration s", "joints °", "°/s", "°/s²"):
-        is_text, folds = heading in ("step", "joints °"), heading == "joints °"  # a stage's instruction is there too
+        is_text, folds = heading in ("step", "joints °"), heading == "joints °"  # may contain a stage's instruction
         table.add_column(heading, justify="left" if is_text else "right", no_wrap=not folds)
     at_s = 0.0
     stages = {stage.begins: (number, stage) for number, stage in enumerate(plan.stages, start=1)}

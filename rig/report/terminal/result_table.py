@@ -44,7 +44,7 @@ def print_kept(folder: Path, document: ResultDocument, since: Sequence[str] = ()
     """Print the end of the finished run in `folder`. `since` is the comparison with the last calibrations."""
     if as_json:
         print(document.text())
-        for line in since:  # the JSON does not contain it
+        for line in since:  # the JSON does not contain these lines
             say(line.replace("`", ""), sys.stderr)
         return
     console, certificate = Console(highlight=False), folder / CERTIFICATE

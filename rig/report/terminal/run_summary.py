@@ -15,11 +15,11 @@ from rig.report.words.mounting_words import farthest_off
 from rig.report.words.printed_values import in_print, plus_minus
 from rig.station.plain_text import INDENT, wrapped
 
-NEAR = 0.9  # of its limit: above it a passed check is named
+NEAR = 0.9  # ratio to its limit, above which a passed check is named
 MOST_NEAR = 2
-CAUSES = ("stuck_axis", "repeated_readings")  # these make other checks fail: such readings do not follow the motion
-ONE_SENSOR, MANY = 12, 25  # lines at most, of one sensor and of six, in
-LEAST_WIDTH = 80  # columns: a narrower screen gets more lines
+CAUSES = ("stuck_axis", "repeated_readings")  # these cause other checks to fail: such readings do not follow the motion
+ONE_SENSOR, MANY = 12, 25  # largest number of lines for one sensor, and for several
+LEAST_WIDTH = 80  # columns: a narrower screen has more lines
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +115,7 @@ def _list_sensors(items: Sequence[_SensorValues], width: int) -> Iterator[str]:
     number = max(len(cell) for _, cells in table for cell in cells)
     columns = max(len(cells) for _, cells in table)
     name = max(len(label) for label, _ in table)
-    if name + (number + 1) * columns > width:  # the longest headings get lines of their own, if that is enough
+    if name + (number + 1) * columns > width:  # if that is enough, the longest headings get lines of their own
         name = max(len(label) for label, _ in table if label.startswith(INDENT))
     gap = next((gap for gap in (3, 2, 1) if name + (number + gap) * columns <= width), 2)
     number += gap

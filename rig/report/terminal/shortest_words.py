@@ -27,7 +27,7 @@ from rig.station.plain_text import plain
 if TYPE_CHECKING:
     from rig.estimation.arrays import Array
 
-LINES = 3  # of contributors, for each sensor
+LINES = 3  # contributors that are listed for each sensor
 # Possible targets by their names in `SIZES`: unit and words.
 SHOWN = {
     "scale": ("", "the scale factors"),
@@ -35,8 +35,8 @@ SHOWN = {
     "acceleration_scale": ("", "the accelerometers' scale factors"),
     "acceleration_bias_m_s2": (" m/s²", "the accelerometers' biases"),
 }
-SIGNIFICANT = 0.05  # of the variance
-MANY = 8  # a longer list than one of speeds
+SIGNIFICANT = 0.05  # least fraction of the variance of a contributor that is listed
+MANY = 8  # a list of speeds is shorter
 ASSUMED = (
     "Predicted for parts as in their data sheets, at one temperature, with flicker noise as the only bias drift, "
     "and a mounting error of 5° (in stages uncertainty.mount_deg). A sensor that is mounted more exactly does better, "

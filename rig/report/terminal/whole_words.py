@@ -4,7 +4,8 @@ from rich import box
 from rich.cells import cell_len
 from rich.table import Table
 
-FRAMED, BARE = 3, 2  # what a column takes beside its words: two blanks and a stroke; at most two blanks without a frame
+# Characters of a column in addition to its words: two blanks and a stroke; two blanks at most without a frame.
+FRAMED, BARE = 3, 2
 STROKE = 1
 
 

@@ -14,7 +14,7 @@ from rig.errors import Refused
 from rig.errors.table_rows import read_rows
 
 TABLE = Path(__file__).with_name("checks.txt")
-ALLOWING = ", or allow it"  # begins the advice to set another limit
+ALLOWING = ", or allow it"  # begins the advice to change the limit
 
 
 @dataclass(frozen=True, slots=True)

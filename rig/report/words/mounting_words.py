@@ -10,7 +10,7 @@ from rig.data.result_file import MountEntry, ResultDocument
 from rig.estimation.statistics.coverage import COVERAGE_FACTOR
 from rig.report.words.printed_values import plus_minus
 
-ROUNDING = 1e-6  # of its uncertainty: a smaller rotation is the assumed one, not a measured one
+ROUNDING = 1e-6  # ratio to its uncertainty, below which a rotation is the assumed one and not a measured one
 
 
 def mount_lines(result: ResultDocument) -> Iterator[str]:

@@ -14,8 +14,8 @@ from rig.data.quantity import DisplayUnit
 from rig.estimation.arrays import SMALLEST_SIZE, divide_or_infinity
 from rig.report.words.printed_values import figures, percent, power_of_ten, small
 
-NEGLIGIBLE = 0.001  # of both variances: smaller lines are combined in one
-DIGITS = 3  # of a combined standard uncertainty: its parts are printed to the same decimal
+NEGLIGIBLE = 0.001  # fraction of either variance, below which lines are combined in one
+DIGITS = 3  # digits of a combined standard uncertainty: its parts are printed to the same decimal
 
 
 @dataclass(frozen=True, slots=True)

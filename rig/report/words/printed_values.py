@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from decimal import ROUND_HALF_UP, Context, Decimal
 
-DIGITS = 2  # significant, of an uncertainty
+DIGITS = 2  # significant digits of an uncertainty
 NO_U = "–"
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 WIDE = Context(prec=1000)  # a value may be much larger than its uncertainty

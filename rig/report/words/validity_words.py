@@ -10,7 +10,8 @@ from rig.data.result_file import GyroscopeEntry
 DEG = math.degrees(1)
 AS_STATED = ", as stated"
 UNKNOWN = "a temperature that is not known"
-ALIKE = 0.005  # of a rate: the effect of the arm's timing and of a sensor tilted by 5° on one speed
+# Relative difference of rates that count as one speed: the effect of the arm's timing, and of a sensor tilted by 5°.
+ALIKE = 0.005
 
 
 def when_words(when: ConditionsEntry) -> str:
