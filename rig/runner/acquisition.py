@@ -19,9 +19,10 @@ from rig.runner.settling import Settling
 from rig.station.events import SensorSamples
 
 KEPT_PARTS = 3
-REACHES_BACK_S = 300.0  # of data before a sweep, from which its clock is determined: more takes longer and adds nothing
-WHOLE_S = 5.0  # of a dwell, in which every state of the arm is recorded
-STANDING_S = 0.25  # between two states recorded after that: hours of a standing arm would fill the disk
+REACHES_BACK_S = 300.0  # data before a sweep from which its clock is determined: more take longer and add nothing
+WHOLE_S = 5.0  # beginning of a dwell, in which every state of the arm is recorded
+# Interval of the states recorded after that: all states of an arm at rest for hours would fill the disk.
+STANDING_S = 0.25
 
 
 @dataclass(slots=True)

@@ -81,7 +81,7 @@ class Connector:
         corrected.
         """
         whole_plan = self.phase.plan()
-        if self.resumed.earlier and not self.phase.agreed:  # a stage that follows resumes nothing
+        if self.resumed.earlier and not self.phase.agreed:  # a later stage resumes nothing
             self.station.event(RunResumed(len(self.resumed.done), len(whole_plan.sweeps) + len(whole_plan.dwells)))
         acquisition = Acquisition()
         with ExitStack() as stack:

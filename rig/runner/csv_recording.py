@@ -69,7 +69,7 @@ class ReadingsFile:
         self._write(",".join(["time_s", *columns]) + "\n")
         self._format = ",".join(["%.6f", *["%.9g"] * len(columns)])
         self._began_s: float | None = None
-        self.lasts_s = 0.0  # from the first reading to the last, by the sensor's clock
+        self.lasts_s = 0.0  # duration from the first reading to the last, by the sensor's clock
 
     def __enter__(self) -> Self:
         return self

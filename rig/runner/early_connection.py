@@ -60,7 +60,7 @@ class _Connection:
         try:
             self._turner = self._context.__enter__()
         except (RigError, OSError):
-            return  # the run connects by itself, and meets the same
+            return  # the run connects itself, and meets the same error
 
     def _pass_on(self, state: State) -> None:
         self._on_state(state)
@@ -72,7 +72,8 @@ class _Connection:
             return None
         try:
             self._turner.check()
-            well = self._turner.missed_states == 0  # else the run would report states that were missed before it began
+            # Otherwise the run would report states that were missed before it began.
+            well = self._turner.missed_states == 0
         except RigError:
             well = False
         if not well:

@@ -20,8 +20,8 @@ from rig.motion.steps import SAME_PLACE_RAD, Motion, Plan, Sweep, Transfer
 from rig.motion.turner_state import Joints
 from rig.station.events import UncertaintySoFar
 
-WRITTEN_S = 0.6  # by then the recorder has written everything
-# Of the target: the complete recording determines clocks and noise slightly better than the one so far.
+WRITTEN_S = 0.6  # time after which the recorder has written everything
+# Fraction of the target: the complete recording determines clocks and noise slightly better than the present one.
 ENOUGH = 0.99
 
 
@@ -44,11 +44,11 @@ class EndingEarly:
     earlier: Sequence[RunData]
     estimator: str
     ended: bool = False
-    _motions: int = 0  # that the script has begun
+    _motions: int = 0  # number of motions that the script has begun
     _due: bool = False
     _recorded: bool = False  # whether this recording has sweeps
     _repeats_left: int = 0
-    _home: int | None = None  # index in the plan of the motion that is still made after the end
+    _home: int | None = None  # index of the motion that is still made after the end
 
     def __post_init__(self) -> None:
         remaining = [sweep.index for sweep in self.plan.sweeps]
@@ -102,7 +102,7 @@ class EndingEarly:
         time.sleep(WRITTEN_S)
         try:
             return assess_reached([*self.earlier, *([read_run(self.path)] if self._recorded else [])], self.estimator)
-        except RigError:  # what is wrong with the recording, the end of the run will say
+        except RigError:  # the end of the run reports what is wrong with the recording
             return None
 
     @property

@@ -18,12 +18,12 @@ from rig.estimation.arrays import Array
 from rig.estimation.by_hand.session_parts import nearest_face
 from rig.motion.steps import Stage
 
-REST_S = 1.0  # of readings to test whether the item is at rest
+REST_S = 1.0  # duration of the readings that show whether the item is at rest
 PARTS = 5
-STEADY_RAD_S = 0.02  # beyond the noise: a hand at the item causes more, a standing turner less
+STEADY_RAD_S = 0.02  # change beyond the noise: a hand at the item causes more, a turner at rest less
 NOISES = 6
 ASKEW_RAD = np.radians(20)  # the largest error of the mounting of sensor and item together
-FRACTIONS = 0.5, 2.0  # of the angle, that a sensor with a scale error reads
+FRACTIONS = 0.5, 2.0  # fraction of the angle that a sensor with a scale error may read
 
 
 @dataclass(frozen=True, slots=True)

@@ -132,7 +132,7 @@ class Run:
             if phase.procedure.reads_corrected:
                 files = files[-1:]  # a complete movement; interrupted ones before it do not count
             for file in files[:-1]:
-                make_plain(file)  # else only readers that expect a killed run's file could open it
+                make_plain(file)  # otherwise only a reader of interrupted files could open it
             return tuple(read_run(file) for file in files)
 
     def _record_stage(

@@ -65,12 +65,12 @@ from rig.station.operator_station import Station
 from rig.turners.turner import Turner
 from rig.turners.turner_kind import AnyTurner
 
-FIRST_SAMPLES_LOOK_S = 0.005  # between two looks whether every sensor has sent something
-LOOK_S = 60.0  # the longest time to solve the recording so far
-SETTLING_LOOK_S = 0.05  # between two questions whether the sensors have settled
-AT_REST_TIMEOUT_S = 10.0  # for the readings whose scatter at rest is measured
-TRIAL_REST_S = 0.3  # of readings after a trial of the mounting: the sensors lag behind it
-SAME_POSE_RAD = radians(1)  # within this the operator's agreement still holds
+FIRST_SAMPLES_LOOK_S = 0.005  # interval of checking whether every sensor has sent something
+LOOK_S = 60.0  # the longest time to solve the present recording
+SETTLING_LOOK_S = 0.05  # interval of checking whether the sensors have settled
+AT_REST_TIMEOUT_S = 10.0  # time for the readings whose scatter at rest is measured
+TRIAL_REST_S = 0.3  # wait after a trial of the mounting, because the sensors lag
+SAME_POSE_RAD = radians(1)  # largest difference to the pose for which the operator's agreement is valid
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,12 +142,12 @@ class Rig:
     up: Vector3 = (0.0, 0.0, 1.0)
     early: EndingEarly | None = None
     warming: Warming | None = None
-    _done: set[int] = field(default_factory=set)  # sweeps and dwells since the latest wait for a temperature
-    _resting_rad_s: dict[str, Array] = field(default_factory=dict)  # of each gyroscope, before anything moved
-    _motions: Iterator[Motion] | None = None  # those of the plan that remain; None before pre-flight
-    _number: int = 0  # of the present step, or the last one
+    _done: set[int] = field(default_factory=set)  # indices of sweeps and dwells since the latest wait for a temperature
+    _resting_rad_s: dict[str, Array] = field(default_factory=dict)  # mean of each gyroscope before anything moved
+    _motions: Iterator[Motion] | None = None  # the remaining motions of the plan; None before pre-flight
+    _number: int = 0  # number of the present step, or of the last one
     _done_s: float = 0.0  # planned duration of the finished steps
-    _step_started_s: float = 0.0  # controller time
+    _step_started_s: float = 0.0  # by the controller's clock
 
     def preflight(self) -> None:
         """Check every condition of a movement, ask the operator, and take control of the arm.
@@ -164,7 +164,7 @@ class Rig:
         if self.hand is not None:
             ask_of_other_boards(self.devices.mounted, self.recording.station)
             self._motions = iter(())
-            return  # nothing moves by itself, so nobody is asked whether it may
+            return  # nothing moves by itself, so the operator is not asked
         away_rad = max(map(abs, find_travel_to_home(self.plan, report.state.q_rad)), default=0.0)
         if not (self.phase.agreed and away_rad <= SAME_POSE_RAD):
             self._agree()

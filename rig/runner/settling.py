@@ -15,14 +15,13 @@ from rig.data.quantity import ACCELERATION, RATE
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.estimation.arrays import Array
 
-SPAN_S = 0.5  # of readings in one scatter, all after the motion
-SPANS_AT_REST = 6  # the vibration of a standing arm comes and goes: the largest of these counts as rest
-QUIET = 1.2  # times the scatter at rest; that of a hundred samples on three axes has a standard uncertainty of 4 %
-STEADY, NOT_FALLING = (
-    2.0,
-    0.85,
-)  # an arm vibrates differently in each attitude: a constant scatter is no decaying oscillation
-LEAST_COUNTS = 0.5  # of scatter: less is rounding
+SPAN_S = 0.5  # time span of the readings in one scatter, all after the motion
+SPANS_AT_REST = 6  # spans at rest: the vibration of an arm varies, so the largest scatter of these counts
+QUIET = 1.2  # ratio to the scatter at rest; that of a hundred samples on three axes has a standard uncertainty of 4 %
+# Largest ratio of a constant scatter to that at rest, and the least ratio of a scatter to the one before that counts as
+# constant: an arm vibrates differently in each attitude, so a constant scatter is no decaying oscillation.
+STEADY, NOT_FALLING = 2.0, 0.85
+LEAST_COUNTS = 0.5  # least scatter: a smaller one is rounding
 
 
 @dataclass(slots=True)

@@ -21,13 +21,13 @@ from rig.errors import Fault, ProblemError, Refused
 from rig.plans.motions.temperature_course import Ramp, TemperatureCourse
 from rig.runner.acquisition import Acquisition
 
-LOOK_S = 0.25  # between two checks, and two commands to the heater
-RATE_SPAN_S = 30.0  # over which the rate of change is judged: a thermometer's counts are coarse
+LOOK_S = 0.25  # interval of checks, and of commands to the heater
+RATE_SPAN_S = 30.0  # time over which the rate of change is judged: a thermometer's steps are coarse
 RATE_LEAST_S = 0.8 * RATE_SPAN_S
-RAMP_SHARE = 0.6  # of the largest allowed rate: the parts do not follow evenly
-SET_SHARE = 0.6  # of a gap, within which a set must end
+RAMP_SHARE = 0.6  # fraction of the largest allowed rate: the parts do not warm up evenly
+SET_SHARE = 0.6  # fraction of the largest step within which a set must end
 BEYOND_K = 1.0  # beyond the ends of the range, so that a set's mean reaches them
-KEEPS_AWAY_K = 2.0  # from the heater's own limit
+KEEPS_AWAY_K = 2.0  # distance from the heater's own limit
 
 
 @dataclass(slots=True)
@@ -48,7 +48,7 @@ class Warming:
     course: TemperatureCourse
     _history: dict[str, deque[tuple[float, float]]] = field(default_factory=dict)
     _of_set: list[dict[str, float]] | None = None  # temperatures since the set began
-    _began_s: float = 0.0  # when the set began
+    _began_s: float = 0.0  # start of the set
     _ramp: Ramp | None = None
     _looked_s: float = -np.inf
 

@@ -27,7 +27,7 @@ from rig.motion.steps import Sweep
 from rig.observation.onboard_window import find_board_averages, revolution_on_the_board
 from rig.runner.acquisition import Acquisition
 
-# From the request to keep readings to the arm's first motion, at most, on a busy computer.
+# Longest time from the request to keep readings to the arm's first motion, on a busy computer.
 KEEP_LONGER_S = 4.0
 
 Revolution = tuple[int, int, float]  # two board times, µs, and the speed between them, rad/s

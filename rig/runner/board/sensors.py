@@ -124,10 +124,10 @@ def describe_corrected(sensor: RecordedSensor, calibration: Calibration, sensiti
     assert raw.full_scale_counts is not None, "every driver states it"
     limit_rad_s = raw.full_scale_counts * raw.unit_per_count
     bias_rad_s, fraction = np.abs(calibration.bias_rad_s), np.ones(3)
-    if calibration.polynomials is not None:  # anywhere in the temperature range
+    if calibration.polynomials is not None:  # the range is that of the whole temperature range
         changed, moved_rad_s = calibration.polynomials.most()
         fraction, bias_rad_s = 1 - changed, bias_rad_s + moved_rad_s
-    # The least corrected rate of a saturated reading, whatever the other axes read.
+    # The least corrected rate of a saturated reading, for any readings of the other axes.
     on_axis, off_axis = np.diag(np.diag(calibration.matrix)), np.abs(calibration.matrix)
     np.fill_diagonal(off_axis, 0.0)
     lowest_rad_s = float(

@@ -44,11 +44,11 @@ from rig.runner.acquisition import Acquisition
 from rig.station.events import HandSeen, RunEvent
 
 LOOK_S = 0.05
-HELD_S = 3.0  # in the hand, before the operator is reminded to lay it down
-MISSED = 3.0  # standard deviations of a whole turn's end
-REFUSED_IN_A_ROW = 10  # then the session ends, as another error is likely
+HELD_S = 3.0  # time in the hand, after which the operator is reminded to lay it down
+MISSED = 3.0  # error of a whole turn's end, in standard deviations
+REFUSED_IN_A_ROW = 10  # after these the session ends, because another error is likely
 NO_REST = frozenset({"held_not_laid_down", "not_flat"})  # the item lies still, but not on a side
-ANEW = frozenset({"bias_jumped", "table_moved"})  # the readings before and after do not agree
+ANEW = frozenset({"bias_jumped", "table_moved"})  # the readings before and after it contradict each other
 MENDED_BY_HAND = frozenset({"clipping", "lost_in_move", "no_fit", "turn_not_closed"}) | NO_REST | ANEW
 
 
@@ -73,14 +73,14 @@ class HandSession:
     _segmenter: Segmenter = field(init=False)
     _not_counted: NotCounted = field(init=False)
     _begins_s: float | None = None  # start of this recording by the session's clock; None: by the board's
-    _shift_s: float | None = None  # from the board's clock to the session's, once samples have come
-    _move: Move | None = None  # that has ended, before the rest after it is judged
-    _rest: HandRest | None = None  # that has begun, while it is shorter than required
-    _judged_s: float = -np.inf  # when the rest ended that was judged last
+    _shift_s: float | None = None  # offset of the session's clock from the board's, once samples have come
+    _move: Move | None = None  # the finished move, until the rest after it is judged
+    _rest: HandRest | None = None  # the present rest, while it is shorter than required
+    _judged_s: float = -np.inf  # end of the rest that was judged last
     _accepted: list[HandMove] = field(default_factory=list)
-    _lay: list[Face] = field(default_factory=list)  # the faces that lay up
-    _refused: int = 0  # in a row
-    _bias_doubted: bool = False  # at the rest before, in which the item may have crept
+    _lay: list[Face] = field(default_factory=list)  # the faces that have been up
+    _refused: int = 0  # number of refused moves in a row
+    _bias_doubted: bool = False  # whether the item may have crept at the previous rest
     _reminded: bool = False
     _request: HandAsked | None = None
     _progress: SessionProgress | None = None
@@ -142,7 +142,7 @@ class HandSession:
         """Judge the move before a rest, and ask for the next."""
         move, self._move, self._rest = self._move, None, None
         if move is not None and self._begins_s is not None and move.start_s < self._begins_s:
-            move = None  # it began in the interruption
+            move = None  # it began during the interruption
         self._pauses_before(rest)
         session = self._not_counted.filter_session(self._segmenter.handled)
         now = self._progress = assess_progress(session, self.conditions)
