@@ -63,7 +63,7 @@ class OwnPort:
         self.fault: SensorError | None = None
         self._port, self._faults, self._take, self._farewell = port, faults, take, farewell
         self._patience = patience
-        self._most_silent_s: float | None = None  # set while it streams
+        self._most_silent_s: float | None = None  # set while data are streamed
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"reader of {name}", daemon=True)
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from firmware_host.samples import FIELD_SAMPLE_DTYPE
 from rig.data.recording.channel import stamp_samples
 
-READING_MESSAGES = 4  # temperature, x, y, z by the sequence number, whose modulus 128 is a multiple
+READING_MESSAGES = 4  # temperature, x, y, z in turn, by the sequence number, whose modulus 128 is a multiple
 GAUSS_T = 1e-4
 
 
@@ -21,7 +21,7 @@ class MagneticFieldReader:
 
     def __init__(self, t_per_count: float, full_scale_counts: int) -> None:
         self._gauss_per_count, self._limit = t_per_count / GAUSS_T, full_scale_counts
-        self._rows = np.zeros(0, FIELD_SAMPLE_DTYPE)  # rows of an incomplete reading, one axis each,
+        self._rows = np.zeros(0, FIELD_SAMPLE_DTYPE)  # rows of an incomplete reading, one for each axis,
         self._axes = np.zeros(0, np.int64)  # … and the index of each axis
         self._first_number: int | None = None
 

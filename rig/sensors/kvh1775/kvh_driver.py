@@ -16,7 +16,7 @@ from rig.sensors.kvh1775.message_numbering import MessageCounter
 from rig.sensors.own_port import OwnPort, PortFaults, closing_on_failure, open_device_port
 from rig.sensors.port_silence import ATTEMPTS, USUAL, Patience
 
-KEPT_BYTES = 4096  # of the input searched for an answer
+KEPT_BYTES = 4096  # bytes of the input that are searched for an answer
 _CABLE = "Check its supply and cable, and whether another program has the port"
 
 # Messages (n,) MESSAGE_DTYPE, their numbers (n,) from 0, their times (n,) in µs, and the time of the read.
@@ -95,7 +95,7 @@ class Kvh1775:
         self._tests.clear()
         period_s = 1.0 / float(self.settings["DR"])  # its result follows the next message
         for wait_s in self._patience.attempts(ATTEMPTS * period_s):
-            self._write("?BIT")  # the result of ?BIT,2 has good bytes other than 7f that the ICD does not list
+            self._write("?BIT")  # not ?BIT,2, in whose result further bytes mean "good" than the 7f that the ICD lists
             if self.own_port.wait(lambda: bool(self._tests), wait_s):
                 result = self._tests[0]
                 if not result.passed:

@@ -121,7 +121,7 @@ class MessageReader:
             if position + length > len(data):
                 break
             if header in starts:
-                for end in range(start + length, len(data) + 1, length):  # as a rule the next is of the same format
+                for end in range(start + length, len(data) + 1, length):  # the next message usually has the same format
                     # Zeros after a shorter message leave its CRC unchanged, so the header must match too.
                     if crc32(backwards[position:end]) != _CRC_RIGHT or not data.startswith(header, position):
                         break

@@ -14,8 +14,8 @@ import numpy as np
 from rig.sensors.errors import SensorError
 from rig.sensors.kvh1775.kvh_messages import Format
 
-# All settings, in the order of setting: the data rate recomputes the filters. FILTEN has its name
-# from the document of the 1750.
+# All settings, in the order of setting: setting the data rate resets the filters. FILTEN has its name from the document
+# of the 1750.
 NAMES = (
     "AXES",
     "BAUD",
@@ -51,7 +51,7 @@ class Kvh1775Settings:
             "OUTPUTFMT": self.message,
             "ROTFMT": self.rotation.upper(),
             "ROTUNITS": "RAD",
-            "TEMPUNITS": "C" if self.message == "C" else "C_100",  # format C's is a float anyway
+            "TEMPUNITS": "C" if self.message == "C" else "C_100",  # in format C it is a float in either unit
             "FILTTYPE,A": USUAL_FILTER,
             "FILTTYPE,G": USUAL_FILTER,
             "FILTEN,A": "1",

@@ -105,7 +105,7 @@ class Kvh1775Source:
         description.channel(TEMPERATURE).fill(samples, temperatures_c[valid])
         rate_rad_s = messages["rotation"][valid].astype(np.float64)
         if self._required.rotation == "delta":
-            rate_rad_s *= self._required.rate_hz  # seconds of its own clock, which sets its intervals
+            rate_rad_s *= self._required.rate_hz  # per second of its own clock, which determines its intervals
         description.channel(RATE).fill(samples, rate_rad_s)
         if description.measures(ACCELERATION):
             force_m_s2 = messages["acceleration_g"][valid].astype(np.float64) * STANDARD_GRAVITY_M_S2

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from rig.sensors.errors import SensorError
 from rig.sensors.kvh1775.kvh_messages import SEQUENCE_NUMBERS
 
-HOST_JITTER_S = 0.04  # error of a silence's duration: a USB adapter buffers for 16 ms, and a clock is read every 20 ms
+# Error of the duration of a silence: a USB adapter buffers for 16 ms, and a clock is read every 20 ms.
+HOST_JITTER_S = 0.04
 _US_WRAP = 1 << 32
 
 
@@ -22,14 +23,14 @@ class MessageCounter:
     count of lost messages unambiguous.
     """
 
-    where: str  # the instrument as messages name it
+    where: str  # the name of the instrument in messages
     interval_us: float
     timed: bool
     host_jitter_s: float = HOST_JITTER_S
     lost: int = 0
     _number: int = -1
     _sequence: int = 0
-    _time_us: int = 0  # of the last message, counted from a zero of its microseconds before the first message
+    _time_us: int = 0  # time of the last message, from a zero of its microseconds before the first message
 
     def count(self, messages: NDArray[Any], silent_s: float = 0.0) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Return the running numbers (n,) and times (n,) in µs of messages (n,) that follow a silence of `silent_s`.

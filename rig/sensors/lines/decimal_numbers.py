@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rig.estimation.arrays import Array
 
-MOST_DIGITS = 18  # of a 64-bit integer
+MOST_DIGITS = 18  # digits of a 64-bit integer
 MOST_DECIMALS = 22  # powers of ten that are exact as floats
 LONGEST = 40  # characters of a number
 _ZERO, _POINT, _PLUS, _MINUS = (ord(character) for character in "0.+-")

@@ -19,7 +19,7 @@ from rig.sensors.lines.decimal_numbers import parse_numbers
 from rig.sensors.lines.fields import TextFieldReader
 
 LONGEST_LINE = 2000  # bytes; longer input without a line end is no line
-KEPT_TEXT = 120  # characters of a rejected line for the message about it
+KEPT_TEXT = 120  # characters of a rejected line that a message quotes
 
 # Classes of bytes.
 _OTHER, _NUMBER, _SEPARATOR, _SPACE, _END, _KEY = range(6)

@@ -15,7 +15,7 @@ NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 WORDS = frozenset({"", "-", "--", "nan", "-nan", "null", "none", "na", "n/a", "inf", "-inf", "+inf", "ovf", "nil"})
 # -127 is DallasTemperature's DEVICE_DISCONNECTED_C; others print 999 or -273.15: all are impossible.
 NOT_PROVIDED: Mapping[str, Absent] = MappingProxyType({"temperature": Absent(within=POSSIBLE_C)})
-NEEDED = ("time", "sequence", *GYROSCOPE)  # required in a sample
+NEEDED = ("time", "sequence", *GYROSCOPE)  # values that a sample must have
 _AROUND_KEYS = " \t,;{}[]()\"'|&"
 
 

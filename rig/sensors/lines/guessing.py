@@ -15,15 +15,17 @@ from rig.sensors.lines.shape import NoShape, Shape
 
 Flags = NDArray[np.bool_]
 G = 9.80665
-FEWEST = 10  # lines at rest, and in motion
-TOLERANCE = 0.12  # relative, for an uncalibrated accelerometer and a rotation by hand
+FEWEST = 10  # fewest lines at rest, and in motion
+TOLERANCE = 0.12  # relative tolerance for an uncalibrated accelerometer and a rotation by hand
 COUNTS_PER_G = (1024, 2048, 4096, 8192, 16384, 32768)
-# °/s per count: InvenSense (131 … 16.4 counts a °/s), ST (8.75 … 70 m°/s), Bosch (the same), Analog Devices.
+# °/s per count: InvenSense (131 … 16.4 counts per °/s), ST (8.75 … 70 m°/s), Bosch (as InvenSense), Analog Devices.
 COUNTS = (1 / 131, 1 / 65.5, 1 / 32.8, 1 / 16.4, 0.00875, 0.0175, 0.035, 0.07, 0.00625, 0.025, 0.1)
 SAME_SCALE = 0.03
 ROTATION_RATIO = 10.0  # least scatter of a gyroscope in rotation, relative to that at rest
-NOISE_QUANTILE, OF_STEPS = 0.9, 1.645 * 2**0.5  # of steps of noise, and their size over its standard deviation
-FLAT_S = 0.02  # interval of gravity's mean direction: in twice this the device rotates by a fifth of a radian at most
+# Quantile of the differences between readings, and its ratio to the noise's standard deviation.
+NOISE_QUANTILE, OF_STEPS = 0.9, 1.645 * 2**0.5
+# Interval over which gravity's direction is averaged: in twice this the device rotates by at most a fifth of a radian.
+FLAT_S = 0.02
 TIMES = {"ns": 1e9, "us": 1e6, "ms": 1e3, "s": 1.0}
 _NAMES = {
     "time": r"(time|timestamp|t|ts|ms|us|millis|micros|tick|ticks|uptime)(_?(us|ms|s|ns))?",
@@ -214,7 +216,7 @@ def _kind(values: Array, still: Flags) -> str | None:
     level = float(np.median(sizes[still]))
     if not len(moving):
         return "a" if _gravity(level) is not None else None
-    # From one reading to the next: a log may have rests in several attitudes.
+    # By differences between readings, because a log may have rests in several attitudes.
     scatter = float(np.linalg.norm(np.quantile(np.abs(np.diff(rest, axis=0)), NOISE_QUANTILE, axis=0))) / OF_STEPS
     if (
         np.linalg.norm(moving.std(axis=0)) > ROTATION_RATIO * max(scatter, 1e-9)

@@ -21,13 +21,13 @@ from rig.sensors.lines.time_steps import find_time_step_s
 from rig.sensors.own_port import OwnPort, PortFaults, closing_on_failure, open_device_port
 from rig.sensors.port_silence import USUAL, Patience
 
-LOOK_SAMPLES, LOOK_S = 50, 0.5  # samples, and device's time, before its rate is judged
+LOOK_SAMPLES, LOOK_S = 50, 0.5  # samples, and duration by the device's clock, before its rate is judged
 QUOTED = 60  # characters of a quoted line
 UNPRINTABLE = 0.05  # fraction of bytes above which the baud rate is wrong
 DAMAGED = 0.5  # fraction of rejected lines above which a stream is useless
 DAMAGED_LINES = 200  # least number of rejected lines for that
 RATE_TOLERANCE = 0.03
-ROUNDED = 2.0  # steps of its time: the error of the interval from both its ends
+ROUNDED = 2.0  # in steps of its time: the error of the interval, by both its ends
 _CABLE = "Check its supply and cable, and whether another program has the port"
 
 # Values (n, columns) as printed, their numbers (n,) from 0, their times (n,) in µs, and the time of the read.

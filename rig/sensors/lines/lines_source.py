@@ -32,7 +32,8 @@ from rig.sensors.sample_source import OnSamples
 from rig.sensors.scales import DEGREES_PER_COUNT, FIELD_FULL_SCALE_T, FULL_SCALE_COUNTS, thermometer_channels
 from rig.sensors.thermometer import Thermometer
 
-AT_THE_END = 1 - 1e-4  # fraction of the range at which readings count as saturated, within a 16-bit count of its end
+# Fraction of the range from which on readings count as saturated: within a 16-bit count of the end.
+AT_THE_END = 1 - 1e-4
 LookResult = str | SensorError
 AXES = {RATE: GYROSCOPE, ACCELERATION: ACCELEROMETER, FIELD: MAGNETOMETER}
 _TriadSection = LineRateSection | LineAccelerationSection | LineFieldSection
@@ -46,7 +47,7 @@ class FirstLines:
     time_step_s: float = 0.0
 
 
-NOT_CONNECTED = FirstLines()  # of a device before a connection: by its section
+NOT_CONNECTED = FirstLines()  # before a connection, according to the section
 
 
 class LinesSource:

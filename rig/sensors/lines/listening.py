@@ -9,10 +9,10 @@ from rig.sensors.lines.shape import TimedLine
 from rig.sensors.own_port import open_device_port
 
 USUAL = (115200, 921600, 460800, 230400, 57600, 38400, 19200, 9600, 500000, 1000000, 250000, 2000000)
-TRIED_S = 1.2  # at each baud rate
+TRIED_S = 1.2  # time spent at each baud rate
 LIKE_TEXT = 0.97
 STILL_S, TURNED_S = 4.0, 6.0
-ENDLESS = LONGEST_LINE + 100  # bytes stored of a line that is too long anyway
+ENDLESS = LONGEST_LINE + 100  # stored bytes of a line that is too long anyway
 
 
 def listen(

@@ -18,12 +18,14 @@ from rig.sensors.lines.guessing import Guess, guess_triads
 NAMES = {"g": "_rad_s", "a": "_m_s2", "m": "_t"}
 SENSORS = {"g": "gyroscope", "a": "accelerometer", "m": "magnetometer"}
 SI_UNITS = {"g": "rad/s", "a": "m/s2", "m": "T"}
-OPEN = "?"  # where a number is still to be stated
-HOTTEST_C = 200.0  # that a part with a thermometer survives
-LIKELY_HZ = 100.0  # of a log without times
-LARGEST_COUNT = 500.0  # whole numbers beyond it are steps of a converter
-BLOCK_S, QUIETEST, AS_QUIET = 0.25, 0.1, 3.0  # a block as quiet as the quietest tenth is at rest
-LARGEST_RAD_S, NOISIEST_RAD_S = 40.0, 0.02  # more than a gyroscope reads in rad/s, or scatters at rest
+OPEN = "?"  # placeholder for a number that the user must state
+HOTTEST_C = 200.0  # temperature that a part with a thermometer survives
+LIKELY_HZ = 100.0  # rate of a log without times
+LARGEST_COUNT = 500.0  # larger whole numbers are steps of a converter
+# A block is at rest if its scatter is at most this many times that of the quietest tenth.
+BLOCK_S, QUIETEST, AS_QUIET = 0.25, 0.1, 3.0
+# Larger than the readings of a gyroscope in rad/s, and than its scatter at rest.
+LARGEST_RAD_S, NOISIEST_RAD_S = 40.0, 0.02
 NORM_TOLERANCE = 2e-3
 AXES = ("x", "y", "z")
 REFERENCE = {name for group in MOTIONS["attitudes"].optional for name in group} | {"start_s", "end_s"}
@@ -33,7 +35,7 @@ GRAVITY = {"m/s2": STANDARD_GRAVITY_M_S2, "g": 1.0, "mg": 1000.0}
 ANGLE_WORDS = {"yaw", "pitch", "roll", "heading", "azimuth", "phi", "theta", "psi", "euler"}
 ROUND_STEPS = (131.0, 65.5, 32.8, 16.4)  # steps per °/s, as data sheets state them
 
-ColumnEntry = Mapping[str, Any]  # of a column: its name or number, and its unit
+ColumnEntry = Mapping[str, Any]  # a column's entry: its name or number, and its unit
 
 
 @dataclass(frozen=True, slots=True)

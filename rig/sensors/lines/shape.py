@@ -15,14 +15,14 @@ from rig.estimation.arrays import Array
 from rig.sensors.lines.decoding import LONGEST_LINE
 from rig.sensors.lines.fields import NUMBER, WORDS
 
-MOST_NUMBERS = 40  # in a line, the limit of a section
+MOST_NUMBERS = 40  # numbers in a line, at most: the limit of a section
 LARGEST = 1e30  # a larger number is no measurement, and its square overflows
 ENOUGH = 0.6  # fraction of the lines that must be alike
 FEWEST = 30
 _NUMBER = re.compile(r"(?<![A-Za-z0-9_.])[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?(?![A-Za-z0-9_])")
 _SUM = re.compile(r"\*([0-9A-Fa-f]{2})$")
 _SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab", "": "space"}
-_CheckedLine = tuple["TimedLine", str, bool]  # a line, its text without checksum, and whether that is right
+_CheckedLine = tuple["TimedLine", str, bool]  # a line, its text without checksum, and whether the checksum is right
 _AROUND = " \t,;{}[]()|&"
 _COLOURS = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
 _BEFORE_A_NUMBER = re.compile(r"(.*[^0-9.+\-])([-+]?[0-9.]+(?:[eE][-+]?\d+)?)")

@@ -12,7 +12,7 @@ from rig.config.units import UNITS
 from rig.estimation.arrays import Array
 from rig.sensors.errors import SensorError
 
-ODD_SAMPLES = 3  # samples in a row with an impossible time: fewer are damaged, these are a restart
+ODD_SAMPLES = 3  # samples in a row with an impossible time: fewer are damaged, as many are a restart
 COARSE = 0.2  # fraction of the sample interval: a time with coarser steps is smoothed
 SMOOTHED_S = 2.0  # time constant of smoothing arrival times and coarse ones
 ARRIVAL_GAP_S = 0.1  # delay of a line above which one counts as lost

@@ -5,7 +5,7 @@ import numpy as np
 from rig.config.units import UNITS
 from rig.estimation.arrays import Array
 
-GROWS = 2.0  # growth of the step of a single-precision number that doubles
+GROWS = 2.0  # factor by which the step of a single-precision number grows if the number doubles
 
 
 def find_time_step_s(printed: Array, decimals: int, unit: str) -> float:

@@ -25,7 +25,7 @@ AUTOPILOT_VERSION = 148
 ACCEPTED = 0  # MAV_RESULT
 _CABLE = "Check its supply and cable, and whether another program, such as a ground station, has the port"
 
-# Messages of pymavlink in their order, each with whether none was lost before it, and the time of the read.
+# Messages of pymavlink in order, each with whether no message before it was lost, and the time of the read.
 OnMessages = Callable[[list[tuple[Any, bool]], float], None]
 
 

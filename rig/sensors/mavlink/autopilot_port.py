@@ -47,7 +47,7 @@ class UdpPort:
     def write(self, data: bytes) -> None:
         """Send data; drop it as long as no autopilot has sent anything, because its address is not known yet."""
         if self._peer is not None:
-            with suppress(BlockingIOError, ConnectionRefusedError):  # no receiver at the moment: the silence shows it
+            with suppress(BlockingIOError, ConnectionRefusedError):  # no receiver at present: it shows as silence
                 self._socket.sendto(data, self._peer)
 
     def close(self) -> None:

@@ -39,7 +39,7 @@ from rig.sensors.thermometer import Thermometer
 RATE_LOOK = 40  # messages for judging the rate
 RATE_WAIT_S = 20.0
 RATE_TOLERANCE = 0.05
-ASKED_FOR, ASKED_S = 10, 2.0  # messages that a look requests one by one, and its wait for them
+ASKED_FOR, ASKED_S = 10, 2.0  # messages that a check requests one by one, and its wait for them
 WIDEST = 0.98  # fraction of the 16-bit range, because undoing a correction may shift the end of the scale
 
 

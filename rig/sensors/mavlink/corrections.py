@@ -20,7 +20,7 @@ from rig.sensors.mavlink.dialect import ARDUPILOT
 from rig.sensors.mavlink.orientations import board_rotation
 
 AXES = "XYZ"
-LEAST_CUTOFF_HZ = 5.0  # a slower low-pass has not settled when a sweep's steady part begins
+LEAST_CUTOFF_HZ = 5.0  # a slower low-pass filter has not settled when a sweep's steady part begins
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +86,7 @@ def parameter_names(firmware: int, section: MavlinkSection) -> ParameterNames:
             filters=("INS_GYRO_FILTER", "INS_ACCEL_FILTER"),
             others=("INS_GYR2_ID", "INS_GYR3_ID"),
         )
-    # Its estimator's bias affects HIGHRES_IMU alone; it learns offsets by itself at supposed rest.
+    # Its estimator's bias affects HIGHRES_IMU alone; the estimator learns offsets when it assumes rest.
     bias = ("EKF2_EN",) if section.imu == "HIGHRES_IMU" else ()
     board = tuple(f"SENS_BOARD_{axis}_OFF" for axis in AXES)
     return ParameterNames(

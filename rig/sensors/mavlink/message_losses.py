@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 from rig.sensors.errors import SensorError
 
 SEQUENCE_NUMBERS = 256
-LATE = 64  # a number at most this far before the newest belongs to an overtaken message
-REMEMBERED = 64  # recent messages to detect copies of
+LATE = 64  # a message whose number is at most this far before the newest was overtaken
+REMEMBERED = 64  # recent messages that are compared to detect copies
 TIME_WRAP = 1 << 32
 LONGEST_GAP_US = 60e6  # a longer step is a restarted clock
-MISSING = 1.5  # intervals between samples above which one is missing: a scheduler may be late
+MISSING = 1.5  # in intervals between samples: after a longer one a sample is missing, although a scheduler may be late
 
 
 @dataclass(slots=True)
