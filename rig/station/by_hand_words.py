@@ -12,7 +12,7 @@ from rig.data.recording.hand_events import (
 )
 from rig.station.events import HandSeen, RunEvent
 
-RED_FROM = 0.8  # of the range: above it a reading may clip
+RED_FROM = 0.8  # fraction of the range, above which a reading may be saturated
 
 
 def by_hand_line(event: RunEvent) -> str | None:

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from rich.text import Text
 
 
-LONG_S = 600.0  # longer times are in minutes
+LONG_S = 600.0  # longer durations are shown in minutes
 NARROWEST, USUAL = 30, 80  # columns of a terminal: the least for breaking lines, and the default
 INDENT = "  "
 COMMAND = re.compile("(`[^`]*`|(?<=: )rig .*$)")  # between backticks, or at the end of a line

@@ -21,8 +21,8 @@ class Choice:
     yes: bool
 
 
-# The first choice is the primary one: the safe one wherever something is in doubt. No word answers two questions with
-# yes except the plain "yes", so an answer to one question starts nothing at another.
+# The first choice is the primary one: the safe one wherever there is doubt. Except for the plain "yes", no word
+# confirms two different questions, so an answer that comes too late starts nothing.
 CHOICES: Mapping[Kind, tuple[Choice, ...]] = {
     "number": (),
     "mount": (Choice(("",), "It is mounted", True), Choice(("no", "n"), "Put it aside", False)),
