@@ -77,7 +77,7 @@ def _draw(rows: list[dict[str, Any]], figure: "Figure") -> None:
         noises = [row["noise_rad_s"] for row in chosen]
         panel.plot(noises, [row["scale_bias_percent"] for row in chosen], "o-", label=label)
     noise = np.linspace(0, 0.2)
-    expected = -50 * (3 * noise**2 / sim.ARM_RAD_S**2 + sim.VIBRATION_FRACTION**2)  # %
+    expected = -50 * (3 * noise**2 / sim.ARM_RAD_S**2 + sim.VIBRATION_FRACTION**2)  # in %
     panel.plot(noise, expected, "k:", label="−(3 σ²/ω² + ε²) / 2")
     panel.set(xlabel="noise of one sample, rad/s", ylabel="mean error of the scale factor, %")
     panel.set_title("averaging and squaring at 60°/s, 200 Hz")

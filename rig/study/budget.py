@@ -31,11 +31,11 @@ DRAWS, BATCHES = 1500, 30
 REST_S = 2.6
 # Lever arms of the flange's centre from wrists 3, 1 and 2: offsets d5 and d6 of a UR10e (maker's article 45257).
 ARMS_M = np.array([[0.0, 0.0, 0.0], [0.11985, 0.0, 0.11655], [0.0, 0.0, 0.11655]])
-STEP_S = 0.05  # of the bias random walk
-ATTITUDES = 72  # per revolution
+STEP_S = 0.05  # step of the bias random walk
+ATTITUDES = 72  # attitudes per revolution
 MOUNTING_RAD, SKEW_RAD = np.radians(5.0), np.radians(0.25)
 SAMPLE_RATE_HZ = 238.0
-WARM_UP_S, STEP_K = 300.0, 1 / 16  # of the thermometer of a LSM9DS1: DocID025715, table 4
+WARM_UP_S, STEP_K = 300.0, 1 / 16  # warm-up, and the resolution of the thermometer of a LSM9DS1: DocID025715, table 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +119,7 @@ def _simulate_session(effects: Effects, rng: np.random.Generator) -> Array:
         [np.cos(latitude) * np.cos(heading), np.cos(latitude) * np.sin(heading), np.sin(latitude)]
     )
     up = np.array([0.0, 0.0, 1.0])
-    sensitivity = rng.normal(0, effects.g_sensitivity_rad_s_g, (3, 3))  # of the axes to specific force
+    sensitivity = rng.normal(0, effects.g_sensitivity_rad_s_g, (3, 3))  # sensitivity of the axes to specific force
     attitudes = true.attitudes.mean(axis=1)
     lever_arms_m = true.arms_m + rng.uniform(-effects.offset_m, effects.offset_m, 3)
     force = attitudes @ up + centripetal_m_s2(true.rates_rad_s, lever_arms_m) / STANDARD_GRAVITY_M_S2

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 MOUNTING_DEG = (0.0, 1.0, 2.0, 5.0, 10.0, 15.0, 20.0)
 SKEW_DEG = (0.0, 0.25, 0.5, 1.0, 1.5, 2.0, 3.0)
-# The varied quantity, its angles, and the mounting error meanwhile (None: these angles).
+# The varied quantity, its angles, and the mounting error (None: the varied quantity itself).
 SWEEPS: dict[str, tuple[tuple[float, ...], float | None]] = {
     "mounting": (MOUNTING_DEG, None),
     "non-orthogonality, mounted straight": (SKEW_DEG, 0.0),
