@@ -78,6 +78,6 @@ def tell_of_stop(error: BaseException, stop: Callable[[], StopOutcome]) -> None:
     """Stop, and add the outcome as a note to the error that caused the stop."""
     try:
         outcome = stop()
-    except KeyboardInterrupt:  # one more, on the way out; the stop has ended by now
+    except KeyboardInterrupt:  # a further interrupt on the way out; the stop has ended by now
         outcome = stop()
     error.add_note(". ".join(filter(None, (outcome.what, outcome.remedy))))

@@ -49,7 +49,8 @@ def kind_of(section: TurnerSection) -> AnyTurner:
 
 def words_of(name: str) -> Wording:
     """Return the wording for a kind of turner; general terms for a kind that is not installed."""
-    # One in stock alone: to look for those of packages takes as long as to write the certificate that needs the words.
+    # Only the stock one: to search for those of packages takes as long as to write the certificate that needs the
+    # words.
     kind: AnyTurner | None = _stock(name).load() if name in STOCK_TURNERS else installed().get(name)
     if kind is not None:
         return kind.words

@@ -26,7 +26,7 @@ from rig.turners.servo.servo_registers import (
 from rig.turners.servo.servo_state import ServoReport, decode
 
 PINGS = 4
-LISTEN_S = 0.012  # after each ping, for another's answer
+LISTEN_S = 0.012  # time after each ping in which another servo may answer
 ROUND_TRIPS = 15
 ANSWER_ALL = 2  # value of Status Return Level: every write is acknowledged
 
@@ -82,7 +82,7 @@ def _request_acknowledgements(bus: Bus) -> None:
         level = 0
     if level != ANSWER_ALL:
         bus.write_unheard(RETURN_LEVEL, ANSWER_ALL)
-        bus.settle()  # which it may acknowledge already
+        bus.settle()  # it may acknowledge already
 
 
 def _report(bus: Bus, port: str, servo_id: int) -> ServoReport:
@@ -124,6 +124,6 @@ def _report(bus: Bus, port: str, servo_id: int) -> ServoReport:
         startup=bus.look_up(STARTUP)[0] if firmware >= STARTUP_FIRMWARE else None,
         shutdown=bus.look_up(SHUTDOWN)[0],
         torque_on=bool(bus.look_up(TORQUE)[0]),
-        round_trip_s=sorted(round_trips)[1],  # near the least: the others include delays of this computer
+        round_trip_s=sorted(round_trips)[1],  # the second shortest: the others include delays of this computer
         state=states[-1],
     )

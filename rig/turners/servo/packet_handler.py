@@ -17,10 +17,10 @@ with suppress(ImportError):  # on Windows
     import termios
 
     FAILURES.append(termios.error)
-SLACK_S = 0.020  # return delay (0.5 ms as delivered), latency of the adapter, and a busy host
+SLACK_S = 0.020  # return delay (0.5 ms as delivered), latency of the adapter, and delays of a busy host
 SETTLE_MOST_S = 0.1  # the longest wait for a line to fall silent
 ATTEMPTS = 4  # a write without acknowledgement is read back, and repeated if it did not take effect
-ALERT = 0x80  # in the error byte: Hardware Error Status is not zero. A flag, no failure of the instruction
+ALERT = 0x80  # bit of the error byte: Hardware Error Status is not zero. The instruction itself has not failed
 SUCCESS, NOT_SENT = 0, (-1000, -1001, -2000)  # results of the packet handler: port busy, not sent, wrong instruction
 DAMAGED = -3002
 ID, LENGTH, ERROR, DATA = 4, 5, 8, 9  # indices in a status packet of protocol 2.0
@@ -61,7 +61,7 @@ class Bus:
         self._id, self._path, self.clock = servo_id, path, clock
         self._packets: Any = PacketHandler(2.0)
         self._gone = False
-        self.alert = False  # of the newest reply
+        self.alert = False  # flag of the newest reply
         try:
             self._port = Port(path, baud, SLACK_S, clock)
         except (OSError, ValueError) as error:  # SerialException is an OSError
@@ -108,9 +108,7 @@ class Bus:
             while result == SUCCESS and (not reply or reply[ID] != self._id):
                 reply, result = self._packets.rxPacket(self._port, False)
         self._judge(result, reply[ERROR] if result == SUCCESS else 0, register)
-        if (
-            reply[LENGTH] + 256 * reply[LENGTH + 1] != register.size + WITHOUT_DATA
-        ):  # the late reply to another question
+        if reply[LENGTH] + 256 * reply[LENGTH + 1] != register.size + WITHOUT_DATA:  # a late reply to another request
             raise ReplyLost(damaged=True)
         return bytes(reply[DATA : DATA + register.size])
 
@@ -182,7 +180,7 @@ class Bus:
             raise PortGone("it has been closed")
         try:
             yield
-        except IndexError as error:  # it reads on in a reply that is too short
+        except IndexError as error:  # the packet handler reads beyond a reply that is too short
             self._port.is_using = False
             raise ReplyLost(damaged=True) from error
         except tuple(FAILURES) as error:

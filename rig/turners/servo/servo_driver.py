@@ -27,12 +27,12 @@ from rig.turners.stop_once import StopOnce, StopOutcome, stopping_on_error, tell
 
 WATCH_S = 0.02  # the caller's watch is called at least this often
 ARRIVAL_RAD = 15 * PULSE_RAD  # 1.3°: the position error at rest of a servo without an integral gain
-SLOWNESS, SLOWNESS_S = 1.1, 1.0  # tolerance on a move's planned duration: "t4" of the manual, and settling
+SLOWNESS, SLOWNESS_S = 1.1, 1.0  # tolerance of a move's planned duration: "t4" of the manual, and settling
 FIRST_STATE_S = 5.0
-STANDING_S = 3.0  # states must show rest within this time before control is taken
-UNWATCHED_S = 2.0  # a move without supervision for this time is stopped
+STANDING_S = 3.0  # time within which states must show rest before control is taken
+UNWATCHED_S = 2.0  # time without supervision, after which a move is stopped
 HUNG_S = 1.0  # the link's thread repeats its loop at least this often
-KEPT_S = 1.0  # length of the buffer of states that tells rest from motion
+KEPT_S = 1.0  # duration of the buffered states that distinguish rest from motion
 NOT_CONTROLLED = StopOutcome(True, "the servo was not under control")
 NOT_ENDED = StopOutcome(False, "the stop has not ended", f"Look at the shaft: {SURE}")
 
@@ -206,7 +206,7 @@ class Servo:
         try:
             outcome = self.stop()
             if self._holds and outcome.at_rest and self._link.alive:
-                with suppress(BusError):  # else the watchdog trips, which does no harm to a shaft that stands
+                with suppress(BusError):  # otherwise the watchdog trips, which does no harm to a shaft at rest
                     self._link.supervising = False
                     self._link.call(disarm, also_stopped=True)
         finally:
@@ -224,7 +224,7 @@ class Servo:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        is_reported = self._problem is not None and isinstance(error, RigError)  # with the outcome of the stop
+        is_reported = self._problem is not None and isinstance(error, RigError)  # reported with the outcome of the stop
         if error is not None and not is_reported:
             tell_of_stop(error, self.stop)
         self.close()

@@ -15,10 +15,11 @@ from rig.turners.servo.servo_preflight import hardware_problem
 from rig.turners.servo.servo_registers import HARDWARE_ERROR, STATE, TORQUE, TRIPPED, WATCHDOG
 from rig.turners.servo.servo_state import ServoState, decode
 
-LOST_MOST, SILENCE_S = 5, 0.4  # tolerated: states lost in a row, and time without a state
-LOOK_S = 0.1  # period of reading what the block of states lacks: torque and watchdog, alternately
+LOST_MOST, SILENCE_S = 5, 0.4  # tolerated number of states lost in a row, and time without a state
+LOOK_S = 0.1  # period of reading what the state packet lacks: torque and watchdog, alternately
 HELD_UP_S = 0.05  # a longer transaction leaves the time of the position unknown
-TICK_S, TICK_FRACTION = 0.005, 0.02  # agreement of the servo's clock with ours; else the reply is late
+# Tolerance of the servo's clock relative to ours: with a larger difference the reply is late.
+TICK_S, TICK_FRACTION = 0.005, 0.02
 UNLIKE_MOST = 4  # after more such replies in a row the servo's clock has restarted
 JOB_S = 5.0  # a caller's longest wait for a job
 
@@ -53,8 +54,8 @@ class ServoLink:
         self._looks = 0
         self._quiet_until_s = 0.0
         self._stopping = False
-        self.torque_off = False  # and not by the rig
-        self.supervising = False  # torque is on and the watchdog armed: anything else is a problem
+        self.torque_off = False  # not switched off by the rig
+        self.supervising = False  # while torque is on and the watchdog armed: any other state is a problem
         self.turned_s = self._clock.now_s()  # time of the last loop
 
     def start(self) -> None:
@@ -185,7 +186,7 @@ class ServoLink:
         register = WATCHDOG if self._looks % 2 else TORQUE
         try:
             (value,) = self._bus.read(register)
-            if register is TORQUE and not value:  # mostly a shutdown, whose reason may not have been read yet
+            if register is TORQUE and not value:  # usually a shutdown, whose reason may not have been read yet
                 self.torque_off = True
                 (self._error_bits,) = self._bus.read(HARDWARE_ERROR)
         except (ReplyLost, InstructionDenied):

@@ -8,15 +8,15 @@ import math
 from dataclasses import dataclass
 
 MAKER = "ROBOTIS"
-PULSES = 4096  # per revolution; 12 bits, 0.088°
+PULSES = 4096  # pulses per revolution; 12 bits, 0.088°
 PULSE_RAD = 2 * math.pi / PULSES
 FARTHEST = 1_048_575  # pulses in either direction in extended position mode: 256 revolutions
-SPEED_RAD_S = 0.229 * 2 * math.pi / 60  # Present Velocity, Velocity Limit: 0.229 rev/min
-LONGEST_MS = 32_737  # of a time-based profile
-TICKS = 32_768  # Realtime Tick counts milliseconds and begins anew
+SPEED_RAD_S = 0.229 * 2 * math.pi / 60  # unit of Present Velocity and Velocity Limit: 0.229 rev/min
+LONGEST_MS = 32_737  # longest duration of a time-based profile
+TICKS = 32_768  # Realtime Tick counts milliseconds modulo this
 
-# Smooth motion allows a fifth of the stall torque: the maker's performance
-# graphs are measured with a rising load and end there ("note on performance graph").
+# Smooth motion takes at most a fifth of the stall torque: the maker's performance graphs are measured with a rising
+# load and end there ("note on performance graph").
 LOAD_FRACTION = 0.2
 
 

@@ -13,9 +13,9 @@ import serial
 
 from rig.turners.servo.driver_clock import Clock
 
-WAIT_S = 0.002  # longest wait of a read for its bytes; then the time-out is checked
-WRITE_S = 1.0  # a longer write has no receiver; pyserial's count includes delays of this program
-BITS = 10  # per byte on the line: start, eight, stop
+WAIT_S = 0.002  # longest wait of a read for its bytes, after which the time-out is checked
+WRITE_S = 1.0  # a write that takes longer has no receiver; pyserial's time-out includes delays of this program
+BITS = 10  # bits per byte on the line: start, eight, stop
 
 
 class Port:

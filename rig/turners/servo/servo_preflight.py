@@ -18,7 +18,7 @@ from rig.turners.servo.servo_registers import (
 from rig.turners.servo.servo_state import ServoReport
 
 GRAVITY_M_S2 = 9.81
-HEADROOM_C = 10.0  # margin below its limit: a servo that holds and turns for minutes grows warmer
+HEADROOM_C = 10.0  # margin below the temperature limit: a servo that holds and turns for minutes warms up
 
 
 def servo_problems(report: ServoReport, wanted_model: str, carried: FlangeLoad, period_s: float) -> list[Problem]:

@@ -22,7 +22,7 @@ SERVO_FIELDS = (
 )
 SERVO_STATE_DTYPE = state_dtype(1, SERVO_FIELDS)
 JOINTS = ("shaft",)
-STILL_S, STILL_STATES = 0.15, 5  # duration and number of states of a shaft at rest
+STILL_S, STILL_STATES = 0.15, 5  # duration and number of the states that show a shaft at rest
 STILL_RAD = 6.5 * PULSE_RAD  # range of its angles: a shaft at rest dithers by ±3 pulses (forum.robotis.com 7582)
 
 

@@ -20,7 +20,7 @@ from rig.turners.servo.servo_link import ServoLink
 from rig.turners.servo.servo_registers import TRIPPED, WATCHDOG
 from rig.turners.stop_once import StopOutcome
 
-STOP_S = 0.95  # a stop is confirmed within this, or not at all
+STOP_S = 0.95  # a stop is confirmed within this time, or not at all
 ACKNOWLEDGE_S = 0.25  # the longest wait for an acknowledgement
 SURE = "only the switch of its supply is sure"
 

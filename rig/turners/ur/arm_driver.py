@@ -41,15 +41,15 @@ from rig.turners.ur.supervision import ControlStage, Supervision, describe_early
 
 WATCH_S = 0.02  # the caller's watch is called at least this often
 ARRIVAL_RAD = 0.01  # the joint servo's ripple and lag stay below this
-START_S = 5.0  # a move begins within this (wall time), or not at all
+START_S = 5.0  # a move begins within this wall time, or not at all
 LAST_STOP_S = 0.8  # time for one more stop order if no state has confirmed the stop
 SLOWNESS = 1.1  # a move may take this much longer than planned …
 SLOWNESS_S = 1.0  # … plus this, in the controller's time
-REPORT_S = 5.0  # … and to report it, in wall time, once the arm stands at its target
+REPORT_S = 5.0  # … and the wall time to report it, once the arm has reached its target
 SILENCE_S = 0.8  # after a longer silence the controller may have lost the client
 REASON_S = 0.2  # a failure waits this long (wall time) for its explanation
 OUR_PROGRAM = "rtde_control"  # the client's name for it
-NOT_BEGUN = ("not_in_remote_control", "registers_in_use")  # reasons that kept the client from starting a program
+NOT_BEGUN = ("not_in_remote_control", "registers_in_use")  # reasons for which the client could not start a program
 NOT_CONTROLLED = StopOutcome(True, "the arm was not under control")
 NOT_ENDED = StopOutcome(False, "the stop has not ended", "Look at the arm")
 
@@ -95,7 +95,7 @@ class Arm:
         self._problem: Problem | None = None
         self._doing = "the preparation"
         self._holds_arm = False  # a program of ours may run, so this driver has to stop the arm
-        self._forwards_states = True  # whether states go to `on_state`; not after an impossible one
+        self._forwards_states = True  # whether states are passed to `on_state`; not after an impossible one
         self._supervision = Supervision()
         self._watch: ControlWatch | None = None
         self._silent_s = 0.0  # the controller's longest silence since the last move ended
@@ -259,7 +259,7 @@ class Arm:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        is_reported = self._problem is not None and isinstance(error, RigError)  # with the outcome of the stop
+        is_reported = self._problem is not None and isinstance(error, RigError)  # reported with the outcome of the stop
         if error is not None and not is_reported:
             tell_of_stop(error, self.stop)
         warning = self._close()

@@ -22,9 +22,9 @@ from rig.turners.ur.controller.robot_api import RobotApi
 from rig.turners.ur.identity import is_polyscope_x
 
 ASK_S = 0.5  # period of polling the control mode
-LOOK_S = 0.1  # the thread ends within this after `close`
+LOOK_S = 0.1  # time within which the thread ends after `close`
 ANSWER_S = 0.8
-GONE_S, CLOSED_S = 1.0, 0.25  # states that continue this long show that the port alone is gone
+GONE_S, CLOSED_S = 1.0, 0.25  # time for which states continue: it shows that only the port is gone
 
 Remote = bool | None  # None: unknown to the controller
 ControlMode = Remote | Literal["gone"]
@@ -53,7 +53,7 @@ class ControlWatch:
         self._primary: socket.socket | None = None
         self._buffer = bytearray()
         self._closed_s: float | None = None  # time at which the primary interface last closed its connection
-        self._gone_since_s: float | None = None  # time from which on no port answers
+        self._gone_since_s: float | None = None  # time since which no port answers
         self.exception: str | None = None  # the controller's latest reason for ending a program
         self.stopped_programs: set[str] = set()  # by their names
         self._ending = threading.Event()

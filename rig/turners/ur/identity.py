@@ -18,10 +18,10 @@ if TYPE_CHECKING:
     from rig.config.models import ArmSection
 
 E_SERIES, POLYSCOPE_X = 5, 10  # first major versions of their software; the CB3 series has 3
-POLYSCOPE_X_SINCE = (10, 10)  # older ones may not take programs and stops at their primary interface
+POLYSCOPE_X_SINCE = (10, 10)  # earlier versions may not take programs and stops at their primary interface
 E_SERIES_MODELS = {
-    1: "UR5e or UR7e",  # same construction, for different payloads
-    2: "UR10e or UR12e",  # same construction, for the same payload
+    1: "UR5e or UR7e",  # same construction, different payloads
+    2: "UR10e or UR12e",  # same construction, same payload
     3: "UR3e",
     4: "UR16e",
     5: "UR18",

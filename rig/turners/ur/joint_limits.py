@@ -12,7 +12,7 @@ from rig.motion.turner_state import JOINT_NAMES, JointLimits, Joints
 
 OURS, THEIRS = "the limit", "the controller's limit"
 WIDER = ", or widen that limit in the arm's safety settings"
-ROUNDING = 1e-6  # relative to a limit
+ROUNDING = 1e-6  # tolerance relative to a limit
 
 
 def motion_problems(motion: Motion, ours: JointLimits, theirs: JointLimits | None) -> list[Problem]:

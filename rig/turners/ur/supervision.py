@@ -6,8 +6,8 @@ from rig.errors import Problem
 from rig.motion.turner_state import ArmState, RuntimeState
 from rig.turners.ur.condition import FULL_SPEED_FRACTION, program_interruption, readiness, speed_limited
 
-INTERRUPTION_S = 0.05  # wait after a stopped program for the safety bits that explain it
-LIMITED_S = 0.1  # a reduced speed of this duration in a movement is not a ramp of the controller
+INTERRUPTION_S = 0.05  # wait after a program ended, for the safety bits that explain it
+LIMITED_S = 0.1  # duration of reduced speed in a movement: a longer one is no ramp of the controller
 FIELDBUS = (
     "Make sure that nobody uses the pendant; check whether a fieldbus (EtherNet/IP, PROFINET) without a connection is "
     "set to stop or pause programs, in the installation under Fieldbus; then start again"
@@ -35,7 +35,8 @@ class Supervision:
         self.stage = ControlStage.LOOKING
         self.moving = False
         self._played = False  # whether a state showed our program running
-        self._interruption: tuple[Problem, float] | None = None  # with the time of the state that showed it first
+        # The problem, with the time of the first state that showed it.
+        self._interruption: tuple[Problem, float] | None = None
         self._limited_since_s: float | None = None
 
     def judge(self, state: ArmState) -> Problem | None:

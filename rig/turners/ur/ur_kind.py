@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 
 
 def _connect(section: ArmSection, on_state: OnState, log: Path) -> AbstractContextManager[Turner]:
-    from rig.turners.ur import arm_driver  # with multiprocessing and HTTP: a plan needs neither
+    # Imported here: it imports multiprocessing and HTTP, which a plan does not need.
+    from rig.turners.ur import arm_driver
 
     rate_hz = min(section.state_rate_hz, model_of(section).state_rate_hz)
     return arm_driver.Arm(section.host, on_state, rate_hz, log, robot_api_port=section.robot_api_port)

@@ -47,9 +47,9 @@ class ChildLink:
         self._ended = threading.Event()
         self._sending = threading.Lock()
         self._patient = False
-        self._silent = Silence(0, spared=SPARED)  # no message; counted once the child runs
+        self._silent = Silence(0, spared=SPARED)  # ticks without a message; counted once the child runs
         self._beaten = False  # whether a heartbeat came since the guard's last tick
-        self._frozen = Silence(0, spared=SPARED)  # heartbeats, but no new state
+        self._frozen = Silence(0, spared=SPARED)  # ticks with heartbeats, but without a new state
         self._silent_s = 0.0  # time without data from the controller
         self._is_remote = False  # whether the controller runs on another machine
         context = multiprocessing.get_context("spawn")
@@ -120,7 +120,7 @@ class ChildLink:
             if thread is not threading.current_thread():
                 thread.join(1.0)
         self._pipe.close()
-        with suppress(ValueError):  # killed, but still in a system call; it ends with that
+        with suppress(ValueError):  # killed, but still in a system call; it ends after that
             self._process.close()
 
     def kill(self) -> None:

@@ -14,7 +14,7 @@ def control_failure(host: str, version: tuple[int, ...], reason: str) -> Problem
     """Describe why the client's constructor failed, by its message."""
     if "remote control" in reason:
         return local_control(host)
-    if "already in use" in reason:  # taken after the check
+    if "already in use" in reason:  # the register was taken after the check
         return registers_in_use(host, version)
     return Problem(
         "control_not_taken",

@@ -53,11 +53,11 @@ HEARTBEAT_S = 0.01
 MOVE_POLL_S = 0.003
 FIRST_PACKET_S = 5.0
 TICK_S = 0.1
-PARENT_TICKS = 20  # 2 s without a sign of the parent's life
+PARENT_TICKS = 20  # 2 s without a sign of life from the parent
 PARENT_SPARED = 2  # factor on that limit while the parent gets no processor
-ABANDON_S = 5.0  # time for the last stop, over the controller's own ports or else over the client
-PAYLOAD_S = 1.0  # the payload shows in the states within this, by the controller's clock and by this machine's
-PAYLOAD_TRIES = 3  # the client gives up after 4 s in which its script is not ready
+ABANDON_S = 5.0  # time for the last stop, over the controller's own ports or over the client
+PAYLOAD_S = 1.0  # time until states show the payload, by the controller's clock and by this machine's
+PAYLOAD_TRIES = 3  # a try ends after 4 s if the client's script is not ready
 PAYLOAD_TOLERANCE_KG, CENTRE_TOLERANCE_M = 0.01, 0.001
 REGISTERS_S = 2.0  # time for the controller to report its free registers
 SILENCE_S = 0.8  # after a longer silence the controller may have lost the client
@@ -96,14 +96,15 @@ class _Child:
         self._robot_api_port = robot_api_port
         self._state_rate_hz = state_rate_hz
         self._sending = threading.Lock()
-        self._states: StateStream  # this and the next: set once connected
+        self._states: StateStream  # this and the next are set once connected
         self._latest: StatePacket
         self._control: Any = None
-        self._carried: StatePacket | None = None  # with the payload that the controller uses, once set
+        self._carried: StatePacket | None = None  # the state that shows the payload of the controller, once set
         self._beats = 0  # heartbeats sent
         self._holds_arm = False  # whether our program may run on the controller
         self._operations_before: int | None = None  # change count before the running move; None when none runs
-        self._serving = False  # a request is being served: others, and the parent's signs of life, wait in the pipe
+        # Whether a request is being served: other messages, and the parent's signs of life, wait in the pipe.
+        self._serving = False
         self._parent = Silence(os.getppid(), spared=PARENT_SPARED)
 
     def send(self, message: Message) -> None:

@@ -27,7 +27,7 @@ class PrimaryStop:
 
     name = "primary interface"
     tells_of_programs = True
-    acknowledged = False  # the interface acknowledges nothing
+    acknowledged = False  # the interface never acknowledges
 
     def __init__(self, host: str, timeout_s: float) -> None:
         self.refusal: str | None = None

@@ -15,11 +15,11 @@ from rig.errors.quoting import printable
 
 PORT = 80
 BASE = "/universal-robots/robot-api"
-SINCE = (10, 11)  # versions before it have none
+SINCE = (10, 11)  # the first version that has one
 PROGRAM = "/program/v1/state"
 CONTROL_MODE, INFORMATION = "/system/v1/controlmode", "/system/v1/information"
 ANSWER_BYTES = 1 << 16
-REDIRECTED = 3  # most redirections: some paths have moved between versions
+REDIRECTED = 3  # largest number of redirections: some paths have moved between versions
 MOVED = (301, 302, 307, 308)
 WORD, ANSWER = 60, 160  # characters of an answer
 

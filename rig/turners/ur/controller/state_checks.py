@@ -16,8 +16,8 @@ ANGLE_RAD, SPEED_RAD_S, MODES = 1e3, 20.0, range(-1, 64)
 # A joint of the fastest arm of this kind turns by 6.3 rad/s, and by 3.14 under the rig; three times that is impossible.
 ENCODER_RAD, FASTEST_RAD_S = 0.03, 10.0
 CYCLE_S = 0.002  # the controller's cycle, at whose ends states are made: four of these for a CB3
-OFF_CYCLE = 0.3  # fraction of a cycle: a time stamp farther from its cycle is wrong
-LOST_S = 0.1  # longest gap in the states without other evidence of it
+OFF_CYCLE = 0.3  # largest fraction of a cycle between a time stamp and its cycle
+LOST_S = 0.1  # longest gap in the states that other evidence need not confirm
 RESTART = "Restart the controller if it happens again"
 
 

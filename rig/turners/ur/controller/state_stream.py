@@ -21,12 +21,14 @@ from rig.turners.ur.controller.listener import is_loopback
 from rig.turners.ur.controller.rtde_packages import PORT, VERSION, package, packages
 from rig.turners.ur.controller.state_checks import clock_step, impossible_motion, impossible_payload, impossible_state
 
-# Ten seconds at the fastest rate, if the system grants it. The rest waits at the controller, for an undocumented
-# time.
+# The buffer holds ten seconds at the highest rate, if the system grants it. Further states wait at the controller, for
+# an undocumented time.
 ROOM_BYTES = 1 << 20
-CLOCKS_DIFFER = 1.05  # a controller's clock against this computer's: far beyond the error of either
-SILENT_S = 0.3  # after a longer silence a local controller may have sent states without a receiver
-RECENT_S = 2.0  # states delayed or lost by a network show within this after the gap
+# Allowed ratio of a time by the controller's clock to that by this computer's: far more than their errors.
+CLOCKS_DIFFER = 1.05
+# Duration of a silence after which a controller on this computer may have sent states without a receiver.
+SILENT_S = 0.3
+RECENT_S = 2.0  # time after the gap within which states delayed or lost by a network show
 # The requested variables and their types. Nothing else is requested, which keeps the packets small.
 VARIABLES = {
     "timestamp": "DOUBLE",
@@ -83,7 +85,7 @@ class StateStream:
         self._deadline_s = time.monotonic() + timeout_s
         self._buffer = bytearray()
         self._period_s = 1 / rate_hz
-        self.closed = False  # by the controller, or after an impossible state
+        self.closed = False  # closed by the controller, or after an impossible state
         self.problem: Problem | None = None  # the first impossible item that it sent
         self.version: tuple[int, ...] = ()  # the controller's software: major, minor, bugfix, build
         self.silent_s = 0.0  # least time without data, excluding delays of this reader

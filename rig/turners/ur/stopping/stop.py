@@ -10,10 +10,10 @@ from rig.turners.ur.child_messages import Braked, BrakeRequest
 from rig.turners.ur.stopping.spare_descriptors import SpareDescriptors
 from rig.turners.ur.stopping.stop_paths import StopConnection, StopPath
 
-STOP_S = 0.9  # a stop is confirmed within this, or not at all
+STOP_S = 0.9  # a stop is confirmed within this time, or not at all
 PATH_S = 0.8  # time-out of a port of the controller …
-LATE_S = 0.1  # … at least this at the end of the stop's time
-LOOKS = 2  # reports on programs after which a refusal would have come
+LATE_S = 0.1  # … but at least this, at the end of the stop's time
+LOOKS = 2  # reports about programs, within which a refusal would have come
 ASK_S = 0.05  # period of asking a port whether the program has ended
 ANSWERS_S = 0.3  # wait at rest for late refusals: the time of three states
 BRAKE_RAD_S2 = 5.0
@@ -112,7 +112,7 @@ class StopOrder:
             looks += 1
             self._note(path, connection)
             self._ended = self._ended or not running
-            # The first state of a port may precede the order.
+            # The first state at a port may precede the stop order.
             if is_answered := looks >= LOOKS or connection.acknowledged or connection.refusal is not None:
                 self._remove(path, self._unanswered)
             if self._ended and is_answered:

@@ -16,7 +16,7 @@ from rig.turners.ur.supervision import describe_early_end
 
 NAME = "rig_stop_trial"
 PROGRAM = f"def {NAME}():\n  while True:\n    sync()\n  end\nend\n"
-BEGIN_S = 5.0  # as long as the client's own program may take to start
+BEGIN_S = 5.0  # time for which the client's own program may take to start
 END_S = 2.0
 
 
