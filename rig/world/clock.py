@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 TICKS_PER_SECOND = 500
 TICK_S = 1.0 / TICKS_PER_SECOND
-PATIENCE_S = 0.02  # wall time by which the world may be late and still catch up
-DIALOGUE_S = 0.1  # wall time after a client's question in which the clock goes no faster than a real one
+PATIENCE_S = 0.02  # wall time by which the world may lag and still catch up
+DIALOGUE_S = 0.1  # wall time after a client's question, in which the clock runs no faster than a real one
 
 
 class WorldClock:

@@ -69,7 +69,7 @@ REPORTED_REGISTERS = (
     "Profile Velocity",
 )
 FAULTS = tuple(fault.name for fault in fields(ServoFaults))
-KINDS = ("kvh", "autopilot", "printer")  # of instruments
+KINDS = ("kvh", "autopilot", "printer")  # kinds of instruments
 LINE_FAULTS = {"bit_error_rate", "silent", "host_baud", "stolen"}
 
 

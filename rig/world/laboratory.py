@@ -44,11 +44,11 @@ class Laboratory:
         self._flash = open_flash(world.board.flash_file)
         self.board: EmulatedBoard | None = None  # None: without power
         self._sensors: dict[str, SpiDevice] = {}
-        self._elements: dict[str, SensingElement] = {}  # of the board's inertial sensors
+        self._elements: dict[str, SensingElement] = {}  # elements of the board's inertial sensors
         self._faults: dict[str, str | None] = dict.fromkeys([*config.on_board, *world.magnetometers])
         self._field = build_magnetic_field(world.site, tuple(world.arm.iron.values()))
-        self._mount = np.eye(3)  # from the flange's frame to the item's
-        self._fitted_parts: set[str] = set()  # parts of a series
+        self._mount = np.eye(3)  # rotation from the flange's frame to the item's
+        self._fitted_parts: set[str] = set()  # parts of a series that have been mounted
         self._sensors_on_item = WeakSet[SensorTruth | MountedMagnetometer]()
         # By the sensor's name; an autopilot, which may have several sensors, by its port.
         self.instruments: Mapping[str, InstrumentMount] = {
@@ -114,7 +114,7 @@ class Laboratory:
         board = self._world.board.model_copy(update={"unique_id": unique_id})
         self._world = self._world.model_copy(update={"board": board})
         self._flash = open_flash(None)
-        forgotten = not part_section.plugged_in and part not in self._fitted_parts  # only once
+        forgotten = not part_section.plugged_in and part not in self._fitted_parts  # an operator forgets it only once
         self._fitted_parts.add(part)
         return not forgotten
 

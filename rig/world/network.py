@@ -12,9 +12,9 @@ from rig.errors import Refused
 from rig.world.clock import TICK_S
 from rig.world.wire import SocketTable, Wire
 
-BACKLOG_BYTES = 1 << 16  # a client that does not read loses packages beyond this
-UNPACED = inf  # the lag of a client that the world does not wait for
-ALONE_S = 0.3  # wall time after which a client's next question no longer depends on the last answer
+BACKLOG_BYTES = 1 << 16  # bytes that a client may leave unread before it loses packages
+UNPACED = inf  # lag of a client for which the world does not wait
+ALONE_S = 0.3  # wall time after which a client's question no longer depends on the last answer
 GATHER_S = 0.002  # wall time for which a gathering port collects bytes while more ticks are due
 
 
@@ -50,7 +50,7 @@ class ClientConnection:
         peer.setblocking(False)
         with suppress(OSError):
             peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        self.wait_s = 0.0  # that the last `deliver` asked for
+        self.wait_s = 0.0  # the wait that the last `deliver` returned
         self._watched = 0  # the selector's events
 
     @property
@@ -225,7 +225,8 @@ class PortListener:
         except OSError:
             return
         for connection in self.connections:
-            while not self.silent and connection.read():  # an old client's end may arrive after the new one
+            # The end of an old connection may arrive after the new one begins.
+            while not self.silent and connection.read():
                 pass
         if len(self.connections) >= self._limit:
             peer.close()

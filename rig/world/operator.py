@@ -19,7 +19,7 @@ from rig.world.ur10e.motion.forward_kinematics import Vector
 
 DIFFERENCE_S = 5e-4  # half the interval of the central difference of the rate
 MISTAKE_ACTION = {"short": "turn", "two_turns": "turn", "other_way": "turn", "wrong_face": "lay"}  # others: both
-SKIPPED_S = 5.0  # until a skipped instruction is read again
+SKIPPED_S = 5.0  # time until a skipped instruction is read again
 ORIGIN: Vector = (0.0, 0.0, 0.0)
 UNMOVED = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 

@@ -9,9 +9,9 @@ import socket
 import struct
 from collections.abc import Callable
 
-# All in wall time. A client earns patience by keeping pace; one that never does delays the others only at first.
+# All in wall time. A client gains patience while it keeps pace; one that never does delays the others only at first.
 FIRST_PATIENCE_S, PATIENCE_S = 0.1, 5.0
-EARNED = 0.5  # patience per time in pace
+EARNED = 0.5  # patience gained per time in pace
 IN_PACE_S = 0.05  # a shorter wait costs no patience: the client works, though slowly
 LOOK_S = (0.0001, 0.001)  # limits of the time between two checks of a lagging client: a quarter of its delay
 
@@ -49,7 +49,7 @@ class SocketTable:
         except OSError:  # it has hung up already
             return lambda: 0
         sockets = _SOCKET_ID.pack(far_port, near_port, socket.inet_aton(far_host), socket.inet_aton(near_host)) + _ANY
-        number = next(self._numbers) & 0xFFFFFFFF  # tells a late answer to another request apart
+        number = next(self._numbers) & 0xFFFFFFFF  # distinguishes a late answer to another request
         request = (
             _REQUEST.pack(
                 *(_REQUEST.size + len(sockets), _SOCK_DIAG_BY_FAMILY, _NLM_F_REQUEST, number, 0),
@@ -88,8 +88,8 @@ class Wire:
         self._count_unread, self._lag_s, self._wall = count_unread, lag_s, wall
         self._behind_since_s: float | None = None  # virtual time of the first packet that may be unread
         self._waiting_since_s: float | None = None  # start of the wait; wall time, like all times below
-        self._unread_bytes = 0  # at the last check
-        self._slept = False  # whether it did not read for a while since it was last in pace
+        self._unread_bytes = 0  # number at the last check
+        self._slept = False  # whether it has not read for a while since it was last in pace
         self._patience_s = FIRST_PATIENCE_S
         self._in_pace = True
         self._settled_s = wall()

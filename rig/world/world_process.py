@@ -42,7 +42,7 @@ REST_S = 0.01  # wall time between two ticks while nobody waits for them: those 
 BUSY_POLL_S = 0.001  # wall time between two polls of the sockets while ticks are due one after the other
 # The threshold of Python's cyclic garbage collection: about the number of objects that ten clients leave behind.
 GARBAGE = 5_000
-LEAP = 4  # at most so many ticks in one go: a packet's interval at 125 Hz
+LEAP = 4  # ticks in one go, at most: a packet's interval at 125 Hz
 ARM_LAG_S = 0.04  # virtual time by which a reader of the arm's states may lag: five packets at 125 Hz
 SERIAL_LAG_S = 1.0  # … and a reader of a serial line, where the system buffers the bytes
 ARM_PORTS: dict[int, tuple[Callable[[Robot], ClientSession], float]] = {

@@ -26,7 +26,7 @@ SCALED = {26: 0, 116: 1, 129: 2}  # index of the IMU in SCALED_IMU, SCALED_IMU2,
 RAW_IMU, HIGHRES_IMU, AUTOPILOT_VERSION = 27, 105, 148
 IMU_INDEX = {**SCALED, RAW_IMU: 0, HIGHRES_IMU: 0}
 FASTEST_S = 1.0 / RATE_HZ
-HEAD_BYTES = 6  # of a message in MAVLink 1
+HEAD_BYTES = 6  # header of a message in MAVLink 1
 BAROMETER_S = 0.05  # interval of PX4's barometer readings
 # HIGHRES_IMU_UPDATED_FLAGS: x y z of the accelerometer and of the gyroscope; temperature.
 UPDATED, TEMPERATURE_UPDATED = 0x3F, 0x1000
@@ -79,7 +79,7 @@ class SimulatedAutopilot:
         self._random = Random(f"autopilot {seed}")
         self._sent = bytearray()
         self._steps = 0
-        self._due_s = {"heartbeat": 0.0, "attitude": 0.0}  # by its own clock since power-up
+        self._due_s = {"heartbeat": 0.0, "attitude": 0.0}  # due times, by its own clock since power-up
         self._intervals_s: dict[int, float] = {}
         self._next_s: dict[int, float] = {}
 
@@ -228,7 +228,7 @@ class SimulatedAutopilot:
             return DENIED
         if message.command == 512:
             self._send_imu(number, round((self._on_for_s + self._steps / RATE_HZ) * 1e6))
-        elif interval_us <= 0:  # disabled, or the default, which is disabled too
+        elif interval_us <= 0:  # a disabled message, or the default, which is also disabled
             self._intervals_s.pop(number, None)
         else:
             self._intervals_s[number] = max(1e-6 * interval_us, FASTEST_S)

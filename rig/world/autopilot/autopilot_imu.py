@@ -14,7 +14,7 @@ from rig.world.board.sensor_truth import SensorTruth
 from rig.world.faulty_gyroscope import FrozenGyroscope, Repeats
 from rig.world.ur10e.motion.forward_kinematics import rotation_from_vector
 
-RATE_HZ = 400.0  # sampling rate, that of a fast main loop
+RATE_HZ = 400.0  # sampling rate: that of a fast main loop
 AVERAGED = 2  # readings in a mean of PX4's VehicleIMU: IMU_INTEG_RATE is 200 Hz
 ORIENTATIONS = {0: (), 2: ((2, 90),), 4: ((2, 180),), 6: ((2, 270),), 8: ((0, 180),), 12: ((1, 180),), 24: ((1, 90),)}
 FAULTLESS = SimulatedFaultySection()
@@ -72,7 +72,7 @@ class SimulatedImu:
         self._sum, self._summed = np.zeros((2, 3)), 0
         self.rate, self.force = np.zeros(3), np.zeros(3)
         self.temperature_c = 25.0
-        self.time_us = 0  # of the reading, by the autopilot's clock
+        self.time_us = 0  # time of the reading, by the autopilot's clock
         nth = str(index + 1) if index else ""
         if px4:
             stems = (f"CAL_GYRO{index}_{{}}OFF", f"CAL_ACC{index}_{{}}OFF", f"CAL_ACC{index}_{{}}SCALE")

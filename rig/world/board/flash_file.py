@@ -41,7 +41,7 @@ def open_flash(path: Path | None) -> FlashMemory:
         ) from error
     torn = frozenset(offset for (offset,) in struct.iter_unpack("<I", data[FLASH_BYTES:]))
     memory = FlashMemory(read_firmware("bin"), data[STORE_OFFSET:FLASH_BYTES], torn)
-    memory.on_change = lambda: write_new(  # atomic: a reader meets the old flash or the new one
+    memory.on_change = lambda: write_new(  # atomic: a reader sees the old flash or the new one
         path, bytes(memory.data) + b"".join(struct.pack("<I", offset) for offset in sorted(memory.torn))
     )
     return memory

@@ -9,7 +9,7 @@ from contextlib import suppress
 from rig.world.board.serial_line import SerialLine
 
 _BAUD = {getattr(termios, name): float(name[1:]) for name in dir(termios) if name[0] == "B" and name[1:].isdigit()}
-OUTPUT_SPEED = 5  # of the list that tcgetattr returns
+OUTPUT_SPEED = 5  # index in the list that tcgetattr returns
 
 
 class PtyPort:

@@ -11,7 +11,7 @@ FAR_BEYOND = 1e3  # rad/s and g: no part has such a range
 class ElementFault(StrEnum):
     """Faults of a sensing element. Its noise and its electronics stay as they are."""
 
-    STUCK = "stuck"  # the motion when the fault began, for ever
+    STUCK = "stuck"  # forever the motion at which the fault began
     SATURATED = "saturated"  # a motion far beyond its range, on every axis
 
 

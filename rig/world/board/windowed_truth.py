@@ -16,9 +16,9 @@ from rig.config.world.laboratory import WorldSection
 from rig.world.board.sensor_truth import SensorTruth
 
 SCHEMA = "rig.truth/1"
-STEP_S = 0.05  # between the instants of a mean, and more in long windows
+STEP_S = 0.05  # interval of the instants of a mean; longer in long windows
 MOST_INSTANTS = 20_000
-ONE_SPEED = 0.01  # speeds whose fractions differ by less are one speed
+ONE_SPEED = 0.01  # relative difference, below which two speeds count as one
 
 Windows = Sequence[tuple[float, float]]
 

@@ -11,8 +11,8 @@ from rig.world.hand.habits import Habits
 from rig.world.hand.rotations import Array, exp_map, log_map, multiply_steps
 
 STEP_S = 1e-3
-PASSES = 4  # of the correction that makes the course end at its target
-GRASP_S = (0.1, 0.25)  # from the first touch to the first push
+PASSES = 4  # iterations of the correction after which the course ends at its target
+GRASP_S = (0.1, 0.25)  # range of the time from the first touch to the first push
 ROCK_S, ROCK_HZ = (0.1, 0.3), (3.0, 10.0)
 WOBBLE_HZ, TREMOR_HZ = (0.3, 2.0), (6.0, 12.0)
 KNOCK_S = 0.006
@@ -51,7 +51,7 @@ def move(start: Array, end: Array, vector: Array, habits: Habits, rng: np.random
     shape = _pulse(time_s, last_s, end_s - last_s)[:, None]
     for _ in range(PASSES):
         rotations = integrate_rates(time_s, rates)
-        residual = rotations[-1] @ log_map((start @ rotations[-1]).T @ end)  # in the axes of the start
+        residual = rotations[-1] @ log_map((start @ rotations[-1]).T @ end)  # in the axes of the body at the start
         rates = rates + shape * (np.swapaxes(rotations, -1, -2) @ residual)
     return time_s, rates
 

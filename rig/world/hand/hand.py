@@ -45,7 +45,8 @@ class SimulatedHand:
         self._table = tilt(1e-3 * habits.table_mrad * rng.normal(size=2))
         self._courses: list[HandCourse] = []
         self._lost_s: list[tuple[float, float]] = []
-        self._bias_jumps: list[tuple[float, Array, Array]] = []  # time of a fall, s, and bias jumps of both triads
+        # Times of falls, s, and the jumps of the bias of both triads.
+        self._bias_jumps: list[tuple[float, Array, Array]] = []
         self._attitude = self._find_rest_attitude(exp_map(rng.uniform(-3, 3) * np.array([0.0, 0.0, 1.0])), self.face)
         self._add(build_course(self._attitude, np.array([-STEP_S, 0.0]), np.zeros((2, 3)), habits), 0.0)
 

@@ -27,7 +27,7 @@ from rig.world.board.sensor_truth import SensorTruth
 from rig.world.faulty_gyroscope import FrozenGyroscope, Repeats
 from rig.world.kvh1775.memory import KvhMemory
 
-INTERNAL_STEP_S = 1e-3  # greatest step of the integration of a delta angle
+INTERNAL_STEP_S = 1e-3  # longest step of the integration of a delta angle
 LINE_END = b"\r\n"
 LONGEST_COMMAND = 200
 PERFECT = MagnetometerTruth()
@@ -132,7 +132,7 @@ class SimulatedKvh1775:
     def _begin(self) -> None:
         """Start sending messages, the first after one interval."""
         delta = self._memory["ROTFMT"] == "DELTA"
-        interval_s = 1.0 / float(self._memory["DR"])  # of its own seconds
+        interval_s = 1.0 / float(self._memory["DR"])  # by its own clock
         self._message_steps = ceil(interval_s / INTERNAL_STEP_S - 1e-9) if delta else 1
         self._step_s = interval_s / self._message_steps / self._speed
         self._began_s, self._steps = self._now_s, 0

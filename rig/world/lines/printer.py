@@ -21,7 +21,7 @@ from rig.world.board.sensor_truth import SensorTruth
 from rig.world.faulty_gyroscope import FrozenGyroscope, Repeats
 
 SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " "}
-# The units in rad/s, m/s² and T; and the units of time per second.
+# Values of the units in rad/s, m/s² and T; and the units of time per second.
 UNITS = {
     "rad/s": 1.0, "mrad/s": 1e-3, "deg/s": radians(1.0), "mdeg/s": radians(1e-3),
     "g": STANDARD_GRAVITY_M_S2, "mg": 1e-3 * STANDARD_GRAVITY_M_S2, "m/s2": 1.0,

@@ -9,8 +9,8 @@ from rig.world.servo.servo import SimulatedServo
 from rig.world.servo.truth import LineTruth
 from rig.world.servo.wire_format import BROADCAST, PING, SYNC_READ, Receiver, ServoPacket
 
-BITS = 10  # of a byte on the wire: start, eight data, stop
-STALL_S = 0.02  # far longer than one pass of the world's loop
+BITS = 10  # bits of a byte on the wire: start, eight data, stop
+STALL_S = 0.02  # far longer than one cycle of the world's loop
 PING_SLOT_S = 0.003  # delay per ID of the answers to a broadcast ping, as the maker's client expects it
 
 

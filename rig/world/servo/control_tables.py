@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from rig.world.servo.wire_format import ACCESS_ERROR, LENGTH_ERROR, LIMIT_ERROR, RANGE_ERROR
 
-RAM = 64  # its first address; registers below are in the EEPROM
+RAM = 64  # first address of the RAM; registers below are in the EEPROM
 SIZE = 662
 MOST_TURNS = 1_048_575  # pulses in extended position mode, ±256 turns
 

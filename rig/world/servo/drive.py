@@ -17,7 +17,7 @@ from rig.world.servo.truth import ServoTruth
 PULSE_RAD = 2 * pi / 4096
 SPEED_RAD_S = 0.229 * 2 * pi / 60  # unit of velocity registers
 ACCELERATION_RAD_S2 = 214.577 * 2 * pi / 3600  # … and of Profile Acceleration: rev/min²
-FASTEST_RAD_S2 = 200.0  # "infinite" acceleration in practice
+FASTEST_RAD_S2 = 200.0  # an "infinite" acceleration
 WATCHDOG_S = 0.020
 TICKS = 32768
 BY_VOLTAGE, BY_HEAT, BY_LOAD = 0x01, 0x04, 0x20  # bits of Hardware Error Status and of Shutdown
@@ -45,7 +45,7 @@ class Drive:
         self.shaft = Shaft(truth, time_s)
         self.faults = ServoFaults(truth.voltage_v, truth.temperature_c)
         self._random = np.random.default_rng(truth.seed)
-        self._strained_s = inf  # since when the shaft is blocked
+        self._strained_s = inf  # time since which the shaft is blocked
         self.torque = False
         self._began_s = self.fed_s = time_s
         self._turns_rad = 0.0

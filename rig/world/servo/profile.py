@@ -54,7 +54,7 @@ def plan_limited(start: ProfileStart, goal_rad: float, speed_rad_s: float, accel
     """Plan a move of at most `speed_rad_s`, with ramps of `acceleration_rad_s2`."""
     v0, a = start.rate_rad_s, acceleration_rad_s2
     distance_rad = goal_rad - start.angle_rad
-    sign = copysign(1.0, distance_rad - v0 * abs(v0) / (2 * a))  # of the distance from its stopping point
+    sign = copysign(1.0, distance_rad - v0 * abs(v0) / (2 * a))  # sign of the distance from its stopping point
     peak_rad_s = sign * min(speed_rad_s, sqrt(max(0.0, a * sign * distance_rad + v0 * v0 / 2)))
     up_s, down_s = abs(peak_rad_s - v0) / a, abs(peak_rad_s) / a
     remaining_rad = distance_rad - (v0 + peak_rad_s) / 2 * up_s - peak_rad_s / 2 * down_s

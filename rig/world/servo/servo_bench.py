@@ -18,7 +18,7 @@ from rig.world.ur10e.motion.forward_kinematics import Rotation, Vector
 from rig.world.ur10e.motion.links import ArmLink
 
 BEHIND_S = 60.0  # wall time by which the board may lag the servo and still catch up
-AHEAD_S = 2 * TICK_S  # the servo's lead over the first tick: no sensor asks for the shaft's future
+AHEAD_S = 2 * TICK_S  # lead of the servo over the first tick: no sensor requests a later angle of the shaft
 CHANGE_S = 1e-4  # the step of the numerical derivative of the rate
 SHAFT = ArmLink(theta_rad=0.0, a_m=0.0, d_m=0.0, alpha_rad=0.0, cos_alpha=1.0, sin_alpha=0.0)
 # Its setup for the rig (docs/how-to/without-an-arm/servo.md): 1 Mbit/s, no return delay. The driver sets the modes.

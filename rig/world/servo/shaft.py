@@ -7,7 +7,7 @@ from math import copysign, cos, pi, radians, sin
 from rig.world.servo.profile import ProfileSegment, ProfileStart
 from rig.world.servo.truth import ServoTruth
 
-HISTORY = 4096  # past segments to keep
+HISTORY = 4096  # number of past segments to keep
 ITERATIONS = 12  # enough to invert the encoder's error to 1e-15 of a revolution
 
 

@@ -11,7 +11,7 @@ HEADER = b"\xff\xff\xfd"
 STUFFED = HEADER + b"\xfd"
 BROADCAST = 0xFE
 LONGEST = 1024  # length field of the longest packet that is accepted
-GAP_S = 0.1  # between two bytes of one packet; a longer gap drops the partial packet (not in the manual)
+GAP_S = 0.1  # time between two bytes of a packet, after which the partial packet is dropped (not in the manual)
 
 PING, READ, WRITE, REG_WRITE, ACTION, REBOOT, CLEAR, STATUS = 0x01, 0x02, 0x03, 0x04, 0x05, 0x08, 0x10, 0x55
 SYNC_READ, SYNC_WRITE = 0x82, 0x83

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 HISTORY = 200
-TEXT_MAX = 4000  # characters of a message
+TEXT_MAX = 4000  # characters of a message, at most
 
 
 class MessageKind(IntEnum):
@@ -39,7 +39,7 @@ MODE_CHANGED = 100  # the argument is the mode
 # Assumptions: the levels, and that a line out of reach is an invalid setpoint (the maker's tests expect an error).
 INVALID_SETPOINT = ErrorReport(204, 5, ReportLevel.VIOLATION)
 STOPPED_FOR_TEST = ErrorReport(209, 0, ReportLevel.VIOLATION)
-READ_ONLY = ErrorReport(210, 0, ReportLevel.WARNING)  # the socket, in local control
+READ_ONLY = ErrorReport(210, 0, ReportLevel.WARNING)  # sent by the socket in local control
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +74,7 @@ class Messages:
 
     def __init__(self) -> None:
         self._messages: deque[Message] = deque(maxlen=HISTORY)
-        self.last = 0  # number of the newest
+        self.last = 0  # number of the newest message
 
     def say(
         self, text: str, kind: MessageKind = MessageKind.TEXT, title: str = "", position: tuple[int, int] = (0, 0)

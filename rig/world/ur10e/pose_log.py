@@ -8,8 +8,8 @@ from rig.config.world.arm_clients import SimulatedPoseLogSection
 from rig.errors import Refused
 
 HEADER = "start_s,end_s,qw,qx,qy,qz\n"
-ROW_S = 0.001  # duration that a row states
-LEAST_STEP_S = 2 * ROW_S  # rows come in order, and not at once
+ROW_S = 0.001  # duration stated in a row
+LEAST_STEP_S = 2 * ROW_S  # least interval of rows, so that no two have the same time
 
 
 class PoseLog:

@@ -29,10 +29,10 @@ ROUNDING_RAD = 1e-6  # a target on a joint's limit is within it
 PROGRAM_STOP_RAD_S2 = 4.0
 PROTECTIVE_STOP_RAD_S2 = 15.0
 BRAKE_RAD_S2 = 40.0
-START_DELAY_S = 0.02  # between the last byte of a program and its first line
-POWER_STEP_S = 0.5  # powering on, releasing the brakes
+START_DELAY_S = 0.02  # time between the last byte of a program and its first line
+POWER_STEP_S = 0.5  # duration of powering on, and of releasing the brakes
 UNLOCK_S = 0.5  # the maker's clients expect more than a millisecond and less than a second
-E_SERIES, POLYSCOPE_X = (5,), (10,)  # their first versions
+E_SERIES, POLYSCOPE_X = (5,), (10,)  # the first versions of their software
 
 
 class Program(Protocol):
@@ -83,7 +83,7 @@ class Robot:
     ) -> None:
         self.identity = identity
         self.model = model
-        self.links = links  # the controller's, not the true ones
+        self.links = links  # the links as the controller has them, not the true ones
         # The tool's frame in the flange's (m, rotation vector rad): same origin, possibly rotated.
         self.tcp_offset = (0.0, 0.0, 0.0, *tool_rotation_rad)
         self.motion = motion
@@ -102,14 +102,14 @@ class Robot:
         self.payload_centre_m: tuple[float, ...] = (0.0, 0.0, 0.0)
         self.loaded_program = ""
         self.messages = Messages()
-        self.watchdog_s = 0.0  # greatest time between inputs before a program stops; 0: no watchdog
+        self.watchdog_s = 0.0  # longest time between inputs before a program is stopped; 0: no watchdog
         self._last_input_tick = 0
         self._program: Program | None = None
         self._start: tuple[int, Program] | None = None
         self._started_tick = 0
         self._mode_changes: list[tuple[int, RobotMode]] = []
         self._stopped_tick = 0
-        self._unlocked_tick: int | None = None  # when a protective stop that is being unlocked will be over
+        self._unlocked_tick: int | None = None  # end of a protective stop that is being unlocked
         self._still_since_tick = 0
         self._moved_tick = 0
         self.speed_slider = speed_slider

@@ -23,7 +23,7 @@ REQUEST_BYTES = 1 << 20
 END = b"\r\n\r\n"
 PROGRAM_STATE = "/program/v1/state"
 LENGTH = re.compile(rb"^content-length:\s*(\d{1,7})\s*$", re.IGNORECASE | re.MULTILINE)
-PATIENCE_TICKS = 10 * TICKS_PER_SECOND  # after which an order is answered, carried out or not
+PATIENCE_TICKS = 10 * TICKS_PER_SECOND  # time after which an order is answered, executed or not
 
 Body = dict[str, Any]
 Answer = Callable[[Robot], Body]

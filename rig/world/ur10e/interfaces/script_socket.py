@@ -101,7 +101,7 @@ class ScriptSession:
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
-        self._read_only = robot.local_control  # for as long as it is open
+        self._read_only = robot.local_control  # as long as the connection is open
         self.closing = False
         self._reader = ScriptReader()
 

@@ -3,7 +3,7 @@
 import json
 
 WAIT_PROGRAM = "wait_program"
-DEFAULT_PROGRAM = "Default program"  # what a PolyScope X has loaded before anybody loads another
+DEFAULT_PROGRAM = "Default program"  # the program that a PolyScope X has loaded at the start
 PROGRAMS_MAX = 50
 
 

@@ -115,7 +115,7 @@ OUTPUTS: dict[str, tuple[str, Get]] = {
     "input_bit_registers32_to_63": ("UINT32", lambda r: _bits(r.inputs.bits, 32)),
 }
 
-# Quantities the simulation has no physics for: constant, and plausible for an idle controller.
+# Quantities without simulated physics: constant, and plausible for an idle controller.
 _CONSTANTS: dict[tuple[str, Any], str] = {
     ("VECTOR6D", ZERO6): """target_current actual_current actual_current_window joint_control_output actual_TCP_force
         wrench_calc_from_currents payload_inertia""",

@@ -13,7 +13,7 @@ from rig.world.site import SiteTruth
 from rig.world.ur10e.motion.links import ArmLink, Links
 
 Components = tuple[Any, Any, Any]  # x, y, z: floats, or arrays of one shape
-CosineAndSine = Sequence[tuple[Any, Any]]  # of every joint
+CosineAndSine = Sequence[tuple[Any, Any]]  # of every joint: cosine and sine of its angle
 
 
 class BodyMotion(NamedTuple):

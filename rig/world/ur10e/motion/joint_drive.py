@@ -16,14 +16,15 @@ from typing import NamedTuple
 from rig.config.world.arm_joints import SimulatedDriveSection
 from rig.world.clock import TICK_S
 
-SLOW_RAD_S = 0.1  # v₀
+SLOW_RAD_S = 0.1  # v₀ of the ripple
 SLOW_SQUARED = SLOW_RAD_S**2
 PARALLEL = {1: (2,), 2: (1, 3), 3: (2,)}  # shoulder, elbow and wrist 1 have parallel axes
-MOST_YIELD_RAD = 3e-4  # in logs no joint is more than 0.7 to 1 mrad off its target, the lag included
-NEGLIGIBLE_RAD, NEGLIGIBLE_RAD_S = 1e-9, 1e-7  # less is no yielding any more
+MOST_YIELD_RAD = 3e-4  # largest yielding: in logs no joint errs by more than 0.7 to 1 mrad, including the lag
+NEGLIGIBLE_RAD, NEGLIGIBLE_RAD_S = 1e-9, 1e-7  # a smaller yielding counts as none
 RippleOrders = tuple[tuple[int, float, float], ...]  # cycles a turn, Rₙ/n in rad/s, phase in rad
 Derivatives = tuple[float, float, float]  # an angle in rad and its first two derivatives
-Shaken = tuple[int, float, float, float]  # a joint, and the same of what comes on top of its smooth angle
+# A joint, and the angle and its derivatives that are added to its smooth angle.
+Shaken = tuple[int, float, float, float]
 
 
 class Yielding(NamedTuple):

@@ -14,7 +14,7 @@ from random import Random
 from rig.world.ur10e.motion.trajectory import ZERO, Joints
 from rig.world.ur10e.motion.vibration import WRISTS, Vibration
 
-REVERSAL_RAD = 0.01  # travel in which hysteresis develops: within the ramps
+REVERSAL_RAD = 0.01  # travel within which hysteresis develops: shorter than the ramps
 STANDING_RAD_S = 1e-6  # slower speeds are rounding errors of joints that do not move
 NEGLIGIBLE_AFTER = 12.0  # decay times after which settling is negligible
 JointState = tuple[Joints, Joints, Joints]  # angles, speeds, accelerations
@@ -62,7 +62,7 @@ class JointErrors:
         self._speed: Joints = ZERO
         self._reversal = [(0.0, 0.0)] * 6  # encoder's angle and hysteresis at the last reversal
         self._moving = [False] * 6
-        self._stops = [(-inf, 0.0)] * 6  # time of the last stop, and the direction before
+        self._stops = [(-inf, 0.0)] * 6  # time of the last stop, and the direction before it
         first, *more = errors.vibration_rad_s
         tones = [(first, [self._phases[joint][2] for joint in WRISTS])]
         tones += [(turn, [random.uniform(0.0, 2.0 * pi) for _ in WRISTS]) for turn in more]

@@ -15,7 +15,7 @@ from rig.world.ur10e.motion.vibration import Vibration
 
 # ROS 2 description of the UR10e, from the 5.8 manual: base and shoulder 120°/s, elbow and wrists 180°/s.
 JOINT_SPEED_LIMIT_RAD_S: Joints = (2.0943951, 2.0943951, 3.1415927, 3.1415927, 3.1415927, 3.1415927)
-JERK_TICKS = 6  # in which a joint's force takes up a change of its target's acceleration
+JERK_TICKS = 6  # ticks in which a joint's force follows a change of its target's acceleration
 SCALING_RATE_PER_S = 4.0  # the speed fraction follows the slider, and pause and play, in at most a quarter second
 
 
@@ -80,8 +80,8 @@ class JointMotion:
         self.fraction_wanted = 1.0
         first = _Tick(-TICK_S, 0.0, 1.0, 0.0, self._trajectory, self._offset, self._gain)
         self._ticks = deque([first], 1 + ceil((memory_s + self._drive.lag_s) / TICK_S))
-        self.smooth_qd_rad_s: Joints = ZERO  # of the smooth angles, at the last tick's end
-        self._changes = deque([ZERO] * JERK_TICKS, JERK_TICKS)  # of those, in the last ticks
+        self.smooth_qd_rad_s: Joints = ZERO  # speeds of the smooth angles at the end of the last tick
+        self._changes = deque([ZERO] * JERK_TICKS, JERK_TICKS)  # changes of the smooth speeds in the last ticks
         self._moving_ticks = 0  # upper bound of the ticks in memory with motion
         self._now: Instant | None = None  # computed on demand: most ticks need none
 
@@ -187,7 +187,7 @@ class JointMotion:
             speed[joint], change[joint] = v * fraction, acceleration[joint] * squared + v * slope_per_s
         joints = self._apply_ripples(tick, smooth, speed, change) if self._has_ripples else (smooth, speed, change)
         q, qd, qdd = joints
-        shaken = []  # joint, angle and its derivatives that come on top
+        shaken = []  # joints, with the angle and derivatives that are added
         for joint in moving:
             if drive.orders[joint]:
                 shaken.extend(drive.shake(joint, smooth[joint], speed[joint], change[joint]))

@@ -24,7 +24,7 @@ class ArmLink:
 
 Links = tuple[ArmLink, ...]
 
-Drawing = tuple[tuple[float, float, int], ...]  # of each link length a, offset d (m), twist alpha in quarter turns
+Drawing = tuple[tuple[float, float, int], ...]  # for each link: length a, offset d (m), twist alpha in quarter turns
 
 
 def build_drawing(a_m: tuple[float, float], d_m: tuple[float, float, float, float]) -> Drawing:

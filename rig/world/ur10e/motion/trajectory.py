@@ -6,8 +6,8 @@ from math import inf, sqrt
 
 Joints = tuple[float, ...]
 ZERO: Joints = (0.0,) * 6
-ROUNDING_S = 1e-9  # a trajectory counts as over this much before its end
-SOFT_STEPS, SOFT_STEP_S, SOFT_OVERSHOOT = 19, 0.008, 1.38  # of the gentle start of a move, as logged
+ROUNDING_S = 1e-9  # a trajectory counts as finished this time before its end
+SOFT_STEPS, SOFT_STEP_S, SOFT_OVERSHOOT = 19, 0.008, 1.38  # the gentle start of a move, as in logs
 
 
 @dataclass(frozen=True, slots=True)

@@ -86,7 +86,7 @@ class TrueArm:
         if is_resting and self._at_rest is not None:
             return self._at_rest
         q, qd, qdd = self._joints_at(controller_s)
-        if self._speed != 1.0:  # the controller's seconds are not the world's
+        if self._speed != 1.0:  # the controller's clock differs from the world's
             speed, squared = self._speed, self._speed**2
             qd, qdd = tuple([v * speed for v in qd]), tuple([a * squared for a in qdd])
         inner = q[:WRIST], qd[:WRIST], qdd[:WRIST]

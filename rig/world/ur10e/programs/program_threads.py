@@ -11,8 +11,8 @@ from rig.world.ur10e.robot import Robot
 
 Steps = Iterator[None]
 
-NUMBER_MAX = 1e6  # of angles, lengths, speeds and accelerations, all in SI units
-SLOWEST, SLOWEST_LINE_M_S = 1e-6, 1e-3  # rad/s and m/s, and the same per second: the slowest moves
+NUMBER_MAX = 1e6  # angles, lengths, speeds and accelerations, all in SI units
+SLOWEST, SLOWEST_LINE_M_S = 1e-6, 1e-3  # the slowest moves: rad/s and m/s, and accelerations with the same numbers
 HAND_OVER_RAD_S2 = 4.0  # deceleration before a move that follows a killed one
 
 

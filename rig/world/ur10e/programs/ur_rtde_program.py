@@ -21,7 +21,7 @@ REALTIME = frozenset({6, 9, 10, 11, 24, 25, 26, 27, 38, 58, 66, 67, 68, 69, 70, 
 STOP_SCRIPT = 255
 READY, DONE = 1, 2
 
-FOLLOWING_RAD_S2 = 40.0  # of joints that follow a target from tick to tick
+FOLLOWING_RAD_S2 = 40.0  # acceleration of joints that follow a target from tick to tick
 
 Command = Callable[[], Steps]
 

@@ -13,9 +13,9 @@ from rig.world.ur10e.motion.trajectory import Joints
 from rig.world.ur10e.programs.program_threads import ScriptMove, Steps, Threads, check_finite
 from rig.world.ur10e.robot import Robot
 
-NESTED = 50  # loops in one another
+NESTED = 50  # loops inside loops
 CALL = re.compile(r"([a-z_][a-z_0-9]*)\((.*)\)$", re.IGNORECASE)
-TEXT = re.compile(r'"[^"]*"|\'[^\']*\'')  # in which brackets and # mean nothing
+TEXT = re.compile(r'"[^"]*"|\'[^\']*\'')  # text in quotation marks, in which brackets and # have no meaning
 FRAME = re.compile(r"^(def|sec)\s+(\w+)\s*\(\s*\)\s*:$")
 
 
@@ -137,7 +137,7 @@ def is_lone_move(body: Block) -> TypeGuard[tuple[Call]]:
 class ScriptProgram:
     """A program of the statements below and endless loops: no variables, no conditions."""
 
-    waiting = False  # unknown
+    waiting = False  # unknown whether it waits
 
     def __init__(self, robot: Robot, lines: Sequence[str]) -> None:
         self._robot = robot
@@ -162,7 +162,7 @@ class ScriptProgram:
             if isinstance(item, Loop):
                 while True:
                     yield from self._play(item.body)
-                    yield  # a loop that takes no time would never give way
+                    yield  # a loop that takes no time would block other threads
             try:
                 yield from STATEMENTS[item.text.split("(", 1)[0]](self._robot, self._threads, Arguments(item.text))
             except OutOfReach:
