@@ -13,9 +13,9 @@ In a notebook:
     rig.changes(rig.load("runs/of_last_year"), run)               # E_n
     rig.calibrations("LSM9DS1-001").to_frame()                    # all of a sensor, out of the history
 
-docs/how-to/with-code/notebook.md goes through all of it. These names are the public ones; where they are made may
-change. To import them loads no arm driver. What is refused raises `Refused`, what fails `Fault`: `error.name` finds it
-in docs/errors.md.
+docs/how-to/with-code/notebook.md goes through all of it. These names are public; the modules that define them may
+change. To import them loads no arm driver. A refusal raises `Refused`, a failure `Fault`: docs/errors.md lists each by
+`error.name`.
 """
 
 from typing import TYPE_CHECKING, Any
