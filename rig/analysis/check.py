@@ -40,7 +40,7 @@ class Check:
 
     @property
     def passed(self) -> bool:
-        """Whether the check passes; a check without a number or a limit does not."""
+        """Whether the check passes; without a value or a limit it does not."""
         if self.value is None or self.limit is None:
             return False
         return math.isfinite(self.value) and self.value <= self.limit - self.guard

@@ -1,7 +1,7 @@
 """The controller's clock, the only standard of size, compared with this computer's clock and the board's crystal.
 
 Every recording has both. A speed is 2π over a time of the controller's clock, so every scale factor has that clock's
-error. No clock is left out for a large error: the differences are compared with what is stated of both clocks.
+error. A clock with a large error is not left out: the differences are compared with the stated errors of both clocks.
 """
 
 from collections.abc import Iterable, Iterator
@@ -27,7 +27,7 @@ SHORT = {BY_COMPUTER: "computer", BY_CRYSTAL: "crystal"}
 
 @dataclass(frozen=True, slots=True)
 class ClockComparison:
-    """The relative error of the controller's clock by another one, and its standard uncertainty.
+    """The relative error of the controller's clock according to another clock, and its standard uncertainty.
 
     `half_width` is stated of the other clock, `noise_std` the uncertainty by the recording with `dof` degrees of
     freedom; `std` combines both.
@@ -47,7 +47,7 @@ class ClockComparison:
 
 @dataclass(frozen=True, slots=True)
 class ClockDifference:
-    """The relative difference of two clocks, by name, and its limit by what is stated and measured."""
+    """The relative difference of two clocks, by name, and its limit from stated and measured errors."""
 
     clocks: tuple[str, str]
     size: float
@@ -117,7 +117,7 @@ def worst_differences(clocks: Iterable[ClockCheck]) -> list[ClockDifference]:
 
 
 def _compare_to_computer(recording: ObservedRun, uncertainty: Uncertainty) -> ClockComparison:
-    """Compare the controller's clock with the computer's, by the times at which the states came."""
+    """Compare the controller's clock with the computer's, using the arrival times of the states."""
     rate = compare_with_computer(recording.motion)
     return ClockComparison(BY_COMPUTER, rate.error, uncertainty.computer_clock_ppm * PPM, rate.std, rate.dof)
 

@@ -1,7 +1,7 @@
 """The degrees of freedom of estimates without a budget of their own: angles, sensitivity to gravity.
 
 Their variance is divided among the budget's contributors of type A, each with its degrees of freedom (Welch and
-Satterthwaite, JCGM 100, G.4); the rest, errors of the arm of a stated size, counts as known.
+Satterthwaite, JCGM 100, G.4); the rest, arm errors of a stated size, has infinite degrees of freedom.
 """
 
 from typing import TYPE_CHECKING

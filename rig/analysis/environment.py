@@ -1,4 +1,4 @@
-"""The surroundings of a run: the site, and the clock that all speeds are measured by."""
+"""The surroundings of a run: the site, and the clock by which all speeds are measured."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,9 +18,9 @@ BY_SPLINE = 0.935  # the same for an angle between two readings, by the cubic sp
 class Surroundings:
     """The site, the stated uncertainty, the controller's clock, and its states' jitter in s.
 
-    - `clock`: speeds are corrected by it; `clocks`: those of all recordings, for the checks.
+    - `clock`: corrects the speeds; `clocks`: of all recordings, for the checks.
     - `extension_m` (3,): the sensors' position from the flange, in its frame.
-    - `reading_noise_rad`: of a joint's angle at any moment, by the noise of its encoder.
+    - `reading_noise_rad`: noise of a joint's angle at any time, from the noise of its encoder.
     - `finds_earth_rate`: the Earth's rate is estimated, not taken from the site.
     """
 

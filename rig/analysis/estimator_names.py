@@ -1,4 +1,4 @@
-"""The estimators that a recording may be solved by, by their names."""
+"""The names of the estimators that can solve a recording."""
 
 from collections.abc import Sequence
 from typing import Final, Literal, TypeVar, get_args

@@ -26,7 +26,7 @@ class OfKind:
 
 @dataclass(frozen=True, slots=True)
 class KindFound:
-    """The solution of a `sensor` by its name, None if there is none: the `fault` says why."""
+    """The solution for the sensor named `sensor`; None if there is none, for the reason in `fault`."""
 
     name: str
     sensor: RecordedSensor | Item
@@ -36,7 +36,7 @@ class KindFound:
 
     @property
     def checks(self) -> tuple[Check, ...]:
-        """The solver's checks; none without a solution."""
+        """The solver's checks; empty without a solution."""
         return () if self.solved is None else self.solved.checks
 
 

@@ -102,7 +102,7 @@ def _check_unsolved(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _GyroscopeOutcome:
-    """The gyroscopes' part of an outcome, from sweeps; empty if none was planned."""
+    """The gyroscopes' part of an outcome, from sweeps; empty if no sweep was planned."""
 
     polynomials: "Polynomials"
     results: Mapping[str, SensorResult] = field(default_factory=dict)
@@ -150,7 +150,7 @@ def _judge_gyroscopes(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _DwellOutcome:
-    """The part of an outcome from attitudes at rest; empty if none was planned."""
+    """The part of an outcome from attitudes at rest; empty if no attitude was planned."""
 
     polynomials: "Polynomials"
     accelerometers: "Mapping[str, AccelerometerResult]" = field(default_factory=dict)
@@ -186,7 +186,7 @@ def _add_polynomials(
     add: Callable[[ResultT, "OverTemperature"], tuple[ResultT, "OverTemperature"]],
     polynomials: "Polynomials",
 ) -> tuple[dict[str, ResultT], "Polynomials"]:
-    """Return a quantity's results, their uncertainty including that of the polynomials, and the polynomials."""
+    """Return a quantity's results, whose uncertainty includes that of the polynomials, and the polynomials."""
     settled = {name: add(results[name], fits[quantity]) for name, fits in polynomials.items() if quantity in fits}
     added = {name: result for name, (result, _) in settled.items()}
     combined = {name: {**polynomials[name], quantity: fit} for name, (_, fit) in settled.items()}

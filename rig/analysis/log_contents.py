@@ -1,4 +1,4 @@
-"""A look at a file of another program: what it holds, by the functions that solve it."""
+"""The contents of a file of another program, read by the functions that solve it."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -33,9 +33,10 @@ class LookedFile:
     """What a file holds.
 
     - layout, guess: of a table; None for a bag or a log of an autopilot.
-    - columns: the map of its columns, as `--columns` takes it, to be completed if it has "?".
-    - samples, survey: its readings, if it has any that can be read; others: rows without any; note: what they lack.
-    - origin_s: of the readings' times; the attitudes count from 0 of their clock.
+    - columns: the map of its columns, in the form of `--columns`, to be completed if it contains "?".
+    - samples, survey: its readings, if any can be read; others: number of rows without readings; note: what the
+      readings lack.
+    - origin_s: origin of the readings' times; the attitudes' times begin with 0 of their own clock.
     - attitudes: the rows of its reference, if it has one.
     - refusals: why readings or attitudes could not be read.
     """
@@ -188,7 +189,7 @@ def find_allan_obstacle(samples: Samples) -> RigError | None:
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """A solution that was tried: `only` of its sensors, all if empty; the `obstacle` in its way, None without one."""
+    """A solution that was tried, for the sensors `only`, all if empty; `obstacle`: why it failed, or None."""
 
     only: tuple[str, ...] = ()
     obstacle: str | None = None

@@ -1,7 +1,7 @@
-"""The times and temperatures at which a calibration holds: those of the readings it is estimated from.
+"""The times and temperatures to which a calibration refers: those of the readings from which it is estimated.
 
-A gyroscope's scale factors come from the sweeps alone, its bias from the rests between them too: in a sensor that warms
-up they have different temperatures.
+A gyroscope's scale factors come from the sweeps alone, its bias from sweeps and rests: in a sensor that warms up they
+refer to different temperatures.
 """
 
 from collections.abc import Iterable, Sequence
@@ -31,7 +31,7 @@ class When:
 
 @dataclass(frozen=True, slots=True)
 class GyroscopeConditions:
-    """The times at which a gyroscope's scale factors hold, and its bias."""
+    """The conditions to which a gyroscope's scale factors and its bias refer."""
 
     scale: When
     bias: When

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """The equipment and times of the measurements; `recorded` is that of the run's first recording."""
+    """The equipment and times of the measurements; `recorded` is the time of the run's first recording."""
 
     recorded: "Provenance"
     stored_calibrations: "Mapping[str, StoredCalibrationEntry]"
@@ -43,7 +43,7 @@ class Origin:
 def origin_of(runs: "Sequence[RunData]") -> Origin:
     """Return the origin of a run's recordings, at least one, with the present time of solution.
 
-    A recording of another stage does not resume the previous one, because the item was mounted anew.
+    A recording of another stage does not resume the previous one, because the item was remounted.
     """
     return Origin(
         recorded=runs[0].provenance,
@@ -60,22 +60,22 @@ def origin_of(runs: "Sequence[RunData]") -> Origin:
 class Outcome:
     """The results of a run's recordings, by sensor name.
 
-    - settings, provenance: those of the recordings.
+    - settings, provenance: of the recordings.
     - recordings: those of the calibration with a finished sweep; empty if stored calibrations were verified.
     - checks: the limits of the verdict.
     - results: the calibrations of gyroscopes; empty if stored calibrations were verified.
     - onboard: the board's own calibrations, compared with the host's; empty if stored ones were verified.
-    - verifications: those that could be made.
-    - clock: the controller's, None if a recording does not state its uncertainty.
+    - verifications: as many as were possible.
+    - clock: comparison of the controller's clock, None if a recording does not state its uncertainty.
     - accelerometers: the calibrations of accelerometers.
     - magnetometers: the calibrations of magnetometers; no limit of scale and bias judges them.
     - drifts: biases by repeat, if attitudes were repeated.
-    - detection_limits: those of the checks of gyroscopes.
-    - reference_detection_limits: those of the checks of accelerometers and magnetometers.
+    - detection_limits: of the checks of gyroscopes.
+    - reference_detection_limits: of the checks of accelerometers and magnetometers.
     - external: the results of external recordings; their gyroscopes are in results too.
     - installed_kinds: the results of the solvers of installed kinds.
     - mounts: the item's mount in each stage after the first.
-    - polynomials: a calibration over temperature; all other results hold at the reference temperature then.
+    - polynomials: a calibration over temperature, with which all other results refer to the reference temperature.
     """
 
     settings: "RunSettings"

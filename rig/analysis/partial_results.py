@@ -1,7 +1,7 @@
 """The partial results of a run in progress: observations, refusals, and parameters when they are identifiable.
 
-They are for display. The final result comes from `rig.analysis.outcome` and may differ; here the uncertainty is that of
-the noise alone.
+They are for display. The final result comes from `rig.analysis.outcome` and may differ; here the uncertainty includes
+only the noise.
 """
 
 from collections.abc import Mapping, Sequence
@@ -34,8 +34,8 @@ NO_SWEEP_YET = Fault("too_few_observations", "no sweep is averaged yet", "Wait f
 class PartialGyroscope:
     """A gyroscope's partial result: its finished sweeps by index, observed or refused.
 
-    The `solution` is the vector model's; None while the fault `missing` names what it lacks. `bias_rad_s` (3,) is that
-    of the rests alone, with its standard deviation, None without rests.
+    The `solution` of the vector model is None as long as the fault `missing` names what it lacks. `bias_rad_s` (3,) is
+    from the rests alone, with its standard deviation; None without rests.
     """
 
     sweeps: Attempts[int, Observation]

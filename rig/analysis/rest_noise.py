@@ -42,9 +42,9 @@ class AtRest:
 
 @dataclass(frozen=True, slots=True)
 class SensorAtRest:
-    """A sensor, None if the readings do not name it, and every quantity it measures, or the Fault it ends in.
+    """A sensor, None if the readings do not name it, and for every quantity its noise, or the Fault if it has none.
 
-    `notes` say what was left out of a log, and how its stamps were read.
+    `notes` state what was left out of a log, and how its time stamps were interpreted.
     """
 
     sensor: RecordedSensor | None

@@ -96,7 +96,7 @@ def judge(
 ) -> tuple[Check, ...]:
     """Return the checks of every gyroscope by name.
 
-    With a budget, combined uncertainties are judged, and values by the decision rule; without one, the noise alone.
+    With a budget, combined uncertainties are judged, and values by the decision rule; without a budget, only the noise.
     """
     checks: list[Check] = []
     for name, solution in solutions.items():
@@ -113,7 +113,7 @@ def judge(
 def verification_checks(sensor: str, verification: "Verification | None", limits: Limits | None) -> tuple[Check, ...]:
     """Return the checks of calibrated readings: the worst axis, and the worst mean over a revolution.
 
-    The same limit applies to the reference's error against the arm, because that may be the cause. None stands for a
+    The same limit applies to the reference's error against the arm, because that may be the cause. None means a
     verification that did not take place.
     """
     rms = mean = verified = None

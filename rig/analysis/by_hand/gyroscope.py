@@ -29,7 +29,7 @@ def solve_hand_samples(item: Item, samples: Samples, columns: Columns) -> Sensor
 
 
 def build_hand_result(sensor: RecordedSensor | Item, solution: HandSolution, corrected_by: Correction) -> SensorResult:
-    """Return a session's result in the same form as that of a gyroscope with sweeps."""
+    """Return a session's result in the form of a gyroscope's result from sweeps."""
     return SensorResult(
         sensor=sensor,
         solution=solution.turned,

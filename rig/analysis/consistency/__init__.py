@@ -1,1 +1,1 @@
-"""Whether a recording agrees with itself: fault modes, residual tests, and the checks that are made of them."""
+"""Checks whether a recording is consistent with itself: fault modes, residual tests, and their limits."""

@@ -96,8 +96,8 @@ def changes(segments: Segments, axis_rates: Array) -> Alternatives:
 def differences(segments: Segments, axis_rates: Array, whole: Array | None) -> dict[str, Array | None]:
     """Return columns (3, N, k) of each check for differences: between directions, sweeps and rests, and residuals.
 
-    `whole` (3, N, k) gives each sweep its own level. If it is None, the check `residuals` uses all residuals, including
-    the scatter within sweeps.
+    `whole` (3, N, k) are the columns that give each sweep its own mean. If it is None, the check `residuals` uses all
+    residuals, including the scatter within sweeps.
     """
     columns_by_name: dict[str, Array | None] = {
         "cw_against_ccw": split_per_axis(np.abs(axis_rates)),

@@ -61,9 +61,9 @@ def contradictions(
 ) -> ConsistencyChecks:
     """Return the checks for contradictions in the results of these sensors.
 
-    `surroundings` are those of the recordings, `false_alarms` is the fraction of undamaged runs that may fail. The
-    check of a disturbed sweep has its index in its name, `gyro.disturbed_sweep.3`, and in its meaning. `has_limits`:
-    whether the detection limits are also computed, which takes a third of the time.
+    `surroundings` belong to the recordings, `false_alarms` is the fraction of undamaged runs that may fail. The check
+    of a disturbed sweep has its index in its name, `gyro.disturbed_sweep.3`, and in its meaning. `has_limits`: whether
+    the detection limits are also computed, which takes a third of the time.
     """
     checks: list[Check] = []
     detection_limits: dict[str, tuple[DetectionLimit, ...]] = {}
@@ -135,8 +135,8 @@ def check_references(
 ) -> ConsistencyChecks:
     """Return the checks for contradictions within the readings of each accelerometer and magnetometer.
 
-    Dwells and sweeps are named as those of gyroscopes: `gyro.acceleration_disturbed_dwell.13`. If `drifting`, the bias
-    may change steadily.
+    Dwells and sweeps are named as for gyroscopes: `gyro.acceleration_disturbed_dwell.13`. If `drifting`, the bias may
+    change steadily.
     """
     from rig.analysis.consistency.reference_contradictions import (
         ReferenceReadings,
@@ -166,7 +166,7 @@ def check_references(
 
 
 def _false_alarm_probability(run: RunData, sensors: Sequence[str], settings: RunSettings, false_alarms: float) -> float:
-    """Return the false-alarm probability of each statistic of a run; all kinds of readings share the run's."""
+    """Return the false-alarm probability of one statistic; all kinds of readings of a run share its probability."""
     accelerometers = run.measuring(ACCELERATION).keys() & settings.to_calibrate
     return false_alarm_per_check(len(sensors) + len(accelerometers) + len(run.measuring(FIELD)), of_all=false_alarms)
 
@@ -174,7 +174,7 @@ def _false_alarm_probability(run: RunData, sensors: Sequence[str], settings: Run
 def disturbed_sweeps(runs: Sequence[RunData]) -> frozenset[int]:
     """Return the sweeps of an unfinished run that contradict the others for any sensor, judged as in the verdict.
 
-    Gyroscopes and accelerometers that cannot be solved yet contribute none.
+    Gyroscopes and accelerometers without a solution so far contribute no sweep.
     """
     settings = runs[0].settings if runs else None
     if settings is None or not settings.planned_sweeps:

@@ -1,8 +1,8 @@
 """Tests of readings as the output of a converter with a noisy input: their bits, range and repetitions. Pure.
 
-With noise above one step every low bit is set in half of the readings, there is no gap, no pile-up at an end of the
-range, no run of equal readings and no repeated sequence. With less noise nothing can be said. A step is that of the
-source: one count of a converter, one unit of an integer message, the last digit of a printed line.
+If the noise exceeds one step, every low bit is set in half of the readings, and there is no gap, no pile-up at an end
+of the range, no run of equal readings and no repeated sequence. With less noise nothing can be said. A step is the
+resolution of the source: one count of a converter, one unit of an integer message, the last digit of a printed line.
 """
 
 from collections.abc import Sequence
@@ -58,8 +58,8 @@ COUNTS = Digits(True, Steps(1.0))
 def find_digits(sensor: RecordedSensor, quantity: Quantity, samples: Sequence[NDArray[Any]]) -> Digits:
     """Return the digits of a sensor's quantity, from all samples (n,) of each recording.
 
-    A board records the counts of the part's converter. Other sources send computed or printed numbers, which have no
-    bits to test if their steps are several recorded counts.
+    A board records the counts of the part's converter. Other sources send computed or printed numbers. If such a number
+    changes in steps of several recorded counts, it has no bits to test.
     """
     channel = sensor.channel(quantity)
     steps = channel.steps(
@@ -81,8 +81,7 @@ def judge_readings(
     """Return statistic and limit by the check's name, from all readings (n, 3) and the windows of each recording.
 
     Each statistic has at most the given false-alarm probability. The noise is the median of all windows, so a stuck
-    axis in some of them does not make it zero. `frozen`: the longest run of equal readings of an axis that moved
-    meanwhile.
+    axis in some of them does not make it zero. `frozen`: the longest run of equal readings of an axis during motion.
     """
     from scipy.special import ndtri
 

@@ -1,4 +1,4 @@
-"""How often the checks against contradictions may fail an undamaged run, and the share of each."""
+"""The probability that the checks against contradictions fail an undamaged run, and the fraction of each check."""
 
 from rig.analysis.consistency import converter_tests, gyroscope_checks
 from rig.analysis.consistency.gyroscope_checks import DISTURBED_SWEEP

@@ -2,12 +2,12 @@
 
 One calibration must explain all segments: m = F ω + c + G a + d t, the vector model with gravity and a steady bias
 drift, within noise, bias random walk and the known errors of arm and sensor. Each check tests the columns of one fault:
-without it, their χ² has as many degrees of freedom as columns. The bias process is estimated from residuals within
-sweeps and between rests, so that a disturbed sweep does not mask itself.
+without this fault, their χ² has as many degrees of freedom as columns. The bias process is estimated from residuals
+within sweeps and between rests, so that a disturbed sweep does not mask itself.
 
 A ripple faster than readings and states is in the transfers' mean readings but in no rates. It looks like noise unless
-it is synchronous with the samples. So the unexplained variance of transfers is inflated as far as they contradict each
-other, beside all that may have changed from quarter to quarter (Birge ratio).
+it is synchronous with the samples. So the unexplained variance of transfers is inflated by their Birge ratio, which
+excludes all changes from quarter to quarter.
 """
 
 from collections.abc import Iterator

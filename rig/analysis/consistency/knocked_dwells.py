@@ -18,10 +18,11 @@ def compare_dwell_halves(
 ) -> Mapping[str, Statistic]:
     """Return the largest difference between a dwell's halves, as χ² of three axes, and its limit; skip short dwells.
 
-    The limit is that of F, as the noise is estimated from the dwells' readings. Flicker with the Allan deviation
-    `flicker_counts` makes the halves differ by √2 times as much. A slow oscillation that no encoder measures is in
-    every dwell, a knock in one; so the differences in the other dwells are added to the variance. The degrees of
-    freedom of both are combined by Welch–Satterthwaite. `steps` are the resolution steps of the counts.
+    The limit is a quantile of the F distribution, because the noise is estimated from the dwells' readings. Flicker
+    with the Allan deviation `flicker_counts` makes the halves differ by √2 times as much. A slow oscillation that no
+    encoder measures affects every dwell, a knock only one; so the differences in the other dwells are added to the
+    variance. The degrees of freedom of both are combined by Welch–Satterthwaite. `steps` are the resolution steps of
+    the counts.
     """
     from scipy.special import fdtri
 

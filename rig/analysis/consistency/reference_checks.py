@@ -2,8 +2,8 @@
 
 The calibration that was computed from them (`rig.estimation.reference.accelerometer_model`) must explain the readings
 of an accelerometer, or of a magnetometer, which has dwells only, within their noise, the arm's attitude error δ and
-stated errors. δ is re-estimated beside every alternative, so that a fault does not mask itself: a likelihood-ratio
-test.
+stated errors. δ is re-estimated together with every alternative, so that a fault does not mask itself: a
+likelihood-ratio test.
 """
 
 from collections.abc import Sequence
@@ -39,7 +39,7 @@ from rig.estimation.reference.shared_errors import decorrelate, information
 class WhitenedReference:
     """Residuals (n,) and model columns (n, q) of readings with unit noise and decoupled errors.
 
-    `growth` (n,) is that of their variance with δ²: see `rig.estimation.reference.shared_errors`.
+    `growth` (n,) is the increase of their variance with δ²: see `rig.estimation.reference.shared_errors`.
     """
 
     residuals: Array
@@ -64,9 +64,9 @@ class WhitenedReference:
         """Return the likelihood-ratio statistic of the columns, and its limit.
 
         It is twice the logarithm of the ratio, χ² if δ is given. Both likelihoods have their restricted
-        maximum-likelihood δ (Welham and Thompson, J. R. Stat. Soc. B 59 (1997) 701). If δ is estimated, the limit is
-        that of F in proportion to δ's part in the variance. Columns None stand for all residuals, and the statistic is
-        their χ².
+        maximum-likelihood δ (Welham and Thompson, J. R. Stat. Soc. B 59 (1997) 701). If δ is estimated, the limit
+        approaches the quantile of F in proportion to δ's part of the variance. Columns None stand for all residuals,
+        and the statistic is their χ².
         """
         from scipy.special import chdtri
 

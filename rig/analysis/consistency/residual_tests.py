@@ -28,8 +28,8 @@ Alternatives = Mapping[str, Array | None]  # by the check's name; None: all resi
 class FaultMode(Generic[Subject]):
     """A possible fault, the `check` that detects it, and the unit of its size; None is the reading's own unit.
 
-    `patterns` return the readings' change by one unit, one for each way in which the fault may occur, without the part
-    that a calibration absorbs: a change half-way is meant about its mean.
+    `patterns` return the readings' change by one unit of the fault, one for each form in which it may occur, without
+    the part that a calibration absorbs: a change half-way through has zero mean.
     """
 
     what: str
@@ -42,8 +42,8 @@ class FaultMode(Generic[Subject]):
 class TestResults:
     """The statistics of one sensor by the name of their check, each with its critical value.
 
-    - `worst`: the statistic of the sweep or dwell least like the others; `disturbed`: those beyond their critical
-      value, by index.
+    - `worst`: the statistic of the sweep or dwell that differs most from the others; `disturbed`: the statistics beyond
+      their critical value, by index.
     - `detection_limits`: the minimal detectable size of each fault mode, by its name, if it is known.
     """
 
@@ -140,7 +140,7 @@ def minimal_detectable_size(model_basis: Array, patterns: Array, alternatives: I
 
     Minimal detectable bias (Baarda 1968): under the fault a test's statistic is non-central χ². All arguments are
     whitened. `model_basis` (n, p): orthonormal columns of the model. `patterns` (n, k): readings per unit fault, one
-    column for each way in which it may occur; the worst counts. `alternatives`: the columns of each test, and its
+    column for each form in which it may occur; the worst counts. `alternatives`: the columns of each test, and its
     critical value as a function of their number.
     """
     from scipy.special import chndtrinc

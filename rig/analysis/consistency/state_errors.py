@@ -28,8 +28,8 @@ def build_time_patterns(segments: Segments, jitter_s: float) -> Array:
 def build_reading_patterns(segments: Segments, noise_rad: float) -> Array:
     """Return the patterns (P, N, 3) rad/s of joint angles read with noise at the edges of sweeps and transfers.
 
-    In sweeps, only the joints that stand still count; in transfers all joints do, because none turns at their ends. At
-    each edge, the joints have as many independent errors as their axes have directions: three at most.
+    In sweeps, only the joints at rest count; in transfers all joints do, because none turns at their ends. At each
+    edge, the joints have as many independent errors as their axes have directions: three at most.
     """
     lengths = np.diff(segments.times_s)
     patterns = []

@@ -60,17 +60,17 @@ class NonlinearityPrior:
 class KnownErrors:
     """The standard uncertainties of arm, site and sensor.
 
-    - angles_rad (17,): of each of ANGLES.
-    - repeatability_rad: of a joint that was moved away and back.
-    - encoder_rad: of a joint's angle by its encoder at one mark; zero if all sweeps are whole turns.
-    - mount_rad: of an item that was mounted again, about each axis.
-    - jitter_s: of the times of the arm's states.
-    - reading_rad: of one reading of a joint's angle.
-    - earth_rad_s (3, k): of the Earth's rate in the base's frame, a column for each unknown direction.
+    - angles_rad (17,): sizes of the errors in ANGLES.
+    - repeatability_rad: error of a joint that was moved away and back.
+    - encoder_rad: encoder error at one angle of a joint; zero if all sweeps are whole turns.
+    - mount_rad: mounting error of an item that was remounted, about each axis.
+    - jitter_s: jitter of the times of the arm's states.
+    - reading_rad: noise of one reading of a joint's angle.
+    - earth_rad_s (3, k): error of the Earth's rate in the base's frame, a column for each unknown direction.
     - curve: prior of the sensor's nonlinearity.
     - sensor: the properties by its data sheet, None if unknown.
     - temperature_times_s: the times of the sensor's temperatures.
-    - stamp_s: of the times of the sensor's samples.
+    - stamp_s: error of the times of the sensor's samples.
     """
 
     angles_rad: Array
@@ -291,7 +291,7 @@ def rate_errors(intervals: Sequence[MotionInterval], steps: int) -> Array:
 
 
 def _wave_indices(motion: ArmMotion) -> dict[int, int]:
-    """Return the first index in `ANGLES` of each joint's waves: of an arm's wrists, else of the last three joints."""
+    """Return the first index in `ANGLES` of each joint's waves: the wrists of an arm, else the last three joints."""
     beyond = motion.kinematics.joints - 1 - WRIST_3
     return {joint + beyond: first for joint, first in WAVES_OF.items() if joint + beyond >= 0}
 

@@ -25,7 +25,7 @@ class Scatter:
 
     - variances_rad2_s2 (N, 3): of independent errors.
     - shared_rad_s (P, N, 3): independent patterns of shared errors.
-    - instability_rad_s: the bias' least Allan deviation, if known.
+    - instability_rad_s: the least Allan deviation of the bias, if known.
     """
 
     variances_rad2_s2: Array
@@ -96,7 +96,7 @@ class WhitenedSegments:
 
 
 def critical_value(false_alarm_probability: float) -> Callable[[int], float]:
-    """Return the critical value of χ² by its degrees of freedom, for this false-alarm probability."""
+    """Return the critical value of χ² as a function of its degrees of freedom, for this false-alarm probability."""
     from scipy.special import chdtri
 
     return lambda dof: float(chdtri(dof, false_alarm_probability))

@@ -1,1 +1,1 @@
-"""What a plan will reach before anything moves: uncertainties, detectable faults, the shortest run."""
+"""Predictions from a plan, before anything moves: uncertainties, detectable faults, the shortest run."""

@@ -30,7 +30,7 @@ MAX_CONDITION = 100.0  # the worst of a thousand random sets of ten has 19; beyo
 class AttitudeAccount:
     """The identifiability of a model of that `order` by `count` attitudes, and the expected uncertainty of each sensor.
 
-    `first` and `second` are the identifiability of the two models; the efficiency is that of the chosen one.
+    `first` and `second` are the identifiability of the two models; the efficiency belongs to the chosen model.
     """
 
     count: int

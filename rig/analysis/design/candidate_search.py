@@ -53,7 +53,7 @@ class Budgets:
 
 @dataclass(frozen=True, slots=True)
 class TargetUncertainty:
-    """The target of each U in `ReachedUncertainty`, infinite without one, in a run of `at_most_s`."""
+    """The target of each U in `ReachedUncertainty`, infinite if there is none, for a run of at most `at_most_s`."""
 
     scale: float = inf
     bias_rad_s: float = inf
@@ -95,7 +95,7 @@ class Candidate:
     rests_s: tuple[float, ...] = ()
 
     def is_contained_in(self, other: "Candidate") -> bool:
-        """Return whether another candidate contains this one, so that this one's U cannot be smaller."""
+        """Return whether another candidate contains this one, whose U cannot be smaller then."""
         return (self.family, self.rests_s) == (other.family, other.rests_s) and all(
             size <= other_size for size, other_size in zip(self.sizes, other.sizes, strict=True)
         )
@@ -128,11 +128,11 @@ class Searched:
 class Shortest:
     """The shortest run for a target.
 
-    - `before`: the file's own procedure, None if it determines nothing.
+    - `before`: the procedure in the file, None if it determines nothing.
     - `nearest`: the candidate with the smallest ratio to the target if none meets it.
     - `endless`: the budgets of the endless runs of each family, and of all evaluated plans.
     - `unreachable`: no run of this kind meets the target, however long.
-    - `directions` (N, 3): those of the sweeps, None without.
+    - `directions` (N, 3): of the sweeps, None if there are none.
     """
 
     wanted: TargetUncertainty

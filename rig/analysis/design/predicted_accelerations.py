@@ -1,7 +1,7 @@
 """The prediction of the uncertainty of accelerometers by a plan's attitudes and sweeps. Pure.
 
-The plan determines the specific force, the data sheet the noise; the arm's errors are the stated ones of its axes, with
-the stated repeatability in each dwell. Bias drift beyond flicker, and disturbances of single readings, are left out.
+The plan determines the specific force, the data sheet the noise; the arm's errors are the stated axis errors, and the
+stated repeatability in each dwell. Bias drift beyond flicker, and disturbances of single readings, are left out.
 """
 
 from dataclasses import replace

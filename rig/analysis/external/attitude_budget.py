@@ -40,8 +40,8 @@ def budget_by_causes(matrix: Array, causes: Mapping[str, Array], noise_dof: floa
     """Return the budget by the contribution of each cause to a reference model's covariance (p, p), F (3, 3) first.
 
     Estimated variance components are uncertain themselves. If the solution integrates over their likelihood, or
-    inflates the covariance as Student's t, u contains this (JCGM 101, 6.4.9), and the degrees of freedom are infinite:
-    also those of the noise, unless `noise_dof` is given.
+    inflates the covariance as Student's t, u contains this (JCGM 101, 6.4.9), and the degrees of freedom are infinite,
+    as are those of the noise unless `noise_dof` is given.
     """
     scale = scale_of(matrix)
     lines = []

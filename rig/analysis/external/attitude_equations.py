@@ -20,7 +20,7 @@ from rig.observation.external.placements import Placements
 
 @dataclass(frozen=True, slots=True)
 class Equations:
-    """The readings of a sensor and the attitudes in which it read them.
+    """The readings of a sensor and the attitudes in which they were taken.
 
     - `means`, `variances` (N, 3), with `dof` (N, 3) degrees of freedom of the variances.
     - `attitudes` (N, 3, 3), `std_rad` (N,): their stated standard deviation; `reference`: its size, or its vectors.

@@ -45,11 +45,11 @@ class InAttitudes:
     """One quantity's calibration by the chosen method.
 
     - `triad`: scale and axes; `budget`: the contributors to the uncertainty.
-    - `other_methods`: the solutions by the other methods, or the Fault each ends in.
+    - `other_methods`: the solutions by the other methods, or the Fault of a method that fails.
     - `measurements`: the means in attitudes; `dwells`: the placements.
     - `reference_fault`: why the estimated reference of a gyroscope is not the Earth's rate.
-    - `laid`: the differences of the placements; `unplaced_rests` rests without an attitude contributed to it.
-    - `moving`: the number of rows that were left out for the body's motion.
+    - `laid`: the differences of the placements, to which `unplaced_rests` rests without an attitude contributed.
+    - `moving`: the number of rows left out because the body moved.
     """
 
     solution: TriaxialSolution

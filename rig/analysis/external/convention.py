@@ -1,9 +1,9 @@
 """The convention of a reference's quaternions, from the readings of a gyroscope that was turned with it.
 
-A quaternion may take body to room coordinates or the other way. Under the right convention the body's rates are a
-linear function of the gyroscope's readings. Whether the scalar part stands first or last changes the frames of body and
-room by a constant rotation, so no readings show it: of two that fit, that with an upright z axis counts, by the
-accelerometer. The other one leads to the same calibration, in other axes of the body.
+A quaternion may transform body to room coordinates, or room to body. Under the right convention the body's rates are a
+linear function of the gyroscope's readings. The position of the scalar part, first or last, changes the frames of body
+and room by a constant rotation, so no readings show it. If both positions fit, the accelerometer decides for the one
+whose z axis is vertical. The other one leads to the same calibration, in other axes of the body.
 """
 
 from dataclasses import dataclass
@@ -30,8 +30,8 @@ UPRIGHT = 0.97  # least component of gravity along the vertical axis of the room
 class Convention:
     """The convention under which the gyroscope explains a fraction of the rates, `lag_s` after the attitudes.
 
-    `scalar_last`: the column read as qw holds qx, and so on. `inverse`: the quaternions take room to body coordinates.
-    `up`: the axis of the room that points upwards, as `--up` takes it; "" if no accelerometer shows it.
+    `scalar_last`: the column read as qw contains qx, and so on. `inverse`: the quaternions take room to body
+    coordinates. `up`: the axis of the room that points upwards, as `--up` takes it; "" if no accelerometer shows it.
     """
 
     scalar_last: bool

@@ -67,11 +67,11 @@ class OfSensor:
     - rates: the gyroscope's solution in attitudes, None by another method.
     - at_rest: the solutions of the other quantities, from rests.
     - unsolved: the faults of recorded quantities without a solution.
-    - turned: the turns from rest to rest that solved it, if any.
-    - installed_kinds: the solutions by installed kinds of sensors.
+    - turned: the turns from rest to rest from which it was solved, if any.
+    - installed_kinds: the solutions of installed kinds of sensors.
     - polynomials: the calibration over temperature, if any.
     - omitted: what was left out, by quantity, None for all of them.
-    - notes: remarkable steps of reading and solving.
+    - notes: what the user should know about reading and solving.
     """
 
     item: Item

@@ -23,7 +23,7 @@ PASSES = 3  # iterations: the clock of one determines the increments of the next
 
 @dataclass(frozen=True, slots=True)
 class InIncrements:
-    """The solution, the length of the windows that its fixes are means over, and what was left out.
+    """The solution, the duration over which attitudes were averaged to fixes, and the increments left out.
 
     `increments` is their number with nothing left out.
     """

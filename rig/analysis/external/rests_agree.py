@@ -2,7 +2,7 @@
 
 A gyroscope at rest reads its bias, and motion of the body that the reference does not show. The reference gives the
 rate of each rest, and its scatter from rest to rest the uncertainty. The reference's errors in motion say little about
-rests: they may be those of its time stamps.
+rests, because time-stamp errors may cause them.
 """
 
 import numpy as np

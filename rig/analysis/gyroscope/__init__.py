@@ -1,1 +1,1 @@
-"""Gyroscopes: from averaged revolutions to a calibration, and comparisons with the board's and a reference's."""
+"""Gyroscopes: from averaged revolutions to a calibration, and its comparison with the board's and a reference's."""

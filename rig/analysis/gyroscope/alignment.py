@@ -1,4 +1,4 @@
-"""The rotation between two sensors on one board, from the mean rates that both read in the same revolutions."""
+"""The rotation between two sensors on one board, from their mean rates in the same revolutions."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""The check of the board's own average of each sweep against the computer's mean of the same sweep. Pure.
+"""The check that the board's average of each sweep agrees with the computer's. Pure.
 
 It detects a mean of readings that is paired with the wrong mean rate, which no residual shows.
 """
@@ -14,7 +14,7 @@ LIMIT = 6.0  # standard deviations of the mean: the two averages share its noise
 
 
 def board_averages(sensor: str, recordings: Sequence[ObservedRun]) -> tuple[Check, ...]:
-    """Return a check for each sweep whose averages contradict each other, or else one check for all sweeps.
+    """Return a check for each sweep whose averages contradict each other; if none do, one check for all sweeps.
 
     Return None if the board averaged nothing. The value is the largest difference of the three axes over the standard
     deviation of the computer's mean.

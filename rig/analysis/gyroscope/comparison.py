@@ -66,8 +66,8 @@ class Deviation:
 class RevolutionError:
     """Mean reading less mean reference over one revolution or arc, (3,) rad/s, and its standard deviation.
 
-    - `sweep`, `joint_name`, `direction`: the motion; `angle_rad` the joint's angle, None for a whole revolution.
-    - `error_rad_s`, `std_rad_s` (3,): the difference, and what noise contributes.
+    - `sweep`, `joint_name`, `direction`: the motion; `angle_rad`: the joint's angle, None for a whole revolution.
+    - `error_rad_s`, `std_rad_s` (3,): the difference, and its standard deviation by noise.
     - `gravity_rad_s` (3,): the part of the error that gravity explains, None if no calibration determines it.
     """
 
@@ -85,12 +85,12 @@ class Comparison:
     """A sensor's readings and the reference's over the whole movement: sweeps, rests and transfers.
 
     - `time_s` (n,): controller time; `reading_rad_s`, `reference_rad_s` (n, 3): in the sensor's frame.
-    - `movement`: over all n samples; `sweeps`: over those of the sweeps with their ramps.
+    - `movement`: over all n samples; `sweeps`: over the samples of the sweeps with their ramps.
     - `noise_rad_s` (3,): standard deviation of the difference at rest, from both sensors' noise: the RMS of a perfect
       calibration; None without rests.
     - `revolutions`: the errors of each.
-    - `delay_s`, `delay_std_s`: of the sensor's filter behind the reference's, one for each recording; none if no common
-      clock stamps the samples.
+    - `delay_s`, `delay_std_s`: delay of the sensor's filter relative to the reference's, one for each recording; empty
+      if no common clock stamps the samples.
     """
 
     time_s: Array
@@ -184,7 +184,7 @@ def _find_delay(recording: ObservedRun, sensor: str, reference: str) -> Delay | 
 
 
 def _mask_covered(time_s: Array, by_s: Array) -> NDArray[np.bool_]:
-    """Return which times (n,) have one of the times `by_s` (m,) shortly before and one shortly after."""
+    """Return a mask of the times (n,) that have one of the times `by_s` (m,) shortly before and one shortly after."""
     after = np.searchsorted(by_s, time_s)
     gaps = np.diff(by_s, prepend=-np.inf, append=np.inf)
     close: NDArray[np.bool_] = gaps[after] <= MAX_GAP * np.median(gaps)

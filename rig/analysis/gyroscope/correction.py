@@ -1,10 +1,11 @@
 """The correction of readings on the board and in `calibration.h`: g = M (m + b), M 3×3. Pure.
 
-`diagonal` is SIX's: M = K, axis by axis. `matrix` also makes the axes orthogonal. With the vector model's m = F ω − b,
-F = K⁻¹ S R: R is the rotation nearest to the three axes (the result's `mounting`), and S, symmetric, has their
-non-orthogonality. M = R F⁻¹ = S⁻¹ K takes a reading to the frame that R rotates the flange's into: the polar
-decomposition. QR would keep the direction of one axis and put the whole error on the others. This one prefers no axis,
-rotates no reading that K would not, and gives the frame in which a verification compares two sensors.
+`diagonal` is the correction of SIX: M = K, axis by axis. `matrix` also makes the axes orthogonal. With the vector
+model's m = F ω − b, F = K⁻¹ S R: R is the rotation nearest to the three axes (the result's `mounting`), and S,
+symmetric, has their non-orthogonality. M = R F⁻¹ = S⁻¹ K takes a reading to the frame that R rotates the flange's into:
+the polar decomposition. QR would keep the direction of one axis and put the whole error on the others. The chosen R
+prefers no axis, rotates no reading that K would not, and defines the frame in which a verification compares two
+sensors.
 """
 
 from dataclasses import dataclass
@@ -30,7 +31,7 @@ class Correction:
 
 
 def diagonal_correction(scale: Array) -> Correction:
-    """Return the matrix M = K of scale factors (3,), for axes taken as orthogonal."""
+    """Return the matrix M = K of scale factors (3,), assuming orthogonal axes."""
     return Correction("diagonal", np.diag(scale))
 
 

@@ -1,7 +1,7 @@
 """The comparison of the board's own solution with one in double precision from the same observations. Pure.
 
 Both average the same samples (the board reports which it used) and use the same speeds, so they differ by the board's
-arithmetic only. If a sample was lost on its way to the host, whose effect would be larger, the board's own mean
+arithmetic only. If a sample was lost on its way to the host, which would have a larger effect, the board's own mean
 replaces the host's. The run's own calibration differs from both: it has weights, removes vibration and uses rests
 (`rig.analysis.gyroscope.calibration`).
 """
@@ -31,7 +31,7 @@ class Agreement:
 
     - `solutions`: the board's, by method.
     - `not_observed`: the sweeps of which the board has no observation, and why.
-    - `host_scale`, `host_bias_rad_s` (3,): in double precision.
+    - `host_scale`, `host_bias_rad_s` (3,): the host's solution in double precision.
     - `scale_difference` (relative), `bias_difference_rad_s`: the largest of three axes, for the closed form.
     """
 

@@ -16,16 +16,17 @@ from rig.observation.consistency.transfers import WristTransfer
 
 @dataclass(frozen=True, slots=True)
 class Segments:
-    """N segments of revolutions and rests, and the readings that they were averaged from.
+    """N segments of revolutions and rests: means of their readings.
 
     - sweep (N,): index of the revolution, −1 of a rest; transfers between sweeps and rests count down from −2.
     - position (N,): from −1 in the first segment of a window to 1 in the last.
     - means_rad_s, variances_rad2_s2 (N, 3): mean readings and their variances.
     - rates_rad_s (N, 3): angular rate of the flange in inertial space, in its frame.
-    - gravity_m_s2 (N, 3): gravity as it is sensed, less the acceleration of the sensor, in that frame.
+    - gravity_m_s2 (N, 3): gravity minus the acceleration of the sensor, in that frame.
     - attitudes (N, 3, 3): from the base into that frame.
     - speed_std (N,): relative standard deviation of the mean speed.
-    - times_s (N, 2): start and end on the clock of the first recording; `intervals` are on that of their own.
+    - times_s (N, 2): start and end on the clock of the first recording; `intervals` are on the clock of their own
+      recording.
     - roundings_rad_s (N, 3): standard uncertainty of each mean by rounding.
     - unexplained_rad2_s2 (N, 3): part of the variances that neither arm nor noise explains.
     """
@@ -48,7 +49,7 @@ class Segments:
 def stack_segments(windows: Sequence[SegmentedAverage], explained: Explained, site: Site) -> Segments:
     """Return the segments of a gyroscope's windows, in the order of the means of `explained`.
 
-    The Earth's rate is that of `explained`: the site's, or the estimated one.
+    The Earth's rate is taken from `explained`: that of the site, or the estimated one.
     """
     inputs = explained.inputs
     placed = list(zip(windows, inputs.windows_s[:, 0], inputs.acceleration_m_s2, strict=True))
@@ -86,7 +87,7 @@ def append_transfers(
 ) -> Segments:
     """Return the segments with the transfers appended, numbered downwards from below `REST`.
 
-    A transfer's noise is the larger of its own and that of the other segments over the same duration. The effect of
+    A transfer's noise is its own, or that of the other segments over the same duration if that is larger. The effect of
     vibration, estimated in the rests before and after, is added. `windows`: the segments' windows.
     """
     if not transfers:

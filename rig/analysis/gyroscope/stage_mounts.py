@@ -1,7 +1,7 @@
-"""The mount of the item in each stage of a run: estimated from the sweeps, then taken as given.
+"""The mount of the item in each stage of a run: estimated from the sweeps, then kept fixed.
 
-All sensors are on one item. Its frame is that of the first stage, whose mount counts as exact: the sensors' own
-mountings contain its error, as those of an item that is mounted once do.
+All sensors are on one item. The first stage defines the frame, so its mount counts as exact: its error is part of the
+sensors' own mountings, as with an item that is mounted once.
 """
 
 from collections.abc import Mapping, Sequence
@@ -36,7 +36,7 @@ class EstimatedMount:
 
     @property
     def rotation(self) -> Array:
-        """The matrix (3, 3) from components in the nominal frame to those in the item's."""
+        """The matrix (3, 3) from components in the nominal frame to components in the item's frame."""
         return rotation_by(-self.rotation_rad)
 
 
@@ -80,8 +80,8 @@ def _estimate_mounts(recordings: Sequence[ObservedRun], settings: RunSettings) -
 def _rotation_in_stage(fit: Explained, index: int) -> tuple[Array, Array]:
     """Return the item's rotation (3,) in a stage relative to the first, and its standard deviations.
 
-    Both are in units of the stated standard deviation. A rotation of the item rotates all sensed rates the opposite
-    way.
+    Both are in units of the stated standard deviation. A rotation of the item rotates all sensed rates in the opposite
+    direction.
     """
     size = len(fit.mounts)
     pick = np.zeros((3, size))

@@ -29,9 +29,9 @@ WAVE_FRACTION = 0.3
 
 @dataclass(frozen=True, slots=True)
 class RecordingPart:
-    """One recording's averages of a sensor: revolutions and rests, and its clock's offset to that of the first.
+    """A sensor's averages in one recording: revolutions and rests; and its clock's offset to the first recording's.
 
-    The item was mounted anew for each `stage`; `mount` (3, 3) takes the flange's frame into the item's.
+    The item was remounted for each `stage`; `mount` (3, 3) transforms the flange's frame into the item's.
     """
 
     turns: Sequence[Observation]
@@ -210,7 +210,7 @@ def list_given(surroundings: Surroundings, name: str) -> EarthRatePrior:
 def list_uncertainties(
     surroundings: Surroundings, name: str, earth_rate: EarthRate | None, stamp_std_s: float | None = None
 ) -> Unknown:
-    """Return the uncertainties that no recording of sensor `name` shows, including that of the estimated Earth rate.
+    """Return the uncertainties that no recording of sensor `name` shows, and that of the estimated Earth's rate.
 
     `stamp_std_s` is as in `RecordedSensor`.
     """

@@ -23,8 +23,8 @@ from rig.observation.observed_run import ObservedRun
 class Verification:
     """The sensor before its calibration (None if that was not recorded) and with it, by one relative rotation.
 
-    `reference_error_rad_s` is the reference's own largest error against the arm: the magnitude of its mean rate over a
-    revolution against 2π/T, and over a rest against zero.
+    `reference_error_rad_s` is the reference's own largest error relative to the arm: that of the magnitude of its mean
+    rate, which is 2π/T over a revolution and zero over a rest.
     """
 
     sensor: str
@@ -47,7 +47,7 @@ def verify(
     """Compare the readings that the board has calibrated (`after`) with those of the reference.
 
     - `before`: recordings of raw readings, from which the `calibration` was made; they determine the rotation between
-      the sensors. Without them, `after` determines it.
+      the sensors; if there are none, `after` does.
     - `gravity_rad_s`, two of (N, 3): gravity's effect on the corrected readings of sensor and reference in the
       revolutions of `after`, if the calibration estimated it.
 
@@ -109,7 +109,7 @@ def _check_complete(runs: Sequence[RunData]) -> None:
 
 
 def _find_reference_error(recordings: Sequence[ObservedRun], reference: Reference) -> float:
-    """Return the largest difference of the reference's speed from the arm's; speeds do not depend on mountings."""
+    """Return the largest difference between the reference's speed and the arm's; speeds do not depend on mountings."""
     turns = list_revolutions(reference.name, recordings)
     rates_rad_s = np.linalg.norm(collect_mean_rates(turns, reference).rate_rad_s, axis=1)
     in_sweeps = rates_rad_s - [turn.speed_rad_s for turn in turns]

@@ -61,10 +61,11 @@ class HeldOut:
 class AccelerometerResult:
     """One accelerometer's calibration, a = F (s + φ s²) + b, in the axes of its nominal mounting.
 
-    - `movement`: the readings that the solution is estimated from; `sweeps`: their number.
-    - `triad`: scale and axes by the solution alone; `budget`: the uncertainty of scale and bias by all causes.
-    - `alignment`: to the gyroscope of the same sensor, None if that was not calibrated.
-    - `other_methods`: the solutions from the attitudes alone, by method, or the Fault each ends in.
+    - `movement`: the readings from which the solution is estimated; `sweeps`: the number of sweeps.
+    - `triad`: scale and axes, with the uncertainty of the solution alone; `budget`: the uncertainty of scale and bias
+      by all causes.
+    - `alignment`: rotation to the gyroscope of the same sensor, None if that was not calibrated.
+    - `other_methods`: the solutions from the attitudes alone, by method, or the Fault of a method that fails.
     - `held_out`: the validation, if the attitudes were repeated.
     - `temperature_c`: the mean of all readings.
     """
@@ -230,7 +231,7 @@ def _split_dwells(
 
 
 def select_held_out(planned: Sequence[PlannedDwell]) -> frozenset[int]:
-    """Return the indices of the last repeat's dwells; none if each attitude is visited once."""
+    """Return the indices of the last repeat's dwells; empty if each attitude is visited once."""
     last = max(dwell.repeat for dwell in planned)
     return frozenset(dwell.index for dwell in planned if dwell.repeat == last > 0)
 

@@ -1,4 +1,4 @@
-"""The errors of an accelerometer's readings by its part's data sheet, in one run: for the solution and its budget."""
+"""The errors of an accelerometer's readings in one run, from the part's data sheet: for the solution and its budget."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -39,7 +39,8 @@ MILLI_G = 1000  # µg
 class Datasheet:
     """The data sheet of one accelerometer: half-widths, except the minimum of the Allan deviation.
 
-    `nonlinearity_percent` of `over_g`, either way. `temperature_words` as in `KnownSensor`.
+    `nonlinearity_percent`: nonlinearity relative to `over_g`, in either direction. `temperature_words` as in
+    `KnownSensor`.
     """
 
     nonlinearity_percent: float

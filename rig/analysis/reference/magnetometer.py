@@ -1,7 +1,7 @@
 """The calibration of magnetometers from dwells in known attitudes: TRIAX, Eq. (7), on an arm.
 
-The solution contains iron and currents that turn with the magnetometer, those of the arm among them, which no residual
-shows. Runs with the sensor turned over separate them: `rig.analysis.reversal`.
+The solution contains iron and currents that turn with the magnetometer, including those of the arm; no residual shows
+them. Runs with the sensor turned over separate them: `rig.analysis.reversal`.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -36,9 +36,10 @@ class MagnetometerResult:
 
     - `field_t`: the size of the field; `extension_m` (3,): the sensor's position on the flange.
     - `triad`: scale, relative to `field_t`, and axes by the solution alone; `budget`: the uncertainty by all causes.
-    - `uniformity`: the test of the field over the attitudes; `drift`: between tests at home, None with fewer than two.
-    - `measurements`: the means that the solution is estimated from, in tesla.
-    - `other_methods`: the solutions by the other methods, or the Fault each ends in.
+    - `uniformity`: the test of the field over the attitudes; `drift`: between tests at home, None if there are fewer
+      than two.
+    - `measurements`: the means from which the solution is estimated, in tesla.
+    - `other_methods`: the solutions by the other methods, or the Fault of a method that fails.
     """
 
     sensor: RecordedSensor
@@ -153,7 +154,7 @@ def _solve(solve: Callable[..., TriaxialSolution]) -> TriaxialSolution:
 def _attitude_error_rad(
     name: str, recordings: Sequence[ObservedRun], accelerometers: Mapping[str, AccelerometerResult]
 ) -> float:
-    """Return an upper bound (2σ) of the arm's attitude error, by the accelerometer on the same clock."""
+    """Return an upper bound (2σ) of the arm's attitude error, by an accelerometer, if possible on the same clock."""
     by = next((other for run in recordings if (other := find_companion(run, name)) in accelerometers), None)
     accelerometer = accelerometers[by] if by is not None else next(iter(accelerometers.values()))
     error = accelerometer.solution.attitude_error

@@ -107,7 +107,7 @@ def _propagate(
 ) -> Spread:
     """Return the spread of scale and bias, from the `response` (p, n) of all parameters.
 
-    `chi_square`: that of the residuals, and its degrees of freedom.
+    `chi_square`: χ² of the residuals, and its degrees of freedom.
     """
     scale = scale_of(solution.matrix)
     rows = scale_and_bias(solution.matrix, scale, len(solution.covariance))

@@ -1,1 +1,1 @@
-"""What changes with temperature and with time: biases repeat by repeat, polynomials of temperature."""
+"""Changes with temperature and with time: biases repeat by repeat, polynomials of temperature."""

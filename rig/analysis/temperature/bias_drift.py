@@ -40,14 +40,14 @@ class ScaleFreeBias:
 class BiasDrift:
     """The bias of one quantity of a sensor by repeat, rad/s or m/s².
 
-    A gyroscope's bias contains the effect of a scale that is not nominal on the Earth's rate, and all of the Earth's
-    rate if the site does not state it (`earth_rate_known`): the same in every repeat.
+    A gyroscope's bias contains the Earth's rate times the scale error, and the whole Earth's rate if the site does not
+    state it (`earth_rate_known`); both are the same in every repeat.
 
     - `scale_fixed`: with scale, axes and reference of the first repeat (accelerometers), or nominal (gyroscopes).
     - `common_std` (3,): the further standard deviation common to all biases.
-    - `scale_free`: the solution of every repeat by itself, by its index.
-    - `time_s`, `temperature_c` (R,): means over every repeat, times since the first.
-    - `dof`, `slope_dof` (3,): those of `scale_fixed.std` and of the slope's standard deviation.
+    - `scale_free`: the separate solution of every repeat, by its index.
+    - `time_s`, `temperature_c` (R,): means over every repeat, times since the first repeat.
+    - `dof`, `slope_dof` (3,): degrees of freedom of `scale_fixed.std` and of the slope's standard deviation.
     - `faults`: by the name SLOPE, why there is no slope.
     """
 
@@ -70,7 +70,7 @@ Drifts = Mapping[str, Mapping[Quantity, BiasDrift]]
 class DwellMean:
     """A sensor's means (3,) in one dwell, their variances, the attitude base → sensor, time and temperature.
 
-    `dof` (3,) is that of the variances.
+    `dof` (3,) are the degrees of freedom of the variances.
     """
 
     mean: Array
