@@ -29,7 +29,7 @@ _NAMES = {kind: name for name, kind in _KINDS.items()}
 
 @dataclass(slots=True)
 class Journal:
-    """The journal in a batch's folder, and the batch by its entries."""
+    """The journal in a batch's folder, and the batch that its entries describe."""
 
     folder: Path
     batch: Batch

@@ -59,7 +59,7 @@ class PartEnded:
     - certificate: its number, empty without one.
     - repeated: how often refused sweeps were repeated.
     - chip: None if unknown.
-    - took_s: the time from "go" to the end.
+    - took_s: the duration from the start to the end.
     - truth: the agreement of the result with a simulated laboratory's truth, empty without a truth.
     """
 

@@ -1,4 +1,4 @@
-"""The operator who names the parts and answers questions, at a terminal or elsewhere; or a list without questions."""
+"""The operator, who names the parts and answers questions, at a terminal or elsewhere; or a list, without questions."""
 
 import sys
 from collections.abc import Callable, Sequence
@@ -16,8 +16,8 @@ from rig.station.questions import COMMAND_WORDS, Kind, Question, Voice, is_agree
 class Operator:
     """The operator, asked by a `voice`, or a list of `numbers`; an empty number ends the batch.
 
-    Without a voice no questions are asked, so a doubt cannot be overridden. Numbers of a list are taken one after the
-    other: a refused one is entered in the table, whereas a typed one is typed again. `asking` is open during a question
+    Without a voice no questions are asked, so a doubt cannot be overridden. Numbers in a list are used in order. If one
+    is refused, it is entered in the table; a refused typed one is typed again. `asking` is open during a question
     between two runs, with its subject, such as "to mount the part".
     """
 

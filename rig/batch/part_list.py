@@ -12,7 +12,7 @@ HEADING = "serial_number"
 
 
 def numbers_in(path: Path) -> tuple[str, ...]:
-    """Return the serial numbers in a CSV file's column `serial_number`, or else in its first column.
+    """Return the serial numbers in a CSV file's column `serial_number`; in its first column if there is no such column.
 
     Raise Refused `parts_file`.
     """

@@ -30,7 +30,7 @@ LABELS = "labels"
 
 
 class Bench(Protocol):
-    """The place where a part is run, with everything that stays between two parts."""
+    """The place where a part is run, with everything that remains between two parts."""
 
     @property
     def simulated(self) -> bool: ...

@@ -35,7 +35,7 @@ class Now:
     - state, part: the present activity, and the serial number of its part.
     - doing: the activity in words.
     - left_s: its remaining time, None if unknown.
-    - operator, work_order, simulated: of the batch.
+    - operator, work_order, simulated: properties of the batch.
     - counts: the numbers of parts by state.
     - parts: serial number and state of the newest parts.
     - rig: the rig's name in a history, empty if unknown.
