@@ -115,6 +115,6 @@ def refuse_other_sensor(
 
 
 def spell_part(part: str) -> str:
-    """Return a part's name in the configuration's spelling; the board uses the maker's."""
+    """Return a part's name in the configuration's spelling; the board uses the maker's spelling."""
     names = {part_on_board.name: name for name, part_on_board in BOARD_PARTS.items()}
     return names.get(part, part.lower())
