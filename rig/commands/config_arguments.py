@@ -69,7 +69,7 @@ def add_columns(parser: _ActionsContainer) -> None:
 
 
 def read_column_map(path: Path | None) -> "ColumnMap":
-    """Return the map that `--columns` names; an empty one without the option. Raise Refused as `load_as` does."""
+    """Return the map that `--columns` names; an empty map without the option. Raise Refused as `load_as` does."""
     from rig.config.column_map import AS_NAMED, ColumnMap
     from rig.config.load import load_as
 
@@ -77,7 +77,7 @@ def read_column_map(path: Path | None) -> "ColumnMap":
 
 
 def find_logs(path: Path) -> list[Path]:
-    """Return a log of another program by its path, or the logs in a folder of `rig record`; none for a run."""
+    """Return the path of a log of another program, or those in a folder of `rig record`; an empty list for a run."""
     from rig.observation.formats.sample_files import is_in_format, whole
 
     if is_in_format(path):

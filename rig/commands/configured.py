@@ -1,4 +1,4 @@
-"""The configuration and the procedure of a command: the one that the file names, or one in a file of its own."""
+"""The configuration of a command and its procedure: the one named in the configuration, or one in a script."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext

@@ -1,4 +1,4 @@
-"""The commands that plan, check, run and write, as functions for Python, with the same output and refusals."""
+"""The commands that plan, check, run and write, as Python functions with the same output and refusals."""
 
 import multiprocessing
 import threading

@@ -49,7 +49,7 @@ class PageWish:
 
 @dataclass(frozen=True, slots=True)
 class OperatorsPage:
-    """The page as a run uses it: its listeners, its answer in place of the terminal's, and how to wait at the end."""
+    """The page as a run uses it: its listeners, its questions instead of the terminal's, and how to wait at the end."""
 
     listeners: "tuple[Listener, ...]" = ()
     answer: Answer | None = None

@@ -1,4 +1,4 @@
-"""Standard streams that cannot end a run: if the reader of the output goes away, the work goes on."""
+"""Standard streams that cannot end a run: if the reader of the output goes away, the work continues."""
 
 import os
 import sys
@@ -9,7 +9,7 @@ from typing import Any, TextIO
 class _Unbroken:
     """A text stream whose loss ends nothing: output that it refuses is discarded, and all later output.
 
-    `lost` is the error, unless the reader has gone away: then it has read all that it wanted.
+    `lost` is the error, None if the reader has gone away, because it has read as much as it wanted.
     """
 
     def __init__(self, stream: TextIO) -> None:
@@ -52,7 +52,7 @@ def output_lost() -> OSError | None:
 
 
 def say_where_the_result_is(result: Path) -> None:
-    """Print on stderr that `path` has the complete result, if stdout has lost output; keep the exit status."""
+    """Print on stderr that `path` contains the complete result, if stdout has lost output; keep the exit status."""
     from rig.station.plain_text import say
 
     if (lost := output_lost()) is not None:

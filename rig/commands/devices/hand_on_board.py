@@ -1,6 +1,6 @@
 """`rig board hand`: the board calibrates a gyroscope that is turned by hand; its result is checked.
 
-With `--fetch` the board has done so alone, begun by its button: its result is taken as it is.
+With `--fetch` the session was started by the board's button: its result is used as it is.
 """
 
 import json

@@ -129,7 +129,7 @@ def _literals(annotation: object) -> Mapping[str, str]:
 
 
 def _port(question: str, option: str, chosen_port: str | None) -> str:
-    """Return a serial port that the user chooses from this computer's, or types."""
+    """Return a serial port that the user chooses from those of this computer, or types."""
     from rig.config.section import check_port
 
     if chosen_port is None:

@@ -18,7 +18,7 @@ def ask(
     usual: str | None = None,
     value: str | None = None,
 ) -> str:
-    """Return the answer to a question: the option's value, else typed text, requested until it is valid.
+    """Return the answer to a question: the option's value, or text typed by the user, requested until it is valid.
 
     `valid` converts an answer and raises ValueError for an invalid one. `usual` is the meaning of Enter. Raise Refused
     `not_answered`, and `bad_option` for an invalid option.
@@ -37,7 +37,7 @@ def ask(
 
 
 def ask_choice(question: str, option: str, choices: Mapping[KeyT, str], value: str | None = None) -> KeyT:
-    """Return the key of a choice, given by its number or itself; Enter selects the first. Raise as `ask` does."""
+    """Return the key of a choice; the user types it or its number; Enter selects the first. Raise as `ask` does."""
     keys = [*choices]
 
     def key_of(text: str) -> str:

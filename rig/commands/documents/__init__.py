@@ -1,1 +1,1 @@
-"""Commands about what a finished run leaves: show, report, export, verify, explain."""
+"""Commands about a finished run: show, report, export, verify, explain."""

@@ -85,7 +85,7 @@ def _explain_remedies(name: str, usual: str) -> Iterator[str]:
 
 
 def _find_method_in_use() -> "CalibrationMethod | None":
-    """Return the latest run's method of calibration, by its configuration; None if it is unknown."""
+    """Return the latest run's method of calibration, from its configuration; None if it is unknown."""
     import yaml
 
     from rig.config.files.regular_file import UnfitFile, read_regular_file

@@ -133,7 +133,7 @@ def _look_up(
 def _judge(
     file: Path, content: bytes, looks: "Mapping[Path, FileInspection]", history_answer: "FileEntries | None"
 ) -> VerifiedFile:
-    """Judge one file by its signature; without one, by a signed file that contains it, or by the history.
+    """Judge one file by its signature; without a signature, by a signed file that contains it, or by the history.
 
     `looks` are the inspections of all files. If the history confirms an unsigned file, it does not matter whether a
     signer is trusted.
@@ -190,7 +190,7 @@ def _print_file(documents: VerifiedFile) -> None:
 
 
 def _describe_state(problems: Sequence[Refused]) -> str:
-    """Return the status with its term in ETSI EN 319 102-1: TOTAL-PASSED, TOTAL-FAILED, INDETERMINATE."""
+    """Return the status in words: TOTAL-PASSED, TOTAL-FAILED or INDETERMINATE of ETSI EN 319 102-1."""
     if not problems:
         return "valid"
     altered = {problem.name for problem in problems} - TRUST_PROBLEMS

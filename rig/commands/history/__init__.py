@@ -1,1 +1,1 @@
-"""The commands of `rig history`, and what other commands ask of a history or enter into it."""
+"""The commands of `rig history`, and queries and entries of other commands."""

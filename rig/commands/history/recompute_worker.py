@@ -27,8 +27,8 @@ NOT_HERE = (
 class Task:
     """Recordings to be solved again, with the program's version, estimator (None: the procedure's own) and settings.
 
-    `key` names the result that they are compared with; `places` are pairs of computer and folder; `recordings` are the
-    entered ones.
+    `key` names the result with which they are compared; `places` are pairs of computer and folder; `recordings` are
+    those in the history.
     """
 
     key: str
@@ -48,7 +48,7 @@ def solve_task(task: Task) -> Answer:
 
 
 def _find_folder(task: Task) -> Path | Unsolved:
-    """Return the newest folder in which every recording has its entered content, or why there is none."""
+    """Return the newest folder in which every recording is as it was entered, or why there is none."""
     if not task.recordings:
         return Unsolved("missing", "the history has no recording of it")
     damaged = None

@@ -34,7 +34,7 @@ def recall_sensors(config: RigConfig, moved: frozenset[str]) -> Memory:
 def find_other_board(
     config: RigConfig, board: str, parts: Collection[str], own_serial_numbers: Collection[str], *, simulated: bool
 ) -> str | None:
-    """Return the serial number, in words, under which the history knows a sensor on this board.
+    """Return the serial number, in words, under which the history contains a sensor on this board.
 
     The newest calibration of one of the `parts` decides. Return None if its serial number is one of
     `own_serial_numbers`, or if the history does not answer.
@@ -65,7 +65,7 @@ def _load_of_sensors(address: "HistoryAddress", serial_numbers: list[str]) -> tu
 
 
 def _load_calibrations(address: "HistoryAddress", wanted: "Sequence[Selection]") -> tuple[CalibratedBefore, ...]:
-    """Return the valid calibrations of the selections, newest first; none if the file is missing."""
+    """Return the valid calibrations of the selections, newest first; an empty list if the file is missing."""
     from rig.history.storage.continuity import is_there
     from rig.history.store import open_history
 

@@ -121,7 +121,7 @@ class Cluster:
         return bool(self._in_hand)
 
     def threads(self) -> dict[str, int]:
-        """Return the number of threads of each worker by its address. Raise Fault `cluster_lost`."""
+        """Return the number of threads of each worker, by the worker's address. Raise Fault `cluster_lost`."""
         if self._client.status == "running":
             with suppress(OSError, RuntimeError):
                 threads: dict[str, int] = self._client.nthreads()

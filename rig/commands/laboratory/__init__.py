@@ -1,1 +1,1 @@
-"""The rig that a command works with: its claims, its address, and the simulated laboratory."""
+"""The rig that a command uses: its claims, its address, and the simulated laboratory."""

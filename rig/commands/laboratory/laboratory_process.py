@@ -72,7 +72,7 @@ def make_mounter(control: str) -> Callable[[int], None]:
 
 
 def make_fitter(control: str) -> Callable[[str], None]:
-    """Return the function that exchanges the part for that of a serial number: the simulated operator does it.
+    """Return the function by which the simulated operator mounts the part with a given serial number.
 
     `control` and errors as in `make_mounter`.
     """

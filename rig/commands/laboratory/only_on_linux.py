@@ -1,4 +1,4 @@
-"""The refusal of what needs Linux: an arm, a servomotor, the simulated laboratory."""
+"""Refusal on other systems of what needs Linux: an arm, a servomotor, the simulated laboratory."""
 
 import sys
 from importlib.util import find_spec

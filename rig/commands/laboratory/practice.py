@@ -1,4 +1,4 @@
-"""What a person can let happen in a running laboratory, by words: the faults to practise, and their remedies."""
+"""Faults to practise in a running laboratory, and their remedies, which a person causes by typing words."""
 
 import re
 from collections.abc import Mapping

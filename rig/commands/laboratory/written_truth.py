@@ -21,7 +21,7 @@ def write_truth(
     """Have the laboratory at `control` write the truth over the windows of a run; yield the event of its file.
 
     The laboratory writes into the file `written` that it was given at its start. The file ends in the run's `folder`.
-    There is none for a calibration over temperature: its values belong to another temperature than the run's.
+    Nothing is written for a calibration over temperature: its values belong to another temperature than the run's.
     """
     if outcome.polynomials or not (outcome.results or outcome.accelerometers):
         return

@@ -1,4 +1,4 @@
-"""`rig demo`: a calibration in a simulated laboratory, and the files to go on with."""
+"""`rig demo`: a calibration in a simulated laboratory, and files for further steps."""
 
 import sys
 from argparse import ArgumentParser, Namespace

@@ -26,7 +26,7 @@ def add(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Print the plan of `make_plan`, or the shortest one for a target uncertainty.
+    """Print the plan of `make_plan`, or the shortest plan for a target uncertainty.
 
     Return 0, or 1 if no plan reaches the target. Raise Refused as `make_plan` and `print_shortest_run` do.
     """

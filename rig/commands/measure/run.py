@@ -1,4 +1,4 @@
-"""`rig run`: the procedure of a configuration, or one in a script of its own."""
+"""`rig run`: the procedure of a configuration, or one in a script."""
 
 import sys
 from argparse import ArgumentParser, Namespace
@@ -58,9 +58,9 @@ def run(options: Namespace) -> int:
 
 @contextmanager
 def prepare_run(options: Namespace) -> "Iterator[tuple[Path, Configured]]":
-    """Yield a new run folder and its configuration; meanwhile a simulated laboratory has an address of its own.
+    """Yield a new run folder and its configuration; during the block a simulated laboratory has its own address.
 
-    If the operator does not agree, no folder remains, so the same command can be given again. Raise Refused as
+    If the operator does not agree, the folder is removed, so the same command can be repeated. Raise Refused as
     `load_configured` and `new_folder` do; `only_on_linux` for a simulated laboratory elsewhere.
     """
     from rig.commands.configured import open_configured

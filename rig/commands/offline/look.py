@@ -1,4 +1,4 @@
-"""`rig look FILE`: what a log of another program holds, which solutions it allows, and the map of its columns."""
+"""`rig look FILE`: the contents of a log of another program, the solutions it allows, and the map of its columns."""
 
 from argparse import ArgumentParser, Namespace
 from collections.abc import Mapping, Sequence

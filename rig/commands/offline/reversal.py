@@ -15,7 +15,7 @@ def add(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Print the biases that the runs together determine, and write them to `--out`; change nothing else.
+    """Print the biases that the runs together determine, and write them to `--out`.
 
     Return 0. Raise Refused `report_folder`, and Refused and Fault as `open_run`, `turner_of`, `judged` and `reversals`
     do.

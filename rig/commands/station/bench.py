@@ -1,7 +1,7 @@
-"""The bench of a station: devices and configuration that stay for all parts, and the run of one part.
+"""The bench of a station: devices and configuration that all parts share, and the run of one part.
 
-The claims, the simulated laboratory, the configuration and its script stay. The turner is connected again for each
-part, as a run ends with it stopped for good, but ahead of time: while the part is changed.
+The claims, the simulated laboratory, the configuration and its script remain. The turner is reconnected for each part,
+because a run stops it for good; this happens ahead of time, while the part is changed.
 """
 
 import json
@@ -46,7 +46,7 @@ from rig.turners.turner_registry import kind_of
 class PartListener:
     """A listener of one run.
 
-    It keeps the board that was met, whether anything was recorded, and whether refused sweeps can be repeated.
+    It stores the connected board, whether anything was recorded, and whether refused sweeps can be repeated.
     """
 
     chip: Chip | None = None
@@ -85,7 +85,7 @@ class RigBench:
     - control: the address of its simulated laboratory, None for a real one.
     - ahead: connects the turner.
     - truth_file: where the simulated laboratory writes its truth.
-    - begun: the folders of the runs that this laboratory has from their beginning.
+    - begun: the folders of the runs that began in this laboratory.
     """
 
     configured: Configured
@@ -264,7 +264,7 @@ def refuse_other_sensors(config: RigConfig) -> None:
 
 
 def _read_ended(folder: Path, configured: Configured) -> PartEnded | None:
-    """Return a run's result from before the station was killed; None if sweeps remain to be repeated."""
+    """Remember a run that ended before the station was killed; return its result, None if sweeps must be repeated."""
     result = read_result(folder)
     failed = [check for check in result.checks if not check.passed]
     if any(check.means.sweep is not None for check in failed):

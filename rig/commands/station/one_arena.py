@@ -1,6 +1,6 @@
 """The memory of a command that runs for hours: every part starts threads, and glibc gives each thread an arena.
 
-Memory that one thread has freed stays unused in its arena, some megabytes more with every part (mallopt(3),
+Memory that one thread has freed remains unused in its arena, some megabytes more with every part (mallopt(3),
 M_ARENA_MAX). With one arena it is used again.
 """
 

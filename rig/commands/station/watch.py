@@ -41,7 +41,7 @@ def _speed(text: str) -> float:
 
 
 def run(options: Namespace) -> int:
-    """Replay every recording in a run folder, `--speed` times as fast; the page stays until Ctrl-C.
+    """Replay every recording in a run folder, `--speed` times as fast; the page remains until Ctrl-C.
 
     Return 0. Raise Refused `no_run`, `page_address`, and as `read_run`, `turner_of`, `check_arms_times` and
     `read_result` do.
