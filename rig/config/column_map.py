@@ -103,7 +103,7 @@ class TableSection(Section):
 
     @model_validator(mode="after")
     def require_rates_of_all_axes(self) -> Self:
-        """Refuse rates of only some axes, because the item's rate needs those of all."""
+        """Refuse rates of only some axes, because the item's rate needs the rates of all axes."""
         _fit("time", self.time, TIME)
         if any(column.unit is None for axis in self.axes for column in (self.time, axis.angle, axis.rate) if column):
             raise ValueError("say the unit of every column of a table")
@@ -120,7 +120,7 @@ class ColumnMap(Section):
 
     - …_skip_lines: lines before the heading.
     - …_rate_hz: rows per second of a file without a column of time.
-    - …_missing: texts that stand for a missing value, as an empty cell does.
+    - …_missing: texts that mean a missing value, as an empty cell does.
     - motion_inverse: the quaternions take table to body coordinates, and are inverted.
     """
 

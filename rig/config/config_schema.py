@@ -1,8 +1,8 @@
 """Print the JSON schema of configurations, for editors: `python -m rig.config.config_schema > docs/config.schema.json`.
 
-An editor with a YAML language server completes and checks a file whose first line names the schema:
-`# yaml-language-server: $schema=PATH`. The schema asks for no key, as a file may build on another (`base`) and state
-only what differs: what is missing `rig check` says.
+An editor with a YAML language server completes and checks a file whose first line names the schema: `#
+yaml-language-server: $schema=PATH`. The schema requires no key, because a file may be based on another (`base`) and
+state only what differs; `rig check` reports missing keys.
 """
 
 import json

@@ -36,10 +36,10 @@ sensors:
 
 @dataclass(frozen=True, slots=True)
 class Answers:
-    """What turns the sensors, what measures, and where they answer.
+    """The turner, the measuring device, and their addresses.
 
-    `sensors` is the section of that name as `rig lines` writes it, if the device was listened to. `part` is one on the
-    board. `arm_host`, `arm_model` and `payload_kg` are of an arm, `servo_port` and `servo_model` of a servomotor.
+    `sensors` is the section of that name as `rig lines` writes it, if the device's lines were read. `part` is one on
+    the board. `arm_host`, `arm_model` and `payload_kg` are of an arm, `servo_port` and `servo_model` of a servomotor.
     """
 
     turner: Turner

@@ -46,7 +46,7 @@ class Loaded:
 
     `simulated`: the file has a `world:` section, which only the simulated laboratory reads, from `text`. `flash_file`:
     the file with the simulated board's memory, or None. `text`: the file as used (merged with its base, overrides
-    applied). `rig_text`: the same without the `world:` section, as a recording keeps it.
+    applied). `rig_text`: the same without the `world:` section, as a recording stores it.
     """
 
     config: RigConfig
@@ -192,7 +192,7 @@ def _validate_rig(
 
 
 def _validate_procedure(data: Any, sections: Sections, layered: Layered) -> tuple[ProcedureSection | None, list[str]]:
-    """Validate the procedure's section. If its name is unknown, its keys are compared with the nearest name's."""
+    """Validate the procedure's section. If the name is unknown, compare its keys with the nearest one's."""
     name = data.get("name", DEFAULT_PROCEDURE) if isinstance(data, dict) else DEFAULT_PROCEDURE
     if sections is None:
         return ProcedureSection(name=str(name)), []
@@ -355,7 +355,7 @@ def _world_fits(config: RigConfig, world: WorldSection) -> Iterator[str]:
 
 
 def _instruments_fit(config: RigConfig, world: WorldSection) -> Iterator[str]:
-    """Yield conflicts: simulated instruments at ports where the rig has another sensor."""
+    """Yield conflicts: simulated instruments at ports at which the rig has another sensor."""
     for name in sorted(config.sensors.keys() & world.sensors.keys()):
         where = "the sensor is on the board" if name in config.on_board else "the sensor is at another's port"
         if world.sensors[name].kvh1775 is not None and config.sensors[name].part != "kvh1775":

@@ -38,7 +38,7 @@ HOMES = "`[0, -90, 90, -90, -90, 0]`, of a `ur3e` `[0, -90, 90, -90, -60, 0]`"
 
 
 class TurnerSection(Section):
-    """What every turner's section has: nothing in common but this. A kind of turner adds its own keys."""
+    """The base of every turner's section, without any common key. A kind of turner adds its own keys."""
 
     @property
     def address(self) -> str:
@@ -161,7 +161,7 @@ class BoardSection(Section):
 
 
 class ProcedureSection(Section):
-    """What every procedure's section has: its name. A procedure adds its own keys and says what else it needs."""
+    """The base of every procedure's section: its name. A procedure adds its own keys and states what else it needs."""
 
     name: str = Field(description="which procedure is run")
 
@@ -184,7 +184,7 @@ class ProcedureSection(Section):
 
     @property
     def needs_reference(self) -> bool:
-        """Whether calibrated readings are compared with a reference's."""
+        """Whether calibrated readings are compared with those of a reference."""
         return self.then_verify
 
     @property
@@ -218,7 +218,7 @@ class StatementConfig(Section):
 
 
 class SensorsConfig(Section):
-    """What who only reads sensors needs of a configuration: how they are turned and judged may be left out."""
+    """The part of a configuration that reading sensors needs; sections about turning and judging may be left out."""
 
     turner: Any = None
     board: BoardSection | None = None

@@ -19,8 +19,8 @@ Places = Mapping[Location, str]  # position of each key, in words: "line 3", "de
 class Layered:
     """All that is said: the `document`, the `places` of its keys, and the `problems` found while putting it together.
 
-    `written` are the letters of every value that YAML takes for something else than text.
-    `text` is what was written, when one file says everything; None when the document was made of more.
+    `written` is the text of every value that YAML reads as something other than text. `text` is the file's text if
+    there is a single file; None if the document is merged from several.
     """
 
     document: dict[str, Any]

@@ -1,4 +1,4 @@
-"""Writes files into folders that somebody else may have laid something into: never through a link or into a pipe."""
+"""Writes files into folders in which another user may have put something: never through a link or into a pipe."""
 
 import os
 import stat
@@ -39,7 +39,8 @@ def new_file(path: Path) -> Iterator[BinaryIO]:
     """Open a file to be written in this block, which then replaces `path` completely or not at all.
 
     Within `replace_together` this happens at the end of that block. If `path` is a link, the link is replaced and its
-    target stays. Raise OSError as writing does, also if another process creates a file of that name at the same moment.
+    target remains. Raise OSError as writing does, also if another process creates a file of that name at the same
+    moment.
     """
     part = path.with_name(path.name + PART)
     part.unlink(missing_ok=True)

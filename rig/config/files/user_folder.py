@@ -1,4 +1,4 @@
-"""The folder of this user's own in which the rig keeps what it is to know again: texts, a history, old parameters."""
+"""The user's own folder, in which the rig stores texts that it recognises later, a history, and old parameters."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Text is taken as text: where a key holds words, a value that YAML reads as a number is what was written, `0017`."""
+"""A key that expects text gets the text as written, such as `0017`, even if YAML reads it as a number."""
 
 import types
 import typing

@@ -1,7 +1,7 @@
 """Reads YAML that anybody may have written: plain data and the line of every key, or one sentence why not.
 
-Nothing a text holds makes reading it slow, large or deep: a configuration is a page, so what is far beyond that is
-refused instead of read.
+No text makes reading slow, large or deep: a configuration is a page, so anything far beyond that is refused instead of
+read.
 """
 
 import unicodedata
@@ -45,9 +45,9 @@ class Unreadable(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Document:
-    """What a text says: `data` as YAML reads it, the `lines` of its keys, and the `problems` of its keys and words.
+    """A text's contents: `data` as YAML reads it, the `lines` of its keys, and the `problems` of its keys and words.
 
-    `written` are the letters of every value that YAML takes for something else than text: a number, a date, a truth.
+    `written` is the text of every value that YAML reads as something other than text: a number, a date, a boolean.
     """
 
     data: Any

@@ -1,4 +1,4 @@
-"""Which addresses a history may have: a file, or a database whose URL holds nothing that is better kept secret."""
+"""The addresses that a history may have: a file, or a database whose URL contains no secret."""
 
 from typing import TYPE_CHECKING
 

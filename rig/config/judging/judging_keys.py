@@ -1,4 +1,4 @@
-"""What a recording is judged by beside limits, a row each key: its range, its usual value, and what it means.
+"""The keys by which a recording is judged, apart from limits, one in a row: its range, its default, and its meaning.
 
 One table for the section of a configuration and for the settings that are recorded, which have every key.
 """

@@ -15,7 +15,7 @@ MIN_LEVEL = 0.1
 
 
 class SiteSection(Section):
-    """Where the arm stands. With latitude and heading the Earth's rate is taken out. The texts are for certificates."""
+    """Where the arm stands. With latitude and heading the Earth's rate is removed. The texts are for certificates."""
 
     laboratory: Words | None = Field(default=None, description="the laboratory's name, for certificates")
     address: Words | None = Field(default=None, description="the laboratory's address, in one line")
@@ -122,7 +122,7 @@ class SiteSection(Section):
 
 
 class CertificateSection(Section):
-    """What a certificate says about the order and about the responsible person. What is left out reads "not stated"."""
+    """What a certificate says about the order and the responsible person; "not stated" for what is left out."""
 
     customer: Words | None = Field(default=None, description="the customer's name")
     customer_address: Words | None = Field(default=None, description="the customer's address, in one line")

@@ -19,11 +19,11 @@ Need = Literal["verification", "accelerometer", "repeated attitudes", "bias drif
 
 @dataclass(frozen=True, slots=True)
 class Limit:
-    """What a limit holds of a sensor's `quantity`, by its name: `what` its check is called, and the unit of both.
+    """A limit for a sensor's `quantity`: `what` names its check, `unit` is that of the value and the limit.
 
-    One of "conformity" holds a property of the item, one of "fitness" asks whether the measurement is fit for use.
-    `parameter` is that of the calibration that is held, None where it is none. `needed_by` is what cannot pass without
-    the limit; None where every configuration states it.
+    A "conformity" limit judges a property of the item, a "fitness" limit the measurement's fitness for use. `parameter`
+    is the judged parameter of the calibration, None if it is no parameter. `needed_by` is what cannot pass without the
+    limit; None if every configuration states the limit.
     """
 
     quantity: str
@@ -35,7 +35,7 @@ class Limit:
 
 
 class Limits(BaseModel):
-    """The verdict's limits; None where what needs one was not asked for."""
+    """The verdict's limits; None for a limit that nothing requested needs."""
 
     # Limits that a later version adds are ignored when a recording is read.
     model_config = ConfigDict(frozen=True, allow_inf_nan=False, defer_build=True)

@@ -123,7 +123,7 @@ class SixSweepsSection(ProcedureSection):
 
     @property
     def mountings(self) -> tuple[StageSection, ...]:
-        """The stages with their mountings of the item; empty if it stays as it is."""
+        """The stages with their mountings of the item; empty if the item is mounted once."""
         return ()
 
     @property

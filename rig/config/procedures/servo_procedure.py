@@ -1,4 +1,4 @@
-"""The `procedure:` section of the six observations with a servo: mountings, and a turn each way in each of them."""
+"""The `procedure:` section of the six observations with a servo: mountings, and a turn in either direction in each."""
 
 from collections.abc import Iterator
 from typing import Literal, Self
@@ -43,7 +43,7 @@ THREE_MOUNTINGS = (
 
 
 class ServoSixObservationSection(ProcedureSection):
-    """Three mountings, and a turn each way of the shaft in each: the speeds alone tell scale and bias."""
+    """Three mountings, in each a turn of the shaft in either direction: the speeds alone determine scale and bias."""
 
     name: Literal["servo_six_observation"] = Field(default="servo_six_observation", description="this procedure")
     stages: tuple[ServoStageSection, ...] = Field(

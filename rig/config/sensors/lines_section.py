@@ -1,4 +1,4 @@
-"""The section `lines` of a sensor: what stands in the lines that a device prints, one sample each."""
+"""The section `lines` of a sensor: the columns of the lines that a device prints, one sample in each."""
 
 import re
 from collections import Counter

@@ -14,7 +14,7 @@ MARGIN = 0.1  # fraction of the link that remains free: for replies, and for a c
 class LinkLoad:
     """What one sensor sends: samples a second, raw or `calibrated` or both in turn, raw ones with its accelerations.
 
-    Or those of a magnetometer, of its `field`.
+    For a magnetometer, of its `field`.
     """
 
     rate_hz: float

@@ -1,4 +1,4 @@
-"""The sensors the rig has drivers for: which data rates and ranges each can be set to."""
+"""The sensors for which the rig has drivers, with their possible data rates and ranges."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ RATE_TOLERANCE = 2e-4  # relative: 333.33 stands for 1000/3, and the closest two
 
 @dataclass(frozen=True, slots=True)
 class Delivered:
-    """How far a part may be off as it is delivered: half-widths, None where its data sheet has no figure.
+    """The errors of a part as it is delivered: half-widths, None if its data sheet has no figure.
 
     `rate_percent` is of its own data rate, with all temperatures.
     """
@@ -41,9 +41,9 @@ class PartSpec:
     - acceleration_noise_ug_sqrt_hz: noise density.
     - acceleration_nonlinearity_percent: of the range that acceleration_nonlinear_over_g states.
     - acceleration_bias_mg_k, acceleration_scale_ppm_k, acceleration_bias_instability_ug: as the gyroscope's.
-    - acceleration_nonlinear_over_g: that range either way; 0 for the range that is set.
+    - acceleration_nonlinear_over_g: that range, in either direction; 0 means the range that is set.
     - delivered: the quantities that its calibration estimates.
-    - own_port: whether it has a port and a clock of its own, beside the board.
+    - own_port: whether it has a port and a clock of its own, apart from the board.
     - any_rate: whether it may be any sensor: its section states rates and ranges, the limits are a consumer part's.
     """
 

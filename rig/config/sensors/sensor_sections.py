@@ -1,4 +1,4 @@
-"""The sections of a sensor: its part and rate, how it is mounted, the port of its own, what of it is known before."""
+"""The sections of a sensor: its part and rate, its mounting, its own port, and what is known of it before the run."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Protocol, Self
@@ -93,7 +93,7 @@ class MountingSection(Section):
 
 
 class TurntableSection(Section):
-    """The reference's own calibration from before: rate = scale · (reading + bias_rad_s)."""
+    """The reference's own earlier calibration: rate = scale · (reading + bias_rad_s)."""
 
     scale: tuple[Positive, Positive, Positive] = Field(
         default=(1.0, 1.0, 1.0), description="scale factor of each axis", json_schema_extra=RATIO

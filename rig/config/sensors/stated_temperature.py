@@ -1,4 +1,4 @@
-"""What the user states of the temperature of a sensor that provides none."""
+"""The temperature that the user states for a sensor that provides none."""
 
 from pydantic import Field
 

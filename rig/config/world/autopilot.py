@@ -1,4 +1,4 @@
-"""The part of a simulated sensor's section that is about the autopilot it is in."""
+"""The part of a simulated sensor's section about the autopilot that contains it."""
 
 from pathlib import Path
 from typing import Literal

@@ -1,4 +1,4 @@
-"""The section of what the electronics of a simulated sensor do wrong, of one that has a port of its own."""
+"""The section about errors of the electronics of a simulated sensor with its own port."""
 
 from typing import Literal
 

@@ -1,4 +1,4 @@
-"""The section of a simulated device that prints lines: its clock, what it prints besides, what it loses."""
+"""The section of a simulated device that prints lines: its clock, its other lines, its losses."""
 
 from typing import Annotated
 

@@ -1,4 +1,4 @@
-"""The `world.thermal` section: how warm the simulated board is, and what of that its sensors feel."""
+"""The `world.thermal` section: the temperature of the simulated board and of its sensors."""
 
 from itertools import pairwise
 from typing import Annotated
