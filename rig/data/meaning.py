@@ -13,8 +13,8 @@ JUDGED_PARAMETERS: tuple[Parameter, Parameter] = ("scale", "bias")
 class Meaning:
     """The subject of a check: conformity of a property of the item, or fitness of the measurement for use.
 
-    `quantity` and `parameter` are those of the `sensor` that is judged; None for no single one. `sweep` is the one of
-    the plan, by index, that contradicts the others and that `rig resume` repeats. `what` names the criterion,
+    `quantity` and `parameter` are those of the `sensor` that is judged; None for no single one. `sweep` is the index in
+    the plan of the sweep that contradicts the others and that `rig resume` repeats. `what` names the criterion,
     `scale_std`: the words of the check are found by it.
     """
 

@@ -17,7 +17,7 @@ MINUTE_S: Final = 60.0  # √(3600 s): from √s to √h
 
 @dataclass(frozen=True, slots=True)
 class DisplayUnit:
-    """A unit that numbers are shown in, and its `size` in SI."""
+    """A unit in which numbers are shown, and its `size` in SI."""
 
     name: str
     size: float
@@ -25,7 +25,7 @@ class DisplayUnit:
 
 @dataclass(frozen=True, slots=True)
 class Mistaken:
-    """A `unit` in which readings are often given by mistake, the remedy, and more than any part reads, in SI."""
+    """A `unit` in which readings are often given by mistake, the remedy, and a value in SI that no part reaches."""
 
     unit: str
     mend: str
@@ -37,14 +37,14 @@ class Quantity:
     """One quantity that a sensor measures along its axes.
 
     - sensor: the kind of sensor; unit: that of SI; suffix: the same in names.
-    - reading: the unit of a reading on a screen; bias: that of a bias with at least so many decimals; drift: that of
-      its change over hours; residuals: those of the residuals in a figure, from the largest.
-    - walk: the name of its white noise; walk_suffix: the SI unit of that in names; walk_unit: a displayed one.
-    - steady: largest difference between the means of two neighbouring seconds at rest, besides noise: no bias moves so
-      fast, but a hand does, and half a degree of tilt is more. A field within a room changes by a tenth of that.
-    - d_si: the unit as a digital certificate writes it. towards: what a sensor at rest is turned towards.
+    - reading: the unit of a reading on a screen; bias: the unit of a bias, and its least number of decimals; drift: the
+      unit of its change over hours; residuals: the units of residuals in a figure, the largest first.
+    - walk: the name of its white noise; walk_suffix: the SI unit of that noise in names; walk_unit: the displayed unit.
+    - steady: largest difference between the means of two adjacent seconds at rest, beyond noise. No bias moves as fast,
+      but a hand does, and half a degree of tilt exceeds it. The field at one place in a room changes by a tenth of it.
+    - d_si: the unit as a digital certificate writes it. towards: the direction to which a sensor at rest is turned.
     - mistaken: the unit in which readings are given by mistake.
-    - offset: the reading at zero over the bias: −1 if the bias is a correction, m = g/k − b.
+    - offset: the ratio of the reading at zero to the bias: −1 if the bias is a correction, m = g/k − b.
     - axes: the letters of its axes.
     """
 
@@ -112,7 +112,7 @@ class Quantity:
 class Scalar:
     """One quantity without axes, which is recorded, shown and exported, and never calibrated.
 
-    `sensor` is the kind of sensor, `unit` that of its values, `suffix` the same in names, `reading` the one on a
+    `sensor` is the kind of sensor, `unit` the unit of its values, `suffix` that unit in names, `reading` the unit on a
     screen.
     """
 

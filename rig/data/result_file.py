@@ -1,6 +1,6 @@
 """`result.json`: one model that writes it, reads it, and is the source of its JSON schema (docs/result.schema.json).
 
-SI units, the unit in every name; vectors and matrices are lists, rows first. Keys stand in the order of the fields.
+SI units, the unit in every name; vectors and matrices are lists, rows first. Keys are in the order of the fields.
 """
 
 import json
@@ -64,8 +64,8 @@ class CheckEntry(Entry):
     - If the value has an expanded uncertainty: uncertainty, its coverage_factor, the guard_band by which the
       decision_rule keeps it below the limit, and the probability that a value beyond the limit is accepted.
     - kind: conformity of a property of the item, or fitness of the measurement for use; sensor, quantity, parameter:
-      the judged one, if it is a single one; sweep: the one that contradicts the others; criterion: the name of the
-      quantity that is judged, null if the package that made the check does not give it.
+      what is judged, if it is a single one; sweep: the sweep that contradicts the others; criterion: the name of the
+      judged quantity, null if the package that made the check does not state it.
     """
 
     name: str
@@ -138,7 +138,7 @@ class FileEntry(Entry):
 class ProvenanceEntry(Entry):
     """The provenance of a result. Later versions may add to it.
 
-    `readings_file` and `motion_file` are those of external readings, without arm and board.
+    `readings_file` and `motion_file` are the files of external readings, which have no arm and no board.
     """
 
     model_config = ConfigDict(frozen=True, extra="allow", defer_build=True)
@@ -187,7 +187,7 @@ class VectorEntry(Entry):
 
     - residuals_std_rad_s: standard deviation that the solution expects of each residual.
     - …_degrees_of_freedom: those of the standard deviations of that name, null if infinite.
-    - Both are left out of a solution without a budget, as that of sweeps of a file.
+    - Both are left out of a solution without a budget, such as one from the sweeps of a file.
     """
 
     model: str
@@ -284,7 +284,7 @@ class BoardSolutionEntry(Entry):
 
 
 class BoardEntry(Entry):
-    """The board's solutions by method, and the closed form's distance from the same in double precision."""
+    """The board's solutions by method, and the difference of the closed form from its solution in double precision."""
 
     solutions: dict[str, BoardSolutionEntry]
     not_observed: tuple[str, ...]
@@ -297,12 +297,12 @@ class BoardEntry(Entry):
 class GyroscopeEntry(Entry):
     """A sensor's calibration by the chosen estimator, its observations, and the solutions of the other estimators.
 
-    - covariance: that of noise and of the bias random walk; covariance_combined holds all of the budget. Both are there
-      if the vector model was chosen.
+    - covariance: of noise and bias random walk; covariance_combined: of all contributors in the budget. Both exist if
+      the vector model was chosen.
     - correction_matrix: M of g = M (m + b), by which the board and the C header correct readings.
-    - speeds_rad_s: those of the sweeps. A calibration at one speed, either way, is valid at that speed, and has no
-      nonlinearity. axis_rate_ranges_rad_s: the smallest and the largest rate along each of the sensor's own axes in the
-      sweeps that determine its scale factor.
+    - speeds_rad_s: those of the sweeps. A calibration at one speed, in either direction, is valid at that speed, and
+      has no nonlinearity. axis_rate_ranges_rad_s: the smallest and the largest rate along each of the sensor's own axes
+      in the sweeps that determine its scale factor.
     - temperature_c: mean over the samples of all sweeps. scale_conditions, bias_conditions: times and temperature of
       the readings for each: scale factors come from sweeps, biases from rests too.
     - board: null for a reference: the board solves only for the sensors that are to be calibrated.
@@ -418,7 +418,7 @@ class VerificationEntry(Entry):
 
 
 class MountEntry(Entry):
-    """The mounting of the item in a stage, counted from 1, against the planned one, both relative to the first stage.
+    """The mounting of the item in a stage, counted from 1, and its error; both are relative to the first stage.
 
     `rotation_rad` is a rotation vector in the item's frame, `std_rad` has the standard deviations of its components.
     """
@@ -434,7 +434,8 @@ class ResultDocument(Entry):
     - gyroscopes: empty for a verification of stored calibrations, and without sweeps; accelerometers, magnetometers:
       empty if none was calibrated or recorded; one that was recorded and not calibrated has the reason.
     - bias_drift: biases by repeat of a run of that procedure, by sensor, then by "rate" and "acceleration".
-    - over_temperature: calibrations over temperature, keyed in the same way: then all else is at their reference.
+    - over_temperature: calibrations over temperature, keyed in the same way; all other results refer to their reference
+      temperature then.
     - unsolved: why a quantity of external readings has no solution, by sensor, then by the quantity's name.
     - omitted: parts of these readings that were left out; notes: remarks on how they were read.
     - others: results of kinds that packages add, by the kind's key, in the package's own format.

@@ -1,4 +1,4 @@
-"""Configurations and scripts that the user of this computer has run, recognized by their text wherever they lie.
+"""Configurations and scripts that the user of this computer has run, recognized by their text in any folder.
 
 An empty file for each, named by its SHA-256, in a folder of the user's own: nothing to parse, nothing to lock.
 """

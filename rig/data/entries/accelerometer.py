@@ -71,7 +71,7 @@ class AccelerometerEntry(Entry):
     - With its nonlinearity in the budget, scale is that of the readings at 1 g up and 1 g down, bias_m_s2 the reading
       at 0 g, whatever curve the sensor has between.
     - reference_m_s2: specific force at rest in the arm's base frame; attitude_error_rad: error of the arm's attitudes
-      about each axis, by the readings.
+      about each axis, estimated from the readings.
     - lever_arm_m, from the sweeps' axes to the sensor in the flange's frame, and delay_s, its lag behind the gyroscope:
       only with sweeps.
     - detection_limits: faults during the recording, and the size from which on each is detected.

@@ -22,7 +22,7 @@ class BiasStepEntry(Entry):
 class RepeatEntry(Entry):
     """One repeat of all attitudes: its bias with scale, axes and reference fixed, and with all of them estimated.
 
-    `time_s` is that of its middle from the first's.
+    `time_s` is the time of its middle, from the middle of the first repeat.
     """
 
     time_s: float
@@ -54,7 +54,7 @@ class DriftEntry(Entry):
     - temperature_slope: slope of the bias over temperature, or the error.
     - earth_rate_known: whether the Earth's rate was subtracted.
     - degrees_of_freedom: those of the standard deviations with the scale fixed, null if infinite.
-    - part, serial_number, full_scale: of the sensor.
+    - part, serial_number, full_scale: properties of the sensor.
     - temperature_stated: whether the temperatures are stated because the sensor has no thermometer.
     """
 

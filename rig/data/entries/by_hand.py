@@ -40,7 +40,7 @@ class HandErrorEntry(Entry):
 class ByHandEntry(Entry):
     """A session by hand: its rests and moves, and the errors of the hand.
 
-    `chi_square`, with `degrees_of_freedom`, is that of the residuals of all rests and moves. `session_std` (3,) of the
+    `chi_square`, with `degrees_of_freedom`, is χ² of the residuals of all rests and moves. `session_std` (3,) of the
     scale is by this session and its clock alone; the budget adds the disagreement seen between recordings of real
     hands.
     """

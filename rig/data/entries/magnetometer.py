@@ -80,7 +80,7 @@ class FieldDriftEntry(Entry):
 class MagnetometerEntry(Entry):
     """A calibration m = F B + b of the magnetic field B in the axes of the nominal mounting.
 
-    - It is that of the magnetometer as it is mounted: iron and currents that turn with it are part of F and b, and
+    - It refers to the magnetometer as it is mounted: iron and currents that turn with it are part of F and b, and
       hard_iron_t is F⁻¹ b. No limit of the verdict judges it.
     - arm_field_in_bias: the arm's own field, as far as it turns with the flange, is in the bias, and no residual shows
       it. Runs with the sensor turned over separate them (`rig reversal`).
@@ -89,7 +89,7 @@ class MagnetometerEntry(Entry):
     - covariance: of scale and bias by the solution alone; covariance_combined: all of it, itemized in budget. field_t:
       the size of the field to which the scale is relative.
     - field_base_t: the field in the arm's base frame; attitude_error_rad: error of the arm's attitudes about each axis,
-      by the readings.
+      estimated from the readings.
     - detection_limits: faults during the recording, and the size from which on each is detected.
     - conditions: times of the readings; non_orthogonality_degrees_of_freedom: null if infinite.
     - placement: only if a file gave the attitudes instead of an arm; the range is unknown then.
@@ -146,11 +146,11 @@ class AsMountedEntry(Entry):
 class ReversalEntry(Entry):
     """A magnetometer's bias and the arm's field, separated by turning the sensor over.
 
-    - bias_t: the sensor's own, except on an axis that was never turned over: arm_field_in_bias is true there, and it is
-      the bias as mounted.
+    - bias_t: the sensor's own bias. On an axis that was never turned over arm_field_in_bias is true, and bias_t is the
+      bias as mounted.
     - arm_field_t: the arm's field in the sensor's axes as it was mounted in the first run; 0 on such an axis.
     - covariance: of bias and arm's field; chi_square: agreement of the runs on their common parameters.
-    - scale, correction_matrix: the means of the runs'. …_degrees_of_freedom: those of the standard deviations of that
+    - scale, correction_matrix: means over the runs. …_degrees_of_freedom: those of the standard deviations of that
       name, null if infinite.
     """
 

@@ -68,7 +68,7 @@ class PlacementEntry(Entry):
 
     `placement_std` is the standard deviation of a reading from one placement to another besides its attitude, null if
     the method does not estimate it, with `rests_without_attitude` further rests. `rows_omitted` rows of the file were
-    left out because the body moved. `covariance` is that of all estimates, in its order.
+    left out because the body moved. `covariance` is the covariance of all estimates, in its own order.
     """
 
     placement_std: float | None
@@ -97,8 +97,8 @@ class DetectionLimitEntry(Entry):
 class OmittedEntry(Entry):
     """Parts left out of a recording: `count` of `total` `what` (rows, increments, readings), and where the `first` is.
 
-    The `reason` begins with the name of an error, if there is one. `quantity` is the one that it is missing from; null
-    if it is missing from all.
+    The `reason` begins with the name of an error, if there is one. `quantity` is the quantity from which they are
+    missing; null if they are missing from all.
     """
 
     quantity: str | None

@@ -34,11 +34,12 @@ class OverTemperatureEntry(Entry):
     """Scale and bias of one quantity of a sensor: Σ coefficient (T − reference)ⁿ, n from 0 to 3, in SI units per Kⁿ.
 
     - The bias has the sign that it has in the calibration, and its unit.
-    - range_c: where both are valid, by the part's own thermometer; table: values from one end to the other.
+    - range_c: the range in which both are valid, by the part's own thermometer; table: values from one end to the
+      other.
     - orders: those that the readings require, of scale and bias.
     - covariance (24, 24): in the order scale n = 0 x y z, n = 1 x y z, …, then the bias.
-    - hysteresis: largest distance of a warming sensor from the middle of warming and cooling, null without both: then
-      it is not in the uncertainty.
+    - hysteresis: largest difference of a warming sensor from the mean of warming and cooling. It is null unless both
+      were measured; then the uncertainty does not include it.
     - lag_s: lag of the thermometer.
     """
 

@@ -41,7 +41,7 @@ class Interrupts:
     """The handler that raises KeyboardInterrupt in the main thread for a signal, without leaving a lock half taken.
 
     An exception while `threading` takes or leaves a lock would leave it taken, and stopping the arm needs the same
-    locks. The way out of a wait takes its lock again: a second exception must not come before that.
+    locks. The end of a wait takes its lock again: a second exception must not come before that.
     """
 
     def __init__(self) -> None:

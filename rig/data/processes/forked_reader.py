@@ -1,4 +1,4 @@
-"""A reading process forked from this one, which has loaded most of what it needs: that saves a tenth of a second.
+"""A reading process forked from this one, which has already loaded most modules: that saves a tenth of a second.
 
 Only a process of one thread is forked, as a lock that another thread holds would stay locked in the child for ever.
 """
@@ -47,9 +47,9 @@ def measure_address_space() -> int:
 
 
 class ForkedReader:
-    """A forked process that calls `read`, which ends it; of `subprocess.Popen` it has what its owner needs.
+    """A forked process that calls `read` and ends; it has those attributes of `subprocess.Popen` that its owner needs.
 
-    Its output goes to the files `out` and `stderr`; no other file of this process stays open in it.
+    Its output goes to the files `out` and `stderr`; no other file of this process remains open in it.
     """
 
     def __init__(

@@ -16,10 +16,11 @@ _Times = dict[str, tuple[float, float]]  # by thread: seconds on a processor, se
 class Silence:
     """A counter of the ticks without a sign of life from the process `pid`.
 
-    Ticks and not seconds, because the counting process may be delayed itself; and no ticks in which the thread that is
-    expected to answer (`thread`, any if None) spent most of the time waiting for a processor. If the system does not
-    show that (proc(5) of Linux does) all ticks count. Every tick counts of a process that was stopped. However busy the
-    machine, a silence lasts at most `spared` times CROWDED times its limit: the arm must not be left alone.
+    It counts ticks and not seconds, because the counting process may itself be delayed. It omits ticks in which the
+    thread that is expected to answer (`thread`, any if None) spent most of the time waiting for a processor. If the
+    system does not show that (proc(5) of Linux does) all ticks count. Every tick counts of a process that was stopped.
+    However busy the machine, a silence lasts at most `spared` times CROWDED times its limit: the arm must not be left
+    alone.
     """
 
     def __init__(self, pid: int, *, spared: int, thread: int | None = None) -> None:

@@ -1,4 +1,4 @@
-"""What a reading process tells: the parts of a file, and how it ended."""
+"""The messages of a reading process: the parts of a file, and how it ended."""
 
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any, TypeAlias

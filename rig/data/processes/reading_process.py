@@ -1,8 +1,9 @@
 """Reading of a foreign file in a process of its own, within limits of memory, time and disk space.
 
-A library may not return from a damaged file, a few bytes may unpack to gigabytes, and nothing in a process can end
-that, no signal either. So a file is read where it can be ended from outside (`rig.data.processes.reading_child`), and
-only complete results reach the rig. All foreign files are read so: recordings, bags, logs, tables.
+A library may never return from a damaged file, a few bytes may unpack to gigabytes, and nothing inside a process can
+end that, not even a signal. So a file is read in a process that can be ended from outside
+(`rig.data.processes.reading_child`), and only complete results reach the rig. All foreign files are read so:
+recordings, bags, logs, tables.
 """
 
 import json
@@ -68,7 +69,7 @@ class UnreadableFile(Exception):
 
 
 class CostlyFile(UnreadableFile):
-    """A file that takes more to read than one of its size may."""
+    """A file that takes more time or memory to read than its size allows."""
 
 
 def limits_for(stored_bytes: int) -> ReadingLimits:
@@ -128,8 +129,8 @@ def size_without_holes(file: BinaryIO) -> int:
 class ReadingTask:
     """A file that another process reads by a `reader` ("module:function"), called with its path and `arguments`.
 
-    The arguments are values of JSON. The process has begun, so the caller may import meanwhile; leaving the context
-    ends it. Raise Refused `temporary_folder_full`.
+    The arguments are values of JSON. The process runs from the beginning, so the caller may import modules during it;
+    leaving the context ends it. Raise Refused `temporary_folder_full`.
     """
 
     def __init__(self, reader: str, path: Path, arguments: Mapping[str, Any], limits: ReadingLimits) -> None:

@@ -29,9 +29,9 @@ class Channel:
     - quantity: a name in `measured()`; type: NumPy's of a number.
     - full_scale_counts: numbers from which on it is saturated, None if unknown; range: the nominal end of scale in the
       unit, None if unknown.
-    - step: largest distance of neighbouring readings, in the unit, if it is more than a count: about zero for numbers
-      that were truncated toward it, and half as much elsewhere.
-    - stated: nobody read the value: all numbers are the same; a count is its possible change.
+    - step: largest distance of neighbouring readings, in the unit, if it is more than a count. Numbers that were
+      truncated toward zero have it there, and half of it elsewhere.
+    - stated: whether the value was stated and not read: all numbers are equal, and a count is its possible change.
     """
 
     quantity: str

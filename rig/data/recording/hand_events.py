@@ -1,4 +1,4 @@
-"""The events of a calibration by hand as its recording keeps them. Times are the board's, in microseconds."""
+"""The events of a calibration by hand as its recording stores them. Times are the board's, in microseconds."""
 
 from dataclasses import dataclass
 from typing import Annotated, Literal
@@ -61,7 +61,7 @@ class HandRestRefused:
 
 @dataclass(frozen=True, slots=True)
 class HandBegunAnew:
-    """A new beginning of the session: nothing before `begin_us` counts any more.
+    """A restart of the session: nothing before `begin_us` counts.
 
     `again` is the error's name: the table, or the sensor, is another.
     """

@@ -106,7 +106,7 @@ def table_dtype(names: Sequence[str]) -> np.dtype[Any]:
 
 
 def lay_out(path: Path, contents: Contents, *, swmr: bool) -> None:
-    """Write a run file next to its path and move it there, so a kill or a full disk leaves a complete file or none.
+    """Write a run file under a temporary name and rename it, so a kill or a full disk leaves a complete file or none.
 
     With `swmr` it can be opened for appending in that mode; without, any HDF5 tool opens it. Raise OSError.
     """

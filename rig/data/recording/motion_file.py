@@ -30,7 +30,7 @@ QUATERNION = ("qw", "qx", "qy", "qz")
 class Header:
     """The columns of a file: those `needed`, `one_of` several, and groups of optional ones.
 
-    `between`: the number that a column must exceed, and the largest allowed one, for a file of `one_row`.
+    `between`: the number that a column must exceed, and the largest allowed number, for a file of `one_row`.
     """
 
     needed: tuple[str, ...]
@@ -113,7 +113,7 @@ class Item:
 
     @property
     def mounting(self) -> NDArray[np.float64]:
-        """Mounting (3, 3) on the moving body: the identity, because the file's axes are taken as the sensor's own."""
+        """Mounting (3, 3) on the moving body: the identity, because the file's axes count as the sensor's own."""
         return np.eye(3)
 
 
@@ -122,8 +122,8 @@ class ReadElsewhere:
     """The `readings` (n,) of an item, and the rows (N,) of sweeps or of attitudes of its `motion`, by column.
 
     For "turns" by hand the readings show the motion: then there is one row, of what the user declared. Times count from
-    `origin_s` of the files' clock. `other_rows` of the readings' file hold readings of other sensors alone. `note` is
-    what the file's format does not say of its readings, "" if it says all.
+    `origin_s` of the files' clock. `other_rows` of the readings' file hold readings of other sensors alone. `note`
+    states what the file's format does not specify about its readings, "" if it specifies everything.
     """
 
     item: Item

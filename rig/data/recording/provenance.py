@@ -32,7 +32,7 @@ PACKAGES = ("ur-rtde", "numpy", "h5py", "pyserial")
 
 @dataclass(frozen=True, slots=True)
 class Provenance:
-    """The origin of a recording; "arm" stands for any turner, `NO_BOARD` for what a recording without a board lacks.
+    """The origin of a recording; "arm" means any turner, `NO_BOARD` replaces what a recording without a board lacks.
 
     - started_utc: the time of its start.
     - rig_version, python_version, package_versions, firmware_version: the software.
@@ -43,7 +43,7 @@ class Provenance:
     - script, script_sha256, script_installed: the procedure's script, its hash, whether it came with a package.
     - arm_kinematics: the turner's geometry, None without one.
     - tcp_offset: the controller's tool centre point in the flange's frame, unused; None if unknown.
-    - arm_maker, arm_model: of the turner that was found.
+    - arm_maker, arm_model: of the connected turner.
     - turner_kind: its registered kind.
     - board_follows_crystal: the board's statement on its clock, None without a board.
     - readings_file, motion_file: the files of an external recording.

@@ -1,4 +1,4 @@
-"""The events of a run as its recording keeps them: one type for each kind, written and read here alone.
+"""The events of a run as its recording stores them: one type for each kind, written and read only by this module.
 
 In the file an event is a line of JSON: its kind's name, its times, and the fields of its type.
 """
@@ -44,7 +44,7 @@ class SweepFinished:
 
 @dataclass(frozen=True, slots=True)
 class RestStarted:
-    """The arm stands still from now on."""
+    """The arm is at rest from this time on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +54,7 @@ class RestFinished:
 
 @dataclass(frozen=True, slots=True)
 class DwellStarted:
-    """The arm stands in an attitude, and the sensors have settled: the dwell's measurement begins."""
+    """The arm is at rest in an attitude, and the sensors have settled: the dwell's measurement begins."""
 
     dwell: Dwell
 

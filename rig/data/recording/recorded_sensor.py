@@ -63,7 +63,7 @@ class RecordedSensor:
 
     @property
     def unseen_change_k(self) -> float:
-        """The change of its temperature, K, that stays unrecorded because it is below the thermometer's step."""
+        """The change of its temperature, K, that remains unrecorded because it is below the thermometer's step."""
         return self.channel(TEMPERATURE).resolution if self.measures(TEMPERATURE) else UNKNOWN_CHANGE_K
 
     @property

@@ -27,8 +27,9 @@ JointName = Annotated[str, Field(pattern=r"^\w[\w -]*$", max_length=40)]  # beco
 class RecordedTurner:
     """A turner: its `kind`, by which it is registered, its maker and its model (None if unknown).
 
-    `joints` are the names of its n joints, 0 to `MAX_JOINTS`, the one on the ground first; `geometry` is the one for
-    their angles; `fields` are those of its states beyond times and joints; `reading_std_rad` as in `TurnerIdentity`.
+    `joints` are the names of its n joints, 0 to `MAX_JOINTS`, beginning on the ground; `geometry` converts their
+    angles; `fields` are the fields of its states in addition to times and joints; `reading_std_rad` as in
+    `TurnerIdentity`.
     """
 
     kind: Kind

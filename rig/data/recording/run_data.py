@@ -1,4 +1,4 @@
-"""A recording in memory. It imports no description of what is in it, as a plan needs only its type."""
+"""A recording in memory. It does not import the descriptions of its contents, because a plan needs only its type."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

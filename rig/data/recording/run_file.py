@@ -104,7 +104,7 @@ class RunRecorder:
             self._pending.states.append(state)
 
     def add(self, event: Event, *, controller_time_s: float | None = None) -> None:
-        """Append an event at this moment; by default its controller time is that of the newest state."""
+        """Append an event at this time; its controller time is by default the time of the newest state."""
         with self._lock:
             time_s = self._controller_time_s if controller_time_s is None else controller_time_s
             self._pending.events.append(encode_event(TimedEvent(event, time.monotonic(), time_s)))
@@ -168,9 +168,10 @@ class RunRecorder:
 def read_run(path: Path, timeout_s: float | None = None, *, begun: ReadingTask | None = None) -> RunData:
     """Read a run file: finished, still being written, or left behind by a killed process.
 
-    `begun` is its `begin_reading`, if that was called before. Rows that a kill left unwritten or incomplete are
-    dropped. Raise Refused: `no_run_file` without a file; `not_a_run_file` if it is damaged, of another kind or schema,
-    or takes longer than `timeout_s` (None: by its size) on a machine that is not overloaded; `temporary_folder_full`.
+    `begun` is the result of `begin_reading`, if that was called before. Rows that a kill left unwritten or incomplete
+    are dropped. Raise Refused: `no_run_file` without a file; `not_a_run_file` if it is damaged, of another kind or
+    schema, or takes longer than `timeout_s` (None: by its size) on a machine that is not overloaded;
+    `temporary_folder_full`.
     """
     contents = _contents(path, timeout_s, begun)
     try:
@@ -221,7 +222,8 @@ def write_elsewhere(path: Path, run: RunData) -> None:
 def make_plain(path: Path) -> None:
     """Rewrite a killed run's file, which only SWMR readers can open, so that any HDF5 tool can open it.
 
-    The content stays the same. No process may be writing the file meanwhile. Raise Refused as `read_run` does; OSError.
+    The content remains the same. No process may be writing the file at that time. Raise Refused as `read_run` does;
+    OSError.
     """
     contents = _contents(path, None)
     samples = {name: _whole_rows(rows) for name, rows in contents.samples.items()}
@@ -313,7 +315,7 @@ def _check_numbers(name: str, rows: NDArray[Any], most: float) -> None:
 
 @dataclass(frozen=True, slots=True)
 class _Named:
-    """The names of the sensors: they become those of files, so the rules of a configuration apply."""
+    """The names of the sensors: they become names of files, so the rules of a configuration apply."""
 
     sensors: tuple[SensorName, ...]
 

@@ -1,4 +1,4 @@
-"""Begins to read a run file in another process, before what its contents need is imported here: both take as long."""
+"""Begins to read a run file in another process, so that this one can import what its contents need in the same time."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -48,7 +48,7 @@ def _stored_bytes(path: Path) -> int:
 def reading_ahead(run: Path) -> Iterator[dict[Path, ReadingTask]]:
     """Read the first recording of a run folder, or a run file, during the block; yield the reading by its path.
 
-    A folder without a recording yields none. Raise as `begin_reading` does.
+    A folder without a recording yields nothing. Raise as `begin_reading` does.
     """
     first = run / FIRST_RECORDING if run.is_dir() else run
     if first != run and not first.exists():

@@ -1,7 +1,7 @@
 """The settings by which a recording is judged: recorded with it, typed, and with a version of their own.
 
-The configuration of a run is kept as text, for people. Its keys may change from one version of the rig to the next;
-these do not, so that a recording is judged as it was, or by the options of `rig solve --set` instead.
+The configuration of a run is stored as text, for people. Its keys may change from one version of the rig to the next,
+but these settings do not, so that a recording is judged as in the run, or by the options of `rig solve --set`.
 """
 
 import json
@@ -88,11 +88,11 @@ class Site:
 
 
 class Uncertainty(UncertaintyKeys[dict[str, NonNegative]]):
-    """Half-widths of quantities that no recording shows: all values between, either way, are equally likely.
+    """Half-widths of quantities that no recording shows: all values within are equally likely.
 
-    Except `angle_std_deg`, a standard deviation, None if it was not stated: that of a joint's angle about its
-    encoder's. Those of sensors are keyed by name. `decision_rule` compares a limit with the value alone ("simple") or
-    with the value and its expanded uncertainty ("guard_band").
+    An exception is `angle_std_deg`, the standard deviation of a joint's angle from its encoder's, None if it was not
+    stated. Those of sensors are keyed by name. `decision_rule` compares a limit with the value alone ("simple") or with
+    the value and its expanded uncertainty ("guard_band").
     """
 
     @model_validator(mode="before")
@@ -128,10 +128,10 @@ class Elsewhere:
     """The settings of a solution of external readings, with a file of their motion (`motion_file`).
 
     - `any_mounting`: the sensor's axes need not lie along those of the body whose attitudes are given.
-    - `find_clock`: the attitudes are on a clock of their own; `exact_rates`: their rates are exact, as a rate table's
-      are; `window_s`: for averages of attitudes in a gyroscope's increments, None for a suitable one.
+    - `find_clock`: the attitudes are on a clock of their own; `exact_rates`: their rates are exact, as those of a rate
+      table are; `window_s`: for averages of attitudes in a gyroscope's increments, None for a suitable one.
     - `estimator`: the requested one, None for the one that suits each quantity.
-    - `only`: the sensors to calibrate, by the kind of sensor; all that were recorded if it is empty.
+    - `only`: the sensors to calibrate, by the kind of sensor; all recorded ones if it is empty.
     """
 
     any_mounting: bool = False
@@ -195,7 +195,7 @@ class RunSettings:
     - finds_earth_rate: whether the gyroscopes' readings give the Earth's rate, instead of the site.
     - extension_m: end of the extension that carries the sensors, in the flange's frame.
     - elsewhere: how an external recording is solved.
-    - mounts: nominal rotations from the flange's to the item's frame by stage, empty for an item that stays as it is.
+    - mounts: nominal rotations from the flange's to the item's frame by stage, empty for an item that is mounted once.
     - stage: number of this recording's stage, from 0.
     - by_hand: how a session by hand is solved.
     - reference_c: temperature at which a calibration over temperature is stated, None for other calibrations.
@@ -329,7 +329,7 @@ def settings_of(config: "RigConfig", plan: "Plan") -> RunSettings:
 
 
 def _limits(config: "RigConfig") -> Limits:
-    """Return the limits of the file, including the targets at which its procedure ends."""
+    """Return the limits in the file, including the targets at which its procedure ends."""
     from rig.config.procedures.procedure_sections import SixObservationSection
 
     limits, section = config.limits.model_dump(), config.procedure
@@ -397,7 +397,7 @@ def _tesla(microtesla: float | None) -> float | None:
 
 
 def uncertainty_of(config: "RigConfig") -> Uncertainty:
-    """Return the stated uncertainties. A sensor that states none gets its part's default."""
+    """Return the stated uncertainties. A sensor without a statement has its part's default."""
     stated: dict[str, Any] = config.uncertainty.model_dump()
     of_sensors: dict[str, Any] = {
         what: {

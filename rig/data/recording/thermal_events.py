@@ -1,4 +1,4 @@
-"""The events of a calibration over temperature, in addition to its sweeps and dwells, as its recording keeps them."""
+"""The events of a calibration over temperature, in addition to its sweeps and dwells, as its recording stores them."""
 
 from dataclasses import dataclass
 from typing import Annotated
