@@ -1,4 +1,4 @@
-"""Errors of the rig: each has a name, says what happened and where, and what to do.
+"""Errors of the rig: each has a name, and states what happened, where, and what to do.
 
 `catalogue` has every name in one table, from which docs/errors.md is made.
 """

@@ -61,5 +61,5 @@ def attempt(faults: dict[str, Fault], name: str, solve: Callable[[], Result]) ->
 
 
 def all_failed(keys: Iterable[Key], fault: Fault) -> Attempts[Key, Result]:
-    """Return attempts that all end in the same Fault."""
+    """Return attempts that all fail with the same Fault."""
     return Attempts({}, dict.fromkeys(keys, fault))

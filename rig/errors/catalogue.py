@@ -17,7 +17,7 @@ KINDS = (
 
 @dataclass(frozen=True, slots=True)
 class CatalogueEntry:
-    """An error's name, one of `KINDS`, a clause on when it occurs, and one on what to do."""
+    """An error's name, one of `KINDS`, a clause about when it occurs, and a clause about what to do."""
 
     name: str
     kind: str

@@ -11,7 +11,7 @@ SHOWN_NAMES = 12
 
 
 def printable_lines(text: str) -> str:
-    """Return a printable message that keeps its lines."""
+    """Return a printable message with the same line breaks."""
     return "\n".join(map(printable, text.split("\n")))
 
 
