@@ -11,8 +11,8 @@ NEGLIGIBLE = 1e-18  # weight of a distant neighbour in a slope: far below the re
 class CubicSpline:
     """The not-a-knot cubic spline through values at rising abscissae (de Boor, A Practical Guide to Splines, ch. IV).
 
-    x: (n,), strictly rising, n ≥ 2; y: (n, …). Called with any shape of abscissae it returns that shape with … behind
-    it; beyond the ends it goes on as the first and last polynomial do. Raises ValueError for other x and y.
+    x: (n,), strictly rising, n ≥ 2; y: (n, …). Called with abscissae of any shape it returns values of that shape
+    followed by …; beyond the ends it continues the first and the last polynomial. Raises ValueError for other x and y.
     """
 
     def __init__(self, x: Array, y: Array) -> None:
@@ -85,7 +85,7 @@ def _end_condition(step: float, following: float, secant: Array, next_secant: Ar
 def _solve_tridiagonal(lower: Array, upper: Array, right: Array) -> Array:
     """Return s (n, k) of lower s₋ + s + upper s₊ = right, with lower and upper (n, 1).
 
-    Parallel cyclic reduction (R. W. Hockney 1965): each pass eliminates the neighbours of a row, so that it contains
+    Parallel cyclic reduction (R. W. Hockney 1965): each pass eliminates the neighbours of a row, which then depends on
     rows twice as far away, with squared coefficients. The rows of a spline are diagonally dominant, so six passes
     suffice for any n.
     """

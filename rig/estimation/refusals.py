@@ -245,7 +245,7 @@ def check_handedness(matrix: Array) -> None:
 
 
 def untrustworthy_attitudes(what: str, remedy: str = "") -> Fault:
-    """Return the error for attitudes that the readings contradict, with what else is to be done than to check them."""
+    """Return the error for attitudes that the readings contradict, with remedies besides checking the attitudes."""
     return Fault(
         "attitude_untrustworthy",
         what,

@@ -1,4 +1,4 @@
-"""The standard deviations that a solve expects of its residuals: all modelled errors, less what the fit absorbs."""
+"""The expected standard deviations of a solution's residuals: all modelled errors minus what the fit absorbs."""
 
 from dataclasses import replace
 from typing import TYPE_CHECKING

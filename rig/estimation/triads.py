@@ -1,7 +1,7 @@
 """The relative rotation of two triads on one flange, above all of a gyroscope and an accelerometer.
 
 Each triad's right-angled frame is the one nearest to its axes, the orthogonal factor of their polar decomposition, as
-`rig.estimation.sensor_axes` and the correction of readings have it. Both F hold the mounting to the same flange.
+`rig.estimation.sensor_axes` and the correction of readings have it. Both F include the mounting on the same flange.
 """
 
 from dataclasses import dataclass
@@ -18,8 +18,8 @@ from rig.estimation.sensor_axes import SensorAxes
 class Alignment:
     """`rotation` (3, 3) from the gyroscope's frame to the accelerometer's.
 
-    `vector_rad` (3,) is the same as a rotation vector; `covariance_rad2` (3, 3) is that of small rotations about the
-    accelerometer's x, y, z.
+    `vector_rad` (3,) is the same as a rotation vector; `covariance_rad2` (3, 3) is the covariance of small rotations
+    about the accelerometer's x, y, z.
     """
 
     rotation: Array

@@ -1,7 +1,7 @@
 """Rests in which the body crept: it turned slowly where it lay.
 
 The reading of such a rest differs from those before and after it. In the graph this is a bias that jumps and jumps
-back, which inflates the bias' random walk, and the rotation within the rest is in no move.
+back, which inflates the bias' random walk, and no move contains the rotation within the rest.
 """
 
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ MOST = 0.125  # largest fraction of the rests: if more stand out, the bias itsel
 
 
 def find_creeping_rests(fit: GraphFit) -> tuple[int, ...]:
-    """Return the smallest set of rests without which the bias' random walk is much smaller; none if the set is large.
+    """Return the smallest set of rests without which the bias' random walk is much smaller; empty if the set is large.
 
     A creeping rest needs a used rest before and after it. Otherwise the creep cannot be distinguished from a jump of
     the bias.

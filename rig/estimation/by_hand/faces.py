@@ -1,4 +1,4 @@
-"""The faces on which the body lay: read by an accelerometer, else tracked from the first one."""
+"""The faces on which the body lay: determined by an accelerometer, or tracked from the first face."""
 
 import numpy as np
 

@@ -6,9 +6,9 @@ deviation of each cause of their errors (Dellaert and Kaess, Factor Graphs for R
 
 - move: Log(R (Qᵢᵀ Qⱼ)ᵀ), with the gyroscope's noise and an error in proportion to the angle
 - rest: m̄ − b − G f; walk: the change of the bias from rest to rest
-- flat: the table's normal in the body is that of the face below; box: that normal against the nominal one
+- flat: the table's normal in the body equals that of the face below; box: that normal equals the nominal one
 - closure: the heading after a whole turn; lean: the mean axis of a turn is the face's normal
-- acceleration: ā − F_a Qᵀ g − b_a, used as a level: the component along the vertical has little weight
+- acceleration: ā − F_a Qᵀ g − b_a, used as a level, so the component along the vertical has little weight
 """
 
 from collections.abc import Iterator
@@ -54,7 +54,7 @@ class GraphState:
 
     - `matrix` F (3, 3), `sensitivity` G (3, 3) in rad/s per g; `bends` (6,): even and odd nonlinearity, s/rad.
     - `level` F_a (3, 3), `offset` b_a (3,) in m/s² of the accelerometer; `table` (2,): its tilt, rad.
-    - `normals` (6, 2): the tilt of each face against its nominal normal, rad.
+    - `normals` (6, 2): the tilt of each face relative to its nominal normal, rad.
     - `attitudes` (N, 3, 3) body to table and `biases` (N, 3) in rad/s at the rests.
     """
 

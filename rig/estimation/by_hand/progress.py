@@ -1,4 +1,4 @@
-"""The progress of a session: the uncertainty after each move, the fault of the last one, the faces still missing."""
+"""The progress of a session: the uncertainty after each move, the fault of the last move, the missing faces."""
 
 from dataclasses import dataclass
 
@@ -28,7 +28,7 @@ FEWEST_TO_COMPARE = 4  # number of moves from which on one of them can be compar
 class SessionProgress:
     """The result of a session so far.
 
-    - `expanded_scale` (3,): U (k = 2), by the session and its clock.
+    - `expanded_scale` (3,): U (k = 2) of the scale factors, from the session and its clock.
     - `faces`, `rests`: face and summary of each rest; `moves`: the summary of each move.
     - `solution`: the solution if the session ended here, None if it is too uncertain.
     - `fault_of_last`: the fault of the last move or the rest after it. `missing_faces`: faces without a rest.

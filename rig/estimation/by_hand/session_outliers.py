@@ -1,7 +1,7 @@
 """The search for the rest or move that contradicts the others: outlier tests of a session by hand.
 
-A fault hypothesis says that some factors do not hold: each of their equations gets a column of its own (Baarda's
-mean-shift model, 1968), and the drop of χ² is compared. The hypothesis with the largest drop is reported.
+A fault hypothesis is that some factors are wrong: each of their equations gets its own column (Baarda's mean-shift
+model, 1968), and the decreases of χ² are compared. The hypothesis with the largest drop is reported.
 
 A single large outlier inflates the hand's standard deviations and is masked by them: the result holds, with a larger
 U. `find_masked_fault` finds it with standard deviations estimated without it. Biases are excluded: real ones jump.
@@ -82,7 +82,7 @@ def _hypotheses(fit: GraphFit, since: int | None) -> Iterator[tuple[str, int]]:
 
 
 def _test_hypotheses(fit: GraphFit, since: int | None) -> list[FaultHypothesis]:
-    """Return each hypothesis with its drop of χ², minus the drop from as many equations left out at random.
+    """Return each hypothesis with its decrease of χ², minus the decrease from as many equations left out at random.
 
     The fault's columns are made orthogonal to the model's, so the graph need not be solved for each hypothesis.
     """
@@ -104,7 +104,7 @@ def _test_hypotheses(fit: GraphFit, since: int | None) -> list[FaultHypothesis]:
 
 
 def _drop_with_new_stds(fit: GraphFit, name: str, index: int) -> float:
-    """Return the drop of χ² with standard deviations re-estimated without the fault; 0 if all stay about as large."""
+    """Return the decrease of χ² with standard deviations re-estimated without the fault; 0 if they hardly change."""
     columns = _fault_columns(fit, name, index)
     ends = np.cumsum([len(row.residual) for row in fit.factors])[:-1]
     parts = zip(fit.factors, np.split(columns, ends), strict=True)
@@ -134,7 +134,7 @@ def _fault_columns(fit: GraphFit, name: str, index: int) -> Array:
 def _tilt_columns(fit: GraphFit, row: Factor, index: int) -> Array:
     """Return the columns (r, 2) of a factor for a table that tilts at rest `index`, and for the move before it.
 
-    At the last rest a tilted table looks like a body that does not lie flat, so there are none.
+    At the last rest a tilted table looks like a body that does not lie flat, so there are no such columns.
     """
     other = np.zeros((len(row.design), 2))
     if row.kind == ACCELERATION and row.index >= index:
@@ -187,7 +187,7 @@ def describe_fault(fit: GraphFit, hypothesis: FaultHypothesis) -> Fault:
 
 
 def _describe_jump(index: int, rests: Sequence[HandRest]) -> Fault:
-    """Return the Fault of a bias that jumped in the move `index`; at the first and last rest a creep looks the same."""
+    """Return the Fault of a bias that jumped in the move `index`; at the first and last rest it may be a creep."""
     after_s = rests[index + 1].start_s
     what = f"the gyroscope's bias was another after the move that ended at {after_s:.1f} s"
     if index == len(rests) - 2:

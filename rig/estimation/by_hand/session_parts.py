@@ -55,7 +55,8 @@ class Move:
 class HandRecording:
     """All readings (n, 3) at times (n,), rests (N,), the N − 1 moves between them.
 
-    `held_in_air_s`: when the body was held still in the air; `creeping_s`: when it crept where it lay.
+    `held_in_air_s`: times at which the body was held still in the air; `creeping_s`: times at which it crept on the
+    table.
     """
 
     time_s: Array
@@ -71,10 +72,10 @@ class HandRecording:
 class SessionConditions:
     """Statements about a session that its readings do not show, except the faces' squareness.
 
-    - `clock_ppm`: half-width of the clock's error; `clock_source` is who states it.
-    - `box_rad`: standard deviation of the faces from square.
-    - `closure`: turns on a face were against an edge, and end where they began.
-    - `first_face`: the axis of the body that pointed upwards at first; needed where there is no accelerometer.
+    - `clock_ppm`: half-width of the clock's error; `clock_source` states where it comes from.
+    - `box_rad`: standard deviation of the faces from a rectangular box.
+    - `closure`: whether turns on a face were against an edge, and so end where they began.
+    - `first_face`: the axis of the body that first pointed upwards; needed without an accelerometer.
     """
 
     clock_ppm: float

@@ -63,9 +63,9 @@ class MoveSummary:
 class HandSolution:
     """The solution of a session by hand.
 
-    - `turned`: the solution in the form of known rotations; its budget is `budget`.
-    - `stds`: standard deviations of the hand by name, each as found, stated, and largest allowed.
-    - `creeping_s`: when the body crept during intended rests, which are left out.
+    - `turned`: the solution in the form of a solution from known rotations; `budget`: its budget.
+    - `stds`: standard deviations of the hand by name: estimated, stated, and largest allowed.
+    - `creeping_s`: times at which the body crept during intended rests, which are left out.
     - `expanded_scale` (3,): U (k = 2) by this session and its clock; the budget adds recordings of real hands.
     """
 
@@ -193,7 +193,7 @@ def parameter_columns(fit: GraphFit) -> NDArray[np.intp]:
 
 
 def insufficient_session(session: HandRecording, expanded: Array | None) -> Fault:
-    """Return the Fault that explains why a session has no result: unusable moves, else too few moves."""
+    """Return the Fault that explains why a session has no result: unusable moves, or else too few moves."""
     clipped = sum(move.clipped for move in session.moves)
     lost = sum(move.lost for move in session.moves)
     if clipped:

@@ -1,1 +1,1 @@
-"""What only recordings of others need: attitudes that a reference states, and bodies that are laid down again."""
+"""Estimators for external recordings only: attitudes that a reference states, and bodies that are placed repeatedly."""

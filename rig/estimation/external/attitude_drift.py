@@ -59,12 +59,12 @@ class Fixes:
     """A reference's attitudes: k samples, grouped into N fixes.
 
     - `at_s` (k,): increasing times; `attitudes` (k, 3, 3): body to table; `fix` (k,): the fix of each sample.
-    - `placement` (N,): fixes with one number share one error: the body lay still.
+    - `placement` (N,): fixes with the same number share one error, because the body lay still.
     - `joined` (N − 1,): True if the gyroscope's readings are complete from one fix to the next.
     - `std_rad` (k,): the stated standard deviation of each sample, None if none is stated.
     - `blind_rad` (N − 1,): standard deviation of the rotation that missing readings hide, None if none are missing.
     - `walk`: sum of squares in rad²/s, and dof, of the gyroscope's random walk at rest; zeros without rests.
-    - `on_arrival`: the readings' times are evened stamps of arrival, so that single lost readings are not noticed.
+    - `on_arrival`: whether the readings' times are smoothed arrival times, which do not show single lost readings.
     """
 
     at_s: Array
@@ -119,7 +119,7 @@ class FixedAttitudes:
 
 
 def average_fixes(recorded: AttitudeSamples, state: DriftState) -> FixedAttitudes:
-    """Return the mean attitude of each fix, from which the gyroscope, with a state's parameters, removes the motion."""
+    """Return the mean attitude of each fix, after removing the motion by the gyroscope with a state's parameters."""
     fixes, time_s = recorded.fixes, recorded.time_s
     at_s = np.clip(fixes.at_s + state.clock_s, time_s[0], time_s[-1])
     integrated = course(time_s, recorded.readings, state.matrix, state.bias, at_s)
@@ -299,8 +299,8 @@ def _weigh_bias(averaged: FixedAttitudes, fixes: Fixes) -> Array:
 def _find_bias_changes(sensitivities: Array, nearby: Array, middles_s: Array, weights: Array) -> Array:
     """Return the covariance (3n, 3n) of the increments due to unit changes of b with attitude and time.
 
-    `nearby` (n, n) is the correlation by attitude, `middles_s` (n,) are the increments' middle times. b is their mean
-    with `weights` (n,), and changes count from this mean: its distance from the mean of all recordings is no error.
+    `nearby` (n, n) is the correlation by attitude, `middles_s` (n,) are the increments' middle times. b is the mean
+    with `weights` (n,), and changes are relative to this mean, whose difference from other recordings is no error.
     """
     apart = np.abs(middles_s[:, None] - middles_s) / (np.ptp(middles_s) / INTERVALS + 1e-9)
     from_mean = np.eye(len(weights)) - weights

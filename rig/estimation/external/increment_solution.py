@@ -3,9 +3,9 @@
 The reference's rates are not used: their noise would be among the regressors and bias the scale (errors in variables).
 The rotation between fixes is used (`attitude_drift`), in which a gyroscope's noise grows only with the root of time.
 
-The variances of the errors of fixes and gyroscope are estimated from the residuals (`variance_components`), and with
-them those of matrix and bias between intervals of the recording: nonlinearity, g-sensitivity, temperature. Matrix and
-bias are their means over the intervals, with the uncertainty by these variances.
+The variances of the errors of fixes and gyroscope are estimated from the residuals (`variance_components`), together
+with those of the changes of matrix and bias between intervals of the recording: nonlinearity, g-sensitivity,
+temperature. Matrix and bias are their means over the intervals, with the uncertainty by these variances.
 """
 
 from dataclasses import dataclass, replace
@@ -90,7 +90,7 @@ class KnownIncrements:
     - random_walk_rad_sqrt_s: random walk of the gyroscope's angle.
     - matrix_scatter, bias_scatter_rad_s: standard deviation of each element between intervals of the recording.
     - residuals_rad (n, 3): of the increments.
-    - aside_s (k,): start of each outlier.
+    - aside_s (k,): start of each outlier that was left out.
     - condition: of the scaled design.
     - iterations: number of Gauss-Newton steps.
     """

@@ -2,13 +2,13 @@
 
     v_m = F (s + φ s²) + b + E ε + η,   ε ~ N(0, δ² 1),   η ~ N(0, ζ² 1)
 
-ε turns the body (`rig.estimation.reference.attitude_error`) and does not change the norm of the reference; η does: a
-bias changed by stress or temperature, a local disturbance. Longer dwells reduce neither. A solution from six faces has
-hardly any redundancy to separate ζ from δ, so θ and its covariance are averaged over both, weighted by the restricted
-likelihood with a uniform prior of δ and a half-Cauchy prior of ζ with a scale of a milli-g (Gelman, Bayesian Analysis 1
-(2006) 515).
+ε rotates the body (`rig.estimation.reference.attitude_error`) and does not change the norm of the reference. η does
+change it: a bias changed by stress or temperature, a local disturbance. Longer dwells reduce neither. A solution from
+six faces has hardly any redundancy to separate ζ from δ, so θ and its covariance are averaged over both, weighted by
+the restricted likelihood with a uniform prior of δ and a half-Cauchy prior of ζ with a scale of a milli-g (Gelman,
+Bayesian Analysis 1 (2006) 515).
 
-Rests of unknown attitude determine ζ as well: the reference's norm is the same in every attitude.
+Rests in an unknown attitude determine ζ as well, because the reference's norm is the same in every attitude.
 """
 
 from dataclasses import dataclass, replace
@@ -92,7 +92,7 @@ class _PlacementFits:
 
 
 def laid_down(theta: Array, placed: Placed, unplaced: Array, unplaced_variances: Array) -> LaidDown:
-    """Return θ (p,) re-estimated with placement errors, from a solution and means (k, 3) without attitude."""
+    """Return θ (p,) re-estimated with placement errors, from a solution and means (k, 3) in unknown attitudes."""
     all_rests = _add_unplaced(theta, placed, unplaced, unplaced_variances)
     free = free_directions(theta, norm_known=all_rests.norm_known)
     linear = _Linear(

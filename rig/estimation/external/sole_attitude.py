@@ -1,7 +1,7 @@
-"""The attitude on which a scale factor hangs: without it nothing tells the scale, so nothing contradicts its error.
+"""The attitude on which a scale factor depends: no other one determines the scale, so none contradicts its error.
 
-Repeated rests in one attitude agree whatever its error, which is the same each time. They show that placements repeat,
-and not that an attitude is right.
+Repeated rests in one attitude agree regardless of its error, which is the same each time. They show that placements
+repeat, and not that an attitude is right.
 """
 
 import numpy as np

@@ -33,7 +33,8 @@ class Contributor:
     """One contributor of the budget.
 
     - `kind`: the type of evaluation (JCGM 100, 4.2 and 4.3).
-    - `half_width`: the assumed one, in `unit`; if normal, the stated expanded uncertainty (k = 2); None if estimated.
+    - `half_width`: the assumed half-width, in `unit`; for a normal distribution the stated expanded uncertainty (k =
+      2); None if estimated.
     - `dof`: its degrees of freedom, infinite for an exact uncertainty.
     - `covariance` (6, 6): of kx ky kz bx by bz.
     """
@@ -114,18 +115,18 @@ class Budget:
 class Unknown:
     """The standard uncertainties, or half-widths, of error sources that no recording determines.
 
-    - clock_std: of the clock, as a fraction.
+    - clock_std: relative uncertainty of the clock.
     - clock_source: explanation of clock_std.
-    - state_jitter_s, stamp_std_s: of the times of the arm's states, and of the sensor's samples.
+    - state_jitter_s, stamp_std_s: errors of the times of the arm's states, and of the sensor's samples.
     - axis_rad: half-width of the direction of each swept axis.
     - sensor_offset_m: half-width of the sensor's position.
     - g_sensitivity_rad_s_per_g: half-width of the change of a reading by 1 g.
     - earth_rate: whether the Earth's rate is unknown.
     - earth_covariance_rad2_s2 (3, 3): in the base frame, None if it was not estimated.
     - clock_dof, state_jitter_dof, earth_dof: degrees of freedom of those estimated from readings.
-    - clock_half_width: that of a clock with limits, else None.
+    - clock_half_width: half-width of a clock with stated limits, else None.
     - repeatability_rad: half-width of the return to an angle.
-    - angle_std_rad: of a joint's encoder at the ends of arcs.
+    - angle_std_rad: error of a joint's encoder at the ends of arcs.
     - mount_rad: half-width of a mounted item's tilt about each axis.
     """
 

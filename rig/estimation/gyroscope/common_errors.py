@@ -1,12 +1,12 @@
 """The vector model with errors common to many observations, each with a prior standard deviation.
 
-A twist of the arm's wrist turns the axis of every sweep beyond it; a nonlinear sensor reads every fast sweep alike.
-Each such error e (zero on average, of standard deviation 1 in its own unit) adds B e to the readings:
+A twist of the arm's wrist rotates the axis of every sweep beyond it; a nonlinear sensor has the same error in every
+fast sweep. Each such error e (zero on average, of standard deviation 1 in its own unit) adds B e to the readings:
 
     m = F ω + c (+ G a) + B e,   e ~ N(0, I)
 
 F, c, G and e are estimated together (the mixed model of Henderson, Biometrics 31 (1975) 423). The result is corrected
-for the part of e that sweeps and rests determine; the other part stays zero and changes nothing.
+for the part of e that sweeps and rests determine; the other part remains zero and has no effect.
 """
 
 from collections.abc import Callable

@@ -9,15 +9,15 @@ parameters are estimated: F, c and ω_E.
 
 The arm's errors are among the e: its angles, as in `explain`, and its repeatability, which tilts the axis of each sweep
 independently. A tilt of a hundred microradians at 1 rad/s is 20 °/h across the axis, where a sweep determines only its
-bias, so the Earth's rate rests on the attitudes. An error in the end time of a revolution is a wrong speed, along the
+bias, so the attitudes determine the Earth's rate. An error in the end time of a revolution is a wrong speed, along the
 axis.
 
 Gravity and the Earth's axis are both fixed in the room. A g-sensitivity G = λ F has the same effect as an Earth's rate
 along the vertical, so one of them must be given: G, which is zero for an optical gyroscope, or the vertical component
-of the Earth's rate, by the latitude.
+of the Earth's rate, which follows from the latitude.
 
-The readings decide if the Earth's rate was detected: the estimate must be large against its uncertainty, which includes
-the drift of the bias between rests, and it must agree with the Earth's rate.
+The readings decide if the Earth's rate was detected: the estimate must be large relative to its uncertainty, which
+includes the drift of the bias between rests, and it must agree with the Earth's rate.
 """
 
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""What every gyroscope estimator's result has in common."""
+"""The common part of the results of all gyroscope estimators."""
 
 from typing import Protocol, runtime_checkable
 

@@ -13,7 +13,8 @@ The second term corrects the trapezoidal rule, the third is coning (Bortz, IEEE 
 step, not per second, so they stay as small as the readings' differences if time stamps jitter. The amplitude of an
 oscillation with n readings per period is underestimated by (2π/n)⁴/720: 5e-6 at n = 25.
 
-A small error of the parameters δθ = (δF row by row, δb) adds δω = −F⁻¹ (δF ω + δb) to the rate and turns the attitude:
+A small error of the parameters δθ = (δF row by row, δb) adds δω = −F⁻¹ (δF ω + δb) to the rate and rotates the
+attitude:
 
     exp(S(t) δθ) C(t),   S(t) = −∫ C F⁻¹ [ω ⊗ 1, 1] dt        in coordinates of the first reading
 
@@ -36,7 +37,7 @@ BLOCK = 1 << 16  # readings processed at once: 20 MB, whatever the recording's l
 class IntegratedAttitudes:
     """A gyroscope's integrated attitudes at k instants, in increasing order.
 
-    - `attitudes` (k, 3, 3): C, body coordinates to those of the first reading.
+    - `attitudes` (k, 3, 3): C, from body coordinates to those of the first reading.
     - `sensitivities` (k, 3, 12): S, rotation of C with F (row by row) and b, in coordinates of the first reading.
     - `rates_rad_s` (k, 3) in body coordinates.
     """
@@ -169,7 +170,7 @@ class _IncrementSteps:
     def middle(self, inverse: Array) -> Array:
         """Return the rotation (k, 3, 3) of each step per unit of rate error, in the body's coordinates at its start.
 
-        The attitude half-way stands for the whole step, which is wrong by about φ²/24.
+        The attitude half-way is used for the whole step, which causes an error of about φ²/24.
         """
         return np.asarray(-_matrices(self.vectors / 2) @ inverse, dtype=np.float64)
 

@@ -1,7 +1,7 @@
 """The six-observation model solved by Levenberg–Marquardt, with which SIX compares Algorithm 1 (Figs. 2 and 5).
 
 The residuals are ω² − ‖K (m + b)‖², Eqs. (2)–(4), weighted if weights are given, in the six parameters themselves, so
-that β0 needs no special care. With six sweeps the solution is that of `closed_form`, to rounding.
+that β0 needs no special care. With six sweeps the solution equals that of `closed_form`, except for rounding.
 """
 
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ REMEDY = "Sweep every wrist in both directions; a second sweep in one direction 
 class LevenbergMarquardtSolution:
     """Scale (3,), bias_rad_s (3,), covariance (6, 6) in the order kx ky kz bx by bz, of g = K (m + b).
 
-    `iterations` counts evaluations of the model. `rank` and `condition` are those of the scaled design.
+    `iterations` counts evaluations of the model. `rank` and `condition` belong to the scaled design.
     """
 
     scale: Array
@@ -49,7 +49,7 @@ def solve_levenberg_marquardt(
     """Solve by `scipy.optimize.least_squares(method="lm")` with the exact Jacobian, from k = 1, b = −(mean m).
 
     `means_rad_s`, `variances_rad2_s2` (N, 3): mean readings of N ≥ 6 sweeps and the variances of these means;
-    `speeds_rad_s`, `speed_std_rad_s` (N,). Weights are the inverse variances of ω² at k = 1; SIX weights all alike.
+    `speeds_rad_s`, `speed_std_rad_s` (N,). Weights are the inverse variances of ω² at k = 1; SIX uses equal weights.
 
     Raise Fault `too_few_observations`, `not_finite`, `bad_variance`, `bad_speed`, `zero_reading`,
     `duplicated_observation`, `lm_did_not_converge`, `rank_deficient`, `ill_conditioned`, `wrong_unit`,

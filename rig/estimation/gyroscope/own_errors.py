@@ -2,7 +2,7 @@
 
 These are nonlinearity and sensitivity to temperature. Each is an error common to many readings
 (`rig.estimation.gyroscope.common_errors`): the result is corrected for the part that sweeps and rests determine, the
-rest is a contributor of the budget.
+other part is a contributor of the budget.
 """
 
 from collections.abc import Iterator
@@ -60,8 +60,8 @@ def own_errors(
 ) -> Iterator[OwnError]:
     """Yield errors of a sensor with matrix F (3, 3) at rates `turns_rad_s` (N, 3), zero at rest, in `windows_s` (N, 2).
 
-    If all sweeps have one speed, the scale is that at this speed along an axis: an oblique rotation was slower, so its
-    scale may differ. Several speeds determine the nonlinearity themselves.
+    If all sweeps have one speed, the scale refers to this speed along an axis: an oblique rotation has a lower rate
+    along the axis, so its scale may differ. Several speeds determine the nonlinearity themselves.
     """
     if len(speeds_rad_s) == 1:
         curved = bending(matrix, turns_rad_s, sensor.full_scale_rad_s, speeds_rad_s[0])

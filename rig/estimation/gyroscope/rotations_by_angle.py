@@ -5,14 +5,14 @@ The rate during a rotation does not matter, so a hand may turn the gyroscope. It
 
     Log(exp(n α) R(F, c)ᵀ) = J δθ + e
 
-R is the body's rotation by its gyroscope (m = F ω + c), n the axis in the body's frame, α the angle. e is the error of
-the end attitude about all three axes, the effect of a tilted axis on that, and the gyroscope's noise. A whole
+R is the body's rotation by its gyroscope (m = F ω + c), n the axis in the body's frame, α the angle. e contains the
+error of the end attitude about all three axes, the effect of a tilted axis on it, and the gyroscope's noise. A whole
 revolution determines nᵀ F n alone; the mean reading determines the components across, as far as the axis is fixed in
 the body:
 
     m̄ = F n α/T + c                                                      across F n
 
-Rests determine c; sweeps at a constant speed are used by their mean, as in `rig.estimation.gyroscope.vector_model`.
+Rests determine c; of sweeps at a constant speed the mean is used, as in `rig.estimation.gyroscope.vector_model`.
 """
 
 from collections.abc import Sequence
@@ -75,7 +75,7 @@ class TurnedSolution:
 
     - `residuals_rad_s` (N, 3): of the means, then of the rotations as mean rates.
     - `widened`: the Birge ratio of the rotations, at least 1, with `widened_dof` degrees of freedom.
-    - `estimator`: another name if readings in attitudes are used as rotations.
+    - `estimator`: its name, which differs if readings in attitudes are used as rotations.
     """
 
     scale: Array

@@ -1,4 +1,4 @@
-"""The uncertainty budget of the six-observation solution by its response to the mean readings.
+"""The uncertainty budget of the six-observation solution, from its response to the mean readings.
 
 That model uses speeds alone, so it is insensitive to the direction of the rates and to the mounting; but it assumes
 orthogonal sensor axes, which adds a contributor.

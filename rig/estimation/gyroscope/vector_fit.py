@@ -1,10 +1,11 @@
 """The vector model with gravity, the Earth's rate, a drifting bias and errors of arm and sensor.
 
-Gravity is fixed in the room and turns in the flange's frame, so attitudes separate g-sensitivity from bias; at rest the
-sensor reads bias, Earth's rate and gravity alone. In a sweep the flange circles about the swept axis with a centripetal
-acceleration that the arm's geometry determines. Sweeps about more than three axes separate the angles between the
-sensor's axes from those between the arm's, sweeps at several speeds determine the nonlinearity. None of this is
-assumed: effects that sweeps and rests do not separate are excluded from the model and belong to the uncertainty.
+Gravity is fixed in the room and rotates in the flange's frame, so attitudes separate g-sensitivity from bias; at rest
+the sensor reads only bias, Earth's rate and the effect of gravity. In a sweep the flange circles about the swept axis
+with a centripetal acceleration that the arm's geometry determines. Sweeps about more than three axes separate the
+angles between the sensor's axes from those between the arm's, sweeps at several speeds determine the nonlinearity. None
+of this is assumed: effects that sweeps and rests do not separate are excluded from the model and belong to the
+uncertainty.
 """
 
 from collections.abc import Callable
@@ -32,7 +33,7 @@ class VectorInputs:
     """The inputs of the vector model: sweeps first, then rests, N in all.
 
     - means_rad_s, variances_rad2_s2 (N, 3): mean readings, and the variances of their noise.
-    - turns_rad_s (N, 3): rates of the flange in the room.
+    - turns_rad_s (N, 3): rates of the flange relative to the room.
     - earth_rate_rad_s (3,): rate of the room, in the base frame.
     - speed_std_rad_s (N,): standard deviations of the speeds.
     - attitudes (N, 3, 3): rotations from the base into the flange frame.
@@ -41,7 +42,8 @@ class VectorInputs:
     - joints (N): the joint that turned, None for a rest.
     - axis_errors_rad_s (P, N, 3): effect of one standard uncertainty of each of the arm's angles on the rates.
     - return_errors_rad_s (P, N, 3): the same for each return of a joint to an angle.
-    - mount_turns_rad (3 S, N, 3): rotation vectors of an item by one std of each mount of S stages (the first last).
+    - mount_turns_rad (3 S, N, 3): rotation vectors of an item by one std of each mount of S stages (the first stage
+      last).
     - arms_m (N, 3): lever arms from the rotation axis to the sensor in the flange frame, None to neglect them.
     - noise_dof (N, 3): degrees of freedom of the variances.
     - sensor: the properties by the data sheet, None if unknown.
@@ -140,7 +142,7 @@ class Explained:
 
     `nonlinearity` is None if all sweeps had one speed. `mounts` (3 S,) are the errors of the mounts as in
     `VectorInputs`, in prior standard deviations, with the posterior covariance `mounts_covariance` (3 S, 3 S); S is 0
-    without mounting anew.
+    without remounting.
     """
 
     solution: VectorSolution

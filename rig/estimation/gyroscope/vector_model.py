@@ -57,12 +57,12 @@ class VectorSolution:
     - g_sensitivity (3, 3): in rad/s per m/s², None if not estimated.
     - g_sensitivity_covariance (9, 9): of its rows.
     - response (6, N, 3): derivative of scale and bias with respect to the mean readings.
-    - residuals_rad_s (N, 3): reading less model.
+    - residuals_rad_s (N, 3): readings minus model.
     - rank: of the scaled design.
     - condition: of the design's part for axes and bias, without gravity.
     - observations, iterations: numbers of means and of solutions.
     - warnings: sentences for people.
-    - estimator: the name of this one.
+    - estimator: its name.
     """
 
     scale: Array
@@ -110,9 +110,9 @@ def solve_vector_model(
     - `rates_rad_s` (N, 3): the mean rate in the flange frame, zero for a rest.
     - `speed_std_rad_s` (N,): the standard deviation of the size of that rate.
     - `gravity_m_s2` (N, 3): the mean apparent gravity, in the flange frame.
-    - `nominal_mounting` (3, 3): flange to sensor, to be compared with.
-    - `shared_covariance_rad2_s2` (N, N): covariance of the means beyond their own variances, for example due to
-      bias drift. It is equal for the three axes, which are independent.
+    - `nominal_mounting` (3, 3): flange to sensor, with which the solution is compared.
+    - `shared_covariance_rad2_s2` (N, N): covariance of the means beyond their own variances, for example due to bias
+      drift. It is equal for the three axes, which are independent.
 
     Raise Fault `too_few_observations`, `not_finite`, `bad_variance`, `zero_reading`, `duplicated_observation`,
     `rank_deficient`, `ill_conditioned`, `wrong_unit`, `mirrored_axis`, `swapped_axes`, `wrong_mounting`.

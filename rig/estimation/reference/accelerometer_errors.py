@@ -4,9 +4,10 @@ Its reading r is slightly nonlinear in the specific force v along its axis, and 
 
     r = (1 + κ ΔT) v + φ v² + χ (v³ − g² v) + b + β ΔT + w(t)
 
-φ, χ, β and κ of each axis are zero on average, w is flicker and a random walk. So the scale is that of the readings at
-1 g up and 1 g down, which φ and χ do not change, and b the reading at 0 g, as data sheets define both (ST DS12140,
-sections 4.6.1 and 4.6.2); both at the mean temperature of the readings, b with the mean of w over their time.
+φ, χ, β and κ of each axis are zero on average, w is flicker and a random walk. So the scale refers to the readings at 1
+g up and 1 g down, which φ and χ do not change, and b is the reading at 0 g, as data sheets define both (ST DS12140,
+sections 4.6.1 and 4.6.2). Both refer to the mean temperature of the readings, and b includes the mean of w over their
+time.
 """
 
 from dataclasses import dataclass, replace
@@ -18,7 +19,7 @@ from rig.estimation.arrays import Array
 
 @dataclass(frozen=True, slots=True)
 class AccelerometerErrors:
-    """One standard uncertainty of each error, alike for all axes, and the records of K' dwells and sweeps.
+    """One standard uncertainty of each error, the same for all axes, and the records of K' dwells and sweeps.
 
     - even_s2_m: φ, zero if it is estimated.
     - odd_s4_m2: χ.

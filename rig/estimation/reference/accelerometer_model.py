@@ -1,4 +1,4 @@
-"""The readings of an accelerometer on an arm's flange: at rest in attitudes, and in sweeps by their first harmonic.
+"""The readings of an accelerometer on an arm's flange: in attitudes at rest, and the first harmonic of sweeps.
 
     m = F (s + φ s²) + b,   s = Rᵀ v_ref + ω × (ω × (p + r)) + α × (p + r)
 
@@ -10,15 +10,15 @@ has a mean, a cosine and a sine over its angle. With u = R₀ᵀ v_ref and c = �
 
     mean: a (a·u) + c,   cosine: cos ψ (u − a (a·u)) + sin ψ a × u,   sine: sin ψ (u − a (a·u)) − cos ψ a × u
 
-A joint turns unevenly. The weights that form mean, cosine and sine of the readings form those of ω² and of α by the
-encoders (`Sweeps.turning_rad2_s2`), and c is each of these times (a aᵀ − 1) (p + r) and a × (p + r). In uneven
-rotation, the lag changes ω² and α to those of τ before, and the rotation of gravity by (ω − ω₀) τ.
+A joint turns unevenly. The weights that form mean, cosine and sine of the readings are also applied to ω² and α of the
+encoders (`Sweeps.turning_rad2_s2`); c is the sum of these, times (a aᵀ − 1) (p + r) and a × (p + r). In uneven
+rotation, ω² and α are those of the time τ earlier, and gravity is rotated by a further (ω − ω₀) τ.
 
 ψ = ω τ is the joint's rotation during the lag τ of the accelerometer behind the clock of its time stamps: with opposite
 signs for opposite directions. If a gyroscope's readings have set that clock, τ is the lag behind the gyroscope. The
 filter's attenuation, (ω τ)²/2 at most, is neglected: 14 ppm at 60°/s and 5 ms.
 
-Dwells and sweeps are one list of K = N + 3 M vectors: the N dwells, then mean, cosine and sine of each of M sweeps. θ
+Dwells and sweeps form one list of K = N + 3 M vectors: the N dwells, then mean, cosine and sine of each of M sweeps. θ
 (22,) contains F row by row, v_ref, b, r, τ and φ.
 """
 
@@ -58,7 +58,8 @@ class Sweeps:
 
     - `harmonics_m_s2` (M, 3, 3): mean, cosine and sine over the joint's angle (rows) of the axes x y z, with the
     - `covariances_m2_s4` (M, 9, 9) of these nine, row by row, by `rig.estimation.reference.sweep_harmonics`.
-    - `axes_flange` (M, 3): unit vector of a growing angle; `speeds_rad_s` (M,): negative if the angle falls.
+    - `axes_flange` (M, 3): unit vector of a rotation with increasing angle; `speeds_rad_s` (M,): negative if the angle
+      decreases.
     - `attitudes` (M, 3, 3): flange to base at the angle zero.
     - `arms_m` (M, 3): p, from the axis to the flange's origin, in flange coordinates.
     - `stations` (M,): a number for each joint and pose; sweeps of one station, in either direction, share errors.
@@ -99,7 +100,7 @@ class Movement:
     - `repeatability_rad`: standard deviation of the independent rotations of each sweep; a station shares all other
       errors.
     - `sensor_errors`: errors of the sensor itself; None if unknown.
-    - `arm_turns` (P, 3 N + 10 M): effects of P errors of the arm by δ, in the order of `effects`; None if unknown.
+    - `arm_turns` (P, 3 N + 10 M): effects of P errors of the arm per δ, in the order of `effects`; None if unknown.
     - `own_share`: the fraction of δ² that is independent in each dwell.
     """
 

@@ -5,8 +5,8 @@ A small rotation ε of the body, (3,) rad, turns the reference in the body's fra
     v_m = F (s + φ s²) + b + E ε,   s = Rᵀ v_ref + v̄,   E = F diag(1 + 2 φ s) [Rᵀ v_ref]×
 
 So with ε ~ N(0, δ² 1) in every attitude a reading's covariance is V = diag(σ²) + δ² E Eᵀ: along the reference it does
-not depend on δ. For δ → 0 this is the fit of equal directions, for δ → ∞ the one to the size of the reference alone. δ
-is the restricted maximum likelihood estimate (Patterson and Thompson, Biometrika 58 (1971) 545).
+not depend on δ. For δ → 0 this is the fit to the reference as a vector, for δ → ∞ the fit to its size alone. δ is the
+restricted maximum likelihood estimate (Patterson and Thompson, Biometrika 58 (1971) 545).
 """
 
 from dataclasses import dataclass

@@ -2,8 +2,8 @@
 
 The model is that of `rig.estimation.reference.accelerometer_model`. F, b, the direction of v_ref, the lever arm r, the
 delay τ and, if requested, φ are estimated together by generalised least squares with the covariance of the arm's
-attitude errors. Each dwell has independent small rotations, the points of a sweep share errors, all of the common size
-δ: restricted maximum likelihood over dwells and sweeps estimates it (`rig.estimation.reference.shared_errors`).
+attitude errors. Each dwell has independent small rotations, and the points of a sweep share errors. Their common size δ
+is estimated by restricted maximum likelihood over dwells and sweeps (`rig.estimation.reference.shared_errors`).
 """
 
 from collections.abc import Sequence
@@ -59,8 +59,8 @@ class ImuSolution:
     - covariance (22, 22): of F by rows, v_ref, b, r, τ, φ; zero for fixed ones.
     - response (22, 3 K): derivative of the parameters with respect to the readings.
     - attitude_error: δ of the arm, about each axis.
-    - dwell_residuals_m_s2 (N, 3): reading less model.
-    - chi_square, dof: of these and the sweeps' residuals.
+    - dwell_residuals_m_s2 (N, 3): readings minus model.
+    - chi_square, dof: of these residuals and the sweeps'.
     - rank, condition: of the readings' derivatives, each column scaled to its norm.
     - sensor_errors: the sensor's own errors with those estimated, None if unknown.
     - own_share: the independent fraction of δ².
@@ -113,8 +113,8 @@ def solve_imu(
 ) -> ImuSolution:
     """Calibrate from dwells, sweeps or both.
 
-    `gravity_m_s2` is the size of v_ref, `up` (3,) the half-space of the base that it points to. `repeatability_rad`,
-    `sensor_errors`, `arm_turns`: see `Movement`; the readings decide between `own_shares`.
+    `gravity_m_s2` is the size of v_ref; `up` (3,) determines its sign: the half-space of the base into which it points.
+    `repeatability_rad`, `sensor_errors`, `arm_turns`: see `Movement`; the readings decide between `own_shares`.
 
     Raise Fault `too_few_observations`, `not_finite`, `bad_variance`, `bad_speed`, `zero_reading`,
     `duplicated_observation`, `bad_attitude`, `rank_deficient`, `ill_conditioned`, `sign_unknown`, `wrong_unit`,

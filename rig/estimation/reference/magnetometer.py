@@ -3,8 +3,8 @@
     m_m = F Rᵀ m + b,   F = M C_NO C_SI,   b = M C_NO b_HI + b_O
 
 C_SI and b_HI are the soft and hard iron, C_NO the non-orthogonality, M the scale factors, b_O the sensor's own offset.
-(Below Eq. (7) TRIAX writes S C_NO b_HI; the line above it makes that M.) Only the products F and b are identifiable:
-iron and sensor are not separated, and need not be, because the correction m = F⁻¹ (m_m − b) removes both.
+(Below Eq. (7) TRIAX writes S C_NO b_HI; the line above it in TRIAX defines that as M.) Only the products F and b are
+identifiable: iron and sensor are not separated, and need not be, because the correction m = F⁻¹ (m_m − b) removes both.
 """
 
 from dataclasses import dataclass

@@ -1,7 +1,7 @@
 """The errors of readings besides the arm's attitudes: noise, the arm's repeatability, the sensor's own errors.
 
-All are zero on average and have prior variances, so they are in the readings' covariance: they are predicted along with
-θ, and their undetermined part is in θ's uncertainty (Henderson, Biometrics 31 (1975) 423).
+All are zero on average and have prior variances, so the readings' covariance includes them: they are predicted together
+with θ, and θ's uncertainty includes their undetermined part (Henderson, Biometrics 31 (1975) 423).
 """
 
 from collections.abc import Callable
@@ -116,7 +116,7 @@ def select_sweeps(movement: Movement) -> Array:
 
 
 def repeat_by_segment(values: Array, movement: Movement) -> Array:
-    """Return a value for each reading (K,) from one for each segment (N + M,); a sweep has three readings."""
+    """Return a value for each reading (K,) from a value for each segment (N + M,); a sweep has three readings."""
     dwells = len(movement.dwells.readings_m_s2)
     return np.concatenate([values[:dwells], np.repeat(values[dwells:], 3)])
 

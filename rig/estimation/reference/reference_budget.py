@@ -1,7 +1,7 @@
 """The uncertainty budget of a sensor calibrated in a constant reference of given norm: gravity, a field.
 
-The readings determine their noise and the error of the arm's attitudes; they do not, or not fully, determine the error
-of the reference's norm, the attenuation of the sensor's filter and the drift of the reference. The solution's response
+The readings determine their noise and the error of the arm's attitudes. They do not fully determine the error of the
+reference's norm, the attenuation of the sensor's filter and the drift of the reference. The solution's response
 propagates each to scale and bias (JCGM 100, 5.1).
 """
 
@@ -28,8 +28,8 @@ class Spread:
     """The uncertainty of scale and bias from the readings: kx ky kz bx by bz, n readings.
 
     - `scale` (3,), `covariance` (6, 6) of noise and attitudes, `response` (6, n) to the readings.
-    - `noise` (n, n): covariance of the readings' own.
-    - `attitude_error`: that of the attitudes.
+    - `noise` (n, n): covariance of the readings' own noise.
+    - `attitude_error`: the error of the attitudes.
     - `chi_square` of the residuals, and its `dof`.
     - `noise_dof` (n,): degrees of freedom of the readings' variances.
     """
@@ -88,7 +88,7 @@ def scale_and_bias_covariance(matrix: Array, scale: Array, covariance: Array) ->
 
 
 def fewest_dof(response: Array, variances: Array, dof: Array) -> float:
-    """Return the smallest degrees of freedom of the noise in scale and bias by their `response` (6, n).
+    """Return the smallest degrees of freedom of the noise in scale and bias, whose response to readings is (6, n).
 
     The readings' `variances` (n,) have `dof` (n,) degrees of freedom.
     """

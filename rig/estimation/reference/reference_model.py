@@ -3,9 +3,9 @@
     v_m = F (s + φ s²) + b,   s = Rᵀ v_ref + v̄
 
 R maps the body frame to the table frame. θ holds F (row by row), v_ref, b, and φ (3,) with second-order terms: 15 or 18
-numbers. The least-squares fit weighted by the readings' variances is that of maximum likelihood; Gauss–Newton reaches
-it from the paper's estimate in a few steps. With v̄ = 0, F and v_ref are identifiable only up to a common factor, so
-‖v_ref‖ is fixed.
+numbers. The least-squares fit weighted by the readings' variances is the maximum likelihood estimate; Gauss–Newton
+reaches it from the paper's estimate in a few steps. With v̄ = 0, F and v_ref are identifiable only up to a common
+factor, so ‖v_ref‖ is fixed.
 
 The covariance V of readings is given as whiteners W (…, N, 3, 3) with W V Wᵀ = 1: `whitening`.
 

@@ -1,14 +1,14 @@
 """Separation of a magnetometer's own bias and the field of its carrier by turning the sensor over on its holder.
 
-In run k the sensor is mounted by the rotation M_k from the holder's axes to its own. Its bias b turns with it, the
-field a of its carrier (the arm's iron, as far as it turns with the flange) is fixed to the holder:
+In run k the sensor is mounted by the rotation M_k from the holder's axes to its own. Its bias b rotates with it; the
+field a of its carrier (the arm's iron, as far as it rotates with the flange) is fixed to the holder:
 
     b_k = b + F_k M_k a
 
 b_k is the bias estimated in run k and F_k the matrix estimated with it, which includes the real mounting. With half a
-revolution about one axis, b is half the sum and the field half the difference on the other two axes; along it their sum
-alone is identifiable. A second one about another axis separates all three. The field of the arm's other links at the
-sensor is the same in all runs with the same attitudes, to first order, and is included in a.
+revolution about one axis, b is half the sum and the field half the difference on the other two axes; along that axis
+only their sum is identifiable. A second one about another axis separates all three. The field of the arm's other links
+at the sensor is the same in all runs with the same attitudes, to first order, and is included in a.
 """
 
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ SAME = 1e-6  # tolerance of mountings, which are nominal and exact
 
 @dataclass(frozen=True, slots=True)
 class Reversal:
-    """`bias_t` b (3,) in the sensor's axes, `arm_field_t` (3,) in those of the first run, `covariance` (6, 6).
+    """`bias_t` b (3,) in the sensor's axes, `arm_field_t` (3,) in its axes of the first run, `covariance` (6, 6).
 
     If an axis was not turned over, `arm_field_in_bias` is True, the bias contains the sum of both and the field is 0.
     `chi_square` tests the agreement of the runs.

@@ -8,7 +8,7 @@ v̄ ≠ 0: linear least squares, Eq. (6). v̄ = 0: the last right singular vecto
 sign. That vector of unit length depends on the units of the columns, which TRIAX does not state; here every block of
 columns is scaled to unit RMS first.
 
-Everything broadcasts over runs: readings (…, N, 3). θ is that of `reference_model`: F itself and b, not their inverses.
+All functions broadcast over runs: readings (…, N, 3). θ is as in `reference_model`: F itself and b, not their inverses.
 """
 
 import numpy as np
@@ -111,7 +111,8 @@ def published_covariance(
     """Return the covariance (p, p) of a published θ, to first order in errors of `variances` (N, 3).
 
     An error e of a reading enters equation k as F⁻¹ e_k, because the readings are in X: δβ = −X⁺ F⁻¹ e, projected to
-    the normalisation. The iteration of the second-order terms adds the change of s² with v_ref. F and b follow from β.
+    the normalisation. With second-order terms, the change of s² with v_ref is added, because they are iterated. F and b
+    follow from β.
     """
     second_order = len(theta) > 15
     norm_known = isinstance(prior, KnownNorm)

@@ -1,12 +1,12 @@
 """The first harmonic of one revolution: mean, cosine and sine of accelerometer readings over the joint's angle.
 
-It extends the mean to which a gyroscope's revolution is reduced. The effects of the servo's vibration follow from the
-joint's own speed: centripetal acceleration by ω² minus the square of its mean, Euler acceleration by the angular
-acceleration α, and gravity by the joint's extra rotation during the filter's lag. One regression removes them all, so
-they neither bias the result nor count as noise. It also removes the second and the third harmonic, by angle errors and
-a nonlinear sensor. A speed with one to four periods per revolution cannot be separated from gravity; its effect
-remains. If the arm also oscillates at a frequency that its encoders do not measure, the residuals have a spectral line;
-it is removed as well, since a revolution is not a whole number of its periods.
+It is the counterpart of the mean to which a gyroscope's revolution is reduced. The effects of the servo's vibration
+follow from the joint's own speed: centripetal acceleration by ω² minus the square of its mean, Euler acceleration by
+the angular acceleration α, and gravity by the joint's extra rotation during the filter's lag. One regression removes
+them all, so they neither bias the result nor count as noise. It also removes the second and the third harmonic, by
+angle errors and a nonlinear sensor. A speed with one to four periods per revolution cannot be separated from gravity;
+its effect remains. If the arm also oscillates at a frequency that its encoders do not measure, the residuals have a
+spectral line; it is removed as well, since a revolution is not a whole number of its periods.
 """
 
 from collections.abc import Callable
@@ -62,7 +62,7 @@ def first_harmonic(
 
     - time_s (n,): on the arm's clock.
     - readings_m_s2 (n, 3): the specific force.
-    - angle_rad, speed_rad_s (n,): of the joint at these times by the arm's states, from the known attitude on.
+    - angle_rad, speed_rad_s (n,): of the joint at these times by the arm's states, relative to the known attitude.
     - coloured: returns the ratio of the variance of a mean of residuals (n,) to that of white noise.
     - swings: returns the columns (n, k) of spectral lines in residuals (n, 3).
 
@@ -116,8 +116,8 @@ def _regression(columns: Array, readings: Array) -> tuple[Array, Array]:
 def _find_long_run_covariance(residuals: Array, scatter: Array, coloured: Callable[[Array], float]) -> Array:
     """Return the long-run covariance (3, 3) of residuals (n, 3), by their autocorrelation along principal axes.
 
-    A vibration is along one of these and averages out almost entirely, unlike the noise across it. Along x, y, z both
-    are mixed, and the vibration's correlation would be taken for the noise's.
+    A vibration is along one of these and averages out almost entirely, unlike the noise along the others. Along x, y, z
+    both are mixed, and the noise would seem to have the vibration's correlation.
     """
     variances, directions = np.linalg.eigh(scatter)
     projected = residuals @ directions

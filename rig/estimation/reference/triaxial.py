@@ -3,15 +3,15 @@
     v_m = F (Rᵀ v_ref + v̄) + b                                                             TRIAX, Eqs. (3), (9)
 
 R maps body coordinates to table coordinates; v_ref, in table coordinates, is estimated as well. v̄ is the table's own
-motion: its rate for a gyroscope (v_ref is then the Earth's rate), zero for an accelerometer or a magnetometer. With v̄
+motion: for a gyroscope its rate (v_ref is then the Earth's rate), zero for an accelerometer or a magnetometer. With v̄
 = 0 the factor between F and v_ref is unknown, so ‖v_ref‖ and its half-space must be given.
 
 Three methods: "as_published" solves the stacked equations (`rig.estimation.reference.stacked`). The readings are in X,
 so their noise σ shrinks F⁻¹ by about (σ/v_rms)², whatever their number (errors in variables); it is significant if √N
 σ/v_rms nears one. Averages of minutes are far below it, single samples at slow rates are not. "maximum_likelihood"
 continues with weighted least squares in the readings themselves (`rig.estimation.reference.reference_model`): it is
-unbiased, independent of the scaling of columns, and efficient. "attitude_weighted" estimates attitude errors, such as
-an arm's, too (`rig.estimation.reference.attitude_error`).
+unbiased, independent of the scaling of columns, and efficient. "attitude_weighted" also estimates attitude errors, such
+as those of an arm (`rig.estimation.reference.attitude_error`).
 """
 
 from collections.abc import Callable
@@ -67,10 +67,10 @@ class TriaxialSolution:
     - reference (3,): v_ref in table coordinates.
     - second_order (3,): φ, the diagonal of F̄ in 1/unit, or None.
     - covariance (15, 15) or (18, 18): of the rows of F, v_ref, b, φ.
-    - residuals (N, 3): reading less model.
+    - residuals (N, 3): readings minus model.
     - rank, condition: of the scaled X; the full rank is 15 (18), one less if ‖v_ref‖ is given.
     - iterations: number of linear solutions or Gauss-Newton steps.
-    - attitude_error: by the method "attitude_weighted", else None.
+    - attitude_error: estimated by the method "attitude_weighted", else None.
     - observations: N.
     - warnings: sentences for people.
     """

@@ -5,10 +5,10 @@
 over all overlapping pairs of adjacent means ȳ of m readings (NIST SP 1065, section 5.2.4, with readings instead of
 frequencies). Pairs lie within one interval of readings, never across two: between them the sensor may have turned.
 
-The equivalent degrees of freedom of σ² (Howe, Allan and Barnes 1981; NIST SP 1065, table 5) are those of the dominant
-noise about τ by the curve's own slope. σ² times these over its true value is then χ². White noise has the slope −1/2
-and σ = N/√τ, N being the random walk; the least σ, at the flat part of the curve, is 0.664 times the bias instability B
-(IEEE Std 952-1997, C.1.1 and C.1.3).
+The equivalent degrees of freedom of σ² (Howe, Allan and Barnes 1981; NIST SP 1065, table 5) are those of the noise that
+dominates about τ, by the slope of the curve. Multiplied by these degrees of freedom and divided by its true value, σ²
+is χ². White noise has the slope −1/2 and σ = N/√τ, N being the random walk; the least σ, at the flat part of the curve,
+is 0.664 times the bias instability B (IEEE Std 952-1997, C.1.1 and C.1.3).
 """
 
 from collections.abc import Sequence

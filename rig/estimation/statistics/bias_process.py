@@ -1,10 +1,10 @@
 """Bias drift: flicker, a random walk, and scatter between averages.
 
-The readings are averaged over windows. A random walk of rate q (rad/s per √s) changes the bias more the farther two
-windows are apart; flicker noise is between that and a scatter s without memory. The size of the flicker is given, as
-few averages determine it; walk and scatter besides it are estimated from the averages by restricted maximum likelihood
-(Patterson and Thompson, Biometrika 58 (1971) 545), the likelihood of the contrasts that do not depend on the fitted
-parameters.
+The readings are averaged over windows. A random walk of rate q (rad/s per √s) changes the bias more the longer the time
+between two windows; flicker noise is between that and a scatter s without memory. The size of the flicker is given,
+because a few averages do not determine it; walk and scatter are estimated from the averages by restricted maximum
+likelihood (Patterson and Thompson, Biometrika 58 (1971) 545), the likelihood of the contrasts that do not depend on the
+fitted parameters.
 """
 
 from collections.abc import Callable
@@ -182,7 +182,7 @@ def bias_process(
 
 
 def _likelihood(contrasts: Array, noise: Array, scatters: Array) -> Array:
-    """Return log-likelihoods (K, L), up to a constant, of K noise covariances (n, n) with L squared scatters each.
+    """Return log-likelihoods (K, L), up to a constant, for K noise covariances (n, n) and L values of s² with each.
 
     A scatter adds to every eigenvalue, so each covariance is decomposed only once.
     """

@@ -1,6 +1,6 @@
 """Coverage: the factor k of a standard uncertainty u, so that value ± k u contains the true value 95.45 times in 100.
 
-If u is itself determined by few readings, k is above two: U = k u with k of Student's t for the effective degrees of
+If u is itself determined by few readings, k exceeds two: U = k u with k by Student's t for the effective degrees of
 freedom ν (JCGM 100, G.3 and G.6.4; EA-4/02 M:2022, annex E). 95.45 % is the probability within two standard deviations
 of a normal distribution, so k → 2 for ν → ∞.
 """

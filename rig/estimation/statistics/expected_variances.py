@@ -1,9 +1,9 @@
 """Expected variance components of readings with shared errors, in place of the most likely ones.
 
 They are the arm's errors, the bias random walk, and the disturbance of single dwells, as in
-`rig.estimation.statistics.bias_process` and `rig.estimation.reference.shared_errors`, together. Few readings determine
-them; the most likely values would by chance be zero in one run and too large in the next, and so would every
-uncertainty.
+`rig.estimation.statistics.bias_process` and `rig.estimation.reference.shared_errors`, together. Only a few readings
+determine them: the most likely values, and with them every uncertainty, would by chance be too small in one run and too
+large in the next.
 """
 
 from collections.abc import Callable, Sequence
@@ -25,9 +25,9 @@ LOUDEST, VOLUMES = 30.0, 8  # grid of a disturbance's size, in standard deviatio
 class ResidualInputs:
     """Residuals (n,) of a fit, its columns `slopes` (n, q), and the covariances of the errors.
 
-    `covariance` (n, n): without arm and walk; `effects(fraction)` (n, P): of the arm's errors with that independent
-    fraction in each dwell; `walk` (n, n): the covariance of a walk of rate 1; `noise` (n,): the variances of the
-    readings' own noise, the scale of the walk's grid.
+    `covariance` (n, n): without arm and walk; `effects(fraction)` (n, P): effects of the arm's errors, of which this
+    fraction is independent in each dwell; `walk` (n, n): the covariance of a walk of rate 1; `noise` (n,): the
+    variances of the readings' own noise, the scale of the walk's grid.
     """
 
     residuals: Array

@@ -1,9 +1,9 @@
 """Weights of a mean: one linear functional for all quantities averaged over the same samples.
 
 A reading is F ω + c plus nuisance effects. Weights w orthogonal to the nuisance columns N give wᵀ m = F wᵀ ω + c: the
-reference of the mean of readings is the mean of ω by the same weights, even if the samples cover a vibration
-incompletely or end anywhere. Least squares by groups and nuisance columns together has these weights in its rows (the
-Frisch–Waugh–Lovell theorem).
+mean of the readings corresponds to the mean of ω with the same weights, even if the samples cover a vibration
+incompletely or end at any time. Least squares by groups and nuisance columns together has these weights in its rows
+(the Frisch–Waugh–Lovell theorem).
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""The rounding error of a mean of readings in steps: the average over many readings keeps a part of it.
+"""The rounding error of a mean of readings in steps: a part of it remains even in the average of many readings.
 
 The mean of x + noise, rounded to multiples of q, has the error Σ (−1)ⁿ q/(πn) exp(−2(πnσ/q)²) sin(2πnx/q): the sawtooth
 of the rounding error, each harmonic damped by the characteristic function of the noise that carries the reading across
@@ -30,9 +30,9 @@ ALIKE = 0.5  # least length of the mean of unit vectors that have one direction
 class Steps:
     """The steps of numbers: `unit` is that of each axis (3,), or of all.
 
-    A number `cut` toward zero is the middle of its interval, and zero stands for all within a unit either way: its
-    neighbours are a unit and a half away. `zero` (3,) is the value of a former zero, in units modulo whole ones, NaN if
-    it is unknown.
+    A number truncated (`cut`) toward zero is shifted to the middle of its interval. Zero then represents all values
+    within one unit in either direction, so its neighbours are a unit and a half away. `zero` (3,) is the value of a
+    former zero, in units modulo whole ones, NaN if it is unknown.
     """
 
     unit: Array | float
@@ -70,8 +70,8 @@ class Steps:
 def cut_steps(readings: Array, unit: float) -> Steps:
     """Return the resolution steps of readings (n, 3) that the source has truncated toward zero to multiples of `unit`.
 
-    The source may have applied an offset and a scale factor near one afterwards. Truncated values lie half a unit off
-    the integers except at zero, which shows the position of zero.
+    The source may have applied an offset and a scale factor near one after truncation. Truncated values lie half a unit
+    off the integers except at zero, which shows the position of zero.
     """
     steps = find_steps(readings)
     units = np.where(np.abs(steps / unit - 1) < NEAR, steps, unit)
@@ -146,9 +146,9 @@ def _count_fractions(axis: Array, unit: float) -> Array:
 def _bound_zero_error(steps: Steps, axis: int, readings: Array) -> float:
     """Return the standard uncertainty, in units, that readings of zero cause in a mean of truncated readings (n,).
 
-    A truncated reading of zero is anywhere within a unit of zero. If the density of readings there decreases as between
-    zero's neighbours, which are three units apart, and s is the slope of its logarithm, the mean of such readings is s
-    · 2²/12 from zero. If no neighbour shows s, the mean may be anywhere in between.
+    A truncated reading of zero is anywhere within a unit of zero. Let s be the slope of the logarithm of the density of
+    readings, taken between zero's neighbours, which are three units apart. Then the mean of the readings that are cut
+    to zero is s · 2²/12. If no neighbour shows s, the mean may be anywhere in between.
     """
     zeros = steps.reads_zero(axis, readings)
     if zeros.all():

@@ -4,7 +4,7 @@
 
 The standard deviations σ_k have the likelihood of y with θ integrated out (Patterson and Thompson, Biometrika 58 (1971)
 545; Harville, J. Am. Stat. Assoc. 72 (1977) 320) and half-Cauchy priors (Gelman, Bayesian Analysis 1 (2006) 515). A few
-residuals hardly determine them, so the uncertainty of θ is that over all σ_k, each as likely as the data make it: by
+residuals hardly determine them, so the uncertainty of θ is integrated over all σ_k, weighted by their posterior: by
 adaptive importance sampling (JCGM 101, 6.4.9).
 """
 
@@ -41,8 +41,8 @@ class Mixed:
     """`observed` (m,), `design` (m, p), C₀ `fixed` (m, m) and A_k `components` (k, m, m).
 
     `precision` (p,): the prior precision of each column's coefficient, 0 if none. `scales` (k,): the medians of the
-    half-Cauchy priors of σ. `alone` (k, 2): sum of squares and dof of residuals that one cause alone makes, measured
-    apart from y; 0 if there are none.
+    half-Cauchy priors of σ. `alone` (k, 2): sum of squares and dof of residuals of each cause alone, measured
+    separately from y; 0 if there are none.
     """
 
     observed: Array
@@ -111,7 +111,7 @@ class MixedModel:
         """Return the maximum of the posterior of ln σ (k,) near a point.
 
         Newton's method in a trust region, whose curvature is the average information (Gilmour, Thompson and Cullis,
-        Biometrics 51 (1995) 1440): a step to ratios that rounding dominates is taken back and shortened.
+        Biometrics 51 (1995) 1440): a step to ratios that rounding dominates is undone and shortened.
         """
         from scipy.optimize import minimize
 
@@ -223,7 +223,7 @@ def sample_adaptively(log_density: Callable[[Array], float], begins: Sequence[tu
 
     Adaptive multiple importance sampling (Cornuet et al., Scand. J. Stat. 39 (2012) 798). It begins at each maximum
     (k,) of `begins` with the curvature (k, k) there: each further round draws from Student's t with the mean and
-    covariance of the samples around this maximum. The weights are those of all samples together.
+    covariance of the samples around this maximum. The weights are normalised over all samples.
     """
     rng = np.random.default_rng(0)
     size = len(begins[0][0])

@@ -3,9 +3,9 @@
 Scale, axes and reference are fixed: their errors, and those of the arm's attitudes, are the same in every repeat of an
 attitude and cancel in the differences between repeats.
 
-The bias stepped before a repeat if the mean from this repeat on differs from the mean before it by more than noise
-makes it, in all repeats and axes together, in 2 % of steady runs (Bonferroni's inequality). Both sides are then tested
-again (binary segmentation: Scott and Knott 1974).
+The bias stepped before a repeat if the mean from this repeat on differs significantly from the mean before it. For a
+steady bias this occurs in at most 2 % of runs, over all repeats and axes together (Bonferroni's inequality). Both sides
+are then tested again (binary segmentation: Scott and Knott 1974).
 """
 
 from collections.abc import Iterator
@@ -38,9 +38,9 @@ class BiasStep:
 class BiasByRepeat:
     """The bias of every repeat.
 
-    - `bias` (R, 3), with the standard deviation `std` (R, 3) of its differences; its steps are `moves`.
-    - `excess` (3,): the scatter of means in an attitude over their standard deviation, 1 at least (Birge ratio). The
-      arm does not repeat its attitudes exactly, or the bias drifts within a repeat. `std` includes it.
+    - `bias` (R, 3); `std` (R, 3): standard deviation of its differences; `moves`: its steps.
+    - `excess` (3,): the ratio of the scatter of means in an attitude to their standard deviation, at least 1 (Birge
+      ratio). The arm does not repeat its attitudes exactly, or the bias drifts within a repeat. `std` includes it.
     - `dof` (3,): degrees of freedom of the excess if there is one, else infinite.
     """
 

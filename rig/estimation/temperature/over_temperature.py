@@ -5,10 +5,10 @@ plan. Only the changes from repeat to repeat depend on temperature:
 
     m = offset(pose) + (1/(1 + q(T)) − 1) F x + c(T) + hysteresis + lag · dT/dt · ∂m/∂T + noise and bias drift
 
-q and c are polynomials in T − reference without a constant. Their orders, one of all axes' q and one of all axes' c,
-are those of the least AICc (Hurvich and Tsai, Biometrika 76 (1989) 297). The results of the other orders, with their
-Akaike weights (Burnham and Anderson, Model Selection, 2002, 4.3), contribute to the uncertainty. The difference of
-warming and cooling is a loop that closes at both ends of the range. A thermometer's lag is fitted with the rest.
+q and c are polynomials in T − reference without a constant. The order of q and the order of c, each common to all axes,
+minimise AICc (Hurvich and Tsai, Biometrika 76 (1989) 297). The results of the other orders, with their Akaike weights
+(Burnham and Anderson, Model Selection, 2002, 4.3), contribute to the uncertainty. The difference of warming and cooling
+is a loop that closes at both ends of the range. A thermometer's lag is fitted with the rest.
 """
 
 from collections.abc import Iterator
@@ -84,10 +84,10 @@ class OverTemperature:
     """k(T) and c(T) = Σ coefficient (T − reference)ⁿ, n from 0, with c added to a reading.
 
     - `scale`, `bias` (4, 3): the coefficients of k and c, SI units per Kⁿ; `orders` of k and of c.
-    - `range_c`: the only range in which both hold. `zero` (3,): the readings at the reference for zero input.
+    - `range_c`: the only range in which both are valid. `zero` (3,): the readings at the reference for zero input.
     - `lag_s`, `lag_std_s`: of the thermometer.
-    - `hysteresis`: the difference (6,) of a warming sensor from the mean of both directions in mid-range, and its
-      standard deviation; None without both directions.
+    - `hysteresis`: in mid-range, the difference (6,) of a warming sensor from the mean of both directions, and its
+      standard deviation; None if only one direction was measured.
     """
 
     reference_c: float
