@@ -22,7 +22,7 @@ UNITS_OF_AGE = ((86_400, "days"), (3600, "h"), (60, "min"), (1, "s"))
 
 
 def rigs(stations: Iterable[StationState], more: int = 0) -> dict[str, Any]:
-    """Return the rigs' present states in sections "rig 0", "rig 1" …, and in "rigs" their number and that of `more`.
+    """Return the rigs' present states in sections "rig 0", "rig 1" …; "rigs" counts them, and how many `more` exist.
 
     The states have separate sections because only changed ones are sent. A section without a rig is None. A rig is
     named as in the history; if it has become silent without a last state, it is shown as dead. A state that this
