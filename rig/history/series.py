@@ -34,7 +34,7 @@ Subject = tuple[str, str, str, float, bool]
 class Trend:
     """One parameter of one sensor over time: `times` of the calibrations, and the parameter in each of them.
 
-    Lines, spreads and charts use the statistical uncertainty of each result and the additional scatter between runs;
+    Lines, bands and charts use the statistical uncertainty of each result and the additional scatter between runs;
     errors common to all results of a rig do not affect them. They are None below five results.
     """
 
@@ -131,7 +131,7 @@ class Change:
 
     @property
     def limit(self) -> float:
-        """The limit of E_n: unchanged values all stay below it in a fraction `UNCHANGED` of comparisons.
+        """The limit of E_n: with the probability `UNCHANGED`, all unchanged values of a comparison are below it.
 
         It uses Student's t for the effective degrees of freedom of the difference, and Bonferroni's inequality, because
         a history does not store the correlations between parameters of one calibration.

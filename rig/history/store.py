@@ -42,7 +42,7 @@ class Selection:
 
 @dataclass(frozen=True, slots=True)
 class Past:
-    """A calibration of the history. `id` is its number, `run_id` that of its run.
+    """A calibration of the history. `id` is its number, `run_id` the number of its run.
 
     `voided` is the reason why it does not count, None if it does.
     """
@@ -107,7 +107,7 @@ class Kept:
 
 @contextmanager
 def open_history(where: str | HistoryAddress | None = None) -> Iterator["History"]:
-    """Open a history by its file or URL, the user's own by default; make or migrate its tables if necessary.
+    """Open a history, given by file or URL, the user's own by default; create or migrate its tables if necessary.
 
     Raise Refused `history_unreachable`, `history_too_old`, `history_too_new`, `not_a_history`, `missing_extra`;
     `history_gone` or `history_exchanged` if this process has opened it before and it is missing or has been replaced.

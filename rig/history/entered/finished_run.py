@@ -170,7 +170,7 @@ def read_configuration(folder: Path) -> "Loaded | None":
 
 
 def _certificate(folder: Path, document: "ResultDocument", stated: "StatedFacts") -> Issued | None:
-    """Return the certificate in the folder if its content is that of this result; an equal number proves nothing.
+    """Return the certificate in the folder if its content matches this result; an equal number proves nothing.
 
     An amended certificate is not entered here, but when it is made.
     """

@@ -1,4 +1,4 @@
-"""The rows of a run that repeat values of its result, written at its entry and compared ever after. Pure."""
+"""The rows of a run that repeat values of its result; written at its entry, and compared later. Pure."""
 
 import hashlib
 import math

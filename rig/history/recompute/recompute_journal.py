@@ -1,4 +1,4 @@
-"""The journal of a recomputation: a line for each solved recording, so that none is solved twice.
+"""The journal of a recomputation: a line for each solved recording, so that no recording is solved twice.
 
 Its first line is the question. Answers to another question are not mixed with it.
 """
@@ -36,7 +36,7 @@ class RecomputeQuestion:
 
 
 class RecomputeJournal(AbstractContextManager["RecomputeJournal"]):
-    """The journal in an existing folder, begun or continued; `solved` are its answers, by their keys.
+    """The journal in an existing folder, new or continued; `solved` are its answers, by their keys.
 
     Raise Refused `another_question`, and `report_folder` if it cannot be read or, at any time, written.
     """
@@ -77,7 +77,7 @@ class RecomputeJournal(AbstractContextManager["RecomputeJournal"]):
 
 
 def _read(path: Path, question: RecomputeQuestion) -> tuple[Mapping[str, Answer], int]:
-    """Return the answers of a journal, and the number of bytes in its complete lines; none without a journal."""
+    """Return the answers of a journal, and the number of bytes in its complete lines; no answers without a journal."""
     solved, complete_bytes = dict[str, Answer](), 0
     if not path.exists():
         return solved, complete_bytes

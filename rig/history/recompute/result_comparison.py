@@ -93,7 +93,7 @@ class ParameterMove:
 
 @dataclass(frozen=True)
 class Compared:
-    """A stated result with the present one of its recordings; None if they were not reached."""
+    """A stated result and the present result of its recordings, None if they were not solved."""
 
     stated: StatedResult
     answer: Answer | None

@@ -2,8 +2,8 @@
 
 A chart needs the mean and the standard deviation of a process in control. They are not known in advance, and estimates
 from a few first runs would give far more alarms than designed. So each result is compared with those before it by
-Student's t (self-starting charts: Hawkins and Olwell, Cumulative Sum Charts, 1998, 7.1): in control the deviations are
-independent and normal from the first on, and false alarms are as rare as designed for any length of the history.
+Student's t (self-starting charts: Hawkins and Olwell, Cumulative Sum Charts, 1998, 7.1). In control, all deviations are
+independent and normal, and false alarms are as rare as designed for any length of the history.
 """
 
 from dataclasses import dataclass
@@ -27,8 +27,8 @@ SPREAD_MIN = 1e-12  # least scatter relative to a value: the rounding of equal v
 class Chart:
     """A control chart, all arrays (…, n).
 
-    `deviation` is standard normal in control, NaN for the first results; `ewma` is its average. `limit` is that of
-    `ewma`, `alarm` is true if either exceeds its limit. Results with an alarm are not used for later ones.
+    `deviation` is standard normal in control, NaN for the first results; `ewma` is its average. `limit` is the limit of
+    `ewma`; `alarm` is true if either exceeds its limit. Results with an alarm are not used for later ones.
     """
 
     deviation: Array
@@ -84,7 +84,7 @@ def raise_alarms(deviation: Array, average: Array, limit: float | Array) -> Alar
 
 
 def _deviation(values: Array, std: Array, counted: Alarms) -> Array:
-    """Return the last result's deviation (…) from those before it (…, i) as a normal deviate of equal probability.
+    """Return the last result's deviation (…) from the earlier ones (…, i) as a normal deviate of equal probability.
 
     With equal stds it is (x − x̄)/(s √(1 + 1/n)) for any std; otherwise the weights include the variance between runs
     (as in `random_effects.fit`).

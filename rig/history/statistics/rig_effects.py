@@ -1,4 +1,4 @@
-"""Effects of rigs on results, separated from those of sensors by sensors calibrated on several rigs."""
+"""Effects of rigs on results. Sensors that were calibrated on several rigs separate them from effects of sensors."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

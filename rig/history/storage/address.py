@@ -31,10 +31,10 @@ class HistoryAddress:
 def choose_history_address(
     section: "HistorySection", environment: Mapping[str, str] = os.environ
 ) -> HistoryAddress | None:
-    """Return the history of a run: the environment's `RIG_HISTORY`, else the configuration's; None without one.
+    """Return the history of a run: from the environment (`RIG_HISTORY`), or from the configuration; None without both.
 
-    `section` must be of a configuration that the user has named or run before, never of another user's folder. Raise
-    Refused `history_address`.
+    `section` must be from a configuration that the user has named or run before, never from another user's folder.
+    Raise Refused `history_address`.
     """
     variable = environment.get(ENVIRONMENT)
     if variable == SWITCHED_OFF or (section.off and not variable):
@@ -45,7 +45,8 @@ def choose_history_address(
 def own_history_address(address: str | None) -> HistoryAddress | None:
     """Return the user's history; None if it is switched off.
 
-    It is the command's `address`, else `RIG_HISTORY`, else the user's own file. Raise Refused `history_address`.
+    It is the command's `address`; without it `RIG_HISTORY`; without both the user's own file. Raise Refused
+    `history_address`.
     """
     address = address or os.environ.get(ENVIRONMENT)
     return None if address == SWITCHED_OFF else resolve_address(address)

@@ -1,7 +1,7 @@
-"""Identity of the histories that this process has opened, so that another one in the same place is not taken for it.
+"""Identity of the histories that this process has opened, to detect another history in the same place.
 
-A history is identified by its file, its time of creation, and the last seen entry of its journal: as entries are only
-added, it keeps that one for ever.
+A history is identified by its file, its time of creation, and the last seen entry of its journal: because entries are
+only added, this entry remains forever.
 """
 
 from dataclasses import dataclass

@@ -1,8 +1,8 @@
 """The journal of entries: a line for each entry, with the hash of its rows, numbered without gaps, chained.
 
-So a row that was changed, added or removed outside of the rig is detected, and so is a line: each contains its own hash
-and that of the chain before it. Whoever may write all tables can write a consistent new journal, or cut off its end.
-That is detected by a `Head` of it that is kept elsewhere: a signed certificate names one.
+So a row that was changed, added or removed outside of the rig is detected. A changed line is detected too: each
+contains its own hash and that of the chain before it. Whoever may write all tables can write a consistent new journal,
+or cut off its end. That is detected by a `Head` of it that is kept elsewhere: a signed certificate names one.
 """
 
 import hashlib

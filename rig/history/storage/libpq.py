@@ -1,7 +1,7 @@
 """Connection options of PostgreSQL's client: encryption, authentication, timeouts. Pure.
 
-The client takes passwords from `~/.pgpass` and PGPASSWORD by itself. So that none is disclosed, SCRAM proves that both
-sides know it, and a server that asks for it in clear text or as an MD5 hash is refused. Source: PostgreSQL 16's
+The client takes passwords from `~/.pgpass` and PGPASSWORD by itself. To disclose no password, SCRAM proves that both
+sides have it; a server that asks for it in clear text or as an MD5 hash is refused. Source: PostgreSQL 16's
 documentation, 34.1.2, `require_auth`, `sslmode`, `tcp_user_timeout`.
 """
 

@@ -1,7 +1,7 @@
 """Tables of a history are made when it is opened, or migrated from an older version; other versions are refused.
 
 A migration is a function from a connection to the next version. All run in one transaction. They only add: existing
-entries stay unchanged.
+entries remain unchanged.
 """
 
 from collections.abc import Callable, Mapping

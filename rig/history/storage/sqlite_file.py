@@ -1,7 +1,7 @@
-"""Inspection of a history's file before it is opened for writing: a file that is not a history stays unchanged.
+"""Inspection of a history's file before it is opened for writing: a file that is not a history remains unchanged.
 
 Only SQLite opens the file. Its locks belong to the process (POSIX advisory locks): if any other code of the process
-opens and closes the file, the locks of all its connections are lost, and another process may take the file as unused.
+opens and closes the file, the locks of all its connections are lost, and another process may regard the file as unused.
 Source: "How To Corrupt An SQLite Database File", 2.2, https://sqlite.org/howtocorrupt.html.
 """
 
@@ -61,7 +61,7 @@ def refuse_unmarked(connection: sqlite3.Connection, file: Path) -> None:
 def new_file_in_place(file: Path) -> Iterator[Path]:
     """Yield the path for a new database, which is moved to `file` when complete, or removed.
 
-    A file that another process has put at `file` meanwhile stays. An incomplete database is never visible. Raise
+    A file that another process has meanwhile created at `file` remains. An incomplete database is never visible. Raise
     OSError.
     """
     file.parent.mkdir(parents=True, exist_ok=True)

@@ -15,7 +15,7 @@ STROKES, ROUND_A_CELL = 1, 3  # width of the frame: one stroke, and for each cel
 
 @dataclass(frozen=True, slots=True)
 class TableColumn:
-    """A column with its `heading`. If columns do not fit, the one of the highest `rank` is omitted first; 0 stays.
+    """A column with its `heading`. If columns do not fit, that of the highest `rank` is omitted first; 0 remains.
 
     A `shorter` column replaces it before it is omitted. A column that `wraps` may use several lines, and is at least
     `least` cells wide.
@@ -38,7 +38,7 @@ class TableColumn:
 
 @dataclass(frozen=True, slots=True)
 class FittingTable:
-    """A table of `columns`, of which those that fit are shown.
+    """A table that shows as many of its `columns` as fit.
 
     On a terminal with letters only, blocks are replaced by letters.
     """
