@@ -15,8 +15,8 @@ Say = Literal["lay", "turn"]
 class Instruction:
     """One action, for the line of text, the drawing and the simulated operator.
 
-    "lay": the side `face` comes up, and the item is released. "turn": the item turns with the side `face` up by whole
-    `turns` about the vertical, counterclockwise seen from above if positive, and is released where it was.
+    "lay": the side `face` comes up, and the item is released. "turn": with the side `face` up, the item is turned by
+    whole `turns` about the vertical, counterclockwise from above if positive, and released where it was.
     """
 
     say: Say

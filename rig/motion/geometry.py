@@ -1,7 +1,7 @@
 """Kinematics of a chain of joints: pose and angular rate of the flange, its end, from joint angles and speeds.
 
 Every function takes arrays whose last axis holds the n joints, the one on the ground first, and broadcasts over the
-others. Shoulder, elbow, forearm are those of an arm like the UR10e, with six joints, base to wrist 3.
+others. Shoulder, elbow and forearm refer to an arm like the UR10e, with six joints from base to wrist 3.
 """
 
 from functools import lru_cache
@@ -170,8 +170,8 @@ def lengths_m(arm: DenavitHartenberg) -> Array:
 def _find_bends(frames: list[Array]) -> tuple[Array, Array, Array]:
     """Return shoulder, elbow and wrist 1, (…, 3) m, each in the plane of the previous one.
 
-    The axes of these three are parallel except for the factory's calibration. They therefore meet hundreds of metres
-    away, and the origins of a calibrated arm's frames may lie anywhere along them.
+    The axes of these three are parallel except for the factory's calibration. They therefore intersect hundreds of
+    metres away, and the origins of a calibrated arm's frames may be anywhere along them.
     """
     shoulder = frames[1][..., :3, 3]
     elbow = _nearest_origin(shoulder, frames[1][..., :3, 2], frames[2])

@@ -42,8 +42,9 @@ def find_clearance_problems(
 ) -> list[Problem]:
     """Return the problems of steps that bring flange, payload's centre or extension too near to forearm or upper arm.
 
-    Lengths are taken from `arm`, else from the model's drawing. A motion from or to an attitude keeps `dwell_room_m`
-    from the forearm, all others `sweep_room_m`. The motion from the arm's pose is checked if the plan begins there.
+    Lengths are taken from `arm` if given, otherwise from the model's drawing. A motion from or to an attitude keeps
+    `dwell_room_m` from the forearm, all others `sweep_room_m`. The motion from the arm's pose is checked if the plan
+    begins there.
     """
     problems = []
     for path in _list_paths(plan, model):
@@ -122,7 +123,7 @@ def _list_load_points(carried: FlangeLoad) -> tuple[list[str], Array]:
 
 
 def _list_extension_points(carried: FlangeLoad) -> list[Array]:
-    """Return points along an extension in the flange's frame, m, the last at its end; none without one."""
+    """Return points along an extension in the flange's frame, m, the last at its end; empty without an extension."""
     end = np.array(carried.extension_m)
     count = 1 + int(np.linalg.norm(end) / EXTENSION_STEP_M)
     return [end * part / count for part in range(1, count + 1)] if end.any() else []

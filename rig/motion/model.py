@@ -32,7 +32,7 @@ class TurnerModel:
 
     - `robot_type`: the number that the controller reports; identical models share one.
     - `sweep_room_m`, `dwell_room_m`: clearances between a link's surface and the middle of the load.
-    - `home_rad`: the default home pose; `sources`: the origin of the figures.
+    - `home_rad`: the default home pose; `sources`: the sources of the figures.
     """
 
     key: str
@@ -93,7 +93,7 @@ def load_turner_model(key: ModelName) -> TurnerModel:
 
 
 def model_of(arm: "ArmSection") -> TurnerModel:
-    """Return the model of an arm by its configuration."""
+    """Return the model of an arm according to its configuration."""
     return load_turner_model(arm.model)
 
 

@@ -1,4 +1,4 @@
-"""Pre-flight of a plan: its problems for any turner. Pure: a plan in, problems out."""
+"""Pre-flight of a plan: its problems for any turner. Pure functions: a plan in, problems out."""
 
 import math
 

@@ -17,7 +17,7 @@ CLOSED_RAD = 1e-6  # tolerance of a whole turn, for rounding
 
 
 class Motion(Protocol):
-    """A joint-space motion. The joint with the longest travel has this speed and acceleration; the others keep pace."""
+    """A joint-space motion. The joint with the longest travel has this speed and acceleration; the others keep step."""
 
     @property
     def name(self) -> str: ...
@@ -38,7 +38,7 @@ class Sweep:
     """One wrist through one revolution, or an arc, at constant speed, with ramps and margins outside of it.
 
     - `index`: the number among the procedure's sweeps and dwells, from 0.
-    - `joint`: 0 (base) to 5 (wrist 3); `direction`: "ccw" for a growing joint angle, "cw" for a falling one.
+    - `joint`: 0 (base) to 5 (wrist 3); `direction`: "ccw" for an increasing joint angle, "cw" for a decreasing one.
     - `axis_flange`: unit vector of the nominal arm's angular velocity in the flange frame, sign included.
     - `revolution_rad`: (low, high) joint angle of the revolution or arc, centred on the home pose.
     """
@@ -137,8 +137,8 @@ Step = Sweep | Transfer | Rest | Dwell
 class Stage:
     """A part of a plan with its own recording, before which the operator mounts the item by the `instruction`.
 
-    `mount` (3 rows of 3) is the nominal rotation from the flange's frame to the item's, which the sensors' mountings
-    refer to. `indices` are those of its sweeps in the whole procedure; `begins`: the number of earlier steps.
+    `mount` (3 rows of 3) is the nominal rotation from the flange's frame to the item's, to which the sensors' mountings
+    refer. `indices` are the indices of its sweeps in the whole procedure; `begins`: the number of earlier steps.
     """
 
     mount: tuple[Vector3, Vector3, Vector3]
@@ -151,7 +151,8 @@ class Stage:
 class Plan:
     """Every step in order. `home_q_rad`: the pose at the plan's end; `start_q_rad`: the expected pose at its start.
 
-    Without `stages` the item's mounting does not change; else it is mounted for each stage, with the arm at home.
+    Without `stages` the item's mounting does not change; otherwise it is remounted for each stage, with the arm at
+    home.
     """
 
     steps: tuple[Step, ...]

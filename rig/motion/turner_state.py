@@ -145,7 +145,7 @@ class JointLimits:
 
 @dataclass(frozen=True, slots=True)
 class TurnerIdentity:
-    """The maker and model (None if unknown) of a turner, and the geometry that results are computed with.
+    """The maker and model (None if unknown) of a turner, and the geometry with which results are computed.
 
     `tcp_offset`: an arm's tool centre point in the flange's frame, for information. `reading_std_rad`: the noise of one
     reading of an angle, if that is too large for single readings; a revolution then ends at the same reading.
@@ -162,7 +162,7 @@ class Report(Protocol):
     """The report on a turner.
 
     `host`: its address or port; `software`: the version of its controller; `model`: None if unknown; `kinematics`: its
-    geometry if it reports one; `joints`: their names, the one on the ground first; `words`: its name in a line of text.
+    geometry if it reports one; `joints`: their names, beginning on the ground; `words`: its name in a sentence.
     """
 
     @property

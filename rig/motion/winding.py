@@ -1,4 +1,4 @@
-"""How far a plan winds the cable at the flange: each joint's travel to both sides of its present angle. Pure."""
+"""The winding of the cable at the flange by a plan: each joint's travel to both sides of its present angle. Pure."""
 
 from collections.abc import Sequence
 from math import degrees, pi
