@@ -95,7 +95,7 @@ class Calibration:
 
     @property
     def std(self) -> Array:
-        """Standard deviations (6,) of that covariance: those of noise alone, unlike U."""
+        """Standard deviations (6,) of that covariance, which includes only noise, unlike U."""
         return np.asarray(np.sqrt(np.diag(self.covariance)), dtype=np.float64)
 
     @property

@@ -35,7 +35,7 @@ class SensorComparison:
 
     @property
     def shown(self) -> Comparison:
-        """The plotted comparison: that of calibrated readings, if recorded."""
+        """The plotted comparison: of calibrated readings, if recorded."""
         return next(part for part in (self.after, self.before) if part is not None)
 
     def plot(self) -> "Plot":
@@ -72,8 +72,8 @@ class SensorComparison:
 def compare(run: Run, sensor: str, reference: str) -> SensorComparison:
     """Compare two sensors of a run sample by sample; the reference's readings are corrected.
 
-    The reference's calibration is the turntable's if the run states one, else this run's. Raise Refused
-    `no_such_sensor`, `nothing_to_compare`; Fault as `rig.analysis.gyroscope.comparison.compare` does.
+    The reference's calibration is that of the turntable if the run states one, otherwise that of this run. Raise
+    Refused `no_such_sensor`, `nothing_to_compare`; Fault as `rig.analysis.gyroscope.comparison.compare` does.
     """
     for name in (sensor, reference):
         if RATE.name not in run[name].quantities:

@@ -126,8 +126,8 @@ def calibrations(
 ) -> Calibrations:
     """Return all calibrations of a serial number, of a part, or of all sensors, as `rig history` lists them.
 
-    `history` is a file or a URL, by default RIG_HISTORY, else the user's own. Raise Refused `not_in_history` if the
-    history has no calibration of this serial number, and as `open_history` does.
+    `history` is a file or a URL, by default RIG_HISTORY or, if not set, the user's own. Raise Refused `not_in_history`
+    if the history has no calibration of this serial number, and as `open_history` does.
     """
     address = None if history is None else str(history)
     with open_history(own_history_address(address) or resolve_address(None)) as opened:
@@ -144,8 +144,9 @@ def calibrations(
 def changes(before: Run | Result, now: Run | Result) -> Changes:
     """Return the changes from a run to a later one, sensor by sensor, as `rig history compare` prints them.
 
-    Sensors are the same by part, serial number, quantity and range. A run is solved by its usual estimator; give
-    results to compare those of other estimators. Raise Refused `not_comparable` if the runs have no sensor in common.
+    Sensors are the same if part, serial number, quantity and range are equal. A run is solved by its usual estimator;
+    give results to compare those of other estimators. Raise Refused `not_comparable` if the runs have no sensor in
+    common.
     """
     first, second = ({_subject(record): record for record in _records(source)} for source in (before, now))
     by_sensor = {}

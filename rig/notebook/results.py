@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 class Result(Mapping[str, Calibration]):
     """A run's result.
 
-    `result["gyro"]` is a sensor's calibration, `result["gyro, accelerometer"]` that of another quantity; for a sensor
-    with one quantity its name is enough. `document` is the complete `result.json`.
+    `result["gyro"]` is a sensor's calibration, `result["gyro, accelerometer"]` that of another quantity. If a sensor
+    has only one quantity, its name is enough. `document` is the complete `result.json`.
     """
 
     document: ResultDocument
@@ -126,7 +126,7 @@ class Result(Mapping[str, Calibration]):
 
 
 def solve(run: Run, estimator: str | None = None, **changes: float) -> Result:
-    """Solve and judge a run, as `rig solve` does, by its procedure's own estimator unless another is named.
+    """Solve and judge a run, as `rig solve` does, by the estimator of its procedure unless another is named.
 
     `changes` are thresholds or limits to use instead of the recorded ones: `max_lost_fraction=0.01`. Raise Fault and
     Refused as `rig solve` does; `unknown_setting` lists the possible changes.
