@@ -1,4 +1,4 @@
-"""Averages of a gyroscope's readings in the rests in which the arm stood still."""
+"""Averages of a gyroscope's readings over the arm's rests."""
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
@@ -39,7 +39,7 @@ def trim_rest(motion: ArmMotion, rest: Window) -> Window | None:
 
 
 def still_samples(run: RunData, stream: Stream, motion: ArmMotion) -> Iterator[slice]:
-    """Yield the samples of every rest and dwell in which the arm stood still, split at each missing sample."""
+    """Yield the samples of every rest and dwell of the arm, split at each missing sample."""
     for window in rested(run):
         still = trim_rest(motion, window)
         if still is None:

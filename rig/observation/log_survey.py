@@ -1,4 +1,4 @@
-"""A survey of a log's readings: how they were sampled, where the body lay still, and how it was turned."""
+"""A survey of a log's readings: their sampling, the rests of the body, and its turns."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ class LogSurvey:
     """A log's sampling, rests and turns.
 
     - rests: windows in which the body lay still.
-    - turns: by axis ("+x"), "other" without one, the number of turns from rest to rest.
+    - turns: the number of turns from rest to rest by axis ("+x"; "other" without an axis).
     - at_rest: by quantity, the mean norm of the readings at rest minus the bias of rates; largest: by quantity.
     - faces: number of directions of gravity at rest that differ by more than 45°.
     """

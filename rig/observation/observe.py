@@ -47,8 +47,8 @@ class Observation:
 
     - sweep: index of the sweep in the plan. joint_name, direction: what turned; None in data recorded elsewhere.
     - axis ("x", "y", "z"), sign: the sensor axis that is nominally along the turn.
-    - axis_flange (3,), speed_rad_s: the arm's mean rate by the weights of the mean reading: its unit vector in the
-      flange's frame, and its size (2π/T nominally; Δθ/T of an arc).
+    - axis_flange (3,), speed_rad_s: the arm's mean rate with the weights of the mean reading: its unit vector in the
+      flange's frame, and its size (nominally 2π/T; Δθ/T for an arc).
     - speed_std_rad_s: standard deviation of the speed, if the arm's states are too far apart to locate the turn's ends.
     - lost: number of samples missing from the average.
     - axis_errors (13, 3): change of the axis per radian of each of the arm's errors
@@ -225,7 +225,7 @@ def _average_revolution(
 
 
 def _sample_turn(time_s: Array, motion: ArmMotion, turn: Revolution, covered: NDArray[np.bool_]) -> SampledTurn:
-    """Return a turn at those times at which the arm's motion is recorded, and the mask (n,) of these, `covered`."""
+    """Return a turn at the times at which the arm's motion is recorded, and `covered`, the mask (n,) of these times."""
     fraction = (time_s - turn.start_s) / turn.duration_s
     waves = harmonics(turn.angle_rad * fraction, 2 * turn.beats)[covered]
     if not turn.closed:

@@ -27,7 +27,7 @@ AS_STATED: Mapping[int, Array] = MappingProxyType({})  # every stage is mounted 
 
 @dataclass(frozen=True, slots=True)
 class Delay:
-    """The delay of one sensor's filter against another's, s, and its standard deviation."""
+    """The delay of one sensor's filter relative to another's, s, and its standard deviation."""
 
     delay_s: float
     std_s: float
@@ -55,9 +55,9 @@ class ObservedRun:
     def time_s(self, sensor: str, gyroscope: str | None = None) -> Array:
         """Return the times (n,) of all samples of a sensor on the arm's clock.
 
-        They use the time base of `gyroscope`, by default the sensor's own, else the first gyroscope's on the same
-        clock. Without any, they are the arrival times of samples and arm states at the computer, accurate to
-        milliseconds.
+        They use the time base of `gyroscope`, by default the sensor's own; if it has none, that of the first gyroscope
+        on the same clock. Without any, they are the arrival times of samples and arm states at the computer, accurate
+        to milliseconds.
         """
         bases = {name: observations.time_base for name, observations in self.sensors.items()}
         return times_s(self.run, sensor, bases, gyroscope)
@@ -130,10 +130,10 @@ def observe_runs(runs: Sequence[RunData], corrections: Mapping[int, Array] = AS_
 
 
 def _clock_offsets_s(recordings: Sequence[ObservedRun]) -> list[float]:
-    """Return the offset of each recording's clock from the first's; the controller may restart in between.
+    """Return the offset of each recording's clock to that of the first; the controller may restart in between.
 
-    A recording begins after the previous one has ended, whatever the computer's clock says: somebody may have set it,
-    and the time of an accelerated laboratory passes faster.
+    A recording begins after the previous one has ended, even if the computer's clock disagrees: it may have been set,
+    and time in an accelerated laboratory passes faster.
     """
     offsets_s = [0.0] * bool(recordings)
     for last, recording in pairwise(recordings):

@@ -1,4 +1,4 @@
-"""The board's clock against the controller's: offset and drift, estimated from the data alone.
+"""The board's clock relative to the controller's: offset and drift, estimated from the data alone.
 
 The gyroscope and the arm measure the same rotation. A coarse search correlates turn rate with joint rate over all data
 (the board may have been switched on at any time); a weighted least-squares fit of the vector readings to the flange's
@@ -50,7 +50,8 @@ class TimeBase:
     """Controller time = board time + `offset_s` + `drift` × (board time − `reference_s`), all in seconds.
 
     `reference_s` is the board's time in the middle of the data, where offset and drift are nearly uncorrelated.
-    `covariance` (2, 2) is that of (`offset_s`, `drift`). `zero_rate_rad_s` (3,) is the fitted reading at rest.
+    `covariance` (2, 2) is the covariance of (`offset_s`, `drift`). `zero_rate_rad_s` (3,) is the fitted reading at
+    rest.
     """
 
     offset_s: float
@@ -85,7 +86,7 @@ class TimeBase:
 
 
 def estimate_time_base(board_time_s: Array, readings_rad_s: Array, motion: KnownMotion) -> TimeBase:
-    """Estimate the board's clock against the turner's from readings (n, 3) taken at board times (n,).
+    """Estimate the board's clock relative to the turner's from readings (n, 3) taken at board times (n,).
 
     Raise Fault `not_finite`, `impossible_times`, `board_clock_restarted`, `duplicated_samples`, `stuck_sensor`,
     `stuck_axis`, `time_base_not_found`.
@@ -297,7 +298,7 @@ def _average_samples(time_s: Array, readings: Array, count: int) -> tuple[Array,
 def _fit_clock(clock: TimeBase, board_time_s: Array, readings: Array, motion: KnownMotion) -> TimeBase:
     """Return the clock with the best fit of readings and motion, first by their slow parts.
 
-    A ripple shifted by a period looks the same, and a fast ripple differs between readings and states, which have
+    A ripple shifted by a period is the same, and a fast ripple differs between readings and states, which have
     different filters. If it leaves the finest fit without an optimum, the clock is that of the slow parts, with its own
     uncertainty. Raise Fault `time_base_not_found`.
     """

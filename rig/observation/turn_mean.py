@@ -1,9 +1,9 @@
-"""The mean of readings over a turn or an arc, and the mean rate of the arm by the same weights.
+"""The mean of readings over a turn or an arc, and the mean rate of the arm with the same weights.
 
-An even mean leaves of a vibration the difference of its phase between both ends: 3 mrad/s at 8.5 Hz leave 20 µrad/s in
-six seconds, more than the noise of a good gyroscope. A vibration that the encoders measure is in both means alike and
-does no harm. Another one is found in the readings as spectral lines, and the weights cancel these. The same weights
-then average the arm's rate, so that a ripple has the same effect on both (`mean_weights`).
+In an unweighted mean a vibration leaves a remainder that depends on its phase at both ends: 3 mrad/s at 8.5 Hz leave 20
+µrad/s in six seconds, more than the noise of a good gyroscope. A vibration that the encoders measure has the same
+effect on both means, which does no harm. Another one is found in the readings as spectral lines, and the weights cancel
+these. The same weights then average the arm's rate, so that a ripple has the same effect on both (`mean_weights`).
 
 The residual of the readings after lines and rate is the noise, which is usually white.
 """
@@ -41,10 +41,11 @@ class SampledTurn:
 
     - `share` (n,): elapsed fraction of its time.
     - `rates_rad_s` (n, 3): the flange's mean rate around each sample, by the encoders.
-    - `uneven_rad_s` (n,): the part of that along the axis, minus its mean over the turn by both ends.
+    - `uneven_rad_s` (n,): the component of that rate along the axis, minus its mean over the turn by the angles at both
+      ends.
     - `passing` (n, k): columns of what comes once, twice and so on in a turn; for an arc minus their means.
     - `beats`: number of sidebands of its lines, see `Revolution`.
-    - `encoders_true`: whether the encoders are right within a turn, and not over whole turns alone.
+    - `encoders_true`: whether the encoders are right within a turn, and not only over whole turns.
     - `closed`: whether it consists of whole turns.
     - `complete`: whether samples follow each other closely, and no long gap is among them.
     """
@@ -63,10 +64,10 @@ class SampledTurn:
 class Lines:
     """Lines to remove from a mean: `cycles` (k,) of each in the turn, the last `not_encoded` of which no encoder shows.
 
-    A slow ripple that the encoders measure needs no line: it is one column of `encoded` (n, m), with its changes and
-    the rest of what the encoders show, mostly noise. Columns (n, 0 to 2) of the `rate` are removed: the rate itself
-    with few samples or with a gap, which do not sample a ripple evenly; else the changes of the slow ripple in a whole
-    turn, which a sensor that lags reads too. Even weights cancel those changes; weights without slow lines do not.
+    A slow ripple that the encoders measure needs no line: it is a column of `encoded` (n, m), as are its changes and
+    the remainder of the encoders' rate, mostly noise. Columns (n, 0 to 2) of the `rate` are removed: the rate itself if
+    few samples or a gap do not sample a ripple evenly; otherwise the changes of the slow ripple in a whole turn, which
+    a lagging sensor reads too. Even weights cancel those changes; weights without slow lines do not.
     """
 
     cycles: Array

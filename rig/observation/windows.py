@@ -60,8 +60,8 @@ def swept(run: RunData) -> Iterator[FinishedSweep]:
 def rested(run: RunData, superseded: Collection[int] = ()) -> Iterator[Window]:
     """Yield the rests and dwells that were started and finished, in order.
 
-    Those whose index is in `superseded` are left out, and rests just before or after such a sweep or dwell, because the
-    disturbance may have begun earlier or lasted longer.
+    A step whose index is in `superseded` is left out, as are rests just before or after it, because the disturbance may
+    have begun earlier or lasted longer.
     """
     rests = [
         window

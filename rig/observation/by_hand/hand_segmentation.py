@@ -1,7 +1,7 @@
 """A recording by hand, segmented into rests and moves by its readings alone.
 
-Rests are those of `rig.observation.by_hand.rests`; a move reaches from one rest to the next and a little into either,
-where the body still rocks or already moves.
+Rests are found by `rig.observation.by_hand.rests`; a move extends from one rest to the next, and a little into both,
+because the body still rocks or already moves there.
 """
 
 from dataclasses import dataclass, replace
@@ -124,7 +124,7 @@ State = Literal["starting", "resting", "moving", "held"]
 
 @dataclass(frozen=True, slots=True)
 class Live:
-    """The body's state at `time_s`, and since when; the rotation (3,) of the move so far and its peak rate."""
+    """The body's state at `time_s`, and its beginning; the rotation (3,) of the present move and its peak rate."""
 
     time_s: float
     state: State
@@ -134,9 +134,9 @@ class Live:
 
 
 class Segmenter:
-    """The feed of a session in progress: it finds what `segment_session` finds in the readings so far.
+    """A segmentation in progress: it finds what `segment_session` would find in the readings so far.
 
-    A rest is settled after `SETTLED_S`. `range_rad_s` is that of the gyroscope, None if unknown.
+    A rest is settled after `SETTLED_S`. `range_rad_s` is the range of the gyroscope, None if unknown.
     """
 
     def __init__(self, range_rad_s: float | None = None) -> None:

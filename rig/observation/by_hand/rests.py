@@ -1,13 +1,13 @@
-"""The rests of a body, by its sensors' readings alone.
+"""The rests of a body, from its sensors' readings alone.
 
 A recording is divided into blocks of a quarter of a second. A block is at rest if its readings scatter no more than a
 few times as much as in the quietest tenth of all blocks, and if a gyroscope reads its value at rest. This is the
-reading that most of the quiet blocks have in common, whatever the bias; a steady turn is as quiet as a rest, so of
-nearly equally frequent readings the smallest counts. Adjacent blocks with equal readings form one rest. A few missing
-readings do not end it.
+reading that most of the quiet blocks have in common, for any bias. A steady turn is as quiet as a rest, so if several
+readings are nearly equally frequent, the smallest counts. Adjacent blocks with equal readings form one rest. A few
+missing readings do not end it.
 
-If there is a gyroscope, it decides alone: it measures every turn, and hardly a knock against the table. Without one, a
-few readings that are due to a knock do not count.
+If there is a gyroscope, it decides alone: it measures every turn, and hardly a knock against the table. Without a
+gyroscope, a few readings that are due to a knock do not count.
 """
 
 from collections.abc import Mapping, Sequence
@@ -93,13 +93,13 @@ def _average_unknocked(blocks: Array, noise: Array) -> tuple[Array, Array]:
 
 
 def _find_steady_blocks(still: NDArray[np.bool_], pairs: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return which blocks (count,) agree with a neighbouring block; all still blocks if none agrees."""
+    """Return a mask of the blocks (count,) that agree with a neighbouring block; all still blocks if none agrees."""
     steady = np.append(pairs, False) | np.append(False, pairs)
     return steady if steady.any() else still
 
 
 def _mask_blocks(times: Array, windows: Sequence[Window]) -> NDArray[np.bool_]:
-    """Return which blocks (count,), by the times (count, width) of their readings, lie in one of the windows."""
+    """Return a mask (count,) of the blocks in one of the windows, by the times (count, width) of their readings."""
     mask = np.zeros(len(times), dtype=np.bool_)
     for window in windows:
         first, last = np.searchsorted(times[:, 0], window.start_s), np.searchsorted(times[:, -1], window.end_s, "right")
@@ -110,7 +110,7 @@ def _mask_blocks(times: Array, windows: Sequence[Window]) -> NDArray[np.bool_]:
 def _find_unturned(
     means: Array, steady: NDArray[np.bool_], tolerance: Array, lying: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """Return which blocks (count,) have a gyroscope's reading at rest: the most frequent one in declared rests."""
+    """Return a mask (count,) of blocks with the gyroscope's reading at rest, the most frequent in declared rests."""
     declared = steady & lying
     pool = means[declared if declared.any() else steady]
     candidates = pool[:: -(-len(pool) // CANDIDATES)]

@@ -1,4 +1,4 @@
-"""The rests and moves of a session by hand, from its recordings. What the operator refused does not count."""
+"""The rests and moves of a session by hand, from its recordings. Moves that were refused do not count."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -112,7 +112,7 @@ def _is_within(part: HandRest | Move, spans: Sequence[tuple[float, float]]) -> b
 
 
 def replay_runs(runs: Sequence[RunData], name: str) -> tuple[Segmenter, NotCounted, float]:
-    """Return one sensor's rests and moves so far, the parts that do not count, and the time to continue.
+    """Return one sensor's rests and moves so far, the parts that do not count, and the time at which to continue.
 
     The item may have been moved in any way between two recordings, so no move connects the last rest of one with the
     first of the next. Raise Fault as `check_readings` does.

@@ -20,7 +20,7 @@ NORMAL = 1.4826  # standard deviation over median absolute deviation
 def contiguous_slices(time_s: Array, sampling: Sampling) -> Iterator[slice]:
     """Yield the rows between the gaps of a log with increasing times (n,); a few missing readings are not a gap.
 
-    `fill_missing` can interpolate so few readings with hardly any loss of noise.
+    `fill_missing` can interpolate as few readings with hardly any loss of noise.
     """
     gaps = sampling.gaps(time_s)
     short = gaps & (np.diff(time_s) <= BRIDGED_S)

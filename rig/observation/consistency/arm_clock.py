@@ -52,9 +52,9 @@ def compare_with_computer(motion: ArmMotion) -> ClockRate:
 def state_jitter(recordings: Sequence[ObservedRun]) -> Jitter:
     """Return the jitter of the times of the arm's states, from the scatter of the joint angles in all sweeps of a run.
 
-    Differences of the sixth order remove the servo's motion, which is slow compared with the states. They keep the
-    times' errors, and the noise and the steps of the encoder. Neighbouring differences share states: n of them have
-    n / Σ ρ² degrees of freedom, with Σ ρ² = C(24, 12) / C(12, 6)² over all lags.
+    Differences of the sixth order remove the servo's motion, which is slow compared with the states. They contain the
+    times' errors, and the noise and the steps of the encoder. Neighbouring differences share states: n of them have n /
+    Σ ρ² degrees of freedom, with Σ ρ² = C(24, 12) / C(12, 6)² over all lags.
     """
     count = 0
     scatter = []
@@ -83,7 +83,7 @@ def find_encoder_noise_rad(recordings: Sequence[ObservedRun]) -> float:
 
 
 def _difference_sweeps(recordings: Sequence[ObservedRun]) -> Iterator[tuple[Sweep, Array]]:
-    """Yield each finished sweep with the sixth differences (n, k) of its joint angles, where states are even."""
+    """Yield each finished sweep with the sixth differences (n, k) of its joint angles, for evenly spaced states."""
     for recording in recordings:
         motion = recording.motion
         for finished in swept(recording.run):

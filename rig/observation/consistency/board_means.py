@@ -1,8 +1,8 @@
 """The board's own average of each sweep, compared with the computer's mean of the same turn. Pure.
 
-Both come from the same samples with other weights: the board's are even, over whole blocks of readings, so its window
-begins and ends a little before or after the turn; the computer's cancel the spectral lines it found. The arm's rotation
-under the board's weights is known, and so is their response to the lines. The rest must agree.
+Both average the same samples, with different weights. The board's weights are equal over whole blocks of readings, so
+its window begins and ends a little before or after the turn; the computer's cancel the spectral lines that it found.
+The arm's rotation under the board's weights is known, and so is their response to the lines. The rest must agree.
 """
 
 from collections.abc import Sequence

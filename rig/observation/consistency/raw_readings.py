@@ -20,10 +20,10 @@ NORMAL = 1.4826  # standard deviation over median absolute deviation
 class RawReadings:
     """Raw readings of one revolution, rest or dwell.
 
-    sweep: the index of the revolution among all of the sensor's, −1 of a rest. counts (n, 3): the readings as recorded.
-    residual_counts (m, 3): readings minus the mean of their segment and the arm's vibration, or in a rest any
+    sweep: the index of the revolution among all of the sensor's, −1 for a rest. counts (n, 3): the readings as
+    recorded. residual_counts (m, 3): readings minus the mean of their segment and the arm's vibration, or in a rest any
     vibration. Only samples for which the arm's motion is recorded. vibration_counts (3,): RMS of the arm's vibration.
-    swing_rad2 (3,): mean square difference of the vibration's angle between two moments of a rest.
+    swing_rad2 (3,): mean square difference of the vibration's angle between two times in a rest.
     """
 
     sweep: int

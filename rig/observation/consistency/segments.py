@@ -64,10 +64,9 @@ class MotionInterval:
 class Segment:
     """A part of a revolution or rest, averaged.
 
-    position: from −1 in the first segment to 1 in the last.
-    mean: of the readings, rad/s.
-    rate_rad_s (3,): mean rate of the flange against the base, in its frame, by the weights of that mean.
-    attitude (3, 3): mean rotation from the base into the flange's frame.
+    position: from −1 in the first segment to 1 in the last. mean: of the readings, rad/s. rate_rad_s (3,): mean rate of
+    the flange relative to the base, in the flange's frame, with the weights of that mean. attitude (3, 3): mean
+    rotation from the base into the flange's frame.
     """
 
     position: float
@@ -117,8 +116,8 @@ def segment_recordings(name: str, recordings: Sequence[ObservedRun]) -> tuple[Se
 class _Division:
     """Samples of a window that lie in segments.
 
-    inside: all samples of the window. used (n,): which of them lie in a segment with `enough`.
-    time_s (m,), readings_rad_s (m, 3): those. groups (m, p): segments they belong to. ends_s (p + 1,): of the segments.
+    inside: all samples of the window. used (n,): mask of the samples in a segment with `enough`. time_s (m,),
+    readings_rad_s (m, 3): these samples. groups (m, p): their segments. ends_s (p + 1,): the segments' ends.
     """
 
     inside: slice

@@ -1,8 +1,8 @@
 """Transfers between sweeps and rests, each averaged whole: the only rotation about some axes at another time.
 
-Each axis is swept in one interval of time, so the sweeps alone do not show whether its scale factor changed before or
-after. In a transfer two wrists turn by half a turn, from standstill to standstill: the arm gives the mean rate as well
-as in a sweep, about axes that are not being swept.
+The sweeps about an axis are all in one interval of time, so they do not show whether its scale factor changed before or
+after. In a transfer two wrists turn by half a revolution, from standstill to standstill: the arm states the mean rate
+as well as in a sweep, about axes other than that of the sweep.
 
 No spectral lines are sought in a transfer: it is short, and the servo's vibration sweeps up and down in it. At the data
 rate that vibration aliases to zero, and the mean is in error by more than the scatter shows: see
@@ -54,9 +54,9 @@ class WristTransfer:
 
     clock_offset_s: converts its times to the clock of the first recording. mean_rad_s (3,): mean of the readings.
     scatter_rad2_s2 (3,): variance of the mean, from the residuals of a fit of the arm's rate and gravity.
-    rounding_rad2_s2 (3,): variance of the mean due to rounding. rate_rad_s (3,): mean rate of the flange against the
-    base, in its frame. gravity_m_s2 (3,): gravity minus the acceleration at the sensors' position, in the same frame.
-    attitude (3, 3): from the base into that frame.
+    rounding_rad2_s2 (3,): variance of the mean due to rounding. rate_rad_s (3,): mean rate of the flange relative to
+    the base, in the flange's frame. gravity_m_s2 (3,): gravity minus the acceleration at the sensors' position, in the
+    same frame. attitude (3, 3): from the base into that frame.
     """
 
     clock_offset_s: float

@@ -4,9 +4,9 @@ samples: see `rig.observation.external.csv_samples`.
 
 attitudes: `start_s`, `end_s` on the same clock, or `time_s` alone, and `qw qx qy qz`, the unit quaternion that takes
 body to table coordinates; while the table turns `rate_x_rad_s rate_y_rad_s rate_z_rad_s`, its rate in body coordinates;
-and `attitude_std_rad` about each axis, if it is known. While the table turns, a row holds for its middle and should be
-short: down to one sample, whose noise is then estimated from the scatter of all rows about the model. Only a gyroscope
-is solved from rows in which the body moves; accelerometers and magnetometers use those at rest
+and `attitude_std_rad` about each axis, if it is known. While the table turns, a row refers to its middle and should be
+short. It may be a single sample, whose noise is then estimated from the scatter of all rows about the model. Only a
+gyroscope is solved from rows in which the body moves; accelerometers and magnetometers use those at rest
 (`rig.observation.external.placements`).
 
 Columns may have any order; the first row holds their names.
@@ -207,7 +207,7 @@ class _ReferenceRows:
 
 
 def _select_different_times(rows: Mapping[str, Array]) -> NDArray[np.intp]:
-    """Return the numbers, from 1, of all rows but those of no length at the time of another row."""
+    """Return the numbers, from 1, of all rows except rows of zero length at the time of another row."""
     middles_s = (rows["start_s"] + rows["end_s"]) / 2
     lasting = rows["end_s"] != rows["start_s"]
     return 1 + np.flatnonzero(lasting | ~np.isin(middles_s, middles_s[lasting]))

@@ -1,6 +1,6 @@
 """External data: a CSV file of samples and one of sweeps, solved like the rig's own recordings.
 
-samples: see `rig.observation.external.csv_samples`, with a gyroscope's; those of other sensors are not used.
+samples: see `rig.observation.external.csv_samples`, including a gyroscope's; those of other sensors are not used.
 
 sweeps: `start_s`, `end_s` on the same clock, `axis_x`, `axis_y`, `axis_z` (unit vector of the turn in a frame fixed to
 the sensor's carrier, right-handed), and either `speed_rad_s` (mean speed) or `angle_rad` (angle turned from start to
@@ -9,7 +9,7 @@ turn: over that its mean speed is 2π/T in any case. Standard deviations may be 
 reached, and `axis_std_rad` of the direction of the axis.
 
 A row with an angle and with the body at rest at both ends is solved by the angle that the gyroscope measured
-(`rig.estimation.gyroscope.rotations_by_angle`): that is how a hand turns, or a servo that starts and stops.
+(`rig.estimation.gyroscope.rotations_by_angle`), as for a turn by hand, or by a servo that starts and stops.
 
 Columns may have any order; the first row holds their names.
 """
@@ -63,7 +63,7 @@ class ExternalData:
     """The contents of the two files: averaged sweeps and rests, in the order of the rows; `turned` if a body was.
 
     `at_reference`: corrected to one temperature by polynomials that include the contradictions of repeats. `by_mean`:
-    numbers of the rows with an angle of which only the mean speed counts, for the body did not lie still before or
+    numbers of the rows with an angle of which only the mean speed counts, because the body did not lie still before or
     after. `omitted`: rows that are left out for missing readings, and the readings that are missing in the others.
     """
 

@@ -53,7 +53,7 @@ class SampleTable:
 class Samples:
     """A file's readings in the order of time, in SI units.
 
-    - `time_s` (n,): evened if stamps are too bad to be the times of the readings; `sampling` is that of the stamps.
+    - `time_s` (n,): smoothed if the time stamps are too inexact; `sampling` describes the stamps.
     - `readings` (n, 3) by quantity; `temperature_c` (n,), None without such a column.
     - `omitted`: rows of the file that are no readings of their own, and spikes, which are interpolated.
     - `notes`: how stamps were read, in words.
@@ -222,7 +222,7 @@ def samples_in(table: Columns, where: str) -> Samples:
 
 
 def _describe_stamps(ordered: OrderedStamps, total: int) -> Iterator[str]:
-    """Yield sentences on how the stamps of `total` samples were interpreted; none for good stamps."""
+    """Yield sentences on how the time stamps of `total` samples were interpreted; nothing for good stamps."""
     for finding in ordered.findings:
         if not finding.left_out:
             yield f"{finding.count} of {total} samples, the first {finding}: {finding.reason}"

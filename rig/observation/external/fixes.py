@@ -1,11 +1,11 @@
 """Attitude fixes from a reference's rows, between which a gyroscope is integrated, and the intervals left out, by name.
 
-Rows that follow each other while the body moves are gathered over windows; each holds for its middle. A row in which
-the gyroscope shows that the body lay still holds from its beginning to its end: both are fixes, and share the row's
-error.
+Rows that follow each other while the body moves are gathered over windows; each holds for its middle. If the gyroscope
+shows that the body lay still during a row, the row is valid from its beginning to its end: both are fixes, and share
+the row's error.
 
-A gyroscope cannot be integrated over missing samples, at the end of its range, or if it turns too far from one reading
-to the next for interpolation.
+A gyroscope cannot be integrated over missing samples, if it is saturated, or if it turns too far between two readings
+for interpolation.
 """
 
 from collections.abc import Iterator
@@ -150,7 +150,7 @@ def _drop_thin(fixes: Fixes) -> Fixes:
 def _find_joined(
     turning: Turning, fixes: Fixes, clock_s: float
 ) -> tuple[NDArray[np.bool_], Array, tuple[LeftOut, ...]]:
-    """Return which adjacent fixes (N − 1,) the gyroscope connects, the rotation in its gaps, and what is left out."""
+    """Return a mask (N − 1,) of fixes connected to the next one, the rotation in gaps, and what is left out."""
     count = len(fixes.placement)
     first_s = clock_s + fixes.at_s[np.searchsorted(fixes.fix, np.arange(count))]
     last_s = clock_s + fixes.at_s[np.searchsorted(fixes.fix, np.arange(count), side="right") - 1]

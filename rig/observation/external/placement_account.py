@@ -31,8 +31,8 @@ class AttitudeRows:
 class Account:
     """The placements among `rows` (N,) of a reference, for readings at `time_s` (n,): the `rest` of each, or −1.
 
-    `cuts` (N,) are the samples of each row that are at rest. `dwells` (N,) are the rows that are long enough to declare
-    that the body lay still; in the others it may move.
+    `cuts` (N,) are the samples of each row that are at rest. `dwells` (N,) marks the rows so long that they declare the
+    body to be at rest; in the other rows it may move.
     """
 
     time_s: Array

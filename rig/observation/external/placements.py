@@ -1,8 +1,8 @@
 """Sensor readings in the attitudes in which a body was laid down: only rests show gravity, or a field.
 
-A placement is a rest of the recording (`rig.observation.by_hand.rests`) and the rows of a reference that fall into it:
-rows that follow each other without a movement in between are one placement. Rests without a row of the reference still
-show the size of the quantity.
+A placement is a rest of the recording (`rig.observation.by_hand.rests`) and the rows of a reference within it.
+Consecutive rows without a movement in between are one placement. Rests without a row of the reference still show the
+size of the quantity.
 
 A knock, or a gap, costs only the readings during it: if the readings before and after are equal, the body lay still.
 """
@@ -57,7 +57,7 @@ class Placements:
     """N placements: the averages `read`, `attitudes` (N, 3, 3), body to table, and `attitude_std_rad` (N,) as stated.
 
     `unplaced` are rests without an attitude; `left_out` is the number of rows without a placement, in which the body
-    moved. `omitted` holds what else is left out.
+    moved. `omitted` lists what else is left out.
     """
 
     read: Rested
@@ -195,9 +195,9 @@ def _find_rest(time_s: Array, window: Window, rests: Sequence[_PlacedRest]) -> t
 
 
 def _mask_inner(rest: NDArray[np.intp], windows_s: Array, starts_s: Array, ends_s: Array) -> NDArray[np.bool_]:
-    """Return which rows (N,) at rest are far enough from the ends of their rest; all those of a rest if none is.
+    """Return a mask of the rows (N,) at rest far enough from the ends of their rest; all rows of a rest if none is.
 
-    A reference that reports late shows the body in motion when it lies still already.
+    A late reference shows the body in motion when it already lies still.
     """
     at_rest = np.flatnonzero(rest >= 0)
     middles_s, number = windows_s[at_rest].mean(axis=1), rest[at_rest]

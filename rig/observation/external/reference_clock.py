@@ -1,9 +1,9 @@
-"""The offset of a reference's clock against that of the readings, from the rotation that both show.
+"""The offset of a reference's clock relative to that of the readings, from the rotation that both show.
 
 The rates of densely written, evenly stamped rows determine offset and drift to a fraction of a millisecond
 (`rig.observation.timebase`). Reports that come slowly, or are stamped on arrival, have no such rates: a drift that is
-fitted to them is that of their stamps' errors. Their offset is that of the least absolute deviations between the
-rotations from row to row (`robust_start`), without drift.
+fitted to them would be caused by time-stamp errors. Their offset, without drift, minimises the absolute deviations
+between the rotations from row to row (`robust_start`).
 """
 
 from dataclasses import replace

@@ -4,7 +4,7 @@
 
 holds to second order for any φ below π, however far apart the rows are. The fit minimises the sum of the residuals'
 lengths (least absolute deviations by reweighting), over a grid of τ. Only pairs between which the body moves determine
-F and τ; so a few bad rows do not, nor a body that rests most of the time.
+F and τ, so a few bad rows have no effect, nor long rests of the body.
 """
 
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""The motion of a table with a file of attitudes, for the clock of what was recorded on it."""
+"""The motion of a table, from a file of attitudes, by which the clock of a recording is found."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +16,9 @@ UNEVEN, EVEN_S = 0.2, 0.05
 
 
 class TableMotion:
-    """A `KnownMotion` from rows that follow each other closely, each of which holds for its middle.
+    """A `KnownMotion` from rows that follow each other closely, each of which refers to its middle.
 
-    `middles_s` (n,) in any order, on the table's clock; `attitudes` (n, 3, 3) take body to table coordinates;
+    `middles_s` (n,) in any order, on the table's clock; `attitudes` (n, 3, 3) transform body to table coordinates;
     `rates_rad_s` (n, 3) in body coordinates, None if only the attitudes are known. Raise Fault `time_base_not_found`.
     """
 

@@ -1,6 +1,6 @@
 """Turns from rest to rest among the rows of a table of sweeps; the other rows are sweeps at a constant speed.
 
-A turn is solved by the angle that the gyroscope measured, whatever its speed; a sweep by its mean.
+A turn is solved by the angle that the gyroscope measured, at any speed; a sweep by its mean.
 """
 
 from collections.abc import Iterator, Sequence

@@ -2,7 +2,7 @@
 
 A reading has the time in its message's header, so readings and poses are on the clock that stamped them. A pose
 (`geometry_msgs/PoseStamped` or `TransformStamped`) is the body's in the room. The reader runs in a process of its own
-(`rig.observation.formats.sample_files`) and keeps one block of the bag at a time.
+(`rig.observation.formats.sample_files`) and holds one block of the bag at a time.
 """
 
 from collections.abc import Iterator, Sequence
@@ -81,7 +81,7 @@ def _inertial(
 ) -> Iterator[tuple[float, ...]]:
     """Yield the time, rate and acceleration of `sensor_msgs/Imu`; absent columns are set to None.
 
-    Messages without a rate are held back until a message with a rate comes; they are then left out and counted in
+    Messages without a rate are buffered until a message with a rate comes; they are then left out and counted in
     `counts`. Raise Refused `bag_topic` if no message holds a rate or an acceleration.
     """
     forces: list[tuple[float, ...]] = []

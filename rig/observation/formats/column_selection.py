@@ -1,4 +1,4 @@
-"""The columns of another program's file that are wanted: by its heading, or by the map that `--columns` names."""
+"""The required columns in a file of another program: by its heading, or by the map that `--columns` names."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -21,7 +21,7 @@ class Mapped:
     - wraps: by the rig's name of a time, the number at which its counter begins again at 0.
     - rate_hz: rows per second, for a file without times.
     - missing: texts that stand for a blank cell.
-    - in_any_unit: the numbers count as they are, so a row of units contradicts nothing.
+    - in_any_unit: the numbers are used as they are, whatever a row of units states.
     """
 
     columns: Mapping[str, tuple[str, float]]

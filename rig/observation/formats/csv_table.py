@@ -73,9 +73,9 @@ def read_table(
 ) -> CsvTable:
     """Return the columns of a file by the names in its header; each group of optional columns is complete or absent.
 
-    The first row holds the names. If it is divided by semicolons, as in spreadsheets with a decimal comma, or by tabs,
-    so are all rows. Empty rows, rows of units below the heading, and repetitions of the heading are skipped. Of a
-    `mapped` file, only columns named in the map, or by the rig's names, are returned. A file packed by gzip is
+    The first row holds the names. If its separators are semicolons, as in spreadsheets with a decimal comma, or tabs,
+    so are those of all rows. Empty rows, rows of units below the heading, and repetitions of the heading are skipped.
+    Of a `mapped` file, only columns named in the map, or by the rig's names, are returned. A file packed by gzip is
     unpacked. Times count from `origin_s`; with None, the first time determines it. A packed or long file is read in a
     process of its own, as it might exhaust the memory. Raise Refused `no_file`, `file_too_costly`,
     `temporary_folder_full`, `wrong_columns`, `wrong_unit`, `not_a_number`.
@@ -181,7 +181,7 @@ class _Wanted:
     in_any_unit: bool = False
 
     def plain_numbers(self, row: Sequence[str]) -> Sequence[float]:
-        """Return a row's numbers in SI units by a fast method; none for a row that needs the careful one."""
+        """Return a row's numbers in SI units by a fast method; empty for a row that needs the careful method."""
         if len(row) != self.width or not self.missing.isdisjoint(map(str.strip, row)):
             return ()
         try:

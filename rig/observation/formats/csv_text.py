@@ -68,7 +68,7 @@ def _text(file: BinaryIO | GzipFile) -> TextIOWrapper:
     """Return a file's text, unpacked, in the encoding that its beginning shows.
 
     Raise UnfitFile if it is not text. If it is not UTF-8, headings such as "°/s" and "µT" are mostly in the Windows
-    encoding. Damaged characters further on are replaced: the row that they are in is refused by its line.
+    encoding. Damaged characters further on are replaced; the row that contains them is refused by its line number.
     """
     if _read_beginning(file).startswith(GZIP):
         file = GzipFile(fileobj=file)

@@ -1,8 +1,8 @@
 """MATLAB's files (`.mat`) as tables: each column of a variable, or of a struct's field, is a column of the table.
 
-Columns have the names by which MATLAB knows them: `t` of a vector, `gyro(:,2)` of a matrix, `imu.gyro(:,2)` of a
-struct. SciPy reads versions 4 to 7, h5py version 7.3. Both run in a process of its own, and read numbers only: no
-object, no function, no link to another file.
+Columns have the names that they have in MATLAB: `t` of a vector, `gyro(:,2)` of a matrix, `imu.gyro(:,2)` of a struct.
+SciPy reads versions 4 to 7, h5py version 7.3. Both run in a process of its own, and read numbers only: no object, no
+function, no link to another file.
 """
 
 from collections.abc import Iterator
@@ -34,7 +34,7 @@ def is_mat(path: Path) -> bool:
 def read_mat_rows(path: Path, header: Header, mapped: Mapped | None) -> Iterator[list[str]]:
     """Yield the names of all columns of a file, then its rows, in which cells of unneeded columns are blank.
 
-    Needed are the columns of the map, and those with the rig's own names. Raise Refused `wrong_columns` if they differ
+    The columns of the map, and those with the rig's own names, are needed. Raise Refused `wrong_columns` if they differ
     in length, and any error of the parser for a damaged file.
     """
     columns = read_mat_columns(path)

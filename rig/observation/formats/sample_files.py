@@ -1,4 +1,4 @@
-"""Files of readings and attitudes that are not tables, each with its reader, recognized by their look.
+"""Files of readings and attitudes that are not tables, each with its reader, recognized by name or content.
 
 A path may select a part of the file behind two colons: `session::/imu/data` is a topic of a bag, `flight.ulg::1` an
 instance in PX4's log.
@@ -29,8 +29,8 @@ class Format:
     """A kind of file, its `name` in messages, and its readers, which run in a process of their own.
 
     `readings` and `attitudes` are readers ("module:function", as in `rig.data.processes.reading_process`), None if a
-    file cannot hold them. They take the path that `reads` makes of the user's, and the part `inside`, and yield columns
-    `in_blocks` (`rig.observation.formats.table_parts`), named as those of a CSV file; attitudes are times and
+    file cannot hold them. They take the path that `reads` returns for the user's, and the part `inside`, and yield
+    columns `in_blocks` (`rig.observation.formats.table_parts`), with the names of a CSV file; attitudes are times and
     quaternions. `remedy` is for a file that cannot be read.
     """
 
@@ -69,7 +69,7 @@ def whole(path: Path) -> Path:
 class FormatColumns:
     """The `columns` (n,) of a file, ordered by time, the number of `others`: rows without any, and the reader's `note`.
 
-    The note says what the readings lack, "" if nothing.
+    The note states what the readings lack, "" if nothing.
     """
 
     columns: Columns

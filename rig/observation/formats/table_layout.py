@@ -37,7 +37,7 @@ class TableLayout:
     """The layout of a table.
 
     - skip_lines: lines before the heading.
-    - headings: the names of the columns, "" without one; units: as the heading or the row below it says, or "".
+    - headings: the names of the columns, "" without one; units: as stated by the heading or the row below it, or "".
     - numbers: the indices of the columns of numbers; texts: of the others that are not blank.
     - time: the index of the column of time, or None; time_unit: of its numbers, None if it is a text.
     - missing: the texts that stand for missing values.
@@ -195,7 +195,7 @@ def _largest_number(column: Sequence[str]) -> float:
 def _find_time(
     headings: Sequence[str], units: Sequence[str], columns: Sequence[Sequence[str]], times: Sequence[int]
 ) -> int | None:
-    """Return the index of the time column: by its name or unit, else the first that increases.
+    """Return the index of the time column: by its name or unit, or else the first that increases.
 
     A column with such a name counts only if its values rise.
     """
@@ -211,7 +211,7 @@ def _find_time(
 
 
 def _rises(column: Sequence[str]) -> bool:
-    """Return whether a column mostly rises, and never falls except where a counter restarts."""
+    """Return whether a column mostly increases, and decreases only at restarts of a counter."""
     try:
         steps = np.diff([float(seconds_of(cell, 1.0)) for cell in column])
     except (ValueError, ArithmeticError):
@@ -225,7 +225,7 @@ def _increases_by_one(column: Sequence[str]) -> bool:
 
 
 def _time_unit(heading: str, unit: str, column: Sequence[str]) -> str:
-    """Return the time unit that the heading states, else one that fits the numbers as dates or a likely sample rate."""
+    """Return the time unit in the heading, or one for which the numbers are dates or the sample rate is likely."""
     if unit in ALLOWED and UNITS[unit].quantity == TIME:
         return unit
     name = heading.lower()

@@ -1,4 +1,4 @@
-"""Columns of numbers on their way out of a reading process: rows in blocks, then the names of the columns."""
+"""The output of a reading process for columns of numbers: rows in blocks, then the names of the columns."""
 
 from array import array
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -26,7 +26,7 @@ def in_blocks(
     """Yield the rows in blocks (n, columns), then the names of the columns. A row has a number for each column.
 
     The names are read after the last row: by then the reader may have replaced a name by None, which omits the column.
-    `counts` are further entries beside the names: the number of `LEFT_OUT` rows, and a `NOTE`.
+    `counts` are entries in addition to the names: the number of `LEFT_OUT` rows, and a `NOTE`.
     """
     values, width = array("d"), len(columns)
     for row in rows:

@@ -1,11 +1,12 @@
-"""Readings from PX4's log (`.ulg`), by `pyulog`: those of the sensors, before the autopilot corrects them.
+"""Readings from PX4's log (`.ulg`), by `pyulog`: the sensors' readings before the autopilot corrects them.
 
 `sensor_gyro` and `sensor_accel` of one instance each, in rad/s and m/s²; `timestamp_sample` is the autopilot's time of
-the sample in µs. An accelerometer that samples at other times is interpolated to the gyroscope's: both usually belong
-to one part, and then the times are the same.
+the sample in µs. An accelerometer with other sample times is interpolated to the gyroscope's times. Both usually belong
+to one part, and then their times are equal.
 
-PX4's default profile logs these once a second or not at all, and `sensor_combined` at 200 Hz or so. Then that is read,
-with a note of what it lacks. The reader runs in a process of its own (`rig.observation.formats.sample_files`).
+PX4's default profile logs these once a second or not at all, and `sensor_combined` at 200 Hz or so. Then that message
+is read, with a note about what it lacks. The reader runs in a process of its own
+(`rig.observation.formats.sample_files`).
 """
 
 from collections.abc import Iterator, Mapping, Sequence

@@ -43,12 +43,11 @@ ATTITUDES = 72  # attitudes in a mean: over whole turns the part perpendicular t
 class ArmMotion:
     """The `KnownMotion` of a chain of k joints: `angles(t)` (n, k) rad of them, `rate(t)` (n, 3) rad/s of the flange.
 
-    Rates come from the recorded joint angles rather than from the controller's velocity signal, which is filtered: what
-    counts is when the joint was where. `states` (m,) are rows of `state_dtype`, for joints of that `kinematics` and
-    those `names`. All vectors in the flange's frame are given in the item's, to which `mount` (3, 3) takes them: the
-    identity unless the item was mounted in another way. If single readings of an angle scatter (`reading_std_rad`),
-    angles and rates are fitted over a window, and a turn ends at the same reading one turn later. Raise Fault
-    `no_motion`, `not_finite`, `impossible_times`, `arm_clock_stepped`.
+    Rates come from the recorded joint angles, because the controller filters its velocity signal. `states` (m,) are
+    rows of `state_dtype`, for joints of that `kinematics` and those `names`. All vectors in the flange's frame are
+    transformed to the item's by `mount` (3, 3): the identity unless a stage mounts the item differently. If single
+    readings of an angle scatter (`reading_std_rad`), angles and rates are fitted over a window, and a turn ends at the
+    same reading one turn later. Raise Fault `no_motion`, `not_finite`, `impossible_times`, `arm_clock_stepped`.
     """
 
     def __init__(
@@ -125,7 +124,7 @@ class ArmMotion:
     def travel_rad(self, window: Window) -> float | None:
         """Return the travel of the joint that moved most in a window; None if it contains fewer than two states.
 
-        The oscillation of a standing arm is excluded, because angles and means are corrected for it.
+        The oscillation of an arm at rest is excluded, because angles and means are corrected for it.
         """
         q_rad = self._q_rad(window)
         if self._scatters and len(q_rad) >= PARTS:
@@ -138,7 +137,7 @@ class ArmMotion:
         return travel_rad
 
     def swing_rates(self, time_s: Array) -> Array:
-        """Return the `rates_at_samples` (n, 3) at rising times (n,) if the standing arm oscillates, else zero.
+        """Return the `rates_at_samples` (n, 3) at rising times (n,) if the arm oscillates at rest, else zero.
 
         Without an oscillation the encoders show only noise, which is not added as a rate.
         """
@@ -162,8 +161,8 @@ class ArmMotion:
     def mean_rates(self, time_s: Array, lasting_s: float) -> Array:
         """Return the flange's mean rate (n, 3), rad/s, over `lasting_s` around each of the times (n,).
 
-        It is the difference of the joints' angles, so the error of one angle cancels between neighbouring rates, and
-        the mean over consecutive samples depends on their ends only.
+        It is the difference of the joints' angles, so the error of one angle cancels between adjacent rates, and the
+        mean over consecutive samples depends only on the first and the last.
         """
         travel_rad = self.angles(time_s + lasting_s / 2) - self.angles(time_s - lasting_s / 2)
         rates: Array = flange_rate(self.angles(time_s), travel_rad / lasting_s, self.kinematics) @ self.mount.T

@@ -1,9 +1,9 @@
-"""A whole turn of a shaft whose single readings scatter, located by the same reading one turn later.
+"""A whole turn of a shaft whose single readings scatter, found by the recurrence of a reading one turn later.
 
 An arm's encoder shows a joint's angle to microradians, so its turn begins and ends at a reading. A servo's encoder
 shows it to a milliradian, with an error of a degree besides. That error is the same at the same angle of the shaft, and
-a quarter of a turn of readings that come again averages the scatter. In the time of one turn the gyroscope then turns
-2π, wherever in the even part of the sweep that time begins; this module puts it in the middle.
+a quarter of a turn of recurring readings averages the scatter. During the time of one turn the gyroscope rotates by 2π,
+wherever that time begins in the even part of the sweep; this module chooses the middle.
 """
 
 from typing import Any

@@ -23,7 +23,7 @@ class RateFunction(Protocol):
 class KnownMotion(Protocol):
     """A body's rotation as a function of its turner's time, in axes fixed to the body.
 
-    How the sensors are mounted on the body does not matter for finding the clock.
+    The mounting of the sensors on the body does not matter for finding the clock.
     """
 
     @property

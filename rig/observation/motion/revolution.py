@@ -26,10 +26,10 @@ class Revolution:
     - `duration_std_s`: uncertainty by interpolation between arm states.
     - `axis_flange` (3,): unit vector of the turn in the flange frame, by the measured joints.
     - `axis_errors` (13, 3): its change per radian of each arm error (`rig.motion.geometry.AXIS_ERRORS`).
-    - `attitude` (3, 3): takes a vector of the arm's base frame into the flange's, at the start.
+    - `attitude` (3, 3): transforms a vector from the arm's base frame to the flange's, at the start.
     - `arm_m` (3,): a vector from the joint's axis to the flange's origin, in the flange's frame.
-    - `station`: the joint, from 0 at the base, and the pose it turned in.
-    - `uneven`: the encoder errs by a degree, so the shaft's angle is known over whole turns alone.
+    - `station`: the joint, from 0 at the base, and the pose in which it turned.
+    - `uneven`: the encoder errs by a degree, so the shaft's angle is known only over whole turns.
     """
 
     start_s: float
@@ -45,7 +45,7 @@ class Revolution:
 
     @property
     def beats(self) -> int:
-        """The number of sidebands of each spectral line: the shaft's speed varies up to so many times per turn.
+        """The number of sidebands of each spectral line: the highest harmonic of a turn in the shaft's speed.
 
         An encoder with a large error errs once and twice a turn; products of these errors come up to four times.
         """
@@ -85,7 +85,7 @@ class Ends:
 def find_revolution(states: NDArray[Any], sweep: Sweep, settings: ObservationThresholds) -> Ends:
     """Return the revolution of one sweep from the turner's `states` (n,), in the order of their times.
 
-    Its ends are where the recorded joint angle crosses the ends of `revolution_rad`. Raise Fault
+    Its ends are the times at which the recorded joint angle crosses the ends of `revolution_rad`. Raise Fault
     `incomplete_revolution`, `arm_states_lost`, `speed_slider`, `speed_limited`, `speed_not_constant`,
     `other_joint_moved`.
     """

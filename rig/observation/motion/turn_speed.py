@@ -1,8 +1,8 @@
 """The mean speed of a shaft over a whole turn, from its own encoder and a clock alone.
 
-The same encoder reading one turn later is the same angle of the shaft, whatever the encoder's nonlinearity: over a
-whole turn it cancels, and so does every unevenness that comes back with the turn (a gear's ripple, backlash, a load
-that pulls). The noise and the steps of the readings remain, and the clock's jitter. Pure.
+The same encoder reading one turn later is the same angle of the shaft for any nonlinearity of the encoder: it cancels
+over a whole turn, as does every unevenness with the period of a turn (a gear's ripple, backlash, an unbalanced load).
+The noise and the steps of the readings remain, and the clock's jitter. Pure.
 """
 
 from dataclasses import dataclass

@@ -20,9 +20,9 @@ from rig.observation.statistics.vibration_noise import fit_inflation, line_colum
 class SweptAcceleration:
     """An accelerometer's first harmonic in sweep `sweep` of the plan; the joint's angle counts from the start.
 
-    There `attitude` (3, 3) takes a vector of the arm's base frame into the flange's. `axis_flange` (3,) is the unit
-    vector of a growing angle, `arm_m` (3,) a vector from the axis to the flange's origin, in the flange's frame.
-    `station` holds the `joint`, from 0 at the base, and the pose it turned in.
+    There `attitude` (3, 3) transforms a vector from the arm's base frame to the flange's. `axis_flange` (3,) is the
+    unit vector of a growing angle, `arm_m` (3,) a vector from the axis to the flange's origin, in the flange's frame.
+    `station` contains the `joint`, from 0 at the base, and the pose in which it turned.
     """
 
     sweep: int

@@ -68,7 +68,7 @@ def _spectrum_dof(centred: Array, memory: int) -> float:
 
 
 def _autoregression(products: Array, count: int, memory: int) -> tuple[float, float, int]:
-    """Return Akaike's criterion and the spectrum at zero, from the `_products` of `count` residuals, and the `memory`.
+    """Return Akaike's criterion and the spectrum at zero for the order `memory`, from `_products` of `count` residuals.
 
     The spectrum is 0 / 0 for residuals that only repeat, such as coarse readings with few different values.
     """

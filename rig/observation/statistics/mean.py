@@ -24,7 +24,8 @@ class Mean:
     - `dof` (3,): degrees of freedom of the variance, fewer than samples if these are not independent.
     - `cycles` (k,): cycles in the window of the spectral lines that were removed from the mean.
     - `rounding` (3,): the part of the variance by rounding to steps.
-    - `weights` (n,): those of the readings, for averaging other data of the same samples; empty if they are not kept.
+    - `weights` (n,): weights of the readings, for averaging other data of the same samples; empty if they are not
+      stored.
     """
 
     mean: Array
@@ -87,18 +88,18 @@ class ReadAtRest:
 
 
 def by_axis(dofs: Iterable[Array | float]) -> Array:
-    """Return degrees of freedom (N, 3) of the variances of N means, from one number for all axes or one for each."""
+    """Return degrees of freedom (N, 3) of the variances of N means, from one number for all axes or three."""
     return np.array([np.broadcast_to(dof, 3) for dof in dofs])
 
 
 def weighted_means(
     readings: Array, groups: Array, weights: Array, *, smooth: Array, noise: MeanNoise, steps: Steps
 ) -> tuple[Mean, ...]:
-    """Return the means of p groups of readings by their weights: one group is a whole window, several its segments.
+    """Return the weighted means of p groups of readings: a single group is a whole window, several are its segments.
 
     - readings (n, 3): in any unit, recorded in `steps`.
     - groups (n, p): above zero if a reading belongs to a group.
-    - weights (p, n): those of each group add up to one over its readings and cancel nuisance columns
+    - weights (p, n): add up to one over each group's readings and cancel nuisance columns
       (`rig.estimation.statistics.mean_weights`).
     - smooth (n, 3): the readings without noise.
 

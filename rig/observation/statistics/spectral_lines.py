@@ -1,4 +1,4 @@
-"""Spectral lines in readings: vibrations that stand out of the noise's spectrum, whether encoders show them or not.
+"""Spectral lines in readings: vibrations that exceed the noise's spectrum, whether encoders show them or not.
 
 A part of a revolution is too short for a vibration to average out: 4 mrad/s at 8 Hz leave 0.1 mrad/s in a second and a
 half, several times the noise of a good gyroscope.
@@ -31,9 +31,10 @@ NONE: Array = np.zeros(0)
 class LineSearch:
     """The criteria of a spectral line.
 
-    It stands `stands_out` times over the median power around it, and over `floor`, a power of the same window for data
-    with less noise than what they are compared with. It makes at least `slowest` cycles in all the readings, and has
-    `beats` sidebands: see `waves`. At most `most` are found, previous ones included.
+    Its power exceeds `stands_out` times the median power around it. It also exceeds `floor` as many times: a power in
+    the same window, for data with less noise than the readings with which they are compared. It makes at least
+    `slowest` cycles in all the readings, and has `beats` sidebands: see `waves`. At most `most` are found, previous
+    ones included.
     """
 
     stands_out: float = 16.0  # one false line in seventy recordings costs nothing
@@ -95,9 +96,9 @@ def column_count(beats: int) -> int:
 def waves(cycles: Array, fraction: Array, beats: int = BEATS) -> Array:
     """Return cosine and sine columns (n, w k) of k lines at elapsed fractions (n,) of the time, w = `column_count`.
 
-    Each line also has two steadily growing columns, for one that begins or ends, and sidebands at one cycle more and
-    one less, by which a rotating sensor senses a vibration in the room. With `beats` b they reach up to b cycles: see
-    `rig.observation.motion.revolution.Revolution`.
+    Each line also has two linearly growing columns, for a vibration that begins or ends, and sidebands at one cycle
+    more and one cycle less, which a vibration of the room causes in a rotating sensor. With `beats` b they reach up to
+    b cycles: see `rig.observation.motion.revolution.Revolution`.
     """
     line, turn = (np.exp(2j * np.pi * np.outer(cycles_each, fraction)) for cycles_each in (cycles, range(1, beats + 1)))
     sidebands = [line * shift for once in turn for shift in (once.conj(), once)]

@@ -1,9 +1,9 @@
-"""The mean of a rest in which the arm vibrates, by weights that rise and fall smoothly at either end.
+"""The mean over a rest in which the arm vibrates, with weights that rise and fall smoothly at either end.
 
-A plain mean over T leaves of a vibration its change of angle between both ends, over T: 2 mrad/s at 14 Hz leave 0.7
-deg/h RMS in ten seconds, three times the noise of a KVH 1775. Weights with raised-cosine flanks of length L (Tukey's
-window) divide that by 4 (f L)² − 1, two hundred with half a second. White noise averages a little worse, by n Σ w² with
-Σ w = 1: 4 % in variance in ten seconds, 10 % in the shortest rests.
+In a plain mean over T the remainder of a vibration is its change of angle between both ends, divided by T: 2 mrad/s at
+14 Hz leave 0.7 deg/h RMS in ten seconds, three times the noise of a KVH 1775. Weights with raised-cosine flanks of
+length L (Tukey's window) divide that by 4 (f L)² − 1, two hundred with half a second. White noise averages a little
+worse, by n Σ w² with Σ w = 1: 4 % in variance in ten seconds, 10 % in the shortest rests.
 """
 
 from functools import lru_cache

@@ -1,7 +1,7 @@
 """The noise of readings that vibrate: spectral lines model the vibration, and the residuals are the sensor's own noise.
 
 The scatter of a vibration is not noise: the few low frequencies without it are too few to show the noise in one turn.
-Without its lines the noise is usually white, and then all residuals determine it; else their correlations do.
+Without its lines the noise is usually white, and then all residuals determine it; otherwise their correlations do.
 """
 
 from collections.abc import Sequence
@@ -33,7 +33,7 @@ def average_rest(readings: Array, time_s: Array, window: Window, steps: Steps) -
 
 
 def average_standstill(readings: Array, time_s: Array, window: Window, steps: Steps) -> tuple[Mean, Window]:
-    """Return the mean of readings (n, 3) of a standing arm, and the window that it represents."""
+    """Return the mean of readings (n, 3) of an arm at rest, and the window that it represents."""
     mean, averaged_window = mean_at_rest(readings, time_s, window, steps)
     if len(readings) >= FEWEST and averaged_window != window:
         mean = average_rest(readings, time_s, window, steps)

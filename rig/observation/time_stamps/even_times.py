@@ -1,4 +1,4 @@
-"""The times at which readings were taken, by stamps that are too coarse, or those of arrival."""
+"""The times at which readings were taken, from time stamps that are too coarse, or are arrival times."""
 
 import numpy as np
 
@@ -12,8 +12,8 @@ AVERAGED = 32  # readings whose time stamps err in either direction
 def find_taken_times(time_s: Array, sampling: Sampling) -> Array:
     """Return the strictly rising times (n,) at which readings were taken; good, distinct stamps are unchanged.
 
-    Arrival stamps are never early, so the least late ones determine the times; coarse stamps err either way, so their
-    mean does. Stamps do not show a latency that all readings share, so it remains.
+    Arrival times are never early, so the least late ones determine the times; coarse stamps err in both directions, so
+    their mean does. Stamps do not show a latency that all readings share, so it remains.
     """
     if sampling.late is not None:
         return _separate(time_s)

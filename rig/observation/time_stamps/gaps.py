@@ -1,9 +1,9 @@
-"""What a gap between readings can hide: the error of bridging it, from how the readings next to it change.
+"""The rotation that a gap between readings can hide: the error of bridging it, from the readings on either side.
 
-A gap of a rate is bridged by the trapezoidal rule. How wrong that is does not depend on the gap's length alone: of a
-body at rest, or one that turns evenly, it hides nothing; of one that starts or swings, a short one hides much. So the
-same gap is made in the readings on either side, and bridged, and compared with their integral. Between two rates that
-differ by more than readings do on either side, the change may lie anywhere in the gap. All functions are pure.
+A gap of a rate is bridged by the trapezoidal rule. The error does not depend on the gap's length alone. If a body is at
+rest or turns evenly, a gap hides nothing; if it starts or swings, a short gap hides much. So gaps of the same length
+are cut into the readings on either side and bridged, and the result is compared with their integral. Between two rates
+that differ by more than readings do on either side, the change may lie anywhere in the gap. All functions are pure.
 """
 
 import numpy as np

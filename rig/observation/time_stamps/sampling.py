@@ -6,9 +6,9 @@ many readings, while every lost reading shifts all later stamps. So the stamps a
 
     lateness of stamp k = t[k] − T (k + readings missing before it)
 
-A reading is never stamped before it is taken: the least lateness among `width` readings after a step, less the least
-among those before it, is that of the readings missing in between. The width is the smallest for which these differences
-are whole multiples of the interval. It is 1 if the stamps are good to a quarter of an interval.
+A reading is never stamped before it is taken. So the least lateness among `width` readings after a step, minus the
+least among those before it, is the time of the readings missing in between. The width is the smallest for which these
+differences are whole multiples of the interval. It is 1 if the stamps are good to a quarter of an interval.
 
 Random losses of readings whose stamps are worse cannot be counted one by one. They make the lateness a random walk,
 whose Allan variance (IEEE 952, annex C) gives the number of missing readings.
@@ -58,7 +58,7 @@ class Sampling:
     - `interval_s`: mean time from one reading to the next.
     - `missing` (n − 1,): number of readings missing between each reading and the next.
     - `scattered`: fraction of readings that are missing at unknown positions.
-    - `width`: number of stamps that have to be compared together; 1 if each is good.
+    - `width`: number of stamps that have to be compared together; 1 if every stamp is good.
     - `on_arrival`: readings were stamped when they arrived, several at once, and not when they were taken.
     - `late` (n,): readings that were stamped much later than others soon after them because they had waited in a
       buffer; only given if stamps are too bad to count missing readings.
@@ -148,7 +148,7 @@ def _has_late(time_s: Array, single: _PeriodCandidate) -> bool:
 
 
 def _list_wider(time_s: Array) -> list[_PeriodCandidate]:
-    """Return the candidates that span several readings, narrowest first, without those with a beat (`_is_beat`)."""
+    """Return the candidates that span several readings, narrowest first, except those with a beat (`_is_beat`)."""
     widths = takewhile(lambda width: 4 * width <= len(time_s), WIDTHS[1:])
     wider = (_count_missing(time_s, width, quantile) for width in widths for quantile in (MEDIAN, UNDISTURBED))
     return [candidate for candidate in wider if not _is_beat(candidate.missing)]
@@ -202,7 +202,7 @@ def _is_beat(missing: NDArray[np.intp]) -> bool:
     """Return whether the missing readings (n − 1,) come more regularly than by chance.
 
     Such a beat is caused by stamps of a polled port, multiples of a time shorter than the interval. A logger that loses
-    every n-th reading looks the same, but hardly loses so many.
+    every n-th reading has the same effect, but hardly loses as many.
     """
     missing = np.minimum(missing, 1)  # a gap counts once
     lost = int(missing.sum())

@@ -1,12 +1,12 @@
-"""The time stamps of a log put in order: what belongs to the recording, and when each reading was taken.
+"""The time stamps of a log put in order: the readings of the recording, and the time at which each was taken.
 
 Other people's loggers write rows that are not readings (NaN, zeros before the first conversion), the same row twice,
 rows in another order, counters that wrap, and readings that had waited in a buffer: at the start of a recording stale
-ones, which come faster than they were taken, and after a stall of the link those that were taken meanwhile. A stall is
-no gap: after it all readings are there. So a long step between two stamps is held against the number of readings that
+ones, which come faster than they were taken, and after a stall of the link those that were taken during it. A stall is
+no gap: after it all readings are there. So a long step between two stamps is compared with the number of readings that
 follow until a reading is on time again.
 
-Each of these is counted, with the first of them by number and time. What remains has the times of
+Each of these is counted, with the first of them by number and time. The remaining readings have the times of
 `rig.observation.time_stamps.sampling`. All functions are pure.
 """
 
@@ -67,7 +67,7 @@ class StampFinding:
 class OrderedStamps:
     """The readings of a log in order: their `rows` (m,) in the log, the `time_s` (m,) of each, strictly increasing.
 
-    `sampling` is that of the stamps; `findings` what was left out or stamped anew.
+    `sampling` describes the stamps; `findings` lists what was left out or has a new time.
     """
 
     rows: NDArray[np.intp]
@@ -153,7 +153,7 @@ def _unwrap(log: _UnorderedLog) -> _UnorderedLog:
 def _drop_repeated(log: _UnorderedLog) -> _UnorderedLog:
     """Return the log without rows that repeat both stamp and readings of another row.
 
-    If a sensor's readings often repeat, neighbours with equal stamps may be two readings and stay.
+    If a sensor's readings often repeat, two rows with equal stamps may be two readings, and both remain.
     """
     shared = np.flatnonzero(np.isin(log.stamps_s, _find_repeated_values(log.stamps_s)))
     if not len(shared):
@@ -229,7 +229,7 @@ def _drop_stale(log: _UnorderedLog) -> _UnorderedLog:
 def _spread_stalled(log: _UnorderedLog) -> _UnorderedLog:
     """Return the log with the times at which readings were taken while a link stalled and they waited.
 
-    If some were lost meanwhile, it is unknown which, and all that waited are left out.
+    If some were lost in this time, it is unknown which, and all that waited are left out.
     """
     stamps_s, interval_s = log.stamps_s.copy(), find_typical_interval_s(log.stamps_s)
     steps_s = np.diff(stamps_s)
@@ -257,7 +257,7 @@ def _spread_stalled(log: _UnorderedLog) -> _UnorderedLog:
 
 
 def _separate_equal(log: _UnorderedLog) -> _UnorderedLog:
-    """Return the log without the second of two readings with one stamp, unless an interval beside them is free.
+    """Return the log without the second of two readings with equal stamps, unless an adjacent interval is free.
 
     If an interval is missing before or after the two, one of them is moved into it. A log with coarse stamps or stamps
     of arrival is unchanged: in it equal stamps are usual, and an even series has a time for each reading.
@@ -285,5 +285,5 @@ def _separate_equal(log: _UnorderedLog) -> _UnorderedLog:
 
 
 def _estimate_usual_delay_s(late_s: Array, interval_s: float) -> float:
-    """Return the delay, relative to the shortest delay soon after, that readings rarely exceed unless they waited."""
+    """Return the delay that only readings that waited exceed, relative to the shortest delay soon after."""
     return USUAL * float(np.median(late_s - find_least_ahead(late_s, LONG[-1]))) + ON_TIME * interval_s
