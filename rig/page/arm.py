@@ -32,7 +32,7 @@ def connected(report: Report) -> dict[str, Any]:
 
 
 def stance(state: State) -> dict[str, Any]:
-    """Return a turner's last state; it is `let_go` if it stands still and no program runs."""
+    """Return a turner's last state; it is `let_go` if it is at rest and no program runs."""
     joints = {"q_rad": round_digits(state.q_rad), "qd_rad_s": round_digits(state.qd_rad_s)}
     if not isinstance(state, ArmState):
         return {**joints, "let_go": False}

@@ -1,4 +1,4 @@
-"""Arrival times of what the page shows, and so its age."""
+"""Arrival times of the data that the page shows, from which it computes their age."""
 
 from rig.station.events import ArmConnected, ArmSeen, PhaseStarted, RunEvent, SamplesTaken
 

@@ -1,4 +1,4 @@
-"""Rows of the page's tables: observations and parameters, of a live run and of one with its result."""
+"""Rows of the page's tables: observations and parameters, of a live run and of a finished run."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

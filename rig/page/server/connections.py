@@ -1,7 +1,7 @@
 """Connections to the page: their number, their timeouts, and which one is closed for a new one.
 
-Each takes a descriptor of the process that moves the arm, and anyone on this computer can open one. Those without the
-token are strangers: one too many closes the oldest one of the address with the most.
+Each takes a descriptor of the process that moves the arm, and anyone on this computer can open one. Connections without
+the token are strangers: if there is one too many, the oldest stranger of the address with the most is closed.
 """
 
 import asyncio

@@ -82,11 +82,11 @@ class Control:
 
     @property
     def gone(self) -> bool:
-        """Whether no browser can send requests any more."""
+        """Whether browsers can no longer send requests."""
         return self._gone
 
     def leave(self) -> None:
-        """Record that no browser can send requests any more."""
+        """Record that browsers can no longer send requests."""
         with self._changed:
             self._gone = True
             self._changed.notify_all()

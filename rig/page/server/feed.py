@@ -1,4 +1,4 @@
-"""The feed from the run's thread to any number of browsers, none of which can delay it.
+"""The feed from the run's thread to any number of browsers, which cannot delay it.
 
 The run's thread changes the page's state and continues. The server's thread builds a frame of the changes ten times a
 second and puts it into each browser's mailbox, which holds one. A browser that has not taken its last frame gets none;

@@ -1,4 +1,4 @@
-"""The content of a page by sections, each any JSON value, replaced as a unit. For pages other than a run's."""
+"""The content of a page by sections, each any JSON value, replaced as a unit. Used for pages that do not show a run."""
 
 import threading
 from typing import Any
@@ -7,7 +7,7 @@ from rig.page.server.feed import frame_of
 
 
 class Sections:
-    """The page's content, between the thread that puts it and the server's."""
+    """The page's content, passed from the thread that puts it to the server's thread."""
 
     ended = False
 

@@ -34,7 +34,7 @@ LARGEST_HEADERS = 8192  # bytes of the headers
 
 @dataclass(frozen=True, slots=True)
 class PageAddress:
-    """The page's address: without a `port` the usual one, or any free one if that is taken."""
+    """The page's address: without a `port` the usual port, or any free port if another program uses that."""
 
     host: str = ADDRESS
     port: int | None = None
