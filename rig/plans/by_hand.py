@@ -1,7 +1,7 @@
 """The list of moves in a calibration by hand, and the next one to ask for. Pure.
 
-Twelve flips over all six faces determine scale factors and right angles best for their time, and whole turns are a
-check that needs no flat table. Any order will do: the next request follows from the item's position and its past moves.
+Twelve flips over all six faces determine scale factors and right angles best in a given time; whole turns are a check
+that needs no flat table. Any order will do: the next request follows from the item's position and its past moves.
 """
 
 from collections.abc import Collection, Iterator, Sequence

@@ -22,8 +22,8 @@ class PhasePlanner(Protocol):
 class Phase:
     """One movement of a run.
 
-    `procedure` determines what is streamed, done and judged, `plan` makes the steps. The operator has `agreed` to it
-    with the phase before, and `follows` is the next phase if it passes.
+    `procedure` determines what is streamed, done and judged; `plan` makes the steps. `agreed`: whether the operator has
+    agreed to it together with the previous phase; `follows`: the next phase if it passes.
     """
 
     procedure: AnyProcedure

@@ -1,7 +1,7 @@
 """The procedures by name: the stock ones, and those that packages add through the entry-point group `rig.procedures`.
 
-The stock ones are those of `STOCK_SECTIONS`: the script of each is the module of its name in `procedures/`. The rig
-knows a procedure only through its `Procedure`; one that is not installed comes from a file of its own
+The stock procedures are those in `STOCK_SECTIONS`; each has its script in the module of its name in `procedures/`. The
+rig knows a procedure only through its `Procedure`; one that is not installed comes from a file of its own
 (`rig.plans.script_file`).
 """
 
@@ -60,11 +60,11 @@ def calibration(runs: Sequence[RunData], before: Outcome | None, estimator: str)
 class Procedure(Generic[SectionT]):
     """A procedure: its name, its section in the configuration, its planner, its script and its analysis.
 
-    - readings: those that the sensors to calibrate stream: raw counts, which the board averages as well, or readings
-      that the board has corrected by its stored calibration.
+    - readings: what the sensors to calibrate stream: raw counts, which the board averages as well, or readings that the
+      board has corrected by its stored calibration.
     - then: the procedure that follows with the same movement if the section has `then_verify`.
     - turner: the section of the kind of turner that it plans for.
-    - estimator: the one of the result, unless another is requested.
+    - estimator: the estimator of the result, unless another is requested.
     """
 
     name: str

@@ -27,7 +27,7 @@ def script_errors(what: str, remedy: str = "Correct the script") -> Iterator[Non
 
 
 def _reason(error: BaseException) -> str:
-    """Return the error and the innermost position where it was raised."""
+    """Return the error and the innermost position at which it was raised."""
     message = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
     places = traceback.extract_tb(error.__traceback__)[2:]  # the first two are the rig's own
     return f"{message}; {Path(places[-1].filename).name}, line {places[-1].lineno}" if places else message

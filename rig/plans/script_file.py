@@ -1,4 +1,4 @@
-"""A procedure and its file: the run folder keeps the file, so that a resumed run continues with the same one."""
+"""A procedure and its file. The run folder keeps the file, so that a resumed run continues with the same script."""
 
 import hashlib
 import inspect

@@ -18,7 +18,7 @@ Motion = tuple[tuple[object, ...], float, Mapping[str, object]]
 
 
 def vary_arm(config: RigConfig) -> Iterator[Motion]:
-    """Yield sweeps about three or six axes, at one or two speeds, over turns or arcs; several speeds in a file stay."""
+    """Yield sweeps about three or six axes, at one or two speeds, over turns or arcs; keep several speeds of a file."""
     procedure = config.procedure
     assert isinstance(procedure, SixSweepsSection)
     axes = (3, 6) if procedure.axes == 3 and not procedure.mountings else (procedure.axes,)

@@ -1,6 +1,7 @@
 """The search for the shortest run of a configuration that reaches a target uncertainty. Pure.
 
-The file's order, directions, stages, several speeds and six axes stay, and the attitudes if magnetometers need them.
+The file's order, directions, stages, several speeds and six axes remain, as do the attitudes if magnetometers need
+them.
 """
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -59,7 +60,7 @@ REST_STEP_S = 0.1  # step of the last, fine search
 class Tried(Protocol):
     """The runs of a procedure among which the search chooses, with the prediction of each.
 
-    - `predict`: the budgets, None of a run that is not possible.
+    - `predict`: returns the budgets, None for a run that is not possible.
     - `anew`: the budget lines whose error is new in each repeat; a run repeated without end has none of them.
     - `ending`: the keys that end a run before its last repeat, when the target is reached.
     """
@@ -147,7 +148,7 @@ def _refuse_others(wanted: TargetUncertainty, config: RigConfig) -> None:
 
 
 def plan_of(config: RigConfig, procedure: ProcedureSection) -> Plan:
-    """Return the motions of a procedure, none if the item is turned by hand. Raise Refused `other_turner`."""
+    """Return the motions of a procedure; empty if the item is turned by hand. Raise Refused `other_turner`."""
     script = installed()[procedure.name]
     return script.plan(turner_for(script, config), procedure)
 
@@ -286,7 +287,7 @@ class _ByHand:
         return [self._candidate(*numbers) for numbers in product(FLIPS, TURNS_BY_HAND, RESTS_S[:4])]
 
     def select_endless(self, candidates: Sequence[Candidate]) -> Sequence[Candidate]:
-        """Return the candidate with the most flips and fewest rests, the best one without noise."""
+        """Return the candidate with the most flips and fewest rests, which would be the best without noise."""
         return [max(candidates, key=lambda candidate: (candidate.sizes[0], -candidate.sizes[1], -candidate.sizes[2]))]
 
     def finer(self, best: Candidate) -> Sequence[Candidate]:

@@ -10,8 +10,8 @@ WORTH_S = 1e-9  # a smaller gain is rounding, and might repeat forever
 def shortest_way(between_s: Array) -> tuple[int, ...]:
     """Return the points 1 to n − 1 in the order of the shortest round trip from point 0.
 
-    `between_s` (n, n), symmetric. Each nearest-neighbour tour is improved by reversing parts as long as that helps
-    (2-opt: Croes, Operations Research 6 (1958) 791), and the best is taken, which is not always the optimum.
+    `between_s` (n, n), symmetric. Each nearest-neighbour tour is improved by reversing parts as long as that shortens
+    it (2-opt: Croes, Operations Research 6 (1958) 791), and the best tour is chosen, which is not always the optimum.
     """
     rounds = [_improve(_nearest_neighbours(between_s, first), between_s) for first in range(1, len(between_s))]
     best = min(rounds, key=lambda order: round(_length(order, between_s), 9))

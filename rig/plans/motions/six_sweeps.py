@@ -36,7 +36,7 @@ WRIST_1, WRIST_2, WRIST_3 = (JOINT_NAMES.index(name) for name in ("wrist_1", "wr
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """The `stations` one after the other, each with its `directions`, reversed every other time if it `alternates`."""
+    """The `stations` in order, each with the `directions`, which every second station reverses if it `alternates`."""
 
     stations: tuple[SweepPose, ...]
     directions: tuple[tuple[Direction, ...], ...]
@@ -49,7 +49,7 @@ def plan_six_observation(
     start_q_rad: Joints | None = None,
     done: Collection[int] = (),
 ) -> Plan:
-    """Plan the movement of SIX, Section III: each wrist in its order turns one way, rests, turns back, rests.
+    """Plan the movement of SIX, Section III: each wrist in turn rotates in one direction, rests, rotates back, rests.
 
     With `axes: 6` wrist 1 turns about three more axes, with wrists 2 and 3 turned. With several speeds, all sweeps are
     made at each speed. A sweep turns by `arc_deg` about the home pose, one revolution by default. An order and
@@ -102,7 +102,7 @@ def _trials(sweeps: Sequence[Sweep], home: Joints) -> Iterator[Step]:
 
 @lru_cache(maxsize=16)
 def _order_sweeps(arm: ArmSection, procedure: SixSweepsSection) -> tuple[Sweep, ...]:
-    """Return all sweeps in the file's order, else in the best order: by direction first, then by wrist."""
+    """Return all sweeps in the file's order or, if it states none, in the best order: by direction, then by wrist."""
     home = find_home(arm)
 
     def harm(order: Order) -> float:

@@ -1,4 +1,4 @@
-"""Attitudes in which the arm stands still, one after the other, for TRIAX's calibration of an accelerometer."""
+"""Attitudes in which the arm rests, one after the other, for TRIAX's calibration of an accelerometer."""
 
 from collections.abc import Collection, Iterator
 from functools import lru_cache

@@ -1,4 +1,4 @@
-"""Sweeps of any turner: the course of one, the transfers between them, and the stages. Pure."""
+"""Sweeps of any turner: their course, the transfers between them, and the stages. Pure."""
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -62,7 +62,7 @@ def connect_sweeps(
 ) -> Iterator[Step]:
     """Yield sweeps with rests after them and transfers between, from home and back.
 
-    Transfers lead through home if none is clear.
+    Transfers lead through home if no direct one is clear.
     """
     pose = home
     for sweep in sweeps:

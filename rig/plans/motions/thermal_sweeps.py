@@ -21,7 +21,7 @@ def plan_thermal(
     start_q_rad: Joints | None = None,
     done: Collection[int] = (),
 ) -> Plan:
-    """Plan the sets one after the other, at most `procedure.repeats` of them, each from home and back.
+    """Plan the sets in sequence, at most `procedure.repeats` of them, each from home and back.
 
     Before each the arm rests at home until the temperature is right. A set that is not complete in `done` is repeated:
     its sweeps belong to one temperature. Raise Refused `axes_do_not_span`.

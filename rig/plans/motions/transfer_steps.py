@@ -26,7 +26,7 @@ LEISURE = pace_of(30, 60)
 
 
 def approach(start_q_rad: Joints | None, home: Joints, pace: Pace) -> Plan:
-    """Return the first motion, slowly home from the turner's pose; none if that is unknown or is home."""
+    """Return the first motion, slowly home from the turner's pose; empty if that is unknown or is home."""
     start = home if start_q_rad is None else start_q_rad
     speed_rad_s = min(pace.speed_rad_s, LEISURE.speed_rad_s)
     acceleration_rad_s2 = min(pace.acceleration_rad_s2, LEISURE.acceleration_rad_s2)
