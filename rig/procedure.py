@@ -1,8 +1,8 @@
-"""The one door for procedures: all that a script in procedures/, or a laboratory's own, is written with.
+"""The interface for procedures: all that a script in procedures/, or a laboratory's own, may import.
 
     from rig.procedure import Plan, Procedure, Rest, Sweep, Transfer, Verbs, run_script
 
-These names are the public ones; where they are made may change. docs/how-to/with-code/own-procedure.md shows their use.
+These names are public; the modules that define them may change. docs/how-to/with-code/own-procedure.md shows their use.
 """
 
 from rig.cli import run_script  # first: it keeps linear algebra to one thread
