@@ -1,1 +1,1 @@
-"""What a run leaves behind: result, certificate, C header, tables."""
+"""The documents of a run: result, certificate, C header, tables."""

@@ -12,7 +12,7 @@ EntryT = TypeVar("EntryT", bound=BaseModel)
 
 
 def entry(kind: type[EntryT], /, *sources: object, **more: Any) -> EntryT:
-    """Return an entry of `kind`: each field from `more`, or by the table from the first source that has it.
+    """Return an entry of `kind`: each field from `more`, or from the first source that has it according to the table.
 
     Arrays become tuples. Raise ValueError if a field has no source or its value does not fit. Raise TypeError if `more`
     has a name that is no field of the entry, or if the table does not list a source: a reader ignores unknown keys, a

@@ -1,7 +1,7 @@
 """The table of what each entry of `result.json` takes from the results of the analysis.
 
-A row names the classes that it reads and, for each field of the entry, the attribute that fills it. A class stands by
-its name: whoever writes one entry need not import the analysis of all others. A field without a row is set by the
+A row names the classes that it reads and, for each field of the entry, the attribute that fills it. A class is given by
+its name, so that writing one entry does not import the analysis of all others. A field without a row is set by the
 function that builds the entry, or is left out. So an attribute may be renamed, or may get the name of a field, without
 a change of the file.
 """

@@ -67,7 +67,7 @@ class TrueValues:
 
 @dataclass(frozen=True, slots=True)
 class TruthRow:
-    """A row of the result beside its truth; `scale` is None where no true scale factor is defined."""
+    """A row of the result with its truth; `scale` is None if no true scale factor is defined."""
 
     row: DisplayRow
     scale: TrueValues | None
@@ -75,7 +75,7 @@ class TruthRow:
 
 
 def truth_rows(folder: Path, result: ResultDocument) -> list[TruthRow]:
-    """Return the rows of the simulated truth in a run folder; none without a valid file."""
+    """Return the rows of the simulated truth in a run folder; empty without a valid file."""
     try:
         document = parse_json(read_regular_file(folder / TRUTH, SIZE_MAX_BYTES))
         truth = validate(_TruthFile, document, "truth")

@@ -1,4 +1,4 @@
-"""C source that corrects readings by their temperature."""
+"""C source that corrects readings for temperature."""
 
 from collections.abc import Iterator, Mapping
 

@@ -142,7 +142,7 @@ class Certificate:
 
     @property
     def arm(self) -> str:
-        """The machine or hand that turned the items, by its recorded model."""
+        """The machine or hand that turned the items, according to its recorded model."""
         provenance = self.provenance
         if self.by_hand or (provenance.readings_file is not None and provenance.motion_file is None):
             return "a hand, which turned the items on a table"
@@ -199,7 +199,7 @@ class Certificate:
 
     @property
     def blocks(self) -> tuple[Block, ...]:
-        """The result blocks of the certificate, sensor by sensor; reference sensors have none."""
+        """The result blocks of the certificate, sensor by sensor; a reference sensor has no block."""
         printable = outlets(self.result, lambda kind: kind.block)
         blocks = [
             Block(macro_path, finding, (*terms(kind.characteristics, finding, "certificate"),))

@@ -117,7 +117,7 @@ def _certified_items(c: Certificate) -> Iterator[CertifiedItem]:
 
 
 def _keys(items: Iterable[CertifiedItem]) -> dict[tuple[str, str], str]:
-    """Return the key of each item by its kind and name; items of a kind are numbered."""
+    """Return a key for each item, by kind and name; the items of a kind are numbered."""
     keys: dict[tuple[str, str], str] = {}
     for certified in items:
         kind_and_name = certified.item, certified.sensor
@@ -227,7 +227,7 @@ def _result(c: Certificate, item: str, measured: CertifiedItem) -> Element:
 
 
 def _arm(c: Certificate) -> Element:
-    """Return the machine that turned the items, by its recorded model."""
+    """Return the machine that turned the items, according to its recorded model."""
     provenance = c.provenance
     identified = provenance.arm_maker is not None and provenance.arm_model is not None
     return dcc(

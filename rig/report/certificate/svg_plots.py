@@ -106,7 +106,7 @@ def _draw(unexplained: Unexplained) -> Residuals:
 
 
 def reach_in(largest: float, units: Sequence[DisplayUnit]) -> tuple[float, DisplayUnit]:
-    """Return a round limit above `largest`, and its unit, the first of the given ones in which `largest` exceeds 1."""
+    """Return a round limit above `largest`, and its unit: the first one in which `largest` exceeds 1."""
     unit = next((unit for unit in units if largest >= unit.size), units[-1])
     shown = largest / unit.size
     decade = 10 ** np.floor(np.log10(max(shown, 1e-9)))

@@ -79,7 +79,7 @@ def _lines(
 ) -> Iterator[str]:
     """Yield a line for each parameter, and comments on the sensor's calibration.
 
-    Sensors are numbered by their order in the configuration; an accelerometer has its gyroscope's number. Raise Refused
+    Sensors are numbered in the order of the configuration; an accelerometer has its gyroscope's number. Raise Refused
     `nothing_to_export`.
     """
     numbers, fields = _number_imus(calibrations), list(calibrations.result.magnetometers)

@@ -1,4 +1,4 @@
-"""imucal's JSON, version 2.0.0, of a turntable calibration: the one format that holds all corrections.
+"""imucal's JSON, version 2.0.0, of a turntable calibration: the only format that contains all corrections.
 
 imucal (2.6, ferraris_calibration_info.py): a = R_a⁻¹ K_a⁻¹ (m_a − b_a), ω = R_g⁻¹ K_g⁻¹ (m_g − K_ga a − b_g).
 """

@@ -38,7 +38,7 @@ class AttitudePlot:
 
 
 def write_attitude_figures(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
-    """Write `accelerometer_<sensor>` and `magnetometer_<sensor>` as PNG and SVG; none without matplotlib."""
+    """Write `accelerometer_<sensor>` and `magnetometer_<sensor>` as PNG and SVG; nothing without matplotlib."""
     return write_pictures(
         [
             Picture(
@@ -77,7 +77,7 @@ def _plots(outcome: Outcome, document: ResultDocument) -> Iterator[tuple[str, At
 
 
 def _mounting(outcome: Outcome, sensor: str) -> Array:
-    """Return the rotation from the flange to the sensor's nominal axes. A file's attitudes are the sensor's own."""
+    """Return the rotation from the flange to the sensor's nominal axes. Attitudes in a file are the sensor's."""
     if sensor in outcome.external:
         return np.eye(3)
     return np.array(outcome.recordings[0].run.sensors[sensor].mounting)

@@ -111,7 +111,7 @@ def draw_comparison(figure: "Figure", comparison: Comparison, sensor: str, refer
 
 
 def envelope(time_s: Array, values: Array) -> tuple[Array, Array]:
-    """Return the lowest and highest value of a curve (n,) in each column of the panel: fewer points look the same."""
+    """Return the lowest and highest value of a curve (n,) in each column of the panel, which suffice to draw it."""
     if len(values) <= 2 * COLUMNS:
         return time_s, values
     starts = np.linspace(0, len(values), COLUMNS, endpoint=False).astype(np.intp)

@@ -182,7 +182,7 @@ OF_THE_RIG: Final = (
 
 
 def every_characteristic() -> tuple[Characteristic, ...]:
-    """Return all characteristics in the order in which a history shows them, installed kinds' characteristics last."""
+    """Return all characteristics in the order in which a history shows them; those of installed kinds are last."""
     return (
         *OF_THE_RIG,
         *(row for kind in installed_kinds() for row in kind.result.characteristics),

@@ -1,7 +1,7 @@
 """The parameters of a result that a history stores, with their uncertainties, by sensor. Pure.
 
 Names: kx ky kz scale factors, k their mean, bx by bz biases; `characteristics.py` names the others. The mean has a row
-of its own because an error of the clock, a gyroscope's only standard, changes all scale factors alike.
+of its own because an error of the clock, a gyroscope's only standard, changes all scale factors by the same fraction.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -27,7 +27,7 @@ class Parameter:
     """One number of a calibration.
 
     `std_combined` is None if only the noise is known of its uncertainty. `max_deviation` from the nominal value is the
-    run's limit, None without one. `coverage_factor` is that of U by its degrees of freedom.
+    run's limit, None without one. `coverage_factor` is the factor of U for its degrees of freedom.
     """
 
     name: str

@@ -46,10 +46,10 @@ class DisplayRow:
     - sensor, quantity: the sensor and what it measures.
     - name, unit: of the row.
     - numbers: the values with U.
-    - combined: whether U includes all contributors; else it is two standard deviations of the noise.
+    - combined: whether U includes all contributors; otherwise it is two standard deviations of the noise.
     - scale: the scale factors with U.
     - held_at: the conditions of validity at the end of a run ("at ±60.0 °/s").
-    - model: the model there ("g = K (m + b)").
+    - model: the model of the correction ("g = K (m + b)").
     - noun: the name of numbers without scale factors.
     - labels: the labels of the numbers.
     """
@@ -154,5 +154,5 @@ def row_of(term: Term, whose: str | None = None, noun: str | None = None) -> Dis
 
 
 def outlet_items(outlet: Callable[..., Iterable[ItemT]] | NoOutlet, *about: object) -> Iterable[ItemT]:
-    """Return the items that an outlet yields for `arguments`; none if the kind does not have the outlet."""
+    """Return the items that an outlet yields for `arguments`; empty if the kind does not have the outlet."""
     return () if isinstance(outlet, NoOutlet) else outlet(*about)

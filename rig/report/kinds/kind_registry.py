@@ -1,4 +1,4 @@
-"""All kinds of results, in the order in which they are shown: a new one is a file and a line here."""
+"""All kinds of results, in the order in which they are shown; a new kind is a file and a line here."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace

@@ -20,8 +20,8 @@ def find_uncovered_in_container(der: bytes) -> Iterator[str]:
 
     `der` is the ContentInfo of a document's signature, which covers its signed attributes only. So the container must
     equal, byte by byte, one that is rebuilt from them, from the signature's value, the certificates of the signer's
-    chain, and at most one time stamp, to which the same applies. Whether the certificates are genuine is not tested
-    here.
+    chain, and at most one time stamp, to which the same applies. This does not test whether the certificates are
+    genuine.
     """
     content = cms.ContentInfo.load(der, strict=True)
     (info,) = content["content"]["signer_infos"]

@@ -104,7 +104,7 @@ def _open_file(file: Path) -> Iterator[Signatory]:
 
 
 def _order_chain(certificates: "Sequence[Certificate]", key: Any) -> "list[Certificate]":
-    """Return the certificates, the key's own first, then those of its issuers; none if the key's own is missing."""
+    """Return the certificates, the key's own first, then those of its issuers; empty if the key's own is missing."""
     matching = [one for one in certificates if key is not None and one.public_key() == key.public_key()]
     return chain_of([matching[0], *certificates]) if matching else []
 

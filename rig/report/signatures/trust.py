@@ -33,8 +33,8 @@ def why_untrusted(
 ) -> str:
     """Return why the signer whose certificate begins this `chain` (DER) is not trusted; empty if it is.
 
-    The certificate must be valid at the `moment`, lead to a trusted one, be made for signing documents and bear the
-    expected name. Revocation `lists`, if given, must cover the whole chain.
+    The certificate must be valid at the `moment`, have a chain to a trusted one, be intended for signing documents and
+    have the expected name. Revocation `lists`, if given, must cover the whole chain.
     """
     from cryptography.x509 import load_der_x509_certificate
 

@@ -60,7 +60,7 @@ def rebuild_document(verified: tuple[bytes, bytes, bytes], method: str, value: s
 
     `verified` are the signed canonical forms: of the document without its signature, of the signed properties (XAdES)
     and of the key's certificates. `method` is the signature's method and `value` its value in base64. All else follows
-    from these: the names from the signed properties, the rest from the rig's way of signing.
+    from these: the names from the signed properties, the rest from the form of the rig's signatures.
     """
     document, properties, key_info = verified
     root, signed_properties, certificates = map(etree.fromstring, verified)

@@ -65,7 +65,7 @@ def line_of(term: Term, lead: str, form: str, width: str = ".2g") -> str:
 
 
 def matrix_lines(matrix: Array, covariance: Array, factor: float) -> Iterator[str]:
-    """Yield F row by row and the angles between its axes, ± U; `covariance` (9, 9) is that of F, row by row.
+    """Yield F row by row and the angles between its axes, ± U; `covariance` (9, 9) is the covariance of F, row by row.
 
     `factor` is the coverage factor: the largest one among those of the scale factors.
     """

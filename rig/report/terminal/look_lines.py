@@ -1,4 +1,4 @@
-"""What a file of another program holds, and what it allows, as lines for a terminal of 80 columns."""
+"""The contents of a file of another program, and the solutions it allows, as lines for a terminal of 80 columns."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""The result beside the truth of a simulated laboratory, as tables for the terminal."""
+"""The result and the truth of a simulated laboratory, as tables for the terminal."""
 
 from collections.abc import Iterator, Sequence
 

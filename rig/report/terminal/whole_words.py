@@ -10,7 +10,7 @@ STROKE = 1
 
 
 def with_whole_words(table: Table, width: int) -> Table:
-    """Return the table with columns that fit `width` cells of a terminal; none is narrower than its words."""
+    """Return the table with columns that fit `width` cells of a terminal; no column is narrower than its words."""
     texts = [[str(column.header), *map(str, column.cells), str(column.footer)] for column in table.columns]
     lines = [max(cell_len(line) for text in column for line in text.split("\n")) for column in texts]
     words = [max((cell_len(word) for text in column for word in _words(text)), default=0) for column in texts]

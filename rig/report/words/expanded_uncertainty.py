@@ -11,7 +11,7 @@ from rig.estimation.statistics.coverage import COVERAGE_FACTOR, coverage_factors
 
 @dataclass(frozen=True, slots=True)
 class Expanded:
-    """Expanded uncertainties U with coverage factors and probabilities, one for each U or one for all."""
+    """Expanded uncertainties U with coverage factors and probabilities, separate for each U or common to all."""
 
     widths: Sequence[float]
     factors: Sequence[float]

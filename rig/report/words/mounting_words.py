@@ -14,7 +14,7 @@ ROUNDING = 1e-6  # ratio to its uncertainty, below which a rotation is the assum
 
 
 def mount_lines(result: ResultDocument) -> Iterator[str]:
-    """Yield a line for each stage after the first, relative to the first; none if the mounting never changed."""
+    """Yield a line for each stage after the first, relative to the first; nothing if the mounting never changed."""
     yield from map(_line, _measured_mounts(result))
 
 

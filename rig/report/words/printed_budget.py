@@ -82,7 +82,7 @@ def printed_indices(budget: BudgetEntry, scale: Sequence[float]) -> tuple[int, i
 
 @dataclass(frozen=True, slots=True)
 class _Size:
-    """The unit of a column's numbers, in which they can be added up: times `factor`, with `decimals`."""
+    """The unit in which a column's numbers are printed and can be added up: multiplied by `factor`, with `decimals`."""
 
     unit: str
     factor: float

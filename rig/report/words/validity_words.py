@@ -39,7 +39,7 @@ def warmth_words(when: ConditionsEntry | None) -> str:
 
 
 def warmth(when: ConditionsEntry, use: str = "") -> dict[str, float | None]:
-    """Return a temperature by its label, which contains the `use` of the readings, for example " at the biases"."""
+    """Return a temperature with its label, which contains the `use` of the readings, for example " at the biases"."""
     return {f"{use}{AS_STATED}" if when.temperature_stated else use: when.temperature_c}
 
 
