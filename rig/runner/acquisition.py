@@ -31,7 +31,7 @@ class SensorCount:
 
     - `lost`: the gaps in its sequence numbers.
     - `latest`: the mean readings of the newest samples, by quantity.
-    - `read_s`: when these were read, by the clock that stamps them.
+    - `read_s`: the time at which these were read, by the clock that stamps them.
     """
 
     name: str
@@ -91,7 +91,7 @@ class Acquisition:
     """The data from the reader threads of the sources and the arm, read by the script's thread.
 
     `counts` is by sensor name. Data that arrive before there is a `recorder` are not recorded. From the first `keep`
-    on, the data since the last `KEPT_PARTS` calls of it are also held in memory.
+    on, the data since its last `KEPT_PARTS` calls are also in memory.
     """
 
     counts: dict[str, SensorCount] = field(default_factory=dict)
@@ -131,7 +131,7 @@ class Acquisition:
 
     @contextmanager
     def thin_states(self) -> Iterator[None]:
-        """Record few of the arm's states inside the block, after its first seconds, while the arm stands still.
+        """Record few of the arm's states inside the block, after its first seconds, during which the arm is at rest.
 
         Page and supervision still receive all of them.
         """

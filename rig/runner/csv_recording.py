@@ -109,8 +109,8 @@ class ReadingsFile:
 def record_readings(config: SensorsConfig, folder: Path, duration_s: float) -> Mapping[Path, RecordedFile]:
     """Record every sensor for `duration_s` by its own clock; return the summary of each file `folder`/<sensor>.csv.
 
-    Nothing moves. If recording ends early, the files keep the readings so far. Raise Refused `run_folder`, and as
-    `connect_sensors` does; Fault `no_samples`, and the faults of a source.
+    Nothing moves. If recording ends early, the files contain the readings until then. Raise Refused `run_folder`, and
+    as `connect_sensors` does; Fault `no_samples`, and the faults of a source.
     """
     arrived: SimpleQueue[tuple[str, NDArray[Any]]] = SimpleQueue()
     with connect_sensors(config, lambda name, samples: arrived.put((name, samples))) as sources, ExitStack() as stack:

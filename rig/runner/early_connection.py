@@ -17,9 +17,9 @@ Connecting = Callable[[OnState, Path], AbstractContextManager[Turner]]
 
 
 class Ahead:
-    """A connection by `connect`, logged into `log`, that is made before the run; the next run takes it over.
+    """A connection by `connect`, logged in `log`, that is made before the run; the next run takes it over.
 
-    If it has failed or was lost meanwhile, the run connects by itself and reports the error.
+    If it fails or is lost before the run, the run connects by itself and reports the error.
     """
 
     def __init__(self, connect: Connecting, log: Path) -> None:

@@ -1,7 +1,7 @@
 """The end of a run before its last repeat, as soon as the target uncertainty is reached.
 
 The arm only makes motions that pre-flight has judged: after the end, the plan's motion that leads home from the present
-pose. If the plan has none, the run goes on to the next repeat.
+pose. If the plan has none, the run continues with the next repeat.
 """
 
 import time
@@ -30,10 +30,10 @@ class EndingEarly:
     """The condition on which a run ends early. It moves nothing.
 
     - `wanted`: the target uncertainty.
-    - `plan`: the motions that remain of the run.
-    - `sweeps`, `repeats`: the numbers of these in the complete run.
+    - `plan`: the remaining motions of the run.
+    - `sweeps`, `repeats`: numbers of sweeps and repeats in the complete run.
     - `path`: the file of this recording.
-    - `earlier`: the recordings before; if these are complete repeats, the run may end before anything moves.
+    - `earlier`: the previous recordings; if these are complete repeats, the run may end before anything moves.
     """
 
     wanted: TargetUncertainty

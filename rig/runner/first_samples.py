@@ -13,9 +13,9 @@ TIMEOUT_S = 2.0
 class FirstSamples:
     """A wait that is counted in looks, `look_s` apart, and by the turner's clock if there is one.
 
-    Elapsed time would not do: the thread that looks may have been held up, and the one that reads samples with it. The
-    limit grows with the load of this computer, as the simulated laboratory may run on it. The turner's clock may be a
-    simulated one, which stands still while its simulation is held up.
+    Elapsed time does not suffice: the thread that checks may be delayed, and with it the thread that reads samples. The
+    limit grows with the load of this computer, as the simulated laboratory may run on it. The turner's clock may be
+    simulated; then it stops while the simulation is delayed.
     """
 
     look_s: float

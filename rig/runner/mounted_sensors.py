@@ -1,4 +1,4 @@
-"""The mounted sensors beside the earlier calibrations of their serial numbers, confirmed before anything moves."""
+"""The mounted sensors and the earlier calibrations of their serial numbers, confirmed before anything moves."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -34,8 +34,8 @@ class CalibratedBefore:
 class Memory:
     """The earlier calibrations of the sensors' serial numbers, the newest first.
 
-    `silent` is why none can be read, None if the history answered. `moved` are the serial numbers of sensors that the
-    operator has declared to be on another board than before.
+    `silent` is why no calibration can be read, None if the history answered. `moved` are the serial numbers of sensors
+    that the operator has declared to be on another board than before.
     """
 
     calibrations: Sequence[CalibratedBefore] = ()
@@ -90,7 +90,7 @@ def find_mounted(
 ) -> Mounted:
     """Return the sensors of a run that can be calibrated, on the board with the identifier `board`.
 
-    `sensors` are the sensors by name. A simulated sensor is never the same as a real one.
+    `sensors` are the sensors by name. A simulated sensor and a real one are never the same.
     """
     turned = []
     for name, sensor in sensors.items():

@@ -1,6 +1,6 @@
 """Tests of the item's mounting against its stage by the item's own sensors, before a sweep turns it. Pure.
 
-A hand still at the item, a board mounted the wrong way round, an instruction not followed: each is detected at rest, or
+A hand that still holds the item, a board mounted in reverse, an instruction not followed: each is detected at rest, or
 by a turn too small to pull at a cable.
 """
 

@@ -1,7 +1,7 @@
 """One run in its folder: records a phase and judges it; if it passed, stores the results and goes on to the next phase.
 
-Each phase has recordings of its own. Whatever ends a phase, the run's log has the reason and, if data were kept, the
-command to go on with.
+Each phase has recordings of its own. Whatever ends a phase, the run's log contains the reason and, if data were kept,
+the command to continue with.
 """
 
 import traceback
@@ -57,8 +57,8 @@ class Run:
 
     - `script`: the script of the first phase.
     - `memory`: the sensors' earlier calibrations.
-    - `connecting`: how to connect the turner; None: as its kind does.
-    - `again`: the command that goes on with the run, if it is not `rig resume`.
+    - `connecting`: connects the turner; None: as its kind does.
+    - `again`: the command that continues the run, if it is not `rig resume`.
     """
 
     folder: Path
@@ -92,7 +92,7 @@ class Run:
         return bool(planned - self._resume(phase).done)
 
     def _resume(self, phase: Phase) -> Resumption:
-        """Return the steps of earlier recordings that count; none of corrected readings, which are never resumed."""
+        """Return the valid steps of earlier recordings; empty for corrected readings, which are never resumed."""
         if phase.procedure.reads_corrected:
             return Resumption()
         with self.report_end(self._advice, moved=False):

@@ -126,7 +126,7 @@ class Rig:
     - `onboard`: the calibration by the board itself, if it makes one.
     - `hand`: the session, if an operator turns the item.
     - `up`: the vertical in the frame of the arm's base.
-    - `early`: the condition to end early, if there is one; then all motions but one home are skipped.
+    - `early`: the condition to end early, if there is one; when it is met, all motions except one home are skipped.
     - `warming`: the supervision of the temperature, if the procedure changes it.
     """
 
@@ -259,7 +259,7 @@ class Rig:
     def sweep(self, sweep: Sweep) -> None:
         """Turn one joint through a revolution, or an arc, at constant speed, and record its start and end.
 
-        Afterwards, while the arm stands still, a board that calibrates by itself averages the sweep's readings. Raise
+        Afterwards, while the arm is at rest, a board that calibrates itself averages the sweep's readings. Raise
         `unplanned_motion`.
         """
         self._refuse_unplanned(sweep)
@@ -303,7 +303,7 @@ class Rig:
         return self.early.skips(motion)
 
     def _observe(self, sweep: Sweep) -> None:
-        """Let the board average the sweep. Finding its window takes seconds, in which a heater still gets commands."""
+        """Let the board average the sweep. Finding its window takes seconds, in which a heater is still controlled."""
         if self.onboard is None:
             return
         if self.warming is None:

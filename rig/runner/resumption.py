@@ -18,7 +18,7 @@ REMEDY = "Undo the change in config.yaml, or start a new run with `rig run`"
 
 @dataclass(frozen=True, slots=True)
 class Resumption:
-    """The recordings so far, oldest first, and the indices of their valid sweeps and dwells; none in a new run."""
+    """The recordings so far, oldest first, and the indices of their valid sweeps and dwells; empty in a new run."""
 
     earlier: Sequence[RunData] = ()
     done: frozenset[int] = frozenset()

@@ -70,7 +70,7 @@ class Settling:
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
     def expect(self, name: str, sensor: RecordedSensor) -> None:
-        """Watch a sensor: its accelerations if it sends them, else its rates."""
+        """Watch a sensor: its accelerations if it sends them, otherwise its rates."""
         enough = max(2, round(SPAN_S * sensor.rate_hz))
         column = sensor.channel(ACCELERATION if sensor.measures(ACCELERATION) else RATE).column
         self._watched[name] = _Watched(name, column, enough, deque(maxlen=2 * enough))
@@ -83,13 +83,13 @@ class Settling:
                 watched.recent.extend(samples[watched.column].astype(np.float64))
 
     def begin(self) -> None:
-        """Drop the readings so far, because the arm stands still from now on."""
+        """Drop the readings so far, because the arm is at rest from now on."""
         with self._lock:
             for watched in self._watched.values():
                 watched.recent.clear()
 
     def learn_rest(self) -> bool:
-        """Add the present scatter to those at rest; return False while there are too few."""
+        """Add the present scatter to the scatters at rest; return False while there are too few."""
         with self._lock:
             for watched in self._watched.values():
                 scatter = watched.scatter_counts()

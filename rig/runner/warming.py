@@ -1,7 +1,7 @@
 """The supervision of the sensors' temperatures by their own thermometers, and the ramp of the board's heater.
 
-Checked many times a second, whatever the arm does: a sensor that is too hot or changes too fast ends the run, which
-stops the arm first. The board's heater switches itself off unless the commands from here keep arriving.
+The temperatures are checked many times a second, even while the arm moves: a sensor that is too hot or changes too fast
+ends the run, which stops the arm first. The board's heater switches itself off if no further commands arrive.
 """
 
 from collections import deque
@@ -153,7 +153,7 @@ class Warming:
             self.heater.keep_heating(0.0)
 
     def _nearest(self, now_c: Mapping[str, float]) -> float:
-        """Return the temperature of the sensor that has come least far on the way through the range."""
+        """Return the temperature of the sensor that has the largest part of the range ahead."""
         return max(now_c.values()) if self.course.warming is False else min(now_c.values())
 
     def _refuse_hot(self, now_c: Mapping[str, float]) -> None:

@@ -58,7 +58,7 @@ class HandSession:
 
     - `conditions`: the other inputs of the solution.
     - `earlier`: the recordings before an interruption; their rests and moves count.
-    - `wait`: lets a number of seconds pass between two looks at the samples.
+    - `wait`: waits a number of seconds between two checks of the samples.
     """
 
     acquisition: Acquisition
@@ -204,7 +204,7 @@ class HandSession:
         self.note(HandMoveTaken(*self._board_us(move), kind, before, face, self._accepted[-1].turns))
 
     def _refuse_move(self, wrong: Fault, move: Move | None, rest: HandRest) -> bool:
-        """Leave out what a fault concerns: the move, the rest, or everything before it. Return whether the rest counts.
+        """Omit what a fault concerns: the move, the rest, or everything before it. Return whether the rest counts.
 
         If the bias has changed at one rest, the item may have crept, so that rest is omitted. If it has changed at the
         next rest too, the bias itself has changed. Raise the fault if no move can correct it.

@@ -53,7 +53,7 @@ class CalibratedByBoard:
 
 @dataclass(slots=True)
 class FollowedSession:
-    """A session as the host follows it by the board's reports: the accepted moves, the faces it lay on."""
+    """A session according to the board's reports: the accepted moves, and the faces on which the item lay."""
 
     sensor: RecordedSensor
     moves: int
@@ -122,7 +122,7 @@ class FollowedSession:
 def calibrate_by_board(
     config: RigConfig, name: str, moves: int, scale_std: float, tell: Callable[[OfTheHand], None]
 ) -> Iterator[tuple[Board, CalibratedByBoard]]:
-    """Let the board calibrate one of its sensors; the board stays connected in the block.
+    """Let the board calibrate one of its sensors; the board remains connected in the block.
 
     The session ends after at least `moves` moves, once the standard uncertainty of the scale is at most `scale_std`.
     Raise Refused `clock_unknown`, `first_face_not_told`, and as `open_board_source` does; Fault `board_unverified`,
