@@ -23,9 +23,9 @@ USUAL = Patience()
 
 
 class PortSilence:
-    """The duration without data, s, in time spent reading, so that a delayed reader does not make a device silent.
+    """The duration without data, s, during reading only, so that a device does not seem silent to a delayed reader.
 
-    Another instrument's clock that stands still, as a simulated one may, does not count either.
+    Time in which another instrument's clock stops, as a simulated one may, does not count either.
     """
 
     def __init__(self) -> None:
@@ -48,7 +48,7 @@ class PortSilence:
     def lasts_s(self) -> float:
         """The time spent reading, s, without receiving data: a delayed reader does not make a device appear silent.
 
-        Time in which another instrument's clock stands still, as in a simulation, does not count either.
+        Time in which another instrument's clock stops, as in a simulation, does not count either.
         """
         silent_s = self._idle_reads * READ_TIMEOUT_S
         if self._clock_s is None:

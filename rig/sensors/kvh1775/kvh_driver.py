@@ -179,7 +179,7 @@ class Kvh1775:
         self._write("=CONFIG,0")  # this command has no answer
 
     def _write(self, command: str) -> None:
-        """Send a command. A line end precedes it, in case half a command was sent before."""
+        """Send a command. A line end precedes it, in case an incomplete command was sent before."""
         self.own_port.write(b"\r\n" + command.encode("ascii") + b"\r\n")
 
     # -- the reader's thread ---------------------------------------------------------------------------------------

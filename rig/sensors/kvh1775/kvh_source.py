@@ -176,7 +176,7 @@ def kvh1775(
 
 
 def look(name: str, section: SensorSection) -> Iterator[str | SensorError]:
-    """Yield the instrument's state and problems; its memory stays as it is. Raise as `Kvh1775` does."""
+    """Yield the instrument's state and problems; its memory is not changed. Raise as `Kvh1775` does."""
     line = _port_section(section)
     with closing(Kvh1775(name, line.port, line.baud)) as driver:
         yield f"KVH 1775 at {line.port}: serial number {driver.serial_number}"

@@ -18,7 +18,7 @@ _POWERS = 10.0 ** np.arange(MOST_DECIMALS + 1)
 
 
 def parse_numbers(text: NDArray[np.uint8], starts: NDArray[np.intp], ends: NDArray[np.intp]) -> Array:
-    """Return the numbers (n,) in `text`: each begins at one of `starts` and stops before one of `ends`; else NaN."""
+    """Return the numbers (n,) in `text`, from each of `starts` to before the next of `ends`; NaN for other text."""
     if not len(starts):
         return np.empty(0)
     integer, digits = _sum_digits(text, starts, ends)

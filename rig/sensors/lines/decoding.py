@@ -1,8 +1,9 @@
 """Lines of text decoded to arrays of numbers, in blocks of bytes as they arrive. Pure.
 
-A line is a sample if it holds as many numbers as there are columns, with the right separators, and a right checksum if
-there is one. Allowed are a trailing separator, colour codes around the line, any text in an unused column, and an empty
-field or a word for "none" in others (`rig.sensors.lines.fields`). All other lines are counted by their kind.
+A line is a sample if it contains as many numbers as there are columns, with the right separators, and the right
+checksum if there is one. Allowed are a trailing separator, colour codes around the line, any text in an unused column,
+and an empty field or a word for "none" in others (`rig.sensors.lines.fields`). All other lines are counted by their
+kind.
 """
 
 import re
@@ -34,11 +35,10 @@ for _value, _digit in enumerate("0123456789abcdef"):
 
 @dataclass(frozen=True, slots=True)
 class LineBatch:
-    """Decoded lines: `values` (n, columns) of the samples, as printed, and the lines that were none.
+    """Decoded lines: `values` (n, columns) of the samples, as printed, and the lines that were no samples.
 
-    A value that the device does not provide is NaN, and so is text in an unused column. `samples_before` (m,): the
-    number of this block's samples before each rejected line (no sample, no comment). `first_rejected`: how the first
-    begins.
+    A value that the device does not provide is NaN, as is text in an unused column. `samples_before` (m,): the number
+    of this block's samples before each rejected line (no sample, no comment). `first_rejected`: how the first begins.
     """
 
     values: Array

@@ -13,7 +13,7 @@ ROUND = (1, 2, 2.5, 4, 5, 8, 10)
 
 @dataclass(frozen=True, slots=True)
 class StatedProperties:
-    """The user's statements on what no line shows, None for an open one; `by_hand`: for a session by hand."""
+    """The user's statements about what no line shows, None if not yet stated; `by_hand`: for a session by hand."""
 
     serial_number: str | None = None
     range_deg_s: str | None = None

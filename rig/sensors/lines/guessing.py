@@ -1,7 +1,8 @@
 """A guess at the columns of an unknown device, from ten seconds at rest and then in rotation by hand. Pure.
 
-Names in a header decide first. Else time and sequence number increase steadily, an accelerometer's norm is that of
-gravity, and a gyroscope reads little at rest and much in rotation; the rotation of gravity gives the gyroscope's unit.
+Names in a header decide first. Otherwise the readings decide: time and sequence number increase steadily, an
+accelerometer's norm is that of gravity, and a gyroscope reads little at rest and much in rotation; the rotation of
+gravity determines the gyroscope's unit.
 """
 
 import re
@@ -50,7 +51,7 @@ class Guess:
     - `columns`, `rate_hz`: the columns' names, and the sample rate.
     - `time`, `sequence_wrap`, `clock`: the sections of these names.
     - `units`: unit and scale of each triad, by its letter.
-    - `reasons`, `gaps`: sentences on what decided, and on what remains to be looked up.
+    - `reasons`, `gaps`: sentences about what decided, and about what the user must look up.
     """
 
     columns: list[str]
@@ -96,7 +97,7 @@ def guess(shape: Shape, still_until_s: float) -> Guess:
 def guess_triads(names: tuple[str, ...], values: Array, still: Flags, rate_hz: float) -> Guess:
     """Guess which columns of readings (n, k) at a given rate are triads of sensors, and their units.
 
-    `still` (n,) are the rows at rest; if it marks none, all rows count as at rest.
+    `still` (n,) marks the rows at rest; if it marks none, all rows count as at rest.
     """
     count = values.shape[1]
     still = still if still.any() else np.ones(len(values), dtype=np.bool_)

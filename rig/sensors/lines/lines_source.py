@@ -51,7 +51,7 @@ NOT_CONNECTED = FirstLines()  # before a connection, according to the section
 
 
 class LinesSource:
-    """A device that prints as configured; samples are passed on from `start` on."""
+    """A device that prints as configured; samples are passed on after `start`."""
 
     def __init__(self, name: str, section: SensorSection, on_samples: OnSamples, *, patience: Patience = USUAL) -> None:
         """Connect and read the first lines. Raise SensorError as `LinesDevice` does."""
@@ -68,7 +68,7 @@ class LinesSource:
 
     @property
     def corrected(self) -> Mapping[str, str]:
-        """The corrected settings: none, because nothing is sent to the device."""
+        """The corrected settings: always empty, because nothing is sent to the device."""
         return {}
 
     @property
@@ -239,7 +239,7 @@ def _make_triad(
 
 
 def _make_thermometer(lines: LinesSection, *, provides: bool) -> Iterator[tuple[Channel, _Printed]]:
-    """Yield the channel of the printed temperature, else of the stated temperature, else nothing."""
+    """Yield the channel of the printed temperature, or of the stated one; nothing without both."""
     printed, printed_channel = None, _Printed(())
     if provides and "temperature" in lines.columns:
         temperature = lines.temperature

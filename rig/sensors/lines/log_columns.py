@@ -1,4 +1,4 @@
-"""A map of the columns of an unknown log, as `--columns` takes it: by headings, and by what the numbers can be."""
+"""A map of the columns of an unknown log, in the form of `--columns`: by headings, and by plausible numbers."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -42,7 +42,7 @@ ColumnEntry = Mapping[str, Any]  # a column's entry: its name or number, and its
 class LogColumns:
     """The columns of a log: maps of `samples` and `motion` as in the file of `--columns`, and sentences on them.
 
-    `gaps` say what nothing shows; `others` are the columns that are not read.
+    `gaps` state what nothing shows; `others` are the columns that are not read.
     """
 
     samples: Mapping[str, ColumnEntry]
@@ -246,7 +246,7 @@ def _list_angles(layout: TableLayout) -> list[int]:
 
 
 def _find_quaternion(layout: TableLayout, values: Array) -> dict[str, int]:
-    """Return the columns of a quaternion, qw qx qy qz: by their names, else four neighbours whose norm is 1."""
+    """Return the columns of a quaternion, qw qx qy qz: by their names, or four adjacent columns whose norm is 1."""
     named: dict[str, int] = {}
     for index in layout.numbers:
         name = re.sub(r"[\W_]+", "_", layout.headings[index].lower()).strip("_")

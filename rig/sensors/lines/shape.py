@@ -230,7 +230,7 @@ def _interpret_texts(common: tuple[str, ...]) -> tuple[str, str, tuple[str, ...]
 
 
 def _find_header(others: Sequence[str], separator: str, count: int) -> tuple[str, ...]:
-    """Return the `count` column names in one of the other lines, or none."""
+    """Return the `count` column names in one of the other lines; empty if there are none."""
     sign = {name: sign for sign, name in _SEPARATORS.items()}[separator]
     for text in others:
         names = [name.strip(" \"'") for name in text.lstrip("#%/ ").split(sign or None)]

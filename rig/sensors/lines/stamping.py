@@ -31,7 +31,7 @@ class Stamper:
     - `section`, `rate_hz`: the configuration.
     - `where`: the device in messages.
     - `step_s`: the step of the printed time; a coarse one is smoothed.
-    - `lost`: the number of samples that never came.
+    - `lost`: the number of samples that did not arrive.
     - `odd`: the number of samples left out because their time or number goes back, or jumps by more than 2 s.
     """
 
@@ -163,7 +163,7 @@ class Stamper:
         return self.section.time is not None and is_coarse(self.step_s, self.rate_hz)
 
     def _count_coarse_steps(self, device_s: Array) -> NDArray[np.int64]:
-        """Return the number of steps (n,) since the previous sample, from coarse times (n,): over one after a jump.
+        """Return the number of steps (n,) since the previous sample, from coarse times (n,): several after a jump.
 
         A loss that is shorter than a step of the time does not show.
         """

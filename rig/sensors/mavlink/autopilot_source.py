@@ -135,7 +135,7 @@ class MavlinkSource:
 
     @property
     def corrected(self) -> Mapping[str, str]:
-        """The changed settings, of which there are none: an autopilot is only read."""
+        """The changed settings: always empty, because an autopilot is only read."""
         return {}
 
     @property

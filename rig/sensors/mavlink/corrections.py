@@ -1,10 +1,10 @@
-"""An autopilot's corrections of its readings, by its parameters: undone, or refused by name. Pure.
+"""An autopilot's corrections of its readings, from its parameters: undone, or refused by name. Pure.
 
 ArduPilot, AP_InertialSensor_Backend.cpp (_rotate_and_correct_gyro, _rotate_and_correct_accel): readings in the sensor's
 axes by the board's definition, minus the temperature's part, minus an offset, accelerations then times a scale, all
 rotated by AHRS_ORIENTATION; then notches and a low-pass of second order (apply_gyro_filters). PX4,
-src/lib/sensor_calibration (`Correct`): the same order, rotated by SENS_BOARD_ROT; its messages hold unfiltered means
-over IMU_INTEG_RATE (VehicleIMU), in HIGHRES_IMU minus its estimator's bias (HIGHRES_IMU.hpp).
+src/lib/sensor_calibration (`Correct`): the same order, rotated by SENS_BOARD_ROT; its messages contain unfiltered means
+over IMU_INTEG_RATE (VehicleIMU), and in HIGHRES_IMU these minus its estimator's bias (HIGHRES_IMU.hpp).
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -29,10 +29,10 @@ class ParameterNames:
 
     - `gyro_offset`, `force_offset`, `force_scale`: its correction, a name for each axis.
     - `orientation`: that of its board.
-    - `must_be_zero`: those of corrections that cannot be undone, if they exist.
+    - `must_be_zero`: parameters of corrections that cannot be undone, if they exist.
     - `filters`: its low-pass filters.
-    - `others`: those that are not 0 if the autopilot has a further IMU.
-    - `identity`: one that must not be 0, without which the correction is not applied.
+    - `others`: parameters that are not 0 if the autopilot has a further IMU.
+    - `identity`: a parameter that must not be 0; otherwise the correction is not applied.
     """
 
     gyro_offset: tuple[str, ...]

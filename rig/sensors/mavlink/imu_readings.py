@@ -60,7 +60,7 @@ def is_integer(imu: str) -> bool:
 def decode_reading(message: Any) -> ImuReading:
     """Decode a message of pymavlink.
 
-    Its temperature is that of the IMU, except in HIGHRES_IMU, where it is that of the barometer.
+    Its temperature is that of the IMU, except in HIGHRES_IMU, which has that of the barometer.
     """
     kind = message.get_type()
     sent: Mapping[Field, Array] = {
@@ -85,6 +85,6 @@ def decode_reading(message: Any) -> ImuReading:
 
 
 def _add_half_step(whole: Array) -> Array:
-    """Return the middle of the interval that a truncated integer stands for."""
+    """Return the middle of the interval that a truncated integer represents."""
     middle: Array = whole + 0.5 * np.sign(whole)
     return middle

@@ -1,7 +1,7 @@
 """Two sets of an autopilot's parameters, old and new: a file that restores them, and a journal during the change.
 
-The journal lies in the user's own folder, by the autopilot's number, from before the first write until all are read
-back. So the next connection, after any interruption, learns of a mixed set.
+The journal is in the user's own folder, by the autopilot's number, from before the first write until all are read back.
+So the next connection, after any interruption, learns of a mixed set.
 """
 
 import json
