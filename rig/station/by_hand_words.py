@@ -16,7 +16,7 @@ RED_FROM = 0.8  # fraction of the range, above which a reading may be saturated
 
 
 def by_hand_line(event: RunEvent) -> str | None:
-    """Return an event of a session by hand in one line; None for other events, and for those among devices."""
+    """Return an event of a session by hand in one line; None for other events, and for messages between devices."""
     text: str | None
     match event:
         case HandAsked(instruction, again, why):

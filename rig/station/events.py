@@ -130,7 +130,7 @@ class Progress:
 class SensorSamples:
     """The samples of one sensor so far: their number, gaps in their numbering, the newest mean readings by quantity.
 
-    A reading has a number for each axis, or one, in the quantity's unit (`rig.data.installed_kinds.measured`).
+    A reading is a number for each axis, or a single one, in the quantity's unit (`rig.data.installed_kinds.measured`).
     """
 
     sensor: str
@@ -181,13 +181,13 @@ class HandSeen:
 
     - time_s: by the board's clock.
     - doing: "starting", "resting", "moving" or "held".
-    - since_s: the duration of that.
+    - since_s: the duration of that state.
     - turned_rad: the angle of the move so far.
     - peak_rad_s: its fastest reading.
     - range_rad_s: the sensor's range.
     - expanded_scale: the largest U (k = 2) of the scale factors so far, None before a solution.
     - faces: the sides done.
-    - pairs, turns: the open moves.
+    - pairs, turns: the remaining moves.
     - accepted: the number of accepted moves.
     """
 

@@ -32,7 +32,7 @@ class Log:
 
 @contextmanager
 def log(path: Path) -> Iterator[Log]:
-    """Open the log at `path` for the block; existing lines stay.
+    """Open the log at `path` for the block; existing lines remain.
 
     Raise Refused `run_folder` if it cannot be written, because the recording in this folder could not be either.
     """

@@ -53,7 +53,7 @@ class Stations:
             self.event(ListenerDropped(type(dropped).__name__, f"{type(why).__name__}: {why}"))
 
     def confirm_part(self) -> None:
-        """Confirm the part as the protocol says; a single run has nothing to compare with."""
+        """Confirm the part as in the protocol; a single run has nothing to compare with."""
         if self.confirm is not None:
             self.confirm()
 
@@ -70,5 +70,5 @@ class Stations:
 
 
 def always_yes(announcement: Sequence[str], to_do: str) -> bool:
-    """Return True, for a run in which nobody can be asked."""
+    """Return True, for a run in which there is no operator."""
     return True

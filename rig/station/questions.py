@@ -35,7 +35,7 @@ COMMAND_WORDS = frozenset(word for choices in CHOICES.values() for choice in cho
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """A question of a `kind`: the `lines` before it, its `text`, and a `hint` on the last answer if it was none."""
+    """A question of a `kind`: the `lines` before it, its `text`, and a `hint` if the last input was no answer."""
 
     kind: Kind
     text: str
@@ -59,7 +59,7 @@ class Question:
 
 
 class Voice(Protocol):
-    """The way to ask an operator; an answer has no white space around it. It is None if the operator has left."""
+    """The interface to an operator; an answer has no white space around it. It is None if the operator has left."""
 
     def answer(self, question: Question) -> str | None: ...
 
@@ -70,7 +70,7 @@ class Terminal:
     def answer(self, question: Question) -> str | None:
         """Return the text typed after the question: earlier input does not answer it.
 
-        Return None if the terminal has gone.
+        Return None if the terminal is closed.
         """
         _forget_what_was_typed()
         for line in (question.hint,) if question.hint else question.lines:

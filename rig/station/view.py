@@ -28,7 +28,7 @@ class PlainView:
     """Lines on stderr, one for each event: for log files, CI and pipes."""
 
     def event(self, event: RunEvent) -> None:
-        """Print an event's line; progress within a step has none."""
+        """Print an event's line; progress within a step has no line."""
         if (text := _text(event)) is not None:
             print(printable_lines(text), file=sys.stderr, flush=True)
 
