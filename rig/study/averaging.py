@@ -1,8 +1,8 @@
 """SIX, Eq. (8): squaring every sample before averaging, against averaging the revolution before squaring.
 
-Taken literally, Eq. (8) averages m². The mean of the squares contains, besides the square of the mean, the variance of
-the noise on all three axes and that of the vibration along the turn (a fraction ε = 0.05 of the speed). The estimated
-scale factors therefore shrink by about 3 k² σ² / (2 ω²) + ε²/2.
+Taken literally, Eq. (8) averages m². The mean of the squares contains the square of the mean, the variance of the noise
+on all three axes, and that of the vibration along the turn (a fraction ε = 0.05 of the speed). The estimated scale
+factors therefore shrink by about 3 k² σ² / (2 ω²) + ε²/2.
 """
 
 from functools import partial

@@ -3,7 +3,7 @@
 JCGM 101: a draw is a session with its own gyroscope, arm and controller. Its mean readings are computed from the true
 motion; the solver gets the controller's values. The interval ± 2 u of the budget must then cover the truth in 95 of 100
 draws. For comparison the solver also runs without this rig's remedies: no gravity columns, no bias random walk, no
-correction of the clock, and the noise alone for uncertainty.
+correction of the clock, and an uncertainty by noise alone.
 """
 
 from dataclasses import dataclass

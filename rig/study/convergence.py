@@ -2,8 +2,8 @@
 
 Without noise the first pass omits β0: k₁² = k² / (1 − β0/ω²), and b₁ = b already. So the first line of each of Table
 I's examples implies the speed that was used, which SIX does not state. Each further pass shrinks the error by Γ = β0 /
-(ω² − β0), alternating: k_n ≈ k (1 ± Γⁿ/2). So Algorithm 1 needs β0 < ω²/2 (SIX's "β0 < 0.5" is that at 1 rad/s), and
-Table I stops counting when its four decimals stop changing, long before Σ|Δβ| ≤ 1e-6.
+(ω² − β0), alternating: k_n ≈ k (1 ± Γⁿ/2). So Algorithm 1 needs β0 < ω²/2 (at 1 rad/s this is SIX's "β0 < 0.5"). Table
+I counts passes until its four decimals stop changing, long before Σ|Δβ| ≤ 1e-6.
 """
 
 from dataclasses import dataclass

@@ -1,8 +1,8 @@
 """Errors of the six-observation method and of the vector model against mounting error and non-orthogonality.
 
 Six averaged sweeps determine only ‖K (m + b)‖, so the sensor's mounting does not matter, but its axes must be
-orthogonal: their non-orthogonality enters the scale factors, to second order if the sensor is mounted straight, but
-times the mounting error, hence to first order, if it is not. The vector model estimates both angles.
+orthogonal: their non-orthogonality changes the scale factors. The change is of second order if the sensor is mounted
+straight, otherwise of first order, as it is multiplied by the mounting error. The vector model estimates both angles.
 """
 
 from functools import partial

@@ -38,7 +38,7 @@ ACCELEROMETER_RESIDUAL_M_S2 = 0.3901 * MG
 
 
 def draw_attitudes(count: int) -> Array:
-    """Return random rotations (count, 3, 3), body to table, spread over all directions; always the same ones."""
+    """Return random rotations (count, 3, 3), body to table, spread over all directions, the same at every call."""
     from scipy.spatial.transform import Rotation
 
     quaternions = np.random.default_rng(1775).normal(size=(count, 4))
@@ -92,8 +92,8 @@ class DriftingSensor:
     def simulate_repeats(self, rng: np.random.Generator, unit: float, unit_name: str) -> list[dict[str, Any]]:
         """Return one row per repeat, with the bias in `unit`, as in TRIAX, Figs. 4 and 6.
 
-        `held`: F and the reference are given by an earlier calibration, only the bias is estimated. `free`: all
-        parameters are estimated from the ten attitudes, with the reference's norm given.
+        `held`: whether F and the reference are given by an earlier calibration, and only the bias is estimated. `free`:
+        all parameters are estimated from the ten attitudes, with the reference's norm given.
         """
         attitudes = draw_attitudes(ATTITUDES)
         force = project(attitudes, self.reference)

@@ -1,7 +1,7 @@
 """Simulated gyroscopes and their averaged sweeps, vectorised over runs: SIX, section III.
 
 A sweep's mean reading is drawn directly. The mean of N samples with white noise σ is Gaussian with σ/√N, so samples are
-not needed; if a study squares the samples first, the mean of the squares is drawn exactly too.
+not needed; if a study squares the samples first, the mean of the squares is drawn from its exact distribution, too.
 
 Two models of the servo's vibration, which SIX describes as "rotation noise" of 5 % of the speed:
 

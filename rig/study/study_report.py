@@ -47,7 +47,7 @@ class StudyFinding:
 
     @property
     def ratio(self) -> float | None:
-        """The value divided by the published one; None if the latter is missing or zero."""
+        """The ratio of the value to the published one; None if the latter is missing or zero."""
         return self.value / self.published if self.published else None
 
 

@@ -1,4 +1,4 @@
-"""The style of figures, the same wherever they are drawn."""
+"""The common style of all figures."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
