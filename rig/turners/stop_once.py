@@ -43,8 +43,8 @@ class StopOnce:
     def outcome(self) -> StopOutcome:
         """Stop, unless the stop has begun; wait for the outcome, which takes less than 1 s.
 
-        An interrupt meanwhile is raised once the outcome is known. (It waits for an event, because in Python 3.11 an
-        interrupted `join` takes the thread for ended.)
+        An interrupt during the stop is raised once the outcome is known. (It waits for an event, because in Python 3.11
+        an interrupted `join` takes the thread for ended.)
         """
         self.begin()
         interrupt = None

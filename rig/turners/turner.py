@@ -39,7 +39,7 @@ class Turner(Protocol):
         ...
 
     def move(self, motion: Motion, watch: Callable[[], None] = ...) -> None:
-        """Make one movement, and return when the turner stands still at its end; stop one that takes too long."""
+        """Make one movement, and return when the turner is at rest at its end; stop a movement that takes too long."""
         ...
 
     def rest(self, duration_s: float, watch: Callable[[], None] = ...) -> None:

@@ -30,7 +30,7 @@ class Wording:
     - briefly: the method in a few words, for the digital certificate.
     - directions: the source of its axes' directions.
     - beware: a warning for the operator before it moves.
-    - stands: a clause on its state while the item is mounted anew.
+    - stands: a clause on its state while the item is remounted.
     - clock: the clock that stamps its states.
     - axes_source: the source of its axes, as a clause.
     - axes_traceability: the traceability of its axes, for the certificate.
@@ -59,8 +59,8 @@ class TurnerKind(Generic[SectionT, ReportT]):
       function passed; the file takes the output of a maker's client. Raises `Refused` by name.
     - look: reads a report of itself; nothing moves and no program is stopped. Raises `Refused` by name.
     - stance: describes its pose in a line of text.
-    - problems: lists all reasons not to drive the last of the plans, before anything moves; without a report, those of
-      the plans alone. Pure.
+    - problems: lists all reasons not to execute the last of the plans, before anything moves; without a report, only
+      those due to the plans. Pure.
     - describe_configured: returns the configured turner with its nominal geometry, before any connection.
     - describe_connected: returns the connected turner for the recording. Raises `Refused` if it is another one.
     - carried: returns the payload to set on the turner.

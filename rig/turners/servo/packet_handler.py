@@ -48,7 +48,7 @@ class InstructionDenied(BusError):
 
 
 class PortGone(BusError):
-    """A failed port. It remains failed; another `Bus` may open it again."""
+    """A failed port. The bus cannot be used any more; another `Bus` may open the port again."""
 
 
 class Bus:
@@ -99,8 +99,8 @@ class Bus:
     def read_bytes(self, register: Register) -> bytes:
         """Read a register's bytes. Raise Lost, Denied, PortGone.
 
-        The packet handler's own `readTxRx` takes as many bytes as it asked for from a reply of any length: the checksum
-        from the late acknowledgement of a write.
+        The packet handler's own `readTxRx` takes the requested number of bytes from a reply of any length, so it would
+        take the checksum of a late acknowledgement for data.
         """
         with self._failing():
             result = self._packets.readTx(self._port, self._id, register.address, register.size)

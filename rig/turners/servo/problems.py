@@ -30,7 +30,7 @@ def silent(silent_s: float, mostly_damaged: bool) -> Problem:
 
 
 def servo_restarted() -> Problem:
-    """Describe a servo that lost its supply meanwhile."""
+    """Describe a servo that has lost its supply and restarted."""
     return Problem(
         "servo_restarted",
         "the servo's clock started again from zero: it was switched off or restarted, and has lost its goal and turns",

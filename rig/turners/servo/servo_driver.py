@@ -153,7 +153,7 @@ class Servo:
             self._linked.supervising = True
 
     def move(self, motion: Motion, watch: Callable[[], None] = _watch_nothing) -> None:
-        """Make one movement and return when the shaft has arrived and stands still.
+        """Make one movement and return when the shaft has arrived and is at rest.
 
         `watch` is called first and then at least every 20 ms; its exception stops the shaft and is passed to the
         caller. The servo executes `moves.move_of(motion)`.
@@ -194,13 +194,13 @@ class Servo:
     def stop(self) -> StopOutcome:
         """Stop the shaft and return its state; takes less than 1 s.
 
-        It may be called at any time, repeatedly, from any thread. A Ctrl-C meanwhile is raised after the stop.
+        It may be called at any time, repeatedly, from any thread. A Ctrl-C during the stop is raised after it.
         Afterwards this object no longer moves the shaft.
         """
         return self._stopper.outcome() if self._holds else NOT_CONTROLLED
 
     def close(self) -> None:
-        """Stop the shaft if it is under control, and close the port; torque stays on."""
+        """Stop the shaft if it is under control, and close the port; torque remains on."""
         if self._link is None:
             return
         try:
@@ -250,14 +250,14 @@ class Servo:
         self.check()
 
     def _why_denied(self, error: InstructionDenied) -> Problem:
-        """Return the reason why the servo refused: mostly a stop by its watchdog."""
+        """Return the reason why the servo refused: usually a stop by its watchdog."""
         with suppress(BusError):
             if self._linked.call(lambda bus: bus.look_up(WATCHDOG), also_stopped=True) == (TRIPPED,):
                 return problems.watchdog_tripped()
         return problems.refuses(error)
 
     def _wait(self, done: Callable[[], bool], watch: Callable[[], None] = _watch_nothing) -> None:
-        """Block until `done` is true; meanwhile check the servo's faults and call the caller's `watch`."""
+        """Block until `done` is true; until then check the servo's faults and call the caller's `watch`."""
         finished = False
         while not finished:
             with self._changed:

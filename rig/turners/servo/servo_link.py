@@ -31,7 +31,7 @@ class JobCancelled(BusError):
 
 
 class ServoLink:
-    """A poller of `bus` every `period_s`. `on_state` and `on_problem` run on its thread; after a problem it goes on."""
+    """A poller of `bus` every `period_s`. `on_state` and `on_problem` run on its thread, even after a problem."""
 
     def __init__(
         self,
@@ -63,7 +63,7 @@ class ServoLink:
         self._thread.start()
 
     def close(self) -> None:
-        """End the thread; the bus stays open. If the system delays the thread, it ends later."""
+        """End the thread; the bus remains open. If the system delays the thread, it ends later."""
         self._closing.set()
         self._woken.set()
         if self._thread.ident is not None:

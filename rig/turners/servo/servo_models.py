@@ -37,7 +37,7 @@ class ServoModel:
 
     @property
     def load_unit(self) -> float:
-        """The unit of register 126: A if the servo senses its current, else a fraction of full load."""
+        """The unit of register 126: A if the servo measures its current, otherwise a fraction of full load."""
         return 2.69e-3 if self.senses_current else 1e-3
 
 

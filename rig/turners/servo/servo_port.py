@@ -1,9 +1,9 @@
 """The serial port under the maker's packet handler, with the method names that the handler calls.
 
 The handler builds and reads the packets; the caller chooses the port. The maker's own `PortHandler` polls with a full
-processor core, measures its time-outs by the wall clock, which may be set meanwhile, has one time-out for every
-adapter, shares the port with other programs, and stays busy after an exception. Here the system waits, the clock is
-monotonic, the time-out is the line's, the port is locked, and a failed port is never used again.
+processor core, measures its time-outs by the wall clock, which may be set, has one time-out for every adapter, shares
+the port with other programs, and remains busy after an exception. In this handler the system waits, the clock is
+monotonic, the time-out suits the line, the port is locked, and a failed port is never used again.
 """
 
 from collections.abc import Sequence

@@ -1,10 +1,9 @@
 """The stop of the shaft.
 
-1. Goal Position becomes Present Position, with a short profile: the shaft brakes and is held. Torque stays on: without
-   it an unbalanced board would fall, and these servos' gears do not lock.
-2. Without an acknowledgement, a last write sets its watchdog to the shortest time, and the line falls silent: the servo
-   stops at once if it receives the write, else after its armed watchdog time.
-3. A *state* newer than the stop confirms that the shaft stands.
+1. Goal Position becomes Present Position, with a short profile: the shaft brakes and holds. Torque remains on: without
+it an unbalanced board would fall, because these servos' gears do not lock. 2. Without an acknowledgement, a last write
+sets its watchdog to the shortest time, and nothing more is sent: the servo stops at once if it receives the write,
+otherwise after its armed watchdog time. 3. A *state* newer than the stop confirms that the shaft is at rest.
 
 None of this is a safety function. Only the switch of the servo's supply is sure.
 """

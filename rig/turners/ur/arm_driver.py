@@ -173,7 +173,7 @@ class Arm:
         self._silent_s = 0.0  # before this there was no client to lose
 
     def move(self, motion: Motion, watch: Callable[[], None] = _watch_nothing) -> None:
-        """Make one movement and return when the arm has arrived and stands still.
+        """Make one movement and return when the arm has arrived and is at rest.
 
         `watch` is called first and then at least every 20 ms; its exception stops the arm and is passed to the caller.
         """
@@ -220,7 +220,7 @@ class Arm:
     def stop(self) -> StopOutcome:
         """Stop the arm and return its state; takes less than 1 s.
 
-        It may be called at any time, repeatedly, from any thread. A Ctrl-C meanwhile is raised after the stop.
+        It may be called at any time, repeatedly, from any thread. A Ctrl-C during the stop is raised after it.
         Afterwards the control script has ended, and this object no longer moves the arm.
         """
         if not self._holds_arm:
@@ -328,7 +328,7 @@ class Arm:
         self._link.send(request)
 
     def _wait(self, done: Callable[[], bool], watch: Callable[[], None] = _watch_nothing) -> None:
-        """Block until `done` is true; meanwhile check the arm's faults and call the caller's `watch`."""
+        """Block until `done` is true; until then check the arm's faults and call the caller's `watch`."""
         finished = False
         while not finished:
             with self._changed:

@@ -1,4 +1,4 @@
-"""Pre-flight of the arm: problems that can be foreseen before it moves. Pure: plans and a report in, problems out."""
+"""Pre-flight of the arm: problems that can be foreseen before it moves. Pure functions of plans and a report."""
 
 import math
 from collections.abc import Sequence
@@ -50,7 +50,7 @@ def _plan_problems_on(plan: Plan, arm: ArmSection, report: ArmReport) -> list[Pr
 
 
 def arm_problems(plan: Plan, report: ArmReport) -> list[Problem]:
-    """Return the problems of the arm's state for this plan: modes, stops, control, the way to the start.
+    """Return the problems of the arm's state for this plan: modes, stops, control, the motion to the start.
 
     The payload is not compared here: `Arm.take_control` sets it and confirms that the controller uses it.
     """
@@ -106,8 +106,8 @@ def _tool_problems(plan: Plan, report: ArmReport) -> list[Problem]:
 def kinematics_problems(arm: ArmSection, report: ArmReport) -> list[Problem]:
     """Return the problems of the controller's description of its arm, if the configuration uses it.
 
-    These are a missing description, and each wrist whose axis differs from the drawing's, in the flange's frame at the
-    home pose.
+    Problems are a missing description, and each wrist whose axis differs from the drawing's, in the flange's frame at
+    the home pose.
     """
     if arm.kinematics == "nominal":
         return []

@@ -10,7 +10,7 @@ MAKER = "Universal Robots"
 
 @dataclass(frozen=True, slots=True)
 class ArmSetup:
-    """The arm that the controller is set up for: the maker's type number, its lengths, its joints' limits."""
+    """The arm for which the controller is set up: the maker's type number, its lengths, its joints' limits."""
 
     robot_type: int
     drawing: DenavitHartenberg
@@ -30,7 +30,7 @@ class ArmReport:
     - state: the state at that time.
     - kinematics: the arm's geometry as measured in the factory.
     - tcp_offset: the pose of its tool centre point in the flange's frame.
-    - setup: the arm it is set up for.
+    - setup: the arm for which it is set up.
     - called: the dashboard's name for it.
     - model: the maker's name of the arm that these items mean.
     - registers_free: whether a half of the registers is free for the client's script.

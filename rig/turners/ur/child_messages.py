@@ -44,7 +44,7 @@ Request = TakeControl | MoveRequest | BrakeRequest | Alive
 
 @dataclass(frozen=True, slots=True)
 class Connected:
-    """The start of the controller's states; `version` is its software's: major, minor, bugfix, build."""
+    """The start of the controller's states; `version` of its software: major, minor, bugfix, build."""
 
     version: tuple[int, ...]
 
@@ -96,7 +96,7 @@ class Braked:
 
 @dataclass(frozen=True, slots=True)
 class Disturbed:
-    """A problem shown by the states, unasked, after which the run cannot continue."""
+    """A problem shown by the states, sent without a request, after which the run cannot continue."""
 
     problem: Problem
 

@@ -2,7 +2,7 @@
 
 Local control disables every independent stop, and neither the states nor the client report it. Sources that do: the
 dashboard, which is polled (from 5.6 on); the Robot API of a PolyScope X (from 10.12 on); and the primary interface,
-whose connections the controller closes at that moment (the maker's client library, and issue 459 of his ROS driver). A
+whose connections the controller closes at that moment (the maker's client library, and issue 459 of its ROS driver). A
 controller of the CB3 series has no local control.
 """
 
@@ -31,7 +31,7 @@ ControlMode = Remote | Literal["gone"]
 
 
 class ControlWatch:
-    """A thread that calls `on_problem` once, if the arm at `host` can no longer be stopped by its ports.
+    """A thread that calls `on_problem` once, if the arm at `host` can no longer be stopped through its ports.
 
     `newest_s()` returns the time of the newest state (monotonic time): a lost link, which the link reports, loses them
     too.

@@ -1,7 +1,7 @@
 """The controller's answers while nothing moves: is the rig able to stop its arm, and the report of the arm.
 
-A controller with PolyScope 5 is asked through its dashboard. A PolyScope X has none: RTDE, the primary interface and
-the Robot API answer what they can.
+A controller with PolyScope 5 is asked through its dashboard. A PolyScope X has no dashboard: RTDE, the primary
+interface and the Robot API answer what they can.
 """
 
 from contextlib import closing

@@ -1,8 +1,8 @@
 """The check that the arm that answers is the configured one. Pure.
 
 All limits depend on the model: the clearance between wrist and forearm, joint speeds, payload. Controllers report the
-type by a number of the maker's (his client library, `RobotType`), which later models share with earlier ones of the
-same construction; so the lengths decide as well, and the series, by the version of the software.
+type as a number (the maker's client library, `RobotType`), which later models share with earlier ones of the same
+construction; so the lengths decide as well, and the series, which the version of the software shows.
 """
 
 from collections.abc import Mapping
@@ -110,7 +110,7 @@ def _models(report: ArmReport) -> Mapping[int, str]:
 
 
 def _robot_type(report: ArmReport) -> int | None:
-    """Return the type of arm as reported, else by the arm's lengths, else by its name."""
+    """Return the type of arm as reported, or else by the arm's lengths, or else by its name."""
     if report.setup is not None:
         return report.setup.robot_type
     if report.kinematics is not None:

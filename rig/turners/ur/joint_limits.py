@@ -1,4 +1,4 @@
-"""Limits of position, speed and acceleration, joint by joint: those of the arm's model, and its controller's. Pure."""
+"""Limits of position, speed and acceleration, joint by joint: of the arm's model, and of its controller. Pure."""
 
 import math
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""Problems of a plan by itself for an arm of Universal Robots: by its model, and by its controller's limits."""
+"""Problems of a plan for an arm of Universal Robots: with its model, and with its controller's limits."""
 
 from rig.errors import Problem
 from rig.motion.carried import FlangeLoad
@@ -22,7 +22,7 @@ def plan_problems(
     """Return the problems of a plan: invalid steps, and limits of position, speed, acceleration, payload and clearance.
 
     Clearance is the distance of the flange and its payload from the arm. The narrower of the `controller`'s and the
-    `model`'s limits counts. Lengths are those of `arm`, else of the drawing.
+    `model`'s limits counts. Lengths are those of `arm` if given, otherwise of the drawing.
     """
     problems = find_step_problems(plan)
     moving = [motion for motion in plan.motions if travels(motion)]

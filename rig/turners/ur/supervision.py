@@ -1,4 +1,4 @@
-"""The supervision of an arm under control by its states: those that end the run, and their problems. No I/O."""
+"""The supervision of an arm under control by its states: which states end the run, and with which problem. No I/O."""
 
 from enum import Enum, auto
 

@@ -105,7 +105,7 @@ class ChildLink:
 
     @property
     def ended(self) -> bool:
-        """Whether no message can come any more."""
+        """Whether messages can no longer come."""
         return self._ended.is_set()
 
     def close(self) -> None:

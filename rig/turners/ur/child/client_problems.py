@@ -11,7 +11,7 @@ LINK_REMEDY = "Look at the arm and its network cable, then start again"
 
 
 def control_failure(host: str, version: tuple[int, ...], reason: str) -> Problem:
-    """Describe why the client's constructor failed, by its message."""
+    """Describe why the client's constructor failed, according to its message."""
     if "remote control" in reason:
         return local_control(host)
     if "already in use" in reason:  # the register was taken after the check

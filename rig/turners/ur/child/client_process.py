@@ -287,7 +287,7 @@ class _Child:
             self.send(RequestFailed(move_failure("the controller did not start the move")))
 
     def _await_state(self) -> None:
-        """Wait for a new state. If none comes, the move did not begin because the link is lost.
+        """Wait for a new state. If no state comes, the move did not begin because the link is lost.
 
         In that case the parent reports the lost link before this wait ends.
         """
@@ -308,9 +308,9 @@ class _Child:
         return confirmed
 
     def abandon(self) -> NoReturn:
-        """Stop the arm, which nobody supervises any more, and exit.
+        """Stop the arm, which is no longer supervised, and exit.
 
-        The program is stopped over the controller's ports. If none confirms it, the RTDE client brakes the arm.
+        The program is stopped over the controller's ports. If no path confirms it, the RTDE client brakes the arm.
         """
         if self._holds_arm:
             # The client's stop may wait forever for a controller that is gone; the system's alarm ends that.

@@ -1,4 +1,4 @@
-"""Messages of the controller's primary interface: errors by their code, and ends of programs. Pure.
+"""Messages of the controller's primary interface, in words: errors by their code, and ends of programs. Pure.
 
 (Client interface description of the maker: a robot message holds a time stamp, a source and its kind. An error code,
 kind 6, continues with code, argument, level, a type and a value; a runtime exception, kind 10, with line and column; a

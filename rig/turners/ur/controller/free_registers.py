@@ -1,8 +1,8 @@
 """The search for a half of the controller's input registers that is free for the client.
 
 The client talks to its script through integers 0 to 7 and doubles 0 to 17, or the same from 24 on. A client keeps its
-registers until it disconnects: fieldbuses take the lower half (EtherNet/IP all 24 of each kind), URCaps mostly some of
-the upper. (RTDE guide of the maker: setting up an input recipe. `ur_rtde`: FLAG_UPPER_RANGE_REGISTERS, which its
+registers until it disconnects: fieldbuses take the lower half (EtherNet/IP all 24 of each kind), URCaps usually some of
+the upper half. (RTDE guide of the maker: setting up an input recipe. `ur_rtde`: FLAG_UPPER_RANGE_REGISTERS, which its
 version 1.6.5 ignores if the controller's software is 5.23 or newer, as its recipes show.)
 """
 

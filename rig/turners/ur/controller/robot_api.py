@@ -73,7 +73,7 @@ class RobotApi:
 class RobotApiStop:
     """The order to end the program, by the Robot API at `host` and `port`, as one path of a stop.
 
-    Its report on programs is not used: whether it includes those of clients is undocumented.
+    Its report on programs is not used, because it may not include those of clients (undocumented).
     """
 
     name = "Robot API"

@@ -58,7 +58,7 @@ class StatePacket:
 
 
 class NotSupported(ConnectionError):
-    """A controller that answers, but does not support the requested item `what`; `version` is its software's."""
+    """A controller that answers, but does not support the requested item `what`; `version` of its software."""
 
     def __init__(self, what: str, version: tuple[int, ...]) -> None:
         super().__init__(f"it does not know {what}")
@@ -122,9 +122,9 @@ class StateStream:
     def read(self, timeout_s: float) -> list[StatePacket]:
         """Return the packets received, oldest first; wait at most `timeout_s` for the first one.
 
-        Once `closed`, there are none. A packet with an impossible state or time is omitted and becomes the stream's
-        `problem`. An impossible state also closes the stream. After a step of the clock the states continue, because
-        they still show whether the arm stands still.
+        Once `closed`, there are no states. A packet with an impossible state or time is omitted and becomes the
+        stream's `problem`. An impossible state also closes the stream. After a step of the clock the states continue,
+        because they still show whether the arm is at rest.
         """
         looked_s = time.monotonic()
         if self.closed:

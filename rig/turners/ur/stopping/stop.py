@@ -38,7 +38,7 @@ class StopOrder:
     def await_delivery(self) -> bool:
         """Wait until every path has delivered the order or failed; return whether that was within the order's time.
 
-        A later delivery would end a program that is started meanwhile.
+        A later delivery would end a program that is started after the stop.
         """
         with self._changed:
             return self._changed.wait_for(lambda: not self._pending, max(0.0, self._remaining_s))
@@ -57,7 +57,7 @@ class StopOrder:
 
     @property
     def words(self) -> str:
-        """The result on each path: taken, refused with the controller's words, or unanswered."""
+        """The result on each path: accepted, refused with the controller's words, or unanswered."""
         with self._changed:
             return ", ".join(self._answers.values())
 
@@ -123,7 +123,7 @@ class StopOrder:
 
 
 class ArmStop:
-    """The stop of an arm by its controller's ports and by the client, at the same time.
+    """The stop of an arm through its controller's ports and through the client, at the same time.
 
     `paths` returns the paths of a stop, `send` passes a request to the child, `braked` returns its answer, None before
     it comes; `await_rest(since_s, timeout_s)` waits for a state newer than `since_s` (monotonic time) and returns

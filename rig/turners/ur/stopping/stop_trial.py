@@ -1,6 +1,6 @@
 """A trial of the stop before anything moves: on a PolyScope X, whose only independent stop gives no acknowledgement.
 
-Its primary interface takes lines in remote control alone, which controllers before 10.12 do not report, and
+Its primary interface accepts lines only in remote control, which controllers before 10.12 do not report, and
 acknowledges none. So the trial starts a program that moves nothing, and ends it by the line that has to stop the arm.
 """
 
@@ -23,7 +23,7 @@ END_S = 2.0
 def stop_trial(host: str, api: RobotApi, shows: Callable[[RuntimeState, float], bool]) -> Problem | None:
     """Run a program that moves nothing and stop it; return why the primary interface could not stop it, or None.
 
-    `shows(state, timeout_s)` waits for this state of the arm's program and returns whether it came.
+    `shows(state, timeout_s)` waits for this state of the arm's program and returns whether it occurred.
     """
     if api.is_in_remote_control() is False:
         return local_control(host)
