@@ -1,7 +1,7 @@
 """`python -m rig.world CONFIG [--until-eof] [--late FILE] [--truth FILE]`: the simulated laboratory in the foreground.
 
-The first line on stdout is JSON: `ready`, and where everything listens. With --until-eof a parent process reads that
-line, so a refusal is reported there too: `ready` is false and `problem` holds the error.
+The first line on stdout is JSON: `ready`, and the addresses at which everything listens. With --until-eof a parent
+process reads that line, so a refusal is reported there too: `ready` is false and `problem` holds the error.
 """
 
 import argparse

@@ -24,7 +24,7 @@ JOINTS = 6
 
 
 class OnArm:
-    """A `MotionSource`: the `robot` that clients talk to, and the `arm` as it really moves."""
+    """A `MotionSource`: the `robot` to which clients talk, and the `arm` as it really moves."""
 
     def __init__(self, config: RigConfig, world: WorldSection) -> None:
         arm = world.arm

@@ -13,7 +13,7 @@ Reply = dict[str, Any]
 
 
 class ArmWorld(Protocol):
-    """The parts of a world that an arm's orders act on."""
+    """The parts of a world on which an arm's orders act."""
 
     @property
     def laboratory(self) -> Laboratory: ...
@@ -99,7 +99,7 @@ def _unlock(robot: Robot) -> None:
 
 
 def _free(robot: Robot) -> None:
-    """Release the registers that a fieldbus has claimed; the rig's stay claimed."""
+    """Release the registers that a fieldbus has claimed; the rig's remain claimed."""
     for name in [name for name, owner in robot.claims.items() if owner is FIELDBUS]:
         del robot.claims[name]
 

@@ -38,7 +38,7 @@ class WorldClock:
 
     @property
     def is_held(self) -> bool:
-        """Whether the clock stands still."""
+        """Whether the clock is stopped."""
         return self._stop_at is not None and self.tick >= self._stop_at
 
     @property

@@ -1,6 +1,6 @@
 """The control channel: JSON lines with which tests make the world misbehave.
 
-A run of the rig uses it for what a simulated operator does, and to have the truth written at its end.
+A run of the rig uses it for the actions of a simulated operator, and to have the truth written at its end.
 
 A request is `{"do": NAME, …}`; the reply is one line, `{"ok": true, "time_s": …, …}` or `{"ok": false, "error": …}`.
 
@@ -272,7 +272,7 @@ class ControlSession:
         return mounts[name]
 
     def _silence_board(self, on: bool) -> None:
-        """Make the board's cable carry nothing, while its port stays open."""
+        """Make the board's cable carry nothing, while its port remains open."""
         self._world.line.silent = bool(on)
 
     def _host_baud(self, baud: float | None) -> None:

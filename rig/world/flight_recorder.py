@@ -1,7 +1,8 @@
-"""The world's flight recorder: it reports why a step was late, while the step is still held up.
+"""The world's flight recorder: it reports the cause of a late step while the step is still delayed.
 
 A thread checks ten times a second when the loop last completed a step. It writes the stacks of all threads as soon as a
-step is late. When the loop goes on, it writes how long the step was held up, and its processor time, which shows why.
+step is late. When the loop continues, it writes the duration of the delay and its processor time, which shows the
+cause.
 """
 
 import faulthandler
@@ -24,7 +25,7 @@ NS_PER_S = 1e9
 class FlightRecorder:
     """A recorder that writes to the file `path`, never through a link, or to stderr if that is None.
 
-    `waits_for` names the clients that the world waits for. A record that cannot be written is lost.
+    `waits_for` names the clients for which the world waits. A record that cannot be written is lost.
     """
 
     def __init__(self, path: Path | None, waits_for: Callable[[], str]) -> None:
@@ -39,7 +40,7 @@ class FlightRecorder:
         self._thread.start()
 
     def alive(self) -> None:
-        """Record that a step has been made, or that none is due."""
+        """Record that a step was made, or that no step is due."""
         now_s = time.monotonic()
         late_s, self._alive_s = now_s - self._alive_s, now_s
         if late_s > LATE_S:

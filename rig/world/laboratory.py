@@ -88,7 +88,7 @@ class Laboratory:
         return self.motion_source.time_s
 
     def plug_in(self) -> None:
-        """Power the board, if there is one without power."""
+        """Power the board, if there is a board without power."""
         if self.board is None and self._config.board is not None:
             time_s = self._time_s
             self._elements = {}
@@ -107,7 +107,7 @@ class Laboratory:
     def fit(self, part: str) -> bool:
         """Exchange the board for another part's, without power: another chip that stores nothing.
 
-        Return whether the operator plugs it in. An operator forgets this at most once per part.
+        Return whether the operator also plugs it in. An operator forgets this at most once per part.
         """
         part_section = self._world.tray.get(part, SimulatedPartSection())
         unique_id = part_section.unique_id or sha256(part.encode()).hexdigest()[:24]

@@ -1,4 +1,4 @@
-"""The interface of what turns the sensors in the laboratory: an arm's flange, a servo's shaft, an operator's hand."""
+"""The interface of the turners in the laboratory: an arm's flange, a servo's shaft, an operator's hand."""
 
 from typing import Protocol
 
@@ -7,7 +7,7 @@ from rig.world.ur10e.motion.flange_motion import BodyMotion, Components
 
 
 class MotionSource(Protocol):
-    """What turns the sensors, tick by tick.
+    """The turner of the sensors, simulated tick by tick.
 
     Times are virtual. They lie inside the last tick or inside the memory that delayed sensors need.
     """

@@ -236,7 +236,7 @@ class PortListener:
         connection.greet()
 
     def set_silent(self, silent: bool) -> None:
-        """Make the port silent, or end the silence. A silent port sends and reads nothing; connections stay open."""
+        """Make the port silent, or end the silence. A silent port sends and reads nothing; connections remain open."""
         self.silent = silent
         for connection in self.connections:
             connection.watch()

@@ -1,6 +1,6 @@
 """The simulated operator: reads an instruction, reacts, and handles the item on the table, now and then by mistake.
 
-The operator knows of an instruction only what its text and drawing show: what to do, and with which side up.
+The operator knows only what the text and drawing of an instruction show: what to do, and with which side up.
 """
 
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""How far a client lags: the bytes sent to it that it has not read.
+"""The lag of a client: the bytes sent to it that it has not read.
 
 The world's clock is paced by this, as a sender is by a wire. The client is not asked: if both ends are on one Linux
 machine, the system knows how many bytes wait in the other end's socket (sock_diag(7)). Otherwise they count as read.
@@ -79,9 +79,9 @@ class SocketTable:
 class Wire:
     """The pace of one client, which may lag `lag_s` of virtual time before the world waits for it.
 
-    A wait ends as soon as a real laboratory would go on, 1 s after 1 s: otherwise other clients would take the world
-    for dead. A client that reads as fast as it can is waited for, however slow it is. One that does not read is waited
-    for only as long as its patience lasts, and then not again until it has kept pace.
+    A wait ends when a real laboratory would have continued, because otherwise other clients would regard the world as
+    dead. The world waits for a client that reads as fast as it can, even if it is slow. One that does not read is
+    waited for only as long as its patience lasts, and then not again until it has kept pace.
     """
 
     def __init__(self, count_unread: Unread, lag_s: float, wall: Callable[[], float]) -> None:

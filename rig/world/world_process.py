@@ -260,9 +260,9 @@ class World:
     def _tick(self) -> None:
         """Simulate one tick, or all that are due, at most `LEAP`, while only a client can make the arm move.
 
-        With a board, ticks are simulated one at a time: its core takes as long in any case, and clients would get their
-        packets in bursts. If the arm is at rest, its motion is sensed once at the end of several ticks, with the same
-        bytes as a result. Every session is called at every tick.
+        With a board, ticks are simulated one at a time: several at once would not be faster, because of the board's
+        core, and clients would receive their packets in bursts. If the arm is at rest, its motion is sensed once at the
+        end of several ticks, with the same bytes as a result. Every session is called at every tick.
         """
         for remaining in reversed(range(LEAP if self.board_listener is None else 1)):
             self.clock.count()
@@ -293,7 +293,7 @@ class World:
 
 
 def _find_host(config: RigConfig) -> str:
-    """Return the laboratory's address: the turner's, or the board's or a sensor's if the item is turned by hand."""
+    """Return the laboratory's address: the turner's; if the item is turned by hand, the board's or a sensor's."""
     if config.turner.simulated_at is not None:
         return config.turner.simulated_at
     ports = [("board.port", config.board.port)] if config.board is not None else []

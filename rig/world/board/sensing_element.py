@@ -9,7 +9,7 @@ FAR_BEYOND = 1e3  # rad/s and g: no part has such a range
 
 
 class ElementFault(StrEnum):
-    """Faults of a sensing element. Its noise and its electronics stay as they are."""
+    """Faults of a sensing element. Its noise and its electronics do not change."""
 
     STUCK = "stuck"  # forever the motion at which the fault began
     SATURATED = "saturated"  # a motion far beyond its range, on every axis

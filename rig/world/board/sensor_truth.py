@@ -53,7 +53,7 @@ class SensorTruth:
         self.remount(np.eye(3))
 
     def remount(self, mount: np.ndarray) -> None:
-        """Mount the item with the sensor: `mount` (3, 3) takes the flange's frame into the item's."""
+        """Mount the item with the sensor: `mount` (3, 3) transforms the flange's frame to the item's."""
         self._rows: list[list[float]] = (self._item_rotation @ mount).tolist()
         self._offset_m: list[float] = (mount.T @ self._item_position_m).tolist()
 

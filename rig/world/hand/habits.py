@@ -32,9 +32,9 @@ USUAL: dict[MistakeKind, float] = {
 class Mistake:
     """A mistake of magnitude `size`; None takes the usual magnitude of its kind (`USUAL`).
 
-    - `short`: the turn ends this many degrees early, as against an edge that slipped.
+    - `short`: the turn ends this many degrees early, as if the edge had slipped.
     - `two_turns` in place of one; a turn the `other_way`; the `wrong_face`; `skipped`: no action.
-    - `crumb`: the face is tilted by this many mrad; `table_pushed`: the table's tilt changes by this many.
+    - `crumb`: the face is tilted by this many mrad; `table_pushed`: the table's tilt changes by this many mrad.
     - `held`: in the air for this many seconds in place of a rest; `lifted`: by this many degrees during a rest.
     - `dropped`: biases jump; `cable_pulled`: for this many seconds; `left`: idle for this many seconds before.
     - `too_fast`: by this factor.
@@ -78,7 +78,7 @@ Action = FlipAction | TurnAction | WaitAction
 
 @dataclass(frozen=True, slots=True)
 class Habits:
-    """How a hand moves and lays down a body. Values drawn anew each time are standard deviations.
+    """How a hand moves and lays down a body. Values that are drawn for every action are standard deviations.
 
     `tilt_mrad`: repeatability of a face put down again; `closure_mrad`, `heading_mrad`: by how much a turn against an
     edge and a flip miss; `faces_mrad`: the box' deviation from squareness; `table_mrad`: the table's tilt;

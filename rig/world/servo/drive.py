@@ -1,7 +1,8 @@
 """The simulated servo's motor and shaft: their response to time, goals and faults.
 
-Source: ROBOTIS e-Manual, pages of the models and the includes named beside each rule. Not simulated: velocity, PWM and
-current modes (their goals are stored, nothing turns), loads on the shaft other than a fall or a blocked shaft.
+Source: ROBOTIS e-Manual: the models' pages, and the included files that are named with each rule. Not simulated:
+velocity, PWM and current modes (their goals are stored, nothing turns), loads on the shaft other than a fall or a
+blocked shaft.
 """
 
 from dataclasses import dataclass

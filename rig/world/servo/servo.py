@@ -1,7 +1,7 @@
 """The simulated servo on its bus: its response to instructions.
 
-Source: ROBOTIS e-Manual, pages of the models and the includes named beside each rule. Not simulated: factory reset,
-bulk instructions, backup.
+Source: ROBOTIS e-Manual: the models' pages, and the included files that are named with each rule. Not simulated:
+factory reset, bulk instructions, backup.
 """
 
 from collections.abc import Callable

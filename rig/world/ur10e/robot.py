@@ -230,7 +230,7 @@ class Robot:
     def start_program(self, program: Program) -> None:
         """Play a program in place of the running one.
 
-        While the brakes are on, it is accepted but stays paused. If a program is paused, a new one only stops it
+        While the brakes are on, it is accepted but remains paused. If a program is paused, a new one only stops it
         (Universal Robots Client Library, issue 123, observed with the maker's simulator).
         """
         paused = self.runtime_state in (RuntimeState.PAUSING, RuntimeState.PAUSED)
@@ -316,7 +316,7 @@ class Robot:
             self.safety_mode = SafetyMode.NORMAL
 
     def release(self) -> None:
-        """Release the emergency stop button, still without power, or reset the safeguard; a program stays paused."""
+        """Release the emergency stop button, still without power, or reset the safeguard; a program remains paused."""
         if self.safety_mode in (SafetyMode.ROBOT_EMERGENCY_STOP, SafetyMode.SAFEGUARD_STOP):
             self.safety_mode = SafetyMode.NORMAL
 

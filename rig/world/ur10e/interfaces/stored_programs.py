@@ -51,6 +51,6 @@ class StoredPrograms:
         return name
 
     def describe(self) -> list[dict[str, object]]:
-        """Return what the Robot API lists of each program."""
+        """Return the Robot API's list of programs."""
         blank = {"createdDate": 0, "description": "", "lastModifiedDate": None, "lastSavedDate": None}
         return [{**blank, "name": name, "programState": "FINAL"} for name in self._documents]

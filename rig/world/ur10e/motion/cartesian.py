@@ -81,7 +81,7 @@ def approach_speed(tool_speed: Sequence[float], target: Sequence[float], step: f
 def plan_straight_line(
     start: Joints, pose: Sequence[float], speed_m_s: float, acceleration_m_s2: float, links: Links = NOMINAL
 ) -> Generator[None, None, Trajectory]:
-    """Plan a moveL from rest to rest, a few knots per tick so that the world goes on meanwhile.
+    """Plan a moveL from rest to rest, a few knots per tick so that the world continues during planning.
 
     If a joint would be too fast, the whole line is slowed down. Raise `OutOfReach` if that makes it slower than
     `SLOWEST`, because the line leads through a singularity, or if the pose is out of reach.

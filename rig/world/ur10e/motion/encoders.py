@@ -1,4 +1,4 @@
-"""The joints' encoders: steps, white noise, a delay that jitters. Only the controller's clients see what they add."""
+"""The joints' encoders: steps, white noise, a delay that jitters. Only the controller's clients see these errors."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field

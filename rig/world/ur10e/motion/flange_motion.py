@@ -2,7 +2,7 @@
 
 Luh, Walker, Paul, On-line computational scheme for mechanical manipulators, 1980, the outward recursion, for standard
 Denavit–Hartenberg frames. The base has the Earth's rate and the reaction to gravity, so gravity, Earth rate and
-Coriolis terms follow. A component may be a float or an array of shape (n,), all alike.
+Coriolis terms follow. A component may be a float or an array of shape (n,), the same for all components.
 """
 
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""How a joint follows its target: late, yielding to acceleration, and with the ripple of its harmonic drive.
+"""The response of a joint to its target: lag, yielding to acceleration, and the ripple of its harmonic drive.
 
 The joint's angle is u(t − lag) + y + p, with u the target. y is what it yields: a critically damped system of second
 order follows −k times the target's mean acceleration of the last 12 ms, and no more than a bound. p is the ripple,
@@ -28,7 +28,7 @@ Shaken = tuple[int, float, float, float]
 
 
 class Yielding(NamedTuple):
-    """What one joint yields during a tick: end + (start + slope s) exp(−s/τ), s after the tick's begin; rad, s."""
+    """The yielding of one joint during a tick: end + (start + slope s) exp(−s/τ), s after the tick's start; rad, s."""
 
     joint: int
     end_rad: float

@@ -3,7 +3,7 @@
 A joint's true angle is e + zero + A₁ sin(e + φ₁) + A₂ sin(2e + φ₂) − h(e) + vibration(t) + settling(t), with e the
 angle at its encoder. Eccentric and tilted graduations err once and twice a turn. h is friction hysteresis in Dahl's
 form (A solid friction model, 1968): after a reversal it tends exponentially to half its width on the other side. A
-vibration that the encoder shows is no part of this: it is added to e and to the true angle alike.
+vibration that the encoder shows is not included: it is added both to e and to the true angle.
 """
 
 from collections.abc import Callable, Sequence

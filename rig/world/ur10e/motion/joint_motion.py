@@ -31,7 +31,7 @@ class Instant:
 
 
 class _Tick(NamedTuple):
-    """How a tick was played: its start, its start on the trajectory, the time scaling there and its derivative."""
+    """The execution of a tick: its start, its start on the trajectory, the time scaling there and its derivative."""
 
     start_s: float
     trajectory_s: float
@@ -47,7 +47,7 @@ class JointMotion:
     """Angles and speeds of the six joints. `step` plays a tick; `joints_at` returns any time within the last one.
 
     - `drive`: how the joints follow the trajectory.
-    - `encoders`: what clients are told of the joints.
+    - `encoders`: the errors of what clients receive about the joints.
     - `memory_s`: the time before the last tick's end that `joints_at` covers too.
     - `vibration`: a vibration that the encoders show; it is added to their angles and to the true ones.
 

@@ -1,4 +1,4 @@
-"""An arm's links: by the drawing, by its controller, and in truth.
+"""An arm's links: according to the drawing, according to its controller, and in truth.
 
 Denavit–Hartenberg parameters, in the names of UR's calibration file (delta_theta, delta_a, delta_d, delta_alpha).
 """

@@ -45,7 +45,7 @@ def find_tcp_motion(q_rad: Joints, qd_rad_s: Joints, qdd_rad_s2: Joints, links: 
 
 @lru_cache(maxsize=4)
 def find_elbow(q_rad: Joints, qd_rad_s: Joints, links: Links) -> tuple[Vector, Vector]:
-    """Return position (m) and velocity (m/s) of the elbow, where the upper arm ends, in the base's axes."""
+    """Return position (m) and velocity (m/s) of the elbow, the end of the upper arm, in the base's axes."""
     _, position = flange_frame(q_rad[:2], links[:2])
     velocity = _velocity(q_rad[:2], qd_rad_s[:2], links[:2])
     return position, velocity

@@ -1,4 +1,4 @@
-"""The arm's true motion, apart from what its controller knows: its flange's motion in the world's time."""
+"""The arm's true motion, which its controller does not know: its flange's motion in the world's time."""
 
 from math import pi
 from random import Random
