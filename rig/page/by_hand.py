@@ -61,7 +61,7 @@ def update(before: Section, event: OfTheHand) -> Section:
         case HandRested(face=face):
             return _add_tone({**before, "face": face}, "rest")
         case HandMoveTaken():
-            return _add_tone(before, "taken")
+            return _add_tone(before, "accepted")
         case HandMoveRefused() | HandRestRefused() | HandBegunAnew():
             return _add_tone(before, "again")
 

@@ -28,7 +28,7 @@ export function recordAges({ age_s: ages }) {
 /** Return `lost`, the seconds for which expected news is overdue (0: none), and `words`, the age of the values shown ("": current). */
 export function assessAge(shown) {
   const kind = shown.state?.kind;
-  if (ENDED.includes(kind)) return { over: true, lost: 0, words: shown.about?.replayed ? "as recorded last" : describeEnd(shown.ended) };
+  if (ENDED.includes(kind)) return { over: true, lost: 0, words: shown.about?.replayed ? "at the end of the recording" : describeEnd(shown.ended) };
   const silences = [now() - lastNews];
   if (newest.arm !== null && ARM_IS_READ.includes(kind) && !shown.about?.replayed) silences.push(now() - newest.arm);
   const silence = Math.max(...silences);

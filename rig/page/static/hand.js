@@ -3,7 +3,7 @@
 const $ = (id) => document.getElementById(id);
 const SVG = "http://www.w3.org/2000/svg";
 const SIZE = { x: 1.5, y: 1.1, z: 0.7 }; // of the box that is drawn, so that its sides differ
-const TONES = { rest: [[660, 0.12]], taken: [[660, 0.1], [990, 0.18]], again: [[330, 0.18], [247, 0.3]] };
+const TONES = { rest: [[660, 0.12]], accepted: [[660, 0.1], [990, 0.18]], again: [[330, 0.18], [247, 0.3]] };
 
 let audio = null; // a browser allows sound only after a tap on the page
 let lastTone = null; // the number of the newest tone

@@ -145,7 +145,7 @@ function drawBar({ number, count, fraction }) {
   }
 }
 
-const describeEnd = () => (!connection.isUp ? "the run is over, and this is how it ended" : shown.ended && !shown.about?.replayed ? `the run ended at ${shown.ended.at}` : "the run is over");
+const describeEnd = () => (!connection.isUp ? "the run is over; this is its last state" : shown.ended && !shown.about?.replayed ? `the run ended at ${shown.ended.at}` : "the run is over");
 
 let ageText = ""; // the age of the readings and the arm in words; "" while they are current
 
@@ -156,7 +156,7 @@ function showStatus() {
   if (shown.state) {
     const [word, sign] = lost ? ["No news", "⚠"] : WORDS[kind] ?? [kind, ""];
     const step = shown.step?.number && shown.step.kind !== "by_hand" && !over ? `, step ${shown.step.number} of ${shown.step.count}` : "";
-    const text = lost ? `Heard last: ${WORDS[kind]?.[0] ?? kind}, ${shown.state.text}${step}` : shown.state.text;
+    const text = lost ? `Last message: ${WORDS[kind]?.[0] ?? kind}, ${shown.state.text}${step}` : shown.state.text;
     for (const [id, content] of [["state-word", word], ["sign", sign], ["state-text", text]]) if ($(id).textContent !== content) $(id).textContent = content;
     document.title = `${word} · ${shown.about?.procedure ?? "calibration rig"}`;
   }

@@ -2,8 +2,8 @@
 
 const SILENT_MS = 15000; // the server sends something every second; after this silence the page connects again
 const REASONS = {
-  403: "the address lacks its token: take the one the terminal shows",
-  503: "too many browsers look on: close one, or take the address the terminal shows",
+  403: "the address lacks its token: use the one that the terminal shows",
+  503: "too many browsers are connected: close one, or use the address that the terminal shows",
 };
 
 export const token = window.location.hash.slice(1);

@@ -39,7 +39,7 @@ function makeCard(section) {
   doing.className = "doing";
   const counts = Object.entries(section.counts ?? {}).map(([state, count]) => `${count} ${state}`).join(", ");
   const who = [section.operator, section.work_order && `order ${section.work_order}`, section.computer, section.at !== section.rig && `at ${section.at}`, section.simulated && "simulated"].filter(Boolean).join(" · ");
-  const age = section.state === "dead" ? `last heard ${section.age} · ` : "";
+  const age = section.state === "dead" ? `last message ${section.age} · ` : "";
   const tray = makeElement("ul");
   tray.className = "tray";
   tray.append(...(section.parts ?? []).map(([serial, state], index) => {
@@ -57,7 +57,7 @@ const SHOW = {
   rigs({ count, more }) {
     $("no-rigs").hidden = count > 0;
     $("more-rigs").hidden = !more;
-    $("more-rigs").textContent = `and ${more} more, heard from earlier than these`;
+    $("more-rigs").textContent = `and ${more} more, whose last messages are older`;
   },
   unread(reason) {
     $("unread").hidden = !reason;
