@@ -46,7 +46,7 @@ def terminal(document: ResultDocument) -> str:
     return console.export_text()
 
 
-def test_u_of_angles_is_the_same_wherever_it_is_told() -> None:
+def test_u_of_angles_is_the_same_in_every_outlet() -> None:
     document = scarce()
     vector = document.gyroscopes["gyro"].vector_model
     assert isinstance(vector, VectorEntry)

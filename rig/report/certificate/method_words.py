@@ -36,10 +36,10 @@ def method_in_short(certificate: Certificate) -> str:
 def _describe_hand(certificate: Certificate) -> str:
     level = " and an accelerometer used as a level" if certificate.levelled else ""
     return (
-        "By hand: the item was turned on a flat table and laid down on its faces, and its own readings show when it "
-        "was at rest and when it moved. The integrated rate between rests is compared with whole turns and with the "
-        f"vertical before and after, by the faces of the item{level}; scale factors, biases and axes are solved for by "
-        "weighted least squares, together with the standard deviations of the handling errors."
+        "By hand: the item was turned on a flat table and laid on its faces; its own readings show when it was at "
+        "rest and when it moved. The integrated rate between rests is compared with whole turns and with the "
+        f"vertical before and after, which the faces of the item{level} show; scale factors, biases and axes are "
+        "solved for by weighted least squares, together with the standard deviations of the handling errors."
     )
 
 
@@ -74,7 +74,7 @@ def _describe_turner(certificate: Certificate) -> Iterator[str]:
     for kind in certificate.held_still:
         yield kind.standard.method(bool(certificate.gyroscopes))
         if kind.kind == "magnetometer" and certificate.reversals:
-            yield "They were turned over between runs, which separates their own bias from the arm's field."
+            yield "They were turned over between runs, which separates their bias from the arm's field."
     if certificate.result.bias_drift:
         yield ("The same attitudes were repeated; biases by repeat are those with scale, axes and reference fixed.")
 

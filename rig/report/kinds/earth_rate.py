@@ -50,7 +50,10 @@ def _describe_item(finding: Finding[GyroscopeEntry], _: object) -> CertifiedItem
     sensor = finding.entry
     if finding.is_reference:
         return None
-    name, results = f"the Earth's rate found by gyroscope {finding.sensor}", dcc_results.earth_rate(_rate_of(finding))
+    name, results = (
+        f"the Earth's rate measured by gyroscope {finding.sensor}",
+        dcc_results.earth_rate(_rate_of(finding)),
+    )
     temperatures = temperatures_c(sensor)
     return CertifiedItem("gyroscope", finding.sensor, sensor.part, sensor.serial_number, name, results, temperatures)
 

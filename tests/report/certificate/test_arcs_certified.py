@@ -26,12 +26,12 @@ def test_whole_turns_close() -> None:
 
 
 @pytest.mark.slow
-def test_of_arcs_the_encoders_tell_and_no_traceability_is_claimed() -> None:
+def test_the_encoders_determine_arcs_and_no_traceability_is_claimed() -> None:
     found = certificate(of_arcs(np.pi))
     text, xml = read(found).text, digital_certificate(found).decode()
     assert certificate(of_arcs(2 * np.pi)).traceable and not found.traceable
     assert "turns by 180°, by the turner's encoders; not traceable, a contributor of the uncertainty" in text
-    assert "the angles of the sweeps are those of the encoders" in text
+    assert "the encoders determine the angles of the sweeps" in text
     assert "180° by the turner's encoders, whose error is in the uncertainty budget" in xml
     assert "turns by 180° and attitudes at rest on a robot arm" in xml
     assert "closure of the circle" not in text + xml

@@ -165,7 +165,7 @@ def test_the_earth_s_rate_and_gravity_s_part_are_the_result_s() -> None:
     sensor = everything().gyroscopes["gyro"]
     assert isinstance(sensor.earth_rate, EarthRateEntry) and isinstance(sensor.vector_model, VectorEntry)
     results = measured(of_everything(), "calibration of gyroscope gyro")
-    found = measured(of_everything(), "the Earth's rate found by gyroscope gyro")
+    found = measured(of_everything(), "the Earth's rate measured by gyroscope gyro")
     values, covariance = read_back(found["Earth's rate"], 3)
     assert values == [*sensor.earth_rate.rate_rad_s]
     np.testing.assert_allclose(covariance, np.array(sensor.earth_rate.covariance_rad2_s2), rtol=1e-9)

@@ -72,7 +72,7 @@ def test_both_certificates_and_the_header_hold_every_kind_they_can(document: Res
     for kind in ("gyroscope", "accelerometer", "magnetometer"):
         assert f"{kind.capitalize()} LSM9DS1" in page
         assert f"calibration of {kind}" in digital
-    assert "Earth's rate as found" in page and "Earth's rate found by gyroscope gyro" in digital
+    assert "Earth's rate, measured" in page and "Earth's rate measured by gyroscope gyro" in digital
     assert "by repeat" in page and "bias by repeat of gyro, rate" in digital
     header = calibration_header(document)
     for function in ("gyro_calibrate(", "gyro_calibrate_acceleration(", "compass_calibrate_field("):

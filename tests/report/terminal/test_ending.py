@@ -69,7 +69,7 @@ def test_whatever_fails_the_end_fits_its_lines(folder: Path, width: int) -> None
         assert sum(told) + said.count("FAILED ") == len(broken)
 
 
-def test_a_narrow_screen_says_what_a_wide_one_says() -> None:
+def test_a_narrow_screen_shows_the_same_as_a_wide_one() -> None:
     result = fail_checks(ONE, *(check.name for check in ONE.checks))
     assert sorted(" ".join(ended(result, 60)).split()) == sorted(" ".join(ended(result, 80)).split())
 

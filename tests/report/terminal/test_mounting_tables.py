@@ -67,7 +67,7 @@ def test_the_page_tells_every_stage(tmp_path: Path) -> None:
     assert shown.sections["mounts"] == TOLD
 
 
-def test_of_an_item_that_stayed_nothing_is_said(tmp_path: Path) -> None:
+def test_no_mounting_is_reported_for_an_item_that_was_mounted_once(tmp_path: Path) -> None:
     found = add_comparison(result())
     assert "mounted in" not in read(certificate(found)).text
     write_result(found, tmp_path)
