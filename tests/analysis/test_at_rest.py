@@ -94,7 +94,7 @@ def test_the_curve_of_bad_stamps_is_that_of_evened_ones(rate_hz: float, stamp: C
         assert walk.value == pytest.approx(0.01 / np.sqrt(true_hz), abs=4 * walk.std)
 
 
-def test_a_few_missing_readings_cut_no_log_in_pieces_and_are_said() -> None:
+def test_a_few_missing_readings_do_not_split_a_log_and_are_reported() -> None:
     time_s = np.arange(6000) / 104
     kept = np.random.default_rng(4).random(6000) > 0.005
     readings = 0.01 * np.random.default_rng(3).normal(size=(6000, 3))

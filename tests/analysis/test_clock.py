@@ -164,7 +164,7 @@ def test_the_computer_of_a_controller_that_is_real_is_a_clock_however_far_off_it
 
 
 @pytest.mark.slow
-def test_every_recording_of_a_run_is_held_against_its_computer_and_the_worst_is_told() -> None:
+def test_every_recording_of_a_run_is_compared_with_its_computer_and_the_worst_is_reported() -> None:
     whole = recorded(FAST, 1.0, REAL)
     assert named(calibrate([whole]).checks)["controller_and_computer"].passed
     both = calibrate(in_two(whole))

@@ -102,7 +102,7 @@ def test_a_sensor_without_thermometer_is_certified_at_the_temperature_that_was_s
 
 
 @pytest.mark.slow
-def test_an_accelerometer_s_scale_and_bias_are_those_at_the_temperature_that_is_said() -> None:
+def test_an_accelerometer_s_scale_and_bias_refer_to_the_stated_temperature() -> None:
     run = open_run(RECORDINGS / "imu").movement[0]
     result = calibrate([warming(run)])
     entry, found = document_of(result).accelerometers["gyro"], result.accelerometers["gyro"]
@@ -136,6 +136,6 @@ def test_axes_that_lean_are_loaded_with_less_than_the_speed_of_the_sweeps() -> N
 
 
 @pytest.mark.slow
-def test_upright_axes_are_loaded_with_the_speed_of_the_sweeps_and_nothing_is_said() -> None:
+def test_aligned_axes_have_the_speed_of_the_sweeps_and_no_rates_of_their_own_are_stated() -> None:
     result = calibrate([synthetic_run(Setup(mounting_error_rad=(0.0, 0.0, 0.0)))])
     assert load_words(document_of(result).gyroscopes["gyro"]) is None

@@ -88,7 +88,7 @@ def test_a_second_simulated_laboratory_moves_to_an_address_of_its_own() -> None:
 
 
 @pytest.mark.slow
-def test_hardware_is_where_its_configuration_says() -> None:
+def test_hardware_is_found_at_its_configured_address() -> None:
     host = fresh_host()
     config = load(DEMO, [f"arm.host={host}"]).config
     with arm_held_elsewhere(host), find_own_address(config, None) as moved:

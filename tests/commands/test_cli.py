@@ -209,7 +209,7 @@ def test_what_solves_and_reports_is_loaded_after_the_first_line(command: str, tm
 
 @pytest.mark.thorough
 @pytest.mark.slow
-def test_a_plan_says_what_its_checks_will_tell() -> None:
+def test_a_plan_states_the_detection_limits_of_its_checks() -> None:
     document = json.loads(shell(f"{PLAN} --json").stdout)
     told = {each["fault"]: each for each in document["detection_limits"]["gyro"]}
     assert told["all scale factors change half-way"]["check"] == "scale_changed"

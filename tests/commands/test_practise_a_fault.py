@@ -124,7 +124,7 @@ def check_shown(step: Step, actual: str) -> None:
 @pytest.mark.slow
 @pytest.mark.one_in(3)  # each of these faults ends a run in tests/runner/faults and tests/turners too
 @pytest.mark.parametrize("title", TITLES)
-def test_each_exercise_goes_as_the_page_says(terminals: Terminals, title: str) -> None:
+def test_each_exercise_runs_as_the_page_states(terminals: Terminals, title: str) -> None:
     steps = SECTIONS[title]
     if not steps[1].prompt:  # the fault ends a run that is on its way
         terminals.pace(PACE)

@@ -255,7 +255,7 @@ def test_a_world_answers_on_this_machine_alone() -> None:
 
 
 @pytest.mark.slow
-def test_thousands_of_errors_are_counted_and_the_first_are_told() -> None:
+def test_thousands_of_errors_are_counted_and_the_first_are_reported() -> None:
     message = refusal("\n".join(f"k{n}: 1" for n in range(2000)))
     assert "2003 errors" in message and message.endswith("more")
 

@@ -150,7 +150,7 @@ def test_no_plugin_is_loaded_to_read_a_file(recording: Path) -> None:
         read_run(recording)
 
 
-def test_why_memory_ran_out_is_said() -> None:
+def test_the_reason_for_exhausted_memory_is_reported() -> None:
     assert "cannot be unpacked" in reason(MemoryError())
 
 

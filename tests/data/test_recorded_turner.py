@@ -57,7 +57,7 @@ def test_states_of_any_number_of_joints_come_back(joints: int, tmp_path: Path) -
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["f4", "f8", "i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8"])
-def test_what_more_a_state_tells_has_the_type_that_its_turner_says(kind: Any, tmp_path: Path) -> None:
+def test_further_fields_of_a_state_have_the_type_that_the_turner_declares(kind: Any, tmp_path: Path) -> None:
     described = turner(2, (StateField("current_a", kind),))
     run = read_run(recorded(tmp_path / "run.h5", described))
     assert run.turner == described and run.states.dtype["current_a"] == np.dtype(f"<{kind}")

@@ -31,7 +31,7 @@ def test_what_is_recorded_comes_back() -> None:
     assert settings_from_json(made.to_json()) == made
 
 
-def test_what_is_known_of_a_sensor_is_recorded_its_part_s_where_nothing_is_said() -> None:
+def test_a_sensor_s_stated_properties_are_recorded_and_its_part_s_by_default() -> None:
     """So that a catalogue of tomorrow changes no recording."""
     said = settings("uncertainty: {acceleration_bias_mg_k: 0.7}\n" + VERIFIED).uncertainty
     assert said is not None

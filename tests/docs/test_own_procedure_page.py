@@ -20,7 +20,7 @@ def shown(language: str) -> str:
     return str(block)
 
 
-def test_the_page_s_procedure_plans_as_it_says(tmp_path: Path) -> None:
+def test_the_page_s_procedure_plans_as_stated(tmp_path: Path) -> None:
     script, config = tmp_path / "warm_up.py", tmp_path / "warm_up.yaml"
     script.write_text(shown("python"), encoding="utf-8")
     config.write_text(shown("yaml").replace("demo.yaml", str(CONFIGS / "demo.yaml")), encoding="utf-8")

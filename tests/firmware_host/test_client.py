@@ -733,7 +733,7 @@ def test_an_answer_to_somebody_before_is_none_to_the_first_request() -> None:
 
 
 @ON_ONE_WIRE
-def test_the_heater_is_asked_and_told(wire: tuple[BoardOnAWire, str]) -> None:
+def test_the_heater_is_read_and_set(wire: tuple[BoardOnAWire, str]) -> None:
     with Board(wire[1], protocol.BAUD_RATE, ignore) as board:
         assert board.heat(0.5).cause == "no_thermometer", "nothing streams yet"
         board.configure(0, 238, 245)

@@ -154,7 +154,7 @@ def test_a_damaged_frame_is_dropped_and_a_sound_one_decodes(body: bytes, data: s
 # The layout of every message in C, as a compiler sees it
 
 
-def test_the_c_structures_lie_as_the_table_says(tmp_path: Path) -> None:
+def test_the_c_structures_have_the_layout_of_the_table(tmp_path: Path) -> None:
     structs = {f"{m.name}_payload": m.fields for m in MESSAGES} | {f"{m.name}_item": m.items for m in MESSAGES}
     expected = []
     prints = []

@@ -33,7 +33,7 @@ def test_frames_of_two_sensors_in_turns_become_a_batch_of_each() -> None:
         assert set(batch.samples["host_time_s"].tolist()) == {7.0}
 
 
-def test_a_batch_ends_where_conversions_are_missing_and_the_latest_count_of_them_is_told() -> None:
+def test_a_batch_ends_at_missing_conversions_and_their_latest_count_is_reported() -> None:
     batches = arrived(
         streamed(0, 0, 5), streamed(0, 5, 5), streamed(0, 12, 5, dropped=2), streamed(0, 17, 1, dropped=3)
     )

@@ -61,7 +61,7 @@ def test_all_values_of_a_run_are_one_comparison() -> None:
 
 
 @pytest.mark.slow
-def test_a_change_of_2_u_in_one_value_of_nineteen_is_told() -> None:
+def test_a_change_of_2_u_in_one_value_of_nineteen_is_reported() -> None:
     """2 U of the change: noise hides it in a quarter of the comparisons, and in none if it is what both results say."""
     random, dof = np.random.default_rng(3), np.full(19, np.inf)
     shift = 2 * 2 * np.sqrt(2)

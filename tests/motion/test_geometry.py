@@ -12,7 +12,7 @@ def random_joints(count: int) -> np.ndarray:
     return np.random.default_rng(7).uniform(-2 * np.pi, 2 * np.pi, (count, 6))
 
 
-def test_stretched_arm_reaches_as_far_as_the_maker_s_dimensions_say() -> None:
+def test_stretched_arm_reaches_as_far_as_by_the_maker_s_dimensions() -> None:
     position = flange_pose(np.zeros(6))[:3, 3]
     np.testing.assert_allclose(position, [-0.6127 - 0.57155, -0.17415 - 0.11655, 0.1807 - 0.11985], atol=1e-12)
 

@@ -29,7 +29,7 @@ def test_what_rounding_leaves_in_a_mean_is_bounded_and_the_bound_is_near(sigma_c
 @pytest.mark.one_in(4)
 @pytest.mark.parametrize("cut", [False, True], ids=["rounded", "cut toward zero"])
 @pytest.mark.parametrize("sigma", [0.02, 0.1, 0.3, 0.5, 0.8, 1.0, 1.5, 3.0])
-def test_a_mean_of_numbers_in_coarse_steps_errs_as_it_says(sigma: float, *, cut: bool) -> None:
+def test_a_mean_of_numbers_in_coarse_steps_errs_as_predicted(sigma: float, *, cut: bool) -> None:
     """Whatever the noise, far below a step or above: of 150 means none is far beyond its U, and few too wide a one."""
     rng = np.random.default_rng(7)
     in_std = []

@@ -44,7 +44,7 @@ def test_a_gyroscope_that_turns_on_where_the_arm_rests_has_told_nothing(index: i
 
 
 @pytest.mark.slow
-def test_when_the_last_sweep_is_sound_the_rest_after_it_still_tells() -> None:
+def test_the_rest_after_a_sound_last_sweep_still_counts() -> None:
     with pytest.raises(Fault, match=r"stuck_sensor: at rest the gyroscope reads .* as if it turned"):
         observe_run(stuck_in_sweep(5), SETTINGS)
 

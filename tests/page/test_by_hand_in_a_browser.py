@@ -57,7 +57,7 @@ def test_the_line_the_drawing_and_what_is_open(driver: Chrome, tmp_path: Path) -
         legible(driver)
 
 
-def test_what_is_too_fast_or_to_be_done_again_is_said(driver: Chrome, tmp_path: Path) -> None:
+def test_a_move_that_is_too_fast_or_to_be_repeated_is_reported(driver: Chrome, tmp_path: Path) -> None:
     with showing(driver, tmp_path, about=ABOUT) as tell:
         tell(PhaseStarted("by_hand", Plan((), (), ()), {"gyro": "raw"}), HandRested(1, 2, "+z"))
         tell(HandMoveRefused(1, 2, "turn_not_closed"))

@@ -137,7 +137,7 @@ def test_a_recording_that_never_ends_ends_no_import(foreign: Path, endless: str)
 
 
 @pytest.mark.parametrize("command", [("report",), ("history", "import")])
-def test_a_result_of_millions_of_wrong_values_is_refused_before_they_are_told(
+def test_a_result_of_millions_of_wrong_values_is_refused_before_they_are_reported(
     foreign: Path, tmp_path: Path, command: tuple[str, ...]
 ) -> None:
     (foreign / "result.json").write_text('{"checks": [' + "{}," * 300_000 + "{}]}", encoding="utf-8")

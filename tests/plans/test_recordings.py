@@ -81,7 +81,7 @@ def otherwise(result: ResultDocument) -> Iterator[ResultDocument]:
     yield result.model_copy(update={"verdict": "fail"})
 
 
-def test_a_number_that_moved_by_a_hundred_thousandth_of_its_uncertainty_is_told() -> None:
+def test_a_number_that_changed_by_a_hundred_thousandth_of_its_uncertainty_is_reported() -> None:
     result = read_result(RECORDINGS / "six_observation")
     assert differences(result, result) == []
     for other in otherwise(result):

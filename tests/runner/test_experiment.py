@@ -97,7 +97,7 @@ def test_calibrated_readings_follow_the_reference(finished: Finished) -> None:
 
 
 @pytest.mark.thorough
-def test_gravitys_share_of_what_is_left_is_told(finished: Finished) -> None:
+def test_gravitys_part_of_the_residuals_is_reported(finished: Finished) -> None:
     """The board does not know which way is down: about the vertical axis most of what it leaves is gravity's hold."""
     out, result, _ = finished
     upright = [turn for turn in result["verification"]["gyro"]["after"]["revolutions"] if turn["joint"] == "wrist_3"]

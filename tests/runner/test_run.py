@@ -175,7 +175,7 @@ def test_an_interrupted_run_is_kept_and_resumed(start: Start, tmp_path: Path) ->
 
 @pytest.mark.proof
 @pytest.mark.thorough
-def test_a_run_goes_on_when_nobody_reads_what_it_says(start: Start, tmp_path: Path) -> None:
+def test_a_run_continues_if_nobody_reads_its_output(start: Start, tmp_path: Path) -> None:
     out = tmp_path / "run"
     process = start("run", configuration(tmp_path), "--out", out)
     assert process.stderr is not None and process.stdout is not None

@@ -190,7 +190,7 @@ def inspect_file(name: str) -> tuple[Shape, Guess]:
 @pytest.mark.one_in(4)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", FORMATS)
-def test_the_section_is_right_or_says_what_it_cannot_tell(name: str) -> None:
+def test_the_section_is_right_or_states_what_is_unknown(name: str) -> None:
     wanted = FORMATS[name]
     shape, found = inspect_file(name)
     document = yaml.safe_load(section(shape, found, "/dev/ttyUSB0", 115200))["sensors"]["imu"]
@@ -238,7 +238,7 @@ def test_lines_that_no_device_prints_are_refused_at_once(harm: str) -> None:
     assert len(str(refused.value)) < 200 and str(refused.value).isprintable()
 
 
-def test_one_impossible_number_costs_its_line_and_a_device_that_stood_mute_is_told() -> None:
+def test_one_impossible_number_costs_its_line_and_a_silent_device_is_reported() -> None:
     lines = [TimedLine(0.01 * n, f"{n},{n % 7},{n % 5},0.{n}") for n in range(1000)]
     lines[500] = TimedLine(5.0, "500,1e400,2,3")
     shape = find_shape(lines)

@@ -205,7 +205,7 @@ def test_a_part_warms_up_and_its_thermometer_shows_it() -> None:
         assert reading == pytest.approx(-bias, abs=3e-3 / 16 + COUNT)
 
 
-def test_a_bias_walks_as_its_truth_alone_says() -> None:
+def test_a_bias_walks_as_its_truth_alone_states() -> None:
     """The emulated sensor's readings are those of `SensorTruth`, which needs neither board nor arm."""
     walk = {"bias_random_walk_rad_s_per_sqrt_s": 0.02, "bias_instability_rad_s": 0.005, "scale": [1, 1, 1]}
     one = laboratory({**walk, "bias_rad_s": [0.01, 0.0, 0.0]}, seed=5)

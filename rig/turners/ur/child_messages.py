@@ -44,7 +44,7 @@ Request = TakeControl | MoveRequest | BrakeRequest | Alive
 
 @dataclass(frozen=True, slots=True)
 class Connected:
-    """The start of the controller's states; `version` of its software: major, minor, bugfix, build."""
+    """The start of the controller's states; `version`: its software's major, minor, bugfix and build number."""
 
     version: tuple[int, ...]
 
@@ -89,7 +89,7 @@ class RequestFailed:
 
 @dataclass(frozen=True, slots=True)
 class Braked:
-    """The answer to a brake request; `confirmed` says whether the client's script did so."""
+    """The answer to a brake request; `confirmed`: whether the client's script has confirmed it."""
 
     confirmed: bool
 

@@ -55,7 +55,7 @@ GOOD = {"ADIS16465": 0, "quiet LSM9DS1": 1}
 @pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.parametrize("name", DAMAGES)
-def test_the_least_damage_that_matters_is_told(name: str, thorough: bool) -> None:
+def test_the_smallest_relevant_fault_is_detected(name: str, thorough: bool) -> None:
     """In 95 of 100 recordings, as what is stated of a size is."""
     *sizes, damage = DAMAGES[name]
     seeds = range(20 if thorough else 1)

@@ -82,7 +82,7 @@ def test_what_is_just_not_told_is_within_the_uncertainty(part: str, name: str) -
         ("one dwell", 0.1),
     ],
 )
-def test_what_is_large_is_told(part: str, name: str, size: float) -> None:
+def test_a_large_error_is_reported(part: str, name: str, size: float) -> None:
     assert passes(DAMAGES[name][0](drawn(part, 1), size)) is None
 
 

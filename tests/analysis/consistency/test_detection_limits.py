@@ -68,7 +68,7 @@ def planted(seen: Drawn, kind: str, times: float, way: int) -> Iterator[tuple[De
 @pytest.mark.proof
 @pytest.mark.timeout(3000)
 @pytest.mark.parametrize("kind", ["ADIS16465", "quiet LSM9DS1"])
-def test_what_is_larger_than_the_size_that_is_said_is_told(kind: str, thorough: bool) -> None:
+def test_a_fault_above_the_stated_detection_limit_is_detected(kind: str, thorough: bool) -> None:
     missed = [
         (seed, each.what)
         for seed in range(18 if thorough else 1)
@@ -109,7 +109,7 @@ def test_a_good_sensor_shows_damage_as_small_whether_or_not_its_encoders_have_no
 
 
 @pytest.mark.slow
-def test_what_a_plan_says_will_be_told_is_what_its_recording_says() -> None:
+def test_a_plan_predicts_the_detection_limits_of_its_recording() -> None:
     seen = drawn(3, KINDS["quiet LSM9DS1"])
     motion = Motion(Setup(), np.random.default_rng(0))
     will = predict_limits(parse(motion.config).config, motion.plan, NOMINAL).rates["gyro"]

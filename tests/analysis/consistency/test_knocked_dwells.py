@@ -45,5 +45,5 @@ def test_what_swings_in_all_dwells_is_no_knock(hertz: float | None) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("hertz", "step"), [(None, 12.0), (1.0, 200.0)])
-def test_a_knock_in_one_of_them_is_told(hertz: float | None, step: float) -> None:
+def test_a_knock_in_one_of_them_is_detected(hertz: float | None, step: float) -> None:
     assert all(told(seed, hertz, np.array([step, 0.0, -step])) for seed in range(4))

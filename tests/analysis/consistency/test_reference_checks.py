@@ -75,7 +75,7 @@ def read_of(movement: Movement, axes: int, axis_rad: float) -> ReferenceModel:
 @pytest.mark.proof
 @pytest.mark.parametrize(("axes", "density_ug"), [(6, 150.0), (6, 23.0), (0, 150.0)])
 @pytest.mark.parametrize("arm_rad", [0.0, 5e-4])
-def test_sound_readings_are_beyond_a_limit_as_often_as_it_says(
+def test_sound_readings_exceed_a_limit_with_its_stated_probability(
     axes: int, density_ug: float, arm_rad: float, thorough: bool
 ) -> None:
     """Of a limit for one recording in twenty; a binomial count strays by three standard deviations once in 400."""

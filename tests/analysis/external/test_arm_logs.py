@@ -164,7 +164,7 @@ def test_a_few_wild_rows_do_not_decide_which_rows_are_kept() -> None:
     assert (np.abs(error) < 5 * std).all()
 
 
-def test_turns_about_one_joint_name_the_axes_that_they_do_not_tell() -> None:
+def test_turns_about_one_joint_name_the_axes_that_they_do_not_determine() -> None:
     with pytest.raises(Fault, match=r"rank_deficient|ill_conditioned.*hardly turned about y and z.*about x reads"):
         solved(record(replace(CLEAR, axes=(5,)), 5))
 

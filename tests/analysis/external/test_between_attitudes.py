@@ -264,7 +264,7 @@ def test_a_body_that_turns_about_one_axis_does_not_tell_a_sensor() -> None:
         solved(replace(followed, readings=rates, attitudes=about_z))
 
 
-def test_a_sensor_may_lie_otherwise_than_the_body_if_it_is_said() -> None:
+def test_a_sensor_may_be_mounted_otherwise_than_the_body_if_this_is_stated() -> None:
     followed = follow(HAND, 11)
     over = Rotation.from_euler("xyz", [20, -50, 130], degrees=True).as_matrix()
     turned = replace(followed, readings=followed.readings @ over.T, matrix=over @ followed.matrix)

@@ -66,7 +66,7 @@ def test_a_row_too_coarse_to_show_noise_is_named() -> None:
         average_sweeps(coarse, read_sweeps(EXAMPLES / "sweeps.csv"))
 
 
-def test_half_a_turn_given_as_a_whole_one_is_refused_by_its_row_where_others_tell() -> None:
+def test_half_a_turn_given_as_a_whole_one_is_refused_by_its_row_if_others_contradict_it() -> None:
     whole = read_sweeps(EXAMPLES / "sweeps.csv")
     sweeps = {name: np.concatenate([column[:1], column]) for name, column in whole.items()}
     sweeps["end_s"][0] = sweeps["start_s"][1] = 4.0  # row 1 in two halves

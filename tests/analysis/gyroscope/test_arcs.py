@@ -107,7 +107,7 @@ def test_of_whole_turns_the_encoders_err_by_nothing() -> None:
 
 @pytest.mark.slow
 @pytest.mark.proof
-def test_encoders_that_err_as_stated_fail_nothing_and_ten_times_that_is_told(thorough: bool) -> None:
+def test_encoder_errors_as_stated_fail_nothing_and_ten_times_as_large_ones_are_detected(thorough: bool) -> None:
     """Where cw and ccw pass the same angle, the parts of both sweeps err alike; a bias that drifts does not."""
     kind = KINDS["quiet LSM9DS1"]
     for seed in range(700, 720 if thorough else 702):

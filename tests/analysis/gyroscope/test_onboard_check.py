@@ -159,7 +159,7 @@ def test_a_board_that_averages_other_samples_than_it_says_fails(run: RunData) ->
 
 
 @pytest.mark.slow
-def test_a_sweep_the_board_missed_is_told(run: RunData) -> None:
+def test_a_sweep_that_the_board_missed_is_reported(run: RunData) -> None:
     missed = BoardNotObserved("gyro", 5, "not_kept: too late")
     unsolved = solved((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), "too_few_observations", sweeps=5)
     events: list[Event] = [*observed(run, range(5)), missed, unsolved]

@@ -61,7 +61,7 @@ def test_a_bias_is_that_at_rest_whatever_is_even_in_the_sensors_curve_which_is_n
     assert (expanded < 1.1 * expanded_straight).all()
 
 
-def test_the_budget_names_what_the_data_sheet_says() -> None:
+def test_the_budget_names_what_the_data_sheet_states() -> None:
     known = [contributor for contributor in stated(solved(ODD)).contributors if contributor.half_width is not None]
     lines = {each.name: f"{each.half_width:.4g} {each.unit}" for each in known}
     assert lines["nonlinearity"] == "0.1 % of full scale"
@@ -69,7 +69,7 @@ def test_the_budget_names_what_the_data_sheet_says() -> None:
 
 
 @pytest.mark.thorough
-def test_several_speeds_find_the_nonlinearity_whatever_the_data_sheet_says() -> None:
+def test_several_speeds_determine_the_nonlinearity_for_any_data_sheet() -> None:
     several = replace(ODD, procedure=(("speeds_deg_s", "[30, 60, 120]"),))
     assert "nonlinearity" not in {contributor.name for contributor in stated(solved(several)).contributors}
 

@@ -37,7 +37,7 @@ def test_a_servo_calibrates_what_is_on_a_port_of_its_own(source: str) -> None:
 @pytest.mark.thorough
 @pytest.mark.timeout(3000)
 @pytest.mark.parametrize("source", SOURCES)
-def test_errors_on_a_servo_are_as_large_as_is_said(source: str) -> None:
+def test_errors_on_a_servo_are_as_large_as_stated(source: str) -> None:
     """Each with an encoder ±1.3° out, ripple, play and an adapter a degree off, as with a board."""
     in_u = np.array([off(SOURCES[source], seed) for seed in range(6)])
     scale, bias = (float(np.sqrt(np.mean(np.square(each)))) for each in np.hsplit(in_u, 2))

@@ -40,7 +40,7 @@ def solved(setup: Setup, seed: int, off_deg: Array) -> tuple[Array, Budget, tupl
 @pytest.mark.thorough
 @pytest.mark.slow
 @pytest.mark.proof
-def test_three_mountings_tell_the_scale_as_well_as_their_budget_says(thorough: bool) -> None:
+def test_three_mountings_determine_the_scale_as_well_as_their_budget_states(thorough: bool) -> None:
     ratios = []
     for seed in SEEDS if thorough else FEW:
         error, budget, _ = solved(stage_setup(Setup()), seed, np.random.default_rng(seed).uniform(-1, 1, (3, 3)))

@@ -15,7 +15,7 @@ SETUP = Setup(noise_rad_s=0.005)
 @pytest.mark.one_in(2)  # earlier than the first, and while it was recorded
 @pytest.mark.slow
 @pytest.mark.parametrize("later_s", [-3600, 0, 20, 7200])
-def test_a_resumed_recording_begins_after_the_last_one_ended_whatever_the_computers_clock_says(later_s: int) -> None:
+def test_a_resumed_recording_begins_after_the_last_one_ended_for_any_time_of_the_computer(later_s: int) -> None:
     """The clock may have been set, and an accelerated laboratory's minutes are a computer's seconds."""
     first, again = synthetic_run(SETUP), synthetic_run(replace(SETUP, seed=2))
     started = datetime.fromisoformat(first.provenance.started_utc) + timedelta(seconds=later_s)

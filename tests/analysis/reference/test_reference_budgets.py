@@ -169,7 +169,7 @@ def test_the_readings_tell_how_much_of_what_an_arm_is_off_by_is_new_in_each_dwel
     assert 0.5 < np.sqrt(np.mean(np.square(off))) < 1.5  # of 18 values, which scatter by 0.17
 
 
-def test_how_far_a_sensor_bends_is_in_its_budget_where_attitudes_do_not_tell() -> None:
+def test_nonlinearity_is_in_the_budget_if_attitudes_do_not_determine_it() -> None:
     """Named lines make up the whole; what a data sheet bounds is of type B, and known by more than its half-width."""
     session = drawn_accelerations.drawn("adis16465", 0)
     solution, budget, _ = drawn_accelerations.solve_session(session)
@@ -196,7 +196,7 @@ def test_a_quiet_sensor_s_flicker_and_what_its_thermometer_hides_are_in_its_budg
     assert np.all(budget.std_of("bias over temperature")[3:] > 0)
 
 
-def test_a_sheet_is_what_the_recording_says() -> None:
+def test_a_data_sheet_is_that_of_the_recording() -> None:
     recording = open_run(RECORDINGS / "imu").movement[0]
     known, sensor = recording.settings.uncertainty, recording.sensors["gyro"]
     range_m_s2 = sensor.channel(ACCELERATION).range
@@ -222,7 +222,7 @@ def test_the_size_of_the_reference_is_the_scale_s_alone(
     np.testing.assert_array_equal(budget.std_of(size)[3:], 0)
 
 
-def test_what_nobody_has_stated_is_assumed_and_said() -> None:
+def test_an_unstated_value_is_assumed_and_reported() -> None:
     unstated = replace(SITE, gravity_expanded_m_s2=None, magnetic_field_expanded_t=None)
     known, standard = accelerometer(0, unstated)[1], accelerometer(0, replace(unstated, gravity_m_s2=9.80665))[1]
     field = magnetometer(0, unstated)[1]

@@ -39,7 +39,7 @@ def test_a_history_that_is_not_there_yet_is_an_empty_one_and_is_not_made(place: 
     assert known.calibrations == () and known.silent is None and not Path(place).exists()
 
 
-def test_a_run_does_not_depend_on_what_the_history_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_run_does_not_depend_on_the_history_s_answer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "history.sqlite").write_text("no database", encoding="utf-8")
     for said, words in ((str(tmp_path / "history.sqlite"), "the history is silent"), ("off", "the history is off")):
         monkeypatch.setenv("RIG_HISTORY", said)

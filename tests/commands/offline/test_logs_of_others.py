@@ -216,7 +216,7 @@ def test_a_gentle_turn_that_cancels_the_bias_is_no_rest(
 
 
 @pytest.mark.slow
-def test_turns_that_count_by_their_mean_speed_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_turns_that_count_by_their_mean_speed_are_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     log = turn_slowly(0.35, np.array([0.02, 0.01, -0.005]))
     cut = log.rows.copy()
     cut[2, 0] += 6.0  # begins in mid-turn

@@ -92,7 +92,7 @@ def test_an_accelerometer_shows_the_units_of_both(tmp_path: Path) -> None:
     assert guess.samples["x_m_s2"] == {"column": 5, "unit": "g", "lsb_per_unit": 8192}
 
 
-def test_a_unit_that_gravity_contradicts_is_told(tmp_path: Path) -> None:
+def test_a_unit_that_gravity_contradicts_is_reported(tmp_path: Path) -> None:
     log = make_log()
     columns = [1e-3 * log.time_ms, *log.rates_deg_s.T, *(9.80665 * log.forces_g).T]
     path = write(tmp_path / "log.csv", "t,gx [dps],gy [dps],gz [dps],ax [g],ay [g],az [g]", columns)

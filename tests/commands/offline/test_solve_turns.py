@@ -65,7 +65,7 @@ def test_a_rest_that_creeps_is_counted_with_its_time(tmp_path: Path, capsys: pyt
 
 
 @pytest.mark.slow
-def test_what_nothing_shows_must_be_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_no_reading_shows_must_be_stated(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     samples = write(tmp_path / "samples.csv", handle(TWELVE, 1), level=False)
     assert "clock_unknown" in refused(capsys, samples, "--turns")
     assert "first_face_not_told" in refused(capsys, samples, *CLOCK)

@@ -64,7 +64,7 @@ def test_coning_leaves_nothing_behind() -> None:
 
 
 @pytest.mark.parametrize("parameter", range(12))
-def test_the_jacobian_is_what_differences_say(parameter: int) -> None:
+def test_the_jacobian_equals_finite_differences(parameter: int) -> None:
     time_s = np.arange(601) / 200
     readings = tumbling(time_s)[1] @ MATRIX.T + BIAS
     windows = np.array([[0.101, 0.607], [0.4, 2.9999], [1.0, 1.0]])
@@ -90,7 +90,7 @@ def test_blocks_of_a_long_recording_join(monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 @pytest.mark.slow
-def test_noise_and_a_walking_bias_scatter_as_theory_says() -> None:
+def test_noise_and_a_bias_random_walk_scatter_as_predicted() -> None:
     """Angle random walk N: N² T; a bias that is right at the start and walks by K: K² T³/3."""
     rng = np.random.default_rng(5)
     time_s, rate_hz = np.arange(401) / 200, 200

@@ -99,7 +99,7 @@ def errors(arm: Arm, std: float, method: Method, runs: int, joints: Array = JOIN
         pytest.param(geometry(1e-3), ADIS_3_S, 15, id="ADIS16465, geometry"),
     ],
 )
-def test_an_arm_that_errs_by_a_milliradian_costs_little_and_is_told(arm: Arm, std: float, better: float) -> None:
+def test_an_arm_that_errs_by_a_milliradian_costs_little_and_is_reported(arm: Arm, std: float, better: float) -> None:
     """TRIAX weighs all directions alike, and no dwell however long helps it."""
     published, weighted = (errors(arm, std, method, 30) for method in ("as_published", "attitude_weighted"))
     assert weighted.scale * better < published.scale and weighted.bias * better < published.bias

@@ -227,7 +227,9 @@ def test_an_exact_arm_reaches_the_bound(design: Design, part: str) -> None:
 @pytest.mark.thorough
 @pytest.mark.parametrize(("part", "limit"), [("MPU-9250", 90.0), ("ADIS16465", 8.0), ("LSM9DS1", 60.0)])
 @pytest.mark.parametrize("design", [SIX_AND_REST, TWELVE_AND_REST])
-def test_an_arm_that_errs_by_a_milliradian_costs_little_and_is_told(design: Design, part: str, limit: float) -> None:
+def test_an_arm_that_errs_by_a_milliradian_costs_little_and_is_reported(
+    design: Design, part: str, limit: float
+) -> None:
     crooked = errors(design, 1e-3, part, RUNS)
     assert crooked.rms[0] < limit and crooked.rms[2] < limit
     assert (crooked.over_stated > 0.8).all() and (crooked.over_stated < 1.3).all()

@@ -76,7 +76,7 @@ def test_random_walk_from_an_hour_is_within_three_of_its_standard_deviations() -
 
 
 @pytest.mark.slow
-def test_the_bounds_hold_the_truth_as_often_as_they_say() -> None:
+def test_the_bounds_contain_the_truth_with_their_stated_probability() -> None:
     """White noise of ten minutes, at every τ that it tells."""
     hits = []
     for seed in range(15):

@@ -20,7 +20,7 @@ def test_freedom_is_cut_to_the_next_lower_whole_number() -> None:
     assert few == more > nearly == coverage_factors([6.0])
 
 
-def test_an_interval_with_few_degrees_of_freedom_holds_the_true_value_as_often_as_it_says() -> None:
+def test_an_interval_with_few_degrees_of_freedom_contains_the_true_value_with_its_stated_probability() -> None:
     rng = np.random.default_rng(1)
     for count in (3, 6, 27):
         readings = rng.normal(size=(40_000, count))

@@ -159,7 +159,7 @@ def test_block_data_update_holds_for_accelerations_too() -> None:
     assert integers(driver.get(OUT_XL, 6), "<")[1] == 11 * 0x101 - 1
 
 
-def test_writing_its_control_register_leaves_the_accelerometer_alone_until_the_gyroscope_is_told() -> None:
+def test_writing_its_control_register_does_not_affect_the_accelerometer_until_the_gyroscope_is_set() -> None:
     driver = accelerating()
     driver.set(CTRL_REG6_XL, RATES[238.0] << 5)
     assert driver.part.next_event_s == math.inf

@@ -146,7 +146,7 @@ def test_non_orthogonal_axes_pick_up_their_neighbours(part: DataSheet) -> None:
 
 
 @every_part
-def test_noise_is_white_and_as_strong_as_told(part: DataSheet) -> None:
+def test_noise_is_white_and_as_strong_as_configured(part: DataSheet) -> None:
     noise_rad_s, count = 0.035, 3000
     driver = part.driver(truth=GyroTruth(noise_rad_s=noise_rad_s), seed=3)
     readings = counts(driver, count) * part.per_count_rad_s()

@@ -64,7 +64,7 @@ def test_a_reading_is_late_by_the_delay() -> None:
     assert late.read(1.0)[0] == pytest.approx(0.997 * G_M_S2)
 
 
-def test_noise_is_as_strong_as_told() -> None:
+def test_noise_is_as_strong_as_configured() -> None:
     times_s = np.arange(3000) / 200.0
     noisy = accelerations(AccelerometerTruth(noise_m_s2=0.05), times_s, np.zeros((3000, 3)), 3)
     assert noisy.std(axis=0) == pytest.approx(0.05, rel=4 / np.sqrt(6000))

@@ -113,7 +113,7 @@ def test_a_stream_that_stops_takes_the_heater_with_it(heated: HeatedBoard) -> No
     assert heated.power == 0
 
 
-def test_the_hottest_of_several_parts_counts_and_each_must_tell() -> None:
+def test_the_hottest_of_several_parts_counts_and_each_must_have_a_temperature() -> None:
     board = HostBoard()
     numbers = {name: number for number, name in enumerate(board.parts)}
     for name, rate_hz, range_deg_s in (("lsm9ds1", 238, 245), ("mpu9250", 200, 250)):

@@ -39,7 +39,7 @@ def test_beside_a_servos_lines_the_noise_is_that_of_the_gyroscope_alone() -> Non
 
 @pytest.mark.slow
 @pytest.mark.proof
-def test_a_servos_speed_is_as_well_known_as_is_said(thorough: bool) -> None:
+def test_a_servos_speed_is_as_accurate_as_stated(thorough: bool) -> None:
     """What its encoder sees of the lines is how single readings scatter: ten times as much as a turn's time is out."""
     off = []
     for turn, shaft in [turn for seed in range(SEEDS if thorough else FEW) for turn in turns(seed)]:

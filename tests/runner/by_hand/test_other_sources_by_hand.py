@@ -128,7 +128,7 @@ def test_what_tells_its_own_time_is_calibrated_by_hand(source: str, tmp_path: Pa
 @pytest.mark.thorough
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("source", SOURCES)
-def test_by_hand_errors_are_as_large_as_is_said(source: str, tmp_path: Path) -> None:
+def test_by_hand_errors_are_as_large_as_stated(source: str, tmp_path: Path) -> None:
     """The sensors stand for all: each clock, and each way of bending, is of another twelfth of its distribution."""
     name, _, clock = SOURCES[source]
     shares = (np.arange(SEEDS) + 0.5) / SEEDS

@@ -72,7 +72,7 @@ def test_its_noise_is_what_its_errors_are(tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.thorough
-def test_a_time_by_arrival_costs_what_the_budget_says(tmp_path: Path) -> None:
+def test_arrival_times_cost_as_much_as_the_budget_states(tmp_path: Path) -> None:
     """The laboratory goes at the computer's pace, for its clock is the sensor's: a busy computer cannot tell."""
     columns = ["-", "gx", "gy", "gz", "ax", "ay", "az", "temperature"]
     lines = {"columns": columns, "time": None, "clock": "arrival", "jitter_ms": JITTER_MS}

@@ -70,7 +70,7 @@ def test_a_turn_that_is_felt_as_the_stage_says_is_none_to_refuse() -> None:
         (2, 1.0, "reads .* of 10.0°"),
     ],
 )
-def test_another_axis_another_sign_and_hardly_a_turn_are_told(about: int, angle_deg: float, words: str) -> None:
+def test_another_axis_another_sign_and_hardly_a_turn_are_detected(about: int, angle_deg: float, words: str) -> None:
     with pytest.raises(Fault, match=words) as refused:
         refuse_turning_otherwise(
             reading(turning(about, angle_deg)), np.full(3, 0.1), NOMINAL, np.radians([10.0, 0, 0]), "trial of wrist_1"

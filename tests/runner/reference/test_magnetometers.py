@@ -184,7 +184,7 @@ def test_one_run_calibrates_gyroscope_and_accelerometer(finished: tuple[Path, di
     assert np.abs(turned).max() < np.radians(0.3) and "rotation against its gyroscope" in printed
 
 
-def test_the_header_corrects_readings_as_the_result_says(
+def test_the_header_corrects_readings_as_the_result_does(
     finished: tuple[Path, dict[str, Any], str], tmp_path: Path
 ) -> None:
     """By a C compiler; the force comes out in the frame of the corrected rates."""

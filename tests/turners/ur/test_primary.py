@@ -111,7 +111,7 @@ def test_what_one_package_tells_holds_without_the_other() -> None:
 
 
 @pytest.mark.slow
-def test_an_arm_that_no_number_describes_is_not_told() -> None:
+def test_an_arm_that_no_number_describes_is_not_reported() -> None:
     nowhere = replace(UR3E, limits=replace(UR3E.limits, speed_rad_s=(float("nan"),) * 6))
     with saying(package(16, configuration(nowhere) + configuration(UR3E)[:100])):
         assert read_description(HOST, 0.3) == ArmDescription()

@@ -58,7 +58,7 @@ class StatePacket:
 
 
 class NotSupported(ConnectionError):
-    """A controller that answers, but does not support the requested item `what`; `version` of its software."""
+    """A controller that answers, but does not support the requested item `what`; `version`: of its software."""
 
     def __init__(self, what: str, version: tuple[int, ...]) -> None:
         super().__init__(f"it does not know {what}")
