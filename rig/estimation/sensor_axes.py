@@ -12,6 +12,9 @@ from rig.estimation.arrays import Array, scale_of
 # The pairs y z, z x, x y; the angle of each is that about the third axis.
 FIRST, SECOND = np.array([1, 2, 0]), np.array([2, 0, 1])
 PAIR = np.arange(3)
+# The other axis of pair p for axis i, as [p, i]; and whether i is the second (1) or first (−1) of the pair, or not in it.
+OTHER = -(PAIR[:, None] + PAIR) % 3
+ORDER = np.roll(np.eye(3), -1, axis=1) - np.roll(np.eye(3), 1, axis=1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,13 +88,10 @@ def angle_jacobian(axes: Array, scale: Array, rotation: Array) -> Array:
     − Mᵀ, M = δA Rᵀ.
     """
     project = scale[:, None, None] * (np.eye(3) - axes[:, :, None] * axes[:, None, :])
-    against_axes, against_mounting = project @ axes.T, project @ rotation.T  # [i, :, j] = P_i a_j and P_i r_j
     stretch = axes @ rotation.T
-    cosines = np.sqrt(1 - (axes @ axes.T)[FIRST, SECOND] ** 2)[:, None]
-    sines, axial = np.zeros((3, 3, 3)), np.zeros((3, 3, 3))  # pair, row of F, element
-    sines[PAIR, FIRST] = against_axes[FIRST, :, SECOND] / cosines
-    sines[PAIR, SECOND] = against_axes[SECOND, :, FIRST] / cosines
-    axial[PAIR, SECOND] = against_mounting[SECOND, :, FIRST]
-    axial[PAIR, FIRST] = -against_mounting[FIRST, :, SECOND]
-    turns = np.linalg.solve(np.trace(stretch) * np.eye(3) - stretch, axial.reshape(3, 9))
+    cosines = np.sqrt(1 - (axes @ axes.T)[FIRST, SECOND] ** 2)
+    # P_i a_j and P_i r_j of the two axes of each pair: pair, row of F, element
+    sines = (axes @ project)[PAIR, OTHER] * (np.abs(ORDER) / cosines[:, None])[..., None]
+    axial = (rotation @ project)[PAIR, OTHER] * ORDER[..., None]
+    turns = np.linalg.solve(stretch.trace() * np.eye(3) - stretch, axial.reshape(3, 9))
     return np.concatenate([sines.reshape(3, 9), turns])

@@ -213,11 +213,9 @@ def design_matrix(rates: Array, gravity: Array | None) -> Array:
 
 def _unit(design: Array) -> Array:
     """Return the size (p,) of each block of columns. Divided by it, blocks are comparable, and a missing axis shows."""
-    unit = np.ones(design.shape[1])
-    squares = np.einsum("np,np->p", design, design)
-    for block in (slice(0, 3), slice(4, None)):
-        unit[block] = (float(squares[block].sum()) / len(design)) ** 0.5 or 1.0
-    return unit
+    squares = np.einsum("np,np->p", design, design).tolist()
+    of_rates, of_gravity = ((sum(squares[block]) / len(design)) ** 0.5 or 1.0 for block in (slice(0, 3), slice(4, 7)))
+    return np.array([*[of_rates] * 3, 1.0, *[of_gravity] * len(squares[4:])])
 
 
 def regress(design: Array, means: Array, variances: Array, shared: Array | None = None) -> tuple[Array, Array]:
