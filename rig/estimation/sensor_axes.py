@@ -12,7 +12,7 @@ from rig.estimation.arrays import Array, scale_of
 # The pairs y z, z x, x y; the angle of each is that about the third axis.
 FIRST, SECOND = np.array([1, 2, 0]), np.array([2, 0, 1])
 PAIR = np.arange(3)
-# The other axis of pair p for axis i, as [p, i]; and whether i is the second (1) or first (−1) of the pair, or not in it.
+# The other axis of pair p for axis i, as [p, i]; whether i is the second (1), the first (−1), or not in the pair (0).
 OTHER = -(PAIR[:, None] + PAIR) % 3
 ORDER = np.roll(np.eye(3), -1, axis=1) - np.roll(np.eye(3), 1, axis=1)
 

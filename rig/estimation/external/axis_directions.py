@@ -18,7 +18,7 @@ PRIOR_MEDIAN = 5e-3  # rad: of the half-Cauchy prior of the inclinations' standa
 REACH = 0.5  # sine of the angle between two axes: those within about this angle are inclined alike
 RATIOS = np.geomspace(1e-6, 20, 120)  # of the inclinations' size to its prior's median: none exceeds 0.1 rad
 EXPLAINED = 0.05  # of the greatest response's size: smaller ones are the noise of the axes
-LEAST_IDENTIFIED = 1e-3  # of the information: F imitates an inclination of which the residuals contain less
+LEAST_IDENTIFIED = 0.05  # of the information: F imitates an inclination of which the residuals contain less
 LEAST_RAD2 = 1e-14  # of a fix's squared rotations: rounding
 
 
@@ -36,49 +36,44 @@ class Inclinations:
     def widen(self, model: MixedModel, std: Array, fit: MixedFit, wanted: Array, variances: Array) -> Array:
         """Return the covariance (q, q) that inclinations add to `wanted` (q, p) combinations of θ.
 
-        `variances` (q,) are those of all other errors. With both, 2 u is the half-width of the 95.45 % interval.
-        """
-        response = wanted @ self.propagate(model, std, fit)
-        added = np.sum(response**2, axis=1)
-        mixture = variances + np.square(self.prior_median_rad * RATIOS)[:, None] * added
-        half_width = find_half_width(np.zeros_like(mixture), mixture, self.weigh_sizes(model, std, fit))
-        size = np.sqrt(np.maximum(half_width**2 / 4 - variances, 0.0) / np.maximum(added, np.finfo(float).tiny))
-        return np.asarray(size[:, None] * (response @ response.T) * size, dtype=np.float64)
-
-    def propagate(self, model: MixedModel, std: Array, fit: MixedFit) -> Array:
-        """Return the response (p, r) of θ to the inclinations, by a fit whose errors have standard deviations (k,)."""
-        from scipy.linalg import cho_factor, cho_solve
-
-        factor = cho_factor(model.covariance(std), lower=True)
-        response: Array = fit.covariance @ model.mixed.design.T @ cho_solve(factor, self.response)
-        return response
-
-    def weigh_sizes(self, model: MixedModel, std: Array, fit: MixedFit) -> Array:
-        """Return the probabilities (j,) of the inclinations' standard deviations, `RATIOS` of the prior's median.
-
-        They are the prior times the restricted likelihood of the residuals, with the standard deviations (k,) of all
-        other errors fixed. In the eigenvectors of the information Hᵀ P H on the inclinations it is a product.
+        Only those count that the residuals do not show: the model's other errors contain the effect of all others.
+        `variances` (q,) are due to these other errors, which have the standard deviations `std` (k,). With both, 2 u is
+        the half-width of the 95.45 % interval.
         """
         from scipy.linalg import cho_factor, cho_solve
 
-        factor = cho_factor(model.covariance(std), lower=True)
+        factor, design = cho_factor(model.covariance(std), lower=True), model.mixed.design
         weighted = cho_solve(factor, self.response)
-        absorbed = weighted - cho_solve(factor, model.mixed.design) @ (
-            fit.covariance @ (model.mixed.design.T @ weighted)
-        )
-        information = self.response.T @ absorbed
+        onto_theta = fit.covariance @ (design.T @ weighted)
+        unexplained = weighted - cho_solve(factor, design) @ onto_theta  # P H, with P of the restricted likelihood
+        information = self.response.T @ unexplained
         values, directions = np.linalg.eigh((information + information.T) / 2)
         whole = np.einsum("ij,ik,kj->j", directions, self.response.T @ weighted, directions)
         identified = values > LEAST_IDENTIFIED * whole
-        values, directions = values[identified], directions[:, identified]
-        scores = directions.T @ (absorbed.T @ model.mixed.observed)
-        variances = np.square(self.prior_median_rad * RATIOS)[:, None]
-        ratio = 1 + variances * values
-        likelihood = 0.5 * np.sum(variances * scores**2 / ratio - np.log(ratio), axis=1)
-        relative = np.log(RATIOS)
-        logarithms = likelihood + relative - np.logaddexp(0, 2 * relative)
-        probabilities = np.exp(logarithms - logarithms.max())
-        return np.asarray(probabilities / probabilities.sum(), dtype=np.float64)
+        scores = directions.T @ (unexplained.T @ model.mixed.observed)
+        sizes_rad = self.prior_median_rad * RATIOS
+        probabilities = _weigh_sizes(sizes_rad, values[identified], scores[identified])
+        response = wanted @ onto_theta @ directions[:, ~identified]
+        added = np.sum(response**2, axis=1)
+        mixture = variances + np.square(sizes_rad)[:, None] * added
+        half_width = find_half_width(np.zeros_like(mixture), mixture, probabilities)
+        size = np.sqrt(np.maximum(half_width**2 / 4 - variances, 0.0) / np.maximum(added, np.finfo(float).tiny))
+        return np.asarray(size[:, None] * (response @ response.T) * size, dtype=np.float64)
+
+
+def _weigh_sizes(sizes_rad: Array, values: Array, scores: Array) -> Array:
+    """Return the probabilities (j,) of the inclinations' standard deviations: prior times restricted likelihood.
+
+    In the eigenvectors of the information Hᵀ P H on the inclinations the likelihood is a product, of factors with an
+    eigenvalue of `values` (r,) and one of the residuals' `scores` (r,). All other errors keep their sizes.
+    """
+    variances = np.square(sizes_rad)[:, None]
+    ratio = 1 + variances * values
+    likelihood = 0.5 * np.sum(variances * scores**2 / ratio - np.log(ratio), axis=1)
+    relative = np.log(RATIOS)
+    logarithms = likelihood + relative - np.logaddexp(0, 2 * relative)
+    probabilities = np.exp(logarithms - logarithms.max())
+    return np.asarray(probabilities / probabilities.sum(), dtype=np.float64)
 
 
 def find_inclinations(averaged: FixedAttitudes, fixes: Fixes, matrix: Array) -> Inclinations:
