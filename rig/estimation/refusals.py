@@ -26,6 +26,10 @@ CONFUSED_ANGLES = (  # ratios of reading to true value if the unit is wrong
         "the readings look like rad/s declared as °/s, or the rates like degrees per second given as rad/s",
     ),
 )
+CONFUSED_RATES = (  # ratios of a table's rates over those of its attitudes
+    (180 / np.pi, "they look like degrees per second given as rad/s"),
+    (np.pi / 180, "they look like rad/s declared as °/s"),
+)
 CONFUSED = (
     *CONFUSED_ANGLES,
     (1 / 9.80665, "the readings look like g given as m/s²"),
@@ -137,17 +141,17 @@ def check_reads(matrix: Array) -> None:
         )
 
 
-def check_unit(scale: Array) -> None:
+def check_unit(scale: Array, confusions: Sequence[tuple[float, str]] = CONFUSED_ANGLES) -> None:
     """Raise Fault `wrong_unit` for a scale factor (3,) above 4 or below 1/4; name the likely unit if there is one."""
     if not is_plausible(scale).all():
         typical = float(np.exp(np.mean(np.log(scale))))
-        raise _wrong_unit(f"the scale factors come out near {typical:.3g}", 1 / typical)
+        raise wrong_unit(f"the scale factors come out near {typical:.3g}", 1 / typical, confusions)
 
 
 def check_reading_ratio(ratio: float, where: str) -> None:
     """Raise Fault `wrong_unit` if readings are more than 4 times, or less than a quarter of, the turn rate."""
     if not is_plausible(ratio).all():
-        raise _wrong_unit(f"in {where} the gyroscope reads {ratio:.3g} times the turn rate", ratio, CONFUSED_ANGLES)
+        raise wrong_unit(f"in {where} the gyroscope reads {ratio:.3g} times the turn rate", ratio, CONFUSED_ANGLES)
 
 
 def is_plausible(ratio: ArrayLike) -> NDArray[np.bool_]:
@@ -156,7 +160,8 @@ def is_plausible(ratio: ArrayLike) -> NDArray[np.bool_]:
     return (ratios < MAX_SCALE) & (ratios > 1 / MAX_SCALE)
 
 
-def _wrong_unit(what: str, ratio: float, confusions: Sequence[tuple[float, str]] = CONFUSED) -> Fault:
+def wrong_unit(what: str, ratio: float, confusions: Sequence[tuple[float, str]]) -> Fault:
+    """Return the error `wrong_unit` for a `ratio`, with the confusion that gives it, if one of `confusions` does."""
     likely = (guess for confused, guess in confusions if 0.7 < ratio / confused < 1.4)
     return Fault(
         "wrong_unit",

@@ -12,7 +12,7 @@ from rig.analysis.estimator_names import ESTIMATORS, Estimator, choose_estimator
 from rig.analysis.external.attitudes import InAttitudes, Result, find_method, solve_placed
 from rig.analysis.external.bias_of_sweeps import check_bias_steady, widen_bias
 from rig.analysis.external.increment_calibration import InIncrements
-from rig.analysis.external.omissions import list_omitted, notes_on_reading, notes_on_turns
+from rig.analysis.external.omissions import list_omitted, notes_on_reading, notes_on_speeds, notes_on_turns
 from rig.analysis.external.sweeps_agree import add_errors, check_agree, noise_dof, sweep_errors
 from rig.analysis.gyroscope.calibration import (
     ALGORITHM_1,
@@ -175,7 +175,8 @@ def _solve_sweeps(read: ReadElsewhere, samples: Samples, name: str | None, refer
     by_turns = data.turned if isinstance(solution, TurnedSolution) else None
     if polynomials is not None:
         gyroscope, polynomials = add_rate_polynomials(gyroscope, polynomials)
-    notes = tuple(notes_on_turns(data, solution)) if chosen in (None, "increments") else ()
+    notes = tuple(notes_on_speeds(data))
+    notes += tuple(notes_on_turns(data, solution)) if chosen in (None, "increments") else ()
     omitted = tuple((RATE, part) for part in data.omitted)
     return OfSensor(read.item, gyroscope, None, {}, {}, by_turns, polynomials=polynomials, omitted=omitted, notes=notes)
 

@@ -2,6 +2,8 @@
 
 from collections.abc import Iterator, Mapping
 
+import numpy as np
+
 from rig.analysis.external.attitudes import InAttitudes, Result
 from rig.analysis.external.increment_calibration import InIncrements
 from rig.analysis.installed_solvers import OfKind
@@ -14,6 +16,9 @@ from rig.observation.external.csv_import import ExternalData
 from rig.observation.external.csv_samples import Samples
 from rig.observation.external.omission import Omitted
 from rig.observation.external.placements import Placements
+from rig.observation.false_readings import OF_MOST
+
+UNUSUAL_RAD_S = OF_MOST * RATE.mistaken.most if RATE.mistaken else np.inf
 
 
 def list_omitted(
@@ -38,6 +43,16 @@ def notes_on_reading(read: ReadElsewhere, samples: Samples) -> Iterator[str]:
         yield f"times count from {read.origin_s} s of the files' clock"
     if read.other_rows:
         yield f"{read.other_rows} rows of the samples do not contain these readings and are left out"
+
+
+def notes_on_speeds(data: ExternalData) -> Iterator[str]:
+    """Yield a note on rates that hardly any gyroscope reads: nothing else shows that both files are in °/s."""
+    fastest = max((sweep.speed_rad_s for sweep in data.sweeps), default=0.0)
+    if fastest > UNUSUAL_RAD_S:
+        yield (
+            f"the sweeps turn at up to {fastest:.4g} rad/s ({np.degrees(fastest):.4g} °/s), faster than most "
+            "gyroscopes can read: if both files are in °/s, name that unit with --columns, for the bias depends on it"
+        )
 
 
 def notes_on_turns(data: ExternalData, solution: Estimate) -> Iterator[str]:

@@ -136,7 +136,7 @@ def solve_imu(
         covariance, response = fit.covariance(), fit.response()
         _check_attitudes(start, movement, fixed, fit)
     f = matrix(fit.theta)
-    refusals.check_unit(scale_of(f))
+    refusals.check_unit(scale_of(f), refusals.CONFUSED)
     refusals.check_handedness(f)
     residuals = movement.readings() - predicted(fit.theta, movement)
     whitened = fit.readings.whitener(fit.std_rad) @ residuals.ravel()

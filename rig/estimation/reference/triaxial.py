@@ -214,7 +214,7 @@ def _check(m: Array, r: Array, v: Array, prior: ReferencePrior, parameters: int)
 def _check_size(m: Array, norm: float) -> None:
     """Raise Fault `wrong_unit` if readings are smaller than the reference, or differ more than attitudes explain."""
     size, spread = (float(np.sqrt(np.mean(np.sum(vectors**2, axis=1)))) for vectors in (m, m - m.mean(axis=0)))
-    refusals.check_unit(np.full(3, norm / np.clip(norm, spread, size)))
+    refusals.check_unit(np.full(3, norm / np.clip(norm, spread, size)), refusals.CONFUSED)
 
 
 def _check_scale(scale: Array, m: Array, prior: ReferencePrior) -> None:
@@ -228,7 +228,7 @@ def _check_scale(scale: Array, m: Array, prior: ReferencePrior) -> None:
             raise refusals.untrustworthy_attitudes(
                 "the readings have the size of the reference, but the attitudes do not fit them with any scale factors"
             )
-    refusals.check_unit(scale)
+    refusals.check_unit(scale, refusals.CONFUSED if isinstance(prior, KnownNorm) else refusals.CONFUSED_ANGLES)
 
 
 def _conditioning(scaled: Array, m: Array, v: Array, needed: int) -> refusals.Conditioning:

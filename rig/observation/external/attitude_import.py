@@ -41,6 +41,7 @@ from rig.observation.external.placement_account import AttitudeRows
 from rig.observation.external.placements import MOSTLY, Placements, find_placements
 from rig.observation.external.reference_clock import check_one_clock, find_reference_clock
 from rig.observation.external.reference_rows import Turning
+from rig.observation.external.table_motion import check_rates_agree
 from rig.observation.formats.column_selection import Mapped
 from rig.observation.formats.csv_table import CsvTable, blank_cell, read_table
 from rig.observation.formats.sample_files import attitudes_in, rows_around
@@ -131,7 +132,7 @@ def placed_by(samples: Samples, table: Mapping[str, Array], *, find_clock: bool 
 
     With `find_clock` the table has a clock of its own, which is estimated, and its rows without samples are left out.
     Raise Refused `bad_quaternion`, `bad_attitude_row`, `overlapping_attitudes`; Fault `clocks_apart`, `lost_samples`,
-    `too_few_observations`, and with `find_clock` those of `find_reference_clock`.
+    `too_few_observations`, `wrong_unit`, and with `find_clock` those of `find_reference_clock`.
     """
     time_s, readings = samples.time_s, samples.readings
     on_arrival = samples.sampling is not None and samples.sampling.on_arrival
@@ -142,6 +143,8 @@ def placed_by(samples: Samples, table: Mapping[str, Array], *, find_clock: bool 
     windows = _windows(table)
     all_rows = rows_found = _ReferenceRows(windows, _rotations(table), rates, _attitude_std(table), numbers)
     clock = None
+    if rates is not None:
+        check_rates_agree(all_rows.rows_s.mean(axis=1), all_rows.attitudes, rates)
     if RATE in readings and not find_clock:
         check_one_clock(
             Turning(time_s, readings[RATE], rows_found.rows_s, rows_found.attitudes, rows_found.std_rad), rates

@@ -53,9 +53,9 @@ STD_COLUMNS = ("angle_std_rad", "axis_std_rad")
 MIN_DURATION_S = 1e-3  # the fewest samples take longer at any data rate
 # Cosine between two axes, and between their readings; least reading relative to a sweep's speed.
 SAME_AXIS, OPPOSITE, SENSED = 0.9, -0.5, 0.25
-ROUNDING = 1e-12  # scatter relative to the mean, below which there is none
-LEAST_MOTION = 1e-9  # rad or rad/s: a smaller motion is no sweep, and its square might be 0
-SWEEPS_MB = 1  # enough for some ten thousand sweeps
+ROUNDING = 1e-12  # of a mean: scatter that is none
+LEAST_MOTION = 1e-9  # rad or rad/s: no sweep, and its square might be 0
+SWEEPS_MB = 1  # some ten thousand sweeps
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,11 +180,19 @@ def _list_omitted(rows: Sequence[RowGaps], windows: Sequence[Window]) -> Iterato
 
 
 def _speeds(sweeps: Mapping[str, Array]) -> Array:
-    """Return mean speeds (k,) from the column that is present: speed, or angle. Raise Refused `bad_sweep`."""
+    """Return mean speeds (k,) from the column of speeds or angles. Raise Refused `bad_sweep`, `wrong_unit`."""
     durations = sweeps["end_s"] - sweeps["start_s"]
     by_angle = "angle_rad" in sweeps
     motion = sweeps["angle_rad" if by_angle else "speed_rad_s"]
     norms = np.linalg.norm(np.column_stack([sweeps[name] for name in AXIS_COLUMNS]), axis=1)
+    if by_angle and (moved_rad := motion[motion > 0]).any() and not (moved_rad % QUARTER_DEG).any():
+        raise Refused(
+            "wrong_unit",
+            f"angle_rad is {moved_rad[0]:g} in row {int(np.argmax(motion > 0)) + 1}, and a whole multiple of "
+            f"{QUARTER_DEG:g} in every row: these are degrees",
+            "Give radians, or name the column's unit with --columns (unit: deg); of a turn of so many radians give "
+            "speed_rad_s",
+        )
     for row, (duration, moved, norm) in enumerate(zip(durations, motion, norms, strict=True), start=1):
         what = None
         if duration <= 0:

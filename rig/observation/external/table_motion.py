@@ -4,8 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.errors import Fault
-from rig.estimation.arrays import Array, rotation_vectors
+from rig.estimation.arrays import Array, integrate_rates, rotation_vectors
 from rig.estimation.cubic_spline import CubicSpline
+from rig.estimation.refusals import CONFUSED_RATES, is_plausible, wrong_unit
 from rig.observation.motion.reference_motion import MIN_RATE_RAD_S, closely_followed
 
 # Longest step and largest angle between rows that show how the table turned: below half a turn.
@@ -53,6 +54,34 @@ class TableMotion:
     def covered(self, time_s: Array) -> NDArray[np.bool_]:
         """Return whether the table's motion is recorded at times (n,), as `KnownMotion` defines it."""
         return closely_followed(self.time_s, self._close, time_s)
+
+
+def check_rates_agree(middles_s: Array, attitudes: Array, rates_rad_s: Array) -> None:
+    """Raise Fault `wrong_unit` if a table's rates (N, 3) are some times what its attitudes (N, 3, 3) turn.
+
+    Each row holds at its middle (N,). A solution by rates alone would not show that they are in another unit, if the
+    readings are in the same.
+    """
+    order = np.argsort(middles_s)
+    time_s, rates = middles_s[order], rates_rad_s[order]
+    later = np.maximum(np.searchsorted(time_s, time_s + COMPARED_S), np.arange(len(time_s)) + 1)
+    first = np.flatnonzero(later < len(time_s))
+    last = later[first]
+    first, last = (rows[time_s[last] - time_s[first] <= 2 * MAX_STEP_S] for rows in (first, last))
+    swept = integrate_rates(time_s, rates)
+    stated_rad = np.linalg.norm(swept[last] - swept[first], axis=1)
+    turned = rotation_vectors(np.swapaxes(attitudes[order[first]], -1, -2) @ attitudes[order[last]])
+    turned_rad = np.linalg.norm(turned, axis=1)
+    moving = (turned_rad > LEAST_RAD) & (turned_rad < MAX_STEP_RAD)
+    if moving.sum() < FEWEST_PAIRS:
+        return
+    ratios = stated_rad[moving] / turned_rad[moving]
+    ratio = float(np.median(ratios))
+    if is_plausible(ratio).all() or np.mean(np.abs(ratios - ratio) < ALIKE * ratio) < MOST_PAIRS:
+        return
+    slowest_rad, fastest_rad = np.quantile(turned_rad[moving], (0.1, 0.9))
+    if ratio < 1 or fastest_rad > VARIED * slowest_rad or abs(ratio / DEGREES - 1) < NEARLY:
+        raise wrong_unit(f"the table's rates are {ratio:.3g} times what its attitudes turn", ratio, CONFUSED_RATES)
 
 
 def _thin(time_s: Array) -> NDArray[np.intp]:

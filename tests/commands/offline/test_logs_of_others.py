@@ -3,6 +3,7 @@
 import gzip
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -442,3 +443,12 @@ def test_an_option_for_logs_of_others_is_not_ignored_with_a_run(
 def test_readings_of_the_future_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     files = [DOCS / "examples" / "samples.csv", "--sweeps", DOCS / "examples" / "sweeps.csv"]
     assert "bad_option: --recorded is 2999-01-01" in refused(capsys, *files, "--recorded", "2999-01-01")
+
+
+@pytest.mark.slow
+def test_a_rate_that_few_gyroscopes_read_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log = swept(50)
+    rows = log.rows * [1, 1, 1, 1, 1, np.degrees(1)]
+    samples, sweeps = write_rates(tmp_path, replace(log, readings=np.degrees(log.readings), rows=rows))
+    said = in_brief(capsys, samples, "--sweeps", sweeps)
+    assert "the sweeps turn at up to 90 rad/s (5157 °/s), faster than most gyroscopes can read: if both files" in said
