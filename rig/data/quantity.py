@@ -31,6 +31,11 @@ class Mistaken:
     mend: str
     most: float
 
+    @property
+    def unusual(self) -> float:
+        """More than most parts read, in SI."""
+        return self.most / 10
+
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
@@ -194,6 +199,7 @@ FIELD: Final = Quantity(
 OF_THE_RIG: Final = (RATE, ACCELERATION, FIELD)
 TEMPERATURE: Final = Scalar("temperature", "thermometer", "°C", "c", DisplayUnit("°C", 1.0))
 PRESSURE: Final = Scalar("pressure", "barometer", "Pa", "pa", DisplayUnit("hPa", 100.0))
+COLDEST_C, HOTTEST_C = -273.15, 200.0  # of a part with a thermometer that survives; kelvins and counts are beyond
 SCALARS: Final = (TEMPERATURE, PRESSURE)
 
 

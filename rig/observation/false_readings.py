@@ -6,20 +6,19 @@ They are a logger's mark of a missing value, an axis that is frozen, or the end 
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.data.quantity import ACCELERATION, RATE, Quantity
+from rig.data.quantity import ACCELERATION, COLDEST_C, HOTTEST_C, RATE, Quantity
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array, equal_runs
 from rig.observation.windows import Window, inside
 
 OF_MOST = 0.1  # fraction of the largest reading that any part has: beyond most parts' range
-BEYOND, USUAL = 20.0, 0.99  # ratio to the largest of the usual readings; the fraction of readings that are usual
-CLIPPED, CLIPPED_RAD_S = 4, 1.0  # equal readings in a row at the end of an axis' range; least range of the readings
-FINE = 0.5  # largest step of the readings relative to their noise, for which equal readings are no chance
+BEYOND, USUAL = 20.0, 0.99  # times the largest of the usual readings, which are this fraction
+CLIPPED, CLIPPED_RAD_S = 4, 1.0  # equal readings in a row at the end of an axis' readings; least range of these
+FINE = 0.5  # of the noise: steps of readings below it, so that equal ones are no chance
 GAP = 1.5  # intervals: no reading is missing
 FROZEN, COARSE = 50, 10  # equal readings in a row; if more than so many occur a second time, the axis is coarse
 TURNED_RAD_S = 0.2  # change of another axis during them
 INNER = (0.05, 0.95)  # quantiles: single readings count for nothing
-COLDEST_C, HOTTEST_C = -273.15, 1000.0
 NO_JUMP, SMOOTH = 0.8, 0.25  # of an axis' span: a jump over its end is larger, and all other steps are smaller
 SYMMETRIC = 0.1  # of the span: the ends of a signed counter differ from each other's negative by less
 FINEST_SPAN = 100  # steps of the readings: a coarse axis that toggles has fewer
@@ -37,7 +36,7 @@ def check_possible(readings: Array, rows: NDArray[np.intp], quantity: Quantity, 
     if quantity.mistaken is None or not len(readings):
         return
     sizes = np.abs(readings).max(axis=1)
-    limit = max(OF_MOST * quantity.mistaken.most, BEYOND * float(np.quantile(sizes, USUAL, method="lower")))
+    limit = max(quantity.mistaken.unusual, BEYOND * float(np.quantile(sizes, USUAL, method="lower")))
     wrong = np.flatnonzero(sizes > limit)
     if len(wrong):
         axis = int(np.argmax(np.abs(readings[wrong[0]])))
@@ -59,7 +58,7 @@ def check_temperatures(temperature_c: Array, rows: NDArray[np.intp], where: str)
             "wrong_unit",
             f"{where} has {len(wrong)} samples whose temperature_c is no temperature in °C, the first is sample "
             f"{rows[wrong[0]] + 1}, with {temperature_c[wrong[0]]:.6g}",
-            "Convert counts to °C, as the data sheet says, or give the column another name, so that it is not read",
+            "Convert kelvins, or counts by the data sheet, to °C; or give the column another name, so that it is not read",
         )
 
 

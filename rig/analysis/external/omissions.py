@@ -16,9 +16,6 @@ from rig.observation.external.csv_import import ExternalData
 from rig.observation.external.csv_samples import Samples
 from rig.observation.external.omission import Omitted
 from rig.observation.external.placements import Placements
-from rig.observation.false_readings import OF_MOST
-
-UNUSUAL_RAD_S = OF_MOST * RATE.mistaken.most if RATE.mistaken else np.inf
 
 
 def list_omitted(
@@ -48,7 +45,7 @@ def notes_on_reading(read: ReadElsewhere, samples: Samples) -> Iterator[str]:
 def notes_on_speeds(data: ExternalData) -> Iterator[str]:
     """Yield a note on rates that hardly any gyroscope reads: nothing else shows that both files are in °/s."""
     fastest = max((sweep.speed_rad_s for sweep in data.sweeps), default=0.0)
-    if fastest > UNUSUAL_RAD_S:
+    if RATE.mistaken is not None and fastest > RATE.mistaken.unusual:
         yield (
             f"the sweeps turn at up to {fastest:.4g} rad/s ({np.degrees(fastest):.4g} °/s), faster than most "
             "gyroscopes can read: if both files are in °/s, name that unit with --columns, for the bias depends on it"

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.config.units import UNITS
+from rig.data.quantity import HOTTEST_C
 from rig.data.recording.motion_file import MOTIONS, QUATERNION
 from rig.estimation.arrays import Array
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
@@ -18,10 +19,10 @@ from rig.sensors.lines.guessing import Guess, guess_triads
 NAMES = {"g": "_rad_s", "a": "_m_s2", "m": "_t"}
 SENSORS = {"g": "gyroscope", "a": "accelerometer", "m": "magnetometer"}
 SI_UNITS = {"g": "rad/s", "a": "m/s2", "m": "T"}
-OPEN = "?"  # placeholder for a number that the user must state
+OPEN = "?"  # where a number is still to be stated
 HOTTEST_C = 200.0  # temperature that a part with a thermometer survives
-LIKELY_HZ = 100.0  # rate of a log without times
-LARGEST_COUNT = 500.0  # larger whole numbers are steps of a converter
+LIKELY_HZ = 100.0  # of a log without times
+LARGEST_COUNT = 500.0  # whole numbers beyond it are steps of a converter
 # A block is at rest if its scatter is at most this many times that of the quietest tenth.
 BLOCK_S, QUIETEST, AS_QUIET = 0.25, 0.1, 3.0
 # Larger than the readings of a gyroscope in rad/s, and than its scatter at rest.
@@ -106,7 +107,7 @@ def _guess_samples(
             position = guessed.columns.index("temperature")
             column = layout.name(group.indices[position])
             largest = float(np.abs(group.values[:, position]).max())
-            if largest < HOTTEST_C:
+            if largest <= HOTTEST_C:
                 samples["temperature_c"] = {"column": column, "unit": "C"}
             else:
                 gaps.append(

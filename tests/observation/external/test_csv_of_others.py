@@ -116,8 +116,9 @@ def test_a_loggers_mark_of_a_missing_value_is_no_wrong_unit(tmp_path: Path, mark
         read(written(tmp_path, content), mapped)
 
 
-def test_counts_are_no_temperature(tmp_path: Path) -> None:
+@pytest.mark.parametrize("value", [-3735, 293.15])
+def test_counts_and_kelvins_are_no_temperature(tmp_path: Path, value: float) -> None:
     head = [*HEAD, "temperature_c"]
-    content = "\n".join([",".join(head), *(f"{row},-3735" for row in ROWS)]).encode()
+    content = "\n".join([",".join(head), *(f"{row},{value}" for row in ROWS)]).encode()
     with pytest.raises(Refused, match=r"wrong_unit: .*30 samples whose temperature_c is no temperature"):
         read(written(tmp_path, content))
