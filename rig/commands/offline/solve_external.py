@@ -20,28 +20,6 @@ if TYPE_CHECKING:
     from rig.data.recording.run_data import RunData
 
 AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
-FOR_OTHERS: dict[str, object] = {  # options without a meaning for a recording of the rig, and their defaults
-    "columns": None,
-    "only": [],
-    "name": "imu",
-    "part": None,
-    "serial_number": None,
-    "recorded": None,
-    "reference_c": None,
-    "clock_ppm": None,
-    "squareness_deg": 0.2,
-    "no_closure": False,
-    "first_face": None,
-    "gravity_m_s2": STANDARD_GRAVITY_M_S2,
-    "up": "+z",
-    "field_t": None,
-    "field_upwards": False,
-    "any_mounting": False,
-    "estimate_clock_offset": False,
-    "exact_rates": False,
-    "window_s": None,
-    "second_order": False,
-}
 
 
 def add(solve: ArgumentParser) -> None:
@@ -142,7 +120,9 @@ def _read_time(text: str) -> datetime:
 
 def refuse_for_recording(options: Namespace) -> None:
     """Raise Refused `bad_option` if a recording of the rig is to be solved with an option for other readings."""
-    for name, default in FOR_OTHERS.items():
+    of_others = ArgumentParser(add_help=False)
+    add(of_others)
+    for name, default in vars(of_others.parse_args([])).items():
         if getattr(options, name) != default:
             option = f"--{name.replace('_', '-')}"
             what = f"{option} is for samples of another program; a recording has its own settings"
