@@ -58,7 +58,7 @@ def check_temperatures(temperature_c: Array, rows: NDArray[np.intp], where: str)
             "wrong_unit",
             f"{where} has {len(wrong)} samples whose temperature_c is no temperature in °C, the first is sample "
             f"{rows[wrong[0]] + 1}, with {temperature_c[wrong[0]]:.6g}",
-            "Convert kelvins, or counts by the data sheet, to °C; or give the column another name, so that it is not read",
+            "Convert kelvins, or counts by the data sheet, to °C; or give the column another name: then it is not read",
         )
 
 

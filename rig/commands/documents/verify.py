@@ -141,7 +141,7 @@ def _judge(
     look, attached_to = looks[file], None
     problems = look.problems
     if not look.signatures:
-        attached_to, problems = _find_signed_holder(file.name, content, look, looks)
+        attached_to, problems = find_signed_holder(file.name, content, look, looks)
         if history_answer is not None and not history_answer.problems:
             problems = tuple(problem for problem in problems if problem.name not in TRUST_PROBLEMS)
     history_words = () if history_answer is None else history_answer.entries
@@ -154,21 +154,34 @@ def _judge(
     )
 
 
-def _find_signed_holder(
+def find_signed_holder(
     name: str, content: bytes, look: "FileInspection", looks: "Mapping[Path, FileInspection]"
 ) -> tuple[str | None, tuple[Refused, ...]]:
-    """Return the signed file that contains an unsigned file, or None, and the problems of its signer."""
-    from rig.report.signatures.findings import not_as_signed
+    """Return the signed file that contains an unsigned file, or None, and the problems of its signer.
 
-    holders = {other: signed for other, signed in looks.items() if name in signed.attached}
-    same = [other for other, signed in holders.items() if signed.attached[name] == content]
+    It contains it under its name, or under another one if no file of this name is attached.
+    """
+    from rig.report.signatures.findings import not_as_signed, not_attached
+
+    named = {other: signed for other, signed in looks.items() if name in signed.attached}
+    same = {other: name for other, signed in named.items() if signed.attached[name] == content}
+    if not named:
+        same = {
+            other: held
+            for other, signed in looks.items()
+            for held in signed.attached
+            if signed.attached[held] == content
+        }
     if same:
         best = min(same, key=lambda other: len(looks[other].problems))
-        return best.name, looks[best].problems
-    if holders and {problem.name for problem in look.problems} == {"not_signed"}:
-        named = ", ".join(dict.fromkeys(other.name for other in holders))
-        return None, (not_as_signed(name, f"another is attached to {named}"),)
-    return None, look.problems
+        return best.name if same[best] == name else f"{best.name} as {same[best]}", looks[best].problems
+    if {problem.name for problem in look.problems} != {"not_signed"}:
+        return None, look.problems
+    if named:
+        holders = ", ".join(dict.fromkeys(other.name for other in named))
+        return None, (not_as_signed(name, f"another is attached to {holders}"),)
+    searched = {other.name: tuple(signed.attached) for other, signed in looks.items() if signed.signatures}
+    return None, (not_attached(name, searched),) if searched else look.problems
 
 
 def _print_file(documents: VerifiedFile) -> None:

@@ -1,10 +1,11 @@
 """Results of the inspection of a signed file: its signatures, and its problems by name."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 
 from rig.errors import Refused
+from rig.errors.quoting import shorten
 from rig.report.signatures.reason import Reason
 
 
@@ -38,8 +39,24 @@ def not_signed(name: str) -> Refused:
     """Return the problem of a file without a signature."""
     return Refused(
         "not_signed",
-        f"{name} has no signature",
+        f"{name} has no signature of its own, and no file that might contain it is given",
         "Give the signed certificate.pdf to which it is attached as well, or a history that has it: --history",
+    )
+
+
+def not_attached(name: str, searched: Mapping[str, Sequence[str]]) -> Refused:
+    """Return the problem of a file without a signature whose bytes are attached to none of the `searched` files.
+
+    `searched` has the names of the files attached to each signed file.
+    """
+    places = "; ".join(
+        f"{signed} ({', '.join(map(shorten, held)) or 'nothing is attached'})" for signed, held in searched.items()
+    )
+    return Refused(
+        "not_signed",
+        f"{name} has no signature of its own, and its bytes are those of no file attached to {places}",
+        "Give the file as the laboratory sent it and the certificate.pdf that belongs to it, or a history that has it: "
+        "--history",
     )
 
 
