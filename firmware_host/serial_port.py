@@ -15,12 +15,17 @@ def explain_closed(port: str, error: OSError) -> str:
     reason = str(error) if cause is None or cause.errno is None else os.strerror(cause.errno)
     if "://" in port:
         return reason
+    return "; ".join(filter(None, [reason, describe_ports()]))
+
+
+def describe_ports() -> str:
+    """Return a clause on the serial ports of this computer; "" where they cannot be listed."""
     try:
         from serial.tools import list_ports
     except ImportError:
-        return reason
+        return ""
     ports = [f"{available.device} ({available.description})" for available in list_ports.comports()]
-    return f"{reason}; this computer has {', '.join(ports) or 'no serial port'}"
+    return f"this computer has {', '.join(ports) or 'no serial port'}"
 
 
 class SerialPort:

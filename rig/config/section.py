@@ -73,19 +73,28 @@ def _is_host_name(name: str) -> bool:
         return False
 
 
+PORT_NAME = re.compile(r".*[/\\].+|COM\d+", re.IGNORECASE)
+
+
 def check_port(value: str) -> str:
     """Return a serial port's name or `socket://host:port` unchanged. Raise ValueError if it cannot be one.
 
-    pyserial knows other addresses, and one of them, `spy://`, empties and writes a file that it names.
+    A name is a path, or that of a port of Windows. pyserial knows other addresses, and one of them, `spy://`, empties
+    and writes a file that it names.
     """
     if "://" in value:
         try:
             parts = urlsplit(value)
-            complete = value.startswith("socket://") and bool(check_host(parts.hostname or "") and parts.port)
+            is_port = value.startswith("socket://") and bool(check_host(parts.hostname or "") and parts.port)
         except ValueError:
-            complete = False
-        if not complete:
-            raise ValueError("must be the name of a port, or socket://host:port with a port from 1 to 65535")
+            is_port = False
+    else:
+        is_port = PORT_NAME.fullmatch(value) is not None
+    if not is_port:
+        raise ValueError(
+            "must be the name of a serial port, as /dev/ttyUSB0 or COM3, or socket://host:port with a port from 1 to "
+            "65535"
+        )
     return value
 
 

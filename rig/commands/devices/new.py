@@ -132,14 +132,22 @@ def _port(question: str, option: str, chosen_port: str | None) -> str:
     """Return a serial port that the user chooses from those of this computer, or types."""
     from rig.config.section import check_port
 
-    if chosen_port is None:
-        from serial.tools.list_ports import comports
+    def valid(value: str) -> str:
+        try:
+            return check_port(value)
+        except ValueError as error:
+            raise ValueError("; ".join(filter(None, [str(error), describe_ports()]))) from None
 
-        ports = [port for port in sorted(comports()) if port.hwid != "n/a"]  # a name without a device behind it
-        plugged_in = {port.device: f"{port.device} ({port.description})" for port in ports}
-        choices = {**plugged_in, ANOTHER: "another, or one that is not plugged in yet"}
-        chosen_port = ask_choice(question, option, choices) if plugged_in else ANOTHER
-        if chosen_port != ANOTHER:
-            return chosen_port
-        chosen_port = None
-    return ask("port, such as /dev/ttyUSB0, COM3 or socket://host:port", option, check_port, value=chosen_port)
+    if chosen_port is None and (ports := _find_ports()):
+        choice = ask_choice(question, option, {**ports, ANOTHER: "another, or one that is not plugged in yet"})
+        if choice != ANOTHER:
+            return choice
+    return ask("port, such as /dev/ttyUSB0, COM3 or socket://host:port", option, valid, value=chosen_port)
+
+
+def _find_ports() -> dict[str, str]:
+    """Return this computer's serial ports with a device, by name, each in words."""
+    from serial.tools.list_ports import comports
+
+    ports = [port for port in sorted(comports()) if port.hwid != "n/a"]  # a name without a device behind it
+    return {port.device: f"{port.device} ({port.description})" for port in ports}

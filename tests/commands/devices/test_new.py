@@ -119,3 +119,14 @@ def test_of_a_device_that_was_not_turned_no_file_is_written_and_the_remedy_is_to
     said = capsys.readouterr().err
     assert "lines_not_turned" in said and "turn the device about every axis" in said
     assert not (tmp_path / "my.yaml").exists()
+
+
+@pytest.mark.parametrize("port", ["1", "", "ttyUSB0", "yes"])
+def test_what_is_no_port_is_refused_with_the_ports_that_there_are(
+    port: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ("--turner", "hand", "--sensor", "lines", "--port", port, "--listen", "no", "--serial-number", "E-1")
+    assert main(["new", str(tmp_path / "my.yaml"), *words]) == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert f"bad_option: --port {port}: must be the name of a serial port, as /dev/ttyUSB0 or COM3" in said
+    assert "; this computer has " in said
