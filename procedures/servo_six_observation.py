@@ -3,8 +3,7 @@
     python procedures/servo_six_observation.py configs/servo.yaml
 
 Before you start:
-  1. The servo is clamped to something heavy, set up as docs/how-to/without-an-arm/servo.md says; its supply has a
-  switch in reach.
+  1. The servo is clamped to something heavy, and `rig check CONFIG` finds it; its supply has a switch in reach.
   2. The board's cable has slack for two thirds of a turn either way.
   3. Nothing is in the way of the board when it turns, in any of the three mountings.
 

@@ -3,7 +3,7 @@
     python procedures/thermal.py configs/thermal.yaml
 
 Before you start: as for procedures/six_observation.py. What warms or cools the board is there: the heater on its pin
-A5, a heat gun, an ice pack, a chamber around the arm's wrist (docs/how-to/at-the-rig/over-temperature.md).
+A5, a heat gun, an ice pack, a chamber around the arm's wrist.
 
 What happens: the arm makes its sweeps (and goes to its attitudes), goes home, and waits until the sensors' own
 thermometers have moved on by half a gap. Then it does the same again, up through the range and down again, until no gap

@@ -63,7 +63,7 @@ def configuration_text(answers: Answers, schema: str, name: str) -> str:
         [
             f"# yaml-language-server: $schema={schema}",
             f"# A first configuration: rig check {name} looks whether all is there; rig run {name} calibrates.",
-            "# Every key, its unit and its range: docs/configuration.md.",
+            "# Every key, its unit and its range: the schema above, which an editor shows.",
         ],
         _turner(answers),
         _board(answers),
@@ -78,10 +78,10 @@ def configuration_text(answers: Answers, schema: str, name: str) -> str:
 
 def _turner(answers: Answers) -> Iterator[str]:
     if answers.turner == "hand":
-        yield "turner: {kind: hand}       # you turn it, on a flat table: docs/how-to/without-an-arm/by-hand.md"
+        yield "turner: {kind: hand}       # you turn it, on a flat table, and are told how"
     elif answers.turner == "servo":
         yield "turner:"
-        yield "  kind: servo              # docs/how-to/without-an-arm/servo.md"
+        yield "  kind: servo"
         yield f"  port: {answers.servo_port}"
         yield "  id: 1                    # of the servo on its bus"
         yield f"  model: {answers.servo_model}"
@@ -131,8 +131,7 @@ def _part(answers: Answers) -> Iterator[str]:
         yield MATRIX
         yield "    acceleration: {}       # shows which side is up, and is a level"
     elif answers.turner == "arm":
-        yield "    mounting: {x: +x, y: +y, z: +z}   # the flange's axes along which the sensor's axes point:"
-        yield "                                      # docs/how-to/at-the-rig/mounting.md"
+        yield "    mounting: {x: +x, y: +y, z: +z}   # the flange's axes along which the sensor's axes point"
 
 
 def _procedure(answers: Answers) -> Iterator[str]:

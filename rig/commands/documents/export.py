@@ -26,7 +26,7 @@ def add(parser: ArgumentParser) -> None:
         "--format",
         choices=FORMATS,
         required=True,
-        help="the format; docs/how-to/finished-runs/export.md describes each",
+        help="the format",
     )
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="folder of the files (default: export/FORMAT in the run folder)"

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 HEAD = """\
 # The columns of {files}, as `rig look` found them: check the units.
-# docs/how-to/without-an-arm/from-a-robots-log.md explains every key.
+# Every command that reads these files takes it with --columns.
 """
 
 

@@ -70,7 +70,7 @@ def resolve_address(address: str | None) -> HistoryAddress:
         raise Refused(
             "history_address",
             f"the address of the history, {address.partition('://')[0]}://…, {error}",
-            "Correct it in --history, RIG_HISTORY or the configuration: docs/how-to/finished-runs/shared-history.md",
+            "Correct it in --history, RIG_HISTORY or the configuration: a file, or postgresql://USER@HOST:PORT/DATABASE",
         ) from error
     if url.drivername == "sqlite":
         return resolve_address(url.database)

@@ -100,7 +100,7 @@ def _print_info(board: BoardInfo) -> None:
         "uptime": f"{health.uptime_s:.1f} s, last reset: {health.reset_cause}",
         "clock": "follows the crystal"
         if health.clock_locked
-        else "NOT locked to the crystal: time stamps drift (docs/board.md, Clock)",
+        else "NOT locked to the crystal: time stamps may be 1 % off; a bridge on the Nucleo connects the crystal",
         "link": f"{health.rx_errors} damaged requests, {health.tx_overruns} frames without room, "
         f"{health.frames_lost} lost, {health.frames_repeated} repeated",
         "sensor bus": f"{health.bus_errors} failed reads",

@@ -179,7 +179,7 @@ class LinesDevice:
             raise SensorError(
                 "lines_time_stands",
                 f"{self.where} prints the same time {printed[0]:.15g} again and again",
-                "See which column is the time, and in which unit: docs/how-to/at-the-rig/lines.md",
+                "See which column is the time, and in which unit: `rig lines PORT` shows it",
             )
         coarse = typical_s < 50 * step_s
         return count / span_s if coarse else 1 / typical_s if typical_s > 0 else count / span_s
