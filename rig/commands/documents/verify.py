@@ -167,10 +167,10 @@ def find_signed_holder(
     same = {other: name for other, signed in named.items() if signed.attached[name] == content}
     if not named:
         same = {
-            other: held
+            other: attachment
             for other, signed in looks.items()
-            for held in signed.attached
-            if signed.attached[held] == content
+            for attachment in signed.attached
+            if signed.attached[attachment] == content
         }
     if same:
         best = min(same, key=lambda other: len(looks[other].problems))

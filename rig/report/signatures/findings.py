@@ -50,7 +50,8 @@ def not_attached(name: str, searched: Mapping[str, Sequence[str]]) -> Refused:
     `searched` has the names of the files attached to each signed file.
     """
     places = "; ".join(
-        f"{signed} ({', '.join(map(shorten, held)) or 'nothing is attached'})" for signed, held in searched.items()
+        f"{signed} ({', '.join(map(shorten, attachments)) or 'nothing is attached'})"
+        for signed, attachments in searched.items()
     )
     return Refused(
         "not_signed",
