@@ -19,7 +19,7 @@ from rig.report.kinds.kind_registry import followed
 from rig.report.tables.certificate import DEG, pair
 from rig.report.terminal.result_table import print_result
 from rig.report.words.expanded_uncertainty import expanded, factor_words
-from support.documents.certified import certificate, everything, read, result
+from support.documents.certified import certificate, everything, over_temperature, read, result
 
 NAMES = {"dcc": "https://ptb.de/dcc", "si": "https://ptb.de/si"}
 GERMAN = StatedFacts(SiteSection(country="DE"))
@@ -92,7 +92,35 @@ def test_u_of_a_drift_is_by_its_freedom_at_the_terminal_and_on_the_page() -> Non
     assert f"{printed.value} ± {printed.uncertainty}" in page
 
 
-@pytest.mark.parametrize("document", [everything, scarce], ids=["uncounted", "scarce"])
+def warmed() -> ResultDocument:
+    """Over temperature too, where U is 2.1 to 2.6 standard uncertainties."""
+    return everything().model_copy(update={"over_temperature": {"gyro": {"rate": over_temperature()}}})
+
+
+def test_u_over_temperature_is_k_times_u_in_the_digital_certificate() -> None:
+    entry = over_temperature()
+    xml = fromstring(digital_certificate(certificate(warmed(), GERMAN)))
+    (bias,) = (
+        result
+        for result in xml.iterfind(".//dcc:result", NAMES)
+        if result.findtext("dcc:name/dcc:content", "", NAMES) == "bias along y over temperature"
+    )
+    widths, factors = (
+        [float(number) for number in bias.findtext(f".//si:{name}XMLList", "", NAMES).split()]
+        for name in ("uncertainty", "coverageFactor")
+    )
+    assert min(factors) > 2.05
+    k = "k = 2.23 to 2.49"  # of the five temperatures that are shown
+    assert f"expanded uncertainty, {k}" in " ".join(read(certificate(warmed())).text.split())
+    assert f"± U ({k})" in terminal(warmed())
+    powers = np.array([[(row.temperature_c - entry.reference_c) ** n for n in range(4)] for row in entry.table])
+    columns = [13 + 3 * n for n in range(4)]
+    covariance = np.array(entry.covariance)[np.ix_(columns, columns)]
+    std = np.sqrt(np.einsum("ti,ij,tj->t", powers, covariance, powers))
+    np.testing.assert_allclose(np.divide(widths, factors), std, rtol=1e-12)
+
+
+@pytest.mark.parametrize("document", [everything, scarce, warmed], ids=["uncounted", "scarce", "warmed"])
 def test_k_of_every_uncertainty_in_the_digital_certificate_is_the_page_s(
     document: Callable[[], ResultDocument],
 ) -> None:
@@ -118,7 +146,7 @@ def test_k_of_every_uncertainty_in_the_digital_certificate_is_the_page_s(
         low, high = f"{min(factors):.3g}", f"{max(factors):.3g}"
         words = f"k = {low}" if low == high else f"k = {low} to {high}"
         assert words in said, name
-        if "by repeat" not in name:  # each axis for itself, on the page all three
+        if not name.endswith(("by repeat", "over temperature")):  # each axis for itself, on the page all three
             assert words in page, name
     assert stated >= 12
 

@@ -73,3 +73,18 @@ class OverTemperatureEntry(Entry):
             return x, y, z
 
         return value(self.scale), value(self.bias)
+
+    def std_at(self, temperature_c: float) -> list[float]:
+        """Return the combined standard uncertainties (6,) of scale and bias at a temperature."""
+        powers = [(temperature_c - self.reference_c) ** n for n in range(4)]
+
+        def std(first: int) -> float:
+            indices = [first + 3 * n for n in range(4)]
+            terms = (
+                one * other * self.covariance[row][column]
+                for one, row in zip(powers, indices, strict=True)
+                for other, column in zip(powers, indices, strict=True)
+            )
+            return float(max(sum(terms), 0.0) ** 0.5)
+
+        return [std(first) for first in (0, 1, 2, 12, 13, 14)]

@@ -15,6 +15,7 @@ from rig.estimation.arrays import Array
 
 COVERAGE_FACTOR = 2.0  # for ν → ∞, and if ν is not given
 PROBABILITY = math.erf(COVERAGE_FACTOR / math.sqrt(2))
+ELLIPSOID_PROBABILITY = 0.95
 ROUNDING = 1e-9  # tolerance of ν, which would be an integer without rounding
 
 
@@ -68,6 +69,22 @@ def joint_factors(values: int, dof: ArrayLike, probability: float) -> Array:
         finite = np.isfinite(whole_dof)
         factors[finite] = -stdtrit(whole_dof[finite], tail)
     return factors
+
+
+def find_ellipsoid_factor(values: int, dof: ArrayLike) -> float:
+    """Return the factor of the ellipsoid that contains `values` values at once with 95 %, by the fewest of `dof`.
+
+    It is √χ² of a normal distribution (JCGM 102, 6.5). For p values with a multivariate t distribution it is √(p F),
+    with the quantile of F for p and ν degrees of freedom.
+    """
+    fewest = float(np.min(_round_down(dof)))
+    if math.isinf(fewest):
+        from scipy.special import chdtri
+
+        return float(np.sqrt(chdtri(values, 1 - ELLIPSOID_PROBABILITY)))
+    from scipy.special import fdtri
+
+    return float(np.sqrt(values * fdtri(values, fewest, ELLIPSOID_PROBABILITY)))
 
 
 def find_dof_by_factor(factor: float) -> float:

@@ -13,7 +13,7 @@ from rig.report.findings.result_kind import OWN_TEMPLATES
 from rig.report.kinds.kind_registry import kinds
 from rig.report.tables import certificate as tables
 from rig.report.tables import coverage_statements as coverage_words
-from rig.report.tables.certificate import DEG, JOINT_FACTOR
+from rig.report.tables.certificate import DEG
 from rig.report.words import (
     detection_limit_words,
     expanded_uncertainty,
@@ -36,7 +36,7 @@ FOOTING = "Relates only to the items calibrated. Not issued under an accreditati
 
 def certificate_page(certificate: Certificate) -> str:
     """Return HTML that loads nothing from outside; texts of configuration, board and arm are escaped."""
-    return _template().render(certificate=certificate, deg=DEG, joint=JOINT_FACTOR, footing=FOOTING)
+    return _template().render(certificate=certificate, deg=DEG, footing=FOOTING)
 
 
 @cache

@@ -16,7 +16,7 @@ from rig.report.findings.history_records import HistoryRecord
 from rig.report.findings.result_kind import CertifiedItem, DisplayRow, NoOutlet, ResultKind, row_of
 from rig.report.tables import dcc_results
 from rig.report.words.printed_values import plus_minus
-from rig.report.words.temperature_words import about_lines, shown_rows
+from rig.report.words.temperature_words import about_lines, coverage_words, shown_rows
 from rig.station.plain_text import plain
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ def _find(document: ResultDocument) -> Iterator[Finding[OverTemperatureEntry]]:
 
 def _render(finding: Finding[OverTemperatureEntry]) -> Iterator[Table | str]:
     entry, unit = finding.entry, finding.quantity.bias
-    title = f"{finding.quantity.full_label(finding.sensor)}: over temperature, ± U"
+    title = f"{finding.quantity.full_label(finding.sensor)}: over temperature, ± U ({coverage_words(entry)})"
     table = Table(title=plain(title, "table.title"))
     table.title_justify = "left"
     for heading in ("°C", *(f"k{axis}" for axis in "xyz"), *(f"b{axis} {unit.name}" for axis in "xyz")):

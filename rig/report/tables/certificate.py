@@ -14,7 +14,6 @@ from rig.report.words.expanded_uncertainty import expanded
 from rig.report.words.printed_values import percent, rounded
 
 AXES = ("x", "y", "z")
-JOINT_FACTOR = 3.548  # for six values at once: √χ² of six degrees of freedom at 95 %
 DEG = math.degrees(1)
 FINE_DEG_S = 1e-3
 

@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 
 from rig.data.entries.budget import BudgetEntry
-from rig.estimation.statistics.coverage import PROBABILITY
+from rig.estimation.statistics.coverage import PROBABILITY, find_ellipsoid_factor
 from rig.report.tables.certificate import AXES
 from rig.report.words.printed_budget import dof_text
 
@@ -15,6 +15,11 @@ def factor_note(budget: BudgetEntry) -> str:
     """Return the note on U: k, if it is the same for all printed values."""
     printed = {f"{factor:.2f}" for factor in budget.coverage_factors}
     return f"k\u00a0=\u00a0{_short(printed.pop())}" if len(printed) == 1 else "k as stated below"
+
+
+def joint_factor(budget: BudgetEntry) -> float:
+    """Return the factor of the ellipsoid that contains all six values at once with 95 %."""
+    return find_ellipsoid_factor(len(budget.std), budget.effective_dof)
 
 
 def coverage_sentence(budget: BudgetEntry) -> str:

@@ -1,5 +1,6 @@
 """The results of a digital certificate: values with all digits, with U or their covariance, by quantity."""
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from xml.etree.ElementTree import Element
 
@@ -14,19 +15,18 @@ from rig.data.quantity import ACCELERATION, FIELD, RATE, Quantity
 from rig.data.result_file import GyroscopeEntry, VerificationEntry
 from rig.errors import Refused
 from rig.estimation.gyroscope.six_observation import PARAMETERS
-from rig.estimation.statistics.coverage import COVERAGE_FACTOR, PROBABILITY
+from rig.estimation.statistics.coverage import PROBABILITY, find_ellipsoid_factor
 from rig.report.findings.characteristic import Term
-from rig.report.tables.certificate import AXES, JOINT_FACTOR
-from rig.report.tables.coverage_statements import coverage_sentence
+from rig.report.tables.certificate import AXES
+from rig.report.tables.coverage_statements import coverage_sentence, joint_factor
 from rig.report.tables.xml_parts import dcc, real_list, text
 from rig.report.words.detection_limit_words import list_limits
-from rig.report.words.expanded_uncertainty import Expanded, expanded, factor_words
+from rig.report.words.expanded_uncertainty import Expanded, expanded, factor_words, spell_factors
+from rig.report.words.temperature_words import coverage_at_rows
 from rig.report.words.validity_words import load_words, speed_words, when_words
 
 ONE, ANGLE = r"\one", r"\radian"
 ValuesAndStds = tuple[Sequence[float], Sequence[float], Sequence[Freedom] | None]
-# For three values at once: √χ² of three degrees of freedom at 95 %.
-JOINT_FACTOR_3 = 2.795
 SOLUTION = "± U of the solution"
 
 
@@ -40,7 +40,7 @@ def gyroscope(sensor: GyroscopeEntry) -> Iterator[Element]:
                   real_list(AXES, sensor.scale, [ONE], expanded=scale))  # fmt: skip
     yield _result("bias", f"{model} {_conditions(sensor.bias_conditions)}{covered}",
                   real_list(AXES, sensor.bias_rad_s, [RATE.d_si], expanded=bias))  # fmt: skip
-    yield _joint([*sensor.scale, *sensor.bias_rad_s], covariance, RATE.d_si)
+    yield _joint([*sensor.scale, *sensor.bias_rad_s], covariance, budget, RATE.d_si)
 
 
 def accelerometer(entry: AccelerometerEntry) -> Iterator[Element]:
@@ -87,11 +87,15 @@ def _reversal(entry: ReversalEntry) -> Iterator[Element]:
     )
     names = ("bx", "by", "bz", "arm x", "arm y", "arm z")
     values = [*entry.bias_t, *entry.arm_field_t]
+    counted = [*entry.bias_degrees_of_freedom, *entry.arm_field_degrees_of_freedom]
     yield _result(
         "own bias and the arm's field in the axes of the first run with their covariance",
         f"{statement} The ellipsoid holds all six values at once with a probability of 95 %.",
         real_list(
-            [name.replace(" ", "_") for name in names], values, [FIELD.d_si], region=(entry.covariance, JOINT_FACTOR)
+            [name.replace(" ", "_") for name in names],
+            values,
+            [FIELD.d_si],
+            region=(entry.covariance, _ellipsoid_factor(counted)),
         ),
     )
 
@@ -116,12 +120,15 @@ def over_temperature(entry: OverTemperatureEntry, quantity: Quantity) -> Iterato
     low, high = entry.range_c
     labels = [f"{row.temperature_c:.6g}_degC" for row in entry.table]
     statement = f"At temperatures of the item's own thermometer; valid from {low!r} to {high!r} °C only"
+    coverage = coverage_at_rows(entry.table, entry)
     for i, axis in enumerate(AXES):
-        for name, which, units in (("scale factor", "scale", ONE), ("bias", "bias", quantity.d_si)):
+        for name, which, first, units in (("scale factor", "scale", 0, ONE), ("bias", "bias", 3, quantity.d_si)):
             values = [getattr(row, which)[i] for row in entry.table]
             widths = [getattr(row, f"expanded_{which}")[i] for row in entry.table]
-            stated = Expanded(widths, *([number] * len(labels) for number in (COVERAGE_FACTOR, PROBABILITY)))
-            yield _result(f"{name} along {axis} over temperature", f"{statement}. ± U, about 95 %.",
+            factors = coverage[:, first + i].tolist()
+            stated = Expanded(widths, factors, [PROBABILITY] * len(labels))
+            description = f"{statement}. ± U, {spell_factors(factors)}, about 95 %."
+            yield _result(f"{name} along {axis} over temperature", description,
                           real_list(labels, values, [units], expanded=stated))  # fmt: skip
 
 
@@ -136,7 +143,8 @@ def verification(entry: VerificationEntry) -> Iterator[Element]:
 def earth_rate(entry: EarthRateEntry) -> Iterator[Element]:
     """Yield the Earth's rate with its covariance, and the site that follows from it."""
     statement = "In the frame of the arm's base. The ellipsoid holds all three values with a probability of 95 %."
-    rate = real_list(AXES, entry.rate_rad_s, [RATE.d_si], region=(entry.covariance_rad2_s2, JOINT_FACTOR_3))
+    factor = _ellipsoid_factor(entry.dofs(len(AXES)))
+    rate = real_list(AXES, entry.rate_rad_s, [RATE.d_si], region=(entry.covariance_rad2_s2, factor))
     yield _result("Earth's rate", statement, rate)
     yield _wide_result(
         "latitude by that rate",
@@ -158,7 +166,7 @@ def _relative(
     statement = f"{statement} {_conditions(entry.conditions)}{_detection_limits(entry.detection_limits)}{covered}"
     yield _result(f"scale factor{how}", statement, real_list(AXES, numbers[:3], [ONE], expanded=scale))
     yield _result(f"bias{how}", statement, real_list(AXES, numbers[3:], [unit], expanded=bias))
-    yield _joint(numbers, entry.covariance_combined, unit, how)
+    yield _joint(numbers, entry.covariance_combined, entry.budget, unit, how)
 
 
 def _full_uncertainty(entry: GyroscopeEntry) -> tuple[BudgetEntry, Matrix6]:
@@ -196,12 +204,19 @@ def _widths(budget: BudgetEntry) -> tuple[Expanded, Expanded]:
     return Expanded(*(column[:3] for column in columns)), Expanded(*(column[3:] for column in columns))
 
 
-def _joint(numbers: list[float], covariance: Sequence[Sequence[float]], unit: str, how: str = "") -> Element:
+def _joint(
+    numbers: list[float], covariance: Sequence[Sequence[float]], budget: BudgetEntry, unit: str, how: str = ""
+) -> Element:
     return _result(
         f"scale factors and biases{how} with their covariance",
         "The ellipsoid holds all six values at once with a probability of 95 %; the matrix is their covariance.",
-        real_list(PARAMETERS, numbers, [ONE] * 3 + [unit] * 3, region=(covariance, JOINT_FACTOR)),
+        real_list(PARAMETERS, numbers, [ONE] * 3 + [unit] * 3, region=(covariance, joint_factor(budget))),
     )
+
+
+def _ellipsoid_factor(counted: Sequence[Freedom]) -> float:
+    """Return the factor of the ellipsoid of as many values as degrees of freedom, of which None is infinite."""
+    return find_ellipsoid_factor(len(counted), [math.inf if dof is None else dof for dof in counted])
 
 
 def _wide_result(

@@ -5,11 +5,11 @@ from datetime import date
 from xml.etree.ElementTree import Element, register_namespace
 
 from rig.errors.quoting import printable
+from rig.estimation.statistics.coverage import ELLIPSOID_PROBABILITY
 from rig.report.words.expanded_uncertainty import Expanded
 
 DCC, SI = "https://ptb.de/dcc", "https://ptb.de/si"
 XSI = "http://www.w3.org/2001/XMLSchema-instance"
-JOINT_PROBABILITY = 0.95  # probability of an ellipsoid
 DIGITS = 4  # decimals of a probability
 UNSAID = "not stated"
 for _prefix, _name in (("dcc", DCC), ("si", SI), ("xsi", XSI)):
@@ -93,7 +93,7 @@ def real_list(
             "ellipsoidalRegionXMLList",
             _covariance(covariance, units if len(units) > 1 else [*units] * len(covariance)),
             values("coverageFactor", [factor]),
-            values("coverageProbability", [JOINT_PROBABILITY]),
+            values("coverageProbability", [ELLIPSOID_PROBABILITY]),
         )
     return si(
         "realListXMLList",

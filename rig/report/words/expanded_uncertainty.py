@@ -29,6 +29,10 @@ def factor_words(dof: Sequence[Freedom] | None) -> str:
     """Return k as printed: one number if all are equal, else the smallest and the largest."""
     if dof is None:
         return f"k = {COVERAGE_FACTOR:g}, degrees of freedom not counted"
-    factors = expanded([1.0] * len(dof), dof).factors
+    return spell_factors(expanded([1.0] * len(dof), dof).factors)
+
+
+def spell_factors(factors: Sequence[float]) -> str:
+    """Return coverage factors as printed: one number if all are equal, else the smallest and the largest."""
     low, high = f"{min(factors):.3g}", f"{max(factors):.3g}"
     return f"k = {low}" if low == high else f"k = {low} to {high}"

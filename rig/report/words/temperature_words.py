@@ -2,9 +2,13 @@
 
 from collections.abc import Iterator, Sequence
 
+import numpy as np
+
 from rig.data.entries.temperature import AtTemperatureEntry, OverTemperatureEntry, TemperatureContributorEntry
 from rig.data.quantity import Quantity
+from rig.estimation.arrays import Array, divide_or_infinity
 from rig.estimation.temperature.over_temperature import GRADIENT, HYSTERESIS, LAG, NOISE, ORDER
+from rig.report.words.expanded_uncertainty import spell_factors
 from rig.report.words.printed_values import plus_minus
 
 STEP = 4  # every fourth row of the table is shown
@@ -13,6 +17,17 @@ STEP = 4  # every fourth row of the table is shown
 def shown_rows(entry: OverTemperatureEntry) -> Sequence[AtTemperatureEntry]:
     """Return the rows for the ends, the middle and the quarters of the range."""
     return entry.table[::STEP]
+
+
+def coverage_at_rows(rows: Sequence[AtTemperatureEntry], entry: OverTemperatureEntry) -> Array:
+    """Return the coverage factors (n, 6) of n rows of the table: U over u, of kx ky kz bx by bz."""
+    expanded = np.array([[*row.expanded_scale, *row.expanded_bias] for row in rows])
+    return divide_or_infinity(expanded, [entry.std_at(row.temperature_c) for row in rows])
+
+
+def coverage_words(entry: OverTemperatureEntry) -> str:
+    """Return the coverage factors of the shown rows as printed."""
+    return spell_factors(coverage_at_rows(shown_rows(entry), entry).ravel().tolist())
 
 
 def own_contributors(entry: OverTemperatureEntry) -> Sequence[TemperatureContributorEntry]:

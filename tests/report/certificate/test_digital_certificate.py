@@ -11,12 +11,11 @@ from rig.config.judging.judging_sections import SiteSection
 from rig.data.entries.earth_rate import EarthRateEntry
 from rig.data.result_file import ResultDocument, VectorEntry, read_result
 from rig.errors import Refused
-from rig.estimation.statistics.coverage import coverage_factors
+from rig.estimation.statistics.coverage import coverage_factors, find_ellipsoid_factor
 from rig.report.certificate.content import Certificate
 from rig.report.certificate.dcc import digital_certificate
 from rig.report.certificate.statements import StatedFacts
-from rig.report.tables.certificate import JOINT_FACTOR
-from rig.report.tables.dcc_results import JOINT_FACTOR_3
+from rig.report.tables.coverage_statements import joint_factor
 from rig.report.tables.xml_parts import product
 from support.documents.certified import (
     LABORATORY,
@@ -226,14 +225,17 @@ def test_values_uncertainties_and_covariance_are_the_result_s() -> None:
         r"\radian\second\tothe{-1}",
         r"\radian\tothe{2}\second\tothe{-2}",
     )
-    assert numbers(found(xml, "si:ellipsoidalRegionXMLList/si:coverageFactor")[0]) == [JOINT_FACTOR]
+    assert numbers(found(xml, "si:ellipsoidalRegionXMLList/si:coverageFactor")[0]) == [joint_factor(sensor.budget)]
 
 
-def test_joint_factors_hold_95_percent_of_all_values_at_once() -> None:
-    from scipy.stats import chi2
-
-    assert pytest.approx(np.sqrt(chi2(6).ppf(0.95)), abs=5e-4) == JOINT_FACTOR
-    assert pytest.approx(np.sqrt(chi2(3).ppf(0.95)), abs=5e-4) == JOINT_FACTOR_3
+@pytest.mark.parametrize(("values", "dof"), [(6, np.inf), (3, np.inf), (6, 5.0), (3, 9.7)])
+def test_an_ellipsoid_contains_95_percent_of_all_values_at_once(values: int, dof: float) -> None:
+    rng = np.random.default_rng(3)
+    drawn = np.sum(rng.standard_normal((100_000, values)) ** 2, axis=1)
+    if np.isfinite(dof):
+        drawn *= np.floor(dof) / rng.chisquare(np.floor(dof), len(drawn))  # a standard deviation from few readings
+    factor = find_ellipsoid_factor(values, [np.inf, dof])
+    assert np.mean(drawn <= factor**2) == pytest.approx(0.95, abs=0.002)
 
 
 @pytest.mark.parametrize(
