@@ -84,21 +84,21 @@ def verification_table(name: str, entry: VerificationEntry) -> Table:
 
 
 def verification_lines(entry: VerificationEntry) -> Iterator[str]:
-    """Yield the lines below the table: relative mounting, the reference's error, whole turns, delays."""
+    """Yield the lines below the table, ± two standard uncertainties: mounting, the reference's error, turns, delays."""
     rotation = entry.rotation
     angles = " ".join(f"{angle:+.3f}" for angle in np.degrees(rotation.from_nominal_rad))
-    std_deg = np.degrees(max(rotation.std_rad))
-    yield f"rotation from the nominal mounting to the reference: {angles} ° (± {std_deg:.3f})"
+    expanded_deg = 2 * np.degrees(max(rotation.std_rad))
+    yield f"rotation from the nominal mounting to the reference: {angles} ° (± {expanded_deg:.3f})"
     errors = [turn.error_rad_s for turn in entry.after.revolutions]
     stds = [turn.std_rad_s for turn in entry.after.revolutions]
     yield f"error of the reference itself, against the arm: at most {entry.reference_error_rad_s:.5f} rad/s"
-    yield f"mean error over a revolution, after: at most {np.abs(errors).max():.5f} rad/s (± {np.max(stds):.5f})"
+    yield f"mean error over a revolution, after: at most {np.abs(errors).max():.5f} rad/s (± {2 * np.max(stds):.5f})"
     gravity = [turn.gravity_rad_s for turn in entry.after.revolutions]
     if None not in gravity:
         remainder = np.abs(np.array(errors) - np.array(gravity)).max()
         yield f"    without the effect of gravity, which the board cannot measure: at most {remainder:.5f}"
     for delay, std in zip(entry.after.delay_s, entry.after.delay_std_s, strict=True):
-        yield f"delay behind the reference: {1e3 * delay:.2f} ms (± {1e3 * std:.2f}), corrected"
+        yield f"delay behind the reference: {1e3 * delay:.2f} ms (± {2e3 * std:.2f}), corrected"
 
 
 def _summarize(finding: Finding[VerificationEntry]) -> Iterator[str]:

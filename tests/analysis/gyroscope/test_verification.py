@@ -361,8 +361,11 @@ def test_the_result_names_its_statistics_and_a_person_can_read_them() -> None:
     console.print(verification_table("gyro", entry), *verification_lines(entry))
     shown = console.export_text()
     assert f"{entry.before.movement.rms_rad_s[0]:.4f}" in shown
-    delay = re.search(r"delay\s+behind the reference: ([\d.]+) ms", shown)
+    delay = re.search(r"delay\s+behind the reference: ([\d.]+) ms \(± ([\d.]+)\)", shown)
     assert delay and float(delay[1]) == pytest.approx(4.0, abs=0.06)
+    assert float(delay[2]) == pytest.approx(2e3 * entry.after.delay_std_s[0], abs=0.006)
+    turned = re.search(r"to the reference: [-+. \d]+° \(± ([\d.]+)\)", shown)
+    assert turned and float(turned[1]) == pytest.approx(2 * np.degrees(max(entry.rotation.std_rad)), abs=6e-4)
     alone = verification_entry(replace(verified(), before=None, after=replace(verified().after, noise_rad_s=None)))
     console.print(verification_table("gyro", alone))
     assert "–" in console.export_text()
