@@ -6,8 +6,10 @@ import pytest
 
 from rig.analysis.design.attitude_information import AttitudeAccount, attitude_account
 from rig.config.load import load
+from rig.config.sensors.sensor_catalogue import PARTS
 from rig.plans.phase import first_phase
 from rig.plans.procedure_registry import installed
+from rig.world.world_section import read_world_section
 from support.paths import CONFIGS, DEMO
 
 
@@ -31,13 +33,24 @@ def test_repeats_average_the_noise_and_not_the_arms_error() -> None:
     assert real[0].non_orthogonality_std_rad == pytest.approx(real[1].non_orthogonality_std_rad, rel=0.01)
 
 
+@pytest.mark.parametrize("name", ["imu.yaml", "icm42688p.yaml", "lsm6dsv16x.yaml", "own_port/kvh1775_drift.yaml"])
+def test_the_noise_of_a_mean_is_that_of_the_simulated_samples(name: str) -> None:
+    """White samples of a part as in its data sheet, averaged over a second."""
+    loaded = load(CONFIGS / name)
+    world = read_world_section(loaded)
+    for sensor, section in loaded.config.to_calibrate.items():
+        simulated = world.sensors[sensor].accelerometer
+        walk_m_s2 = PARTS[section.part].velocity_random_walk_ug_sqrt_s * 9.80665e-6
+        assert simulated.noise_m_s2 / sqrt(section.rate_hz) == pytest.approx(walk_m_s2, rel=0.03)
+
+
 @pytest.mark.slow
 def test_each_part_has_its_own_noise_and_a_longer_dwell_less_of_it() -> None:
     found = account("uncertainty.axis_deg=0").sensors
     longer = account("uncertainty.axis_deg=0", "procedure.dwell_s=12").sensors
     for name, density in (("lsm9ds1", 150), ("mpu9250", 300), ("adis16465", 23)):
         bias_ug = found[name].bias_std_m_s2 / 9.80665e-6
-        assert bias_ug == pytest.approx(density / sqrt(3 * 18), rel=0.01)
+        assert bias_ug == pytest.approx(density / sqrt(2 * 3 * 18), rel=0.01)  # one-sided: a band of 1/(2 T)
         assert longer[name].bias_std_m_s2 == pytest.approx(found[name].bias_std_m_s2 / 2)
 
 

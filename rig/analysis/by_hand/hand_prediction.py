@@ -79,7 +79,7 @@ def _session(sensor: SensorSection, moves: Sequence[Instruction], rest_s: float)
 
     rates, acceleration = read(turning_rad_s, part.angle_random_walk_rad_sqrt_s), None
     if sensor.acceleration is not None:
-        acceleration = read(STANDARD_GRAVITY_M_S2 * up, part.acceleration_noise_ug_sqrt_hz * MICRO_G_M_S2)
+        acceleration = read(STANDARD_GRAVITY_M_S2 * up, part.velocity_random_walk_ug_sqrt_s * MICRO_G_M_S2)
     return segment_session(np.arange(len(rates)) / SAMPLED_HZ, rates, acceleration)
 
 

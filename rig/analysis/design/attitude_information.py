@@ -66,7 +66,7 @@ def attitude_account(config: RigConfig, plan: Plan) -> AttitudeAccount | None:
         name: expected_stds(
             attitudes,
             reference,
-            PARTS[sensor.part].acceleration_noise_ug_sqrt_hz * MICRO_G_M_S2 / np.sqrt(dwells_s),
+            PARTS[sensor.part].velocity_random_walk_ug_sqrt_s * MICRO_G_M_S2 / np.sqrt(dwells_s),
             attitude_std_rad,
             order,
         )

@@ -59,17 +59,17 @@ def predict_readings(accelerometer: PlannedAccelerometer) -> ReferenceModel:
         mounting_matrix(accelerometer.sensor.mounting),
         accelerometer.run.settings.second_order,
     )
-    noise_m_s2_sqrt_hz = PARTS[accelerometer.sensor.part].acceleration_noise_ug_sqrt_hz * MICRO_G_M_S2
+    walk_m_s_sqrt_s = PARTS[accelerometer.sensor.part].velocity_random_walk_ug_sqrt_s * MICRO_G_M_S2
     held_out_dwells = select_held_out(run.settings.planned_dwells)
     dwells = [dwell for dwell in time_steps_of(run.plan, Dwell) if dwell.step.index not in held_out_dwells]
     sweeps = time_steps_of(run.plan, Sweep)
-    swept = [_predict_sweep(sweep, run.arm, noise_m_s2_sqrt_hz) for sweep in sweeps]
+    swept = [_predict_sweep(sweep, run.arm, walk_m_s_sqrt_s) for sweep in sweeps]
     theta = np.zeros(PARAMETERS)
     theta[:9], theta[REFERENCE] = np.eye(3).ravel(), run.site.gravity_m_s2 * np.array(run.site.up)
     movement = Movement(
         Dwells(
             readings_m_s2=np.zeros((len(dwells), 3)),
-            variances_m2_s4=np.array([np.full(3, noise_m_s2_sqrt_hz**2 / dwell.step.duration_s) for dwell in dwells]),
+            variances_m2_s4=np.array([np.full(3, walk_m_s_sqrt_s**2 / dwell.step.duration_s) for dwell in dwells]),
             attitudes=np.array([predict_attitude(dwell, run.arm, mounting).T for dwell in dwells]),
         ),
         stack_sweeps(swept, mounting),
@@ -96,12 +96,12 @@ def _segment(timed_step: Timed[Dwell] | Timed[Sweep]) -> ReferenceWindow:
     return ReferenceWindow(step.index, timed_step.window_s, 1, 0.0, Posture(np.array(q_rad), wrist))
 
 
-def _predict_sweep(timed_step: Timed[Sweep], arm: DenavitHartenberg, noise_m_s2_sqrt_hz: float) -> SweptAcceleration:
+def _predict_sweep(timed_step: Timed[Sweep], arm: DenavitHartenberg, walk_m_s_sqrt_s: float) -> SweptAcceleration:
     turn = predict_revolution(timed_step, arm, np.eye(3))
     waves = np.diag(np.repeat([1.0, 2.0, 2.0], 3))  # weights of the mean, the cosine and the sine over a revolution
     harmonic = FirstHarmonic(
         harmonic_m_s2=np.zeros((3, 3)),
-        covariance_m2_s4=noise_m_s2_sqrt_hz**2 / turn.duration_s * waves,
+        covariance_m2_s4=walk_m_s_sqrt_s**2 / turn.duration_s * waves,
         speed_rad_s=timed_step.step.growing * turn.speed_rad_s,
         noise_m_s2=np.zeros(3),
         dof=0,

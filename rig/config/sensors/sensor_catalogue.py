@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import radians
+from math import radians, sqrt
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal
 
@@ -38,7 +38,7 @@ class PartSpec:
     - bias_instability_deg_h: the least Allan deviation of the bias.
     - non_orthogonality_deg: deviation from 90° between two axes.
     - ranges_g: the ranges of its accelerometer, the usual one first; the data rate is the gyroscope's.
-    - acceleration_noise_ug_sqrt_hz: noise density.
+    - acceleration_noise_ug_sqrt_hz: noise density, one-sided, as data sheets state it.
     - acceleration_nonlinearity_percent: of the range that acceleration_nonlinear_over_g states.
     - acceleration_bias_mg_k, acceleration_scale_ppm_k, acceleration_bias_instability_ug: as the gyroscope's.
     - acceleration_nonlinear_over_g: that range, in either direction; 0 means the range that is set.
@@ -75,6 +75,11 @@ class PartSpec:
     def angle_random_walk_rad_sqrt_s(self) -> float:
         """The standard deviation of the angle after 1 s by white noise alone, rad/√s."""
         return radians(self.angle_random_walk_deg_sqrt_h) / 60
+
+    @property
+    def velocity_random_walk_ug_sqrt_s(self) -> float:
+        """The standard deviation of an accelerometer's mean over 1 s by white noise alone, µg·√s."""
+        return self.acceleration_noise_ug_sqrt_hz / sqrt(2)
 
     def accept_rate(self, rate_hz: float) -> float:
         """Return the part's exact rate for a nominal `rate_hz`. Raise ValueError, with the nearest, if it has none."""
@@ -281,7 +286,7 @@ PARTS: Mapping[str, PartSpec] = MappingProxyType(
             bias_instability_deg_h=0.05,  # assumed: the maker's typical value
             non_orthogonality_deg=0.06,  # assumed: 1 mrad
             ranges_g=(10, 25),
-            acceleration_noise_ug_sqrt_hz=119,  # TRIAX, table 1: 0.0701 m/s/√h
+            acceleration_noise_ug_sqrt_hz=168,  # TRIAX, table 1: 0.0701 m/s/√h, times √2 / 60
             # Of the accelerometer, assumed: the maker's data sheet states it, but was not looked up.
             acceleration_nonlinearity_percent=0.9,
             acceleration_nonlinear_over_g=10,

@@ -95,7 +95,7 @@ def drawn(part: str, seed: int, arm_rad: float = 1e-4, warmer_k: float = WARMER_
     deviation.
     """
     rng, sheet = np.random.default_rng([seed, 7]), sheet_of(part)
-    density = PARTS[part].acceleration_noise_ug_sqrt_hz
+    walk_ug = PARTS[part].velocity_random_walk_ug_sqrt_s
     truth = Truth(
         matrix=np.diag(1 + 0.02 * rng.normal(size=3)) @ (np.eye(3) + 0.005 * rng.normal(size=(3, 3))),
         bias_m_s2=0.1 * rng.normal(size=3),
@@ -105,7 +105,7 @@ def drawn(part: str, seed: int, arm_rad: float = 1e-4, warmer_k: float = WARMER_
     )
     arm, turned = draw_true_arm(arm_rad, rng), plan_sweeps(AXES)
     straight = Movement(
-        record_dwells(truth, arm, JOINTS, density, rng), record_sweeps(truth, arm, turned, density, rng)
+        record_dwells(truth, arm, JOINTS, walk_ug, rng), record_sweeps(truth, arm, turned, walk_ug, rng)
     )
     even, odd, bias_k = sheet.even_s2_m, sheet.odd_s4_m2, MILLI_G * MICRO_G_M_S2 * sheet.bias_mg_k
     start_s = BETWEEN_S * np.concatenate([len(turned) + np.arange(len(JOINTS)), np.arange(len(turned))])
