@@ -1,6 +1,6 @@
 """What a plan's attitudes are said to tell of the sensors in a file."""
 
-from math import sqrt
+from math import radians, sqrt
 
 import pytest
 
@@ -59,6 +59,10 @@ def test_under_a_ceiling_the_attitudes_tell_as_much() -> None:
     floor, ceiling = account(), account("site.base_up=[0,0,-1]")
     assert ceiling.first.condition == pytest.approx(floor.first.condition)
     assert ceiling.sensors["mpu9250"].bias_std_m_s2 == pytest.approx(floor.sensors["mpu9250"].bias_std_m_s2)
+
+
+def test_what_the_configuration_states_of_the_arm_is_a_half_width() -> None:
+    assert account("uncertainty.axis_deg=0.3").attitude_std_rad == pytest.approx(radians(0.3) / sqrt(3))
 
 
 def test_sweeps_alone_have_none() -> None:

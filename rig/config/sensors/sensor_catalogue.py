@@ -204,7 +204,7 @@ PARTS: Mapping[str, PartSpec] = MappingProxyType(
             scale_ppm_k=3e3 / 60,
             angle_random_walk_deg_sqrt_h=0.15,  # data sheet, features
             bias_instability_deg_h=2,  # data sheet, features: that of the -1 (±125 °/s), assumed for the others
-            non_orthogonality_deg=0.15,  # axis to axis ±0.05° (data sheet, features), used as a standard deviation
+            non_orthogonality_deg=0.15,  # axis to axis ±0.05° (data sheet, features), taken as a std: three of it
             ranges_g=(8,),
             acceleration_noise_ug_sqrt_hz=23,  # assumed: the part's data sheet states it, but was not looked up
             # Of the accelerometer, assumed: the part's data sheet states it, but was not looked up.

@@ -40,7 +40,7 @@ def print_account(console: Console, account: AttitudeAccount) -> None:
         soft_wrap=True,
     )
     arm_mrad = 1e3 * account.attitude_std_rad
-    console.print(f"Expected standard deviations of the accelerometers, for an arm good to {arm_mrad:.2g} mrad:")
+    console.print(f"Expected standard deviations of accelerometers, if the attitudes' is {arm_mrad:.2g} mrad:")
     table = Table(box=SIMPLE)
     table.add_column("sensor")
     headings = ["scale ppm", "non-orthogonality mrad", "bias µg", *(["φ 1e-6 s²/m"] if account.order == 2 else [])]
