@@ -20,7 +20,6 @@ NAMES = {"g": "_rad_s", "a": "_m_s2", "m": "_t"}
 SENSORS = {"g": "gyroscope", "a": "accelerometer", "m": "magnetometer"}
 SI_UNITS = {"g": "rad/s", "a": "m/s2", "m": "T"}
 OPEN = "?"  # where a number is still to be stated
-HOTTEST_C = 200.0  # temperature that a part with a thermometer survives
 LIKELY_HZ = 100.0  # of a log without times
 LARGEST_COUNT = 500.0  # whole numbers beyond it are steps of a converter
 # A block is at rest if its scatter is at most this many times that of the quietest tenth.
