@@ -19,7 +19,7 @@ from support.processes.waiting import PATIENCE_S, alive, wait_for
 from support.processes.warm import start_module
 
 QUICK = (  # sweeps that are over soon, by a laboratory that hurries
-    "procedure.speed_deg_s=150", "procedure.acceleration_deg_s2=400", "procedure.rest_s=0.5",
+    "procedure.speed_deg_s=170", "procedure.acceleration_deg_s2=700", "procedure.rest_s=0.5",
     "arm.transfer_speed_deg_s=170", "sensors.gyro.rate_hz=119", "sensors.gyro.range_deg_s=500",
     "limits.scale_std=0.02", "limits.bias_std_rad_s=0.02", "limits.condition=20",
 )  # fmt: skip

@@ -119,7 +119,7 @@ def without_sweeps(run: RunData) -> RunData:
     return replace(run, events=())
 
 
-SHORTEST = {"name": "shortest", "speed_deg_s": 150, "acceleration_deg_s2": 400, "rest_s": 0.5}
+SHORTEST = {"name": "shortest", "speed_deg_s": 170, "acceleration_deg_s2": 700, "rest_s": 0.5}
 
 
 @pytest.mark.thorough

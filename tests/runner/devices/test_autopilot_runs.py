@@ -16,7 +16,7 @@ from support.paths import CONFIGS
 QUICK: dict[str, Any] = {
     "arm": {"transfer_speed_deg_s": 170},
     "sensors": {"imu1": {"acceleration": None}},
-    "procedure": {"speed_deg_s": 150, "acceleration_deg_s2": 400, "rest_s": 0.5},
+    "procedure": {"speed_deg_s": 170, "acceleration_deg_s2": 700, "rest_s": 0.5},
     "limits": {"bias_std_rad_s": 0.01, "scale_std": 0.01},
 }
 TRUTH = [1.006, 0.994, 1.003, 0.008, -0.011, 0.005]

@@ -21,7 +21,7 @@ KVH = CONFIGS / "own_port" / "kvh1775.yaml"
 QUICK: dict[str, Any] = {
     "arm": {"transfer_speed_deg_s": 170},
     "sensors": {"kvh": {"rate_hz": 100, "acceleration": None}},
-    "procedure": {"speed_deg_s": 150, "acceleration_deg_s2": 400, "rest_s": 0.5},
+    "procedure": {"speed_deg_s": 170, "acceleration_deg_s2": 700, "rest_s": 0.5},
     "limits": {"bias_std_rad_s": 0.001, "scale_std": 0.001},
     "world": {"time_scale": 12},
 }

@@ -20,7 +20,7 @@ from support.paths import CONFIGS
 QUICK: dict[str, Any] = {
     "arm": {"transfer_speed_deg_s": 170},
     "sensors": {"kvh": {"rate_hz": 100, "acceleration": None}},
-    "procedure": {"speed_deg_s": 150, "acceleration_deg_s2": 400, "rest_s": 0.5},
+    "procedure": {"speed_deg_s": 170, "acceleration_deg_s2": 700, "rest_s": 0.5},
     "limits": {"scale_deviation": 0.05, "scale_std": 0.01, "bias_rad_s": 0.1, "bias_std_rad_s": 0.05},
     "world": {"time_scale": 12},
 }

@@ -44,7 +44,7 @@ class Everything:
 def test_a_run_goes_on_when_a_listener_raises_while_the_arm_moves(world: World, tmp_path: Path) -> None:
     fast = {
         "arm": {"transfer_speed_deg_s": 170},
-        "procedure": {"speed_deg_s": 150, "acceleration_deg_s2": 400, "rest_s": 0.5},
+        "procedure": {"speed_deg_s": 170, "acceleration_deg_s2": 700, "rest_s": 0.5},
         "limits": {"scale_std": 1, "bias_std_rad_s": 1},
         "world": {"time_scale": 12},
     }

@@ -27,7 +27,7 @@ QUICK_EXPERIMENT: dict[str, Any] = {
         "gyro": {"rate_hz": 119},
         "reference": {"part": "adis16465", "serial_number": "ADIS16465-001", "role": "reference", "rate_hz": 100},
     },
-    "procedure": {"verify": True, "speed_deg_s": 150, "acceleration_deg_s2": 400, "rest_s": 0.5},
+    "procedure": {"verify": True, "speed_deg_s": 160, "acceleration_deg_s2": 700, "rest_s": 0.5},
     "limits": {"scale_std": 1, "bias_std_rad_s": 1, "verification_rms_rad_s": 1, "verification_mean_rad_s": 1},
     "world": {"time_scale": 12, "sensors": {"reference": {"scale": [1.0, 1.0, 1.0], "bias_rad_s": [0.0, 0.0, 0.0]}}},
 }
