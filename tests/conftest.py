@@ -8,7 +8,7 @@ import tempfile
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from hypothesis import settings
@@ -32,6 +32,8 @@ settings.load_profile("test")
 # Rooms whose tests wait for a laboratory: first, so that at the end those that compute use every processor.
 WAITING = {"runner", "world", "turners", "page", "batch", "floor", "sensors"}
 
+NURSERY = "rig's nursery"  # of what xdist hands to the processes that run tests
+
 # Nothing that a test runs enters the history of whoever runs the tests, or is known as a run of theirs.
 os.environ["RIG_HISTORY"] = "off"
 _share = tempfile.TemporaryDirectory(prefix="rig-share-")
@@ -51,7 +53,16 @@ def pytest_configure(config: pytest.Config) -> None:
     if nursery.closed:
         settings.load_profile("proof")
     else:
+        nursery.addresses = getattr(config, "workerinput", {}).get(NURSERY)
         readers_forked()
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_configure_node(node: Any) -> None:
+    """Processes that run tests fork others from the same one, which the process that gives them their tests starts."""
+    if not nursery.closed:
+        nursery.addresses = nursery.addresses or nursery.begin()
+        node.workerinput[NURSERY] = nursery.addresses
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

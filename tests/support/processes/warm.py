@@ -23,21 +23,26 @@ NURSERY = Path(__file__).with_name("nursery.py")
 
 
 class _Nursery:
-    """The processes that all are forked from; they are started when the first is wanted, and end with this one."""
+    """The processes that all are forked from. They are started when the first is wanted, and end with this one.
+
+    `addresses`: where their orders are taken. Several processes that run tests share those of the one that started
+    them, because to import everything takes seconds.
+    """
 
     def __init__(self) -> None:
-        self._addresses: dict[str, str] | None = None
+        self.addresses: dict[str, str] | None = None
         self._starting = Lock()
         self.closed = False  # nothing is forked: all are processes that the system starts
 
     def address(self, module: str) -> str:
         """Return the address that takes orders for processes of that module; modules of tests share one."""
         with self._starting:
-            if self._addresses is None:
-                self._addresses = self._begun()
-        return self._addresses.get(module, self._addresses["rig"])
+            if self.addresses is None:
+                self.addresses = self.begin()
+        return self.addresses.get(module, self.addresses["rig"])
 
-    def _begun(self) -> dict[str, str]:
+    def begin(self) -> dict[str, str]:
+        """Start them; return their addresses."""
         command = [sys.executable, str(NURSERY), json.dumps(ENVIRONMENT)]
         process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
         assert process.stdin is not None and process.stdout is not None
