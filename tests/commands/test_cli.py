@@ -10,10 +10,13 @@ from pathlib import Path
 import pytest
 
 from rig.cli import COMMANDS
+from support.laboratories.commands import rig, rig_here
 from support.paths import DOCS, ROOT
 from support.processes.waiting import PATIENCE_S
+from support.processes.warm import start_module
 
 CONFIG = ROOT / "configs" / "ci.yaml"
+FULL = Path("/dev/full")
 PLAN = f"{sys.executable} -m rig plan {CONFIG}"
 
 
@@ -63,20 +66,28 @@ def test_the_help_of_every_command_is_shown_on_a_terminal_of_plain_ascii() -> No
 
 @pytest.mark.slow
 def test_results_that_cannot_be_written_are_a_named_error() -> None:
-    done = shell(f"{PLAN} > /dev/full")
-    assert done.returncode == 5
-    assert done.stderr.startswith("rig: output_lost: ") and "No space left" in done.stderr
-    assert done.stderr.count("\n") == 1
+    with (
+        FULL.open("w") as full,
+        start_module("plan", CONFIG, stdout=full, stderr=subprocess.PIPE, text=True) as process,
+    ):
+        _, errors = process.communicate(timeout=PATIENCE_S)
+    assert process.returncode == 5
+    assert errors.startswith("rig: output_lost: ") and "No space left" in errors
+    assert errors.count("\n") == 1
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("room", ["/dev/full", "/dev/full 2> /dev/full", "/dev/null"])
-def test_a_result_that_is_kept_in_a_folder_keeps_its_verdict(tmp_path: Path, room: str) -> None:
-    examples = DOCS / "examples"
-    kept = f"solve {examples / 'samples.csv'} --sweeps {examples / 'sweeps.csv'} --out {tmp_path / 'run'}"
-    done = shell(f"{sys.executable} -m rig {kept} > {room}")
-    assert done.returncode == 0 and (tmp_path / "run" / "result.json").exists()
-    assert ("output_lost" in done.stderr) == (room == "/dev/full")
+@pytest.mark.parametrize(("output", "errors"), [(FULL, None), (FULL, FULL), (os.devnull, None)])
+def test_a_result_that_is_kept_in_a_folder_keeps_its_verdict(
+    tmp_path: Path, output: str | Path, errors: Path | None
+) -> None:
+    samples, sweeps = DOCS / "examples" / "samples.csv", DOCS / "examples" / "sweeps.csv"
+    told = errors or tmp_path / "stderr"
+    with Path(output).open("w") as stdout, told.open("w") as stderr:
+        words = ("solve", samples, "--sweeps", sweeps, "--out", tmp_path / "run")
+        status = start_module(*words, stdout=stdout, stderr=stderr).wait(PATIENCE_S)
+    assert status == 0 and (tmp_path / "run" / "result.json").exists()
+    assert errors or ("output_lost" in told.read_text(encoding="utf-8")) == (output == FULL)
 
 
 @pytest.mark.slow
@@ -86,14 +97,14 @@ def test_a_terminal_without_special_characters_gets_the_plan_too() -> None:
 
 
 def test_the_bare_command_shows_what_one_does_first_and_where_help_is() -> None:
-    done = shell(f"{sys.executable} -m rig")
+    done = rig_here()
     assert done.returncode == 0 and done.stderr == ""
     for command in ("rig demo", "rig plan", "rig run", "rig check", "rig report", "rig history", "rig --help"):
         assert command in done.stdout
 
 
 def test_blanks_about_the_equals_sign_are_told_as_what_is_wrong() -> None:
-    done = shell(f"{PLAN} --set procedure.speed_deg_s = 30")
+    done = rig("plan", CONFIG, "--set", "procedure.speed_deg_s", "=", "30")
     assert done.returncode == 2 and "--set takes one word without blanks" in done.stderr, done
 
 
@@ -134,8 +145,8 @@ def test_the_plan_of_attitudes_says_what_they_will_tell_of_each_accelerometer() 
 
 @pytest.mark.slow
 def test_attitudes_of_ones_own_that_tell_too_little_are_refused_by_the_plan() -> None:
-    imu = f"{sys.executable} -m rig plan {ROOT / 'configs' / 'imu.yaml'}"
-    done = shell(f"{imu} --set 'procedure.attitudes=[[0, -90, 0], [0, -90, 90], [0, -90, 180]]'")
+    own = "procedure.attitudes=[[0, -90, 0], [0, -90, 90], [0, -90, 180]]"
+    done = rig_here("plan", ROOT / "configs" / "imu.yaml", "--set", own)
     assert done.returncode == 2 and "rig: rank_deficient: 3 attitudes determine 9 of the 14" in done.stderr, done
 
 

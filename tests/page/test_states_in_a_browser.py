@@ -79,7 +79,7 @@ def test_every_state_of_a_run_has_its_word_and_its_sign(driver: Chrome, tmp_path
         for state, events in (*before.items(), *moves.items(), ("judging", [recorded])):
             tell(*events)
             wait_for(partial(in_state, driver, state), state)
-            assert text(driver, "state-word") and text(driver, "sign") and text(driver, "state-text")
+            wait_for(lambda: all(text(driver, part) for part in ("state-word", "sign", "state-text")), "word and sign")
             picture(driver, state)
 
 
