@@ -87,6 +87,7 @@ def test_a_benchmark_says_what_it_can(benchmark: Path, tmp_path: Path) -> None:
     assert said.returncode == 0 and said.stdout.startswith("usage:"), said.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("seconds", "status", "met"), [(0.05, 0, "yes"), (0.066, 0, "no, by 10%"), (0.09, 3, "no, by 50%")]
 )
@@ -103,6 +104,7 @@ def test_a_figure_far_behind_its_goal_has_a_status_of_its_own(
     assert f"| rig --help | {seconds:.3g} s | python 0.02 s | {ratio:.3g} | ≤ 0.06 s | {met} |" in said.stdout
 
 
+@pytest.mark.slow
 def test_a_benchmark_that_fails_is_named_and_the_others_run(tmp_path: Path) -> None:
     fails, runs = tmp_path / "fails.py", tmp_path / "runs.py"
     fails.write_text("raise SystemExit(4)\n")

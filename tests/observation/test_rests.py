@@ -13,6 +13,7 @@ from support.external.turned_body import Hand, turn
 from support.paths import DOCS
 
 
+@pytest.mark.slow
 def test_a_hands_rests_are_found_as_they_are_known_of_a_real_recording(tmp_path: Path) -> None:
     """Thirteen, say those who looked at it."""
     samples = read_samples(unpack("imucal", "samples.csv", tmp_path))

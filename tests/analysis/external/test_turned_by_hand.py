@@ -69,6 +69,7 @@ def test_uncertainties_are_those_of_many_sessions(tmp_path: Path, hand: Hand, th
         assert (0.93 if thorough else 0.87) < within
 
 
+@pytest.mark.slow
 def test_real_turns_by_hand_tell_as_much_as_they_can(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -269,6 +269,7 @@ def test_the_probe_of_another_board_is_refused(monkeypatch: pytest.MonkeyPatch) 
     assert error.name == "other_microcontroller" and "F302R8" in error.what.upper()
 
 
+@pytest.mark.slow
 def test_no_script_of_the_working_folder_is_executed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     (tmp_path / "pyocd_user.py").write_text(f"open({str(tmp_path / 'trace')!r}, 'w')", encoding="utf-8")
     (tmp_path / "pyocd.yaml").write_text("user_script: pyocd_user.py\n", encoding="utf-8")

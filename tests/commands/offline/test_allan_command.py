@@ -128,6 +128,7 @@ def test_a_log_in_which_the_sensor_was_turned_is_refused(
     assert "rig: not_at_rest: about 2" in (said := capsys.readouterr().err) or "rig: not_at_rest: about 30" in said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["imucal", "broad"])
 def test_a_body_that_a_hand_moved_was_not_at_rest(
     name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]

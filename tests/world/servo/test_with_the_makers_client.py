@@ -70,6 +70,7 @@ def test_a_negative_position_comes_as_two_s_complement_and_the_block_in_one_pack
         assert (len(data), result, error) == (27, 0, 0)
 
 
+@pytest.mark.slow
 def test_errors_have_the_manual_s_numbers() -> None:
     with client(ServoTruth(settings=FAST | {"Operating Mode": 4})) as (port, packets, _):
         assert packets.write1ByteTxRx(port, 1, 11, 2) == (0, 4), "no such mode: data range"
