@@ -18,7 +18,7 @@ def read_world_section(loaded: Loaded) -> WorldSection:
             "the configuration has no world: section, so there is nothing to simulate",
             "Name a file with a world: section, for example configs/demo.yaml",
         )
-    world = WorldSection.model_validate(yaml.safe_load(loaded.text)["world"])
+    world = WorldSection.model_validate(yaml.load(loaded.text, yaml.CSafeLoader)["world"])
     default = {"offset_mm": tuple(1000 * length for length in loaded.config.turner.extension_m)}
     sensors = {
         name: sensor if "offset_mm" in sensor.model_fields_set else sensor.model_copy(update=default)

@@ -85,8 +85,7 @@ def read_yaml(text: str) -> Document:
         if (character := first_control_character(line.rstrip("\r").replace("\t", " "))) is not None:
             raise Unreadable(f"holds the control character {printable(character)}", number)
     try:
-        loader = _Loader(text)
-        node = loader.get_single_node()
+        loader, node = _compose(text)
         lines: dict[Location, int] = {}
         written: dict[Location, str] = {}
         problems = tuple(_survey(node, (), lines, written))
@@ -99,11 +98,26 @@ def read_yaml(text: str) -> Document:
         raise Unreadable(_shorten_words(" ".join(str(error).split()))) from None
 
 
-class _Loader(yaml.SafeLoader):
-    """Composes no more than a configuration can need; makes plain data only."""
+def _compose(text: str) -> "tuple[_Loader, yaml.Node | None]":
+    """Return the loader of a text and its node.
 
-    def __init__(self, text: str) -> None:
+    libyaml parses five times as fast, and PyYAML says more of what is wrong.
+    """
+    try:
+        loader = _Loader(text, yaml.CSafeLoader(text))
+        return loader, loader.get_single_node()
+    except yaml.YAMLError:
+        loader = _Loader(text)
+        return loader, loader.get_single_node()
+
+
+class _Loader(yaml.SafeLoader):
+    """Composes no more than a configuration can need; makes plain data only. `parser`: another one of the same text."""
+
+    def __init__(self, text: str, parser: yaml.CSafeLoader | None = None) -> None:
         super().__init__(text)
+        if parser is not None:
+            self.check_event, self.peek_event, self.get_event = parser.check_event, parser.peek_event, parser.get_event
         self._depth = self._nodes = 0
         self._size_of: dict[str, int] = {}  # number of nodes that an alias stands for, once all of them are known
 
