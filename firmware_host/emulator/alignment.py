@@ -9,7 +9,7 @@ from firmware_host.emulator.engine import Engine
 from firmware_host.emulator.thumb import word_accesses
 
 _CORE_REGISTERS = [*range(UC_ARM_REG_R0, UC_ARM_REG_R0 + 13), UC_ARM_REG_SP, UC_ARM_REG_LR]
-_ENOUGH = 1_000  # aligned runs after which an instruction is trusted: the check costs a fifth of all time
+_ENOUGH = 1_000  # aligned runs after which an instruction is trusted
 
 
 class AlignmentWatch:
@@ -22,7 +22,7 @@ class AlignmentWatch:
         self._engine = engine
         self._registered: set[int] = set()  # their addresses in all blocks so far
         self._new: dict[int, int] = {}  # base registers by address, of those not hooked yet
-        self._watched: dict[int, _WatchedInstruction] = {}
+        self._watched: dict[int, tuple[Callable[[], int], Callable[[], None]]] = {}  # its base, the end of the watch
         self._trusted: list[int] = []
 
     def add_block(self, address: int, code: bytes) -> bool:
@@ -33,32 +33,22 @@ class AlignmentWatch:
         return bool(self._new)
 
     def update(self) -> None:
-        """Hook new instructions, and release trusted ones. Call between two runs."""
+        """Watch new instructions, and release trusted ones. Call between two runs."""
         while self._new:
             address, base = self._new.popitem()
-            release = self._engine.hook_instruction(address, self._check)
-            self._watched[address] = _WatchedInstruction(self._engine.register(_CORE_REGISTERS[base]), release)
+            register = _CORE_REGISTERS[base]
+            release = self._engine.watch_instruction(address, register, _ENOUGH, self._judge)
+            self._watched[address] = self._engine.register(register), release
             self._registered.add(address)
         for address in self._trusted:
-            self._watched.pop(address).release()
+            _, release = self._watched.pop(address)
+            release()
         self._trusted.clear()
 
-    def _check(self, address: int) -> None:
-        watched = self._watched[address]
-        base = watched.read_base()
+    def _judge(self, address: int) -> None:
+        """Raise Violation if the access is not aligned; otherwise trust it, because it was aligned often enough."""
+        read_base, _ = self._watched[address]
+        base = read_base()
         if base & 3:
             raise Violation("firmware_fault", f"unaligned access by address 0x{base:08X}", "Correct the firmware")
-        watched.times += 1
-        if watched.times == _ENOUGH:
-            self._trusted.append(address)
-
-
-class _WatchedInstruction:
-    """One instruction: the reader of its base register, the release of its hook, and the count of its runs."""
-
-    __slots__ = ("read_base", "release", "times")
-
-    def __init__(self, read_base: Callable[[], int], release: Callable[[], None]) -> None:
-        self.read_base = read_base
-        self.release = release
-        self.times = 0
+        self._trusted.append(address)

@@ -36,7 +36,7 @@ from unicorn import (
 from unicorn.arm_const import UC_ARM_REG_LR, UC_ARM_REG_PC, UC_CPU_ARM_CORTEX_M4
 from unicorn.unicorn_py3.unicorn import uclib
 
-from firmware_host.emulator.hooks import BlockTicks, Bus, Counter, Meter, Shortcuts, address_of
+from firmware_host.emulator.hooks import BlockTicks, Bus, Counter, Meter, Shortcuts, Watch, address_of
 from firmware_host.emulator.timeline import Timeline
 
 _SET_CPU_MODEL = (1 << 30) | (1 << 26) | UC_CTL_CPU_MODEL  # uc_ctl: write, one argument
@@ -201,19 +201,26 @@ class Engine:
         self._callbacks += [callback, meter, timeline, ticks]
         self._add(UC_HOOK_BLOCK, ctypes.c_void_p(address_of("block")), ctypes.byref(meter))
 
-    def hook_instruction(self, address: int, hook: Callable[[int], None]) -> Callable[[], None]:
-        """Call `hook(address)` before the instruction at `address`, until the returned function is called.
+    def watch_instruction(
+        self, address: int, register: int, enough: int, ask: Callable[[int], None]
+    ) -> Callable[[], None]:
+        """Call `ask(address)` before the instruction at `address` if a core register is no multiple of four there.
 
+        `register`: Unicorn's number. After `enough` runs `ask` is called once too. The returned function ends the watch.
         Use between two runs.
         """
 
-        def call_hook(_handle: int, address: int, _size: int) -> None:
+        def call_ask(_handle: int, address: int, _size: int) -> None:
             try:
-                hook(address)
+                ask(address)
             except BaseException as error:
                 self._fail(error)
 
-        hook_handle = self._hook(UC_HOOK_CODE, _BLOCK(call_hook), address, address)
+        callback = _BLOCK(call_ask)
+        watch = Watch(ctypes.cast(uclib.uc_reg_read, ctypes.c_void_p), _pointer(callback), register, 0, enough)
+        self._callbacks += [callback, watch]
+        function = ctypes.c_void_p(address_of("watch"))
+        hook_handle = self._add(UC_HOOK_CODE, function, ctypes.byref(watch), address, address)
         addresses = ctypes.c_uint64(address), ctypes.c_uint64(address + 2)
         _check(
             uclib.uc_ctl(self._handle, _TRANSLATE_ANEW, *addresses)

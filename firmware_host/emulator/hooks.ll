@@ -4,6 +4,7 @@
 
 %Time = type { i64, i64 }                                 ; now, deadline
 %Meter = type { ptr, ptr, i64, i64, ptr }                 ; ask, time, first address, halfwords, ticks of each
+%Watch = type { ptr, ptr, i64, i64, i64 }                ; read, ask, register, times, enough
 %Shortcuts = type { ptr, ptr, ptr, ptr, ptr, ptr }        ; read, write, exchange, time, counter, bus
 %Counter = type { i64, i64, i64, i64, i64, i64, i64, i64 } ; clocked, since, counted, counts, ticks, modulus, read at, polls
 %Bus = type { i64, i64, i64, i64, i64, i64, i64, [2 x i64], [2 x i64], i64, i64, i64, i64, i64, [16 x i16] }
@@ -48,6 +49,41 @@ pass:
 ask:
   %python = load ptr, ptr %meter
   call void %python(ptr %engine, i64 %address, i32 %size)
+  ret void
+}
+
+; --- before an instruction whose base register has to be a multiple of four: ask where it is not, and once when it was
+; --- often enough
+
+define void @watch(ptr %engine, i64 %address, i32 %size, ptr %watch) {
+  %base_at = alloca i32
+  %register_at = getelementptr %Watch, ptr %watch, i32 0, i32 2
+  %register_wide = load i64, ptr %register_at
+  %register = trunc i64 %register_wide to i32
+  %read = load ptr, ptr %watch
+  %status = call i32 %read(ptr %engine, i32 %register, ptr %base_at)
+  %base = load i32, ptr %base_at
+  %odd = and i32 %base, 3
+  %aligned = icmp eq i32 %odd, 0
+  br i1 %aligned, label %count, label %ask
+
+count:
+  %times_at = getelementptr %Watch, ptr %watch, i32 0, i32 3
+  %enough_at = getelementptr %Watch, ptr %watch, i32 0, i32 4
+  %times = load i64, ptr %times_at
+  %more = add i64 %times, 1
+  store i64 %more, ptr %times_at
+  %enough = load i64, ptr %enough_at
+  %trusted = icmp eq i64 %more, %enough
+  br i1 %trusted, label %ask, label %done
+
+ask:
+  %python_at = getelementptr %Watch, ptr %watch, i32 0, i32 1
+  %python = load ptr, ptr %python_at
+  call void %python(ptr %engine, i64 %address, i32 %size)
+  br label %done
+
+done:
   ret void
 }
 

@@ -62,6 +62,18 @@ class BlockTicks:
         ctypes.memset(self._ticks, 0, ctypes.sizeof(self._ticks))
 
 
+class Watch(ctypes.Structure):
+    """The watch of an instruction: `ask` is called when `register` is no multiple of four, and after `enough` runs."""
+
+    _fields_ = (
+        ("read", ctypes.c_void_p),
+        ("ask", ctypes.c_void_p),
+        ("register", Int),
+        ("times", Int),
+        ("enough", Int),
+    )
+
+
 class Counter(ctypes.Structure):
     """A free-running counter.
 
