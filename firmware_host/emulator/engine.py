@@ -206,8 +206,8 @@ class Engine:
     ) -> Callable[[], None]:
         """Call `ask(address)` before the instruction at `address` if a core register is no multiple of four there.
 
-        `register`: Unicorn's number. After `enough` runs `ask` is called once too. The returned function ends the watch.
-        Use between two runs.
+        `register`: Unicorn's number. After `enough` runs `ask` is called once too. Call the returned function to end
+        the watch. Use between two runs.
         """
 
         def call_ask(_handle: int, address: int, _size: int) -> None:

@@ -79,7 +79,8 @@ def test_a_run_that_goes_on_is_alive_by_the_same_reading(driver: Chrome, tmp_pat
         tell.word("Measuring")
         places = {place for place, words in says(driver) if ALIVE.search(words)}
         assert {"title", "link-words", "state-word", "clock", "bar", "step-number"} <= places
-        assert SPEED.search(text(driver, "arm-facts")) and "playing" in text(driver, "arm-facts")
+        wait_for(lambda: SPEED.search(text(driver, "arm-facts")), "the arm's speed")
+        assert "playing" in text(driver, "arm-facts")
         assert not driver.execute_script("return document.querySelector('.plot .age').textContent")
         assert contradictions(driver) and not driver.find_element("id", "stale").is_displayed()
 
