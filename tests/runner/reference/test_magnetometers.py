@@ -40,7 +40,7 @@ ATTITUDES = {
     "field_test_s": 4.0,
     "acceleration_deg_s2": 700,
 }
-IMU = {**ATTITUDES, "name": "imu", "axes": 3, "speed_deg_s": 170, "rest_s": 0.5}
+IMU = {**ATTITUDES, "name": "imu", "axes": 3, "speed_deg_s": 150, "rest_s": 0.5}
 ACCELEROMETER: dict[str, Any] = {
     "scale": [1.02, 0.985, 1.01],
     "bias_m_s2": [0.3, -0.2, 0.4],
