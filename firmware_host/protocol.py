@@ -49,7 +49,7 @@ METHODS = ("closed_form", "algorithm_1")
 SOLUTION_STATUSES = ("solved", "too_few_observations", "degenerate", "not_converged")
 # States of a session by hand, and outcomes of its last move.
 HAND_STATES = ("idle", "starting", "moving", "resting", "done", "failed")
-HAND_OUTCOMES = ("nothing", "taken", "clipped", "lost", "no_face", "contradicts")
+HAND_OUTCOMES = ("nothing", "accepted", "clipped", "lost", "no_face", "contradicts")
 HAND_FACES = ("+x", "-x", "+y", "-y", "+z", "-z")  # the sensor's axis that points upwards
 HEATER_CAUSES = ("on", "not_wanted", "no_word", "too_hot", "no_thermometer")  # reasons for being off
 ENUMERATIONS = {  # name → prefix of its values in C, the values counted from 0

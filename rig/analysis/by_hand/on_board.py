@@ -51,8 +51,8 @@ def compare_with_board(
     Raise Fault `board_unverified` if readings or reports are missing, `board_disagrees` if the limits are exceeded.
     """
     host = solve_like_board(tuple(_moves(readings, reports)))
-    if (used := sum(report.outcome == "taken" for report in reports)) != solved.accepted:
-        raise _unverified_fault(f"it has taken {solved.accepted} moves, of which this computer received {used}")
+    if (used := sum(report.outcome == "accepted" for report in reports)) != solved.accepted:
+        raise _unverified_fault(f"it has accepted {solved.accepted} moves, of which this computer received {used}")
     matrix = float(np.max(np.abs(np.array(solved.matrix) - host.matrix)))
     bias = float(np.max(np.abs(np.array(solved.bias_rad_s) - host.bias_rad_s)))
     if not (matrix <= SCALE_LIMIT and bias <= BIAS_LIMIT_RAD_S):
@@ -68,14 +68,14 @@ def compare_with_board(
 def _moves(readings: BoardReadings, reports: Sequence[HandReport]) -> Iterator[BoardMove]:
     counted = False  # the previous rest is in the solution
     for report in reports:
-        used = report.outcome == "taken"
+        used = report.outcome == "accepted"
         if used:
             yield _move(readings, report, follows=counted)
         counted = used
 
 
 def _move(readings: BoardReadings, report: HandReport, *, follows: bool) -> BoardMove:
-    assert report.before is not None and report.after is not None, "taken moves are between faces"
+    assert report.before is not None and report.after is not None, "accepted moves are between faces"
     times_us, rates = readings.times_us, readings.rates
     marks = [report.rest_us, report.move_us, report.after_us, report.end_us]
     first, begin, end, last = np.searchsorted(times_us, marks).tolist()

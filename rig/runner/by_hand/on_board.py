@@ -88,7 +88,7 @@ class FollowedSession:
             self._note_rest(report, report.after)
         if report.outcome == "nothing":
             return None
-        if report.outcome != "taken" or report.before is None or report.after is None:
+        if report.outcome != "accepted" or report.before is None or report.after is None:
             wrong = Fault(*AGAIN[report.outcome])
             self.tell(HandMoveRefused(report.move_us, report.after_us, wrong.name))
             return wrong

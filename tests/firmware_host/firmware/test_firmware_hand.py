@@ -56,7 +56,7 @@ def played() -> Played:
 
 
 def test_twelve_flips_are_found_and_taken(played: Played) -> None:
-    assert played.outcomes == ["taken"] * 12
+    assert played.outcomes == ["accepted"] * 12
     assert [report.after for report in played.reports] == [flip.to for flip in TWELVE if isinstance(flip, FlipAction)]
     assert played.solved.state == "done"
     assert played.solved.accepted == 12
@@ -80,7 +80,7 @@ def test_a_scale_of_the_turntables_part_needs_more_moves_and_whole_turns_count()
     off = 1.1771
     recorded = replace(recorded, rates=recorded.rates / off, matrix=recorded.matrix / off, bias=recorded.bias / off)
     played = play(recorded, moves=16, scale_std=2e-3)
-    assert played.outcomes == ["taken"] * 16
+    assert played.outcomes == ["accepted"] * 16
     assert [report.whole for report in played.reports[12:]] == [True, True, False, True]
     assert played.agreement.matrix_difference < SCALE_LIMIT / 2
     assert np.max(np.abs(played.scale / recorded.truth[:3] - 1)) < 2e-3
@@ -89,7 +89,7 @@ def test_a_scale_of_the_turntables_part_needs_more_moves_and_whole_turns_count()
 def test_a_slow_part_that_is_left_alone_for_a_minute() -> None:
     actions = (*TWELVE[:4], FlipAction("-y", Mistake("left", 60.0)), *TWELVE[5:])
     slow = play(handle(actions, 1, replace(LSM9DS1, rate_hz=59.5), rest_s=2.0))
-    assert slow.outcomes == ["taken"] * 12
+    assert slow.outcomes == ["accepted"] * 12
     assert slow.agreement.matrix_difference < SCALE_LIMIT
 
 
@@ -100,7 +100,7 @@ def test_a_touched_box_costs_nothing() -> None:
         *TWELVE[4:],
     )  # lifted by a corner, and on that face already
     played = play(handle(actions, 1, rest_s=REST_S))
-    assert [outcome for outcome in played.outcomes if outcome != "nothing"] == ["taken"] * 12
+    assert [outcome for outcome in played.outcomes if outcome != "nothing"] == ["accepted"] * 12
     assert "nothing" in played.outcomes
     assert played.agreement.matrix_difference < SCALE_LIMIT
 
@@ -110,7 +110,7 @@ def test_a_move_beyond_the_range_is_asked_again() -> None:
     played = play(recorded)
     assert np.abs(recorded.rates).max() > np.radians(573)
     assert played.outcomes[5] == "clipped"
-    assert played.outcomes.count("taken") == 11
+    assert played.outcomes.count("accepted") == 11
     assert played.solved.state == "resting"
 
 
@@ -119,7 +119,7 @@ def test_a_move_in_which_readings_are_missing_is_asked_again() -> None:
     numbers = np.round(recorded.time_s * 119.0).astype(int)  # the board counts what it did not get as well
     played = play(recorded, number=numbers)
     assert played.outcomes[5] == "lost"
-    assert played.outcomes.count("taken") == 11
+    assert played.outcomes.count("accepted") == 11
 
 
 def test_a_box_that_lies_on_no_face_is_asked_again_and_the_move_from_there_tells_nothing() -> None:
@@ -132,12 +132,12 @@ def test_a_box_that_lies_on_no_face_is_asked_again_and_the_move_from_there_tells
     again = play(replace(recorded, acceleration=leaning))
     assert again.outcomes[3:5] == ["no_face", "nothing"]
     assert again.reports[3].after is None
-    assert again.outcomes.count("taken") == 10
+    assert again.outcomes.count("accepted") == 10
 
 
 def test_a_turn_that_ends_short_contradicts_what_is_known() -> None:
     played = play(handle((*TWELVE, TurnAction(1, Mistake("short")), TurnAction(1)), 3, rest_s=REST_S), moves=14)
-    assert played.outcomes == [*["taken"] * 12, "contradicts", "taken"]
+    assert played.outcomes == [*["accepted"] * 12, "contradicts", "accepted"]
 
 
 def test_a_box_on_another_face_than_its_accelerometer_says_is_far_from_what_is_known() -> None:
@@ -160,7 +160,7 @@ def test_after_ten_refused_moves_in_a_row_it_gives_up() -> None:
 
 def test_a_box_that_is_held_askew_in_the_hand_is_asked_again() -> None:
     played = play(twelve(2, "held"))
-    assert played.outcomes == ["taken", "taken", "no_face", "nothing", *["taken"] * 8]
+    assert played.outcomes == ["accepted", "accepted", "no_face", "nothing", *["accepted"] * 8]
 
 
 def test_what_is_missing_in_the_readings_of_the_host_is_named(played: Played) -> None:
@@ -169,7 +169,7 @@ def test_what_is_missing_in_the_readings_of_the_host_is_named(played: Played) ->
     with pytest.raises(Fault, match="did not arrive") as missing:
         compare_with_board(gappy, played.reports, played.solved)
     assert missing.value.name == "board_unverified"
-    with pytest.raises(Fault, match="taken 12 moves, of which this computer received 11"):
+    with pytest.raises(Fault, match="accepted 12 moves, of which this computer received 11"):
         compare_with_board(played.readings, played.reports[1:], played.solved)
     (mxx, mxy, mxz), second, third = played.solved.matrix
     wrong = replace(played.solved, matrix=((mxx * 1.00003, mxy, mxz), second, third))

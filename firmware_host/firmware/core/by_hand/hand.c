@@ -210,7 +210,7 @@ static uint8_t find_outcome(struct rest *after)
     if (hand.accepted < UINT8_MAX)
         hand.accepted++;
     hand.scale_std = estimate_scale_std(&hand.estimate);
-    return MOVE_TAKEN;
+    return MOVE_ACCEPTED;
 }
 
 static void judge(struct rest *after)
@@ -229,7 +229,7 @@ static void judge(struct rest *after)
     report->end_us = hand.pending.start_us;
     hand.judged_us = hand.last_us;
     if (outcome != MOVE_NOTHING)
-        hand.refused = outcome == MOVE_TAKEN ? 0 : hand.refused + 1;
+        hand.refused = outcome == MOVE_ACCEPTED ? 0 : hand.refused + 1;
 }
 
 /* Completes a rest that has lasted long enough. */
@@ -360,7 +360,7 @@ void hand_add(unsigned sensor, uint64_t time_us, uint32_t sequence, const struct
 bool hand_lamp(uint64_t now_us)
 {
     uint32_t elapsed_ms = (uint32_t)((now_us - hand.judged_us) / 1000u);
-    bool is_refused = hand.report.outcome > MOVE_TAKEN;
+    bool is_refused = hand.report.outcome > MOVE_ACCEPTED;
     if (hand.state == HAND_DONE)
         return elapsed_ms % 1000u < 100u;
     if (hand.state == HAND_FAILED)

@@ -122,7 +122,7 @@ enum hand_state {
 
 enum hand_outcome {
     MOVE_NOTHING = 0,
-    MOVE_TAKEN = 1,
+    MOVE_ACCEPTED = 1,
     MOVE_CLIPPED = 2,
     MOVE_LOST = 3,
     MOVE_NO_FACE = 4,
