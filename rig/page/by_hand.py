@@ -7,7 +7,7 @@ from rig.data.recording.hand_events import (
     HandAsked,
     HandBegunAnew,
     HandMoveRefused,
-    HandMoveTaken,
+    HandMoveAccepted,
     HandRested,
     HandRestRefused,
     OfTheHand,
@@ -60,7 +60,7 @@ def update(before: Section, event: OfTheHand) -> Section:
             return _add_tone(now, "again") if is_reminder else now
         case HandRested(face=face):
             return _add_tone({**before, "face": face}, "rest")
-        case HandMoveTaken():
+        case HandMoveAccepted():
             return _add_tone(before, "accepted")
         case HandMoveRefused() | HandRestRefused() | HandBegunAnew():
             return _add_tone(before, "again")

@@ -11,7 +11,7 @@ from rig.data.recording.hand_events import (
     HandAsked,
     HandBegunAnew,
     HandMoveRefused,
-    HandMoveTaken,
+    HandMoveAccepted,
     HandRested,
     HandRestRefused,
 )
@@ -147,7 +147,14 @@ class PageState:
                 self._fresh = False
             case Progress():
                 self._newest[Progress] = event
-            case HandAsked() | HandRested() | HandMoveTaken() | HandMoveRefused() | HandRestRefused() | HandBegunAnew():
+            case (
+                HandAsked()
+                | HandRested()
+                | HandMoveAccepted()
+                | HandMoveRefused()
+                | HandRestRefused()
+                | HandBegunAnew()
+            ):
                 self.put("hand", by_hand.update(self.sections["hand"] or {}, event))
                 if isinstance(event, HandAsked):
                     self._state("by_hand", event.instruction.words)

@@ -6,7 +6,7 @@ from rig.data.recording.hand_events import (
     HandAsked,
     HandBegunAnew,
     HandMoveRefused,
-    HandMoveTaken,
+    HandMoveAccepted,
     HandRested,
     HandRestRefused,
 )
@@ -25,9 +25,9 @@ def by_hand_line(event: RunEvent) -> str | None:
             )
         case HandRested(face=face):
             text = f"detected: it rests with the side {face} up"
-        case HandMoveTaken(kind="flip", from_face=before, to_face=after):
+        case HandMoveAccepted(kind="flip", from_face=before, to_face=after):
             text = f"accepted: from {before} to {after}"
-        case HandMoveTaken(turns=turns, from_face=face):
+        case HandMoveAccepted(turns=turns, from_face=face):
             again_laid = f"accepted: laid down again with the side {face} up"
             text = f"accepted: {turns:+d} whole turns with the side {face} up" if turns else again_laid
         case HandMoveRefused(again=again):

@@ -30,7 +30,7 @@ class HandRested:
 
 
 @dataclass(frozen=True, slots=True)
-class HandMoveTaken:
+class HandMoveAccepted:
     """A move between two rests counts: a flip, or whole turns on a face."""
 
     begin_us: Microseconds
@@ -70,4 +70,4 @@ class HandBegunAnew:
     again: Reason
 
 
-OfTheHand = HandAsked | HandRested | HandMoveTaken | HandMoveRefused | HandRestRefused | HandBegunAnew
+OfTheHand = HandAsked | HandRested | HandMoveAccepted | HandMoveRefused | HandRestRefused | HandBegunAnew

@@ -17,7 +17,7 @@ from rig.data.recording.hand_events import (
     HandAsked,
     HandBegunAnew,
     HandMoveRefused,
-    HandMoveTaken,
+    HandMoveAccepted,
     HandRested,
     HandRestRefused,
     OfTheHand,
@@ -94,7 +94,7 @@ class HandSession:
         self._not_counted.seams.append(ends_s + BETWEEN_S / 2)
         self._begins_s = self._judged_s = ends_s + BETWEEN_S
         for event in (recorded.event for run in self.earlier for recorded in run.events):
-            if isinstance(event, HandMoveTaken):
+            if isinstance(event, HandMoveAccepted):
                 self._accepted.append(HandMove(event.kind, event.from_face, event.to_face, event.turns))
             elif isinstance(event, HandRested):
                 self._lay.append(event.face)
@@ -201,7 +201,7 @@ class HandSession:
         before, turns = self._lay[-1] if self._lay else face, now.moves[-1].turns
         kind: Literal["flip", "turn"] = "flip" if before != face else "turn"
         self._accepted.append(HandMove(kind, before, face, turns if kind == "turn" else 0))
-        self.note(HandMoveTaken(*self._board_us(move), kind, before, face, self._accepted[-1].turns))
+        self.note(HandMoveAccepted(*self._board_us(move), kind, before, face, self._accepted[-1].turns))
 
     def _refuse_move(self, wrong: Fault, move: Move | None, rest: HandRest) -> bool:
         """Omit what a fault concerns: the move, the rest, or everything before it. Return whether the rest counts.

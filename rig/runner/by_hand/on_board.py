@@ -20,7 +20,7 @@ from rig.board.crystal import follows_crystal
 from rig.board.identify import changing, refusing
 from rig.config.models import RigConfig
 from rig.data.quantity import ACCELERATION, RATE
-from rig.data.recording.hand_events import HandAsked, HandMoveRefused, HandMoveTaken, HandRested, OfTheHand
+from rig.data.recording.hand_events import HandAsked, HandMoveRefused, HandMoveAccepted, HandRested, OfTheHand
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.errors import Fault, Refused
 from rig.motion.by_hand import Face, HandMove
@@ -96,7 +96,7 @@ class FollowedSession:
         kind: Literal["flip", "turn"] = "flip" if before != after else "turn"
         turns = int(report.whole)
         self._accepted.append(HandMove(kind, before, after, turns))
-        self.tell(HandMoveTaken(report.move_us, report.after_us, kind, before, after, turns))
+        self.tell(HandMoveAccepted(report.move_us, report.after_us, kind, before, after, turns))
         return None
 
     def _note_rest(self, report: HandReport, face: str) -> None:

@@ -5,7 +5,7 @@ import dataclasses
 import pytest
 
 from rig.analysis.by_hand.on_board import SCALE_LIMIT, compare_with_board
-from rig.data.recording.hand_events import HandAsked, HandMoveTaken, OfTheHand
+from rig.data.recording.hand_events import HandAsked, HandMoveAccepted, OfTheHand
 from rig.runner.by_hand.on_board import FollowedSession
 from support.board.hand_on_board import play
 from support.external.handled_body import TWELVE, handle
@@ -27,5 +27,5 @@ def test_a_press_of_the_button_begins_anew_and_only_what_follows_is_held_against
     for report in played.reports:
         session.take(report)
     assert session.reports == played.reports
-    assert sum(isinstance(event, HandMoveTaken) for event in told) == 5 + 12
+    assert sum(isinstance(event, HandMoveAccepted) for event in told) == 5 + 12
     assert compare_with_board(played.readings, session.reports, played.solved).matrix_difference < SCALE_LIMIT

@@ -12,7 +12,7 @@ from rig.data.recording.hand_events import (
     HandAsked,
     HandBegunAnew,
     HandMoveRefused,
-    HandMoveTaken,
+    HandMoveAccepted,
     HandRestRefused,
     OfTheHand,
 )
@@ -100,9 +100,9 @@ class Table:
         return [event.again for event in self.events if isinstance(event, HandAsked) and event.again is not None]
 
     @property
-    def accepted(self) -> list[HandMoveTaken]:
+    def accepted(self) -> list[HandMoveAccepted]:
         """Return the moves that count."""
-        return [event for event in self.events if isinstance(event, HandMoveTaken)]
+        return [event for event in self.events if isinstance(event, HandMoveAccepted)]
 
     def _note(self, event: OfTheHand) -> None:
         self.events.append(event)
