@@ -175,7 +175,7 @@ def _random_walk(curve: AllanCurve, axis: int) -> AllanReading | Fault:
     index = int(np.argmin(np.abs(curve.tau_s - RANDOM_WALK_TAU_S)))
     tau_s, relative_std = float(curve.tau_s[index]), float(curve.relative_std[index, axis])
     if abs(tau_s - RANDOM_WALK_TAU_S) > RANDOM_WALK_TAU_S / 2:
-        what = f"no stretch reaches {RANDOM_WALK_TAU_S:g} s, where random walk is read"
+        what = f"no stretch reaches {RANDOM_WALK_TAU_S:g} s, at which random walk is read"
         if curve.total_s >= ENOUGH_S:
             what = f"readings are missing so often that {what}"
             return Fault("lost_samples", what, "See that the sensor's link loses nothing, and record again")

@@ -115,7 +115,7 @@ def describe_solutions(looked: LookedFile | None, reference: LookedFile | None, 
         yield from _describe_sweeps(looked.survey, f"rig solve {log} --sweeps SWEEPS.csv{option}")
     if reference is None:
         yield _row("attitudes", f"rig solve {log} --attitudes {PLACEHOLDER}{option}")
-        yield _row("", f"{PLACEHOLDER} says when the body was how: time_s qw qx qy qz")
+        yield _row("", f"{PLACEHOLDER} gives the attitudes of the body: time_s qw qx qy qz")
     elif tried.attitudes is not None:
         options = " --any-mounting" + (f" --up={tried.up}" if tried.up not in ("", "+z") else "")
         options += " --estimate-clock-offset" if tried.finds_clock else ""

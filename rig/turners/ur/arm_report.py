@@ -24,7 +24,7 @@ class ArmReport:
     - host: its address.
     - version: its software (major, minor, bugfix, build).
     - polyscope: the software in its own words.
-    - serial_number: the arm's, or "not told".
+    - serial_number: the arm's, or "not reported".
     - remote_control: whether the pendant's mode is remote control.
     - program_running: whether the controller runs a program.
     - state: the state at that time.

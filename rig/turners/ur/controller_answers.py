@@ -21,7 +21,7 @@ from rig.turners.ur.identity import identify_model, is_polyscope_x, series_probl
 
 LOOK_S = 1.0  # time-out of a port that may be closed
 ANSWER_S = 5.0  # time-out of an open port while nothing moves
-NOT_TOLD = "not reported"
+NOT_REPORTED = "not reported"
 
 
 def stop_problem(host: str, version: tuple[int, ...]) -> Problem | None:
@@ -74,7 +74,7 @@ def read_report(host: str, connected: Connected, state: ArmState, robot_api_port
         host=host,
         version=connected.version,
         polyscope=description.software or ".".join(map(str, connected.version)),
-        serial_number=NOT_TOLD,
+        serial_number=NOT_REPORTED,
         remote_control=None,
         program_running=state.runtime_state != RuntimeState.STOPPED,
         state=state,
@@ -106,7 +106,7 @@ def _add_dashboard_answers(report: ArmReport, dashboard: Dashboard) -> ArmReport
 
 
 def _add_robot_api_answers(report: ArmReport, api: RobotApi) -> ArmReport:
-    return replace(report, serial_number=api.serial_number() or NOT_TOLD, remote_control=api.is_in_remote_control())
+    return replace(report, serial_number=api.serial_number() or NOT_REPORTED, remote_control=api.is_in_remote_control())
 
 
 def _read_description(host: str) -> ArmDescription:
