@@ -14,7 +14,7 @@ from rig.commands.standard_streams import keep_streams_usable, output_lost
 from rig.data.version import VERSION
 from rig.errors import INTERRUPTED, Fault, RigError, Unprinted
 from rig.errors.quoting import printable, printable_lines
-from rig.station.plain_text import for_file, say_on_terminal
+from rig.station.plain_text import format_for_file, say_on_terminal
 
 if TYPE_CHECKING:
     from rig.plans.procedure_registry import AnyProcedure
@@ -234,9 +234,9 @@ def _first_word(words: Sequence[str]) -> str | None:
 
 
 def _first_steps() -> int:
-    from rig.config.files.supplied_files import supplied
+    from rig.config.files.supplied_files import locate_supplied
 
-    print(FIRST_STEPS + (f" Step by step: {PAGES}." if supplied(PAGES).exists() else ""))
+    print(FIRST_STEPS + (f" Step by step: {PAGES}." if locate_supplied(PAGES).exists() else ""))
     return 0
 
 
@@ -281,7 +281,7 @@ def run_guarded(command: Callable[[], int]) -> int:
 
 
 def _print_ending(text: str, status: int) -> int:
-    print(for_file(f"rig: {printable_lines(text)}", sys.stderr), file=sys.stderr)
+    print(format_for_file(f"rig: {printable_lines(text)}", sys.stderr), file=sys.stderr)
     return status
 
 

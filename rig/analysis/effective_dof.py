@@ -22,19 +22,19 @@ if TYPE_CHECKING:
     from rig.analysis.reversal import MagnetometerReversal
 
 
-def of_angles(result: "SensorResult") -> Array | None:
+def angle_dof(result: "SensorResult") -> Array | None:
     """Return the degrees of freedom (6,) of a gyroscope's non-orthogonality, then of its mounting, or None."""
     explained, budget = result.explained, result.uncertainty
     if explained is None or budget is None:
         return None
     solution = explained.solution
-    derivative = _to_angles(solution.matrix)
-    readings = np.einsum("aij,ijkl,akl->a", derivative, _of_matrix(solution), derivative)
+    derivative = _angle_derivatives(solution.matrix)
+    readings = np.einsum("aij,ijkl,akl->a", derivative, _matrix_covariance(solution), derivative)
     walk = np.einsum("aij,ijl,ail->a", derivative, _drift_covariance(explained)[:, :3, :3], derivative)
-    return _split(np.diag(solution.angles_covariance_rad2), _of_readings(readings - walk, walk, explained), budget)
+    return _split(np.diag(solution.angles_covariance_rad2), _reading_parts(readings - walk, walk, explained), budget)
 
 
-def of_sensitivity(result: "SensorResult") -> Array | None:
+def g_sensitivity_dof(result: "SensorResult") -> Array | None:
     """Return the degrees of freedom (3, 3) of a gyroscope's g-sensitivity; None without it or without a budget."""
     explained, budget = result.explained, result.uncertainty
     if explained is None or budget is None:
@@ -44,33 +44,33 @@ def of_sensitivity(result: "SensorResult") -> Array | None:
         return None
     whole = np.diag(covariance).reshape(3, 3)
     walk = np.diagonal(_drift_covariance(explained)[:, 4:, 4:], axis1=1, axis2=2)
-    return _split(whole, _of_readings(whole - walk, walk, explained), budget)
+    return _split(whole, _reading_parts(whole - walk, walk, explained), budget)
 
 
-def of_acceleration_angles(result: "AccelerometerResult") -> Array:
+def acceleration_angle_dof(result: "AccelerometerResult") -> Array:
     """Return the degrees of freedom (3,) of an accelerometer's non-orthogonality."""
-    return _of_axes(result, result.solution.response, result.movement.noise())
+    return _axis_dof(result, result.solution.response, result.movement.noise())
 
 
-def of_second_order(result: "AccelerometerResult") -> Array | None:
+def second_order_dof(result: "AccelerometerResult") -> Array | None:
     """Return the degrees of freedom (3,) of an accelerometer's φ; None if it was not estimated."""
     from rig.estimation.reference.accelerometer_model import SECOND
 
     if result.solution.second_order_s2_m is None:
         return None
     std = np.sqrt(np.diag(result.solution.covariance)[SECOND])
-    return _in_attitudes(result.budget, result.solution.response[SECOND], result.movement.noise(), std)
+    return _attitude_dof(result.budget, result.solution.response[SECOND], result.movement.noise(), std)
 
 
-def of_field_angles(result: "MagnetometerResult") -> Array:
+def field_angle_dof(result: "MagnetometerResult") -> Array:
     """Return the degrees of freedom (3,) of a magnetometer's non-orthogonality."""
     from rig.estimation.reference.reference_budget import response_in_attitudes
 
     response = response_in_attitudes(result.solution, result.measurements)
-    return _of_axes(result, response, np.diag(result.measurements.variances_m2_s4.ravel()))
+    return _axis_dof(result, response, np.diag(result.measurements.variances_m2_s4.ravel()))
 
 
-def of_reversal(reversal: "MagnetometerReversal") -> tuple[Array, Array]:
+def reversal_dof(reversal: "MagnetometerReversal") -> tuple[Array, Array]:
     """Return the degrees of freedom of the mean scale factors (3,), and of bias and arm's field (6,).
 
     The latter are the fewest of any run's bias: a lower bound for a sum of independent parts.
@@ -83,15 +83,15 @@ def of_reversal(reversal: "MagnetometerReversal") -> tuple[Array, Array]:
     return scale, np.full(6, min(float(budget.dof[3:].min()) for budget in budgets))
 
 
-def _of_axes(result: "AccelerometerResult | MagnetometerResult", response: Array, noise: Array) -> Array:
+def _axis_dof(result: "AccelerometerResult | MagnetometerResult", response: Array, noise: Array) -> Array:
     """Return the degrees of freedom of the angles between the axes, from the `response` (p, n) of all parameters."""
     from rig.estimation.reference.reference_model import F
 
-    derivative = _to_angles(result.solution.matrix)[:3].reshape(3, 9) @ response[F]
-    return _in_attitudes(result.budget, derivative, noise, result.triad.non_orthogonality_std_rad)
+    derivative = _angle_derivatives(result.solution.matrix)[:3].reshape(3, 9) @ response[F]
+    return _attitude_dof(result.budget, derivative, noise, result.triad.non_orthogonality_std_rad)
 
 
-def _in_attitudes(budget: Budget, response: Array, noise: Array, std: Array) -> Array:
+def _attitude_dof(budget: Budget, response: Array, noise: Array, std: Array) -> Array:
     """Return the degrees of freedom of `std` (q,), from the `response` (q, n) to readings with that `noise` (n, n)."""
     from rig.estimation.reference.reference_budget import ATTITUDES
 
@@ -99,7 +99,7 @@ def _in_attitudes(budget: Budget, response: Array, noise: Array, std: Array) -> 
     return _split(std**2, {NOISE: by_noise, ATTITUDES: std**2 - by_noise}, budget)
 
 
-def _of_readings(noise: Array, walk: Array, explained: Explained) -> dict[str, Array]:
+def _reading_parts(noise: Array, walk: Array, explained: Explained) -> dict[str, Array]:
     """Return the parts of a gyroscope's variances that are estimated from readings, by their contributor.
 
     If the readings show no bias drift, the drift's part is omitted: it is the data sheet's flicker, whose dof is
@@ -120,12 +120,12 @@ def _split(whole: Array, parts: dict[str, Array], budget: Budget) -> Array:
     return effective_dof(np.array([*clipped, rest]), np.reshape([*dof, np.inf], shape))
 
 
-def _to_angles(matrix: Array) -> Array:
+def _angle_derivatives(matrix: Array) -> Array:
     """Return the derivative (6, 3, 3) of the angles between the axes, and of their mounting, with respect to F."""
     return SensorAxes.from_matrix(matrix).to_angles.reshape(6, 3, 3)
 
 
-def _of_matrix(solution: VectorSolution) -> Array:
+def _matrix_covariance(solution: VectorSolution) -> Array:
     """Return the covariance (3, 3, 3, 3) of F due to the readings."""
     return solution.matrix_covariance[:9, :9].reshape(3, 3, 3, 3)
 

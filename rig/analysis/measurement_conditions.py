@@ -47,7 +47,7 @@ class _WeightedReadings:
     temperature_c: float
 
 
-def of_gyroscope(recordings: Sequence[ObservedRun], name: str) -> GyroscopeConditions:
+def gyroscope_conditions(recordings: Sequence[ObservedRun], name: str) -> GyroscopeConditions:
     """Return the conditions of a gyroscope's readings: for the scale in sweeps, for the bias in sweeps and rests."""
     parts = [(recording.sensors[name], recording.clock_offset_s) for recording in recordings]
     turns = [_read_average(turn.average, offset_s) for part, offset_s in parts for turn in part.revolutions]
@@ -57,7 +57,7 @@ def of_gyroscope(recordings: Sequence[ObservedRun], name: str) -> GyroscopeCondi
     )
 
 
-def of_accelerometer(recordings: Sequence[ObservedRun], name: str, dwells: Iterable[int]) -> When:
+def accelerometer_conditions(recordings: Sequence[ObservedRun], name: str, dwells: Iterable[int]) -> When:
     """Return the conditions of an accelerometer's readings: in the dwells with these indices, and in sweeps."""
     wanted = frozenset(dwells)
     read = []
@@ -77,7 +77,7 @@ def of_accelerometer(recordings: Sequence[ObservedRun], name: str, dwells: Itera
     return _average_conditions(recordings, name, read)
 
 
-def of_magnetometer(recordings: Sequence[ObservedRun], name: str, dwells: Iterable[int]) -> When:
+def magnetometer_conditions(recordings: Sequence[ObservedRun], name: str, dwells: Iterable[int]) -> When:
     """Return the conditions of a magnetometer's readings in the last dwells of these indices; it has no thermometer."""
     wanted = frozenset(dwells)
     times_s = {

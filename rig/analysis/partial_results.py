@@ -19,7 +19,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.vector_model import VectorSolution
 from rig.observation.average import Average, Stream, synchronize_stream
 from rig.observation.field_means import field_mean, find_dwelling_companion
-from rig.observation.finished_steps import finished_dwells, finished_sweeps
+from rig.observation.finished_steps import complete_dwells, complete_sweeps
 from rig.observation.motion.arm_motion import ArmMotion, motion_of
 from rig.observation.observe import Observation, observe_each_sweep, observe_sensor
 from rig.observation.observed_run import times_s
@@ -102,8 +102,8 @@ def _observe(run: RunData, name: str, motion: ArmMotion) -> _RecordedPart:
     try:
         stream = synchronize_stream(run.samples[name], sensor, motion)
     except Fault as fault:  # a fault of the sensor as a whole: its clock is not found
-        dwells = finished_dwells(run) if sensor.measures(ACCELERATION) else ()
-        return _RecordedPart(None, all_failed(finished_sweeps(run), fault), all_failed(dwells, fault), ())
+        dwells = complete_dwells(run) if sensor.measures(ACCELERATION) else ()
+        return _RecordedPart(None, all_failed(complete_sweeps(run), fault), all_failed(dwells, fault), ())
     sweeps, rests = _observe_sweeps(run, name, stream, motion)
     return _RecordedPart(stream.clock, sweeps, read_each_dwell(run, stream, motion, run.settings.observation), rests)
 
@@ -153,7 +153,7 @@ def _observe_sweeps(
     try:
         sensor = observe_sensor(run, name, motion, thresholds, sweeps.faults.keys() | dwells)
     except Fault as fault:  # a fault of the sensor as a whole
-        return all_failed(finished_sweeps(run), fault), ()
+        return all_failed(complete_sweeps(run), fault), ()
     return sweeps.updated(Attempts({turn.sweep: turn for turn in sensor.revolutions})), sensor.rests
 
 

@@ -87,7 +87,7 @@ class OnPage:
 
 
 @contextmanager
-def on_page(present: Present, address: PageAddress) -> Iterator[tuple[OnPage, str]]:
+def open_page(present: Present, address: PageAddress) -> Iterator[tuple[OnPage, str]]:
     """Open the page that shows `present` during the block; yield the page and its URL.
 
     Its last state shows how the station ended. Raise Refused `page_address`.

@@ -39,7 +39,7 @@ class Bench(Protocol):
         """Describe today's run of the serial number in the history; None if there is none."""
         ...
 
-    def known_as(self, chip: Chip, serial: str) -> str | None:
+    def find_other_serial_number(self, chip: Chip, serial: str) -> str | None:
         """Return another serial number that the history has for the chip, or None."""
         ...
 
@@ -126,7 +126,7 @@ class Work:
             return
         other = self.journal.batch.same_chip(chip, part.serial)
         earlier = f"{other.serial}, part {other.number} of this batch" if other else None
-        earlier = earlier or self.bench.known_as(chip, part.serial)
+        earlier = earlier or self.bench.find_other_serial_number(chip, part.serial)
         if earlier is None:
             return
         doubt = Doubt(f"the part mounted as {part.serial} is {chip}, which was {earlier}")

@@ -8,13 +8,13 @@ from firmware_host.parts import BOARD_PARTS
 from firmware_host.protocol import FIRMWARE_VERSION
 from rig.config.models import BoardSection, SensorsConfig
 from rig.config.sensors.sensor_sections import ConfiguredSensor, SensorSection
-from rig.errors import Fault, Refused, raised_as
+from rig.errors import Fault, Refused, raise_as
 
 UNDRIVEN = (0x00, 0xFF, 0x0000, 0xFFFF)  # an SPI bus reads this if no part drives it
 
 
-refusing = partial(raised_as, Refused)  # before anything has moved
-changing = partial(raised_as, Fault)  # while the board is being changed, a refusal is too late
+refusing = partial(raise_as, Refused)  # before anything has moved
+changing = partial(raise_as, Fault)  # while the board is being changed, a refusal is too late
 
 
 def require_board_section(config: SensorsConfig) -> BoardSection:

@@ -10,7 +10,7 @@ from rig.config.load import Loaded, load, parse
 from rig.plans.phase import Phase, first_phase
 from rig.plans.procedure_registry import Procedures, installed, sections
 from rig.plans.script_errors import script_errors
-from rig.plans.script_file import ScriptFile, installed_script, load_script
+from rig.plans.script_file import ScriptFile, find_installed_script, load_script
 from rig.turners import turner_registry as turners
 
 
@@ -40,7 +40,7 @@ def load_configured(
     with script_errors(f"the section of {script.name} fails") if script is not None else nullcontext():
         loaded = load(config_path, overrides, sections(procedures), turners.sections())
     if script is None:
-        script = installed_script(loaded.config.procedure.name)
+        script = find_installed_script(loaded.config.procedure.name)
     return Configured(loaded, script, first_phase(script.procedure, loaded.config, procedures))
 
 

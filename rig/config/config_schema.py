@@ -37,9 +37,9 @@ def config_schema() -> dict[str, Any]:
         *STOCK_TURNERS.values(),
     )
     _, schema = models_json_schema([(model, "validation") for model in models])
-    definitions = {name: _as_written(definition) for name, definition in schema["$defs"].items()}
+    definitions = {name: _file_schema(definition) for name, definition in schema["$defs"].items()}
     whole = definitions.pop(RigConfig.__name__)
-    turners = {kind: _with_kind(definitions[section.__name__]) for kind, section in STOCK_TURNERS.items()}
+    turners = {kind: _add_kind(definitions[section.__name__]) for kind, section in STOCK_TURNERS.items()}
     procedures = {name: _section(section) for name, section in STOCK_SECTIONS.items()}
     own_sections = {
         BASE: {"type": "string", "description": "file on which this one builds; this one states what differs"},
@@ -72,7 +72,7 @@ def _section(model: type[BaseModel]) -> dict[str, Any]:
     return {"$ref": f"#/$defs/{model.__name__}"}
 
 
-def _with_kind(section: Mapping[str, Any]) -> dict[str, Any]:
+def _add_kind(section: Mapping[str, Any]) -> dict[str, Any]:
     """Return the schema of a turner, with its kind next to the keys of its section."""
     return {**section, "properties": {"kind": {"type": "string"}, **section["properties"]}}
 
@@ -90,15 +90,15 @@ def _chosen(key: str, sections: Mapping[str, Mapping[str, Any]], text: str) -> d
     return {"type": OBJECT, "description": text, "properties": {key: names}, "allOf": branches}
 
 
-def _as_written(schema: Any) -> Any:
+def _file_schema(schema: Any) -> Any:
     """Return a model's schema for files: all keys are optional, null omits a key, text may be a number."""
     if isinstance(schema, list):
-        return [_as_written(item) for item in schema]
+        return [_file_schema(item) for item in schema]
     if not isinstance(schema, dict):
         return schema
-    written = {key: _as_written(value) for key, value in schema.items() if key not in LEFT_OUT}
+    written = {key: _file_schema(value) for key, value in schema.items() if key not in LEFT_OUT}
     if "properties" in schema:  # its keys are names of a section, which may equal a word of the schema
-        written["properties"] = {key: _as_written(value) for key, value in schema["properties"].items()}
+        written["properties"] = {key: _file_schema(value) for key, value in schema["properties"].items()}
     if schema.get("additionalProperties") is False:
         written["additionalProperties"] = NOTHING
     if "const" in schema:

@@ -335,7 +335,7 @@ def _world_fits(config: RigConfig, world: WorldSection) -> Iterator[str]:
         yield "world: simulates an arm, a hand, or a servo whose port is socket://host:port, and turner says otherwise"
         return
     if host is not None and not _is_loopback(host):
-        key = "arm.host" if isinstance(turner, ArmSection) else f"turner.{next(iter(turner.moved_to(host)))}"
+        key = "arm.host" if isinstance(turner, ArmSection) else f"turner.{next(iter(turner.override_host(host)))}"
         yield f"{key}: {quote(host)} must be a loopback address (127.x.y.z) when the file has a world: section"
     yield from world.misfits(turner)
     for key, port in config.ports.items():

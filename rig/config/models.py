@@ -60,7 +60,7 @@ class TurnerSection(Section):
         """The host of a simulated turner; None if this kind cannot be simulated."""
         return None
 
-    def moved_to(self, host: str) -> Mapping[str, str]:
+    def override_host(self, host: str) -> Mapping[str, str]:
         """Return the keys and values that move a simulated turner to another host."""
         return {}
 
@@ -136,7 +136,7 @@ class ArmSection(TurnerSection):
         """The controller's name or address."""
         return self.host
 
-    def moved_to(self, host: str) -> Mapping[str, str]:
+    def override_host(self, host: str) -> Mapping[str, str]:
         """Return the key of the controller's host, with another `host` as its value."""
         return {"host": host}
 
@@ -259,7 +259,7 @@ class SensorsConfig(Section):
             if source in sensor_at:
                 raise ValueError(f"{sensor_at[source]} and {name} are both {what}")
             sensor_at[source] = name
-        bundled = _bundled_names(sensors)
+        bundled = _device_sensor_names(sensors)
         if both := sorted({name for name in bundled if name in sensors or bundled.count(name) > 1}):
             raise ValueError(f"{', '.join(both)} is already the name of a sensor at another sensor's port")
         if problem := autopilots_over_budget({name: (s.mavlink, s.rate_hz) for name, s in sensors.items()}):
@@ -290,7 +290,7 @@ class SensorsConfig(Section):
     ) -> dict[str, MagnetometerSection]:
         """Refuse a magnetometer with a sensor's name, and rates that exceed the link's capacity."""
         sensors = info.data.get("sensors", {})
-        if both := sorted({*sensors, *_bundled_names(sensors)} & magnetometers.keys()):
+        if both := sorted({*sensors, *_device_sensor_names(sensors)} & magnetometers.keys()):
             raise ValueError(f"{', '.join(both)} is the name of one of the sensors already")
         if not magnetometers or not sensors or "board" not in info.data:
             return magnetometers
@@ -344,7 +344,7 @@ class RigConfig(SensorsConfig):
         return self.turner
 
 
-def _bundled_names(sensors: Mapping[str, SensorSection]) -> list[str]:
+def _device_sensor_names(sensors: Mapping[str, SensorSection]) -> list[str]:
     """Return the names of the further sensors in the devices of `sensors`: magnetometers and scalars."""
     return [bundled for name, sensor in sensors.items() for bundled in sensor.brings(name)]
 

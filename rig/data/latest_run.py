@@ -5,7 +5,7 @@ from pathlib import Path
 
 from rig.config.files.regular_file import UnfitFile, read_regular_file
 from rig.config.files.safe_writing import write_new
-from rig.config.files.user_folder import own_folder
+from rig.config.files.user_folder import rig_folder
 from rig.errors import Refused
 
 LATEST = "latest"
@@ -49,4 +49,4 @@ def _read_noted() -> list[str]:
 
 
 def _list() -> Path:
-    return own_folder() / "latest_runs"
+    return rig_folder() / "latest_runs"

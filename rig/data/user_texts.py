@@ -7,7 +7,7 @@ import hashlib
 from contextlib import suppress
 from pathlib import Path
 
-from rig.config.files.user_folder import own_folder
+from rig.config.files.user_folder import rig_folder
 from rig.errors import Refused
 
 
@@ -28,5 +28,5 @@ def is_own(sha256: str) -> bool:
 
 
 def _folder() -> Path:
-    """Return the folder of the notes. Raise as `own_folder` does."""
-    return own_folder() / "own"
+    """Return the folder of the notes. Raise as `rig_folder` does."""
+    return rig_folder() / "own"

@@ -9,7 +9,7 @@ from typing import TypeVar
 
 from firmware_host.problem import Problem, ProblemError
 
-__all__ = ["Fault", "Problem", "ProblemError", "Refused", "RigError", "Unprinted", "or_fault", "raised_as", "refuse"]
+__all__ = ["Fault", "Problem", "ProblemError", "Refused", "RigError", "Unprinted", "or_fault", "raise_as", "refuse"]
 Result = TypeVar("Result")
 INTERRUPTED = 130  # exit status of an interrupted command: 128 + SIGINT, as in a shell
 
@@ -45,7 +45,7 @@ def or_fault(solve: Callable[[], Result]) -> Result | Fault:
 
 
 @contextmanager
-def raised_as(kind: type[RigError]) -> Iterator[None]:
+def raise_as(kind: type[RigError]) -> Iterator[None]:
     """Raise problems of board or recording inside the block as `kind`; Refused stays unchanged."""
     try:
         yield

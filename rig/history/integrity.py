@@ -45,7 +45,7 @@ def examine_history(history: History) -> Iterator[EntryState]:
     documents = _files_by_folder(history)
     examined_folders: set[Path] = set()
     for run in history.kept():
-        pasts = history.of_run(run.run_id)
+        pasts = history.select_run(run.run_id)
         why = "; ".join(_contradictions(run, pasts))
         numbers = calibrations_in_words([past.id for past in pasts])
         yield EntryState(f"run {run.run_id}, {numbers}", "changed" if why else "ok", why)

@@ -190,7 +190,7 @@ class History:
             raise Refused("not_in_history", f"there is no calibration number {number}", "Look with `rig history`")
         return pasts[0]
 
-    def of_run(self, run_id: int) -> list[Past]:
+    def select_run(self, run_id: int) -> list[Past]:
         """Return all calibrations of one run."""
         return self._pasts(select(*_COLUMNS).select_from(_ROWS).where(_RUN.id == run_id).order_by(*_IN_TIME))
 
@@ -313,7 +313,7 @@ def _read_kept(connection: Connection, number: int) -> Kept:
         row["result"],
         tuple(EnteredRecording(*row) for row in connection.execute(recorded)),
         tuple((computer, path) for computer, path in connection.execute(locations)),
-        certificates.of_run(connection, number),
+        certificates.select_run(connection, number),
         tuple((name, sha256) for name, sha256 in connection.execute(documented)),
         dict(row),
     )

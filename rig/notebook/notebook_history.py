@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from rig.errors import Refused
 from rig.history.documents import COLUMNS, change_entry
 from rig.history.series import Change, changes_in, time_of
-from rig.history.storage.address import own_history_address, resolve_address
+from rig.history.storage.address import default_history_address, resolve_address
 from rig.history.store import Past, Selection, open_history
 from rig.history.terminal.history_tables import title_of, value_text
 from rig.notebook.frames import frame
@@ -130,7 +130,7 @@ def calibrations(
     if the history has no calibration of this serial number, and as `open_history` does.
     """
     address = None if history is None else str(history)
-    with open_history(own_history_address(address) or resolve_address(None)) as opened:
+    with open_history(default_history_address(address) or resolve_address(None)) as opened:
         pasts = opened.calibrations(Selection(serial_number=serial_number, part=part))
     if not pasts and serial_number is not None:
         raise Refused(

@@ -132,7 +132,7 @@ def solve(run: Run, estimator: str | None = None, **changes: float) -> Result:
     Refused as `rig solve` does; `unknown_setting` lists the possible changes.
     """
     overrides = [f"{setting(key)}={value!r}" for key, value in changes.items()]
-    return Result(document_of(judged(run.recorded.judged_by(overrides), estimator)))
+    return Result(document_of(judged(run.recorded.override_settings(overrides), estimator)))
 
 
 def load_result(path: str | Path) -> Result:

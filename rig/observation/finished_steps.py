@@ -4,12 +4,12 @@ from rig.data.recording.run_data import RunData
 from rig.observation.windows import dwelt, swept
 
 
-def finished_sweeps(run: RunData) -> frozenset[int]:
+def complete_sweeps(run: RunData) -> frozenset[int]:
     """Return the indices of the sweeps that a recording contains from start to end."""
     return frozenset(finished.sweep.index for finished in swept(run))
 
 
-def finished_dwells(run: RunData) -> frozenset[int]:
+def complete_dwells(run: RunData) -> frozenset[int]:
     """Return the indices of the dwells that a recording contains from start to end."""
     return frozenset(finished.dwell.index for finished in dwelt(run))
 

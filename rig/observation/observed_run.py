@@ -14,7 +14,7 @@ from rig.data.recording.run_data import RunData
 from rig.data.recording.settings import ObservationThresholds
 from rig.estimation.arrays import Array
 from rig.observation.average import Stream, convert_stream
-from rig.observation.finished_steps import finished_dwells, finished_sweeps
+from rig.observation.finished_steps import complete_dwells, complete_sweeps
 from rig.observation.motion.arm_motion import ArmMotion, motion_of, turner_of
 from rig.observation.observe import SensorObservations, observe_sensor
 from rig.observation.timebase import TimeBase
@@ -121,7 +121,7 @@ def observe_runs(runs: Sequence[RunData], corrections: Mapping[int, Array] = AS_
             run, runs[0].settings.observation, _find_superseded(runs, index), corrections.get(run.settings.stage)
         )
         for index, run in enumerate(runs)
-        if _finished_steps(run) - _find_superseded(runs, index)
+        if _complete_steps(run) - _find_superseded(runs, index)
     ]
     offsets_s = _clock_offsets_s(recordings)
     return tuple(
@@ -151,8 +151,8 @@ def _start_time(recording: ObservedRun) -> datetime:
 def _find_superseded(runs: Sequence[RunData], index: int) -> frozenset[int]:
     """Return the sweeps and dwells that later recordings of the same stage repeat."""
     stage = runs[index].settings.stage
-    return frozenset[int]().union(*(_finished_steps(run) for run in runs[index + 1 :] if run.settings.stage == stage))
+    return frozenset[int]().union(*(_complete_steps(run) for run in runs[index + 1 :] if run.settings.stage == stage))
 
 
-def _finished_steps(run: RunData) -> frozenset[int]:
-    return finished_sweeps(run) | finished_dwells(run)
+def _complete_steps(run: RunData) -> frozenset[int]:
+    return complete_sweeps(run) | complete_dwells(run)

@@ -12,7 +12,7 @@ from rig.data.recording.settings import ObservationThresholds
 from rig.motion.chain import DenavitHartenberg
 from rig.motion.steps import Sweep
 from rig.observation.average import synchronize_stream
-from rig.observation.finished_steps import finished_sweeps
+from rig.observation.finished_steps import complete_sweeps
 from rig.observation.motion.arm_motion import ArmMotion
 from rig.observation.windows import Window
 
@@ -45,7 +45,7 @@ def revolution_on_the_board(
 
 def find_averaged_sweeps(run: RunData, sensors: Collection[str]) -> frozenset[int]:
     """Return the sweeps that the board has averaged for each of its sensors."""
-    sweeps = finished_sweeps(run)
+    sweeps = complete_sweeps(run)
     on_board = [sensor for sensor in sensors if run.sensors[sensor].on_board]
     return sweeps.intersection(*(find_board_averages([run], sensor, sweeps) for sensor in on_board))
 

@@ -8,7 +8,7 @@ from rig.data.recording.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.observation.arm_rests import average_rests
 from rig.observation.average import Stream, between, synchronize_stream
-from rig.observation.finished_steps import finished_dwells, finished_sweeps
+from rig.observation.finished_steps import complete_dwells, complete_sweeps
 from rig.observation.motion.arm_motion import ArmMotion, motion_of
 from rig.observation.observe import check_response, observe_each_sweep
 from rig.observation.reference.dwell_acceleration import read_each_dwell
@@ -19,12 +19,12 @@ SPIKE = 8.0  # standard deviations of the readings: normal noise exceeds it once
 
 def sound_sweeps(run: RunData, settings: ObservationThresholds) -> frozenset[int]:
     """Return the finished sweeps that `observe_sensor` accepts for every sensor and that contain no spike."""
-    return finished_sweeps(run) & _find_sound_steps(run, settings)
+    return complete_sweeps(run) & _find_sound_steps(run, settings)
 
 
 def sound_dwells(run: RunData, settings: ObservationThresholds) -> frozenset[int]:
     """Return the finished dwells that are accepted for every sensor and that contain no spike."""
-    return finished_dwells(run) & _find_sound_steps(run, settings)
+    return complete_dwells(run) & _find_sound_steps(run, settings)
 
 
 def _find_sound_steps(run: RunData, settings: ObservationThresholds) -> frozenset[int]:
@@ -55,7 +55,7 @@ def _find_sound_steps_of(
     for index, turn in sweeps.results.items():
         windows[index] = Window(turn.average.start_s, turn.average.end_s)
     spiky = {index for index, window in windows.items() if _has_spike(stream, window)}
-    return (finished_sweeps(run) | finished_dwells(run)).difference(sweeps.faults, dwells.faults, spiky)
+    return (complete_sweeps(run) | complete_dwells(run)).difference(sweeps.faults, dwells.faults, spiky)
 
 
 def _has_spike(stream: Stream, window: Window) -> bool:

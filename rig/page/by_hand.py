@@ -6,14 +6,14 @@ from typing import Any
 from rig.data.recording.hand_events import (
     HandAsked,
     HandBegunAnew,
-    HandMoveRefused,
     HandMoveAccepted,
+    HandMoveRefused,
     HandRested,
     HandRestRefused,
     OfTheHand,
 )
 from rig.motion.by_hand import FACES
-from rig.station.by_hand_words import RED_FROM, wanted_words
+from rig.station.by_hand_words import RED_FROM, open_moves_words
 from rig.station.events import HandSeen
 
 Section = dict[str, Any]
@@ -31,7 +31,7 @@ def live_section(event: HandSeen) -> Section:
         "scale_u": event.expanded_scale,
         "sides": [[face, face in event.faces] for face in FACES],
         "pairs": [list(pair) for pair in event.pairs],
-        "wanted": wanted_words(event),
+        "wanted": open_moves_words(event),
         "turns": len(event.turns),
     }
 

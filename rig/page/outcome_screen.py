@@ -14,7 +14,7 @@ from rig.page.about import About
 from rig.report.findings.result_kind import AxisValues
 from rig.report.kinds.kind_registry import shown
 from rig.report.simulated_truth import TruthRow
-from rig.report.words.printed_values import in_print
+from rig.report.words.printed_values import format_with_u
 from rig.station.events import Since
 
 Row = dict[str, Any]
@@ -109,7 +109,7 @@ def _next(words: str, command: str) -> Row:
 
 
 def _numbers(three: AxisValues, nominal: float, limit: float | None) -> Row:
-    texts = [in_print(value, u) for value, u in zip(three.values, three.expanded, strict=True)]
+    texts = [format_with_u(value, u) for value, u in zip(three.values, three.expanded, strict=True)]
     return {
         "values": [float(value) for value in three.values],
         "expanded": [float(u) for u in three.expanded],

@@ -10,8 +10,8 @@ from rig.data.quantity import TEMPERATURE, DisplayUnit, Quantity, Scalar, select
 from rig.data.recording.hand_events import (
     HandAsked,
     HandBegunAnew,
-    HandMoveRefused,
     HandMoveAccepted,
+    HandMoveRefused,
     HandRested,
     HandRestRefused,
 )

@@ -73,7 +73,7 @@ def moments(run: RunData) -> Iterator[Moment]:
     def samples_until(host_time_s: float) -> tuple[SensorSamples, ...]:
         return tuple(sensor_samples.until(host_time_s) for sensor_samples in samples.values())
 
-    events = sorted(_recorded_events(run, steps), key=lambda moment: moment[0])
+    events = sorted(_iterate_events(run, steps), key=lambda moment: moment[0])
     for time_s in [*np.arange(start_s, end_s, FRAME_S).tolist(), end_s]:
         while events and events[0][0] <= time_s:
             _, event = events.pop(0)
@@ -118,15 +118,15 @@ def _list_steps(run: RunData, end_s: float) -> list[_Done]:
                 done[-1] = replace(done[-1], end_s=time_s)
         if step is not None:
             done.append(_Done(len(done) + 1, step, time_s, end_s))
-    return [replace(recorded, step=_with_duration(recorded)) for recorded in done]
+    return [replace(recorded, step=_set_rest_duration(recorded)) for recorded in done]
 
 
-def _with_duration(done: _Done) -> Step:
+def _set_rest_duration(done: _Done) -> Step:
     """Return the step; a rest gets its duration, which the recording does not state."""
     return Rest("rest", done.end_s - done.start_s) if isinstance(done.step, Rest) else done.step
 
 
-def _recorded_events(run: RunData, steps: Sequence[_Done]) -> Iterator[tuple[float, RunEvent]]:
+def _iterate_events(run: RunData, steps: Sequence[_Done]) -> Iterator[tuple[float, RunEvent]]:
     for done in steps:
         yield done.start_s, StepStarted(done.number, len(steps), done.step)
         yield done.end_s, StepFinished(done.number, len(steps), done.step, done.end_s - done.start_s)

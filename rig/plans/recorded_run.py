@@ -41,9 +41,11 @@ class RecordedRun:
         """Return the run's calibration without its verification."""
         return replace(self, corrected=(), alone=True)
 
-    def judged_by(self, overrides: Sequence[str]) -> "RecordedRun":
-        """Return the run with other thresholds or limits, see `RunSettings.with_overrides`."""
-        raw, corrected = (tuple(run.judged_by(overrides) for run in runs) for runs in (self.raw, self.corrected))
+    def override_settings(self, overrides: Sequence[str]) -> "RecordedRun":
+        """Return the run with other thresholds or limits, see `RunSettings.apply_overrides`."""
+        raw, corrected = (
+            tuple(run.override_settings(overrides) for run in runs) for runs in (self.raw, self.corrected)
+        )
         return replace(self, raw=raw, corrected=corrected)
 
 

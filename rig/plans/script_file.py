@@ -44,7 +44,7 @@ class ScriptFile:
     def is_installed(self) -> bool:
         """Whether the script is identical to the installed one of its procedure's name."""
         name = self.procedure.name
-        return name in installed() and installed_script(name).sha256 == self.sha256
+        return name in installed() and find_installed_script(name).sha256 == self.sha256
 
 
 def script_in(module: ModuleType, procedure: AnyProcedure) -> ScriptFile:
@@ -53,7 +53,7 @@ def script_in(module: ModuleType, procedure: AnyProcedure) -> ScriptFile:
     return ScriptFile(procedure, path.name, _text(path))
 
 
-def installed_script(name: str) -> ScriptFile:
+def find_installed_script(name: str) -> ScriptFile:
     """Return an installed procedure with its file."""
     return script_in(sys.modules[module_of(name)], installed()[name])
 
@@ -82,7 +82,7 @@ def kept_script(folder: Path, kept: ScriptIdentity, named: ScriptFile | None = N
     if kept.sha256 != _sha256(text):
         raise another_script(str(path))
     for name in installed():
-        if (script := installed_script(name)).sha256 == kept.sha256:
+        if (script := find_installed_script(name)).sha256 == kept.sha256:
             return replace(script, name=kept.name)
     if not is_own(kept.sha256):
         raise Refused(

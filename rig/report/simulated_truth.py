@@ -16,7 +16,7 @@ from rig.data.run_folder import TRUTH
 from rig.data.validation import Finite, parse_json, validate
 from rig.report.findings.result_kind import AxisValues, DisplayRow
 from rig.report.kinds.kind_registry import shown
-from rig.report.words.printed_values import format_signed, in_print
+from rig.report.words.printed_values import format_signed, format_with_u
 
 SIZE_MAX_BYTES = 1_000_000
 Vector3 = tuple[Finite, Finite, Finite]
@@ -62,7 +62,7 @@ class TrueValues:
     @property
     def truth_texts(self) -> list[str]:
         """The printed true value of each axis, with as many decimals as U."""
-        return [in_print(true, u)[0] for true, u in zip(self.truth, self.result.expanded, strict=True)]
+        return [format_with_u(true, u)[0] for true, u in zip(self.truth, self.result.expanded, strict=True)]
 
 
 @dataclass(frozen=True, slots=True)

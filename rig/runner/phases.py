@@ -26,7 +26,7 @@ from rig.observation.reference.dwell_acceleration import DwellReading
 from rig.observation.statistics.mean import QuantityInDwell, ReadAtRest, StaticReading
 from rig.plans.phase import Phase
 from rig.plans.script_errors import ENDING
-from rig.plans.script_file import ScriptFile, installed_script
+from rig.plans.script_file import ScriptFile, find_installed_script
 from rig.report.writers import write_outcome
 from rig.runner.announcement import mounting
 from rig.runner.connect import Connector
@@ -147,7 +147,7 @@ class Run:
         """Carry out the phase's script for one stage, or a plan without stages; return the recording's path."""
         path = next_recording(self.folder, phase.procedure.readings)
         is_own = phase.procedure is self.script.procedure
-        script = self.script if is_own else installed_script(phase.procedure.name)
+        script = self.script if is_own else find_installed_script(phase.procedure.name)
         settings = replace(self._settings(phase), stage=stage)
         context = self.station, resumed, results or {}, self.memory, self.connecting
         connector = Connector(phase, self.loaded, settings, script, path, *context)

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from rig.analysis.consistency.contradictions import disturbed_sweeps
+from rig.analysis.consistency.contradictions import contradicting_sweeps
 from rig.data.recording.provenance import Provenance
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.run_data import RunData
@@ -71,4 +71,4 @@ def resumption(earlier: Sequence[RunData], settings: RunSettings, script: Script
         sound_sweeps(run, settings.observation) & find_averaged_sweeps(run, settings.to_calibrate) for run in earlier
     )
     dwelt = (sound_dwells(run, settings.observation) for run in earlier)
-    return Resumption(earlier, frozenset[int]().union(*sound, *dwelt) - disturbed_sweeps(earlier))
+    return Resumption(earlier, frozenset[int]().union(*sound, *dwelt) - contradicting_sweeps(earlier))

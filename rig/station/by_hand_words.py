@@ -5,8 +5,8 @@ from math import degrees
 from rig.data.recording.hand_events import (
     HandAsked,
     HandBegunAnew,
-    HandMoveRefused,
     HandMoveAccepted,
+    HandMoveRefused,
     HandRested,
     HandRestRefused,
 )
@@ -15,7 +15,7 @@ from rig.station.events import HandSeen, RunEvent
 RED_FROM = 0.8  # fraction of the range, above which a reading may be saturated
 
 
-def by_hand_line(event: RunEvent) -> str | None:
+def hand_event_line(event: RunEvent) -> str | None:
     """Return an event of a session by hand in one line; None for other events, and for messages between devices."""
     text: str | None
     match event:
@@ -51,14 +51,14 @@ def live_rows(state: HandSeen) -> tuple[tuple[str, str], ...]:
         ("turned", f"{degrees(state.turned_rad):6.1f} °"),
         ("fastest", f"{peak:6.0f}{of_range} °/s{fast}"),
         ("sides done", " ".join(state.faces) or "none"),
-        ("still open", wanted_words(state)),
+        ("still open", open_moves_words(state)),
     ]
     if state.expanded_scale is not None:
         rows.append(("U of the scale", f"{state.expanded_scale:.1e}"))
     return tuple(rows)
 
 
-def wanted_words(state: HandSeen) -> str:
+def open_moves_words(state: HandSeen) -> str:
     """Return the number of open moves in words."""
     flips = f"{len(state.pairs)} moves from side to side" if len(state.pairs) != 1 else "1 move from side to side"
     turns = f", {len(state.turns)} whole turn{'' if len(state.turns) == 1 else 's'}" if state.turns else ""

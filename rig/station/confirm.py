@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from rig.errors import Refused
 from rig.errors.quoting import printable_lines
-from rig.station.plain_text import for_file
+from rig.station.plain_text import format_for_file
 from rig.station.questions import Terminal, is_agreed, question_before
 
 NOT_AGREED = "Run again and agree, or agree in advance: --yes, in Python yes=True"
@@ -19,11 +19,11 @@ def ask_operator(announcement: Sequence[str], to_do: str = "start") -> bool:
     if sys.stdin.isatty():
         return is_agreed(Terminal(), question_before(announcement, to_do))
     for line in announcement:
-        print(for_file(printable_lines(line), sys.stderr), file=sys.stderr)
+        print(format_for_file(printable_lines(line), sys.stderr), file=sys.stderr)
     return False
 
 
-def agreed_or_refused(announcement: Sequence[str], to_do: str, assume_yes: bool) -> None:
+def require_agreement(announcement: Sequence[str], to_do: str, assume_yes: bool) -> None:
     """Raise Refused `not_confirmed` unless the operator agrees."""
     if not assume_yes and not ask_operator(announcement, to_do):
         raise Refused("not_confirmed", "the operator did not agree to the change", NOT_AGREED)

@@ -21,7 +21,7 @@ UNBROKEN = "\N{NO-BREAK SPACE}"
 def say(text: str, file: TextIO | None = None) -> None:
     """Print one printable line, on stdout by default; for a terminal it is broken between words."""
     file = sys.stdout if file is None else file
-    print(for_file(printable(text), file), file=file)
+    print(format_for_file(printable(text), file), file=file)
 
 
 def say_on_terminal(doing: str) -> None:
@@ -30,7 +30,7 @@ def say_on_terminal(doing: str) -> None:
         print(f"{printable(doing)} …", file=sys.stderr, flush=True)
 
 
-def for_file(text: str, file: TextIO) -> str:
+def format_for_file(text: str, file: TextIO) -> str:
     """Return a message for a file such as stderr: broken between words for a terminal, unchanged otherwise."""
     if not file.isatty():
         return text

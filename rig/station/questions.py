@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Literal, Protocol
 
 from rig.errors.quoting import printable_lines
-from rig.station.plain_text import for_file
+from rig.station.plain_text import format_for_file
 
 Kind = Literal["number", "mount", "go", "doubt", "again"]
 
@@ -74,8 +74,8 @@ class Terminal:
         """
         _forget_what_was_typed()
         for line in (question.hint,) if question.hint else question.lines:
-            print(for_file(printable_lines(line), sys.stderr), file=sys.stderr)
-        print(for_file(printable_lines(question.text), sys.stderr), end=" ", file=sys.stderr, flush=True)
+            print(format_for_file(printable_lines(line), sys.stderr), file=sys.stderr)
+        print(format_for_file(printable_lines(question.text), sys.stderr), end=" ", file=sys.stderr, flush=True)
         line = sys.stdin.readline()
         return line.strip() if line else None
 

@@ -18,7 +18,7 @@ from rig.errors.quoting import printable_lines
 from rig.station.by_hand_words import live_rows
 from rig.station.events import Advice, HandSeen, Progress, RunEvent, SamplesTaken, SensorSamples
 from rig.station.operator_station import Listener
-from rig.station.plain_text import for_file, plain
+from rig.station.plain_text import format_for_file, plain
 from rig.station.words import line
 
 REFRESH_S = 0.1
@@ -60,7 +60,7 @@ class LiveView:
     def _line(self, event: RunEvent) -> None:
         if (text := _text(event)) is not None:
             # A path has no markup, and a command must stay in one line to be copied.
-            shown = for_file(printable_lines(text), sys.stderr)
+            shown = format_for_file(printable_lines(text), sys.stderr)
             self._live.console.print(shown, highlight=False, markup=False, emoji=False, soft_wrap=True)
 
     def _show(self, panel: Table) -> None:

@@ -7,7 +7,7 @@ from traceback import format_exception
 from firmware_host.installation import install_command
 from rig.data.recording.thermal_events import SetMeasured, TemperatureWanted
 from rig.motion.plan_warnings import doubts
-from rig.station.by_hand_words import by_hand_line
+from rig.station.by_hand_words import hand_event_line
 from rig.station.events import (
     Advice,
     ArmConnected,
@@ -68,7 +68,7 @@ def line(event: RunEvent) -> str | None:
             samples, lost = (sum(counts) for counts in zip(*((s.samples, s.lost) for s in sensors), strict=True))
             text = f"recorded: {samples} samples, {lost} lost; {missed_states} arm states missed"
         case _:
-            text = by_hand_line(event) or _temperature_line(event) or _outcome_line(event)
+            text = hand_event_line(event) or _temperature_line(event) or _outcome_line(event)
     return text
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rig.analysis.effective_dof import of_acceleration_angles, of_angles
+from rig.analysis.effective_dof import acceleration_angle_dof, angle_dof
 from rig.estimation.gyroscope.budget import NOISE, WANDERING, Budget
 from rig.estimation.reference.reference_budget import ATTITUDES
 from rig.plans.recorded_run import judged, open_run
@@ -17,12 +17,12 @@ def test_a_line_that_angles_have_their_freedom_of_is_there_or_told_to_be_missing
     outcome = judged(open_run(RECORDINGS / "imu"))
     (gyroscope, *_), (accelerometer, *_) = outcome.results.values(), outcome.accelerometers.values()
     assert gyroscope.uncertainty is not None and accelerometer.budget is not None
-    for found in (of_angles(gyroscope), of_acceleration_angles(accelerometer)):
+    for found in (angle_dof(gyroscope), acceleration_angle_dof(accelerometer)):
         assert found is not None and np.isfinite(found).all()
     with pytest.raises(KeyError, match=NOISE):
-        of_angles(replace(gyroscope, uncertainty=gyroscope.uncertainty.without([NOISE])))
+        angle_dof(replace(gyroscope, uncertainty=gyroscope.uncertainty.without([NOISE])))
     with pytest.raises(KeyError, match=ATTITUDES):
-        of_acceleration_angles(replace(accelerometer, budget=accelerometer.budget.without([ATTITUDES])))
+        acceleration_angle_dof(replace(accelerometer, budget=accelerometer.budget.without([ATTITUDES])))
 
 
 def test_a_budget_tells_that_it_has_no_such_line() -> None:

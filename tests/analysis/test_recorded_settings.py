@@ -26,4 +26,4 @@ def test_keys_the_configuration_no_longer_has_do_not_matter(tmp_path: Path) -> N
 def test_another_limit_gives_another_verdict() -> None:
     run: RunData = read_run(RECORDING)
     assert calibrate([run]).passed
-    assert not calibrate([run.judged_by(["limits.scale_std=1e-6"])]).passed
+    assert not calibrate([run.override_settings(["limits.scale_std=1e-6"])]).passed

@@ -10,7 +10,7 @@ import pytest
 
 from rig.analysis.analyses import calibrate
 from rig.analysis.gyroscope.calibration import observe_recordings
-from rig.analysis.measurement_conditions import of_gyroscope
+from rig.analysis.measurement_conditions import gyroscope_conditions
 from rig.data.quantity import TEMPERATURE
 from rig.data.recording.channel import stated_temperature_channel
 from rig.data.recording.recorded_sensor import RecordedSensor, sensor_of
@@ -42,7 +42,7 @@ def warming(run: RunData) -> RunData:
 def test_a_sensor_that_warms_up_has_its_scale_and_its_bias_conditions_the_temperatures_of_their_own_readings() -> None:
     run = warming(synthetic_run(Setup()))
     recordings = observe_recordings([run])
-    held, seen = of_gyroscope(recordings, "gyro"), recordings[0].sensors["gyro"]
+    held, seen = gyroscope_conditions(recordings, "gyro"), recordings[0].sensors["gyro"]
     started = datetime.fromisoformat(run.provenance.started_utc)
     first_s = float(recordings[0].motion.time_s[0])
     windows = [*(turn.average for turn in seen.revolutions), *seen.rests]
@@ -118,7 +118,7 @@ def test_what_was_recorded_again_was_read_when_it_was_recorded_last() -> None:
     first, again = (synthetic_run(Setup(seed=seed)) for seed in (1, 2))
     later = datetime.fromisoformat(first.provenance.started_utc) + timedelta(hours=2)
     again = replace(again, provenance=replace(again.provenance, started_utc=later.isoformat()))
-    held = of_gyroscope(observe_recordings([first, again]), "gyro")
+    held = gyroscope_conditions(observe_recordings([first, again]), "gyro")
     assert later < held.bias.from_utc < held.bias.to_utc < later + timedelta(minutes=3)
 
 

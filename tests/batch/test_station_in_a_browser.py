@@ -14,7 +14,7 @@ from selenium.webdriver.remote.webelement import WebElement
 
 from rig.batch.batch_state import BatchPart, Begun, PartBegun, PartEnded, state_of
 from rig.batch.operators import Operator
-from rig.batch.page_operator import on_page
+from rig.batch.page_operator import open_page
 from rig.batch.status import Now, Present
 from rig.motion.steps import Rest
 from rig.page.server.control import STOPPED
@@ -64,7 +64,7 @@ def has_theme(driver: Chrome, theme: str) -> bool:
 
 def test_a_number_is_scanned_and_go_is_typed_or_ticked(driver: Chrome) -> None:
     questions = "number", "go", "go"
-    with on_page(Present(NOW), PageAddress(port=0)) as (voice, url), answered(Operator(voice), *questions) as answers:
+    with open_page(Present(NOW), PageAddress(port=0)) as (voice, url), answered(Operator(voice), *questions) as answers:
         driver.get(url)
         wait_for(lambda: "serial number" in text(driver, "text"), "the question for a number")
         assert text(driver, "part") == "<b>G-003</b>" and "A. Person" in text(driver, "who")
@@ -101,7 +101,7 @@ def test_a_number_is_scanned_and_go_is_typed_or_ticked(driver: Chrome) -> None:
 
 def test_a_run_shows_its_progress_and_a_verdict_stands_until_the_next_number(driver: Chrome) -> None:
     present = Present(NOW)
-    with on_page(present, PageAddress(port=0)) as (_, url):
+    with open_page(present, PageAddress(port=0)) as (_, url):
         driver.get(url)
         present.event(Progress(2, 4, Rest("rest", 10.0), 0.5, 15.0, 45.0, 1.0471975511965976))
         present.event(SamplesTaken((SensorSamples("gyro", 200, 1, {}),)))
@@ -128,7 +128,7 @@ def test_a_run_shows_its_progress_and_a_verdict_stands_until_the_next_number(dri
 
 def test_after_a_stop_the_page_says_that_and_not_that_there_is_no_news(driver: Chrome) -> None:
     present = Present(NOW)
-    with pytest.raises(KeyboardInterrupt), on_page(present, PageAddress(port=0)) as (voice, url):
+    with pytest.raises(KeyboardInterrupt), open_page(present, PageAddress(port=0)) as (voice, url):
         driver.get(url)
         wait_for(lambda: "checks" in text(driver, "state"), "what the station does")
         stop = driver.find_element(By.ID, "halt")

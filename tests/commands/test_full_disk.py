@@ -13,7 +13,7 @@ from rig.data.recording.run_file import read_run
 from rig.errors import Refused
 from rig.history.storage import engine
 from rig.history.store import open_history
-from rig.report.exports.exported_recording import exported
+from rig.report.exports.exported_recording import export_recordings
 from rig.report.exports.formats import OF_READINGS, writer_of_readings
 from rig.runner.csv_recording import ReadingsFile
 from support.laboratories.commands import rig_here
@@ -53,7 +53,7 @@ def test_the_file_that_is_not_written_is_named_and_not_there(
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(OF_READINGS))
 def test_readings_are_exported_whole_or_not_at_all(name: str, tmp_path: Path) -> None:
-    recordings = exported([read_run(RUN / "run.h5")])
+    recordings = export_recordings([read_run(RUN / "run.h5")])
     with full_disk(4000), pytest.raises(OSError, match=str(tmp_path)):
         writer_of_readings(name)(recordings, tmp_path)
     assert list(tmp_path.iterdir()) == []

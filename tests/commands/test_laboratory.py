@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rig.commands.laboratory.laboratory_process import simulated_laboratory
+from rig.commands.laboratory.laboratory_process import run_simulated_laboratory
 from rig.errors import Refused
 from support.laboratories.commands import rig
 from support.laboratories.worlds import World
@@ -21,7 +21,7 @@ def test_a_laboratory_whose_port_is_taken_is_refused_by_the_worlds_own_words_and
     running = world()
     with (
         pytest.raises(Refused, match=f"port_in_use: .*cannot listen on {running.host}:29999"),
-        simulated_laboratory(running.config_path.read_text(encoding="utf-8")),
+        run_simulated_laboratory(running.config_path.read_text(encoding="utf-8")),
     ):
         pass
     done = rig("check", running.config_path)
@@ -39,6 +39,6 @@ def test_a_laboratory_that_breaks_before_it_is_ready_says_how_it_ended(
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), *sys.path]))
     with (
         pytest.raises(Refused, match=r"world_not_ready: .* ended with status 7"),
-        simulated_laboratory(DEMO.read_text(encoding="utf-8")),
+        run_simulated_laboratory(DEMO.read_text(encoding="utf-8")),
     ):
         pass

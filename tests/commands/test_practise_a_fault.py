@@ -8,7 +8,7 @@ from queue import Queue
 
 import pytest
 
-from rig.commands.laboratory.laboratory_process import send_request, simulated_laboratory
+from rig.commands.laboratory.laboratory_process import run_simulated_laboratory, send_request
 from rig.commands.laboratory.practice import HELP, INCIDENTS, find_incident, practise
 from rig.config.load import load
 from rig.errors import Fault
@@ -159,7 +159,7 @@ def test_the_laboratory_shows_first_what_can_happen_in_it(terminals: Terminals) 
 def test_what_a_laboratory_does_not_have_cannot_happen_in_it() -> None:
     host = fresh_host()
     by_hand = load(CONFIGS / "by_hand.yaml", [f"board.port=socket://{host}:7321"], sections=None)
-    with simulated_laboratory(by_hand.text) as control:
+    with run_simulated_laboratory(by_hand.text) as control:
         assert practise(control, "slider 50") == "this cannot happen in this laboratory"
         assert practise(control, "Unplug") == INCIDENTS["unplug"].text
     with pytest.raises(Fault, match="world_ended"):

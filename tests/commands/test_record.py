@@ -10,7 +10,7 @@ import yaml
 from scipy.spatial.transform import Rotation
 
 from rig.cli import main
-from rig.commands.laboratory.laboratory_process import simulated_laboratory
+from rig.commands.laboratory.laboratory_process import run_simulated_laboratory
 from rig.motion.carried import FlangeLoad
 from rig.motion.geometry import flange_attitude, flange_rate
 from rig.motion.steps import Transfer, trapezoid_duration, travel
@@ -56,7 +56,7 @@ def test_a_sensor_on_a_table_with_a_clock_of_its_own(tmp_path: Path, capsys: pyt
     config = tmp_path / "config.yaml"
     config.write_text(yaml.safe_dump(document), encoding="utf-8")
     states: list[ArmState] = []
-    with simulated_laboratory(config.read_text(encoding="utf-8")), Arm(host, states.append) as table:
+    with run_simulated_laboratory(config.read_text(encoding="utf-8")), Arm(host, states.append) as table:
         out = tmp_path / "recorded"
         command = ("record", hardware(config, tmp_path), "--out", out, "--duration-s", f"{DURATION_S}")
         with start_module(*command, stdout=subprocess.PIPE, text=True) as recording:

@@ -21,7 +21,7 @@ def test_every_limit_is_configured_recorded_and_changed_under_one_key() -> None:
     recorded = json.loads(made.to_json())["limits"]
     assert recorded == limits
     assert settings_from_json(made.to_json()).limits == Limits(**limits)
-    changed = made.with_overrides([f"{setting(key)}={2 * limit}" for key, limit in limits.items()])
+    changed = made.apply_overrides([f"{setting(key)}={2 * limit}" for key, limit in limits.items()])
     assert changed.limits == Limits(**{key: 2 * limit for key, limit in limits.items()})
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from rig.config.files.user_folder import own_folder
+from rig.config.files.user_folder import rig_folder
 from rig.data.user_texts import is_own, note_own
 from rig.errors import Refused
 from rig.history.storage.address import resolve_address
@@ -23,9 +23,9 @@ def homeless(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 
 def test_a_folder_of_ones_own_needs_a_home(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     with pytest.raises(Refused, match="no_home: no home of this user is known"):
-        own_folder()
+        rig_folder()
     monkeypatch.setenv("HOME", str(tmp_path))
-    assert own_folder().is_relative_to(tmp_path)
+    assert rig_folder().is_relative_to(tmp_path)
 
 
 def test_a_history_without_a_home_is_refused_by_name(tmp_path: Path) -> None:

@@ -68,7 +68,7 @@ def test_other_settings_are_not_taken_for_these(change: dict[str, object]) -> No
 
 
 def test_thresholds_and_limits_can_be_changed_for_another_judgement() -> None:
-    changed = settings().with_overrides(["observation.max_lost_fraction=0.01", "limits.scale_std = 1e-3"])
+    changed = settings().apply_overrides(["observation.max_lost_fraction=0.01", "limits.scale_std = 1e-3"])
     assert changed.observation.max_lost_fraction == 0.01
     limits, before = changed.limits, settings().limits
     assert limits is not None and before is not None
@@ -77,7 +77,7 @@ def test_thresholds_and_limits_can_be_changed_for_another_judgement() -> None:
 
 
 def test_how_well_the_encoders_tell_arcs_can_be_stated_anew() -> None:
-    changed = settings().with_overrides(["uncertainty.angle_std_deg=0.02"]).uncertainty
+    changed = settings().apply_overrides(["uncertainty.angle_std_deg=0.02"]).uncertainty
     assert changed is not None and changed.angle_std_deg == 0.02
 
 
@@ -103,6 +103,6 @@ def test_how_well_the_encoders_tell_arcs_can_be_stated_anew() -> None:
 )
 def test_what_cannot_be_changed_is_refused_with_what_can(override: str, refusal: str) -> None:
     with pytest.raises(Refused, match=refusal) as refused:
-        settings().with_overrides([override])
+        settings().apply_overrides([override])
     assert len(str(refused.value)) < 800
     assert "\x1b" not in str(refused.value)

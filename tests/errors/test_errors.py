@@ -8,7 +8,7 @@ import pytest
 from firmware_host.emulator.chip.bus import Violation
 from firmware_host.errors import BoardError
 from rig.cli import main
-from rig.errors import Fault, Problem, ProblemError, Refused, RigError, raised_as
+from rig.errors import Fault, Problem, ProblemError, Refused, RigError, raise_as
 
 PROBLEM = Problem("no_board", "nothing answers on /dev/ttyACM0", "Check the cable")
 
@@ -36,7 +36,7 @@ def test_every_kind_of_error_carries_a_problem(kind: type[ProblemError]) -> None
 def test_one_converter_serves_every_kind(
     raised: type[ProblemError], as_kind: type[RigError], expected: type[RigError]
 ) -> None:
-    with pytest.raises(ProblemError) as caught, raised_as(as_kind):
+    with pytest.raises(ProblemError) as caught, raise_as(as_kind):
         raise raised.from_problem(PROBLEM)
     assert type(caught.value) is expected
     assert caught.value.problem == PROBLEM

@@ -13,7 +13,14 @@ from rig.errors import Refused
 from rig.history.entered.finished_run import FinishedRun
 from rig.history.recompute.recompute_journal import JOURNAL, RecomputeJournal, RecomputeQuestion
 from rig.history.recompute.recompute_report import again_csv, again_page, counts
-from rig.history.recompute.result_comparison import Answer, Compared, RecomputedResult, Unsolved, compared, to_solve
+from rig.history.recompute.result_comparison import (
+    Answer,
+    Compared,
+    RecomputedResult,
+    Unsolved,
+    compared,
+    pending_recordings,
+)
 from rig.history.recompute.selection import list_stated_results
 from rig.history.store import History, Selection, open_history
 from rig.report.kinds.kind_registry import followed
@@ -163,7 +170,7 @@ def test_what_is_solved_is_not_solved_again_and_what_is_not_is_tried_again(histo
         runs[0].content_sha256: given(runs[0]),
         runs[1].content_sha256: Unsolved("damaged", "another SHA-256"),
     }
-    assert [each.run_id for each in to_solve(stated, solved)] == [2, 3]
+    assert [each.run_id for each in pending_recordings(stated, solved)] == [2, 3]
 
 
 @pytest.mark.slow
@@ -227,7 +234,7 @@ def test_ten_thousand_results_are_planned_in_a_handful_of_questions(history: His
         for each in stated[:4000]:
             journal.note(each.content_sha256, answer)
     with RecomputeJournal(tmp_path, QUESTION) as journal:
-        left = to_solve(stated, journal.solved)
+        left = pending_recordings(stated, journal.solved)
         assert [each.run_id for each in left] == [each.run_id for each in stated[4000:]]
         outcome = compared(stated, journal.solved)
     assert (outcome.solved, outcome.unreached, outcome.moved) == (4000, 6000, 0)

@@ -22,7 +22,7 @@ from rig.history.storage.triggers import create_triggers
 from rig.history.store import History, open_history
 from rig.report.certificate.certificate_page import certificate_page
 from rig.report.certificate.content import certificate_of
-from rig.report.certificate.statements import stated_in
+from rig.report.certificate.statements import folder_statements
 from support.history.kept_rows import drop_triggers, forge
 from support.history.past_runs import finish_run
 from support.history.postgres import postgresql
@@ -74,7 +74,7 @@ def run_folder(folder: Path) -> Path:
     shutil.copy(CONFIGS / "demo.yaml", folder / "config.yaml")
     (folder / "calibration.h").write_text("#define KX 1.01f\n", encoding="utf-8")
     document = read_finished_run(folder).document
-    page = certificate_page(certificate_of(document, stated_in(folder)))
+    page = certificate_page(certificate_of(document, folder_statements(folder)))
     (folder / "certificate.html").write_text(page, encoding="utf-8")
     return folder
 

@@ -48,7 +48,7 @@ def test_a_run_is_found_again_with_all_its_numbers(history: History) -> None:
     (kept,) = history.kept()
     assert kept.result == run.text and content_sha256(kept.result) == kept.content_sha256
     assert [recording.name for recording in kept.recordings] == ["run.h5", "verify.h5"]
-    found = history.of_run(entered.run_id)
+    found = history.select_run(entered.run_id)
     stated = followed(read_result(RECORDINGS / "verified"))
     assert [(f.part, f.serial_number, f.estimator, f.temperature_c) for f in found] == [
         (s.part, s.serial_number, s.estimator, s.temperature_c) for s in stated

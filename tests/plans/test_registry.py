@@ -17,7 +17,7 @@ from rig.errors import Refused
 from rig.motion.steps import Plan
 from rig.plans.phase import first_phase
 from rig.plans.procedure_registry import installed, sections
-from rig.plans.script_file import installed_script, load_script
+from rig.plans.script_file import find_installed_script, load_script
 from support.paths import CONFIGS, ROOT
 from support.processes.waiting import PATIENCE_S
 
@@ -87,7 +87,7 @@ def test_a_planner_that_fails_is_refused_by_name(planner: Callable[..., Plan], s
 
 
 def test_the_kept_script_is_the_file_the_procedure_came_from() -> None:
-    kept = installed_script("verify")
+    kept = find_installed_script("verify")
     assert kept.procedure is verify.PROCEDURE and kept.is_installed
     assert kept.name == "verify.py" and "PROCEDURE = Procedure(" in kept.text and len(kept.sha256) == 64
 

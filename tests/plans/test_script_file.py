@@ -12,7 +12,7 @@ from rig.commands.configured import load_configured
 from rig.data.run_folder import ScriptIdentity, script_identity
 from rig.data.user_texts import note_own
 from rig.errors import Refused
-from rig.plans.script_file import SIZE_MAX_BYTES, installed_script, kept_script, load_script
+from rig.plans.script_file import SIZE_MAX_BYTES, find_installed_script, kept_script, load_script
 from support.laboratories.commands import configuration
 from support.laboratories.worlds import hardware
 from support.paths import CONFIGS, ROOT
@@ -68,7 +68,7 @@ def test_nothing_of_another_script_than_the_kept_one_is_executed(tmp_path: Path)
 
 
 def test_a_kept_script_that_is_installed_is_taken_from_where_it_is_installed(tmp_path: Path) -> None:
-    stock = installed_script("six_observation")
+    stock = find_installed_script("six_observation")
     (tmp_path / "script.py").write_text(stock.text, encoding="utf-8")
     found = kept_script(tmp_path, stock.identity)
     assert found.procedure is stock.procedure

@@ -138,7 +138,7 @@ def reached(of: Run, seed: int) -> ReachedUncertainty:
     seen = observe_recordings(runs)
     found = solve_observed(sensors, seen, surroundings_of(seen, seen[0].run.settings), estimator)["gyro"]
     assert found.uncertainty is not None
-    return ReachedUncertainty.of_budgets({"gyro": found.uncertainty})
+    return ReachedUncertainty.worst_case({"gyro": found.uncertainty})
 
 
 def reached_by_hand(of: Run, seed: int) -> ReachedUncertainty:
@@ -148,7 +148,7 @@ def reached_by_hand(of: Run, seed: int) -> ReachedUncertainty:
     part = Part(SAMPLED_HZ, noise_of(of), clock_ppm=20.0)
     told = handle(actions, seed, part, rest_s=1.5)
     session = segment_session(told.time_s, told.rates, told.acceleration)
-    return ReachedUncertainty.of_budgets({"gyro": solve_by_hand(session, SessionConditions(50.0)).budget})
+    return ReachedUncertainty.worst_case({"gyro": solve_by_hand(session, SessionConditions(50.0)).budget})
 
 
 def off(rng: np.random.Generator, angle_deg: float) -> tuple[float, ...]:
@@ -185,7 +185,7 @@ def test_a_run_that_is_ten_times_as_noisy_is_not_what_was_predicted() -> None:
     seen = observe_recordings([noisy])
     found = solve_observed(noisy.sensors, seen, surroundings_of(seen, seen[0].run.settings))["gyro"]
     assert found.uncertainty is not None
-    assert ReachedUncertainty.of_budgets({"gyro": found.uncertainty}).scale > 2 * predicted_of(each).scale
+    assert ReachedUncertainty.worst_case({"gyro": found.uncertainty}).scale > 2 * predicted_of(each).scale
 
 
 @cache
@@ -320,7 +320,7 @@ def test_the_accelerometers_uncertainty_is_what_a_drawn_session_reaches(part: st
     config = load(CONFIGS / "imu.yaml", [*said, *others], sections(installed()), turners.sections()).config
     made = turners.kind_of(config.turner).describe_configured(config.turner)
     budgets = predict_accelerometer_budgets(config, plan_of(config, config.procedure), made.kinematics)
-    foretold = ReachedUncertainty.of_budgets({}, budgets)
+    foretold = ReachedUncertainty.worst_case({}, budgets)
     for seed in range(5 if thorough else 1):
         session = drawn(part, seed, ARM_RAD, warmer_k=0.0, noisier=1.0)
         found = ReachedUncertainty.of_budgets({}, {"drawn": solve_session(session)[1]})

@@ -24,7 +24,7 @@ from rig.observation.observed_run import ObservedRun, observe_runs
 from rig.plans.recorded_run import open_run
 from rig.report.exports.autopilots import ardupilot_files, px4_files
 from rig.report.exports.exported_corrections import calibrations
-from rig.report.exports.exported_recording import WithMotion, exported
+from rig.report.exports.exported_recording import WithMotion, export_recordings
 from rig.report.exports.formats import FORMATS, OF_CALIBRATIONS, texts_of_calibrations, writer_of_readings
 from rig.report.exports.imucal import imucal_files
 from rig.report.exports.kalibr import kalibr_files, triangular
@@ -400,7 +400,7 @@ def test_readings_of_a_file_are_a_ros_2_bag_where_a_gyroscope_is_among_them(
     from rosbags.rosbag2 import Reader
 
     run = read_run(ELSEWHERE / "sweeps" / "run.h5")
-    (path,) = writer_of_readings("ros2")(exported([run]), tmp_path)
+    (path,) = writer_of_readings("ros2")(export_recordings([run]), tmp_path)
     with Reader(str(path)) as bag:
         assert bag.message_count == len(run.samples["imu"])
         assert bag.duration * 1e-9 == pytest.approx(np.ptp(run.samples["imu"]["host_time_s"]))

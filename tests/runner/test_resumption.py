@@ -15,14 +15,14 @@ from rig.data.recording.recorded_events import BoardObserved, TimedEvent
 from rig.data.recording.run_data import RunData
 from rig.data.recording.run_file import read_run
 from rig.observation.windows import swept
-from rig.plans.script_file import ScriptFile, installed_script
+from rig.plans.script_file import ScriptFile, find_installed_script
 from rig.runner.resumption import resumption
 from support.laboratories.commands import configuration, rig
 from support.recordings import damaged_accelerations
 from support.recordings.damaged_readings import offset, readings_of, replace_readings
 from support.recordings.synthetic_run import Setup
 
-SCRIPT = installed_script("six_observation")
+SCRIPT = find_installed_script("six_observation")
 SETUP = Setup(noise_rad_s=0.005)
 
 
@@ -58,7 +58,7 @@ def test_a_sweep_that_contradicts_the_others_is_repeated() -> None:
 def test_a_sweep_that_only_the_accelerometer_contradicts_is_repeated() -> None:
     sound = damaged_accelerations.readings_of("imu", "gyro")
     damaged = damaged_accelerations.offset(0.02, lambda seen: seen.sweep(4))(sound)
-    script = installed_script("imu")
+    script = find_installed_script("imu")
     before, run = (by_script(each.recording(), script) for each in (sound, damaged))
     done = resumption([before], run.settings, script).done
     assert 4 in done and resumption([run], run.settings, script).done == done - {4}

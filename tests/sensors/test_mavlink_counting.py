@@ -10,7 +10,7 @@ from rig.sensors.mavlink.dialect import ARDUPILOT, PX4
 from rig.sensors.mavlink.message_losses import ImuCounter, LinkCounter
 from rig.sensors.mavlink.orientations import RIGHT_ANGLES, board_rotation
 from rig.sensors.mavlink.parameter_encoding import AutopilotParameter, encode_value
-from rig.world.autopilot.autopilot_imu import ORIENTATIONS, simulated_rotation
+from rig.world.autopilot.autopilot_imu import ORIENTATIONS, orientation_rotation
 
 
 def taken(sequence: list[int], counter: LinkCounter) -> list[int]:
@@ -69,5 +69,5 @@ def test_orientations_are_rotations_and_those_of_the_simulated_autopilot() -> No
         assert matrix is not None and matrix @ matrix.T == pytest.approx(np.eye(3))
         assert np.linalg.det(matrix) == pytest.approx(1.0)
     for number in ORIENTATIONS:
-        assert board_rotation(float(number)) == pytest.approx(simulated_rotation(number))
+        assert board_rotation(float(number)) == pytest.approx(orientation_rotation(number))
     assert board_rotation(1.0) is None and board_rotation(100.0) is None and board_rotation(0.5) is None

@@ -52,7 +52,7 @@ def compare_with_board(
     """
     host = solve_like_board(tuple(_moves(readings, reports)))
     if (used := sum(report.outcome == "accepted" for report in reports)) != solved.accepted:
-        raise _unverified_fault(f"it has accepted {solved.accepted} moves, of which this computer received {used}")
+        raise _verification_fault(f"it has accepted {solved.accepted} moves, of which this computer received {used}")
     matrix = float(np.max(np.abs(np.array(solved.matrix) - host.matrix)))
     bias = float(np.max(np.abs(np.array(solved.bias_rad_s) - host.bias_rad_s)))
     if not (matrix <= SCALE_LIMIT and bias <= BIAS_LIMIT_RAD_S):
@@ -81,7 +81,7 @@ def _move(readings: BoardReadings, report: HandReport, *, follows: bool) -> Boar
     first, begin, end, last = np.searchsorted(times_us, marks).tolist()
     complete = first > 0 and last < len(times_us) and np.array_equal(times_us[[first, begin, end, last]], marks)
     if not complete or (np.diff(readings.sequence[first - 1 : last]) != 1).any():
-        raise _unverified_fault(f"readings of its move from {report.before} to {report.after} did not arrive here")
+        raise _verification_fault(f"readings of its move from {report.before} to {report.after} did not arrive here")
     return BoardMove(
         before=BoardRest(HAND_FACES.index(report.before), rates[first:begin].mean(axis=0), begin - first),
         after=BoardRest(HAND_FACES.index(report.after), rates[end:last].mean(axis=0), last - end),
@@ -94,7 +94,7 @@ def _move(readings: BoardReadings, report: HandReport, *, follows: bool) -> Boar
     )
 
 
-def _unverified_fault(what: str) -> Fault:
+def _verification_fault(what: str) -> Fault:
     return Fault(
         "board_unverified",
         f"the board's calibration by hand cannot be checked: {what}",

@@ -171,7 +171,7 @@ def _false_alarm_probability(run: RunData, sensors: Sequence[str], settings: Run
     return false_alarm_per_check(len(sensors) + len(accelerometers) + len(run.measuring(FIELD)), of_all=false_alarms)
 
 
-def disturbed_sweeps(runs: Sequence[RunData]) -> frozenset[int]:
+def contradicting_sweeps(runs: Sequence[RunData]) -> frozenset[int]:
     """Return the sweeps of an unfinished run that contradict the others for any sensor, judged as in the verdict.
 
     Gyroscopes and accelerometers without a solution so far contribute no sweep.

@@ -23,7 +23,7 @@ class ReachedUncertainty:
     acceleration_bias_m_s2: float = 0.0
 
     @classmethod
-    def of_budgets(
+    def worst_case(
         cls, rates: Mapping[str, Budget], accelerations: Mapping[str, Budget] = NONE
     ) -> "ReachedUncertainty":
         """Return the worst U in the budgets of all gyroscopes, and of all accelerometers."""
@@ -40,7 +40,7 @@ class Budgets:
     @property
     def reached(self) -> ReachedUncertainty:
         """The worst U of the budgets."""
-        return ReachedUncertainty.of_budgets(self.rates, self.accelerations)
+        return ReachedUncertainty.worst_case(self.rates, self.accelerations)
 
     def without(self, names: Collection[str]) -> "Budgets":
         """Return the budgets without the named contributors."""

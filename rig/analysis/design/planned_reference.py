@@ -78,7 +78,7 @@ def predict_readings(accelerometer: PlannedAccelerometer) -> ReferenceModel:
     segments = [*map(_segment, dwells), *map(_segment, sweeps)]
     poses = [segment.posture for segment in segments]
     movement = replace(
-        _with_predicted_readings(theta, movement),
+        _add_predicted_readings(theta, movement),
         sensor_errors=list_sensor_errors(accelerometer.datasheet, segments, 0.0, second_order=second_order),
         arm_turns=list_arm_rotations(poses, run.arm, mounting),
     )
@@ -112,7 +112,7 @@ def _predict_sweep(timed_step: Timed[Sweep], arm: DenavitHartenberg, walk_m_s_sq
     return of_turn(timed_step.step, turn, harmonic)
 
 
-def _with_predicted_readings(theta: Array, movement: Movement) -> Movement:
+def _add_predicted_readings(theta: Array, movement: Movement) -> Movement:
     """Return the movement with the readings that the model predicts."""
     readings = predicted(theta, movement)
     count = len(movement.dwells.readings_m_s2)

@@ -27,5 +27,5 @@ def assess_reached(runs: Sequence[RunData], estimator: str) -> ReachedUncertaint
     budgets = {name: results[name].uncertainty for name in settings.to_calibrate}
     known_budgets = {name: budget for name, budget in budgets.items() if budget is not None}
     return (
-        ReachedUncertainty.of_budgets(known_budgets) if known_budgets and len(known_budgets) == len(budgets) else None
+        ReachedUncertainty.worst_case(known_budgets) if known_budgets and len(known_budgets) == len(budgets) else None
     )

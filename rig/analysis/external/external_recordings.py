@@ -43,7 +43,7 @@ from rig.estimation.reference.reference_model import F
 from rig.estimation.reference.triaxial import UNTRUSTWORTHY_RAD
 from rig.estimation.sensor_axes import SensorAxes
 from rig.estimation.temperature.over_temperature import OverTemperature
-from rig.observation.external.attitude_import import placed_by
+from rig.observation.external.attitude_import import average_placements
 from rig.observation.external.csv_import import ExternalData, average_sweeps
 from rig.observation.external.csv_samples import Samples, samples_in
 from rig.observation.external.omission import Omitted
@@ -237,7 +237,7 @@ def _vector(data: ExternalData) -> VectorSolution:
 def _solve_attitudes(read: ReadElsewhere, samples: Samples, settings: RunSettings, name: str | None) -> OfSensor:
     method, site, options = find_method(name), settings.site, settings.elsewhere
     assert options is not None, "of readings of others"
-    placed = placed_by(samples, read.motion, find_clock=options.find_clock)
+    placed = average_placements(samples, read.motion, find_clock=options.find_clock)
     attempts = solve_placed(read.item.name, placed, site, options, method, second_order=settings.second_order)
     rates = attempts.results.get(RATE)
     gyroscope = rates if isinstance(rates, InAttitudes | InIncrements) else None

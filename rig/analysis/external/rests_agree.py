@@ -38,7 +38,7 @@ def check_rests_agree(turning: Turning, solution: KnownIncrements) -> None:
     wander = np.ptp(np.quantile(readings, (TAIL, 1 - TAIL), axis=0), axis=0) / 2
     _check_steady(wander)
     other = G_SENSITIVITY_RAD_S**2 + EARTH_RATE_RAD_S**2
-    std = np.sqrt(np.diag(solution.covariance)[BIAS] + wander**2 + _undetected_std_rad_s(turned) ** 2 + other)
+    std = np.sqrt(np.diag(solution.covariance)[BIAS] + wander**2 + _motion_std_rad_s(turned) ** 2 + other)
     normalised = np.abs(solution.bias - bias) / std
     worst = int(np.argmax(normalised))
     if normalised[worst] <= _critical_value(np.inf):
@@ -71,7 +71,7 @@ def _critical_value(dof: float) -> float:
     return -float(ndtri(tail) if np.isinf(dof) else stdtrit(dof, tail))
 
 
-def _undetected_std_rad_s(turned_rad_s: Array) -> float:
+def _motion_std_rad_s(turned_rad_s: Array) -> float:
     """Return the standard deviation, about any axis, of the body's undetected motion averaged over all rests.
 
     It is estimated from the scatter of the reference's rates (k, 3) and inflated by Student's t for so few rests.

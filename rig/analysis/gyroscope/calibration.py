@@ -26,7 +26,7 @@ from rig.estimation.gyroscope.vector_fit import Explained, VectorInputs, explain
 from rig.estimation.gyroscope.vector_model import VectorSolution, solve_vector_model
 from rig.estimation.refusals import check_duplicates
 from rig.observation.average import Average
-from rig.observation.finished_steps import finished_sweeps
+from rig.observation.finished_steps import complete_sweeps
 from rig.observation.observe import Observation
 from rig.observation.observed_run import AS_STATED, ObservedRun, observe_runs
 from rig.observation.timebase import TimeBase
@@ -276,7 +276,7 @@ def _solve_levenberg_marquardt(observations: Sequence[Observation]) -> "Levenber
 def _check_recordings(runs: Sequence[RunData]) -> None:
     """Raise Fault `duplicated_observation` if two recordings have the same samples of a sweep."""
     for run, other in combinations(runs, 2):
-        repeated = finished_sweeps(run) & finished_sweeps(other)
+        repeated = complete_sweeps(run) & complete_sweeps(other)
         if repeated and all(np.array_equal(samples, other.samples[name]) for name, samples in run.samples.items()):
             raise Fault(
                 "duplicated_observation",

@@ -15,7 +15,7 @@ from rig.analysis.gyroscope.comparison import Comparison, Reference, compare, li
 from rig.data.recording.run_data import RunData
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.observation.finished_steps import finished_sweeps
+from rig.observation.finished_steps import complete_sweeps
 from rig.observation.observed_run import ObservedRun
 
 
@@ -99,7 +99,7 @@ def fit_mounting(
 def _check_complete(runs: Sequence[RunData]) -> None:
     """Raise Fault `incomplete_verification` unless all planned sweeps were finished."""
     planned = len(runs[0].settings.planned_sweeps)
-    done = len(frozenset[int]().union(*map(finished_sweeps, runs)))
+    done = len(frozenset[int]().union(*map(complete_sweeps, runs)))
     if done < planned:
         raise Fault(
             "incomplete_verification",

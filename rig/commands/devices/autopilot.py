@@ -52,7 +52,7 @@ def _store(options: Namespace) -> int:
     from rig.sensors.mavlink.parameter_encoding import AutopilotParameter, encode_value
     from rig.sensors.mavlink.parameter_journal import ParameterChange
     from rig.sensors.mavlink.writing import autopilot_id, find_unfinished_change
-    from rig.station.confirm import agreed_or_refused
+    from rig.station.confirm import require_agreement
 
     result = read_passed_result(options.result)
     with _connect(options) as (link, sections):
@@ -71,7 +71,7 @@ def _store(options: Namespace) -> int:
             for name, value in wanted.items()
         }
         planned = ParameterChange(autopilot_id(link), link.identity.firmware, old, new, _backup_path(options))
-        agreed_or_refused([f"In the {link.identity.words}:", *_announce(planned, "new")], "store", options.yes)
+        require_agreement([f"In the {link.identity.words}:", *_announce(planned, "new")], "store", options.yes)
         planned.keep()
         say(f"the old parameters are kept in {planned.backup}")
         _change(link, planned, "new")
@@ -83,7 +83,7 @@ def _store(options: Namespace) -> int:
 def _restore(options: Namespace) -> int:
     from rig.sensors.mavlink.parameter_journal import read_change
     from rig.sensors.mavlink.writing import autopilot_id
-    from rig.station.confirm import agreed_or_refused
+    from rig.station.confirm import require_agreement
 
     planned = read_change(options.file)
     with _connect(options) as (link, _):
@@ -95,17 +95,17 @@ def _restore(options: Namespace) -> int:
                 "Connect that autopilot, or give the file of this one",
             )
         which = "new" if options.new else "old"
-        agreed_or_refused([f"In the {link.identity.words}:", *_announce(planned, which)], "restore", options.yes)
+        require_agreement([f"In the {link.identity.words}:", *_announce(planned, which)], "restore", options.yes)
         _change(link, planned, which)
     return 0
 
 
 def _change(link: "AutopilotLink", planned: "ParameterChange", which: str) -> None:
-    from rig.errors import Fault, raised_as
+    from rig.errors import Fault, raise_as
     from rig.sensors.mavlink.writing import change
 
     to = planned.new if which == "new" else planned.old
-    with raised_as(Fault):
+    with raise_as(Fault):
         change(link, planned, to)
     say(f"written and read back, bit by bit: {len(to)} parameters, the {which} ones")
 
@@ -165,9 +165,9 @@ def _backup_path(options: Namespace) -> Path:
 def _connect(options: Namespace) -> Iterator[tuple["AutopilotLink", Mapping[str, "SensorSection"]]]:
     """Connect to the only autopilot of a configuration, with its IMUs; start its simulated laboratory if it has one."""
     from rig.commands.laboratory.claims import claim_sensor
-    from rig.commands.laboratory.laboratory_process import simulated_laboratory
+    from rig.commands.laboratory.laboratory_process import run_simulated_laboratory
     from rig.commands.laboratory.own_address import load_at_own_address
-    from rig.errors import raised_as
+    from rig.errors import raise_as
     from rig.sensors.mavlink.autopilot_link import AutopilotLink
     from rig.sensors.mavlink.autopilot_source import mavlink_section
     from rig.sensors.sensor_registry import group_by_port
@@ -183,7 +183,7 @@ def _connect(options: Namespace) -> Iterator[tuple["AutopilotLink", Mapping[str,
                 "Give a configuration with the sensors of one",
             )
         if loaded.simulated:
-            stack.enter_context(simulated_laboratory(loaded.text))
+            stack.enter_context(run_simulated_laboratory(loaded.text))
             memory = "unless world.sensors.NAME.autopilot.parameter_file names a file that keeps it"
             say(
                 f"simulated laboratory: its autopilot's memory lasts as long as this command, {memory}", file=sys.stderr
@@ -191,7 +191,7 @@ def _connect(options: Namespace) -> Iterator[tuple["AutopilotLink", Mapping[str,
         ((port, sections),) = autopilots
         name, section = next(iter(sections.items()))
         stack.enter_context(claim_sensor(name, port))
-        stack.enter_context(raised_as(Refused))
+        stack.enter_context(raise_as(Refused))
         link = stack.enter_context(closing(AutopilotLink(name, port, mavlink_section(section).baud)))
         link.identify()
         yield link, sections

@@ -22,7 +22,7 @@ from rig.board.identify import (
     spell_part,
 )
 from rig.commands.laboratory.claims import claim_board
-from rig.commands.laboratory.laboratory_process import simulated_laboratory
+from rig.commands.laboratory.laboratory_process import run_simulated_laboratory
 from rig.commands.laboratory.own_address import load_at_own_address
 from rig.config.models import RigConfig
 from rig.config.sensors.sensor_sections import SensorSection
@@ -30,7 +30,7 @@ from rig.data.quantity import RATE
 from rig.data.result_file import ResultDocument, read_passed_result
 from rig.errors import Fault, Refused
 from rig.report.terminal.board_info import BoardInfo, BoardSensorRow, print_info, print_stored
-from rig.station.confirm import agreed_or_refused
+from rig.station.confirm import require_agreement
 from rig.station.plain_text import say
 
 
@@ -83,7 +83,7 @@ def write(options: Namespace) -> int:
         calibrations = {slot.name: _select_calibration(slot, result, options.result) for slot in slots}
         for slot in slots:
             find_sensor(board.identity, slot.name, slot.section)
-        agreed_or_refused(
+        require_agreement(
             _announce(board, (_describe_replacement(slot, calibrations[slot.name]) for slot in slots)),
             "store",
             options.yes,
@@ -105,7 +105,7 @@ def erase(options: Namespace) -> int:
             print("nothing to erase: no calibration is stored")
             return 0
         losses = (f"{slot.name}: erases {_describe_record(slot.stored)}" for slot in slots if slot.stored is not None)
-        agreed_or_refused(_announce(board, losses), "erase", options.yes)
+        require_agreement(_announce(board, losses), "erase", options.yes)
         with changing():
             for slot in slots:
                 board.erase_calibration(slot.index)
@@ -126,7 +126,7 @@ def _connect(options: Namespace) -> Iterator[tuple[RigConfig, Board]]:
         loaded = stack.enter_context(load_at_own_address(options.config, options.overrides))
         section = require_board_section(loaded.config)
         if loaded.simulated:
-            stack.enter_context(simulated_laboratory(loaded.text))
+            stack.enter_context(run_simulated_laboratory(loaded.text))
             file = loaded.flash_file
             memory = f"is kept in {file}" if file else "too, unless world.board.flash_file names a file that keeps it"
             say(f"simulated laboratory: it lasts as long as this command, its board's memory {memory}", file=sys.stderr)

@@ -25,7 +25,7 @@ def write_checked(path: Path, answers: "Answers") -> int:
     Return 0, or 1 if values remain to be filled in. Raise Refused `configuration_not_written`.
     """
     from rig.config.files.safe_writing import write_new
-    from rig.config.files.supplied_files import supplied
+    from rig.config.files.supplied_files import locate_supplied
     from rig.config.first_configuration import configuration_text
     from rig.config.load import ConfigurationRefused, load
     from rig.plans.procedure_registry import installed, sections
@@ -33,7 +33,7 @@ def write_checked(path: Path, answers: "Answers") -> int:
 
     refuse_existing(path)
     try:
-        write_new(path, configuration_text(answers, _schema_from(supplied(SCHEMA), path), str(path)))
+        write_new(path, configuration_text(answers, _schema_from(locate_supplied(SCHEMA), path), str(path)))
     except OSError as error:
         raise _not_written(path, str(error.strerror or error)) from error
     say(f"written: {path}")

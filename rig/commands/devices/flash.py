@@ -8,7 +8,7 @@ from pathlib import Path
 from firmware_host import flashing
 from firmware_host.protocol import FIRMWARE_VERSION
 from rig.board.identify import changing, refusing
-from rig.station.confirm import agreed_or_refused
+from rig.station.confirm import require_agreement
 from rig.station.plain_text import say
 
 
@@ -26,7 +26,7 @@ def flash(options: Namespace) -> int:
             probe = flashing.find_probe(options.probe)
             carry_out = partial(flashing.flash_by_probe, image, probe)
             route, calibrations = f"the debug probe {probe.unique_id}", "stay"
-    agreed_or_refused(
+    require_agreement(
         [
             f"The board at {route} gets the firmware {FIRMWARE_VERSION} ({len(image)} bytes).",
             f"SHA-256 {flashing.sha256(image)}.",

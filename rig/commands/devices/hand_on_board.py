@@ -24,7 +24,7 @@ from rig.board.identify import (
     spell_part,
 )
 from rig.commands.laboratory.claims import claim_board
-from rig.commands.laboratory.laboratory_process import simulated_laboratory
+from rig.commands.laboratory.laboratory_process import run_simulated_laboratory
 from rig.commands.laboratory.own_address import load_at_own_address
 from rig.commands.laboratory.simulated_operator import OperatorListener
 from rig.config.models import RigConfig
@@ -32,8 +32,8 @@ from rig.config.sensors.sensor_sections import SensorSection
 from rig.data.recording.hand_events import OfTheHand
 from rig.errors import Refused
 from rig.estimation.by_hand.solution import REAL_HANDS
-from rig.station.by_hand_words import by_hand_line
-from rig.station.confirm import agreed_or_refused, refuse_unless_answerable
+from rig.station.by_hand_words import hand_event_line
+from rig.station.confirm import refuse_unless_answerable, require_agreement
 from rig.station.plain_text import say
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ def hand(options: Namespace) -> int:
         among = _select_sensors(config, options.sensor)
         operator = None
         if loaded.simulated:
-            operator = OperatorListener(stack.enter_context(simulated_laboratory(loaded.text)))
+            operator = OperatorListener(stack.enter_context(run_simulated_laboratory(loaded.text)))
         stack.enter_context(claim_board(require_board_section(config).port))
         session = (
             _fetch_session(config, among)
@@ -88,7 +88,7 @@ def hand(options: Namespace) -> int:
                 say(line)
         if options.write:
             unchecked = [f"  {UNCHECKED}"] if by_board.agreement is None else []
-            agreed_or_refused([f"On the board {board.identity.unique_id}: {name}", *unchecked], "store", options.yes)
+            require_agreement([f"On the board {board.identity.unique_id}: {name}", *unchecked], "store", options.yes)
             with changing():
                 if options.fetch:  # a record needs a configured sensor
                     board.configure(by_board.index, config.sensors[name].rate_hz, config.sensors[name].range_deg_s)
@@ -117,7 +117,7 @@ def _run_session(
     from rig.runner.by_hand.on_board import calibrate_by_board
 
     def tell(event: OfTheHand) -> None:
-        if (line := by_hand_line(event)) is not None:
+        if (line := hand_event_line(event)) is not None:
             say(line, file=sys.stderr)
         if operator is not None:
             operator.event(event)

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from rig.commands.config_arguments import add_json, add_set
-from rig.commands.laboratory.laboratory_process import simulated_laboratory
-from rig.errors import Refused, raised_as
+from rig.commands.laboratory.laboratory_process import run_simulated_laboratory
+from rig.errors import Refused, raise_as
 from rig.station.plain_text import say
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ def run(options: Namespace) -> int:
             if not ports:
                 raise Refused("no_kvh_section", f"{target} has no KVH 1775", "Give a port, or another configuration")
             if loaded.simulated:
-                stack.enter_context(simulated_laboratory(loaded.text))
+                stack.enter_context(run_simulated_laboratory(loaded.text))
         problems = []
         for name, (port, speed) in ports.items():
             info = _query_instrument(name, port, speed)
@@ -74,7 +74,7 @@ def _query_instrument(name: str, port: str, baud: int) -> "KvhInfo":
 
     batches: list[NDArray[Any]] = []
     with (
-        raised_as(Refused),
+        raise_as(Refused),
         claim_sensor(name, port),
         closing(Kvh1775(name, port, baud, lambda messages, *_: batches.append(messages))) as kvh,
     ):

@@ -5,7 +5,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rig.errors import Refused, raised_as
+from rig.errors import Refused, raise_as
 from rig.errors.quoting import printable_lines
 from rig.station.plain_text import say
 
@@ -113,7 +113,7 @@ def look_at_device(
     from rig.sensors.lines.listening import listen
     from rig.sensors.lines.shape import NoShape, find_shape
 
-    with raised_as(Refused), claim_sensor(name, port):
+    with raise_as(Refused), claim_sensor(name, port):
         baud, lines, still_s = listen(port, baud, _tell, seconds)
     try:
         shape = find_shape(lines)

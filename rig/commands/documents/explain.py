@@ -125,9 +125,9 @@ def _list_names() -> list[str]:
 
 def _has_pages(*pages: str) -> bool:
     """Return whether the program was installed with its pages."""
-    from rig.config.files.supplied_files import supplied
+    from rig.config.files.supplied_files import locate_supplied
 
-    return all(supplied(page).exists() for page in pages)
+    return all(locate_supplied(page).exists() for page in pages)
 
 
 def _refer_to(*pages: str) -> Iterator[str]:

@@ -51,9 +51,9 @@ def export_files(options: Namespace) -> list[Path]:
 
     `--at-temperature`: a temperature in °C, and the run of `bias_drift` with the slopes. Return the files. Raise
     Refused `report_folder`, `bad_option`, `missing_extra`, and as `refuse_links` does; for readings as `open_run`,
-    `read_log` and `exported`; for calibrations as `read_passed_result`, `at_temperature` and the format.
+    `read_log` and `export_recordings`; for calibrations as `read_passed_result`, `at_temperature` and the format.
     """
-    from rig.report.exports.exported_recording import exported
+    from rig.report.exports.exported_recording import export_recordings
 
     run, name, out = options.run, options.format, options.out
     moved: tuple[str, str] | None = options.at_temperature
@@ -66,7 +66,7 @@ def export_files(options: Namespace) -> list[Path]:
         if name in OF_READINGS:
             write = writer_of_readings(name)
             say_on_terminal("reading the recordings")
-            recordings = exported(_read_recordings(run, options.columns))
+            recordings = export_recordings(_read_recordings(run, options.columns))
             _make_folder(folder, named_by_user=out is not None)
             with replace_together():
                 written = write(recordings, folder)

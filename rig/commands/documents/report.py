@@ -72,7 +72,7 @@ def write_documents(options: Namespace) -> tuple[list[Path], list[Refused]]:
     file that `rig reversal` wrote for its magnetometers. `--history` is the history in which the certificate is
     entered: by default the user's own, never one that the folder names. Return the files, and why requested forms could
     not be made. Raise Refused `report_folder`, `bad_option`, and as `read_result`, `read_reversal`, `refuse_links`,
-    `certificate_of`, `stated_in` and `signatory`.
+    `certificate_of`, `folder_statements` and `signatory`.
     """
     if options.sign is None and options.time_server is not None:
         raise Refused("bad_option", "--time-server is for signed documents", "Give --sign KEY too, or leave it out")
@@ -96,14 +96,14 @@ def _write_signed(options: Namespace, by: "Signatory | None") -> tuple[list[Path
     from rig.report.certificate.certificate_page import certificate_page
     from rig.report.certificate.content import certificate_of
     from rig.report.certificate.pdf import PDF
-    from rig.report.certificate.statements import stated_in
+    from rig.report.certificate.statements import folder_statements
     from rig.report.signatures.reason import reason_of
 
     pdf = options.pdf or (by is not None and not options.dcc)  # the page itself cannot carry a signature
     file: Path = options.run / RESULT if options.run.is_dir() else options.run
     result = read_result(file)
     reversals = {} if options.reversal is None else read_reversal(options.reversal).magnetometers
-    certificate = certificate_of(result, stated_in(file.parent, options.overrides), reversals)
+    certificate = certificate_of(result, folder_statements(file.parent, options.overrides), reversals)
     end = None if by is None else find_journal_end(file.parent, read_history_name(options.history))
     reason = reason_of(certificate, end)
     written: dict[str, bytes] = {CERTIFICATE: certificate_page(certificate).encode()}

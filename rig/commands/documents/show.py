@@ -32,7 +32,7 @@ def run(options: Namespace) -> int:
     from rig.report.simulated_truth import truth_lines, truth_rows
     from rig.report.terminal.result_table import print_checks, print_kept, print_values, print_verdict
     from rig.report.terminal.truth_table import truth_tables
-    from rig.report.terminal.whole_words import with_whole_words
+    from rig.report.terminal.whole_words import fit_words
     from rig.station.plain_text import say
 
     result, sensor = read_result(options.run), options.sensor
@@ -49,7 +49,7 @@ def run(options: Namespace) -> int:
     if options.budget or options.all or (sensor is not None and not options.checks):
         print_values(result, console, sensor)
         for table in truth_tables(truth, sensor):
-            console.print(with_whole_words(table, console.width))
+            console.print(fit_words(table, console.width))
     if options.checks or options.all:
         print_checks(result, console, sensor)
     if options.budget or options.all or options.checks or sensor is not None:

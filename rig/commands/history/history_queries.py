@@ -17,7 +17,7 @@ from rig.errors import Refused, RigError
 from rig.history.documents import change_entry, history_csv, history_document, rigs_document
 from rig.history.entered.finished_run import PAGE, FinishedRun, read_finished_run
 from rig.history.series import Change, changes_between, effects, rig_states, subjects, trends
-from rig.history.storage.address import HistoryAddress, own_history_address, resolve_address
+from rig.history.storage.address import HistoryAddress, default_history_address, resolve_address
 from rig.history.storage.continuity import is_there
 from rig.history.store import History, Past, Selection, open_history
 from rig.history.terminal.change_words import comparison_in_words
@@ -140,7 +140,7 @@ def import_runs(options: Namespace) -> int:
                 say(f"{folder}: {error}", sys.stderr)
                 continue
             new, existing = new + entered.new, existing + (not entered.new)
-            numbers = calibrations_in_words([past.id for past in history.of_run(entered.run_id)])
+            numbers = calibrations_in_words([past.id for past in history.select_run(entered.run_id)])
             say(f"{folder}: {'entered' if entered.new else 'already there'} as {numbers}")
             if entered.new and run.certificate is None and (folder / PAGE).exists():
                 reason = f"its {PAGE} is not the one this version writes of its result, and was not entered"
@@ -172,7 +172,7 @@ def compare(options: Namespace) -> int:
     """
     with open_named_history(options) as history:
         first, second = history.calibration(options.first), history.calibration(options.second)
-        before, now = ([*history.of_run(past.run_id), past] for past in (first, second))
+        before, now = ([*history.select_run(past.run_id), past] for past in (first, second))
     if first.subject != second.subject:
         raise Refused(
             "not_comparable",
@@ -222,7 +222,7 @@ def _open_existing(address: HistoryAddress) -> AbstractContextManager[History]:
 
 
 def _read_address(options: Namespace) -> HistoryAddress:
-    return own_history_address(read_history_name(options.history)) or resolve_address(None)
+    return default_history_address(read_history_name(options.history)) or resolve_address(None)
 
 
 def _read_selection(options: Namespace) -> Selection:

@@ -20,7 +20,7 @@ from rig.data.version import VERSION
 from rig.errors import Fault, Refused
 from rig.history.recompute.recompute_journal import JOURNAL, RecomputeJournal, RecomputeQuestion
 from rig.history.recompute.recompute_report import CSV, PAGE, again_csv, again_page, counts, notable_table
-from rig.history.recompute.result_comparison import Answer, RecomputeOutcome, StatedResult, compared, to_solve
+from rig.history.recompute.result_comparison import Answer, RecomputeOutcome, StatedResult, compared, pending_recordings
 from rig.history.recompute.selection import list_stated_results
 from rig.history.store import Selection
 from rig.station.plain_text import say
@@ -45,7 +45,7 @@ def recompute_history(options: Namespace, solve: Solve = solve_task) -> int:
         out.mkdir(parents=True, exist_ok=True)
     with RecomputeJournal(out, question) as journal:
         answers = dict(journal.solved)
-        remaining = to_solve(stated, answers)
+        remaining = pending_recordings(stated, answers)
         if len(remaining) < len(stated):
             say(f"{len(stated) - len(remaining)} of {len(stated)} are already solved in {out / JOURNAL}", sys.stderr)
         tasks = [

@@ -85,7 +85,7 @@ def _solve(folder: Path, task: Task) -> Answer:
     except (RigError, OSError) as error:
         return Unsolved("failed", f"{folder} cannot be read: {error}")
     try:
-        outcome = judged(recorded.judged_by(task.overrides), task.estimator)
+        outcome = judged(recorded.override_settings(task.overrides), task.estimator)
     except RigError as error:
         state: State = "unjudged" if error.name in UNJUDGED else "failed" if error.name in NOT_HERE else "refused"
         return Unsolved(state, f"{folder}: {error}")

@@ -40,9 +40,9 @@ def remember(folder: Path, section: "HistorySection") -> tuple[RunEvent | None, 
 
 def remember_own(folder: Path, named: str | None) -> tuple[RunEvent | None, tuple[CalibrationComparison, ...]]:
     """Enter the run in `folder` in the user's own history, or the `named` one. Return what `remember` returns."""
-    from rig.history.storage.address import own_history_address
+    from rig.history.storage.address import default_history_address
 
-    return _enter_run(folder, lambda: own_history_address(named))
+    return _enter_run(folder, lambda: default_history_address(named))
 
 
 def _enter_run(
@@ -65,10 +65,10 @@ def _enter_run(
 
 def _is_usual(address: "HistoryAddress") -> bool:
     """Return whether this history is the default one, which commands use if they name none."""
-    from rig.history.storage.address import own_history_address
+    from rig.history.storage.address import default_history_address
 
     try:
-        return address == own_history_address(None)
+        return address == default_history_address(None)
     except RigError:  # the user has no home
         return False
 
@@ -101,11 +101,11 @@ def _find_own(folder: Path, history: str | None) -> "tuple[Loaded | None, Histor
     The address is None if there is no history, or if that configuration switches it off and none is named.
     """
     from rig.history.entered.finished_run import read_configuration
-    from rig.history.storage.address import own_history_address
+    from rig.history.storage.address import default_history_address
 
     loaded = read_configuration(folder)
     is_off = history is None and loaded is not None and loaded.config.history.off
-    return loaded, None if is_off else own_history_address(history)
+    return loaded, None if is_off else default_history_address(history)
 
 
 def find_journal_end(folder: Path, history: str | None = None) -> tuple[int, str] | None:
@@ -153,7 +153,7 @@ def _enter(
 
     with open_history(address) as history:
         run_id = history.enter(run).run_id
-        return tuple(past.id for past in history.of_run(run_id)), tuple(_compare_with_earlier(history, run_id))
+        return tuple(past.id for past in history.select_run(run_id)), tuple(_compare_with_earlier(history, run_id))
 
 
 def _certify(address: "HistoryAddress", content_sha256: str, certificate: "Issued") -> bool:
@@ -195,7 +195,7 @@ def _compare_with_earlier(history: "History", run_id: int) -> "list[CalibrationC
     from rig.history.store import Selection
 
     pairs = []
-    for now in history.of_run(run_id):
+    for now in history.select_run(run_id):
         series = subjects(history.calibrations(Selection(serial_number=now.serial_number))).get(now.subject, [])
         earlier = [past for past in series if (past.started_utc, past.id) < (now.started_utc, now.id)]
         pairs.extend([(earlier[-1], now)] if earlier else [])

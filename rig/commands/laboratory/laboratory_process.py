@@ -18,7 +18,7 @@ CONTROL_TIMEOUT_S = 30.0
 
 
 @contextmanager
-def simulated_laboratory(config_text: str, late: Path | None = None, truth: Path | None = None) -> Iterator[str]:
+def run_simulated_laboratory(config_text: str, late: Path | None = None, truth: Path | None = None) -> Iterator[str]:
     """Run the world of a configuration text for the length of the block; yield the address of its control channel.
 
     If its steps come late, it writes the causes to the file `late`, or to stderr if that is None. It may be asked to

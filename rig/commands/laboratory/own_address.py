@@ -79,7 +79,7 @@ def _move_turner(config: RigConfig, text: str, host: str) -> Iterator[str]:
     import yaml
 
     section = "turner" if "turner" in yaml.safe_load(text) else "arm"
-    for key, value in config.turner.moved_to(host).items():
+    for key, value in config.turner.override_host(host).items():
         yield f"{section}.{key}={value}"
 
 

@@ -5,7 +5,7 @@ import sys
 from argparse import ArgumentParser, Namespace
 
 from rig.commands.config_arguments import add_config
-from rig.commands.laboratory.laboratory_process import send_request, simulated_laboratory, write_temporary
+from rig.commands.laboratory.laboratory_process import run_simulated_laboratory, send_request, write_temporary
 from rig.commands.laboratory.only_on_linux import refuse_unless_linux
 
 
@@ -22,7 +22,7 @@ def add(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     """Run only the world of a configuration, until Ctrl-C; return its exit status.
 
-    Raise Refused `only_on_linux`, as `load` does, and with `--faults` as `simulated_laboratory` does; Fault
+    Raise Refused `only_on_linux`, as `load` does, and with `--faults` as `run_simulated_laboratory` does; Fault
     `world_ended`.
     """
     refuse_unless_linux("the simulated laboratory")
@@ -30,7 +30,7 @@ def run(options: Namespace) -> int:
 
     text = load(options.config, options.overrides, sections=None).text
     if options.faults:
-        with simulated_laboratory(text) as control:
+        with run_simulated_laboratory(text) as control:
             return _practise(control)
     with write_temporary(text) as config_path:
         return subprocess.call([sys.executable, "-P", "-m", "rig.world", str(config_path)])

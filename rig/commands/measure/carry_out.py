@@ -9,7 +9,7 @@ from rig.commands.configured import Configured
 from rig.commands.history.remember import describe_changes, remember
 from rig.commands.history.run_serials import recall_sensors
 from rig.commands.laboratory.claims import claim_devices
-from rig.commands.laboratory.laboratory_process import make_mounter, simulated_laboratory
+from rig.commands.laboratory.laboratory_process import make_mounter, run_simulated_laboratory
 from rig.commands.laboratory.simulated_operator import OperatorListener
 from rig.commands.laboratory.written_truth import write_truth
 from rig.commands.page_arguments import PageWish, serve_operators_page
@@ -59,7 +59,7 @@ def carry_out(
                     resumed = bool(recordings(folder, "raw"))
                     (folder / TRUTH).unlink(missing_ok=True)
                     control = stack.enter_context(
-                        simulated_laboratory(configured.loaded.text, folder / WORLD_LATE, folder / TRUTH)
+                        run_simulated_laboratory(configured.loaded.text, folder / WORLD_LATE, folder / TRUTH)
                     )
                     station.mount = make_mounter(control)
                     station.listeners = (*station.listeners, OperatorListener(control))

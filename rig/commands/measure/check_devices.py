@@ -8,7 +8,7 @@ from contextlib import ExitStack
 from typing import TYPE_CHECKING
 
 from rig.commands.config_arguments import add_config, add_json, add_script
-from rig.commands.laboratory.laboratory_process import simulated_laboratory
+from rig.commands.laboratory.laboratory_process import run_simulated_laboratory
 from rig.errors import Problem, Refused, RigError
 from rig.station.plain_text import say
 
@@ -37,7 +37,7 @@ def run(options: Namespace) -> int:
     with ExitStack() as stack:
         configured = stack.enter_context(open_configured(options.config, options.overrides, options.script))
         if configured.loaded.simulated:
-            stack.enter_context(simulated_laboratory(configured.loaded.text))
+            stack.enter_context(run_simulated_laboratory(configured.loaded.text))
         checks = [_check_board, _check_instruments, _check_turner]
         missing = [problem for check in checks for problem in _catch_problem(check, configured, tell)]
     if options.json:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rig.commands.config_arguments import add_json
 from rig.commands.page_arguments import add_page
-from rig.config.files.supplied_files import NAMES, supplied
+from rig.config.files.supplied_files import NAMES, locate_supplied
 from rig.errors import Refused
 from rig.station.plain_text import say
 
@@ -37,7 +37,7 @@ def run(options: Namespace) -> int:
     from rig.commands.measure.run import run as run_configuration
 
     say("the demonstration: a simulated arm turns a simulated LSM9DS1 gyroscope; about ten seconds", sys.stderr)
-    options.config = supplied(DEMO)
+    options.config = locate_supplied(DEMO)
     return run_configuration(options)
 
 
@@ -66,7 +66,7 @@ def _pairs(folder: Path) -> list[tuple[Path, Path]]:
     """Return every supplied file with its path in the folder."""
     pairs = []
     for name in NAMES:
-        source = supplied(name)
+        source = locate_supplied(name)
         files = sorted(source.rglob("*")) if source.is_dir() else [source]
         pairs.extend(
             (file, folder / name / file.relative_to(source) if source.is_dir() else folder / name)

@@ -7,7 +7,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from rig.commands.config_arguments import add_config
-from rig.commands.laboratory.laboratory_process import simulated_laboratory
+from rig.commands.laboratory.laboratory_process import run_simulated_laboratory
 from rig.errors import Refused
 from rig.station.plain_text import say
 
@@ -42,7 +42,7 @@ def run(options: Namespace) -> int:
         if simulated is not None and (moved := stack.enter_context(find_own_address(config, simulated))):
             config, simulated = load_sensors(options.config, [*options.overrides, *moved])
         if simulated is not None:
-            stack.enter_context(simulated_laboratory(simulated))
+            stack.enter_context(run_simulated_laboratory(simulated))
         recordings = record_readings(config, options.out, options.duration_s)
     for path, recording in recordings.items():
         say(f"{path}: {recording.summary.samples} samples, {recording.summary.lost} lost")

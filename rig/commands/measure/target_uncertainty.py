@@ -92,10 +92,10 @@ def _write(options: Namespace, best: "Planned") -> None:
     """Write a configuration for `rig run`: the file's values with the procedure of the plan."""
     from rig.commands.configured import load_configured
     from rig.config.files.safe_writing import write_new
-    from rig.report.terminal.shortest_words import changed_keys
+    from rig.report.terminal.shortest_words import list_key_changes
 
     section = load_configured(options.config, options.overrides).loaded.config.procedure
-    changed = changed_keys(section, best.candidate.procedure)
+    changed = list_key_changes(section, best.candidate.procedure)
     overrides = [f"procedure.{key}={json.dumps(value)}" for key, value in changed.items()]
     loaded = load_configured(options.config, [*options.overrides, *overrides]).loaded
     reached = best.reached

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from rig.commands.config_arguments import add_columns, add_json, add_run, find_logs, read_column_map
 from rig.commands.report_folder import draw_into
-from rig.errors import Refused, raised_as
+from rig.errors import Refused, raise_as
 from rig.station.plain_text import say
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ def run(options: Namespace) -> int:
     """
     from rig.report.figures.allan import draw_at_rest, print_at_rest
 
-    with raised_as(Refused):  # no arm moves: wrong data is a refusal
+    with raise_as(Refused):  # no arm moves: wrong data is a refusal
         logs = find_logs(options.run)
         if not logs and options.columns is not None:
             raise Refused("bad_option", "--columns is for a log, and a run needs no map", "Leave it out")

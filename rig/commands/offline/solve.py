@@ -80,7 +80,7 @@ def _refuse_samples(path: Path) -> None:
 def _solve_recording(options: Namespace) -> int:
     """Recompute the result of a run folder or a run file.
 
-    Return 0 if it passed, else 1. `--set` changes the settings that judge it, see `RunSettings.with_overrides`.
+    Return 0 if it passed, else 1. `--set` changes the settings that judge it, see `RunSettings.apply_overrides`.
     `--script` names the script with which another user made the recording.
     """
     from rig.data.recording.run_reading import reading_ahead
@@ -90,7 +90,7 @@ def _solve_recording(options: Namespace) -> int:
         from rig.report.document import document_of
         from rig.report.terminal.result_table import print_outcome
 
-        run = open_run(options.run, options.script, begun=begun).judged_by(options.overrides)
+        run = open_run(options.run, options.script, begun=begun).override_settings(options.overrides)
     say_on_terminal("solving")
     outcome = judged(run, options.estimator)
     if (omission := left_out(run)) is not None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from rig.commands.config_arguments import add_columns, read_column_map
 from rig.commands.history.named_history import add_history, read_history_name
-from rig.errors import Refused, raised_as
+from rig.errors import Refused, raise_as
 from rig.errors.quoting import shorten
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from rig.station.plain_text import say
@@ -144,7 +144,7 @@ def run(options: Namespace) -> int:
 
     if options.history is not None and options.out is None:
         raise Refused("bad_option", "--history is for runs that are kept", "Give --out, which keeps the run")
-    with raised_as(Refused):  # no arm moves: wrong data is a refusal, not a fault
+    with raise_as(Refused):  # no arm moves: wrong data is a refusal, not a fault
         recording = _build_recording(options)
         outcome = calibrate([recording])
     comparisons = () if options.out is None else _keep_run(options, recording, outcome)

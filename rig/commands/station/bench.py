@@ -20,7 +20,7 @@ from rig.commands.configured import Configured, change_configured
 from rig.commands.history.remember import remember
 from rig.commands.history.run_serials import find_other_board, recall_sensors
 from rig.commands.laboratory.claims import claim_devices
-from rig.commands.laboratory.laboratory_process import make_fitter, make_mounter, simulated_laboratory
+from rig.commands.laboratory.laboratory_process import make_fitter, make_mounter, run_simulated_laboratory
 from rig.commands.laboratory.simulated_operator import OperatorListener
 from rig.commands.laboratory.written_truth import write_truth
 from rig.commands.page_arguments import Answer
@@ -30,7 +30,7 @@ from rig.data.run_folder import ARM_LOG, CONFIG, LOG, RESULT, TRUTH, WORLD_LATE,
 from rig.data.user_texts import note_own
 from rig.errors import Fault, Refused
 from rig.report.certificate.content import certificate_of
-from rig.report.certificate.statements import of_configuration
+from rig.report.certificate.statements import configuration_statements
 from rig.report.document import document_of
 from rig.report.simulated_truth import truth_lines, truth_rows
 from rig.runner.early_connection import Ahead
@@ -112,7 +112,7 @@ class RigBench:
         )
         return next((past.words for past in calibrations if (past.day, past.verdict) == (day, "pass")), None)
 
-    def known_as(self, chip: Chip, serial: str) -> str | None:
+    def find_other_serial_number(self, chip: Chip, serial: str) -> str | None:
         """Return the newest other serial number that the history has for this board, or None."""
         config = self._configure(serial).loaded.config
         own_numbers = {sensor.serial_number for sensor in config.all_sensors.values()}
@@ -243,7 +243,7 @@ def open_bench(configured: Configured, folder: Path, station: BatchSettings) -> 
         control = None
         if configured.loaded.simulated:
             control = stack.enter_context(
-                simulated_laboratory(configured.loaded.text, folder / WORLD_LATE, folder / TRUTH)
+                run_simulated_laboratory(configured.loaded.text, folder / WORLD_LATE, folder / TRUTH)
             )
         connect = partial(kind_of(config.turner).connect, config.turner)
         ahead = Ahead(connect, folder / ARM_LOG)
@@ -287,4 +287,4 @@ def _prepare_folder(folder: Path, configured: Configured) -> bool:
 
 def _certificate_number(folder: Path, configured: Configured) -> str:
     """Return the number of the certificate in a run folder."""
-    return certificate_of(read_result(folder), of_configuration(configured.loaded)).number
+    return certificate_of(read_result(folder), configuration_statements(configured.loaded)).number

@@ -21,13 +21,13 @@ def run(options: Namespace) -> int:
     Return 0. Raise Refused `page_address`, `no_history`, and as `open_history` does.
     """
     from rig.floor.floor_feed import looking
-    from rig.history.storage.address import own_history_address
+    from rig.history.storage.address import default_history_address
     from rig.history.storage.continuity import is_there
     from rig.history.store import open_history
     from rig.page.server.control import Control
     from rig.page.server.serving import Page, serving
 
-    shared = own_history_address(read_history_name(options.history))
+    shared = default_history_address(read_history_name(options.history))
     if shared is None or not is_there(shared):
         what = "the history is off" if shared is None else f"there is no history {shared.label}"
         raise Refused("no_history", what, "Name the history that the rigs share: rig floor --history URL")

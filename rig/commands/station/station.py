@@ -133,9 +133,9 @@ def _send_heartbeats(config: "RigConfig", present: "Present") -> Iterator[None]:
 @contextmanager
 def _serve_page(wanted: "PageWish", present: "Present") -> "Iterator[Voice]":
     """Serve the station's page, which asks the operator."""
-    from rig.batch.page_operator import on_page
+    from rig.batch.page_operator import open_page
 
-    with on_page(present, wanted.address()) as (voice, url):
+    with open_page(present, wanted.address()) as (voice, url):
         say(f"page: {url}", sys.stderr)
         yield voice
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from rig.commands.config_arguments import add_run
 from rig.commands.page_arguments import PageWish, add_page_address, read_page_token, wait_for_interrupt
 from rig.config.files.regular_file import UnfitFile, read_regular_file
-from rig.errors import Refused, raised_as
+from rig.errors import Refused, raise_as
 from rig.station.plain_text import say
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def run(options: Namespace) -> int:
     runs = [read_run(path) for readings in ("raw", "calibrated") for path in recordings(folder, readings)]
     if not runs:
         raise Refused("no_run", f"{folder} holds no recording", "Give the folder of a run")
-    with raised_as(Refused):  # no arm moves: wrong data is a refusal
+    with raise_as(Refused):  # no arm moves: wrong data is a refusal
         for run in runs:
             turner_of(run)
             check_arms_times(run.states)

@@ -5,7 +5,7 @@ from pathlib import Path
 from rig.errors import Refused
 
 
-def own_folder() -> Path:
+def rig_folder() -> Path:
     """Return this user's folder of the rig, which may not exist yet. Raise Refused `no_home` without a home folder."""
     from platformdirs import user_data_path
 

@@ -66,6 +66,6 @@ class ServoSection(TurnerSection):
         """The host of its port; None for a serial port, which cannot be simulated."""
         return urlsplit(self.port).hostname if self.port.startswith("socket://") else None
 
-    def moved_to(self, host: str) -> Mapping[str, str]:
+    def override_host(self, host: str) -> Mapping[str, str]:
         """Return the key of the servo's port, with the same port number at another `host`."""
         return {"port": f"socket://{host}:{urlsplit(self.port).port}"}

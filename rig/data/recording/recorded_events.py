@@ -12,8 +12,8 @@ from firmware_host.answers import BoardObservation, BoardSolution
 from rig.data.recording.hand_events import (
     HandAsked,
     HandBegunAnew,
-    HandMoveRefused,
     HandMoveAccepted,
+    HandMoveRefused,
     HandRested,
     HandRestRefused,
     OfTheHand,

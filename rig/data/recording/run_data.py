@@ -38,6 +38,6 @@ class RunData:
         """Return the sensors whose samples hold the given quantity, by name."""
         return {name: sensor for name, sensor in self.sensors.items() if sensor.measures(quantity)}
 
-    def judged_by(self, overrides: Sequence[str]) -> "RunData":
-        """Return the recording under other settings: see `RunSettings.with_overrides`."""
-        return replace(self, settings=self.settings.with_overrides(overrides)) if overrides else self
+    def override_settings(self, overrides: Sequence[str]) -> "RunData":
+        """Return the recording under other settings: see `RunSettings.apply_overrides`."""
+        return replace(self, settings=self.settings.apply_overrides(overrides)) if overrides else self

@@ -247,7 +247,7 @@ class RunSettings:
         steps = self.planned_sweeps, self.planned_dwells
         return self.procedure, self.then_verify, self.home_q_rad, *steps, self.mounts, self.by_hand
 
-    def with_overrides(self, overrides: Sequence[str]) -> "RunSettings":
+    def apply_overrides(self, overrides: Sequence[str]) -> "RunSettings":
         """Return the settings with other thresholds or limits:
 
         `limits.scale_std=0.001`. If the run has arcs, the encoders' uncertainty can also be changed:

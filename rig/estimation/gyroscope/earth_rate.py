@@ -182,7 +182,7 @@ def _fit(
 
     def effects(matrix: Array) -> Array:
         curved = [curvature(matrix, inputs.rates_rad_s)] if several else []
-        return np.concatenate([*curved, inputs.own_patterns(matrix), rate_errors @ matrix.T])
+        return np.concatenate([*curved, inputs.sensor_error_patterns(matrix), rate_errors @ matrix.T])
 
     solve = solver(inputs, mounting, gravity, speed_std, effects)
     solution, errors = solve(None)

@@ -126,7 +126,7 @@ class VectorInputs:
         stated = own_errors(self.sensor, matrix, self.turns_rad_s, self.windows_s, self.speeds_rad_s)
         return (*stated, *rounded)
 
-    def own_patterns(self, matrix: Array) -> Array:
+    def sensor_error_patterns(self, matrix: Array) -> Array:
         """Return the effects (P, N, 3) of one standard deviation of each of the sensor's own errors."""
         none = np.zeros((0, *self.means_rad_s.shape))
         return np.concatenate([none, *(own_error.patterns / np.sqrt(3) for own_error in self.own_errors(matrix))])
@@ -224,11 +224,11 @@ def _explain(
         return np.concatenate([arm_errors @ matrix.T, *curved])
 
     def effects(matrix: Array) -> Array:
-        return np.concatenate([arm_and_speed_patterns(matrix), inputs.own_patterns(matrix)])
+        return np.concatenate([arm_and_speed_patterns(matrix), inputs.sensor_error_patterns(matrix)])
 
     solve = solver(inputs, mounting, gravity_m_s2, inputs.speed_std_rad_s, effects)
     steady, errors = solve(None)
-    patterns, of_sensor = arm_and_speed_patterns(steady.matrix), inputs.own_patterns(steady.matrix)
+    patterns, of_sensor = arm_and_speed_patterns(steady.matrix), inputs.sensor_error_patterns(steady.matrix)
     speed_squares = propagate_speed_std(inputs.rates_rad_s, inputs.speed_std_rad_s, steady.matrix) ** 2
     bias = process or bias_process(
         design_matrix(inputs.rates_rad_s, gravity_m_s2),

@@ -35,7 +35,7 @@ def enter(connection: Connection, run_id: int, issued: Issued, now_utc: str) -> 
             journal.note(connection, certificate_file, number, name, sha256)
 
 
-def of_run(connection: Connection, run_id: int) -> tuple[Issued, ...]:
+def select_run(connection: Connection, run_id: int) -> tuple[Issued, ...]:
     """Return the certificates of a run, each with its files, in the order of entry."""
     query = select(certificate).where(certificate.c.run_id == run_id).order_by(certificate.c.id)
     return tuple(

@@ -78,7 +78,7 @@ def read_finished_run(folder: Path, document: "ResultDocument | None" = None) ->
     from rig.config.judging.judging_sections import HistorySection
     from rig.data.recording.provenance import calls_itself_simulated
     from rig.data.result_file import SIZE_MAX_BYTES, read_result
-    from rig.report.certificate.statements import StatedFacts, of_configuration
+    from rig.report.certificate.statements import StatedFacts, configuration_statements
 
     if document is None:
         document = read_result(folder)
@@ -89,7 +89,7 @@ def read_finished_run(folder: Path, document: "ResultDocument | None" = None) ->
     section = HistorySection() if loaded is None else loaded.config.history
     simulated = loaded is not None and loaded.simulated
     provenance = document.provenance
-    certificate = _certificate(folder, document, StatedFacts() if loaded is None else of_configuration(loaded))
+    certificate = _certificate(folder, document, StatedFacts() if loaded is None else configuration_statements(loaded))
     return FinishedRun(
         text=compact(json.loads(text)),
         document=document,

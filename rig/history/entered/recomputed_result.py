@@ -34,11 +34,11 @@ def not_given(claimed: ResultDocument, recomputed: ResultDocument) -> list[str]:
     for record in followed(recomputed):
         key = record.sensor, record.quantity
         if record.quantity in quantities() or key in stated:
-            records.append(_without_later_parameters(record, stated.get(key)))
+            records.append(_drop_later_parameters(record, stated.get(key)))
     return [*rows, *unlike(claimed, records), *numbers]
 
 
-def _without_later_parameters(recomputed: HistoryRecord, claimed: HistoryRecord | None) -> HistoryRecord:
+def _drop_later_parameters(recomputed: HistoryRecord, claimed: HistoryRecord | None) -> HistoryRecord:
     """Return a record without characteristics that the claim lacks, because later versions may add some."""
     if claimed is None:
         return recomputed

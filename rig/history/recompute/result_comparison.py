@@ -74,15 +74,13 @@ class ParameterMove:
     @property
     def shift(self) -> float:
         """The shift of the value in multiples of the stated U; infinite if there is no new value."""
-        return (
-            math.inf if self.now is None else _in_units(abs(self.now.value - self.before.value), self.before.expanded)
-        )
+        return math.inf if self.now is None else _u_ratio(abs(self.now.value - self.before.value), self.before.expanded)
 
     @property
     def growth(self) -> float:
         """The growth of U in multiples of the stated U; positive if the stated U was too small."""
         return (
-            math.inf if self.now is None else _in_units(self.now.expanded - self.before.expanded, self.before.expanded)
+            math.inf if self.now is None else _u_ratio(self.now.expanded - self.before.expanded, self.before.expanded)
         )
 
     @property
@@ -202,12 +200,12 @@ def compared(stated: Iterable[StatedResult], answers: Mapping[str, Answer], of_u
     )
 
 
-def to_solve(stated: Sequence[StatedResult], solved: Mapping[str, Answer]) -> tuple[StatedResult, ...]:
+def pending_recordings(stated: Sequence[StatedResult], solved: Mapping[str, Answer]) -> tuple[StatedResult, ...]:
     """Return the recordings still to be solved: those without an answer, and those that failed."""
     return tuple(result for result in stated if not isinstance(solved.get(result.content_sha256), RecomputedResult))
 
 
-def _in_units(difference: float, expanded: float) -> float:
+def _u_ratio(difference: float, expanded: float) -> float:
     """Return a difference in multiples of U; infinite if U is 0."""
     if expanded > 0:
         return difference / expanded

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rig.config.files.user_folder import own_folder
+from rig.config.files.user_folder import rig_folder
 from rig.config.judging.history_address import history_url
 from rig.errors import Refused
 
@@ -42,7 +42,7 @@ def choose_history_address(
     return resolve_address(variable or section.url)
 
 
-def own_history_address(address: str | None) -> HistoryAddress | None:
+def default_history_address(address: str | None) -> HistoryAddress | None:
     """Return the user's history; None if it is switched off.
 
     It is the command's `address`; without it `RIG_HISTORY`; without both the user's own file. Raise Refused
@@ -55,7 +55,7 @@ def own_history_address(address: str | None) -> HistoryAddress | None:
 def resolve_address(address: str | None) -> HistoryAddress:
     """Return the history at a file's name or a URL; None means the user's own file. Raise Refused `history_address`."""
     if not address:
-        address = str(own_folder() / NAME)
+        address = str(rig_folder() / NAME)
     if "://" not in address:
         try:
             path = Path(address).expanduser().absolute()

@@ -71,9 +71,9 @@ def unlike_made(connection: Connection) -> Iterator[Broken]:
     existing = {row.name: row.sql for row in connection.execute(query)}
     for name, statement in _file_triggers().items():
         if name not in existing:
-            yield _dropped_trigger(name)
+            yield _report_missing_trigger(name)
         elif existing[name].split() != statement.split():
-            yield _changed_trigger(name)
+            yield _report_changed_trigger(name)
 
 
 def _unlike_made_by_server(connection: Connection) -> Iterator[Broken]:
@@ -81,20 +81,20 @@ def _unlike_made_by_server(connection: Connection) -> Iterator[Broken]:
     for trigger in _server_triggers():
         name, row = f"{trigger.name} of {trigger.table}", existing.get((trigger.table.name, trigger.name))
         if row is None:
-            yield _dropped_trigger(name)
+            yield _report_missing_trigger(name)
             continue
         fires, bits, conditional, body = row
         if fires not in _FIRES:
             yield Broken(f"trigger {name}", "changed", "it is disabled, so that rows can be changed or removed")
         elif (bits, conditional, body) != (trigger.bits, bool(trigger.condition), _BODY):
-            yield _changed_trigger(name)
+            yield _report_changed_trigger(name)
 
 
-def _dropped_trigger(name: str) -> Broken:
+def _report_missing_trigger(name: str) -> Broken:
     return Broken(f"trigger {name}", "missing", "it was dropped, so that rows can be changed or removed")
 
 
-def _changed_trigger(name: str) -> Broken:
+def _report_changed_trigger(name: str) -> Broken:
     return Broken(f"trigger {name}", "changed", "it is not the one with which the history was made")
 
 

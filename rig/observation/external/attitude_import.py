@@ -127,7 +127,7 @@ def _drop_other_rows(path: Path, table: CsvTable) -> dict[str, Array]:
     return {name: column[kept] for name, column in table.columns.items()}
 
 
-def placed_by(samples: Samples, table: Mapping[str, Array], *, find_clock: bool = False) -> PlacedReadings:
+def average_placements(samples: Samples, table: Mapping[str, Array], *, find_clock: bool = False) -> PlacedReadings:
     """Average the samples of each attitude in `table`, the columns of a file of attitudes.
 
     With `find_clock` the table has a clock of its own, which is estimated, and its rows without samples are left out.

@@ -17,7 +17,7 @@ from rig.data.recording.motion_file import QUATERNION, TIME
 from rig.errors import Refused
 from rig.errors.extras import missing_extra
 from rig.errors.quoting import listing, quote, shorten
-from rig.observation.formats.table_parts import LEFT_OUT, NOTE, in_blocks
+from rig.observation.formats.table_parts import LEFT_OUT, NOTE, read_blocks
 
 IMU, MAGNETIC = "sensor_msgs/msg/Imu", "sensor_msgs/msg/MagneticField"
 POSES = (
@@ -61,11 +61,11 @@ def bag_readings(path: Path, inside: str | None) -> Iterator[Part]:
         chosen = _select_topic(reader, (IMU,) if inside is None else (IMU, MAGNETIC), inside, "readings")
         if chosen[0].msgtype == MAGNETIC:
             fields = ((time_s, *_xyz(message.magnetic_field)) for time_s, message in _read_messages(reader, chosen))
-            yield from in_blocks(fields, [TIME, *FIELD.columns])
+            yield from read_blocks(fields, [TIME, *FIELD.columns])
             return
         columns: list[str | None] = [TIME, *RATE.columns, *ACCELERATION.columns]
         counts: dict[str, Any] = {LEFT_OUT: 0}
-        yield from in_blocks(_inertial(_read_messages(reader, chosen), columns, counts), columns, counts)
+        yield from read_blocks(_inertial(_read_messages(reader, chosen), columns, counts), columns, counts)
 
 
 def bag_attitudes(path: Path, inside: str | None) -> Iterator[Part]:
@@ -73,7 +73,7 @@ def bag_attitudes(path: Path, inside: str | None) -> Iterator[Part]:
     with _open_bag(path) as reader:
         poses = _read_messages(reader, _select_topic(reader, POSES, inside, "attitudes"))
         orientations = ((time_s, _orientation(message)) for time_s, message in poses)
-        yield from in_blocks(((time_s, q.w, q.x, q.y, q.z) for time_s, q in orientations), [TIME, *QUATERNION])
+        yield from read_blocks(((time_s, q.w, q.x, q.y, q.z) for time_s, q in orientations), [TIME, *QUATERNION])
 
 
 def _inertial(

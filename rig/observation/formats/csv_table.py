@@ -30,7 +30,7 @@ from rig.observation.formats.csv_cells import (
 )
 from rig.observation.formats.csv_text import is_harmless, read_rows
 from rig.observation.formats.mat_table import is_mat, read_mat_rows
-from rig.observation.formats.table_parts import columns_of, in_blocks, parts_read_apart
+from rig.observation.formats.table_parts import columns_of, parts_read_apart, read_blocks
 
 BLANK = float("nan")
 LINE = "line"  # an additional column: the number of each row's line
@@ -162,7 +162,7 @@ def _parts(path: Path, header: Header, largest_mb: int, mapped: Mapped | None, o
             has_rows, repeated = True, False
             yield line, *numbers
 
-    yield from in_blocks(number_rows(), [LINE, *selected.values()])
+    yield from read_blocks(number_rows(), [LINE, *selected.values()])
     yield {"origin_s": origin_s or 0, "by_day": by_day}
 
 

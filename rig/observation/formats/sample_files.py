@@ -30,7 +30,7 @@ class Format:
 
     `readings` and `attitudes` are readers ("module:function", as in `rig.data.processes.reading_process`), None if a
     file cannot hold them. They take the path that `reads` returns for the user's, and the part `inside`, and yield
-    columns `in_blocks` (`rig.observation.formats.table_parts`), with the names of a CSV file; attitudes are times and
+    columns `read_blocks` (`rig.observation.formats.table_parts`), with the names of a CSV file; attitudes are times and
     quaternions. `remedy` is for a file that cannot be read.
     """
 

@@ -20,7 +20,7 @@ LEFT_OUT = "left_out"  # number of rows of the file that contain none of the col
 NOTE = "note"  # what the readings lack, in words
 
 
-def in_blocks(
+def read_blocks(
     rows: Iterable[Sequence[float]], columns: Sequence[str | None], counts: Mapping[str, Any] | None = None
 ) -> Iterator[Part]:
     """Yield the rows in blocks (n, columns), then the names of the columns. A row has a number for each column.

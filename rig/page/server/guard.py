@@ -98,7 +98,7 @@ class Guard:
         if scope["type"] != "http":
             return
 
-        async def with_headers(message: "Message") -> None:
+        async def send_with_headers(message: "Message") -> None:
             if message["type"] == "http.response.start":
                 present = {name for name, _ in message.get("headers", ())}
                 more = [(name, value) for name, value in self._headers if name not in present]
@@ -112,4 +112,4 @@ class Guard:
         app = self._app if refusal is None else PlainTextResponse(f"{refusal[1]}\n", refusal[0])
         has_token = refusal is None and self._door.may_act(Headers(scope=scope))
         with self._connections.answering(client_of(scope.get("client")), has_token=has_token):
-            await app(scope, receive, with_headers)
+            await app(scope, receive, send_with_headers)

@@ -19,7 +19,7 @@ def gyroscope_lines(finding: Finding[GyroscopeEntry], sensitivities: Mapping[str
     prefix, sensitivity = prefix_of(finding.sensor), sensitivities.get(finding.sensor)
     yield from _correction(prefix, finding.entry)
     if sensitivity is not None:
-        yield from _without_gravity(prefix, sensitivity)
+        yield from _gravity_correction(prefix, sensitivity)
 
 
 def accelerometer_lines(finding: Finding[AccelerometerEntry], _: Mapping[str, Array]) -> Iterator[str]:
@@ -72,7 +72,7 @@ def _correction(prefix: str, sensor: GyroscopeEntry) -> Iterator[str]:
     )
 
 
-def _without_gravity(prefix: str, sensitivity: Array) -> Iterator[str]:
+def _gravity_correction(prefix: str, sensitivity: Array) -> Iterator[str]:
     yield from (
         "",
         "/* The same, corrected for g-sensitivity: gravity_m_s2 points down, in the frame of the corrected",

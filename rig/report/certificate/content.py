@@ -25,7 +25,7 @@ from rig.data.result_file import (
 from rig.errors import Refused
 from rig.motion.steps import closes, turn_words
 from rig.report.certificate.statements import StatedFacts
-from rig.report.entries.omission_entries import omitted_lines
+from rig.report.entries.omission_entries import omission_lines
 from rig.report.findings.characteristic import Term, terms
 from rig.report.findings.finding import Finding
 from rig.report.findings.result_kind import NoOutlet, Standard
@@ -376,7 +376,7 @@ def _deviations(result: ResultDocument) -> Iterator[str]:
             yield f"{FIELD.label(name)} was recorded and not calibrated: {magnetometer.error}"
     for name, faults in result.unsolved.items():
         yield from (f"{name}, {what}, was recorded and not calibrated: {fault.error}" for what, fault in faults.items())
-    yield from (f"{line[:1].upper()}{line[1:]}." for line in omitted_lines(result))
+    yield from (f"{line[:1].upper()}{line[1:]}." for line in omission_lines(result))
     if not provenance.model_dump().get("script_installed", True):
         yield f"The movement was that of a script of the laboratory's own, {provenance.model_dump().get('script')}."
 

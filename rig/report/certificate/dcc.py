@@ -53,7 +53,7 @@ def digital_certificate(certificate: Certificate) -> bytes:
             "the laboratory's country is not stated",
             "State site.country, for example with --set site.country=DE",
         )
-    items = list(_certified_items(certificate))
+    items = list(_iterate_items(certificate))
     root = dcc(
         "digitalCalibrationCertificate",
         _administrative(certificate, items),
@@ -108,7 +108,7 @@ def _contact(name: str, who: str | None, address: str | None) -> Element:
     return dcc(name, text("name", who), dcc("location", text("further", address)))
 
 
-def _certified_items(c: Certificate) -> Iterator[CertifiedItem]:
+def _iterate_items(c: Certificate) -> Iterator[CertifiedItem]:
     """Yield all measured items, kind by kind, with their further characteristics."""
     for kind, measure, finding in outlets(c.result, lambda kind: kind.measured):
         if (item := measure(finding, c.reversals)) is not None:

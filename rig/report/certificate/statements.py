@@ -33,7 +33,7 @@ class StatedFacts:
         return self.site or SiteSection()
 
 
-def stated_in(folder: Path, overrides: Sequence[str] = ()) -> StatedFacts:
+def folder_statements(folder: Path, overrides: Sequence[str] = ()) -> StatedFacts:
     """Return the statements in the configuration of a run folder, with `overrides` applied.
 
     If the folder has no configuration, the overrides alone count. Raise Refused `unknown_setting` for an override of a
@@ -49,13 +49,13 @@ def stated_in(folder: Path, overrides: Sequence[str] = ()) -> StatedFacts:
             )
     path = folder / CONFIG
     if path.exists():
-        return of_configuration(load(path, overrides, sections=None))
+        return configuration_statements(load(path, overrides, sections=None))
     if not overrides:
         return StatedFacts()
     stated = load_statement(overrides)
     return StatedFacts(stated.site, stated.certificate)
 
 
-def of_configuration(loaded: Loaded) -> StatedFacts:
+def configuration_statements(loaded: Loaded) -> StatedFacts:
     """Return the statements of a configuration on site and certificate."""
     return StatedFacts(loaded.config.site, loaded.config.certificate, loaded.simulated)

@@ -17,7 +17,7 @@ ALWAYS = (
 OF_THE_FILE = ("the scale of the file's angles and of its time",)
 
 
-def in_budget(budget: BudgetEntry | None, name: str) -> bool:
+def has_contributor(budget: BudgetEntry | None, name: str) -> bool:
     """Return whether the budget has a contributor whose name contains `name`."""
     return budget is not None and any(name in line.name for line in budget.contributors)
 
@@ -31,7 +31,7 @@ def list_omitted_rates(sensor: GyroscopeEntry, *, external: bool = False) -> str
 def list_omitted_accelerations(entry: AccelerometerEntry) -> str:
     """Return the effects that an accelerometer's U does not include."""
     bent = "nonlinearity" if entry.second_order_s2_m is None else "nonlinearity beyond the second order"
-    bent = "nonlinearity beyond 1 g" if in_budget(entry.budget, "nonlinearity") else bent
+    bent = "nonlinearity beyond 1 g" if has_contributor(entry.budget, "nonlinearity") else bent
     return ", ".join((bent, *ALWAYS))
 
 

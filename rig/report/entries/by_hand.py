@@ -29,7 +29,7 @@ PUBLIC_NAMES = {
 UNITS = {"face_repeatability_rad": 1e3, "closure_error_rad": 1e3, "angle_fraction": 1e2}
 
 
-def by_hand_entry(solution: "HandSolution") -> ByHandEntry:
+def hand_entry(solution: "HandSolution") -> ByHandEntry:
     """Return the entry of a solution by hand."""
     return ByHandEntry(
         rests=tuple(entry(RestByHandEntry, rest) for rest in solution.rests),
@@ -44,7 +44,7 @@ def by_hand_entry(solution: "HandSolution") -> ByHandEntry:
     )
 
 
-def by_hand_lines(entry: ByHandEntry) -> Iterator[str]:
+def hand_lines(entry: ByHandEntry) -> Iterator[str]:
     """Yield faces, moves and error estimates in words."""
     flips, turns = (sum(move.kind == kind for move in entry.moves) for kind in ("flip", "turn"))
     faces = " ".join(rest.face or "(none)" for rest in entry.rests)

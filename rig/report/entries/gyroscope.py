@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rig.analysis.effective_dof import of_angles, of_sensitivity
+from rig.analysis.effective_dof import angle_dof, g_sensitivity_dof
 from rig.analysis.gyroscope.calibration import ALGORITHM_1, EARTH_RATE, NEWTON, VECTOR, SensorResult
 from rig.data.entries.result_types import ErrorEntry, Role
 from rig.data.quantity import RATE
@@ -26,7 +26,7 @@ from rig.estimation.gyroscope.six_observation import MODEL, PARAMETERS
 from rig.estimation.residuals import residual_std_rad_s
 from rig.observation.average import Average
 from rig.report.entries.budget import bias_process_entry, budget_entry
-from rig.report.entries.by_hand import by_hand_entry
+from rig.report.entries.by_hand import hand_entry
 from rig.report.entries.earth_rate import earth_rate_entry
 from rig.report.entries.error import error_entry
 from rig.report.entry import counted, entry
@@ -61,7 +61,7 @@ def sensor_entry(
         vector_model=_vector_or_error(result),
         six_observation=_estimate_or_error(result.six_observation, result.faults.get(NEWTON)),
         algorithm_1=_estimate_or_error(result.algorithm_1, result.faults.get(ALGORITHM_1)),
-        by_hand=None if result.by_hand is None else by_hand_entry(result.by_hand),
+        by_hand=None if result.by_hand is None else hand_entry(result.by_hand),
         **({} if board is None else {"board": _board(board)}),
         **_uncertainty_fields(result),
         **more,
@@ -109,12 +109,12 @@ def _vector_or_error(result: SensorResult) -> VectorEntry | ErrorEntry:
     more: dict[str, Any] = {}
     if result.explained is not None:
         more["residuals_std_rad_s"] = residual_std_rad_s(result.explained)
-        if (angles_dof := counted(of_angles(result))) is not None:
+        if (angles_dof := counted(angle_dof(result))) is not None:
             more |= {
                 "non_orthogonality_degrees_of_freedom": angles_dof[:3],
                 "mounting_degrees_of_freedom": angles_dof[3:],
             }
-        if (sensitivity_dof := counted(of_sensitivity(result))) is not None:
+        if (sensitivity_dof := counted(g_sensitivity_dof(result))) is not None:
             more["g_sensitivity_degrees_of_freedom"] = sensitivity_dof
     return vector_entry(outcome, **more)
 

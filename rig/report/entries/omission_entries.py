@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 LEFT_OUT = "omitted"  # a move by hand that gives no information
 
 
-def omitted_entries(outcome: "Outcome") -> dict[str, tuple[OmittedEntry, ...]]:
+def list_omissions(outcome: "Outcome") -> dict[str, tuple[OmittedEntry, ...]]:
     """Return the omitted parts of the recording, by sensor; a sensor without omissions has no entry."""
     by_sensor = {
         name: [entry(OmittedEntry, part, quantity=quantity and quantity.name) for quantity, part in sensor.omitted]
@@ -41,7 +41,7 @@ def notes(outcome: "Outcome") -> dict[str, tuple[str, ...]]:
     return {name: sensor.notes for name, sensor in outcome.external.items() if sensor.notes}
 
 
-def omitted_lines(result: ResultDocument, sensor: str | None = None) -> Iterator[str]:
+def omission_lines(result: ResultDocument, sensor: str | None = None) -> Iterator[str]:
     """Yield a line for each omission and each note, of all sensors or of one."""
     for name, parts in result.omitted.items():
         if sensor in (None, name):

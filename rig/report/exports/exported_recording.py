@@ -156,7 +156,7 @@ class ReadingsAlone:
             )
 
 
-def exported(runs: Sequence[RunData]) -> tuple[Exported, ...]:
+def export_recordings(runs: Sequence[RunData]) -> tuple[Exported, ...]:
     """Return the recordings of one run for export.
 
     Raise Fault as `observe_runs` does; Refused `nothing_to_export` without a finished sweep or dwell, or without

@@ -35,8 +35,8 @@ def _entries(outcome: Outcome) -> dict[str, AccelerometerEntry]:
 
 
 def _entry(outcome: Outcome, name: str, result: "AccelerometerResult") -> AccelerometerEntry:
-    from rig.analysis.effective_dof import of_acceleration_angles, of_second_order
-    from rig.analysis.measurement_conditions import of_accelerometer
+    from rig.analysis.effective_dof import acceleration_angle_dof, second_order_dof
+    from rig.analysis.measurement_conditions import accelerometer_conditions
     from rig.estimation.reference.accelerometer_model import DELAY, SECOND
     from rig.estimation.reference.imu import MODEL
     from rig.estimation.residuals import dwell_residual_std_m_s2
@@ -55,10 +55,12 @@ def _entry(outcome: Outcome, name: str, result: "AccelerometerResult") -> Accele
         second_order_std_s2_m=None if solution.second_order_s2_m is None else std[SECOND],
         delay_std_s=None if solution.delay_s is None else float(std[DELAY]),
         alignment=None if result.alignment is None else _alignment(result.alignment),
-        non_orthogonality_degrees_of_freedom=counted(of_acceleration_angles(result)),
-        second_order_degrees_of_freedom=counted(of_second_order(result)),
+        non_orthogonality_degrees_of_freedom=counted(acceleration_angle_dof(result)),
+        second_order_degrees_of_freedom=counted(second_order_dof(result)),
         validation=None if result.held_out is None else _validation(result.held_out),
-        conditions=when_entry(of_accelerometer(outcome.recordings, name, [dwell.index for dwell in result.dwells])),
+        conditions=when_entry(
+            accelerometer_conditions(outcome.recordings, name, [dwell.index for dwell in result.dwells])
+        ),
         **detection_limit_field(outcome.reference_detection_limits.get(name, ())),
     )  # fmt: skip
 

@@ -15,14 +15,14 @@ from rig.data.result_file import BoardEntry, EstimateEntry, GyroscopeEntry, Resu
 from rig.estimation.arrays import divide_or_infinity
 from rig.estimation.gyroscope.six_observation import PARAMETERS
 from rig.report.c_code.c_functions import gyroscope_lines
-from rig.report.entries.by_hand import by_hand_lines
+from rig.report.entries.by_hand import hand_lines
 from rig.report.entries.earth_rate import earth_rate_lines
 from rig.report.findings.characteristics import GYROSCOPES, NON_ORTHOGONALITY
 from rig.report.findings.finding import Finding
 from rig.report.findings.linear_corrections import Corrected, noise_of
 from rig.report.findings.result_kind import CertifiedItem, DisplayRow, NoOutlet, ResultKind
 from rig.report.findings.unexplained import find_sweep_residuals
-from rig.report.kinds.triad import followed_of, item_words, shown_of, tables, unsolved_lines
+from rig.report.kinds.triad import history_record, item_words, shown_of, tables, unsolved_lines
 from rig.report.tables import dcc_results
 from rig.report.tables.axis_tables import decimals, line_of, matrix_lines, triple
 from rig.report.words.detection_limit_words import detection_limit_field, detection_limit_lines
@@ -31,7 +31,7 @@ from rig.report.words.validity_words import load_words, speed_words, warmth, whe
 
 def _entries(outcome: Outcome) -> dict[str, GyroscopeEntry]:
     """Return the entries of all gyroscopes. Every result has their key, even without sweeps."""
-    from rig.analysis.measurement_conditions import of_gyroscope
+    from rig.analysis.measurement_conditions import gyroscope_conditions
     from rig.report.entries.conditions_entry import when_entry
     from rig.report.entries.gyroscope import sensor_entry
 
@@ -48,7 +48,7 @@ def _entries(outcome: Outcome) -> dict[str, GyroscopeEntry]:
         if outcome.settings.by_hand is not None:
             entries[name] = sensor_entry(result, role)
             continue
-        conditions, board = of_gyroscope(outcome.recordings, name), outcome.onboard.get(name)
+        conditions, board = gyroscope_conditions(outcome.recordings, name), outcome.onboard.get(name)
         entries[name] = sensor_entry(
             result,
             role,
@@ -131,7 +131,7 @@ def _lines(finding: Finding[GyroscopeEntry]) -> Iterator[str]:
     yield from _attitude_lines(sensor.in_attitudes, sensor.time_bases)
     yield from _angle_lines(sensor)
     if sensor.by_hand is not None:
-        yield from by_hand_lines(sensor.by_hand)
+        yield from hand_lines(sensor.by_hand)
     yield from earth_rate_lines(sensor.earth_rate)
     vector = sensor.vector_model
     std = [sensor.covariance[i][i] ** 0.5 for i in range(6)]
@@ -257,7 +257,7 @@ GYROSCOPE = ResultKind(
     find=_find,
     printed=_render,
     shown=_build_row,
-    followed=followed_of,
+    followed=history_record,
     header=gyroscope_lines,
     unsolved=lambda document: unsolved_lines(document, RATE),
     figures=NoOutlet("its residuals are on the certificate and in the notebook"),

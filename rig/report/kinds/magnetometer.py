@@ -41,8 +41,8 @@ def _entries(outcome: Outcome) -> dict[str, MagnetometerEntry | ErrorEntry]:
 
 
 def _entry(outcome: Outcome, name: str, result: "MagnetometerResult") -> MagnetometerEntry:
-    from rig.analysis.effective_dof import of_field_angles
-    from rig.analysis.measurement_conditions import of_magnetometer
+    from rig.analysis.effective_dof import field_angle_dof
+    from rig.analysis.measurement_conditions import magnetometer_conditions
     from rig.estimation.reference.magnetometer import MODEL, hard_iron
     from rig.report.entries.conditions_entry import when_entry
     from rig.report.entries.triad import OF_MAGNETOMETERS, attitudes_entry
@@ -56,8 +56,10 @@ def _entry(outcome: Outcome, name: str, result: "MagnetometerResult") -> Magneto
         drift=None if result.drift is None else entry(FieldDriftEntry, result.drift),
         hard_iron_t=hard_iron(result.solution),
         field_base_t=result.solution.reference,
-        non_orthogonality_degrees_of_freedom=counted(of_field_angles(result)),
-        conditions=when_entry(of_magnetometer(outcome.recordings, name, [dwell.index for dwell in result.dwells])),
+        non_orthogonality_degrees_of_freedom=counted(field_angle_dof(result)),
+        conditions=when_entry(
+            magnetometer_conditions(outcome.recordings, name, [dwell.index for dwell in result.dwells])
+        ),
         **detection_limit_field(outcome.reference_detection_limits.get(name, ())),
     )  # fmt: skip
 

@@ -61,7 +61,7 @@ def shown_of(finding: Finding[Any]) -> DisplayRow:
     return DisplayRow(finding.sensor, quantity, name, unit, bias, combined, scale, labels=quantity.axes)
 
 
-def followed_of(finding: Finding[Any], document: ResultDocument) -> HistoryRecord:
+def history_record(finding: Finding[Any], document: ResultDocument) -> HistoryRecord:
     """Return a history's record of scale and bias."""
     quantity, entry = finding.quantity, finding.entry
     parameters = [*scale_and_bias(finding.sensor, quantity, entry, bias_of(quantity, entry), document)]
@@ -189,7 +189,7 @@ def triad_kind(
         unsolved=explain_unsolved,
         printed=render,
         shown=shown_of,
-        followed=followed_of,
+        followed=history_record,
         header=header,
         figures="rig.report.figures.attitudes:write_attitude_figures",
         block=block,

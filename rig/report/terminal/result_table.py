@@ -10,12 +10,12 @@ from rich.table import Table
 
 from rig.data.result_file import CheckEntry, ResultDocument
 from rig.data.run_folder import CERTIFICATE
-from rig.report.entries.omission_entries import omitted_lines
+from rig.report.entries.omission_entries import omission_lines
 from rig.report.findings.characteristic import Term, terms
 from rig.report.findings.result_kind import outlet_items
 from rig.report.kinds.kind_registry import kinds
 from rig.report.terminal.run_summary import ending
-from rig.report.terminal.whole_words import with_whole_words
+from rig.report.terminal.whole_words import fit_words
 from rig.report.words.expanded_uncertainty import factor_words
 from rig.report.words.mounting_words import mount_lines
 from rig.report.words.printed_values import plus_minus
@@ -83,12 +83,12 @@ def print_values(result: ResultDocument, console: Console, sensor: str | None = 
                 *map(_term_line, terms(kind.characteristics, finding, "terminal")),
             ):
                 if isinstance(item, Table):
-                    console.print(with_whole_words(item, console.width))
+                    console.print(fit_words(item, console.width))
                 else:
                     console.print(plain(item))
         for line in kind.unsolved(result):
             console.print(plain(line))
-    for line in (*mount_lines(result), *omitted_lines(result, sensor)):
+    for line in (*mount_lines(result), *omission_lines(result, sensor)):
         console.print(plain(line))
 
 
@@ -106,7 +106,7 @@ def print_checks(result: ResultDocument, console: Console, sensor: str | None = 
         by_sensor.setdefault(check.means.sensor, []).append(check)
     for name, checks in by_sensor.items():
         if sensor in (None, name):
-            console.print(with_whole_words(_checks(name, checks), console.width))
+            console.print(fit_words(_checks(name, checks), console.width))
 
 
 def print_verdict(result: ResultDocument, console: Console) -> None:

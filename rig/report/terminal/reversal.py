@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from rich.console import Console
 
-from rig.analysis.effective_dof import of_reversal
+from rig.analysis.effective_dof import reversal_dof
 from rig.analysis.reversal import AsMounted, MagnetometerReversal
 from rig.data.entries.magnetometer import AsMountedEntry, ReversalDocument, ReversalEntry
 from rig.data.quantity import FIELD
@@ -54,7 +54,7 @@ def _lines(reversal: ReversalEntry) -> Iterator[str]:
 
 def _entry(reversal: MagnetometerReversal) -> ReversalEntry:
     std = np.sqrt(np.diag(reversal.separation.covariance))
-    scale, both = of_reversal(reversal)
+    scale, both = reversal_dof(reversal)
     return entry(
         ReversalEntry, reversal.separation, reversal, reversal.runs[0].result.sensor,
         bias_std_t=std[:3],

@@ -7,12 +7,12 @@ from typing import Any
 
 from rig.data.recording.layout_keys import NOT_STATED
 from rig.data.result_file import CheckEntry, ResultDocument
-from rig.report.entries.omission_entries import omitted_lines
+from rig.report.entries.omission_entries import omission_lines
 from rig.report.findings.result_kind import AxisValues, DisplayRow
 from rig.report.kinds.kind_registry import kinds, outlets
 from rig.report.words.check_words import what_failed, words_of
 from rig.report.words.mounting_words import farthest_off
-from rig.report.words.printed_values import in_print, plus_minus
+from rig.report.words.printed_values import format_with_u, plus_minus
 from rig.station.plain_text import INDENT, wrapped
 
 NEAR = 0.9  # ratio to its limit, above which a passed check is named
@@ -49,7 +49,7 @@ def ending(
     items = [*_items(result)]
     summary = "; ".join([*_describe_values(items), _count_passed(result)])
     unsolved = (line for kind in kinds() for line in kind.unsolved(result))
-    needed = [*unsolved, *omitted_lines(result)], [*since]
+    needed = [*unsolved, *omission_lines(result)], [*since]
     in_short = [line for kind in kinds() for finding in kind.find(result) for line in kind.in_short(finding)]
     files = [] if certificate is None else [f"certificate: {certificate}"]
     files.append(f"all details: {everything}")
@@ -155,7 +155,7 @@ def _plus_minus(three: AxisValues) -> list[str]:
 
 def _format_axes(three: AxisValues) -> list[str]:
     """Format the values of three axes, then the largest U."""
-    cells = [in_print(value, max(three.expanded)) for value in three.values]
+    cells = [format_with_u(value, max(three.expanded)) for value in three.values]
     return [*(value for value, _ in cells), cells[0][1]]
 
 

@@ -44,7 +44,7 @@ ASSUMED = (
 )
 
 
-def changed_keys(before: ProcedureSection, after: ProcedureSection) -> dict[str, Any]:
+def list_key_changes(before: ProcedureSection, after: ProcedureSection) -> dict[str, Any]:
     """Return the changed keys of the procedure with their new values; standard sets of attitudes by name."""
     old, new = _values(before), _values(after)
     return {key: value for key, value in new.items() if old.get(key) != value}
@@ -99,7 +99,7 @@ def _plan_entry(planned: Planned, section: ProcedureSection) -> dict[str, Any]:
     return {
         "duration_s": planned.candidate.duration_s,
         **_sizes_entry(planned.reached),
-        "changed": changed_keys(section, planned.candidate.procedure),
+        "changed": list_key_changes(section, planned.candidate.procedure),
         "limits": {
             name: [{"contributor": line, "scale_share": scale, "bias_share": bias} for line, scale, bias in lines]
             for name, lines in _main_contributors(planned.budgets).items()
@@ -137,7 +137,7 @@ def _tabulate_plans(shortest: Shortest, shown: Planned, section: ProcedureSectio
         table.add_column(heading, justify="right" if heading else "left")
     before = shortest.before
     old = _values(section)
-    for key, value in changed_keys(section, shown.candidate.procedure).items():
+    for key, value in list_key_changes(section, shown.candidate.procedure).items():
         table.add_row(f"procedure.{key}", plain(_shown(old.get(key))), plain(_shown(value)))
     for size, (unit, what) in SHOWN.items():
         if getattr(shown.reached, size) > 0:

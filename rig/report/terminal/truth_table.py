@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from rich.table import Table
 
 from rig.report.simulated_truth import TrueValues, TruthRow
-from rig.report.words.printed_values import format_signed, in_print
+from rig.report.words.printed_values import format_signed, format_with_u
 from rig.station.plain_text import plain
 
 
@@ -30,6 +30,6 @@ def truth_tables(rows: Sequence[TruthRow], sensor: str | None = None) -> Iterato
 def _cells(values: TrueValues) -> Iterator[list[str]]:
     """Yield three columns: the results, their true values to the same decimals, and the deviations."""
     numbers = values.result
-    yield [in_print(value, u)[0] for value, u in zip(numbers.values, numbers.expanded, strict=True)]
+    yield [format_with_u(value, u)[0] for value, u in zip(numbers.values, numbers.expanded, strict=True)]
     yield values.truth_texts
     yield [format_signed(deviation, 2) for deviation in values.deviations]

@@ -9,7 +9,7 @@ FRAMED, BARE = 3, 2
 STROKE = 1
 
 
-def with_whole_words(table: Table, width: int) -> Table:
+def fit_words(table: Table, width: int) -> Table:
     """Return the table with columns that fit `width` cells of a terminal; no column is narrower than its words."""
     texts = [[str(column.header), *map(str, column.cells), str(column.footer)] for column in table.columns]
     lines = [max(cell_len(line) for text in column for line in text.split("\n")) for column in texts]

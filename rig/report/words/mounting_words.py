@@ -15,12 +15,12 @@ ROUNDING = 1e-6  # ratio to its uncertainty, below which a rotation is the assum
 
 def mount_lines(result: ResultDocument) -> Iterator[str]:
     """Yield a line for each stage after the first, relative to the first; nothing if the mounting never changed."""
-    yield from map(_line, _measured_mounts(result))
+    yield from map(_line, _significant_mounts(result))
 
 
 def farthest_off(result: ResultDocument) -> Iterator[str]:
     """Yield the line of the stage with the largest mounting error, then one with the number of the other stages."""
-    mounts = _measured_mounts(result)
+    mounts = _significant_mounts(result)
     if not mounts:
         return
     others = len(mounts) - 1
@@ -28,7 +28,7 @@ def farthest_off(result: ResultDocument) -> Iterator[str]:
     yield farthest if not others else f"{farthest}; less in {others} other stage{'s' if others > 1 else ''}"
 
 
-def _measured_mounts(result: ResultDocument) -> list[MountEntry]:
+def _significant_mounts(result: ResultDocument) -> list[MountEntry]:
     return [mount for mount in result.mounts if hypot(*mount.rotation_rad) > ROUNDING * hypot(*mount.std_rad)]
 
 

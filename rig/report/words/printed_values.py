@@ -46,7 +46,7 @@ def format_signed(value: float, decimals: int) -> str:
     return f"{value:+.{decimals}f}".replace("-", "−")
 
 
-def in_print(value: float, uncertainty: float) -> tuple[str, str]:
+def format_with_u(value: float, uncertainty: float) -> tuple[str, str]:
     """Return the texts of a value and its U; without a positive U, six digits and a dash."""
     try:
         printed = rounded(float(value), float(uncertainty))
@@ -57,7 +57,7 @@ def in_print(value: float, uncertainty: float) -> tuple[str, str]:
 
 def plus_minus(value: float, uncertainty: float) -> str:
     """Return a printed value ± U; the value alone without U."""
-    text, width = in_print(value, uncertainty)
+    text, width = format_with_u(value, uncertainty)
     return text if width == NO_U else f"{text} ± {width}"
 
 

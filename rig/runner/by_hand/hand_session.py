@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from rig.data.recording.hand_events import (
     HandAsked,
     HandBegunAnew,
-    HandMoveRefused,
     HandMoveAccepted,
+    HandMoveRefused,
     HandRested,
     HandRestRefused,
     OfTheHand,

@@ -20,7 +20,7 @@ from rig.board.crystal import follows_crystal
 from rig.board.identify import changing, refusing
 from rig.config.models import RigConfig
 from rig.data.quantity import ACCELERATION, RATE
-from rig.data.recording.hand_events import HandAsked, HandMoveRefused, HandMoveAccepted, HandRested, OfTheHand
+from rig.data.recording.hand_events import HandAsked, HandMoveAccepted, HandMoveRefused, HandRested, OfTheHand
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.errors import Fault, Refused
 from rig.motion.by_hand import Face, HandMove

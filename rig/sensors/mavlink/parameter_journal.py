@@ -13,7 +13,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from rig.config.files.user_folder import own_folder
+from rig.config.files.user_folder import rig_folder
 from rig.errors import Refused
 from rig.sensors.mavlink.parameter_encoding import REAL32, WHOLE, AutopilotParameter
 
@@ -106,8 +106,8 @@ def read_change(path: Path) -> ParameterChange:
 
 
 def folder() -> Path:
-    """Return the folder of the journals. Raise as `own_folder` does."""
-    return own_folder() / "autopilots"
+    """Return the folder of the journals. Raise as `rig_folder` does."""
+    return rig_folder() / "autopilots"
 
 
 def _journal_path(autopilot_id: str) -> Path:

@@ -91,7 +91,7 @@ class SimulatedImu:
             np.array([self._parameters[name] for name in names]) for names in self._names
         )
         self.temperature_c = self._gyroscope.temperature_c(at_s)
-        rotation = simulated_rotation(self._parameters["SENS_BOARD_ROT" if self._px4 else "AHRS_ORIENTATION"])
+        rotation = orientation_rotation(self._parameters["SENS_BOARD_ROT" if self._px4 else "AHRS_ORIENTATION"])
         rate = rotation @ (np.array(self._gyroscope.read(at_s)) - offset)
         force = rotation @ ((np.array(self._accelerometer.read(at_s)) - force_offset) * force_scale)
         if self._px4:
@@ -106,7 +106,7 @@ class SimulatedImu:
         self.time_us = time_us
 
 
-def simulated_rotation(number: float) -> Vector:
+def orientation_rotation(number: float) -> Vector:
     """Return the rotation (3, 3) of the board orientation `number`.
 
     Raise ValueError if this orientation is not simulated.

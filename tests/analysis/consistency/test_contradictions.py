@@ -7,7 +7,7 @@ import pytest
 
 from rig.analysis.analyses import calibrate
 from rig.analysis.check import Check
-from rig.analysis.consistency.contradictions import contradictions, disturbed_sweeps
+from rig.analysis.consistency.contradictions import contradicting_sweeps, contradictions
 from rig.analysis.consistency.converter_tests import judge_readings
 from rig.analysis.consistency.false_alarms import FALSE_ALARMS
 from rig.analysis.environment import surroundings_of
@@ -208,13 +208,13 @@ def test_a_disturbed_sweep_is_named_and_fails_the_verdict() -> None:
     assert not outcome.passed
     named = [check.name for check in outcome.checks if check.means.sweep is not None]
     assert named == ["gyro.disturbed_sweep.2", "gyro.disturbed_sweep.3"]
-    assert disturbed_sweeps([run]) == {2, 3}
+    assert contradicting_sweeps([run]) == {2, 3}
 
 
 @pytest.mark.slow
 def test_of_several_sweeps_alike_the_disturbed_one_is_named_alone() -> None:
     setup = Setup(noise_rad_s=0.005, repeats=2, rest_s=1.0, speed_deg_s=120.0)
-    assert disturbed_sweeps([offset(0.02, sweep_2)(readings_of(setup)).recording()]) == {2}
+    assert contradicting_sweeps([offset(0.02, sweep_2)(readings_of(setup)).recording()]) == {2}
 
 
 @pytest.mark.thorough

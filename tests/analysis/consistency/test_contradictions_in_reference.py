@@ -5,7 +5,7 @@ import pytest
 import yaml
 
 from rig.analysis.analyses import calibrate
-from rig.analysis.consistency.contradictions import disturbed_sweeps
+from rig.analysis.consistency.contradictions import contradicting_sweeps
 from rig.analysis.gyroscope.calibration import observe_recordings
 from rig.analysis.reference.accelerometer import calibrate_accelerometers
 from rig.errors import Fault
@@ -163,12 +163,12 @@ def test_a_sweep_that_only_the_accelerometer_feels_to_be_disturbed_is_repeated_a
     run = offset(0.02, sweep_4)(readings_of(IMU, "gyro")).recording()
     failed = {check.name: check.means.sweep for check in calibrate([run]).checks if not check.passed}
     assert failed == {"gyro.acceleration_disturbed_sweep.4": 4, "gyro.acceleration_residuals": None}
-    assert disturbed_sweeps([run]) == {4}
+    assert contradicting_sweeps([run]) == {4}
 
 
 @pytest.mark.thorough  # that it is named as a dwell, test_the_disturbed_dwell_is_named_and_fails_the_verdict
 def test_a_disturbed_dwell_is_no_sweep_that_is_repeated() -> None:
-    assert disturbed_sweeps([offset(0.02, dwell_3)(readings_of(IMU, "gyro")).recording()]) == frozenset()
+    assert contradicting_sweeps([offset(0.02, dwell_3)(readings_of(IMU, "gyro")).recording()]) == frozenset()
 
 
 def test_a_bias_that_drifts_contradicts_nothing_where_it_is_watched() -> None:

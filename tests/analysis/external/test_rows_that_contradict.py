@@ -13,7 +13,7 @@ from rig.analysis.external.increment_calibration import InIncrements
 from rig.data.quantity import ACCELERATION, RATE, Quantity
 from rig.data.recording.settings import Elsewhere, Site
 from rig.errors import Fault, Refused
-from rig.observation.external.attitude_import import placed_by, read_attitudes
+from rig.observation.external.attitude_import import average_placements, read_attitudes
 from rig.observation.external.csv_import import ExternalData, average, average_sweeps, read_sweeps
 from rig.observation.external.csv_samples import Samples, read_samples
 from support.external.loggers import MATRIX
@@ -132,7 +132,7 @@ def test_rows_outside_the_recording_are_not_covered_and_lack_no_samples() -> Non
     cut = replace(
         samples, time_s=samples.time_s[kept], readings={each: of[kept] for each, of in samples.readings.items()}
     )
-    placed = placed_by(cut, rows)
+    placed = average_placements(cut, rows)
     assert [str(each) for each in placed.omitted] == [
         f"120 of 600 rows, not covered by the recording; the first row 481, from {ends_s:.10g} s"
     ]
@@ -150,7 +150,7 @@ def test_poses_in_any_order_and_repeated_ones_are_placed_by_their_times(tmp_path
     matrices = []
     for table in (poses, np.vstack([poses[shuffled], poses[100:110]])):
         np.savetxt(path, table, delimiter=",", header=",".join(["time_s", *names]), comments="", fmt="%.17g")
-        placed = placed_by(samples, read_attitudes(path))
+        placed = average_placements(samples, read_attitudes(path))
         result = solve_placed("imu", placed, SITE, ASKED, None, second_order=False).results[RATE]
         assert isinstance(result, InIncrements)
         matrices.append(result.solution.matrix)
@@ -165,8 +165,8 @@ def test_a_clock_that_runs_fast_is_refused_unless_its_offset_is_estimated() -> N
     rows = read_attitudes(EXAMPLES / "swinging_attitudes.csv")
     fast = replace(samples, time_s=1.004 * samples.time_s)
     with pytest.raises(Fault, match=r"clocks_apart: the clock of the attitudes gains -0.4 % on that of the samples"):
-        placed_by(fast, rows)
-    clock = placed_by(fast, rows, find_clock=True).clock
+        average_placements(fast, rows)
+    clock = average_placements(fast, rows, find_clock=True).clock
     assert clock is not None and clock.drift == pytest.approx(-0.004, rel=0.01)
 
 
@@ -182,7 +182,7 @@ def by_sweeps(samples: Samples) -> object:
 
 
 def by_attitudes(samples: Samples) -> object:
-    placed = placed_by(samples, read_attitudes(EXAMPLES / "swinging_attitudes.csv"))
+    placed = average_placements(samples, read_attitudes(EXAMPLES / "swinging_attitudes.csv"))
     raise solve_placed("imu", placed, SITE, ASKED, None, second_order=False).faults[RATE]
 
 
@@ -198,7 +198,7 @@ def test_an_axis_that_reads_the_same_throughout_is_named(
 
 def test_a_rest_whose_readings_are_all_the_same_is_named() -> None:
     samples = constant(read_samples(EXAMPLES / "still_samples.csv"), ACCELERATION, 9.3)
-    placed = placed_by(samples, read_attitudes(EXAMPLES / "still_attitudes.csv"))
+    placed = average_placements(samples, read_attitudes(EXAMPLES / "still_attitudes.csv"))
     found = solve_placed("imu", placed, SITE, ASKED, None, second_order=False).faults[ACCELERATION]
     assert found.name == "stuck_sensor"
     assert "the accelerometer reads 9.3 m/s² on z" in str(found) and "at the end of its range" in str(found)

@@ -19,7 +19,7 @@ from rig.errors import Refused
 from rig.estimation.gyroscope.budget import Budget, Contributor
 from rig.report.certificate.certificate_page import certificate_page
 from rig.report.certificate.content import is_simulated
-from rig.report.certificate.statements import StatedFacts, of_configuration, stated_in
+from rig.report.certificate.statements import StatedFacts, configuration_statements, folder_statements
 from rig.report.certificate.validity import list_omitted_rates
 from rig.report.entries.budget import budget_entry
 from rig.report.tables.coverage_statements import coverage_sentence
@@ -537,7 +537,7 @@ def test_what_cannot_be_rounded_is_not(value: float, uncertainty: float) -> None
 def test_what_the_configuration_says_is_stated(tmp_path: Path) -> None:
     text = (CONFIGS / "demo.yaml").read_text(encoding="utf-8")
     said = "site: {laboratory: ' Ours ', country: DE}\ncertificate: {customer: Theirs, received: 2026-11-20}\n"
-    found = of_configuration(parse(text + said))
+    found = configuration_statements(parse(text + said))
     assert found.simulated
     assert (found.where.laboratory, found.certificate.customer, str(found.certificate.received)) == (
         "Ours",
@@ -545,7 +545,7 @@ def test_what_the_configuration_says_is_stated(tmp_path: Path) -> None:
         "2026-11-20",
     )
     (tmp_path / "config.yaml").write_text(text + said, encoding="utf-8")
-    amended = stated_in(tmp_path, ["certificate.customer=Somebody", "certificate.replaces=RIG-1"])
+    amended = folder_statements(tmp_path, ["certificate.customer=Somebody", "certificate.replaces=RIG-1"])
     assert (amended.certificate.customer, amended.certificate.replaces) == ("Somebody", "RIG-1")
     with pytest.raises(Refused, match="unknown_setting"):
-        stated_in(tmp_path, ["site.gravity_m_s2=9.81"])
+        folder_statements(tmp_path, ["site.gravity_m_s2=9.81"])

@@ -13,7 +13,7 @@ import pytest
 import yaml
 
 from rig.data.recording.run_file import read_run
-from rig.observation.finished_steps import finished_dwells
+from rig.observation.finished_steps import complete_dwells
 from support.laboratories.commands import configuration, rig, rig_here, wait_for_log
 
 SIX = [[0, -90, 0], [-90, -90, 0], [-90, -90, 90], [-180, -90, 45], [90, -90, -45], [45, -90, 90]]
@@ -51,10 +51,10 @@ def test_a_killed_run_loses_one_dwell_at_most_and_tells_every_repeat(tmp_path: P
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True) as run:
         wait_for_log(out, "done: dwell at", times=8)
         os.killpg(run.pid, signal.SIGKILL)
-    kept = finished_dwells(read_run(out / "run.h5"))
+    kept = complete_dwells(read_run(out / "run.h5"))
     resumed = rig("resume", out)
     assert resumed.returncode == 0, resumed.stdout + resumed.stderr
-    repeated = finished_dwells(read_run(out / "run-2.h5"))
+    repeated = complete_dwells(read_run(out / "run-2.h5"))
     # The file is flushed four times a second, in which this laboratory goes through a dwell, or two when it is quick.
     assert len(kept) >= 6 and not kept & repeated and kept | repeated == set(range(18))
 

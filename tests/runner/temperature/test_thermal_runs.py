@@ -14,7 +14,7 @@ from rig.data.recording.run_data import RunData
 from rig.data.recording.run_file import read_run
 from rig.data.recording.thermal_events import SetMeasured, TemperatureWanted
 from rig.data.result_file import read_result
-from rig.observation.finished_steps import finished_sweeps
+from rig.observation.finished_steps import complete_sweeps
 from support.laboratories.commands import configuration, rig, rig_here, wait_for_log
 from support.laboratories.worlds import World, hardware, merge, world
 from support.processes.waiting import PATIENCE_S, alive, wait_for
@@ -93,7 +93,7 @@ def test_a_heater_takes_the_sensors_through_the_range(heated: Path) -> None:
     temperatures = sorted(each.temperatures_c["gyro"] for each in sets)
     assert temperatures[0] <= 26 and temperatures[-1] >= 38
     assert max(b - a for a, b in pairwise(temperatures)) <= 5
-    assert finished_sweeps(run) == set(range(6 * len(sets)))
+    assert complete_sweeps(run) == set(range(6 * len(sets)))
     assert [(each.first, each.end) for each in sets] == [(6 * k, 6 * k + 6) for k in range(len(sets))]
     assert all(event.heated for event in of_events(run, TemperatureWanted))
     assert run.settings.reference_c == 30
@@ -233,8 +233,8 @@ def test_an_interrupted_run_goes_on_with_its_sets(tmp_path: Path) -> None:
     ended = rig("resume", out, "--yes")
     assert ended.returncode in (0, 1), ended.stdout + ended.stderr
     again = read_run(out / "run-2.h5")
-    assert 0 not in finished_sweeps(again), "a whole set is not made again"
-    assert 6 * len(first) in finished_sweeps(again), "one that was interrupted is, from its beginning"
+    assert 0 not in complete_sweeps(again), "a whole set is not made again"
+    assert 6 * len(first) in complete_sweeps(again), "one that was interrupted is, from its beginning"
 
 
 def test_a_killed_rig_leaves_the_heater_on_for_two_and_a_half_seconds_at_most(tmp_path: Path, world: World) -> None:

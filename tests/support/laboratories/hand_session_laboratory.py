@@ -11,8 +11,8 @@ from rig.data.recording.channel import triad_channel
 from rig.data.recording.hand_events import (
     HandAsked,
     HandBegunAnew,
-    HandMoveRefused,
     HandMoveAccepted,
+    HandMoveRefused,
     HandRestRefused,
     OfTheHand,
 )
