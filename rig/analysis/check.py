@@ -8,7 +8,7 @@ from rig.config.judging.verdict_limits import Parameter
 from rig.data.installed_kinds import quantities
 from rig.data.meaning import Meaning
 from rig.errors import Fault
-from rig.estimation.statistics.coverage import COVERAGE_FACTOR, beyond
+from rig.estimation.statistics.coverage import COVERAGE_FACTOR, tail_probability
 
 # Faults of sensors that were only recorded, not to be calibrated.
 ONLY_RECORDED = ("no_attitudes", "field_strength_unknown")
@@ -50,7 +50,7 @@ class Check:
         """The probability that the true value of a passed check is beyond the limit; None if it did not pass."""
         if self.value is None or self.limit is None or not self.uncertainty or not self.passed:
             return None
-        return float(beyond((self.limit - self.value) * self.coverage_factor / self.uncertainty, self.dof))
+        return float(tail_probability((self.limit - self.value) * self.coverage_factor / self.uncertainty, self.dof))
 
 
 def fitness(

@@ -74,9 +74,9 @@ def so_far(runs: Sequence[RunData]) -> SoFar:
             continue  # nothing has moved yet
         recorded = {name: _observe(run, name, motion) for name in run.measuring(RATE)}
         for name, sensor in recorded.items():
-            sweeps[name] = sweeps.get(name, Attempts()).updated(sensor.sweeps)
+            sweeps[name] = sweeps.get(name, Attempts()).merge(sensor.sweeps)
             rests.setdefault(name, []).extend(sensor.rests)
-        at_rest = at_rest.updated(_accelerations(run, recorded)).updated(_fields(run, recorded))
+        at_rest = at_rest.merge(_accelerations(run, recorded)).merge(_fields(run, recorded))
     return SoFar(
         {
             name: _solve_gyroscope(attempts, rests[name], np.array(runs[-1].sensors[name].mounting))
@@ -132,9 +132,9 @@ def _fields(run: RunData, recorded: Mapping[str, _RecordedPart]) -> Attempts[Qua
         time_s = np.empty(0) if clock is None else times_s(run, name, {other: clock}, other)
         read = partial(_read_field, run, time_s, expected_t)
         by_dwell = {QuantityInDwell(name, FIELD, i, dwell.name): dwell for i, dwell in dwells.results.items()}
-        fields = fields.updated(attempt_each({key: partial(read, key, dwell) for key, dwell in by_dwell.items()}))
+        fields = fields.merge(attempt_each({key: partial(read, key, dwell) for key, dwell in by_dwell.items()}))
         refused = {QuantityInDwell(name, FIELD, i, ""): fault for i, fault in dwells.faults.items()}
-        fields = fields.updated(Attempts({}, refused))
+        fields = fields.merge(Attempts({}, refused))
     return fields
 
 
@@ -154,7 +154,7 @@ def _observe_sweeps(
         sensor = observe_sensor(run, name, motion, thresholds, sweeps.faults.keys() | dwells)
     except Fault as fault:  # a fault of the sensor as a whole
         return all_failed(complete_sweeps(run), fault), ()
-    return sweeps.updated(Attempts({turn.sweep: turn for turn in sensor.revolutions})), sensor.rests
+    return sweeps.merge(Attempts({turn.sweep: turn for turn in sensor.revolutions})), sensor.rests
 
 
 def _bias(rests: Sequence[Average]) -> tuple[Array, Array] | None:

@@ -52,7 +52,7 @@ class SensorAtRest:
     notes: tuple[str, ...] = ()
 
 
-def at_rest(runs: Sequence[RunData]) -> dict[str, SensorAtRest]:
+def rest_noises(runs: Sequence[RunData]) -> dict[str, SensorAtRest]:
     """Return every sensor with rates, by name, over all recordings of a run, without readings corrected by the board.
 
     Raise Fault as `motion_of` and `synchronize_stream` do.

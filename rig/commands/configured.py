@@ -8,7 +8,7 @@ from pathlib import Path
 from rig.commands.laboratory.own_address import find_own_address
 from rig.config.load import Loaded, load, parse
 from rig.plans.phase import Phase, first_phase
-from rig.plans.procedure_registry import Procedures, installed, sections
+from rig.plans.procedure_registry import Procedures, load_procedures, sections
 from rig.plans.script_errors import script_errors
 from rig.plans.script_file import ScriptFile, find_installed_script, load_script
 from rig.turners import turner_registry as turners
@@ -32,7 +32,7 @@ def load_configured(
     """
     if isinstance(script, Path):
         script = load_script(script)
-    procedures: Procedures = installed()
+    procedures: Procedures = load_procedures()
     if script is not None:
         procedures = {**procedures, script.procedure.name: script.procedure}
         overrides = [*overrides, f"procedure.name={script.procedure.name}"]
@@ -46,7 +46,7 @@ def load_configured(
 
 def change_configured(configured: Configured, overrides: Sequence[str]) -> Configured:
     """Change values of a configuration, given as for `load`. Raise Refused as `load_configured` does."""
-    procedures: Procedures = {**installed(), configured.script.procedure.name: configured.script.procedure}
+    procedures: Procedures = {**load_procedures(), configured.script.procedure.name: configured.script.procedure}
     with script_errors(f"the section of {configured.script.name} fails"):
         loaded = parse(configured.loaded.text, "configuration", overrides, sections(procedures), turners.sections())
     return Configured(loaded, configured.script, first_phase(configured.script.procedure, loaded.config, procedures))

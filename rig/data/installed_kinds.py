@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 from rig.data.quantity import OF_THE_RIG, SCALARS, Quantity, Scalar
 from rig.errors import Refused
-from rig.errors.installed import added
+from rig.errors.installed import load_entry_points
 
 GROUP = "rig.kinds"
 
@@ -32,7 +32,7 @@ class InstalledKind(Protocol):
 @cache
 def installed_kinds() -> tuple[InstalledKind, ...]:
     """Return the kinds of the packages installed here. Raise Refused `kind_not_loaded`."""
-    return tuple(kind for _, kind in added(GROUP, _not_loaded))
+    return tuple(kind for _, kind in load_entry_points(GROUP, _not_loaded))
 
 
 def _not_loaded(what: str, remedy: str) -> Refused:
@@ -47,6 +47,6 @@ def quantities() -> Mapping[str, Quantity]:
 
 
 @cache
-def measured() -> Mapping[str, Quantity | Scalar]:
+def channel_contents() -> Mapping[str, Quantity | Scalar]:
     """Return everything that a channel may hold, by its name: quantities, and scalars without axes."""
     return MappingProxyType({**quantities(), **{scalar.name: scalar for scalar in SCALARS}})

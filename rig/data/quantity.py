@@ -75,7 +75,7 @@ class Quantity:
     def __str__(self) -> str:
         return self.name
 
-    def named(self, what: str) -> str:
+    def file_key(self, what: str) -> str:
         """Return a file's key for the value `what` in this quantity's unit, such as `bias_rad_s`."""
         return f"{what}_{self.suffix}"
 
@@ -95,7 +95,7 @@ class Quantity:
     @property
     def columns(self) -> tuple[str, ...]:
         """Columns of its readings in a table, one for each axis."""
-        return tuple(self.named(axis) for axis in self.axes)
+        return tuple(self.file_key(axis) for axis in self.axes)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -127,14 +127,14 @@ class Scalar:
     suffix: str
     reading: DisplayUnit
 
-    def named(self, what: str) -> str:
+    def file_key(self, what: str) -> str:
         """Return a file's key for the value `what` in this quantity's unit, such as `pressure_pa`."""
         return f"{what}_{self.suffix}"
 
     @property
     def columns(self) -> tuple[str, ...]:
         """The one column of its readings in a table."""
-        return (self.named(self.name),)
+        return (self.file_key(self.name),)
 
     @property
     def shape(self) -> tuple[int, ...]:

@@ -23,14 +23,14 @@ class Attempts(Generic[Key, Result]):
     results: Mapping[Key, Result] = field(default_factory=dict)
     faults: Mapping[Key, Fault] = field(default_factory=dict)
 
-    def updated(self, later: "Attempts[Key, Result]") -> "Attempts[Key, Result]":
+    def merge(self, later: "Attempts[Key, Result]") -> "Attempts[Key, Result]":
         """Return the attempts together with those in `later`, which replace earlier ones of the same key."""
         repeated = later.results.keys() | later.faults.keys()
         kept = {key: result for key, result in self.results.items() if key not in repeated}
         kept_faults = {key: fault for key, fault in self.faults.items() if key not in repeated}
         return Attempts({**kept, **later.results}, {**kept_faults, **later.faults})
 
-    def by_key(
+    def results_by_key(
         self, of_result: Callable[[Result], Converted], of_fault: Callable[[Fault], ConvertedFault]
     ) -> dict[Key, Converted | ConvertedFault]:
         """Return each result converted by `of_result`, then each Fault converted by `of_fault`."""

@@ -9,7 +9,7 @@ from typing import Any
 from rig.errors import Refused
 
 
-def added(
+def load_entry_points(
     group: str, not_loaded: Callable[[str, str], Refused], stock: Iterable[EntryPoint] = ()
 ) -> Iterator[tuple[EntryPoint, Any]]:
     """Yield the entry points of a group, those in `stock` first, each with its loaded object.

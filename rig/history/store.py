@@ -181,7 +181,7 @@ class History:
         Calibrations that a later one of their run has replaced are included only on request.
         """
         question = select(*_COLUMNS).select_from(_ROWS).order_by(*_IN_TIME)
-        return self._pasts(chosen(question if replaced_too else question.where(~replaced()), selection))
+        return self._pasts(chosen(question if replaced_too else question.where(~replacement_condition()), selection))
 
     def calibration(self, number: int) -> Past:
         """Return one calibration by its number, replaced or not. Raise Refused `not_in_history`."""
@@ -319,7 +319,7 @@ def _read_kept(connection: Connection, number: int) -> Kept:
     )
 
 
-def replaced() -> Any:
+def replacement_condition() -> Any:
     """Return the SQL condition that a later result of the same measurement replaces a run's row."""
     later = schema.run.alias("later")
     newer = or_(later.c.solved_utc > _RUN.solved_utc, and_(later.c.solved_utc == _RUN.solved_utc, later.c.id > _RUN.id))

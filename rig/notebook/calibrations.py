@@ -112,7 +112,7 @@ class Calibration:
         `calibration.h`. A row with a NaN becomes NaN. Raise Refused `not_readings` for counts and other shapes,
         `wrong_unit` for numbers that this sensor cannot read in its SI unit, such as °/s, g or µT.
         """
-        limit = getattr(self.entry, self.quantity.named("range"), None)
+        limit = getattr(self.entry, self.quantity.file_key("range"), None)
         valid = own_readings(readings, self.quantity, limit, f"the {self.quantity.sensor} {self.name}")
         corrected: Array = (valid - self.quantity.offset * self.bias) @ self.correction_matrix.T
         return corrected

@@ -16,7 +16,7 @@ from rig.notebook.html import table
 from rig.notebook.results import Result, solve
 from rig.notebook.runs import Run
 from rig.report.findings.history_records import HistoryRecord, Parameter
-from rig.report.kinds.kind_registry import followed
+from rig.report.kinds.kind_registry import history_records
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -173,7 +173,7 @@ def _subject(record: HistoryRecord) -> Subject:
 
 
 def _records(source: Run | Result) -> tuple[HistoryRecord, ...]:
-    return followed((solve(source) if isinstance(source, Run) else source).document)
+    return history_records((solve(source) if isinstance(source, Run) else source).document)
 
 
 def _parameters(sensor: HistoryRecord) -> dict[str, Parameter]:

@@ -16,7 +16,7 @@ from rig.notebook.frames import frame
 from rig.notebook.html import table
 from rig.notebook.readings import NoSuchSensor
 from rig.notebook.runs import Run
-from rig.plans.recorded_run import judged
+from rig.plans.recorded_run import judge_phases
 from rig.report.document import document_of
 from rig.report.findings.finding import Finding
 from rig.report.kinds.kind_registry import outlets, shown, terms_of
@@ -132,7 +132,7 @@ def solve(run: Run, estimator: str | None = None, **changes: float) -> Result:
     Refused as `rig solve` does; `unknown_setting` lists the possible changes.
     """
     overrides = [f"{setting(key)}={value!r}" for key, value in changes.items()]
-    return Result(document_of(judged(run.recorded.override_settings(overrides), estimator)))
+    return Result(document_of(judge_phases(run.recorded.override_settings(overrides), estimator)))
 
 
 def load_result(path: str | Path) -> Result:

@@ -16,7 +16,7 @@ from rig.notebook.html import table
 from rig.notebook.readings import HEADINGS, NoSuchSensor, Readings
 from rig.observation.external.from_files import read_log as read_external_log
 from rig.observation.observed_run import ObservedRun, observe_runs
-from rig.plans.recorded_run import RecordedRun, judged, open_run
+from rig.plans.recorded_run import RecordedRun, judge_phases, open_run
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +54,7 @@ class Run(Mapping[str, Readings]):
     @cached_property
     def calibration(self) -> Outcome | None:
         """The outcome of the raw readings alone; None without raw readings."""
-        return judged(self.recorded.only_raw()) if self.recorded.raw else None
+        return judge_phases(self.recorded.only_raw()) if self.recorded.raw else None
 
     @cached_property
     def corrected(self) -> tuple[ObservedRun, ...]:

@@ -8,11 +8,11 @@ import numpy as np
 
 from rig.data.recording.run_data import RunData
 from rig.estimation.arrays import Array
-from rig.observation.average import Average, Stream, between, build_average
+from rig.observation.average import Average, Stream, build_average, slice_time
 from rig.observation.motion.arm_motion import ArmMotion
 from rig.observation.oscillation import MAX_TRAVEL_AT_REST_RAD
 from rig.observation.statistics.vibration_noise import average_standstill
-from rig.observation.windows import Window, rested
+from rig.observation.windows import Window, iterate_rests
 
 REST_SETTLING_S = 0.2  # time removed at either end of a rest
 MIN_SAMPLES_AT_REST = 20
@@ -27,7 +27,7 @@ def average_rests(
     The encoders measure an oscillation of the resting arm; `response` (3, 3) converts it to the sensor's readings. The
     means are corrected for this oscillation.
     """
-    rests = (_average_rest(stream, motion, window, response) for window in rested(run, superseded))
+    rests = (_average_rest(stream, motion, window, response) for window in iterate_rests(run, superseded))
     return tuple(rest for rest in rests if rest is not None)
 
 
@@ -40,11 +40,11 @@ def trim_rest(motion: ArmMotion, rest: Window) -> Window | None:
 
 def still_samples(run: RunData, stream: Stream, motion: ArmMotion) -> Iterator[slice]:
     """Yield the samples of every rest and dwell of the arm, split at each missing sample."""
-    for window in rested(run):
+    for window in iterate_rests(run):
         still = trim_rest(motion, window)
         if still is None:
             continue
-        inside = between(stream, still.start_s, still.end_s)
+        inside = slice_time(stream, still.start_s, still.end_s)
         sequence = stream.raw["sequence"][inside].astype(np.int64)
         gaps = inside.start + 1 + np.flatnonzero(np.diff(sequence) != 1)
         edges = [inside.start, *gaps.tolist(), inside.stop]
@@ -78,7 +78,7 @@ def _average_rest(stream: Stream, motion: ArmMotion, window: Window, response: A
     still = trim_rest(motion, window)
     if still is None:
         return None
-    inside = between(stream, still.start_s, still.end_s)
+    inside = slice_time(stream, still.start_s, still.end_s)
     if inside.stop - inside.start < MIN_SAMPLES_AT_REST:
         return None
     time_s = stream.time_s[inside]

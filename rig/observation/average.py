@@ -84,7 +84,7 @@ class Stream:
     polynomials: Mapping[Quantity, "OverTemperature"] = field(default_factory=dict)
     steps: Steps = NO_STEPS
 
-    def at_reference(self, polynomials: Mapping[Quantity, "OverTemperature"]) -> "Stream":
+    def correct_to_reference(self, polynomials: Mapping[Quantity, "OverTemperature"]) -> "Stream":
         """Return the stream with its rates corrected to the polynomials' reference temperature."""
         stream = replace(self, polynomials=polynomials)
         return replace(stream, readings_rad_s=stream.correct_temperature(RATE, self.readings_rad_s, slice(None)))
@@ -131,7 +131,7 @@ def steps_of(raw: NDArray[Any], sensor: RecordedSensor, quantity: Quantity) -> S
     return channel.steps(channel.values(raw), trusts_counts=sensor.on_board)
 
 
-def between(stream: Stream, start_s: float, end_s: float) -> slice:
+def slice_time(stream: Stream, start_s: float, end_s: float) -> slice:
     """Return the samples between two controller times."""
     return slice(*np.searchsorted(stream.time_s, [start_s, end_s]).tolist())
 

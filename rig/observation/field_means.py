@@ -16,7 +16,7 @@ from rig.observation.average import steps_of
 from rig.observation.observed_run import ObservedRun, one_clock
 from rig.observation.reference.dwell_acceleration import DwellReading, check_complete
 from rig.observation.statistics.mean import Mean, StaticReading, even_mean
-from rig.observation.windows import Window, inside, rested
+from rig.observation.windows import Window, inside, iterate_rests
 
 AT_HOME_RAD = 1e-3  # angle from home, of any joint
 SETTLING_S = 0.2  # time removed at either end of a rest
@@ -88,7 +88,7 @@ def field_tests(
         return ()
     time_s = recording.time_s(name, other)
     samples = partial(_samples, recording.run, name, time_s)
-    windows = (Window(rest.start_s + SETTLING_S, rest.end_s - SETTLING_S) for rest in rested(recording.run))
+    windows = (Window(rest.start_s + SETTLING_S, rest.end_s - SETTLING_S) for rest in iterate_rests(recording.run))
     return tuple(
         _mean(recording.run, name, samples(window), f"a field test of {name}", thresholds)
         for window in windows

@@ -23,7 +23,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.refusals import check_reading_ratio
 from rig.motion.steps import Sweep
 from rig.observation.arm_rests import add_attitude, average_rests, estimate_bias_drift
-from rig.observation.average import Average, Stream, between, build_average, synchronize_stream
+from rig.observation.average import Average, Stream, build_average, slice_time, synchronize_stream
 from rig.observation.lost_samples import lost_samples
 from rig.observation.motion.arm_motion import ArmMotion, is_sparse
 from rig.observation.motion.revolution import Revolution, arm_states_lost, describe
@@ -185,7 +185,7 @@ def _average_revolution(
     stream: Stream, motion: ArmMotion, sweep: Sweep, turn: Revolution, settings: ObservationThresholds
 ) -> Observation:
     where = describe(sweep)
-    inside = between(stream, turn.start_s, turn.end_s)
+    inside = slice_time(stream, turn.start_s, turn.end_s)
     lost = _count_lost(stream, inside, where, settings)
     _check_saturation(stream, inside, where)
     _check_stuck(stream, inside, where)

@@ -50,7 +50,7 @@ class ObservedRun:
     def stream(self, sensor: str) -> Stream:
         """Return a sensor's samples in rad/s on the arm's clock."""
         stream = convert_stream(self.run.samples[sensor], self.run.sensors[sensor], self.sensors[sensor].time_base)
-        return stream.at_reference(self.polynomials[sensor]) if sensor in self.polynomials else stream
+        return stream.correct_to_reference(self.polynomials[sensor]) if sensor in self.polynomials else stream
 
     def time_s(self, sensor: str, gyroscope: str | None = None) -> Array:
         """Return the times (n,) of all samples of a sensor on the arm's clock.

@@ -7,7 +7,7 @@ from rig.data.recording.run_data import RunData
 from rig.data.recording.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.observation.arm_rests import average_rests
-from rig.observation.average import Stream, between, synchronize_stream
+from rig.observation.average import Stream, slice_time, synchronize_stream
 from rig.observation.finished_steps import complete_dwells, complete_sweeps
 from rig.observation.motion.arm_motion import ArmMotion, motion_of
 from rig.observation.observe import check_response, observe_each_sweep
@@ -60,7 +60,7 @@ def _find_sound_steps_of(
 
 def _has_spike(stream: Stream, window: Window) -> bool:
     """Return whether a sweep has a spike, which fails the verdict regardless of the mean."""
-    inside = between(stream, window.start_s, window.end_s)
+    inside = slice_time(stream, window.start_s, window.end_s)
     counts = stream.sensor.channel(RATE).counts(stream.raw)[inside].astype(np.float64)
     if not len(counts):
         return False

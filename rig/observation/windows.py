@@ -57,7 +57,7 @@ def swept(run: RunData) -> Iterator[FinishedSweep]:
         yield FinishedSweep(event.sweep, window)
 
 
-def rested(run: RunData, superseded: Collection[int] = ()) -> Iterator[Window]:
+def iterate_rests(run: RunData, superseded: Collection[int] = ()) -> Iterator[Window]:
     """Yield the rests and dwells that were started and finished, in order.
 
     A step whose index is in `superseded` is left out, as are rests just before or after it, because the disturbance may

@@ -19,7 +19,7 @@ def geometry(chain: DenavitHartenberg, joints: Sequence[str] = JOINT_NAMES) -> d
     return {**built(chain), "joints": list(joints), "q_rad": None, "missed": 0}
 
 
-def connected(report: Report) -> dict[str, Any]:
+def turner_section(report: Report) -> dict[str, Any]:
     """Return the page section of a connected turner, with its geometry if the turner reports one."""
     names = {
         "model": report.model,

@@ -5,7 +5,7 @@ from dataclasses import asdict
 from typing import Any
 
 from rig.analysis.check import Check
-from rig.data.installed_kinds import measured
+from rig.data.installed_kinds import channel_contents
 from rig.data.quantity import TEMPERATURE, DisplayUnit, Quantity, Scalar, select_displayed
 from rig.data.recording.hand_events import (
     HandAsked,
@@ -22,7 +22,7 @@ from rig.motion.geometry import NOMINAL
 from rig.motion.steps import Dwell, Rest, Step, Sweep
 from rig.page import by_hand
 from rig.page.about import About
-from rig.page.arm import connected, geometry, stance
+from rig.page.arm import geometry, stance, turner_section
 from rig.page.outcome_screen import after_fault, after_verdict, outcome_rows, since_rows
 from rig.page.recent_readings import PageHistory, round_digits
 from rig.page.rows import Look, dwell_row, observation_row, parameter_rows, projection
@@ -184,7 +184,7 @@ class PageState:
         sections = self.sections
         match event:
             case ArmConnected(report):
-                self.put("arm", {**sections["arm"], **connected(report)})
+                self.put("arm", {**sections["arm"], **turner_section(report)})
             case PhaseStarted(procedure, plan, sensors):
                 self._modes = sensors
                 self._turns = {sweep.index: _turn(sweep) for sweep in plan.sweeps}
@@ -277,7 +277,7 @@ class PageState:
             "lost": sensor.lost,
             "temperature_c": next(iter(sensor.latest.get(TEMPERATURE.name, ())), None),
             "units": {
-                quantity.named(quantity.name): [quantity.name, unit.name] for quantity, unit in _quantities(sensor)
+                quantity.file_key(quantity.name): [quantity.name, unit.name] for quantity, unit in _quantities(sensor)
             },
         }
 
@@ -295,7 +295,7 @@ class PageState:
 
 def _quantities(sensor: SensorSamples) -> Iterator[tuple[Quantity | Scalar, DisplayUnit]]:
     """Yield the quantities of a sensor with their units of display, and the units of their biases."""
-    by_name = measured()
+    by_name = channel_contents()
     for quantity in (by_name[name] for name in select_displayed(sensor.latest)):
         yield quantity, quantity.bias if isinstance(quantity, Quantity) else quantity.reading
 
@@ -303,7 +303,7 @@ def _quantities(sensor: SensorSamples) -> Iterator[tuple[Quantity | Scalar, Disp
 def _values(sensors: tuple[SensorSamples, ...]) -> dict[str, tuple[float, ...]]:
     """Return the newest readings by the names of their curves."""
     return {
-        f"{sensor.sensor}.{quantity.named(quantity.name)}": tuple(
+        f"{sensor.sensor}.{quantity.file_key(quantity.name)}": tuple(
             value / unit.size for value in sensor.latest[quantity.name]
         )
         for sensor in sensors

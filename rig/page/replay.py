@@ -92,7 +92,7 @@ def moments(run: RunData) -> Iterator[Moment]:
     yield Moment(end_s - start_s, SamplesTaken(samples_until(np.inf)))
 
 
-def ended(result: ResultDocument) -> Iterator[RunEvent]:
+def end_events(result: ResultDocument) -> Iterator[RunEvent]:
     """Yield the checks and the verdict of a finished run as events."""
     for c in result.checks:
         yield Checked(Check(c.name, c.value, c.limit, c.unit, c.means, c.uncertainty, c.guard_band))

@@ -18,7 +18,7 @@ from rig.config.models import ArmSection, ProcedureSection, TurnerSection
 from rig.config.procedures.procedure_sections import STOCK_SECTIONS
 from rig.data.recording.run_data import RunData
 from rig.errors import Refused
-from rig.errors.installed import added
+from rig.errors.installed import load_entry_points
 from rig.motion.steps import Plan
 from rig.motion.turner_state import Joints
 from rig.plans.verbs import Script
@@ -106,7 +106,7 @@ Procedures = Mapping[str, AnyProcedure]
 def _load_installed() -> Mapping[str, tuple[AnyProcedure, str]]:
     """Return the installed procedures by name, each with its Python module."""
     stock = (EntryPoint(name, f"procedures.{name}:PROCEDURE", GROUP) for name in STOCK_SECTIONS)
-    entries = added(GROUP, _not_loaded, stock)
+    entries = load_entry_points(GROUP, _not_loaded, stock)
     return {procedure.name: (procedure, entry.module) for entry, procedure in entries}
 
 
@@ -114,7 +114,7 @@ def _not_loaded(what: str, remedy: str) -> Refused:
     return Refused("procedure_not_loaded", f"the procedure {what}", remedy)
 
 
-def installed() -> Procedures:
+def load_procedures() -> Procedures:
     """Return the procedures of the packages installed here. Raise Refused `procedure_not_loaded`."""
     return {name: procedure for name, (procedure, _) in _load_installed().items()}
 

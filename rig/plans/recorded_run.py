@@ -12,7 +12,7 @@ from rig.data.recording.run_data import RunData
 from rig.data.recording.run_file import read_run
 from rig.data.run_folder import SCRIPT, recordings
 from rig.errors import Refused
-from rig.plans.procedure_registry import AnyProcedure, installed
+from rig.plans.procedure_registry import AnyProcedure, load_procedures
 from rig.plans.script_file import ScriptFile, kept_script, load_script
 
 RAW, CORRECTED = "six_observation", "verify"  # procedures that judge any recording: of raw readings, of corrected ones
@@ -80,7 +80,7 @@ def open_run(
     return RecordedRun(path, raw, repeated, script=named)
 
 
-def judged(run: RecordedRun, estimator: str | None = None) -> Outcome:
+def judge_phases(run: RecordedRun, estimator: str | None = None) -> Outcome:
     """Return the outcome of a run, phase by phase; a planned phase that is missing counts as failed.
 
     The estimator is the procedure's own unless another is requested; a single recording has its own outcome. Raise
@@ -92,12 +92,12 @@ def judged(run: RecordedRun, estimator: str | None = None) -> Outcome:
     if run.raw and run.corrected:
         return _procedure_of(run, run.corrected[0]).analyse(run.corrected, outcome, estimator)
     if run.raw and not run.alone and run.raw[0].settings.then_verify:
-        missing = procedure.following(installed())
+        missing = procedure.following(load_procedures())
         return outcome if missing is None else missing.analyse([], outcome, estimator)
     return outcome
 
 
-def left_out(run: RecordedRun) -> str | None:
+def describe_omission(run: RecordedRun) -> str | None:
     """Return a sentence if the solution lacks the analysis of a script, which is not executed here."""
     for recording in (*run.raw, *run.corrected):
         if recording.external is None and _script_of(run, recording) is None and not _is_by_installed(recording):
@@ -120,14 +120,14 @@ def _procedure_of(run: RecordedRun, recording: RunData) -> AnyProcedure:
     Raise Refused `another_script` if the script is not that of the recording, and as `kept_script` does.
     """
     if _is_by_installed(recording):
-        return installed()[recording.settings.procedure]
+        return load_procedures()[recording.settings.procedure]
     if (script := _script_of(run, recording)) is not None:
         return script.procedure
-    return installed()[CORRECTED if _is_corrected(recording) else RAW]
+    return load_procedures()[CORRECTED if _is_corrected(recording) else RAW]
 
 
 def _is_by_installed(recording: RunData) -> bool:
-    return recording.provenance.script_installed and recording.settings.procedure in installed()
+    return recording.provenance.script_installed and recording.settings.procedure in load_procedures()
 
 
 def _script_of(run: RecordedRun, recording: RunData) -> ScriptFile | None:

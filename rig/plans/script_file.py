@@ -14,7 +14,7 @@ from rig.config.files.regular_file import UnfitFile, read_regular_file
 from rig.data.run_folder import SCRIPT, ScriptIdentity
 from rig.data.user_texts import is_own
 from rig.errors import Refused
-from rig.plans.procedure_registry import AnyProcedure, Procedure, installed, module_of
+from rig.plans.procedure_registry import AnyProcedure, Procedure, load_procedures, module_of
 from rig.plans.script_errors import script_errors
 
 SIZE_MAX_BYTES = 1_000_000  # the longest procedure shipped has 3,000
@@ -44,7 +44,7 @@ class ScriptFile:
     def is_installed(self) -> bool:
         """Whether the script is identical to the installed one of its procedure's name."""
         name = self.procedure.name
-        return name in installed() and find_installed_script(name).sha256 == self.sha256
+        return name in load_procedures() and find_installed_script(name).sha256 == self.sha256
 
 
 def script_in(module: ModuleType, procedure: AnyProcedure) -> ScriptFile:
@@ -55,7 +55,7 @@ def script_in(module: ModuleType, procedure: AnyProcedure) -> ScriptFile:
 
 def find_installed_script(name: str) -> ScriptFile:
     """Return an installed procedure with its file."""
-    return script_in(sys.modules[module_of(name)], installed()[name])
+    return script_in(sys.modules[module_of(name)], load_procedures()[name])
 
 
 def load_script(path: Path) -> ScriptFile:
@@ -81,7 +81,7 @@ def kept_script(folder: Path, kept: ScriptIdentity, named: ScriptFile | None = N
     text = _text(path)
     if kept.sha256 != _sha256(text):
         raise another_script(str(path))
-    for name in installed():
+    for name in load_procedures():
         if (script := find_installed_script(name)).sha256 == kept.sha256:
             return replace(script, name=kept.name)
     if not is_own(kept.sha256):

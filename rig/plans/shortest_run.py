@@ -41,7 +41,7 @@ from rig.motion.steps import Plan
 from rig.plans.by_hand import WantedMoves as Asked
 from rig.plans.by_hand import simulate_session
 from rig.plans.phase import turner_for
-from rig.plans.procedure_registry import installed
+from rig.plans.procedure_registry import load_procedures
 from rig.plans.shortest_motions import Motion, vary_arm, vary_attitudes, vary_imu, vary_servo
 from rig.turners.turner_registry import kind_of
 
@@ -86,7 +86,7 @@ def shortest_run(config: RigConfig, wanted: TargetUncertainty) -> Shortest:
     _refuse_others(wanted, config)
     candidates = what.candidates()
     floors = [
-        (candidate.family, once.without(what.anew))
+        (candidate.family, once.omit(what.anew))
         for candidate in what.select_endless(candidates)
         if (once := what.predict(candidate)) is not None
     ]
@@ -149,7 +149,7 @@ def _refuse_others(wanted: TargetUncertainty, config: RigConfig) -> None:
 
 def plan_of(config: RigConfig, procedure: ProcedureSection) -> Plan:
     """Return the motions of a procedure; empty if the item is turned by hand. Raise Refused `other_turner`."""
-    script = installed()[procedure.name]
+    script = load_procedures()[procedure.name]
     return script.plan(turner_for(script, config), procedure)
 
 

@@ -26,7 +26,7 @@ def entry(kind: type[EntryT], /, *sources: object, **more: Any) -> EntryT:
     return kind.model_validate({name: _plain_value(value) for name, value in {**fields, **more}.items()})
 
 
-def counted(dof: Array | None) -> list[Any] | None:
+def dof_or_none(dof: Array | None) -> list[Any] | None:
     """Return degrees of freedom as `list_dof` does, or None if unknown."""
     return None if dof is None else list_dof(dof)
 

@@ -37,10 +37,10 @@ def format_for_file(text: str, file: TextIO) -> str:
     width = _columns(file)
     if width < NARROWEST:
         return text
-    return "\n".join(row for line in text.split("\n") for row in wrapped(line, width) or [""])
+    return "\n".join(row for line in text.split("\n") for row in wrap_line(line, width) or [""])
 
 
-def wrapped(text: str, width: int) -> list[str]:
+def wrap_line(text: str, width: int) -> list[str]:
     """Return the text of one line, broken into lines of at most `width`; a command or a long word is not broken."""
     import textwrap
 

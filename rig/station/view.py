@@ -11,7 +11,7 @@ from rich.live import Live
 from rich.progress_bar import ProgressBar
 from rich.table import Table
 
-from rig.data.installed_kinds import measured
+from rig.data.installed_kinds import channel_contents
 from rig.data.quantity import select_displayed
 from rig.data.recording.hand_events import HandAsked
 from rig.errors.quoting import printable_lines
@@ -115,7 +115,7 @@ def _readings(sensor: SensorSamples) -> list[tuple[str, str]]:
     """Return the rows of a sensor, one for each of its quantities; the first has the number of samples."""
     counts, rows = f"{sensor.samples} samples, {sensor.lost} lost", list[tuple[str, str]]()
     for quantity in select_displayed(sensor.latest):
-        kind = measured()[quantity]
+        kind = channel_contents()[quantity]
         shown = " ".join(f"{component / kind.reading.size:+7.2f}" for component in sensor.latest[quantity])
         name, more = (f"{sensor.sensor}, {kind.sensor}", "") if rows else (sensor.sensor, f", {counts}")
         rows.append((name, f"{shown} {kind.reading.name}{more}"))

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rig.analysis.rest_noise import AtRest, at_rest, log_at_rest
+from rig.analysis.rest_noise import AtRest, log_at_rest, rest_noises
 from rig.data.quantity import RATE
 from rig.data.recording.run_data import RunData
 from rig.errors import Fault
@@ -27,7 +27,7 @@ def run() -> RunData:
 
 
 def rates(run: RunData) -> AtRest:
-    return at_rest([run])["gyro"].quantities.results[RATE]
+    return rest_noises([run])["gyro"].quantities.results[RATE]
 
 
 @pytest.mark.slow

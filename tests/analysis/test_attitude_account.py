@@ -15,7 +15,7 @@ from support.paths import CONFIGS, DEMO
 
 def account(*overrides: str) -> AttitudeAccount:
     config = load(CONFIGS / "attitudes.yaml", overrides).config
-    plan = first_phase(installed()[config.procedure.name], config, installed()).plan()
+    plan = first_phase(load_procedures()[config.procedure.name], config, load_procedures()).plan()
     found = attitude_account(config, plan)
     assert found is not None
     return found
@@ -67,5 +67,5 @@ def test_what_the_configuration_states_of_the_arm_is_a_half_width() -> None:
 
 def test_sweeps_alone_have_none() -> None:
     config = load(DEMO).config
-    plan = first_phase(installed()["six_observation"], config, installed()).plan()
+    plan = first_phase(load_procedures()["six_observation"], config, load_procedures()).plan()
     assert attitude_account(config, plan) is None

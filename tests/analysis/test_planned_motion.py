@@ -15,7 +15,7 @@ from rig.config.load import load
 from rig.motion.geometry import NOMINAL
 from rig.motion.steps import Rest, Sweep
 from rig.observation.windows import Window
-from rig.plans.procedure_registry import installed, sections
+from rig.plans.procedure_registry import load_procedures, sections
 from rig.plans.shortest_run import plan_of
 from rig.turners import turner_registry as turners
 from support.paths import CONFIGS
@@ -25,7 +25,7 @@ AS_THE_FLANGE = np.eye(3)
 
 @pytest.mark.parametrize("said", [(), ("procedure.arc_deg=90", "uncertainty.angle_std_deg=0.01")])
 def test_a_planned_turn_is_what_the_motion_shows(said: tuple[str, ...]) -> None:
-    config = load(CONFIGS / "demo.yaml", said, sections(installed()), turners.sections()).config
+    config = load(CONFIGS / "demo.yaml", said, sections(load_procedures()), turners.sections()).config
     run = plan_run(config, plan_of(config, config.procedure), NOMINAL)
     motion = predict_motion(run.plan, run.arm)
     for each in time_steps_of(run.plan, Sweep):
@@ -38,7 +38,7 @@ def test_a_planned_turn_is_what_the_motion_shows(said: tuple[str, ...]) -> None:
 
 
 def test_a_planned_rest_is_where_the_last_motion_ends() -> None:
-    config = load(CONFIGS / "demo.yaml", (), sections(installed()), turners.sections()).config
+    config = load(CONFIGS / "demo.yaml", (), sections(load_procedures()), turners.sections()).config
     plan = plan_of(config, config.procedure)
     motion = predict_motion(plan, NOMINAL)
     rests = [step for step in time_steps(plan) if isinstance(step.step, Rest)]

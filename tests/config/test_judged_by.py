@@ -6,7 +6,7 @@ from rig.config.judging.judging_keys import OF_SENSORS, ObservationKeys, Uncerta
 from rig.config.load import load
 from rig.data.recording.settings import settings_from_json, settings_of
 from rig.plans.phase import first_phase
-from rig.plans.procedure_registry import installed
+from rig.plans.procedure_registry import load_procedures
 from support.paths import CONFIGS
 
 PAIR = CONFIGS / "lsm9ds1_adis16465.yaml"
@@ -17,7 +17,7 @@ def test_every_threshold_and_every_uncertainty_is_configured_and_recorded_under_
     stated = [f"observation.{key}=0.5" for key in ObservationKeys.model_fields]
     stated += [f"uncertainty.{key}=0.5" for key in sizes]
     config = load(PAIR, [*stated, "uncertainty.decision_rule=guard_band"]).config
-    made = settings_of(config, first_phase(installed()[config.procedure.name], config, installed()).plan())
+    made = settings_of(config, first_phase(load_procedures()[config.procedure.name], config, load_procedures()).plan())
     recorded, of_each = json.loads(made.to_json()), dict.fromkeys(config.sensors, 0.5)
     assert recorded["observation"] == dict.fromkeys(ObservationKeys.model_fields, 0.5)
     sizes_recorded = {key: of_each if key in OF_SENSORS else 0.5 for key in sizes}

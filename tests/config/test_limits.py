@@ -8,7 +8,7 @@ from rig.config.judging.verdict_limits import LIMITS, Limits, Need
 from rig.config.load import ConfigurationRefused, load, parse
 from rig.data.recording.settings import setting, settings_from_json, settings_of
 from rig.plans.phase import first_phase
-from rig.plans.procedure_registry import installed
+from rig.plans.procedure_registry import load_procedures
 from support.paths import CONFIGS
 
 PAIR = CONFIGS / "lsm9ds1_adis16465.yaml"
@@ -17,7 +17,7 @@ PAIR = CONFIGS / "lsm9ds1_adis16465.yaml"
 def test_every_limit_is_configured_recorded_and_changed_under_one_key() -> None:
     limits = {key: 0.5 + i for i, key in enumerate(LIMITS)}
     config = load(PAIR, [f"limits.{key}={limit}" for key, limit in limits.items()]).config
-    made = settings_of(config, first_phase(installed()[config.procedure.name], config, installed()).plan())
+    made = settings_of(config, first_phase(load_procedures()[config.procedure.name], config, load_procedures()).plan())
     recorded = json.loads(made.to_json())["limits"]
     assert recorded == limits
     assert settings_from_json(made.to_json()).limits == Limits(**limits)
@@ -27,7 +27,7 @@ def test_every_limit_is_configured_recorded_and_changed_under_one_key() -> None:
 
 def test_a_recording_may_lack_a_limit_of_today_and_have_one_of_tomorrow() -> None:
     config = load(PAIR).config
-    made = settings_of(config, first_phase(installed()[config.procedure.name], config, installed()).plan())
+    made = settings_of(config, first_phase(load_procedures()[config.procedure.name], config, load_procedures()).plan())
     document = json.loads(made.to_json())
     del document["limits"]["bias_drift_rad_s"]
     document["limits"]["field_bias_t"] = 1e-6

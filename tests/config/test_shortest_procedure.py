@@ -7,7 +7,7 @@ from rig.config.models import ProcedureSection
 from rig.config.procedures.procedure_sections import SixObservationSection
 from rig.data.recording.settings import settings_of
 from rig.plans.motions.six_sweeps import plan_six_observation
-from rig.plans.procedure_registry import installed, sections
+from rig.plans.procedure_registry import load_procedures, sections
 from rig.turners import turner_registry as turners
 from support.paths import CONFIGS
 from support.recordings.synthetic_run import CONFIG
@@ -57,7 +57,7 @@ def test_a_wish_that_is_none_is_refused_by_its_place(wish: tuple[str, ...], wher
 def test_where_no_arm_turns_it_is_refused_with_what_to_do_instead(file: str, instead: str) -> None:
     changes = ["procedure={name: shortest, target_uncertainty: {scale: 1e-3}}"]
     with pytest.raises(ConfigurationRefused) as refused:
-        load(CONFIGS / file, changes, sections(installed()), turners.sections())
+        load(CONFIGS / file, changes, sections(load_procedures()), turners.sections())
     (problem,) = refused.value.problems
     assert (
         problem.startswith("procedure.name")

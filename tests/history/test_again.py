@@ -18,12 +18,12 @@ from rig.history.recompute.result_comparison import (
     Compared,
     RecomputedResult,
     Unsolved,
-    compared,
+    match_answers,
     pending_recordings,
 )
 from rig.history.recompute.selection import list_stated_results
 from rig.history.store import History, Selection, open_history
-from rig.report.kinds.kind_registry import followed
+from rig.report.kinds.kind_registry import history_records
 from support.history.kept_recordings import certify
 from support.history.past_runs import BIAS_RAD_S, SCALE, STD, finish_run
 
@@ -38,12 +38,12 @@ def history(tmp_path: Path) -> Iterator[History]:
 
 
 def given(run: FinishedRun, verdict: str = "pass") -> RecomputedResult:
-    return RecomputedResult(verdict, (), followed(run.document))
+    return RecomputedResult(verdict, (), history_records(run.document))
 
 
 def again(history: History, answers: Sequence[tuple[FinishedRun, Answer]], of_u: float = 0.1) -> list[Compared]:
     by_key = {run.content_sha256: answer for run, answer in answers}
-    return list(compared(list_stated_results(history, Selection()), by_key, of_u).compared)
+    return list(match_answers(list_stated_results(history, Selection()), by_key, of_u).compared)
 
 
 def scaled(by: float) -> Sequence[float]:
@@ -75,7 +75,7 @@ def test_a_value_moves_by_its_part_of_the_stated_u(
 def test_a_u_that_was_too_small_and_a_value_that_is_gone_are_moves_too(history: History) -> None:
     run = finish_run(0)
     history.enter(run)
-    (calibration,) = followed(run.document)
+    (calibration,) = history_records(run.document)
     wider = tuple(
         replace(parameter, std_statistical=1.5 * parameter.std_statistical) for parameter in calibration.parameters
     )
@@ -182,10 +182,10 @@ def test_the_report_says_all_in_csv_and_what_is_to_be_looked_at_on_the_page(hist
     answers: dict[str, Answer] = {
         run.content_sha256: given(run),
         hostile.content_sha256: RecomputedResult(
-            "fail", ("gyro.scale_std",), followed(finish_run(1, scaled(U)).document)
+            "fail", ("gyro.scale_std",), history_records(finish_run(1, scaled(U)).document)
         ),
     }
-    outcome = compared(list_stated_results(history, Selection()), answers, 0.1)
+    outcome = match_answers(list_stated_results(history, Selection()), answers, 0.1)
     rows = list(csv.DictReader(io.StringIO(again_csv(outcome))))
     assert [(row["calibration"], row["state"], row["verdict"], row["verdict_now"], row["moved"]) for row in rows] == [
         ("1", "solved", "pass", "pass", "False"),
@@ -236,6 +236,6 @@ def test_ten_thousand_results_are_planned_in_a_handful_of_questions(history: His
     with RecomputeJournal(tmp_path, QUESTION) as journal:
         left = pending_recordings(stated, journal.solved)
         assert [each.run_id for each in left] == [each.run_id for each in stated[4000:]]
-        outcome = compared(stated, journal.solved)
+        outcome = match_answers(stated, journal.solved)
     assert (outcome.solved, outcome.unreached, outcome.moved) == (4000, 6000, 0)
     assert again_csv(outcome).count("\n") == 10_001

@@ -26,7 +26,7 @@ from rig.history.storage.address import choose_history_address, resolve_address
 from rig.history.storage.engine import engine_of
 from rig.history.store import History, Selection, open_history
 from rig.report.entries.budget import budget_entry
-from rig.report.kinds.kind_registry import followed
+from rig.report.kinds.kind_registry import history_records
 from support.history.past_runs import FIRST, finish_run
 from support.paths import DEMO, RECORDINGS
 
@@ -49,7 +49,7 @@ def test_a_run_is_found_again_with_all_its_numbers(history: History) -> None:
     assert kept.result == run.text and content_sha256(kept.result) == kept.content_sha256
     assert [recording.name for recording in kept.recordings] == ["run.h5", "verify.h5"]
     found = history.select_run(entered.run_id)
-    stated = followed(read_result(RECORDINGS / "verified"))
+    stated = history_records(read_result(RECORDINGS / "verified"))
     assert [(f.part, f.serial_number, f.estimator, f.temperature_c) for f in found] == [
         (s.part, s.serial_number, s.estimator, s.temperature_c) for s in stated
     ]
@@ -58,9 +58,9 @@ def test_a_run_is_found_again_with_all_its_numbers(history: History) -> None:
 
 def test_the_mean_scale_factor_has_the_uncertainty_of_all_three() -> None:
     sensor = read_result(RECORDINGS / "verified").gyroscopes["gyro"]
-    mean = {parameter.name: parameter for parameter in followed(read_result(RECORDINGS / "verified"))[0].parameters}[
-        "k"
-    ]
+    mean = {
+        parameter.name: parameter for parameter in history_records(read_result(RECORDINGS / "verified"))[0].parameters
+    }["k"]
     assert mean.value == pytest.approx(sum(sensor.scale) / 3)
     variance = sum(sensor.covariance[i][j] for i in range(3) for j in range(3)) / 9
     assert mean.std_statistical == pytest.approx(variance**0.5)

@@ -3,13 +3,13 @@
 from rig.config.load import load
 from rig.motion.plan_warnings import doubts
 from rig.plans.phase import first_phase
-from rig.plans.procedure_registry import installed
+from rig.plans.procedure_registry import load_procedures
 from support.paths import DEMO
 
 
 def doubts_of(*overrides: str) -> list[str]:
     config = load(DEMO, overrides).config
-    procedures = installed()
+    procedures = load_procedures()
     return doubts(first_phase(procedures[config.procedure.name], config, procedures).plan())
 
 

@@ -16,7 +16,7 @@ from rig.motion.turner_state import Report
 from rig.page.about import About
 from rig.page.arm import built
 from rig.station.events import ArmConnected, ArmSeen, HandSeen, PhaseStarted, RunEvent, SamplesTaken, SensorSamples
-from rig.turners.turner_registry import installed, kind_of, sections
+from rig.turners.turner_registry import kind_of, load_turner_kinds, sections
 from support.laboratories.command_with_a_page import start_with_page
 from support.laboratories.commands import configuration
 from support.laboratories.servo_runs import configure
@@ -34,10 +34,10 @@ HAND = HandSeen(5.0, "resting", 0.8, 0.0, 0.0, 8.0, None, (), (), (), 0)
 ARM_SEEN, SERVO_SEEN = state(1.0, HOME, HOME), servo_state(1.0, 0.1)
 # A configuration whose turner turns, what reads, how the turner is connected, and how it is seen then.
 TURNERS: dict[str, tuple[str, str, Report, RunEvent]] = {
-    "hand": ("by_hand.yaml", "lsm9ds1", installed()["hand"].look(installed()["hand"].section()), HAND),
+    "hand": ("by_hand.yaml", "lsm9ds1", load_turner_kinds()["hand"].look(load_turner_kinds()["hand"].section()), HAND),
     "arm": ("demo.yaml", "lsm9ds1", report(HOME), ArmSeen(ARM_SEEN, 0)),
     "servo": ("servo.yaml", "lsm9ds1", servo_report(SERVO_SEEN), ArmSeen(SERVO_SEEN, 0)),
-    "lines": ("by_hand.yaml", "lines", installed()["hand"].look(installed()["hand"].section()), HAND),
+    "lines": ("by_hand.yaml", "lines", load_turner_kinds()["hand"].look(load_turner_kinds()["hand"].section()), HAND),
 }
 WATCHED_MS = 4000  # twice what the page takes for old: an age that nothing renews has been said by then
 

@@ -14,13 +14,13 @@ from rig.page.about import About
 from rig.page.arm import built
 from rig.plans.by_hand import WantedMoves, still_open
 from rig.station.events import ArmConnected, HandSeen, PhaseStarted
-from rig.turners.turner_registry import installed
+from rig.turners.turner_registry import load_turner_kinds
 from support.page.browser import legible, needs_browser, picture, screen, text
 from support.page.scripted_page import showing
 from support.processes.waiting import wait_for
 
 pytestmark = [pytest.mark.slow, needs_browser, pytest.mark.usefixtures("nothing_severe_and_nothing_from_elsewhere")]
-KIND = installed()["hand"]
+KIND = load_turner_kinds()["hand"]
 SECTION = KIND.section()
 ABOUT = About(
     "runs/by hand", "by_hand", parts={"gyro": "lsm9ds1 HAND-1"}, arm=built(KIND.describe_configured(SECTION).kinematics)

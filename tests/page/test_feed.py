@@ -14,7 +14,7 @@ from rig.page.page_state import PageState
 from rig.page.recent_readings import POINTS, STEP_S
 from rig.page.server.feed import Broadcast, Feed, Mailbox
 from rig.station.events import ArmConnected, ArmSeen, HandSeen, RunEvent, SamplesTaken, SensorSamples
-from rig.turners.turner_registry import installed
+from rig.turners.turner_registry import load_turner_kinds
 from support.page.scripted_runs import (
     ABOUT,
     before_it_moves,
@@ -64,7 +64,7 @@ def test_the_arm_is_named_as_it_was_found() -> None:
     assert arm["model"] == "UR10e or UR12e" and arm["serial_number"] == "20225500001"
 
 
-HAND = installed()["hand"]
+HAND = load_turner_kinds()["hand"]
 AT_HAND = HandSeen(5.0, "resting", 0.8, 0.0, 0.0, 8.0, None, (), (), (), 0)
 # How a turner is connected, how it is seen then, and what has an age before the first sample.
 TURNERS: dict[str, tuple[Report, Callable[[float], RunEvent], dict[str, float]]] = {

@@ -9,8 +9,8 @@ import pytest
 from rig.config.sensors.sensor_catalogue import has_own_port
 from rig.data.quantity import ACCELERATION, FIELD
 from rig.data.result_file import ResultDocument, read_result
-from rig.plans.procedure_registry import installed
-from rig.plans.recorded_run import RecordedRun, judged, open_run
+from rig.plans.procedure_registry import load_procedures
+from rig.plans.recorded_run import RecordedRun, judge_phases, open_run
 from rig.report.document import document_of
 from support.paths import RECORDINGS
 from support.recordings.frozen import frozen
@@ -52,7 +52,7 @@ def named(folder: Path) -> str:
 @pytest.mark.kernels
 @pytest.mark.parametrize("folder", frozen(), ids=named)
 def test_a_frozen_recording_solves_to_its_numbers(folder: Path) -> None:
-    found = document_of(judged(opened(folder)))
+    found = document_of(judge_phases(opened(folder)))
     assert differences(read_result(folder), found) == []
 
 
@@ -65,7 +65,7 @@ def test_every_kind_has_a_frozen_recording(kind: str) -> None:
 @pytest.mark.slow
 def test_every_procedure_has_a_frozen_recording() -> None:
     kept = {run.settings.procedure for folder in frozen() for run in (*opened(folder).raw, *opened(folder).corrected)}
-    assert installed().keys() - kept == set(), FREEZE
+    assert load_procedures().keys() - kept == set(), FREEZE
 
 
 def otherwise(result: ResultDocument) -> Iterator[ResultDocument]:

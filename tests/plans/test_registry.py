@@ -16,7 +16,7 @@ from rig.config.procedures.procedure_sections import STOCK_SECTIONS
 from rig.errors import Refused
 from rig.motion.steps import Plan
 from rig.plans.phase import first_phase
-from rig.plans.procedure_registry import installed, sections
+from rig.plans.procedure_registry import load_procedures, sections
 from rig.plans.script_file import find_installed_script, load_script
 from support.paths import CONFIGS, ROOT
 from support.processes.waiting import PATIENCE_S
@@ -35,29 +35,29 @@ VERIFIED = CONFIGS / "lsm9ds1_adis16465.yaml"
 
 
 def test_the_stock_procedures_are_found_by_the_names_of_their_sections() -> None:
-    assert installed()["six_observation"] is six_observation.PROCEDURE
-    assert installed()["verify"] is verify.PROCEDURE
-    found = sections(installed())
+    assert load_procedures()["six_observation"] is six_observation.PROCEDURE
+    assert load_procedures()["verify"] is verify.PROCEDURE
+    found = sections(load_procedures())
     assert {name: found[name] for name in STOCK_SECTIONS} == STOCK_SECTIONS
 
 
 def test_a_calibration_is_followed_by_its_verification_only_when_asked() -> None:
     config = load(VERIFIED).config
-    phase = first_phase(six_observation.PROCEDURE, config, installed())
+    phase = first_phase(six_observation.PROCEDURE, config, load_procedures())
     assert phase.follows is not None and phase.follows.procedure is verify.PROCEDURE
     assert (phase.agreed, phase.follows.agreed) == (False, True)
     assert (phase.procedure.readings, phase.follows.procedure.readings) == ("raw", "calibrated")
     assert phase.follows.plan() == phase.plan() and phase.follows.follows is None
     once = load(VERIFIED, ["procedure.verify=false"]).config
-    assert first_phase(six_observation.PROCEDURE, once, installed()).follows is None
+    assert first_phase(six_observation.PROCEDURE, once, load_procedures()).follows is None
     alone = load(VERIFIED, ["procedure.name=verify"]).config
-    assert first_phase(verify.PROCEDURE, alone, installed()).follows is None
+    assert first_phase(verify.PROCEDURE, alone, load_procedures()).follows is None
 
 
 def test_a_procedure_that_is_to_follow_and_is_not_there_is_refused_by_name() -> None:
     config = load(VERIFIED).config
     with pytest.raises(Refused, match=r"no_such_procedure: .*six_observation is to be followed by 'nonesuch'"):
-        first_phase(replace(six_observation.PROCEDURE, then="nonesuch"), config, installed())
+        first_phase(replace(six_observation.PROCEDURE, then="nonesuch"), config, load_procedures())
 
 
 def failing(*_: object) -> Plan:
@@ -81,7 +81,7 @@ def ending(*_: object) -> Plan:
     ],
 )
 def test_a_planner_that_fails_is_refused_by_name(planner: Callable[..., Plan], said: str) -> None:
-    phase = first_phase(replace(six_observation.PROCEDURE, plan=planner), load(VERIFIED).config, installed())
+    phase = first_phase(replace(six_observation.PROCEDURE, plan=planner), load(VERIFIED).config, load_procedures())
     with pytest.raises(Refused, match=rf"script_failed: the procedure six_observation cannot be planned \({said}"):
         phase.plan()
 

@@ -30,7 +30,7 @@ from rig.estimation.gyroscope.budget import Budget, Contributor
 from rig.observation.by_hand.hand_segmentation import segment_session
 from rig.plans.by_hand import WantedMoves as Asked
 from rig.plans.by_hand import simulate_session
-from rig.plans.procedure_registry import installed, sections
+from rig.plans.procedure_registry import load_procedures, sections
 from rig.plans.shortest_motions import ARCS_DEG
 from rig.plans.shortest_run import find_search, plan_of, shortest_run
 from rig.turners import turner_registry as turners
@@ -89,7 +89,7 @@ def config_of(of: Run) -> RigConfig:
         return servo_loaded((*of_servo(of),)).config
     overrides = [*as_set(of.part), *said]
     overrides += ["uncertainty.crystal_ppm=50", "procedure.rest_s=1.0"]
-    return load(CONFIGS / "by_hand.yaml", overrides, sections(installed()), turners.sections()).config
+    return load(CONFIGS / "by_hand.yaml", overrides, sections(load_procedures()), turners.sections()).config
 
 
 def of_servo(of: Run) -> tuple[str, ...]:
@@ -190,7 +190,7 @@ def test_a_run_that_is_ten_times_as_noisy_is_not_what_was_predicted() -> None:
 
 @cache
 def demo() -> RigConfig:
-    return load(CONFIGS / "demo.yaml", (), sections(installed()), turners.sections()).config
+    return load(CONFIGS / "demo.yaml", (), sections(load_procedures()), turners.sections()).config
 
 
 @pytest.mark.thorough
@@ -283,7 +283,9 @@ def budgets_of(tells: Tells) -> Callable[[Candidate], Budgets]:
 def test_several_speeds_are_tried_and_keep_what_the_file_says_of_them() -> None:
     speeds = {candidate.procedure.speeds_deg_s for candidate in find_search(demo()).candidates()}  # pyrefly: ignore[missing-attribute]  # of this procedure
     assert None in speeds and (15.0, 150.0) in speeds
-    said = load(CONFIGS / "demo.yaml", ["procedure.speeds_deg_s=[20, 50]"], sections(installed()), turners.sections())
+    said = load(
+        CONFIGS / "demo.yaml", ["procedure.speeds_deg_s=[20, 50]"], sections(load_procedures()), turners.sections()
+    )
     speeds = {candidate.procedure.speeds_deg_s for candidate in find_search(said.config).candidates()}  # pyrefly: ignore[missing-attribute]  # of this procedure
     assert speeds == {(20.0, 50.0)}
 
@@ -292,7 +294,7 @@ def test_several_speeds_are_tried_and_keep_what_the_file_says_of_them() -> None:
 def in_attitudes() -> RigConfig:
     """The accelerometer of one LSM9DS1."""
     others = [f"{where}sensors.{name}=null" for where in ("", "world.") for name in ("mpu9250", "adis16465")]
-    return load(CONFIGS / "attitudes.yaml", others, sections(installed()), turners.sections()).config
+    return load(CONFIGS / "attitudes.yaml", others, sections(load_procedures()), turners.sections()).config
 
 
 @pytest.mark.slow
@@ -317,7 +319,7 @@ def test_the_accelerometers_uncertainty_is_what_a_drawn_session_reaches(part: st
     said += ["uncertainty.repeatability_deg=0", "uncertainty.acceleration_lag_ms=0", "procedure.rest_s=1"]
     unasked = {"mpu9250", "adis16465", "lsm9ds1"} - {part}
     others = [f"{where}sensors.{name}=null" for where in ("", "world.") for name in unasked]
-    config = load(CONFIGS / "imu.yaml", [*said, *others], sections(installed()), turners.sections()).config
+    config = load(CONFIGS / "imu.yaml", [*said, *others], sections(load_procedures()), turners.sections()).config
     made = turners.kind_of(config.turner).describe_configured(config.turner)
     budgets = predict_accelerometer_budgets(config, plan_of(config, config.procedure), made.kinematics)
     foretold = ReachedUncertainty.worst_case({}, budgets)
@@ -332,7 +334,9 @@ def test_the_accelerometers_uncertainty_is_what_a_drawn_session_reaches(part: st
 @pytest.mark.thorough
 @pytest.mark.slow
 def test_arcs_are_tried_where_the_encoders_are_known() -> None:
-    known = load(CONFIGS / "demo.yaml", ["uncertainty.angle_std_deg=0.01"], sections(installed()), turners.sections())
+    known = load(
+        CONFIGS / "demo.yaml", ["uncertainty.angle_std_deg=0.01"], sections(load_procedures()), turners.sections()
+    )
     arcs = {candidate.sizes[0] for candidate in find_search(known.config).candidates()}
     assert arcs >= set(ARCS_DEG)
     assert not {candidate.sizes[0] for candidate in find_search(demo()).candidates()} & set(ARCS_DEG)
@@ -342,14 +346,14 @@ def test_a_candidate_lasts_as_long_as_its_plan() -> None:
     """Where the order of the sweeps is said; and though a field test is a rest as well, it does not become shorter."""
     said = ["procedure.rest_s=2", "procedure.dwell_s=2", "procedure.field_test_s=30"]
     said += ["procedure.order=[wrist_3, wrist_1, wrist_2]", "procedure.directions=[cw, ccw]"]
-    config = load(CONFIGS / "imu.yaml", said, sections(installed()), turners.sections()).config
+    config = load(CONFIGS / "imu.yaml", said, sections(load_procedures()), turners.sections()).config
     whole = Candidate(config.procedure, (), (), plan_of(config, config.procedure).duration_s)
     for each in find_search(config).finer(whole)[::40]:
         assert each.duration_s == pytest.approx(plan_of(config, each.procedure).duration_s)
 
 
 def test_a_procedure_that_is_not_predicted_is_refused() -> None:
-    config = load(CONFIGS / "bias_drift.yaml", (), sections(installed()), turners.sections()).config
+    config = load(CONFIGS / "bias_drift.yaml", (), sections(load_procedures()), turners.sections()).config
     with pytest.raises(Refused, match="not predicted"):
         shortest_run(config, TargetUncertainty(scale=1e-3))
     with pytest.raises(Refused, match="no accelerometer"):
@@ -374,7 +378,7 @@ def test_by_hand_the_session_also_ends_when_u_is_reached(tmp_path: Path, capsys:
     written = tmp_path / "hand.yaml"
     words = ["plan", str(CONFIGS / "by_hand.yaml"), "--target-uncertainty", "scale=1.2e-3", "--write", str(written)]
     assert main(words) == 0
-    section = load(written, (), sections(installed()), turners.sections()).config.procedure
+    section = load(written, (), sections(load_procedures()), turners.sections()).config.procedure
     assert section.target_scale_u == pytest.approx((1.2e-3**2 - 1e-3**2) ** 0.5, rel=1e-3)  # pyrefly: ignore[missing-attribute]  # of this procedure
     assert main(["plan", str(CONFIGS / "by_hand.yaml"), "--target-uncertainty", "scale=9e-4"]) == 1
     assert "recordings of real hands" in " ".join(capsys.readouterr().out.split())
@@ -383,4 +387,4 @@ def test_by_hand_the_session_also_ends_when_u_is_reached(tmp_path: Path, capsys:
     assert (
         main(["plan", str(CONFIGS / "by_hand.yaml"), "--target-uncertainty", "scale=0.2", "--write", str(loose)]) == 0
     )
-    assert load(loose, (), sections(installed()), turners.sections()).config.procedure.target_scale_u is None  # pyrefly: ignore[missing-attribute]  # of this procedure
+    assert load(loose, (), sections(load_procedures()), turners.sections()).config.procedure.target_scale_u is None  # pyrefly: ignore[missing-attribute]  # of this procedure

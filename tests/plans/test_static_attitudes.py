@@ -20,7 +20,7 @@ from rig.plans.motions.shortest_tour import shortest_way
 from rig.plans.motions.static_attitudes import plan_static_attitudes
 from rig.plans.motions.sweeps_and_attitudes import plan_imu
 from rig.plans.phase import first_phase
-from rig.plans.procedure_registry import installed
+from rig.plans.procedure_registry import load_procedures
 from support.paths import CONFIGS
 from support.wires.ur10e import plan_problems
 
@@ -197,7 +197,7 @@ def test_what_are_no_attitudes_is_refused(attitudes: object, said: str) -> None:
 )
 def test_attitudes_that_do_not_tell_enough_are_refused_before_anything_moves(overrides: list[str], said: str) -> None:
     config = load(CONFIGS / "attitudes.yaml", overrides).config
-    phase = first_phase(installed()[config.procedure.name], config, installed())
+    phase = first_phase(load_procedures()[config.procedure.name], config, load_procedures())
     with pytest.raises(Refused, match=rf"rank_deficient: .*{said}"):
         phase.plan()
 
@@ -206,10 +206,10 @@ def test_attitudes_that_hardly_differ_about_one_wrist_are_refused() -> None:
     attitudes = [[wrist_1, -90, 0.1 * turn] for turn, wrist_1 in enumerate(range(-180, 180, 45))]
     config = load(CONFIGS / "attitudes.yaml", [f"procedure.attitudes={attitudes}"]).config
     with pytest.raises(Refused, match="ill_conditioned: 8 attitudes hardly determine"):
-        first_phase(installed()["static_attitudes"], config, installed()).plan()
+        first_phase(load_procedures()["static_attitudes"], config, load_procedures()).plan()
 
 
 def test_what_is_left_of_an_interrupted_run_need_not_tell_everything() -> None:
     config = load(CONFIGS / "attitudes.yaml").config
-    phase = first_phase(installed()["static_attitudes"], config, installed())
+    phase = first_phase(load_procedures()["static_attitudes"], config, load_procedures())
     assert len(phase.plan(None, range(17)).dwells) == 1

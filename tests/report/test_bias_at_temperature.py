@@ -12,7 +12,7 @@ from rig.data.entries.result_types import ErrorEntry
 from rig.data.result_file import ResultDocument, write_result
 from rig.errors import Refused
 from rig.report.exports.exported_corrections import calibrations
-from rig.report.exports.temperature import at_temperature
+from rig.report.exports.temperature import move_to_temperature
 from support.documents.certified import accelerometer, result
 
 ENDLESS = (None, None, None)
@@ -45,7 +45,7 @@ def watched(range_c: tuple[float, float] = (18.0, 31.0), **changes: Any) -> Resu
 def test_biases_move_along_the_slope_and_the_readings_corrected_by_them_do_not() -> None:
     beside = accelerometer().model_copy(update={"temperature_c": 22.0})
     before = calibrations(result().model_copy(update={"accelerometers": {"gyro": beside}}))
-    after = at_temperature(before, watched(), 30.0)
+    after = move_to_temperature(before, watched(), 30.0)
     assert [sensor.temperature_c for sensor in after.sensors] == [30.0, 30.0]
     warmer = np.array(SLOPE) * 8.0  # what every reading gains
     for old, new in zip(before.sensors, after.sensors, strict=True):
@@ -55,7 +55,7 @@ def test_biases_move_along_the_slope_and_the_readings_corrected_by_them_do_not()
 @pytest.mark.parametrize(("range_c", "wanted_c"), [((18.0, 31.0), 31.5), ((18.0, 31.0), -5.0), ((24.0, 31.0), 30.0)])
 def test_outside_of_what_was_seen_it_is_refused(range_c: tuple[float, float], wanted_c: float) -> None:
     with pytest.raises(Refused, match="only") as refused:
-        at_temperature(calibrations(result()), watched(range_c), wanted_c)
+        move_to_temperature(calibrations(result()), watched(range_c), wanted_c)
     assert refused.value.name == "temperature_outside"
 
 
@@ -63,11 +63,11 @@ def test_a_run_that_tells_no_slope_or_watched_another_sensor_is_refused() -> Non
     confounded = watched(temperature_slope=ErrorEntry(error="temperature_and_time_confounded: it warmed up"))
     for drift in (confounded, result()):
         with pytest.raises(Refused) as refused:
-            at_temperature(calibrations(result()), drift, 25.0)
+            move_to_temperature(calibrations(result()), drift, 25.0)
         assert refused.value.name == "temperature_slope_unknown"
     made = watched().provenance.model_copy(update={"sensor_serial_numbers": {"gyro": "another"}})
     with pytest.raises(Refused) as refused:
-        at_temperature(calibrations(result()), watched().model_copy(update={"provenance": made}), 25.0)
+        move_to_temperature(calibrations(result()), watched().model_copy(update={"provenance": made}), 25.0)
     assert refused.value.name == "another_sensor"
 
 

@@ -11,11 +11,11 @@ from rich.console import Console
 from rig.config.judging.judging_sections import SiteSection
 from rig.data.quantity import RATE
 from rig.data.result_file import ResultDocument, VectorEntry
-from rig.estimation.statistics.coverage import PROBABILITY, coverage_factors, covered
+from rig.estimation.statistics.coverage import PROBABILITY, coverage_factors, coverage_probability
 from rig.report.certificate.dcc import digital_certificate
 from rig.report.certificate.statements import StatedFacts
 from rig.report.kinds.bias_drift import drift_table
-from rig.report.kinds.kind_registry import followed
+from rig.report.kinds.kind_registry import history_records
 from rig.report.tables.certificate import DEG, pair
 from rig.report.terminal.result_table import print_result
 from rig.report.words.expanded_uncertainty import expanded, factor_words
@@ -59,7 +59,7 @@ def test_u_of_angles_is_the_same_in_every_outlet() -> None:
         assert f"{printed.value}° ± {printed.uncertainty}°" in page
     assert f"(± U, {k})" in page
     assert f"(± {DEG * max(widths):.2g}, {k})" in terminal(document)
-    (kept,) = (each for each in followed(document) if each.quantity == "rate")
+    (kept,) = (each for each in history_records(document) if each.quantity == "rate")
     parameters = {parameter.name: parameter.expanded for parameter in kept.parameters}
     assert [parameters[f"nonorth_{each}"] for each in ("yz", "zx", "xy")] == pytest.approx(widths)
     assert vector.g_sensitivity_std_rad_s_per_m_s2 is not None
@@ -181,4 +181,4 @@ def test_what_a_run_finds_beside_scale_and_bias_has_freedom_between_the_scarcest
         counted = [each for each in dof or () if each is not None and each >= fewest]
         assert len(counted) == 3
         factors = expanded([1.0] * 3, counted).factors
-        assert covered(factors, counted) == pytest.approx([PROBABILITY] * 3)
+        assert coverage_probability(factors, counted) == pytest.approx([PROBABILITY] * 3)

@@ -17,7 +17,7 @@ from rig.report.certificate.statements import StatedFacts
 from rig.report.exports.autopilots import ardupilot_files, px4_files
 from rig.report.exports.exported_corrections import calibrations
 from rig.report.header import calibration_header
-from rig.report.kinds.kind_registry import followed
+from rig.report.kinds.kind_registry import history_records
 from support.documents.certified import certificate
 from support.documents.dcc_rules import rule_faults, schema_faults
 from support.motions.warmed_sweeps import FROM_C, REFERENCE_C, TO_C, Drawn, drawn, session, write_files
@@ -84,7 +84,7 @@ def test_the_run_folder_has_picture_certificate_and_history(
 def test_a_history_follows_the_slopes_and_the_values_at_the_reference(
     result: ResultDocument, entry: OverTemperatureEntry
 ) -> None:
-    by_quantity = {each.quantity: each for each in followed(result)}
+    by_quantity = {each.quantity: each for each in history_records(result)}
     slopes = {parameter.name: parameter for parameter in by_quantity["rate over temperature"].parameters}
 
     assert by_quantity["rate"].temperature_c == by_quantity["rate over temperature"].temperature_c == REFERENCE_C

@@ -7,7 +7,7 @@ from rig.analysis.estimator_names import DEFAULT_ESTIMATOR
 from rig.data.entries.magnetometer import MagnetometerEntry
 from rig.data.quantity import ACCELERATION, FIELD, RATE
 from rig.data.result_file import ResultDocument, VectorEntry, read_result
-from rig.plans.recorded_run import judged, open_run
+from rig.plans.recorded_run import judge_phases, open_run
 from rig.report.certificate.certificate_page import certificate_page
 from rig.report.certificate.svg_plots import (
     HEIGHT,
@@ -53,7 +53,7 @@ def test_bars_of_solutions_without_a_model_of_their_scatter_are_called_what_they
 
 @pytest.mark.slow
 def test_bars_of_attitudes_are_what_the_solve_expects_of_them() -> None:
-    document = document_of(judged(open_run(RECORDINGS / "magnetometer"), DEFAULT_ESTIMATOR))
+    document = document_of(judge_phases(open_run(RECORDINGS / "magnetometer"), DEFAULT_ESTIMATOR))
     (acceleration,), (field,) = document.accelerometers.values(), document.magnetometers.values()
     assert isinstance(field, MagnetometerEntry)
     pictures = (

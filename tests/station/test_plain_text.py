@@ -14,7 +14,7 @@ from rig.cli import main
 from rig.errors.quoting import printable, printable_lines
 from rig.station.events import RunFolderWritten
 from rig.station.log import log
-from rig.station.plain_text import duration_words, plain, say, wrapped
+from rig.station.plain_text import duration_words, plain, say, wrap_line
 from rig.station.view import LiveView, PlainView
 from support.paths import ROOT
 
@@ -54,7 +54,7 @@ def test_a_line_for_a_pipe_shows_it_as_it_is(capsys: pytest.CaptureFixture[str])
 def test_a_terminal_gets_its_lines_broken_between_words_and_commands_whole(width: int) -> None:
     said = "rig: foreign_folder: it would connect to 192.0.2.5. Read it, then `rig check CONFIG --json`. "
     command = "rig resume runs/2026-11-25T10-00-00Z-imu --connect 192.0.2.5"
-    lines = wrapped(f"{said}If all of this is yours, state it: {command}", width)
+    lines = wrap_line(f"{said}If all of this is yours, state it: {command}", width)
     assert " ".join(" ".join(lines).split()) == f"{said}If all of this is yours, state it: {command}"
     assert any("`rig check CONFIG --json`" in line for line in lines) and lines[-1].endswith(command)
     assert all(len(line) <= width for line in lines if command not in line)

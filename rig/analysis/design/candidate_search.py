@@ -42,10 +42,10 @@ class Budgets:
         """The worst U of the budgets."""
         return ReachedUncertainty.worst_case(self.rates, self.accelerations)
 
-    def without(self, names: Collection[str]) -> "Budgets":
+    def omit(self, names: Collection[str]) -> "Budgets":
         """Return the budgets without the named contributors."""
         rates, accelerations = (
-            {sensor: budget.without(names) for sensor, budget in budgets.items()}
+            {sensor: budget.omit(names) for sensor, budget in budgets.items()}
             for budgets in (self.rates, self.accelerations)
         )
         return Budgets(rates, accelerations)

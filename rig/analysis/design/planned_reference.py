@@ -22,7 +22,7 @@ from rig.estimation.reference.sweep_harmonics import FirstHarmonic, evenly_turni
 from rig.motion.chain import DenavitHartenberg
 from rig.motion.geometry import WRIST_1
 from rig.motion.steps import Dwell, Sweep
-from rig.observation.reference.swept_acceleration import SweptAcceleration, of_turn
+from rig.observation.reference.swept_acceleration import SweptAcceleration, turn_harmonic
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +109,7 @@ def _predict_sweep(timed_step: Timed[Sweep], arm: DenavitHartenberg, walk_m_s_sq
         vibration_m_s2=np.zeros(3),
         turning_rad2_s2=evenly_turning(turn.speed_rad_s),
     )
-    return of_turn(timed_step.step, turn, harmonic)
+    return turn_harmonic(timed_step.step, turn, harmonic)
 
 
 def _add_predicted_readings(theta: Array, movement: Movement) -> Movement:

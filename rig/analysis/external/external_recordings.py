@@ -48,7 +48,7 @@ from rig.observation.external.csv_import import ExternalData, average_sweeps
 from rig.observation.external.csv_samples import Samples, samples_in
 from rig.observation.external.omission import Omitted
 from rig.observation.external.turns import TurnedData
-from rig.observation.statistics.mean import by_axis
+from rig.observation.statistics.mean import dof_by_axis
 from rig.observation.timebase import TimeBase
 
 BySweeps = Estimator | Literal["increments"]
@@ -227,7 +227,7 @@ def budget_of(solution: Estimate, data: ExternalData) -> Budget:
 
 def _fewest_of_means(data: ExternalData) -> float:
     """Return the fewest degrees of freedom of the noise of any mean."""
-    return float(by_axis(average.dof for average in [*(sweep.average for sweep in data.sweeps), *data.rests]).min())
+    return float(dof_by_axis(average.dof for average in [*(sweep.average for sweep in data.sweeps), *data.rests]).min())
 
 
 def _vector(data: ExternalData) -> VectorSolution:

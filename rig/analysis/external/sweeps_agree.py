@@ -13,7 +13,7 @@ from rig.estimation.reference.reference_budget import fewest_dof
 from rig.estimation.sensor_axes import SensorAxes, parameter_jacobian
 from rig.estimation.statistics.coverage import coverage_factors, effective_dof
 from rig.observation.external.csv_import import ExternalData
-from rig.observation.statistics.mean import by_axis
+from rig.observation.statistics.mean import dof_by_axis
 
 WRONG = 0.1  # leave-one-out residual relative to the sweep's rate: no rate table errs by this much, a wrong row does
 BEYOND_NOISE = 6.0  # residual in standard deviations of the sweep's mean
@@ -128,7 +128,7 @@ def noise_dof(solution: VectorSolution, data: ExternalData) -> float:
     """Return the smallest degrees of freedom of the noise, from the weights of the means in the vector model."""
     averages = [*(sweep.average for sweep in data.sweeps), *data.rests]
     variances = np.array([average.variance_rad2_s2 for average in averages])
-    dof = by_axis(average.dof for average in averages)
+    dof = dof_by_axis(average.dof for average in averages)
     return fewest_dof(solution.response.reshape(6, -1), variances.ravel(), dof.ravel())
 
 

@@ -19,7 +19,7 @@ from rig.motion.geometry import AXIS_ERRORS
 from rig.observation.average import Average
 from rig.observation.observe import Observation
 from rig.observation.observed_run import ObservedRun
-from rig.observation.statistics.mean import by_axis
+from rig.observation.statistics.mean import dof_by_axis
 
 ZEROS = tuple(index for index, name in enumerate(AXIS_ERRORS) if name.startswith("zero"))
 SAME_AXIS = 1 - 1e-6  # cosine between two axes: the other joints return to 1.4 mrad
@@ -87,9 +87,9 @@ def combine_recordings(parts: Sequence[RecordingPart], surroundings: Surrounding
         encoder_errors_rad_s=_encoder_errors(turns, rests, surroundings.uncertainty),
         mount_turns_rad=list_mount_rotations(stages, rests, surroundings.uncertainty.mount_deg),
         arms_m=np.concatenate([lever_arms, np.zeros((rests, 3))]),
-        noise_dof=by_axis(average.dof for average in averages),
+        noise_dof=dof_by_axis(average.dof for average in averages),
         ripples=np.array([*(turn.ripple for turn in turns), *np.zeros(rests)]),
-        roundings_rad_s=np.sqrt(by_axis(average.rounding_rad2_s2 for average in averages)),
+        roundings_rad_s=np.sqrt(dof_by_axis(average.rounding_rad2_s2 for average in averages)),
     )
 
 

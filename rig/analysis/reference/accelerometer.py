@@ -35,7 +35,7 @@ from rig.estimation.triads import Alignment, align_triads
 from rig.observation.observed_run import ObservedRun
 from rig.observation.reference.dwell_acceleration import DwellReading
 from rig.observation.reference.swept_acceleration import SweptAcceleration
-from rig.observation.statistics.mean import by_axis
+from rig.observation.statistics.mean import dof_by_axis
 
 NO_GYROSCOPES: Mapping[str, SensorResult] = MappingProxyType({})
 NOT_IDENTIFIABLE = "Set procedure.second_order: false, which makes the bias much better known; or dwell longer"
@@ -260,7 +260,7 @@ def _list_swept(name: str, recordings: Sequence[ObservedRun]) -> list[SweptAccel
 
 def _readings_dof(dwells: Sequence[DwellReading], swept: Sequence[SweptAcceleration]) -> Array:
     """Return the degrees of freedom (3 N + 9 M,) of the readings of dwells, then of the harmonics of sweeps."""
-    still = by_axis(dwell.reading.dof for dwell in dwells).ravel()
+    still = dof_by_axis(dwell.reading.dof for dwell in dwells).ravel()
     return np.concatenate([still, *(np.full(9, float(sweep.harmonic.dof)) for sweep in swept)])
 
 

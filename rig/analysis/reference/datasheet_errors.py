@@ -64,15 +64,15 @@ class Datasheet:
 def read_datasheet(uncertainty: Uncertainty, name: str, range_m_s2: float) -> Datasheet:
     """Return the data of the accelerometer of the sensor `name`, from its data sheet or the configuration."""
 
-    def stated(what: OfSensor) -> float:
+    def errors_from_datasheet(what: OfSensor) -> float:
         return uncertainty.stated_size(what, name)
 
     return Datasheet(
-        nonlinearity_percent=stated("acceleration_nonlinearity_percent"),
-        over_g=stated("acceleration_nonlinear_over_g") or range_m_s2 / STANDARD_GRAVITY_M_S2,
-        bias_mg_k=stated("acceleration_bias_mg_k"),
-        scale_ppm_k=stated("acceleration_scale_ppm_k"),
-        bias_instability_ug=stated("acceleration_bias_instability_ug"),
+        nonlinearity_percent=errors_from_datasheet("acceleration_nonlinearity_percent"),
+        over_g=errors_from_datasheet("acceleration_nonlinear_over_g") or range_m_s2 / STANDARD_GRAVITY_M_S2,
+        bias_mg_k=errors_from_datasheet("acceleration_bias_mg_k"),
+        scale_ppm_k=errors_from_datasheet("acceleration_scale_ppm_k"),
+        bias_instability_ug=errors_from_datasheet("acceleration_bias_instability_ug"),
     )
 
 

@@ -24,7 +24,7 @@ from rig.estimation.reference.magnetometer import FieldDrift, Uniformity, field_
 from rig.estimation.reference.triaxial import UNTRUSTWORTHY_RAD, Method, TriaxialSolution, solve_triaxial
 from rig.observation.field_means import field_readings, field_tests, find_companion
 from rig.observation.observed_run import ObservedRun
-from rig.observation.statistics.mean import StaticReading, by_axis
+from rig.observation.statistics.mean import StaticReading, dof_by_axis
 
 ESTIMATOR: Method = "attitude_weighted"
 REMEDY = "Take iron and currents away, or measure farther from them; set the sensor farther from the arm"
@@ -114,7 +114,7 @@ def _calibrate(
             (homogeneity, drift),
             site,
             field_t=reference.norm,
-            noise_dof=by_axis(dwell.reading.dof for dwell in dwells).ravel(),
+            noise_dof=dof_by_axis(dwell.reading.dof for dwell in dwells).ravel(),
         ),
         other_methods=attempt_each({method: partial(solve, method=method) for method in COMPARED}),
         dwells=dwells,

@@ -18,10 +18,10 @@ from rig.estimation.reference.magnetometer import FieldDrift, Uniformity
 from rig.estimation.reference.reference_budget import (
     KnownSize,
     Spread,
-    assumed,
     reference_budget,
     response_in_attitudes,
     scale_and_bias,
+    type_b,
 )
 from rig.estimation.reference.triaxial import TriaxialSolution
 
@@ -153,13 +153,13 @@ def drift_patterns(matrix: Array, attitudes: Array, drift: FieldDrift | None) ->
 
 def _lag(spread: Spread, movement: Movement, lag_s: float) -> Contributor:
     source = "uncertainty.acceleration_lag_ms"
-    return assumed("filter's lag", 1e3 * lag_s, "ms", source, spread.covariance_of(lag_pattern(movement, lag_s)))
+    return type_b("filter's lag", 1e3 * lag_s, "ms", source, spread.covariance_of(lag_pattern(movement, lag_s)))
 
 
 def _drift(spread: Spread, matrix: Array, attitudes: Array, drift: FieldDrift | None) -> Contributor:
     patterns, change_t = drift_patterns(matrix, attitudes, drift)
     if drift is None:
         source = f"procedure.field_test_s {NOT_GIVEN}"
-        return assumed("drift of the field", change_t / FIELD.bias.size, "µT", source, spread.covariance_of(patterns))
+        return type_b("drift of the field", change_t / FIELD.bias.size, "µT", source, spread.covariance_of(patterns))
     tested = spread.covariance_of(patterns)
     return Contributor("drift of the field", "A", "normal", None, "", "tests at home", float(TESTED_AXES), tested)

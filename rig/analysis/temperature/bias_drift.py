@@ -22,7 +22,7 @@ from rig.estimation.temperature.bias_by_repeat import BiasByRepeat, bias_by_repe
 from rig.estimation.temperature.bias_over_temperature import BiasOverTemperature, bias_over_temperature
 from rig.observation.finished_steps import dwell_times_s
 from rig.observation.observed_run import ObservedRun
-from rig.observation.statistics.mean import by_axis
+from rig.observation.statistics.mean import dof_by_axis
 
 FEWEST_REPEATS = 2
 SLOPE = "over_temperature"
@@ -227,7 +227,7 @@ def _combine(
 
 def _repeat_dof(repeat: Sequence[DwellMean]) -> Array:
     """Return the degrees of freedom (3,) of a repeat's mean over its attitudes."""
-    return effective_dof([mean.variance for mean in repeat], by_axis(mean.dof for mean in repeat))
+    return effective_dof([mean.variance for mean in repeat], dof_by_axis(mean.dof for mean in repeat))
 
 
 def _solve_repeat(solve: Callable[[int], TriaxialSolution], repeat: int) -> ScaleFreeBias:

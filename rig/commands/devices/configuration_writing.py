@@ -28,7 +28,7 @@ def write_checked(path: Path, answers: "Answers") -> int:
     from rig.config.files.supplied_files import locate_supplied
     from rig.config.first_configuration import configuration_text
     from rig.config.load import ConfigurationRefused, load
-    from rig.plans.procedure_registry import installed, sections
+    from rig.plans.procedure_registry import load_procedures, sections
     from rig.turners import turner_registry as turners
 
     refuse_existing(path)
@@ -38,7 +38,7 @@ def write_checked(path: Path, answers: "Answers") -> int:
         raise _not_written(path, str(error.strerror or error)) from error
     say(f"written: {path}")
     try:
-        load(path, sections=sections(installed()), turners=turners.sections())
+        load(path, sections=sections(load_procedures()), turners=turners.sections())
     except ConfigurationRefused as refused:
         say("to be filled in:")
         for problem in refused.problems:

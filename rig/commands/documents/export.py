@@ -118,7 +118,7 @@ def _make_folder(folder: Path, *, named_by_user: bool) -> None:
 def _read_calibrations(run: Path, moved: tuple[str, str] | None) -> "ExportedCalibrations":
     from rig.data.result_file import read_passed_result, read_result
     from rig.report.exports.exported_corrections import calibrations
-    from rig.report.exports.temperature import at_temperature
+    from rig.report.exports.temperature import move_to_temperature
 
     run_calibrations = calibrations(read_passed_result(run))
     if moved is None:
@@ -129,4 +129,4 @@ def _read_calibrations(run: Path, moved: tuple[str, str] | None) -> "ExportedCal
     except ValueError as error:
         remedy = "Give it as in --at-temperature 31.5 DRIFT_RUN"
         raise Refused("bad_option", f"--at-temperature {temperature} is not a temperature", remedy) from error
-    return at_temperature(run_calibrations, read_result(Path(drift)), temperature_c)
+    return move_to_temperature(run_calibrations, read_result(Path(drift)), temperature_c)

@@ -268,10 +268,10 @@ def _recompute_finished(folder: Path, history: History, *, solve: bool) -> Finis
             )
     from rig.history.entered.recomputed_result import not_given
     from rig.history.integrity import MOST_TOLD
-    from rig.plans.recorded_run import judged, open_run
+    from rig.plans.recorded_run import judge_phases, open_run
     from rig.report.document import document_of
 
-    document = document_of(judged(open_run(folder)))
+    document = document_of(judge_phases(open_run(folder)))
     differing = list[str]() if claimed is None else not_given(claimed.document, document)
     if claimed is not None and not differing:
         return claimed

@@ -20,7 +20,13 @@ from rig.data.version import VERSION
 from rig.errors import Fault, Refused
 from rig.history.recompute.recompute_journal import JOURNAL, RecomputeJournal, RecomputeQuestion
 from rig.history.recompute.recompute_report import CSV, PAGE, again_csv, again_page, counts, notable_table
-from rig.history.recompute.result_comparison import Answer, RecomputeOutcome, StatedResult, compared, pending_recordings
+from rig.history.recompute.result_comparison import (
+    Answer,
+    RecomputeOutcome,
+    StatedResult,
+    match_answers,
+    pending_recordings,
+)
 from rig.history.recompute.selection import list_stated_results
 from rig.history.store import Selection
 from rig.station.plain_text import say
@@ -53,7 +59,7 @@ def recompute_history(options: Namespace, solve: Solve = solve_task) -> int:
             for result in remaining
         ]
         lost = _solve_all(tasks, options, solve, journal, answers)
-    outcome = compared(stated, answers, options.u_fraction)
+    outcome = match_answers(stated, answers, options.u_fraction)
     with refuse_unwritable(out):
         write_new(out / CSV, again_csv(outcome))
         write_new(out / PAGE, again_page(outcome, question, label))

@@ -75,9 +75,9 @@ def _find_damage(file: Path, entered: EnteredRecording) -> Unsolved | None:
 
 
 def _solve(folder: Path, task: Task) -> Answer:
-    from rig.plans.recorded_run import judged, left_out, open_run
+    from rig.plans.recorded_run import describe_omission, judge_phases, open_run
     from rig.report.document import document_of
-    from rig.report.kinds.kind_registry import followed
+    from rig.report.kinds.kind_registry import history_records
 
     load_hdf5()  # once, for the processes that read all the recordings
     try:
@@ -85,7 +85,7 @@ def _solve(folder: Path, task: Task) -> Answer:
     except (RigError, OSError) as error:
         return Unsolved("failed", f"{folder} cannot be read: {error}")
     try:
-        outcome = judged(recorded.override_settings(task.overrides), task.estimator)
+        outcome = judge_phases(recorded.override_settings(task.overrides), task.estimator)
     except RigError as error:
         state: State = "unjudged" if error.name in UNJUDGED else "failed" if error.name in NOT_HERE else "refused"
         return Unsolved(state, f"{folder}: {error}")
@@ -93,6 +93,6 @@ def _solve(folder: Path, task: Task) -> Answer:
     return RecomputedResult(
         document.verdict,
         tuple(check.name for check in document.checks if not check.passed),
-        followed(document),
-        left_out(recorded),
+        history_records(document),
+        describe_omission(recorded),
     )

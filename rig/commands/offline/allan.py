@@ -60,7 +60,7 @@ def _analyse_logs(paths: Sequence[Path], columns: Path | None) -> "dict[str, Sen
 
 
 def _analyse_run(path: Path) -> "dict[str, SensorAtRest]":
-    from rig.analysis.rest_noise import at_rest, log_at_rest
+    from rig.analysis.rest_noise import log_at_rest, rest_noises
     from rig.observation.external.csv_samples import samples_in
     from rig.plans.recorded_run import open_run
 
@@ -73,4 +73,4 @@ def _analyse_run(path: Path) -> "dict[str, SensorAtRest]":
         )
     if (read := recorded[0].external) is not None:
         return {read.item.name: log_at_rest(samples_in(read.readings, str(path)))}
-    return at_rest(recorded)
+    return rest_noises(recorded)

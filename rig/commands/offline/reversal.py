@@ -23,13 +23,13 @@ def run(options: Namespace) -> int:
     from rig.analysis.reversal import reversals
     from rig.config.files.safe_writing import write_new
     from rig.observation.motion.arm_motion import turner_of
-    from rig.plans.recorded_run import judged, open_run
+    from rig.plans.recorded_run import judge_phases, open_run
     from rig.report.terminal.reversal import print_reversal, reversal_document
 
     opened = [(str(path), open_run(path)) for path in options.runs]
     for _, run in opened:
         turner_of(run.movement[0])
-    document = reversal_document(reversals([(name, judged(run)) for name, run in opened]))
+    document = reversal_document(reversals([(name, judge_phases(run)) for name, run in opened]))
     print_reversal(document, as_json=options.json)
     if options.out is not None:
         try:

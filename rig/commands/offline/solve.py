@@ -86,14 +86,14 @@ def _solve_recording(options: Namespace) -> int:
     from rig.data.recording.run_reading import reading_ahead
 
     with reading_ahead(options.run) as begun:
-        from rig.plans.recorded_run import judged, left_out, open_run
+        from rig.plans.recorded_run import describe_omission, judge_phases, open_run
         from rig.report.document import document_of
         from rig.report.terminal.result_table import print_outcome
 
         run = open_run(options.run, options.script, begun=begun).override_settings(options.overrides)
     say_on_terminal("solving")
-    outcome = judged(run, options.estimator)
-    if (omission := left_out(run)) is not None:
+    outcome = judge_phases(run, options.estimator)
+    if (omission := describe_omission(run)) is not None:
         say(omission, sys.stderr)
     folder = options.run if options.run.is_dir() else options.run.parent
     print_outcome(document_of(outcome), as_json=options.json, whole=options.all, folder=folder)

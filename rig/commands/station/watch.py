@@ -114,7 +114,7 @@ def _replay(recorded: "Iterator[Moment]", feed: "Feed", speed: float) -> None:
 
 def _read_ending(folder: Path, result: "ResultDocument | None") -> "Iterator[RunEvent]":
     from rig.data.run_folder import CERTIFICATE, RESULT, TRUTH
-    from rig.page.replay import ended
+    from rig.page.replay import end_events
     from rig.station.events import DocumentWritten, Interrupted
 
     if (folder / CERTIFICATE).is_file():
@@ -125,7 +125,7 @@ def _read_ending(folder: Path, result: "ResultDocument | None") -> "Iterator[Run
     yield DocumentWritten(folder / RESULT)
     if (folder / TRUTH).is_file():
         yield DocumentWritten(folder / TRUTH)
-    yield from ended(result)
+    yield from end_events(result)
 
 
 def read_last_words(folder: Path) -> str:

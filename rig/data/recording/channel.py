@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from firmware_host.samples import STAMPS
-from rig.data.installed_kinds import measured
+from rig.data.installed_kinds import channel_contents
 from rig.data.quantity import TEMPERATURE, Quantity, Scalar
 from rig.data.validation import Finite, Positive
 from rig.estimation.arrays import Array
@@ -47,7 +47,7 @@ class Channel:
     @property
     def measures(self) -> Quantity | Scalar:
         """The quantity or scalar that the channel holds."""
-        return measured()[self.quantity]
+        return channel_contents()[self.quantity]
 
     @property
     def resolution(self) -> float:

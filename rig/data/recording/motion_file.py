@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from rig.config.section import SensorName
-from rig.data.installed_kinds import measured, quantities
+from rig.data.installed_kinds import channel_contents, quantities
 from rig.data.quantity import TEMPERATURE, Quantity
 from rig.data.recording.channel import Channel, sample_dtype
 from rig.data.recording.layout_keys import NOT_STATED
@@ -137,7 +137,7 @@ class ReadElsewhere:
     @property
     def sensor(self) -> RecordedSensor:
         """The item as a recorded sensor, whose samples hold readings and no counts, on a clock of their own."""
-        present = [channel for channel in measured().values() if channel.columns[0] in self.readings]
+        present = [channel for channel in channel_contents().values() if channel.columns[0] in self.readings]
         time_s = self.readings[TIME]
         span_s = float(np.ptp(time_s)) if len(time_s) else 0.0
         return RecordedSensor(

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from rig.config.sensors.sensor_sections import AccelerationSection, ConfiguredSensor, mounting_matrix
-from rig.data.installed_kinds import measured
+from rig.data.installed_kinds import channel_contents
 from rig.data.quantity import RATE, TEMPERATURE, Quantity, Scalar
 from rig.data.recording.channel import MAX_CHANNELS, Channel, sample_dtype
 from rig.data.validation import Finite, Positive, validate
@@ -135,9 +135,9 @@ def sensor_of(document: Mapping[str, Any]) -> RecordedSensor:
     """
     sensor = validate(RecordedSensor, document, "sensor")
     quantities = [channel.quantity for channel in sensor.channels]
-    names = ", ".join(measured())
+    names = ", ".join(channel_contents())
     for quantity in quantities:
-        if quantity not in measured() or quantities.count(quantity) > 1:
+        if quantity not in channel_contents() or quantities.count(quantity) > 1:
             raise ValueError(f"the {sensor.part} measures {quote(quantity)}, which is not one of {names}")
     _ = sensor.sample_dtype
     if sensor.measures(RATE) and sensor.channel(RATE).range is None:

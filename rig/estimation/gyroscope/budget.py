@@ -81,7 +81,7 @@ class Budget:
         """Return the standard uncertainties (6,) due to one contributor. Raise KeyError as `line` does."""
         return self.line(name).std
 
-    def without(self, names: Collection[str]) -> "Budget":
+    def omit(self, names: Collection[str]) -> "Budget":
         """Return the budget without the named contributors."""
         return replace(
             self, contributors=tuple(contributor for contributor in self.contributors if contributor.name not in names)

@@ -47,7 +47,7 @@ class AccelerometerErrors:
     louder: Array | None = None
     turning_m_s2: float = 0.0
 
-    def without(self, segment: int) -> "AccelerometerErrors":
+    def omit(self, segment: int) -> "AccelerometerErrors":
         """Return the errors without one dwell's or sweep's own errors; `segment` is its index."""
         remaining = np.arange(len(self.warmer_k)) != segment
         return replace(

@@ -111,7 +111,7 @@ class Movement:
     arm_turns: Array | None = None
     own_share: float = OWN_SHARE
 
-    def without(self, dwell: int) -> "Movement":
+    def omit(self, dwell: int) -> "Movement":
         """Return the movement without one dwell."""
         remaining = np.arange(len(self.dwells.readings_m_s2)) != dwell
         dwells, columns = self.dwells, np.arange(OWN_ERRORS * dwell, OWN_ERRORS * (dwell + 1))
@@ -120,7 +120,7 @@ class Movement:
             dwells=Dwells(
                 dwells.readings_m_s2[remaining], dwells.variances_m2_s4[remaining], dwells.attitudes[remaining]
             ),
-            sensor_errors=None if self.sensor_errors is None else self.sensor_errors.without(dwell),
+            sensor_errors=None if self.sensor_errors is None else self.sensor_errors.omit(dwell),
             arm_turns=None if self.arm_turns is None else np.delete(self.arm_turns, columns, axis=1),
         )
 

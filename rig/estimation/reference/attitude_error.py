@@ -58,7 +58,7 @@ class Placed:
     attitude_std_rad: Array
     norm_known: bool
 
-    def without(self, attitude: int) -> "Placed":
+    def omit(self, attitude: int) -> "Placed":
         """Return the readings without one attitude."""
         remaining = np.arange(len(self.readings)) != attitude
         return Placed(
@@ -112,7 +112,7 @@ def find_worst_attitude(start: Array, placed: Placed, fit: AttitudeWeighted) -> 
     """
     residuals = placed.readings - predicted(fit.theta, placed.attitudes, placed.v_bar)
     worst = int(np.argmax(np.sum(whitened(fit.whiteners, residuals) ** 2, axis=1)))
-    rest = solve_attitude_weighted(start, placed.without(worst))
+    rest = solve_attitude_weighted(start, placed.omit(worst))
     missed = placed.readings[worst] - predicted(rest.theta, placed.attitudes, placed.v_bar)[worst]
     rotation = effects(rest.theta, placed.attitudes, placed.v_bar)[worst]
     error_rad = np.linalg.lstsq(rotation, missed, rcond=1e-6)[0]  # rotations about the reference are not identifiable

@@ -179,7 +179,7 @@ def _find_worst_dwell(start: Array, movement: Movement, fixed: list[int], fit: F
     )
     misfit = np.sum(residuals * np.linalg.solve(spread, residuals[..., None])[..., 0], axis=1)
     worst = int(np.argmax(misfit))
-    rest = most_likely(start, movement.without(worst), fixed, None)
+    rest = most_likely(start, movement.omit(worst), fixed, None)
     missed = (movement.readings() - predicted(rest.theta, movement))[worst]
     rotation = turned(rest.theta, movement)[3 * worst : 3 * worst + 3, 3 * worst : 3 * worst + 3]
     error_rad = np.linalg.lstsq(rotation, missed, rcond=1e-6)[0]  # rotations about the reference are not identifiable

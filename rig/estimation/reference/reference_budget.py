@@ -129,7 +129,7 @@ def reference_budget(spread: Spread, size: KnownSize, others: Sequence[Contribut
     return Budget((*contributors, _evaluate_norm(spread.scale, size), *others))
 
 
-def assumed(name: str, half_width: float, unit: str, source: str, covariance: Array) -> Contributor:
+def type_b(name: str, half_width: float, unit: str, source: str, covariance: Array) -> Contributor:
     """Return a contributor of type B; `covariance` (6, 6) is the effect of its half-width."""
     return Contributor(name, "B", "rectangular", half_width, unit, source, np.inf, covariance / 3)
 

@@ -30,12 +30,12 @@ def coverage_factors(dof: ArrayLike) -> Array:
     return factors
 
 
-def covered(factors: ArrayLike, dof: ArrayLike) -> Array:
+def coverage_probability(factors: ArrayLike, dof: ArrayLike) -> Array:
     """Return the probability that value ± k u contains the true value, for k and ν of one shape."""
-    return 1 - 2 * beyond(factors, dof)
+    return 1 - 2 * tail_probability(factors, dof)
 
 
-def beyond(distances: ArrayLike, dof: ArrayLike) -> Array:
+def tail_probability(distances: ArrayLike, dof: ArrayLike) -> Array:
     """Return the one-sided probability that the true value is farther away than this many standard uncertainties."""
     distance, whole_dof = np.broadcast_arrays(np.asarray(distances, dtype=np.float64), _round_down(dof))
     tails = np.array([math.erfc(value / math.sqrt(2)) / 2 for value in distance.ravel()]).reshape(distance.shape)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 def enter_run(connection: Connection, finished: FinishedRun, content_sha256: str) -> int:
     """Add a run with all that belongs to it; return its number."""
     from rig.history.entered.index import run_row
-    from rig.report.kinds.kind_registry import followed
+    from rig.report.kinds.kind_registry import history_records
 
     run_id = next_number(connection, schema.run)
     row = {
@@ -37,7 +37,7 @@ def enter_run(connection: Connection, finished: FinishedRun, content_sha256: str
     if finished.documents:
         rows = [{"run_id": run_id, "name": name, "sha256": sha256} for name, sha256 in finished.documents]
         connection.execute(insert(schema.document), rows)
-    for record in followed(finished.document):
+    for record in history_records(finished.document):
         is_standard = record.serial_number in finished.check_standards
         _enter_calibration(connection, run_id, record, check_standard=is_standard)
     journal.note(connection, schema.run, run_id)

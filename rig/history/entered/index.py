@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 
 from rig.data.result_file import ResultDocument
 from rig.report.findings.history_records import HistoryRecord, Parameter
-from rig.report.kinds.kind_registry import followed
+from rig.report.kinds.kind_registry import history_records
 
 SAME = 1e-6  # difference relative to the standard uncertainty: more than by the rounding of another processor
 
@@ -51,7 +51,7 @@ def utc(text: str) -> str:
 
 def unlike(document: ResultDocument, recomputed: Sequence[HistoryRecord]) -> Iterator[str]:
     """Yield how `recomputed` calibrations differ from the stated ones, beyond a processor's rounding."""
-    stated = {(record.sensor, record.quantity): record for record in followed(document)}
+    stated = {(record.sensor, record.quantity): record for record in history_records(document)}
     present = {(record.sensor, record.quantity): record for record in recomputed}
     for sensor, quantity in sorted(stated.keys() ^ present.keys()):
         yield f"{quantity} of {sensor}, which only one of them has"

@@ -9,7 +9,7 @@ from rig.data.installed_kinds import quantities
 from rig.data.result_file import CheckEntry, ResultDocument
 from rig.history.entered.index import SAME, unlike
 from rig.report.findings.history_records import BIASES, SCALES, HistoryRecord
-from rig.report.kinds.kind_registry import followed
+from rig.report.kinds.kind_registry import history_records
 
 ROUNDING = 1e-15  # values that are zero except for rounding: no quantity of a result is as small
 # The same result may take other iterations, and has another time.
@@ -29,9 +29,9 @@ def not_given(claimed: ResultDocument, recomputed: ResultDocument) -> list[str]:
     checks = {check.name: _check_values(check) for check in recomputed.checks}
     rows += [check.name for check in claimed.checks if checks.get(check.name) != _check_values(check)]
     numbers = _differences(_numbers_of(claimed), _numbers_of(recomputed), "")
-    stated = {(record.sensor, record.quantity): record for record in followed(claimed)}
+    stated = {(record.sensor, record.quantity): record for record in history_records(claimed)}
     records = []
-    for record in followed(recomputed):
+    for record in history_records(recomputed):
         key = record.sensor, record.quantity
         if record.quantity in quantities() or key in stated:
             records.append(_drop_later_parameters(record, stated.get(key)))

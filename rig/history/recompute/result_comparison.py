@@ -193,7 +193,9 @@ class RecomputeOutcome:
         return tuple(comparison for comparison in self.compared if not comparison.same)
 
 
-def compared(stated: Iterable[StatedResult], answers: Mapping[str, Answer], of_u: float = OF_U) -> RecomputeOutcome:
+def match_answers(
+    stated: Iterable[StatedResult], answers: Mapping[str, Answer], of_u: float = OF_U
+) -> RecomputeOutcome:
     """Return the results with their answers, matched by the checksum of the result."""
     return RecomputeOutcome(
         of_u, tuple(Compared(result, answers.get(result.content_sha256), of_u) for result in stated)

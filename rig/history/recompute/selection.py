@@ -11,7 +11,7 @@ from rig.history.entered.finished_run import EnteredRecording
 from rig.history.entered.issued_certificate import Issued
 from rig.history.recompute.result_comparison import StatedResult
 from rig.history.storage import schema
-from rig.history.store import History, Past, Selection, chosen, replaced
+from rig.history.store import History, Past, Selection, chosen, replacement_condition
 
 Value = TypeVar("Value")
 _RUN = schema.run.c
@@ -27,7 +27,14 @@ def list_stated_results(history: History, selection: Selection) -> tuple[StatedR
     for past in history.calibrations(selection, replaced_too=True):
         pasts[past.run_id].append(past)
     includes_all = selection.serial_number is None and selection.part is None
-    query = select(_RUN.id, _RUN.content_sha256, _RUN.started_utc, _RUN.rig, _RUN.verdict, replaced().label("replaced"))
+    query = select(
+        _RUN.id,
+        _RUN.content_sha256,
+        _RUN.started_utc,
+        _RUN.rig,
+        _RUN.verdict,
+        replacement_condition().label("replaced"),
+    )
     runs = chosen(query.order_by(_RUN.started_utc, _RUN.id), replace(selection, serial_number=None, part=None))
     with history.engine.connect() as connection:
         rows = connection.execute(runs).all()

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from rig.data.recording.run_data import RunData
 from rig.estimation.arrays import Array
 from rig.observation.arm_rests import REST_SETTLING_S
-from rig.observation.windows import Window, rested, swept
+from rig.observation.windows import Window, iterate_rests, swept
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +23,7 @@ class MovementMasks:
 
 def mask_movement(run: RunData, time_s: Array) -> MovementMasks:
     """Return the masks of samples at controller times (n,), in a recording that holds a sweep."""
-    sweeps, rests = [finished.window for finished in swept(run)], list(rested(run))
+    sweeps, rests = [finished.window for finished in swept(run)], list(iterate_rests(run))
     return MovementMasks(
         moving=_mask_windows(time_s, Window(sweeps[0].start_s, max(window.end_s for window in [*sweeps, *rests]))),
         sweeping=_mask_windows(time_s, *sweeps),

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from rig.data.quantity import ACCELERATION
 from rig.estimation.arrays import Array
-from rig.observation.average import between
+from rig.observation.average import slice_time
 from rig.observation.consistency.raw_readings import REST, RawReadings, counts_of
 from rig.observation.field_means import read_field_in_dwells
 from rig.observation.observed_run import ObservedRun
@@ -49,7 +49,7 @@ def raw_acceleration_dwells(name: str, recording: ObservedRun, matrix: Array) ->
     per_count = matrix / stream.sensor.channel(ACCELERATION).unit_per_count
     dwells = []
     for dwell in recording.sensors[name].dwells:
-        inside = between(stream, dwell.window.start_s, dwell.window.end_s)
+        inside = slice_time(stream, dwell.window.start_s, dwell.window.end_s)
         counts = counts_of(stream, ACCELERATION, inside)
         attitudes = recording.motion.attitudes(stream.time_s[inside])
         swing = gravity_difference(attitudes, attitudes.mean(axis=0), stream.sensor, site) @ per_count.T
@@ -64,7 +64,7 @@ def raw_acceleration_sweeps(name: str, recording: ObservedRun) -> list[RawReadin
     for index, turn in enumerate(recording.sensors[name].revolutions):
         if turn.acceleration is not None:
             lsb = stream.sensor.channel(ACCELERATION).unit_per_count
-            inside, wave = between(stream, turn.average.start_s, turn.average.end_s), turn.acceleration.harmonic
+            inside, wave = slice_time(stream, turn.average.start_s, turn.average.end_s), turn.acceleration.harmonic
             counts = counts_of(stream, ACCELERATION, inside)
             sweeps.append(RawReadings(index, counts, wave.residuals_m_s2 / lsb, wave.vibration_m_s2 / lsb))
     return sweeps

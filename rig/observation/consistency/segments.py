@@ -14,7 +14,7 @@ from rig.data.quantity import RATE
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.mean_weights import even_groups, mean_weights
 from rig.estimation.statistics.rounding import Steps
-from rig.observation.average import Average, Stream, between
+from rig.observation.average import Average, Stream, slice_time
 from rig.observation.consistency.raw_readings import REST, RawReadings, counts_of
 from rig.observation.motion.arm_motion import ArmMotion
 from rig.observation.observe import Observation, fit_response
@@ -142,7 +142,7 @@ class _Division:
 
 def _divide(stream: Stream, average: Average, usable: NDArray[np.bool_], count: int) -> _Division:
     """Divide the `usable` samples (n,) of an average into `count` segments, or fewer for few samples."""
-    inside = between(stream, average.start_s, average.end_s)
+    inside = slice_time(stream, average.start_s, average.end_s)
     time_s = stream.time_s[inside]
     count = max(1, min(count, int(usable.sum()) // FEWEST_SAMPLES))
     ends_s = np.linspace(average.start_s, average.end_s, count + 1)
@@ -164,7 +164,7 @@ def _segment_revolution(
     measure only in part does not count as noise of a segment.
     """
     average, axis = turn.average, turn.axis_flange
-    times_s = stream.time_s[between(stream, average.start_s, average.end_s)]
+    times_s = stream.time_s[slice_time(stream, average.start_s, average.end_s)]
     division = _divide(stream, average, motion.covered(times_s), count)
     rates = motion.rates_at_samples(times_s)[division.used]
     fraction = (division.time_s - average.start_s) / average.duration_s
@@ -197,7 +197,7 @@ def _segment_revolution(
 
 def _segment_rest(stream: Stream, motion: ArmMotion, average: Average, count: int, response: Array) -> SegmentedAverage:
     """Average a rest in segments, without vibrations and the arm's oscillation: see `average_rests`."""
-    inside = between(stream, average.start_s, average.end_s)
+    inside = slice_time(stream, average.start_s, average.end_s)
     division = _divide(stream, average, np.ones(inside.stop - inside.start, dtype=np.bool_), count)
     readings = division.readings_rad_s - motion.swing_rates(division.time_s) @ response.T
     division = replace(division, readings_rad_s=readings)

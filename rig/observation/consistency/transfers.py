@@ -21,14 +21,14 @@ from rig.data.recording.settings import Site
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.rounding import bound_rounding_variance
 from rig.motion.geometry import flange_attitude, flange_pose
-from rig.observation.average import Stream, between
+from rig.observation.average import Stream, slice_time
 from rig.observation.consistency.segments import MotionInterval
 from rig.observation.motion.arm_motion import ArmMotion
 from rig.observation.motion.reference_motion import MIN_RATE_RAD_S
 from rig.observation.observed_run import ObservedRun
 from rig.observation.statistics.spectral_lines import unit_columns
 from rig.observation.statistics.tapered_weights import noise_at_zero
-from rig.observation.windows import rested, swept
+from rig.observation.windows import iterate_rests, swept
 
 BEYOND_S = 0.1  # time before and after the motion: an arm at this speed may still be moving
 SHORTEST_S, LONGEST_S = 0.5, 30.0
@@ -80,7 +80,7 @@ def average_transfers(
     for recording in recordings:
         stream = recording.stream(name)
         for interval in _find_transfers(recording.run, stream, recording.motion):
-            inside = between(stream, interval.start_s, interval.end_s)
+            inside = slice_time(stream, interval.start_s, interval.end_s)
             readings, time_s = stream.readings_rad_s[inside], stream.time_s[inside]
             moving = interval.motion.rate(time_s) @ matrix.T
             transfers.append(
@@ -156,7 +156,7 @@ def _find_transfers(run: RunData, stream: Stream, motion: ArmMotion) -> Iterator
     """
     if not motion.tells_parts_of_turns:
         return
-    windows = sorted([*(sweep.window for sweep in swept(run)), *rested(run)], key=lambda window: window.start_s)
+    windows = sorted([*(sweep.window for sweep in swept(run)), *iterate_rests(run)], key=lambda window: window.start_s)
     for before, after in pairwise(windows):
         yield from _whole_transfer(before.end_s, after.start_s, stream, motion)
     if windows:
@@ -168,7 +168,7 @@ def _whole_transfer(start_s: float, end_s: float, stream: Stream, motion: ArmMot
     transfer = find_transfer(motion, start_s, end_s)
     if transfer is None:
         return
-    samples = between(stream, transfer.start_s, transfer.end_s)
+    samples = slice_time(stream, transfer.start_s, transfer.end_s)
     time_s = stream.time_s[samples]
     if len(time_s) < 2 or np.diff(time_s).mean() > SPARSE_S:
         return

@@ -16,7 +16,7 @@ from rig.errors import Fault
 from rig.errors.attempts import Attempts, attempt_each
 from rig.estimation.arrays import Array
 from rig.observation.arm_rests import MIN_SAMPLES_AT_REST
-from rig.observation.average import Stream, between, steps_of
+from rig.observation.average import Stream, slice_time, steps_of
 from rig.observation.lost_samples import lost_samples
 from rig.observation.motion.arm_motion import ArmMotion
 from rig.observation.oscillation import MAX_TRAVEL_AT_REST_RAD
@@ -109,7 +109,7 @@ def _dwell_reading(
 ) -> DwellReading:
     dwell, window = finished.dwell, trim_dwell(run, finished).window
     where = f"dwell {dwell.index} ({dwell.name})"
-    inside = between(stream, window.start_s, window.end_s)
+    inside = slice_time(stream, window.start_s, window.end_s)
     _check_standstill(motion, window, where)
     check_complete(stream.sensor, stream.raw[inside], where, settings)
     check_acceleration(stream, inside, where)

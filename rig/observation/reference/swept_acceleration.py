@@ -9,7 +9,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.reference.sweep_harmonics import FirstHarmonic, first_harmonic
 from rig.estimation.sensor_axes import nearest_rotation
 from rig.motion.steps import Sweep
-from rig.observation.average import Stream, between
+from rig.observation.average import Stream, slice_time
 from rig.observation.motion.arm_motion import ArmMotion
 from rig.observation.motion.revolution import Revolution, describe
 from rig.observation.reference.dwell_acceleration import accelerations, check_acceleration, gravity_difference
@@ -43,7 +43,7 @@ def swept_acceleration(
     changes, so gravity's difference between this and the arm's attitude is subtracted. Raise Fault `saturation`,
     `stuck_sensor`, `incomplete_revolution` or `not_finite`.
     """
-    inside = between(stream, turn.start_s, turn.end_s)
+    inside = slice_time(stream, turn.start_s, turn.end_s)
     check_acceleration(stream, inside, describe(sweep), turning=True)
     time_s = stream.time_s[inside]
     covered = motion.covered(time_s)
@@ -59,7 +59,7 @@ def swept_acceleration(
         coloured=fit_inflation,
         swings=line_columns,
     )
-    return of_turn(sweep, replace(turn, attitude=began), harmonic)
+    return turn_harmonic(sweep, replace(turn, attitude=began), harmonic)
 
 
 def _rotations(axis: Array, angle_rad: Array) -> Array:
@@ -70,7 +70,7 @@ def _rotations(axis: Array, angle_rad: Array) -> Array:
     return rotations
 
 
-def of_turn(sweep: Sweep, turn: Revolution, harmonic: FirstHarmonic) -> SweptAcceleration:
+def turn_harmonic(sweep: Sweep, turn: Revolution, harmonic: FirstHarmonic) -> SweptAcceleration:
     """Return the first harmonic of a sweep together with the arm's attitude, axis and station."""
     return SweptAcceleration(
         sweep=sweep.index,

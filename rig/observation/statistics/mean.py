@@ -87,7 +87,7 @@ class ReadAtRest:
     expected: float | None
 
 
-def by_axis(dofs: Iterable[Array | float]) -> Array:
+def dof_by_axis(dofs: Iterable[Array | float]) -> Array:
     """Return degrees of freedom (N, 3) of the variances of N means, from one number for all axes or three."""
     return np.array([np.broadcast_to(dof, 3) for dof in dofs])
 

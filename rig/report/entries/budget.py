@@ -12,7 +12,7 @@ from rig.data.entries.budget import (
 )
 from rig.estimation.gyroscope.budget import Budget
 from rig.estimation.gyroscope.vector_fit import Explained
-from rig.estimation.statistics.coverage import covered
+from rig.estimation.statistics.coverage import coverage_probability
 from rig.report.entry import entry
 
 HOUR_S = 3600.0
@@ -31,7 +31,7 @@ def budget_entry(budget: Budget) -> BudgetEntry:
         contributors=lines,
         coverage_factor=float(factors.max()),
         degrees_of_freedom=[_finite(dof) for dof in budget.dof.tolist()],
-        coverage_probabilities=covered(factors, budget.dof),
+        coverage_probabilities=coverage_probability(factors, budget.dof),
     )
 
 

@@ -128,7 +128,10 @@ def _other_rates(attitudes: InAttitudes) -> dict[str, RateSolutionEntry | ErrorE
     def solution_entry(other: TriaxialSolution) -> RateSolutionEntry:
         return entry(RateSolutionEntry, other, scale=scale_of(other.matrix), bias_rad_s=-other.bias)
 
-    return {str(method): other for method, other in attitudes.other_methods.by_key(solution_entry, error_entry).items()}
+    return {
+        str(method): other
+        for method, other in attitudes.other_methods.results_by_key(solution_entry, error_entry).items()
+    }
 
 
 def _attitude_results(outcome: Outcome, quantity: Quantity) -> list[tuple[str, Item, Site, InAttitudes]]:

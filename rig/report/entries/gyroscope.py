@@ -29,7 +29,7 @@ from rig.report.entries.budget import bias_process_entry, budget_entry
 from rig.report.entries.by_hand import hand_entry
 from rig.report.entries.earth_rate import earth_rate_entry
 from rig.report.entries.error import error_entry
-from rig.report.entry import counted, entry
+from rig.report.entry import dof_or_none, entry
 
 if TYPE_CHECKING:
     from rig.analysis.gyroscope.onboard_check import Agreement
@@ -109,12 +109,12 @@ def _vector_or_error(result: SensorResult) -> VectorEntry | ErrorEntry:
     more: dict[str, Any] = {}
     if result.explained is not None:
         more["residuals_std_rad_s"] = residual_std_rad_s(result.explained)
-        if (angles_dof := counted(angle_dof(result))) is not None:
+        if (angles_dof := dof_or_none(angle_dof(result))) is not None:
             more |= {
                 "non_orthogonality_degrees_of_freedom": angles_dof[:3],
                 "mounting_degrees_of_freedom": angles_dof[3:],
             }
-        if (sensitivity_dof := counted(g_sensitivity_dof(result))) is not None:
+        if (sensitivity_dof := dof_or_none(g_sensitivity_dof(result))) is not None:
             more["g_sensitivity_degrees_of_freedom"] = sensitivity_dof
     return vector_entry(outcome, **more)
 

@@ -61,7 +61,7 @@ def triad_entry(
         covariance_units=models.quantity.parameter_units,
         **_attitude_error(result.solution.attitude_error),
         dwells=[_dwell_entry(models, *row) for row in zip(dwells, *residuals, strict=True)],
-        other_methods=result.other_methods.by_key(partial(_other_entry, models), error_entry),
+        other_methods=result.other_methods.results_by_key(partial(_other_entry, models), error_entry),
         **more,
     )  # fmt: skip
 
@@ -72,7 +72,7 @@ def attitudes_entry(
     """Return the entry of a sensor that was calibrated in attitudes alone."""
     solution = result.solution
     residuals = solution.residuals, attitude_residual_std(solution, result.measurements)
-    bias = {models.quantity.named("bias"): solution.bias}
+    bias = {models.quantity.file_key("bias"): solution.bias}
     return triad_entry(models, result, sensor, residuals, estimator=solution.method, **bias, **more)
 
 
@@ -86,7 +86,7 @@ def _attitude_error(error: AttitudeError | None) -> dict[str, float | None]:
 
 def _other_entry(models: Models[Any], other: TriaxialSolution) -> Entry:
     """Return the entry of another method's solution."""
-    return entry(models.other, other, scale=scale_of(other.matrix), **{models.quantity.named("bias"): other.bias})
+    return entry(models.other, other, scale=scale_of(other.matrix), **{models.quantity.file_key("bias"): other.bias})
 
 
 def _dwell_entry(
@@ -98,10 +98,10 @@ def _dwell_entry(
         models.dwell, dwell, read,
         duration_s=dwell.window.end_s - dwell.window.start_s,
         **{
-            quantity.named("mean"): read.mean,
-            quantity.named("mean_std"): np.sqrt(read.variance),
-            quantity.named("noise"): read.noise,
-            quantity.named("residual"): residual,
-            quantity.named("residual_std"): residual_std,
+            quantity.file_key("mean"): read.mean,
+            quantity.file_key("mean_std"): np.sqrt(read.variance),
+            quantity.file_key("noise"): read.noise,
+            quantity.file_key("residual"): residual,
+            quantity.file_key("residual_std"): residual_std,
         },
     )  # fmt: skip

@@ -19,7 +19,7 @@ from rig.report.findings.linear_corrections import Corrected
 WATCHED = (RATE, ACCELERATION)  # a run of `bias_drift` measures their biases
 
 
-def at_temperature(
+def move_to_temperature(
     calibrations: ExportedCalibrations, drift: ResultDocument, temperature_c: float
 ) -> ExportedCalibrations:
     """Return the calibrations with biases at `temperature_c`, by the slopes in `drift`.

@@ -115,11 +115,11 @@ def _entry(quantity: Quantity, result: AtRest) -> dict[str, Any]:
         "total_s": result.total_s,
         "temperature_c": None if result.temperature_c is None else list(result.temperature_c),
         f"random_walk_{quantity.walk_suffix}": [_read(axis.random_walk) for axis in result.axes],
-        quantity.named("bias_instability"): [_read(axis.bias_instability) for axis in result.axes],
+        quantity.file_key("bias_instability"): [_read(axis.bias_instability) for axis in result.axes],
         "tau_s": result.curve.tau_s.tolist(),
-        quantity.named("deviation"): result.curve.deviation.tolist(),
-        quantity.named("deviation_low"): result.curve.low.tolist(),
-        quantity.named("deviation_high"): result.curve.high.tolist(),
+        quantity.file_key("deviation"): result.curve.deviation.tolist(),
+        quantity.file_key("deviation_low"): result.curve.low.tolist(),
+        quantity.file_key("deviation_high"): result.curve.high.tolist(),
         "degrees_of_freedom": result.curve.dof.tolist(),
     }
 

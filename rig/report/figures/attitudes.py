@@ -63,7 +63,7 @@ def draw(figure: "Figure", sensor_plot: AttitudePlot) -> None:
 def plot_of(finding: Finding[Any], mounting: Array) -> AttitudePlot:
     """Return the data of a sensor's plots; `mounting` (3, 3) takes the attitudes' frame to the sensor's axes."""
     entry, quantity, unexplained = finding.entry, finding.quantity, find_attitude_residuals(finding)
-    noise = np.array([getattr(dwell, quantity.named("mean_std")) for dwell in entry.dwells])
+    noise = np.array([getattr(dwell, quantity.file_key("mean_std")) for dwell in entry.dwells])
     reference = entry.reference_m_s2 if quantity == ACCELERATION else entry.field_base_t
     towards = np.array([np.array(dwell.attitude) @ reference for dwell in entry.dwells]) @ mounting.T
     return AttitudePlot(quantity, unexplained.values, unexplained.stds, noise, towards)

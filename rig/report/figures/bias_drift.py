@@ -11,7 +11,7 @@ from rig.analysis.outcome import Outcome
 from rig.analysis.temperature.bias_drift import BiasDrift
 from rig.data.quantity import Quantity
 from rig.data.result_file import ResultDocument
-from rig.report.entry import counted
+from rig.report.entry import dof_or_none
 from rig.report.figures.verification import Picture, write_pictures
 from rig.report.words.expanded_uncertainty import expanded, factor_words
 from rig.station.events import RunEvent
@@ -48,7 +48,7 @@ def draw_drift(axes: "Axes", quantity: Quantity, drift: BiasDrift) -> None:
     size = quantity.drift.size
     repeat = np.arange(1, len(drift.scale_fixed.bias) + 1)
     free_solutions = [(index + 1, solution) for index, solution in drift.scale_free.results.items()]
-    factors = expanded((1.0, 1.0, 1.0), counted(drift.dof)).factors
+    factors = expanded((1.0, 1.0, 1.0), dof_or_none(drift.dof)).factors
     for i, axis in enumerate("xyz"):
         bias, std = drift.scale_fixed.bias[:, i] / size, drift.scale_fixed.std[:, i] / size
         axes.errorbar(repeat, bias, factors[i] * std, fmt="o-", ms=3, lw=0.8, color=f"C{i}", label=axis)
@@ -72,6 +72,6 @@ def draw_drift(axes: "Axes", quantity: Quantity, drift: BiasDrift) -> None:
     axes.set(
         xlabel="repeat",
         ylabel=f"bias   {quantity.drift.name}",
-        title=f"{quantity.sensor}; ± U ({factor_words(counted(drift.dof))}), × all solved again",
+        title=f"{quantity.sensor}; ± U ({factor_words(dof_or_none(drift.dof))}), × all solved again",
     )
     axes.legend(frameon=False, ncols=3, fontsize=8)

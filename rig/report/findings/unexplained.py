@@ -61,7 +61,7 @@ def find_attitude_residuals(finding: Finding[Any]) -> Unexplained:
     entry, quantity, dwells = finding.entry, finding.quantity, finding.entry.dwells
 
     def read(dwell: object, name: str) -> Any:
-        return getattr(dwell, quantity.named(name))
+        return getattr(dwell, quantity.file_key(name))
 
     residuals, stds = (np.array([read(dwell, name) for dwell in dwells]) for name in ("residual", "residual_std"))
     expectation = EXPECTED_OF_FILES if entry.placement is not None else EXPECTED_IN_ATTITUDES[quantity]

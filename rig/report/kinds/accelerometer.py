@@ -9,7 +9,7 @@ from rig.analysis.outcome import Outcome
 from rig.data.entries.accelerometer import AccelerometerEntry, AlignmentEntry, ValidationEntry
 from rig.data.quantity import ACCELERATION
 from rig.report.c_code.c_functions import accelerometer_lines
-from rig.report.entry import counted, entry
+from rig.report.entry import dof_or_none, entry
 from rig.report.findings.characteristics import ACCELEROMETERS, SECOND_ORDER
 from rig.report.findings.finding import Finding
 from rig.report.findings.result_kind import Standard
@@ -55,8 +55,8 @@ def _entry(outcome: Outcome, name: str, result: "AccelerometerResult") -> Accele
         second_order_std_s2_m=None if solution.second_order_s2_m is None else std[SECOND],
         delay_std_s=None if solution.delay_s is None else float(std[DELAY]),
         alignment=None if result.alignment is None else _alignment(result.alignment),
-        non_orthogonality_degrees_of_freedom=counted(acceleration_angle_dof(result)),
-        second_order_degrees_of_freedom=counted(second_order_dof(result)),
+        non_orthogonality_degrees_of_freedom=dof_or_none(acceleration_angle_dof(result)),
+        second_order_degrees_of_freedom=dof_or_none(second_order_dof(result)),
         validation=None if result.held_out is None else _validation(result.held_out),
         conditions=when_entry(
             accelerometer_conditions(outcome.recordings, name, [dwell.index for dwell in result.dwells])

@@ -48,7 +48,7 @@ def drift_entry(quantity: Quantity, drift: "BiasDrift", sensor: "RecordedSensor"
     scale_fixed, slope = drift.scale_fixed, drift.over_temperature
     full_scale = sensor.channel(quantity).range
     assert full_scale is not None, "a gyroscope and an accelerometer state it"
-    scale_free = drift.scale_free.by_key(_bias_entry, error_entry)
+    scale_free = drift.scale_free.results_by_key(_bias_entry, error_entry)
     return DriftEntry(
         unit=quantity.unit,
         repeats=tuple(

@@ -53,7 +53,7 @@ def shown(document: ResultDocument) -> Iterator[DisplayRow]:
     yield from map(row_of, terms_of(document, "page"))
 
 
-def followed(document: ResultDocument) -> tuple[HistoryRecord, ...]:
+def history_records(document: ResultDocument) -> tuple[HistoryRecord, ...]:
     """Return the records of a result that a history follows, of all sensors including references."""
     return tuple(_records(document))
 

@@ -11,7 +11,7 @@ from rig.data.entries.result_types import ErrorEntry
 from rig.data.quantity import FIELD
 from rig.report.c_code.c_functions import magnetometer_lines
 from rig.report.entries.error import error_entry
-from rig.report.entry import counted, entry
+from rig.report.entry import dof_or_none, entry
 from rig.report.findings.characteristics import MAGNETOMETERS
 from rig.report.findings.finding import Finding
 from rig.report.findings.result_kind import Standard
@@ -56,7 +56,7 @@ def _entry(outcome: Outcome, name: str, result: "MagnetometerResult") -> Magneto
         drift=None if result.drift is None else entry(FieldDriftEntry, result.drift),
         hard_iron_t=hard_iron(result.solution),
         field_base_t=result.solution.reference,
-        non_orthogonality_degrees_of_freedom=counted(field_angle_dof(result)),
+        non_orthogonality_degrees_of_freedom=dof_or_none(field_angle_dof(result)),
         conditions=when_entry(
             magnetometer_conditions(outcome.recordings, name, [dwell.index for dwell in result.dwells])
         ),

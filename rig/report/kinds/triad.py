@@ -44,7 +44,7 @@ class Words:
 
 def bias_of(quantity: Quantity, entry: object) -> Sequence[float]:
     """Return the bias (3,) of an entry, in SI units."""
-    bias: Sequence[float] = getattr(entry, quantity.named("bias"))
+    bias: Sequence[float] = getattr(entry, quantity.file_key("bias"))
     return bias
 
 
@@ -65,7 +65,7 @@ def history_record(finding: Finding[Any], document: ResultDocument) -> HistoryRe
     """Return a history's record of scale and bias."""
     quantity, entry = finding.quantity, finding.entry
     parameters = [*scale_and_bias(finding.sensor, quantity, entry, bias_of(quantity, entry), document)]
-    full_scale: float = getattr(entry, quantity.named("range")) or 0.0
+    full_scale: float = getattr(entry, quantity.file_key("range")) or 0.0
     temperature_c: float | None = getattr(entry, "temperature_c", None)
     about = entry.part, entry.serial_number, full_scale, entry.estimator, temperature_c
     return HistoryRecord(finding.sensor, quantity.name, *about, select_uncertain(parameters))
@@ -126,13 +126,13 @@ def unsolved_lines(document: ResultDocument, quantity: Quantity) -> Iterator[str
 def _build_correction(finding: Finding[Any]) -> Corrected:
     """Return the correction of readings, in the right-angled frame of the entry's matrix."""
     quantity, entry = finding.quantity, finding.entry
-    noise = [(getattr(dwell, quantity.named("noise")), dwell.samples) for dwell in entry.dwells]
+    noise = [(getattr(dwell, quantity.file_key("noise")), dwell.samples) for dwell in entry.dwells]
     return Corrected(
         sensor=finding.sensor,
         quantity=quantity,
         part=entry.part,
         serial_number=entry.serial_number,
-        full_scale=getattr(entry, quantity.named("range")),
+        full_scale=getattr(entry, quantity.file_key("range")),
         temperature_c=getattr(entry, "temperature_c", None),
         scale=np.array(entry.scale),
         matrix=np.linalg.inv(np.array(entry.correction_matrix)),

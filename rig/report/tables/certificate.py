@@ -11,7 +11,7 @@ from rig.data.recording.layout_keys import NOT_STATED
 from rig.data.result_file import CheckEntry, GyroscopeEntry, VerificationEntry
 from rig.report.findings.characteristic import Term
 from rig.report.words.expanded_uncertainty import expanded
-from rig.report.words.printed_values import percent, rounded
+from rig.report.words.printed_values import percent, round_to_u
 
 AXES = ("x", "y", "z")
 DEG = math.degrees(1)
@@ -58,7 +58,7 @@ def pair(value: float, uncertainty: float) -> Pair:
     """Return a value and its uncertainty, rounded together; without an uncertainty the value has nine digits."""
     if not uncertainty > 0:
         return Pair(f"{value:.9g}".replace("-", "−"), "0")
-    rounded_pair = rounded(value, uncertainty)
+    rounded_pair = round_to_u(value, uncertainty)
     return Pair(rounded_pair.value_text, rounded_pair.uncertainty_text)
 
 

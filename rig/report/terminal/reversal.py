@@ -9,7 +9,7 @@ from rig.analysis.effective_dof import reversal_dof
 from rig.analysis.reversal import AsMounted, MagnetometerReversal
 from rig.data.entries.magnetometer import AsMountedEntry, ReversalDocument, ReversalEntry
 from rig.data.quantity import FIELD
-from rig.report.entry import counted, entry
+from rig.report.entry import dof_or_none, entry
 from rig.report.tables.axis_tables import scale_and_bias_table, triple
 from rig.report.tables.budget import heading_of
 from rig.report.words.expanded_uncertainty import expanded
@@ -59,9 +59,9 @@ def _entry(reversal: MagnetometerReversal) -> ReversalEntry:
         ReversalEntry, reversal.separation, reversal, reversal.runs[0].result.sensor,
         bias_std_t=std[:3],
         arm_field_std_t=std[3:],
-        scale_degrees_of_freedom=counted(scale),
-        bias_degrees_of_freedom=counted(both[:3]),
-        arm_field_degrees_of_freedom=counted(both[3:]),
+        scale_degrees_of_freedom=dof_or_none(scale),
+        bias_degrees_of_freedom=dof_or_none(both[:3]),
+        arm_field_degrees_of_freedom=dof_or_none(both[3:]),
         runs=tuple(map(_run_entry, reversal.runs)),
     )  # fmt: skip
 

@@ -13,7 +13,7 @@ from rig.report.kinds.kind_registry import kinds, outlets
 from rig.report.words.check_words import what_failed, words_of
 from rig.report.words.mounting_words import farthest_off
 from rig.report.words.printed_values import format_with_u, plus_minus
-from rig.station.plain_text import INDENT, wrapped
+from rig.station.plain_text import INDENT, wrap_line
 
 NEAR = 0.9  # ratio to its limit, above which a passed check is named
 MOST_NEAR = 2
@@ -229,5 +229,5 @@ def _ratio_to_limit(check: CheckEntry) -> float:
 
 def _wrap(text: str, width: int) -> Iterator[str]:
     """Yield the text in lines; a command between backticks is not broken."""
-    for line in wrapped(text, width):
+    for line in wrap_line(text, width):
         yield line.replace("`", "")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig.data.entries.result_types import Freedom
-from rig.estimation.statistics.coverage import COVERAGE_FACTOR, coverage_factors, covered
+from rig.estimation.statistics.coverage import COVERAGE_FACTOR, coverage_factors, coverage_probability
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +22,7 @@ def expanded(stds: Sequence[float], counted: Sequence[Freedom] | None) -> Expand
     """Return U = k u by Student's t; two standard deviations if the degrees of freedom are unknown."""
     dofs = [np.inf if dof is None else dof for dof in counted or [None] * len(stds)]
     factors = coverage_factors(dofs)
-    return Expanded((factors * np.array(stds)).tolist(), factors.tolist(), covered(factors, dofs).tolist())
+    return Expanded((factors * np.array(stds)).tolist(), factors.tolist(), coverage_probability(factors, dofs).tolist())
 
 
 def factor_words(dof: Sequence[Freedom] | None) -> str:

@@ -26,7 +26,7 @@ class Rounded:
         return f"{self.uncertainty:f}"
 
 
-def rounded(value: float, uncertainty: float) -> Rounded:
+def round_to_u(value: float, uncertainty: float) -> Rounded:
     """Return U to two significant digits, and the value to the same decimal.
 
     Halves are rounded up, so U never falls by more than 4.8 %; EA-4/02 requires rounding up only from 5 %. Raise
@@ -49,7 +49,7 @@ def format_signed(value: float, decimals: int) -> str:
 def format_with_u(value: float, uncertainty: float) -> tuple[str, str]:
     """Return the texts of a value and its U; without a positive U, six digits and a dash."""
     try:
-        printed = rounded(float(value), float(uncertainty))
+        printed = round_to_u(float(value), float(uncertainty))
     except ValueError:
         return f"{value:.6g}".replace("-", "−"), NO_U
     return printed.value_text, printed.uncertainty_text

@@ -22,7 +22,7 @@ from rig.data.recording.run_data import RunData
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.observation.observed_run import ObservedRun, observe_runs
-from rig.observation.windows import rested
+from rig.observation.windows import iterate_rests
 from rig.report.figures.verification import draw_verifications
 from rig.report.kinds.verification import verification_entry, verification_lines, verification_table
 from rig.station.events import Plotted
@@ -262,7 +262,7 @@ def test_the_recordings_of_a_resumed_run_count_together() -> None:
 def reference_asleep_in_rests(run: RunData) -> RunData:
     board_s = run.samples["reference"]["board_time_us"] * 1e-6
     asleep = np.zeros(len(board_s), dtype=bool)
-    for rest in rested(run):
+    for rest in iterate_rests(run):
         since = board_s * (1 + QUIET.drift) + 33.0 - rest.start_s
         asleep |= (since > 0.3) & (since < 2.7)
     return replace(run, samples={**run.samples, "reference": run.samples["reference"][~asleep]})

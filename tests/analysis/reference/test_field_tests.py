@@ -8,12 +8,12 @@ import pytest
 from rig.analysis.gyroscope.calibration import observe_recordings
 from rig.estimation.reference.magnetometer import FieldDrift
 from rig.observation.field_means import field_tests
-from rig.plans.recorded_run import RecordedRun, judged, open_run
+from rig.plans.recorded_run import RecordedRun, judge_phases, open_run
 from support.paths import RECORDINGS
 
 
 def drift_of(run: RecordedRun) -> FieldDrift:
-    drift = judged(run).magnetometers.results["compass"].drift
+    drift = judge_phases(run).magnetometers.results["compass"].drift
     assert drift is not None
     return drift
 

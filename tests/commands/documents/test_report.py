@@ -11,7 +11,7 @@ from rig.data.entries.magnetometer import ReversalDocument
 from rig.data.result_file import write_result
 from rig.errors import Refused
 from rig.report.certificate import pdf
-from rig.report.words.printed_values import rounded
+from rig.report.words.printed_values import round_to_u
 from support.documents.certified import everything, result, reversal
 from support.laboratories.commands import rig
 from support.paths import CONFIGS, RECORDINGS
@@ -122,7 +122,7 @@ def test_the_pdf_holds_every_value_and_its_data(run: Path, tmp_path: Path) -> No
     sensor = result().gyroscopes["gyro"]
     assert sensor.budget is not None
     for value, expanded in zip([*sensor.scale, *sensor.bias_rad_s], sensor.budget.expanded, strict=True):
-        found = rounded(value, expanded)
+        found = round_to_u(value, expanded)
         assert f"{found.value_text} ± {found.uncertainty_text}" in text
     pages = text.split("\f")[:-1]
     assert 1 <= len(pages) <= 2

@@ -15,7 +15,7 @@ from rig.commands.history.recompute_worker import Task
 from rig.data.result_file import ResultDocument
 from rig.history.recompute.result_comparison import Answer, RecomputedResult
 from rig.history.store import History, open_history
-from rig.report.kinds.kind_registry import followed
+from rig.report.kinds.kind_registry import history_records
 from support.history.kept_recordings import certify, keep
 from support.history.past_runs import finish_run
 from support.laboratories.commands import rig_here
@@ -47,7 +47,7 @@ def in_file(folder: Path) -> dict[Path, bytes]:
 def shifted(document: ResultDocument) -> ResultDocument:
     """Half of U beside what the recording gives, in kx."""
     gyro = document.gyroscopes["gyro"]
-    (kx,) = (parameter for parameter in followed(document)[0].parameters if parameter.name == "kx")
+    (kx,) = (parameter for parameter in history_records(document)[0].parameters if parameter.name == "kx")
     scale = (gyro.scale[0] + 0.5 * kx.expanded, *gyro.scale[1:])
     return document.model_copy(update={"gyroscopes": {"gyro": gyro.model_copy(update={"scale": scale})}})
 
@@ -145,7 +145,7 @@ def test_another_estimator_moves_what_it_moves_and_answers_are_not_mixed(history
     (row,) = rows()
     solved = rig_here("solve", "run", "--estimator", "newton", "--json")
     document = ResultDocument.model_validate_json(solved.stdout)
-    (now,) = (parameter for parameter in followed(document)[0].parameters if parameter.name == row["parameter"])
+    (now,) = (parameter for parameter in history_records(document)[0].parameters if parameter.name == row["parameter"])
     assert float(row["now"]) == now.value and float(row["now_expanded"]) == now.expanded
     refused = rig_here("history", "recompute")
     assert refused.returncode == 2 and "another_question" in refused.stderr
@@ -180,7 +180,7 @@ def test_an_interrupted_one_is_gone_on_with(history: History) -> None:
             asked.append("interrupted")
             raise KeyboardInterrupt
         asked.append(task.key)
-        return RecomputedResult("pass", (), followed(runs[task.key].document))
+        return RecomputedResult("pass", (), history_records(runs[task.key].document))
 
     parser = argparse.ArgumentParser()
     history_command.add(parser)

@@ -13,7 +13,7 @@ from rig.analysis.estimator_names import DEFAULT_ESTIMATOR
 from rig.data.result_file import ResultDocument, read_result
 from rig.history.entered.recomputed_result import not_given
 from rig.history.store import open_history
-from rig.plans.recorded_run import judged, open_run
+from rig.plans.recorded_run import judge_phases, open_run
 from rig.report.document import document_of
 from support.laboratories.commands import rig_here
 from support.paths import RECORDINGS
@@ -35,7 +35,7 @@ def claims(folder: Path, change: Callable[[Document], None]) -> None:
 
 @pytest.fixture(scope="module")
 def given() -> ResultDocument:
-    return document_of(judged(open_run(RECORDINGS / "six_observation"), DEFAULT_ESTIMATOR))
+    return document_of(judge_phases(open_run(RECORDINGS / "six_observation"), DEFAULT_ESTIMATOR))
 
 
 def runs(folder: Path) -> int:

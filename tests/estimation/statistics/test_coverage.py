@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 
 from rig.estimation.gyroscope.budget import Budget, Contributor
-from rig.estimation.statistics.coverage import PROBABILITY, beyond, coverage_factors, covered, effective_dof
+from rig.estimation.statistics.coverage import (
+    PROBABILITY,
+    coverage_factors,
+    coverage_probability,
+    effective_dof,
+    tail_probability,
+)
 
 # EA-4/02 M:2022, annex E, table E1: k for a coverage probability of 95.45 %.
 TABLE = {1: 13.97, 2: 4.53, 3: 3.31, 4: 2.87, 5: 2.65, 6: 2.52, 7: 2.43, 8: 2.37, 10: 2.28, 20: 2.13, 50: 2.05}
@@ -27,12 +33,14 @@ def test_an_interval_with_few_degrees_of_freedom_contains_the_true_value_with_it
         found, std = readings.mean(axis=1), readings.std(axis=1, ddof=1) / np.sqrt(count)
         held = np.mean(np.abs(found) <= coverage_factors([count - 1.0]) * std)
         assert held == pytest.approx(PROBABILITY, abs=0.004)
-        assert np.mean(np.abs(found) <= 2 * std) == pytest.approx(covered([2.0], [count - 1.0])[0], abs=0.006)
+        assert np.mean(np.abs(found) <= 2 * std) == pytest.approx(
+            coverage_probability([2.0], [count - 1.0])[0], abs=0.006
+        )
 
 
 def test_beyond_is_a_tail_of_the_normal_distribution_where_all_is_known() -> None:
-    assert beyond(1.0, np.inf) == pytest.approx(0.158655, abs=1e-6)
-    assert beyond([2.0, 2.0], [3.0, 1e9]) == pytest.approx([0.0697, 0.02275], abs=1e-4)
+    assert tail_probability(1.0, np.inf) == pytest.approx(0.158655, abs=1e-6)
+    assert tail_probability([2.0, 2.0], [3.0, 1e9]) == pytest.approx([0.0697, 0.02275], abs=1e-4)
 
 
 def test_of_two_equal_parts_the_one_that_is_known_counts_by_nothing() -> None:

@@ -9,7 +9,7 @@ from rig.errors import Fault
 from rig.observation.arm_rests import trim_rest
 from rig.observation.motion.arm_motion import motion_of
 from rig.observation.motion.even_turn import fit_lines
-from rig.observation.windows import rested, swept
+from rig.observation.windows import iterate_rests, swept
 from support.motions.drawn_servo import Drawn, drawn_servo
 
 SHARE = 5e-5  # of the scale's uncertainty, that the turning may have
@@ -46,7 +46,7 @@ def test_what_turned_the_encoder_wrong_is_not_in_the_speed(drawn: Drawn) -> None
 @pytest.mark.slow
 def test_a_shaft_that_dithers_is_at_rest(drawn: Drawn) -> None:
     motion = motion_of(drawn.runs[0])
-    assert all(trim_rest(motion, window) is not None for window in rested(drawn.runs[0]))
+    assert all(trim_rest(motion, window) is not None for window in iterate_rests(drawn.runs[0]))
 
 
 @pytest.mark.slow

@@ -23,7 +23,7 @@ from rig.report.certificate.statements import StatedFacts, configuration_stateme
 from rig.report.certificate.validity import list_omitted_rates
 from rig.report.entries.budget import budget_entry
 from rig.report.tables.coverage_statements import coverage_sentence
-from rig.report.words.printed_values import rounded
+from rig.report.words.printed_values import round_to_u
 from support.documents.certified import (
     LABORATORY,
     add_accelerometer,
@@ -128,7 +128,7 @@ def test_values_and_their_uncertainties_are_those_of_the_budget() -> None:
     page = read(certificate())
     values = [*sensor.scale, *sensor.bias_rad_s]
     for value, expanded in zip(values, sensor.budget.expanded, strict=True):
-        found = rounded(value, expanded)
+        found = round_to_u(value, expanded)
         assert f"{found.value_text} ± {found.uncertainty_text}" in page.text
     noise = [sensor.covariance[i][i] ** 0.5 for i in range(6)]
     assert all(u > 2 * n for u, n in zip(sensor.budget.expanded, noise, strict=True))
@@ -503,7 +503,7 @@ def test_a_screen_reader_finds_its_way() -> None:
     uncertainty=st.floats(1e-12, 1e12, allow_nan=False),
 )
 def test_two_significant_digits_the_same_decimals_and_never_below_95_percent(value: float, uncertainty: float) -> None:
-    found = rounded(value, uncertainty)
+    found = round_to_u(value, uncertainty)
     digits = found.uncertainty_text.replace(".", "").lstrip("0")
     assert len(digits.rstrip("0")) <= 2 <= len(digits)
     places = [len(text.partition(".")[2]) for text in (found.value_text, found.uncertainty_text)]
@@ -524,14 +524,14 @@ def test_two_significant_digits_the_same_decimals_and_never_below_95_percent(val
     ],
 )
 def test_rounding_by_example(value: float, uncertainty: float, texts: tuple[str, str]) -> None:
-    found = rounded(value, uncertainty)
+    found = round_to_u(value, uncertainty)
     assert (found.value_text, found.uncertainty_text) == texts
 
 
 @pytest.mark.parametrize(("value", "uncertainty"), [(1.0, 0.0), (1.0, -1.0), (float("nan"), 1.0), (1.0, float("inf"))])
 def test_what_cannot_be_rounded_is_not(value: float, uncertainty: float) -> None:
     with pytest.raises(ValueError, match="cannot be rounded"):
-        rounded(value, uncertainty)
+        round_to_u(value, uncertainty)
 
 
 def test_what_the_configuration_says_is_stated(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from rig.page.rows import parameter_rows
 from rig.report.certificate.dcc import digital_certificate
 from rig.report.findings.result_kind import NoOutlet, ResultKind
 from rig.report.header import calibration_header
-from rig.report.kinds.kind_registry import followed, kinds
+from rig.report.kinds.kind_registry import history_records, kinds
 from rig.report.terminal.result_table import print_result
 from support.documents.certified import LABORATORY, certificate, everything, over_temperature, read
 
@@ -62,7 +62,7 @@ def test_the_page_shows_every_kind_that_has_numbers(document: ResultDocument) ->
 
 
 def test_a_history_follows_every_kind_that_has_numbers(document: ResultDocument) -> None:
-    found = {(each.sensor, each.quantity) for each in followed(document)}
+    found = {(each.sensor, each.quantity) for each in history_records(document)}
     assert found >= {("gyro", "rate"), ("gyro", "acceleration"), ("compass", "field"), ("gyro", "Earth's rate")}
 
 

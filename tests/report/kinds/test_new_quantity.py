@@ -33,7 +33,7 @@ from rig.report.findings.characteristic import OUTLETS, Characteristic, Series, 
 from rig.report.findings.history_records import BIASES, SCALES
 from rig.report.findings.result_kind import NoOutlet, ResultKind
 from rig.report.kinds import kind_registry
-from rig.report.kinds.kind_registry import followed, kinds
+from rig.report.kinds.kind_registry import history_records, kinds
 from rig.report.terminal.result_table import print_result
 from support.documents.certified import LABORATORY, certificate, everything, over_temperature, read
 from support.documents.dcc_rules import schema_faults
@@ -141,7 +141,7 @@ def test_page_and_notebook_show_it(document: ResultDocument) -> None:
 
 @pytest.mark.slow
 def test_a_history_follows_it(document: ResultDocument, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (of,) = (each for each in followed(document) if (each.sensor, each.quantity) == ("gyro", "rate"))
+    (of,) = (each for each in history_records(document) if (each.sensor, each.quantity) == ("gyro", "rate"))
     assert [parameter.name for parameter in of.parameters if parameter.name in DENSITY.parameters] == [
         "bow_x",
         "bow_y",

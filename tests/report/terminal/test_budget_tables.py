@@ -22,7 +22,7 @@ from rig.data.entries.magnetometer import MagnetometerEntry
 from rig.data.entries.result_types import ErrorEntry
 from rig.data.result_file import GyroscopeEntry, ResultDocument, read_result
 from rig.estimation.statistics.coverage import coverage_factors
-from rig.plans.recorded_run import judged, open_run
+from rig.plans.recorded_run import judge_phases, open_run
 from rig.report.certificate.certificate_page import certificate_page
 from rig.report.certificate.dcc import digital_certificate
 from rig.report.certificate.statements import StatedFacts
@@ -254,7 +254,7 @@ def test_k_and_its_probability_are_the_same_on_the_page_and_in_the_digital_certi
 def test_each_value_has_the_coverage_factor_of_its_degrees_of_freedom() -> None:
     """A KVH 1775 that was at rest for little time: what its bias does is known from fifteen differences."""
     run = open_run(RECORDINGS / "kvh1775")
-    document = document_of(judged(run, DEFAULT_ESTIMATOR))
+    document = document_of(judge_phases(run, DEFAULT_ESTIMATOR))
     by_dof = document.gyroscopes["kvh"].budget
     assert by_dof is not None
     np.testing.assert_allclose(by_dof.expanded, np.multiply(by_dof.coverage_factors, by_dof.std), rtol=1e-9)

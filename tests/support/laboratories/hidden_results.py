@@ -17,7 +17,7 @@ from rig.config.world.laboratory import SimulatedSensorSection
 from rig.errors import RigError
 from rig.estimation.gyroscope.budget import Budget
 from rig.observation.observed_run import ObservedRun
-from rig.plans.recorded_run import judged, open_run
+from rig.plans.recorded_run import judge_phases, open_run
 from rig.world.world_section import read_world_section
 from support.laboratories.drawn_laboratory import bias_at_0_g, truth
 
@@ -56,7 +56,7 @@ def solve(folder: Path) -> Judged:
     """Solve the run in `folder`/run, whose laboratory is `folder`/config.yaml, by today's code."""
     document: dict[str, Any] = yaml.safe_load((folder / "config.yaml").read_text(encoding="utf-8"))
     try:
-        outcome = judged(open_run(folder / "run"), DEFAULT_ESTIMATOR)
+        outcome = judge_phases(open_run(folder / "run"), DEFAULT_ESTIMATOR)
     except RigError as error:
         return Judged(folder, (), (), error.name)
     return Judged(folder, tuple(_list_stated(outcome, document)), outcome.checks, None)

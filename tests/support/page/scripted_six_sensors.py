@@ -7,7 +7,7 @@ from pathlib import Path
 from rig.analysis.check import Check
 from rig.data.result_file import ResultDocument, read_result, write_result
 from rig.data.run_folder import RESULT
-from rig.page.replay import ended
+from rig.page.replay import end_events
 from rig.station.events import Checked, DocumentWritten, Remembered, RunEvent, SamplesTaken, Since, VerdictReached
 from support.page.scripted_runs import ABOUT, moving, plan_demo
 from support.paths import RECORDINGS
@@ -57,7 +57,7 @@ def six_judged(folder: Path, *, passed: bool = True, broken: Collection[str] = (
     (folder / "certificate.html").write_text("<title>Certificate</title>", encoding="utf-8")
     yield DocumentWritten(folder / "certificate.html")
     yield DocumentWritten(folder / RESULT)
-    *checks, _ = ended(document)
+    *checks, _ = end_events(document)
     yield from checks
     if not passed:
         limit = document.checks[0]

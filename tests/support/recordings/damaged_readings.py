@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rig.data.recording.run_data import RunData
 from rig.estimation.arrays import Array
-from rig.observation.windows import rested, swept
+from rig.observation.windows import iterate_rests, swept
 from support.recordings.synthetic_run import SENSITIVITY, Setup, synthetic_run
 
 Mask = NDArray[np.bool_]
@@ -48,7 +48,7 @@ class Readings:
         return self.between((window.start_s + window.end_s) / 2, window.end_s)
 
     def rest(self, index: int) -> Mask:
-        window = list(rested(self.run))[index]
+        window = list(iterate_rests(self.run))[index]
         return self.between(window.start_s, window.end_s)
 
     def between(self, start_s: float, end_s: float) -> Mask:

@@ -17,7 +17,7 @@ from rig.data.result_file import (
     read_result,
 )
 from rig.report.findings.history_records import Parameter
-from rig.report.kinds.kind_registry import followed
+from rig.report.kinds.kind_registry import history_records
 
 SHARE = 1e-6
 Number = tuple[str, float, float]  # its name, its value, and of what it may move by that share
@@ -67,7 +67,7 @@ def _list_moved(expected: Iterable[Number], actual: Iterable[Number]) -> list[st
 
 
 def _numbers(document: ResultDocument) -> Iterator[Number]:
-    for sensor in followed(document):
+    for sensor in history_records(document):
         yield from _parameter_numbers(f"{sensor.sensor} {sensor.quantity} ", sensor.parameters)
     for check in document.checks:
         if check.value is not None:

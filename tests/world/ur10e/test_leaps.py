@@ -13,7 +13,7 @@ import pytest
 import yaml
 
 from rig.config.load import Loaded, parse
-from rig.plans.procedure_registry import installed, sections
+from rig.plans.procedure_registry import load_procedures, sections
 from rig.world import world_process
 from rig.world.ur10e.interfaces.rtde import build_package
 from rig.world.world_process import World
@@ -118,13 +118,13 @@ def loaded_from(name: str, host: str) -> tuple[Loaded, dict[str, int]]:
         if section.serial is not None:
             document["sensors"][sensor]["serial"]["port"] = f"socket://{host}:7331"
             ports["kvh"] = 7331
-    return parse(yaml.safe_dump(document), sections=sections(installed())), ports
+    return parse(yaml.safe_dump(document), sections=sections(load_procedures())), ports
 
 
 def parse_file(name: str) -> Loaded:
     from rig.config.load import load
 
-    return load(CONFIGS / name, sections=sections(installed()))
+    return load(CONFIGS / name, sections=sections(load_procedures()))
 
 
 def session(loaded: Loaded, ports: dict[str, int], dwell_s: float) -> tuple[dict[str, bytes], float]:
