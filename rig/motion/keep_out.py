@@ -22,7 +22,7 @@ from rig.motion.turner_state import JointLimits, Joints
 POSE_STEP_RAD = radians(2)
 EXTENSION_STEP_M = 0.05
 OTHER_ATTITUDES = "Bring wrist 2 nearer to -90 or 90 in procedure.attitudes, or turn wrist 1 so that it points away"
-OTHER_HOME = "Set wrist 1 in arm.home_deg between -180 and 0: then wrist 2 sweeps beside the forearm"
+OTHER_HOME = "Set wrist 1 in arm.home_deg between -180 and 0: then wrist 2 sweeps next to the forearm"
 NEARER_HOME = "Bring the arm near its home pose from the pendant"
 OTHER_EXTENSION = "Take a shorter extension, or open the elbow in arm.home_deg"
 OTHER_ELBOW = "Bring wrist 2 in arm.home_deg, or in procedure.attitudes, farther from the upper arm: -60 instead of -90"

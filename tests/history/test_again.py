@@ -12,7 +12,7 @@ from sqlalchemy import text
 from rig.errors import Refused
 from rig.history.entered.finished_run import FinishedRun
 from rig.history.recompute.recompute_journal import JOURNAL, RecomputeJournal, RecomputeQuestion
-from rig.history.recompute.recompute_report import again_csv, again_page, counts
+from rig.history.recompute.recompute_report import counts, recompute_csv, recompute_page
 from rig.history.recompute.result_comparison import (
     Answer,
     Compared,
@@ -186,14 +186,14 @@ def test_the_report_says_all_in_csv_and_what_is_to_be_looked_at_on_the_page(hist
         ),
     }
     outcome = match_answers(list_stated_results(history, Selection()), answers, 0.1)
-    rows = list(csv.DictReader(io.StringIO(again_csv(outcome))))
+    rows = list(csv.DictReader(io.StringIO(recompute_csv(outcome))))
     assert [(row["calibration"], row["state"], row["verdict"], row["verdict_now"], row["moved"]) for row in rows] == [
         ("1", "solved", "pass", "pass", "False"),
         ("2", "solved", "pass", "fail", "True"),
     ]
     assert float(rows[1]["shift_over_u"]) == pytest.approx(1.0) and rows[1]["parameter"] == "kx"
     assert rows[1]["serial_number"] == "'=<b>G-2</b>" and rows[1]["certificates_to_withdraw"] == "RIG-1"
-    page = again_page(outcome, QUESTION, "history.sqlite")
+    page = recompute_page(outcome, QUESTION, "history.sqlite")
     assert "pass, now fail (gyro.scale_std)" in page and "&lt;b&gt;G-2" in page and "<b>" not in page
     assert ">G-1<" not in page and "RIG-1" in page
     assert list(counts(outcome)) == [
@@ -238,4 +238,4 @@ def test_ten_thousand_results_are_planned_in_a_handful_of_questions(history: His
         assert [each.run_id for each in left] == [each.run_id for each in stated[4000:]]
         outcome = match_answers(stated, journal.solved)
     assert (outcome.solved, outcome.unreached, outcome.moved) == (4000, 6000, 0)
-    assert again_csv(outcome).count("\n") == 10_001
+    assert recompute_csv(outcome).count("\n") == 10_001

@@ -24,7 +24,7 @@ class Means:
     - sweep (N,): the index of their sweep, negative for none.
     """
 
-    felt_rad_s: Array
+    sensed_rad_s: Array
     times_s: Array
     sweep: NDArray[np.intp]
 
@@ -55,19 +55,19 @@ def _sweep_patterns(means: Means) -> Array:
 FAULT_MODES: tuple[FaultMode[Means], ...] = (  # (k, N, 3) each
     FaultMode(
         "all scale factors change half-way", "scale_changed", "1",
-        lambda means: (means.felt_rad_s * (means.later - 0.5))[None],
+        lambda means: (means.sensed_rad_s * (means.later - 0.5))[None],
     ),
     FaultMode(
         "one scale factor changes half-way", "axis_changed", "1",
-        lambda means: _axis_patterns(means.felt_rad_s * (means.later - 0.5)),
+        lambda means: _axis_patterns(means.sensed_rad_s * (means.later - 0.5)),
     ),
     FaultMode(
         "the sensor turns on the flange half-way", "loose_mounting", "rad",
-        lambda means: np.cross(np.eye(3)[:, None], means.felt_rad_s[None]) * (means.later - 0.5),
+        lambda means: np.cross(np.eye(3)[:, None], means.sensed_rad_s[None]) * (means.later - 0.5),
     ),
     FaultMode(
         "another scale one way than the other", "cw_against_ccw", "1",
-        lambda means: np.abs(means.felt_rad_s)[None] / 2,
+        lambda means: np.abs(means.sensed_rad_s)[None] / 2,
     ),
     FaultMode(
         "another bias in sweeps than in rests", "sweeps_against_rests", None,
@@ -122,7 +122,7 @@ def quarter_columns(means: Means) -> Array:
     """Return columns (3, N, 9): the scale factor of an axis changes at a quarter of the recording."""
     middle, (begin, end) = means.times_s.mean(axis=1), (means.times_s.min(), means.times_s.max())
     edges = np.linspace(begin, end, 5)[1:-1]
-    return np.concatenate([split_per_axis(means.felt_rad_s * (middle > edge)[:, None]) for edge in edges], axis=2)
+    return np.concatenate([split_per_axis(means.sensed_rad_s * (middle > edge)[:, None]) for edge in edges], axis=2)
 
 
 def sweep_columns(segments: Segments, sweep: int) -> Array:

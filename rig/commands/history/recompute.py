@@ -19,7 +19,7 @@ from rig.data.run_folder import refuse_links
 from rig.data.version import VERSION
 from rig.errors import Fault, Refused
 from rig.history.recompute.recompute_journal import JOURNAL, RecomputeJournal, RecomputeQuestion
-from rig.history.recompute.recompute_report import CSV, PAGE, again_csv, again_page, counts, notable_table
+from rig.history.recompute.recompute_report import CSV, PAGE, counts, notable_table, recompute_csv, recompute_page
 from rig.history.recompute.result_comparison import (
     Answer,
     RecomputeOutcome,
@@ -61,8 +61,8 @@ def recompute_history(options: Namespace, solve: Solve = solve_task) -> int:
         lost = _solve_all(tasks, options, solve, journal, answers)
     outcome = match_answers(stated, answers, options.u_fraction)
     with refuse_unwritable(out):
-        write_new(out / CSV, again_csv(outcome))
-        write_new(out / PAGE, again_page(outcome, question, label))
+        write_new(out / CSV, recompute_csv(outcome))
+        write_new(out / PAGE, recompute_page(outcome, question, label))
     _print(outcome, out)
     if lost is not None:
         raise lost

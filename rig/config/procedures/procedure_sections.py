@@ -258,7 +258,7 @@ AsWritten = Literal["eighteen", "faces", "magnetic"] | Attitudes  # the names ar
 
 
 class AttitudesSection(ProcedureSection):
-    """Attitudes in which the arm stands still: which, how long, how often."""
+    """Attitudes in which the arm is at rest: which, how long, how often."""
 
     attitudes: Annotated[Attitudes, BeforeValidator(set_of_that_name, json_schema_input_type=AsWritten)] = Field(
         default=SETS["eighteen"],
@@ -331,7 +331,7 @@ class AttitudesSection(ProcedureSection):
 
 
 class StaticAttitudesSection(AttitudesSection):
-    """The arm stands still in attitudes that determine an accelerometer's scale, angles and bias."""
+    """The arm rests in attitudes that determine an accelerometer's scale, angles and bias."""
 
     name: Literal["static_attitudes"] = Field(default="static_attitudes", description="this procedure")
 

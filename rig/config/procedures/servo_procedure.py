@@ -80,8 +80,8 @@ class ServoSixObservationSection(ProcedureSection):
         default=90.0,
         ge=30,
         le=360,
-        description="angle of constant speed beyond the whole turn: the same readings of the encoder come again there, "
-        "which tells how long the turn took",
+        description="angle of constant speed beyond the whole turn: there the encoder repeats its readings of one turn "
+        "earlier, so the duration of the turn is known",
     )
 
     @model_validator(mode="after")

@@ -178,7 +178,7 @@ def linearise(graph: Graph) -> Iterator[Factor]:
         if move.is_usable:
             yield _move(graph, row)
         if faces.turns[row]:
-            yield _lean(graph, row)
+            yield _tilt_factor(graph, row)
             if graph.conditions.closure:
                 yield _closure(graph, row)
         yield _bias_walk(graph, row)
@@ -231,7 +231,7 @@ def _move(graph: Graph, row: int) -> Factor:
     return Factor(MOVE, row, graph.residuals_rad[row], design, causes)
 
 
-def _lean(graph: Graph, row: int) -> Factor:
+def _tilt_factor(graph: Graph, row: int) -> Factor:
     state, integrals, faces = graph.state, graph.integrals, graph.faces
     up, angle = faces.up[row], float(faces.up[row] @ integrals.swept_rad[row])
     perpendicular = perpendicular_axes(state.matrix @ up / np.linalg.norm(state.matrix @ up))

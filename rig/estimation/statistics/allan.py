@@ -189,7 +189,7 @@ def _random_walk(curve: AllanCurve, axis: int) -> AllanReading | Fault:
     # A factor of about two to either side, so that the slope does not depend on one point.
     below, above = (int(np.argmin(np.abs(np.log(curve.tau_s / (tau_s * by))))) for by in (0.5, 2.0))
     if below == above:
-        return too_short(f"the curve has no second point beside {RANDOM_WALK_TAU_S:g} s to show its slope")
+        return too_short(f"the curve has no second point besides {RANDOM_WALK_TAU_S:g} s to show its slope")
     run = np.log(curve.tau_s[above] / curve.tau_s[below])
     slope = float(np.log(curve.deviation[above, axis] / curve.deviation[below, axis]) / run)
     slope_std = float(np.hypot(*curve.relative_std[[below, above], axis]) / run)

@@ -270,7 +270,7 @@ class _ParameterFits:
         within = (readings.temperature_c - range_c[0]) / (range_c[1] - range_c[0])
         self.both_ways = min(np.mean(direction > 0), np.mean(direction < 0)) >= EACH_WAY
         self.loop = (direction * 4 * within * (1 - within))[:, None]
-        self._take(readings, readings.means)
+        self._fit_inputs(readings, readings.means)
         self.process = self._process(readings, poses)
         weights = 1 / np.median(readings.variances, axis=1)
         self.weights = np.array([self.inputs.T**2 * weights, np.tile(weights, (3, 1))])  # (2, 3, N)
@@ -284,9 +284,11 @@ class _ParameterFits:
     def refer(self, readings: RepeatedMeans, fit: "_TemperatureFit") -> None:
         """Recompute the inputs from the readings at the reference temperature instead of at the mean temperature."""
         powers = self.powers[:, 1:] * self.span ** np.arange(1.0, HIGHEST + 1)
-        self._take(readings, readings.means - powers @ fit.bias + (1 - 1 / (1 + powers @ fit.relative)) * self.inputs)
+        self._fit_inputs(
+            readings, readings.means - powers @ fit.bias + (1 - 1 / (1 + powers @ fit.relative)) * self.inputs
+        )
 
-    def _take(self, readings: RepeatedMeans, means: Array) -> None:
+    def _fit_inputs(self, readings: RepeatedMeans, means: Array) -> None:
         design = np.column_stack([readings.inputs, np.ones(len(means))])
         solved, *_ = np.linalg.lstsq(design, means)
         self.scale: Array = 1 / np.linalg.norm(solved[:3], axis=0)

@@ -59,7 +59,7 @@ STATE_WORDS = {
 }
 
 
-def again_csv(outcome: RecomputeOutcome) -> str:
+def recompute_csv(outcome: RecomputeOutcome) -> str:
     """Return CSV with a line for each calibration and its most changed parameter, or for a run without calibrations."""
     out = io.StringIO(newline="")
     writer = csv.DictWriter(out, COLUMNS, lineterminator="\n", restval="")
@@ -70,7 +70,7 @@ def again_csv(outcome: RecomputeOutcome) -> str:
     return out.getvalue()
 
 
-def again_page(outcome: RecomputeOutcome, question: RecomputeQuestion, history: str) -> str:
+def recompute_page(outcome: RecomputeOutcome, question: RecomputeQuestion, history: str) -> str:
     """Return HTML that loads nothing from outside: the question, the numbers, and notable results."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 

@@ -76,7 +76,7 @@ def find_encoder_noise_rad(recordings: Sequence[ObservedRun]) -> float:
     """
     squares = [
         np.mean(np.delete(steps_rad, sweep.joint, axis=1) ** 2)
-        for sweep, steps_rad in _difference_sweeps([run for run in recordings if run.motion.tells_parts_of_turns])
+        for sweep, steps_rad in _difference_sweeps([run for run in recordings if run.motion.has_accurate_angles])
         if steps_rad.shape[0] and steps_rad.shape[1] > 1
     ]
     return float(np.sqrt(np.mean(squares) / SQUARED)) if squares else 0.0

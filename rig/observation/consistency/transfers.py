@@ -154,7 +154,7 @@ def _find_transfers(run: RunData, stream: Stream, motion: ArmMotion) -> Iterator
 
     A transfer is a part of a turn, so a shaft whose encoder is exact only over whole turns has no usable transfers.
     """
-    if not motion.tells_parts_of_turns:
+    if not motion.has_accurate_angles:
         return
     windows = sorted([*(sweep.window for sweep in swept(run)), *iterate_rests(run)], key=lambda window: window.start_s)
     for before, after in pairwise(windows):

@@ -60,7 +60,7 @@ class Account:
             what = f"more rows are left out than kept: {next(self._moving(self.dwells))}"
         raise Fault(
             "not_at_rest",
-            f"{what}; but only a body at rest feels gravity, or a field, and nothing else",
+            f"{what}; but only in a body at rest the sensor measures gravity, or a field, alone",
             "Add attitudes in which it lies still for half a second or longer; begin a row when it lies still",
         )
 
@@ -72,7 +72,7 @@ class Account:
         knocks = [np.intersect1d(knocked, samples) for samples in kept]
         moved = [self._find_moved(row) for row in self._kept]
         for samples_by_row, reason in (
-            (knocks, "knocks that the others did not feel"),
+            (knocks, "knocks that the other sensors did not measure"),
             (moved, "not_at_rest: the body was knocked or moved"),
         ):
             if count := sum(map(len, samples_by_row)):

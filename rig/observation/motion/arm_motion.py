@@ -80,7 +80,7 @@ class ArmMotion:
             times_s = self.time_s[:: max(min(round(KNOT_S / step_s), len(self.time_s) // 4), 1)]
             rates = self.mean_rates(times_s, max(RATE_STEP_S, step_s))
         if not np.linalg.norm(rates, axis=1).max() > MIN_RATE_RAD_S:
-            raise Fault("no_motion", "the arm stands still in the whole recording", "Record a run with sweeps")
+            raise Fault("no_motion", "the arm is at rest in the whole recording", "Record a run with sweeps")
         self.rate = CubicSpline(times_s, rates)
         close = np.diff(self.time_s) <= (SMOOTHED_S / 3 if self._scatters else MAX_STATE_STEP_S)
         self._covered = close & np.append(close[1:], True) & np.append(True, close[:-1])
@@ -117,7 +117,7 @@ class ArmMotion:
         return closely_followed(self.time_s, self._covered, time_s)
 
     @property
-    def tells_parts_of_turns(self) -> bool:
+    def has_accurate_angles(self) -> bool:
         """Whether single angles are accurate, and not only differences between equal readings a turn apart."""
         return not self._scatters
 
@@ -143,7 +143,7 @@ class ArmMotion:
         """
         still = np.zeros((len(time_s), 3))
         q_rad = self._q_rad(Window(float(time_s[0]), float(time_s[-1])))
-        if len(q_rad) < 2 or not self.tells_parts_of_turns:
+        if len(q_rad) < 2 or not self.has_accurate_angles:
             return still
         noise_rad = np.sqrt(np.mean(np.diff(q_rad, axis=0) ** 2, axis=0))
         return self.rates_at_samples(time_s) if (np.ptp(q_rad, axis=0) > SWINGS * noise_rad).any() else still

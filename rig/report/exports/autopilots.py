@@ -46,14 +46,14 @@ def px4_files(calibrations: ExportedCalibrations) -> Mapping[str, str]:
     """Return `px4.params` as QGroundControl loads it: vehicle, component, name, value, type, separated by tabs."""
     lines = [
         *HEADING,
-        "# Lost too: CAL_GYROn_ID, CAL_ACCn_ID, CAL_MAGn_ID, which only the vehicle knows; PX4 uses parameters",
+        "# Lost too: CAL_GYROn_ID, CAL_ACCn_ID, CAL_MAGn_ID, which only the vehicle has; PX4 uses parameters",
         "# with its sensor's ID only. Magnetic fields are in gauss.",
         *_lines(calibrations, PX4, lambda name, value: f"1\t1\t{name}\t{value!r}\t{PX4_FLOAT}"),
     ]
     if calibrations.over_temperature:
         lines += [
             "# Over temperature: reading - (X1 d + X2 d^2 + X3 d^3) - offset, d = T - TREF, T within TMIN and TMAX.",
-            "# Lost: scale factors over temperature; TC_Gn_ID, TC_An_ID, which only the vehicle knows.",
+            "# Lost: scale factors over temperature; TC_Gn_ID, TC_An_ID, which only the vehicle has.",
         ]
     for name, value in px4_parameters(calibrations.over_temperature, _number_imus(calibrations)):
         lines.append(f"1\t1\t{name}\t{value!r}\t{PX4_INT if isinstance(value, int) else PX4_FLOAT}")

@@ -58,7 +58,7 @@ def _find_speed(port: str, tell: Callable[[str], None]) -> int:
         has_input = has_input or bool(data)
         like_text = sum(32 <= byte < 127 or byte in b"\r\n\t\x1b" for byte in data)
         if len(data) > 20 and like_text > LIKE_TEXT * len(data) and (b"\n" in data or b"\r" in data):
-            tell(f"{port} speaks at {baud} Bd")
+            tell(f"{port} sends at {baud} Bd")
             return baud
     if not has_input:
         raise _silent(port)

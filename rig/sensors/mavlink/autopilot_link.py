@@ -181,7 +181,7 @@ class AutopilotLink:
             if self._other_count:
                 raise SensorError(
                     "mavlink_other_device",
-                    f"{self._where}: who speaks MAVLink there is neither ArduPilot nor PX4",
+                    f"{self._where}: the device that sends MAVLink there is neither ArduPilot nor PX4",
                     "Connect the autopilot itself, not a radio or a camera",
                 )
             if self._byte_count:

@@ -113,7 +113,7 @@ SERVO = TurnerKind(
         name="servo",
         short="servo",
         turned="the shaft",
-        method="A servo turns the items through {turns} at constant rate about its shaft, both ways, mounted anew for "
+        method="A servo turns the items through {turns} at constant rate about its shaft, both ways, remounted for "
         "each axis",
         briefly="{turns} and rests on the shaft of a servo",
         directions="how the item is mounted on the shaft",

@@ -67,7 +67,7 @@ def arm_problems(plan: Plan, report: ArmReport) -> list[Problem]:
     if report.registers_free is False:
         problems.append(registers_in_use(report.host, report.version))
     if not report.state.at_rest:
-        problems.append(Problem("arm_moves", "the arm is moving", "Wait until it stands still"))
+        problems.append(Problem("arm_moves", "the arm is moving", "Wait until it is at rest"))
     too_far = [
         f"{name} {math.degrees(angle):+.0f}°"
         for name, angle, limit in zip(

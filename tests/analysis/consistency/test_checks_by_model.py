@@ -38,14 +38,14 @@ def turned(angle_deg: float) -> Array:
 
 # Each with the size that is told of an ADIS16465, and of a LSM9DS1 whose noise is 0.002 rad/s.
 DAMAGES: dict[str, tuple[float, float, Callable[[Drawn, float], Array]]] = {
-    "gain of all axes half-way": (6e-4, 9.5e-4, lambda seen, by: by * later(seen) * seen.felt_rad_s),
-    "gain of x half-way": (1e-3, 2.5e-3, lambda seen, by: by * later(seen) * seen.felt_rad_s * [1, 0, 0]),
-    "gain of y half-way": (1e-3, 2.5e-3, lambda seen, by: by * later(seen) * seen.felt_rad_s * [0, 1, 0]),
-    "gain of z half-way": (1e-3, 2.5e-3, lambda seen, by: by * later(seen) * seen.felt_rad_s * [0, 0, 1]),
-    "mounting half-way, °": (0.02, 0.075, lambda seen, by: later(seen) * (seen.felt_rad_s @ turned(by))),
-    "cw against ccw": (5e-4, 6.3e-4, lambda seen, by: by * np.maximum(seen.felt_rad_s, 0.0)),
+    "gain of all axes half-way": (6e-4, 9.5e-4, lambda seen, by: by * later(seen) * seen.sensed_rad_s),
+    "gain of x half-way": (1e-3, 2.5e-3, lambda seen, by: by * later(seen) * seen.sensed_rad_s * [1, 0, 0]),
+    "gain of y half-way": (1e-3, 2.5e-3, lambda seen, by: by * later(seen) * seen.sensed_rad_s * [0, 1, 0]),
+    "gain of z half-way": (1e-3, 2.5e-3, lambda seen, by: by * later(seen) * seen.sensed_rad_s * [0, 0, 1]),
+    "mounting half-way, °": (0.02, 0.075, lambda seen, by: later(seen) * (seen.sensed_rad_s @ turned(by))),
+    "cw against ccw": (5e-4, 6.3e-4, lambda seen, by: by * np.maximum(seen.sensed_rad_s, 0.0)),
     "offset of one sweep, rad/s": (4e-4, 8e-4, lambda seen, by: by * sweep_2(seen) * DIRECTION),
-    "gain of one sweep": (6e-4, 1e-3, lambda seen, by: by * sweep_2(seen) * seen.felt_rad_s),
+    "gain of one sweep": (6e-4, 1e-3, lambda seen, by: by * sweep_2(seen) * seen.sensed_rad_s),
 }
 GOOD = {"ADIS16465": 0, "quiet LSM9DS1": 1}
 
@@ -80,7 +80,7 @@ def test_what_changes_on_one_axis_alone_is_told_by_the_ways_between_the_sweeps()
     """The axis is swept in one stretch of time, and its gain changes after it: no sweep shows that."""
     kind = KINDS["ADIS16465"]
     seen = drawn(3, kind)
-    checks = check_run(add_readings(seen, kind, 1e-2 * later(seen) * seen.felt_rad_s * [0, 0, 1]))
+    checks = check_run(add_readings(seen, kind, 1e-2 * later(seen) * seen.sensed_rad_s * [0, 0, 1]))
     assert max(checks, key=lambda check: (check.value or 0.0) / (check.limit or np.inf)).name == "gyro.axis_changed"
     assert list_failed(checks) <= {"axis_changed", "scale_changed", "loose_mounting"}
 

@@ -44,10 +44,12 @@ def sweeps(seen: Drawn) -> Array:
 
 # (n, 3) of one unit, in one of the ways in which each may happen: on an axis, or in one sweep and on one axis.
 PLANTED: Mapping[str, Callable[[Drawn, int], Array]] = {
-    "all scale factors change half-way": lambda seen, _: seen.felt_rad_s * later(seen),
-    "one scale factor changes half-way": lambda seen, way: seen.felt_rad_s * later(seen) * AXES[way % 3],
-    "the sensor turns on the flange half-way": lambda seen, way: np.cross(AXES[way % 3], seen.felt_rad_s) * later(seen),
-    "another scale one way than the other": lambda seen, _: np.abs(seen.felt_rad_s) / 2,
+    "all scale factors change half-way": lambda seen, _: seen.sensed_rad_s * later(seen),
+    "one scale factor changes half-way": lambda seen, way: seen.sensed_rad_s * later(seen) * AXES[way % 3],
+    "the sensor turns on the flange half-way": lambda seen, way: (
+        np.cross(AXES[way % 3], seen.sensed_rad_s) * later(seen)
+    ),
+    "another scale one way than the other": lambda seen, _: np.abs(seen.sensed_rad_s) / 2,
     "another bias in sweeps than in rests": lambda seen, way: sweeps(seen).sum(axis=1, keepdims=True) * AXES[way % 3],
     "the bias jumps half-way": lambda seen, way: later(seen) * AXES[way % 3],
     "another reading in one sweep": lambda seen, way: sweeps(seen)[:, [way // 3 % 6]] * AXES[way % 3],

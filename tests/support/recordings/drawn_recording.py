@@ -105,7 +105,7 @@ class Drawn:
 
     run: RunData
     time_s: Array
-    felt_rad_s: Array
+    sensed_rad_s: Array
     scale: Array
     bias_rad_s: Array
 

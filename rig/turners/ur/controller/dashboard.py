@@ -21,7 +21,7 @@ class Dashboard:
     """
 
     name = "dashboard"
-    tells_of_programs = True
+    reports_programs = True
 
     def __init__(self, host: str, timeout_s: float) -> None:
         self.refusal: str | None = None

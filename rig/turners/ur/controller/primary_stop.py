@@ -26,7 +26,7 @@ class PrimaryStop:
     """
 
     name = "primary interface"
-    tells_of_programs = True
+    reports_programs = True
     acknowledged = False  # the interface never acknowledges
 
     def __init__(self, host: str, timeout_s: float) -> None:

@@ -77,7 +77,7 @@ class RobotApiStop:
     """
 
     name = "Robot API"
-    tells_of_programs = False
+    reports_programs = False
 
     def __init__(self, host: str, port: int, timeout_s: float) -> None:
         self.refusal: str | None = None

@@ -107,7 +107,7 @@ class StopOrder:
     def _ask(self, path: StopPath, connection: StopConnection) -> None:
         """Poll until the program has ended and the path has answered the order."""
         looks = 0
-        while connection.tells_of_programs and self._remaining_s > 0.0:
+        while connection.reports_programs and self._remaining_s > 0.0:
             running = connection.program_running()
             looks += 1
             self._note(path, connection)
