@@ -8,7 +8,7 @@ from rig.analysis.design.attitude_information import AttitudeAccount, attitude_a
 from rig.config.load import load
 from rig.config.sensors.sensor_catalogue import PARTS
 from rig.plans.phase import first_phase
-from rig.plans.procedure_registry import installed
+from rig.plans.procedure_registry import load_procedures
 from rig.world.world_section import read_world_section
 from support.paths import CONFIGS, DEMO
 

@@ -30,7 +30,7 @@ def coverage_words(entry: OverTemperatureEntry) -> str:
     return spell_factors(coverage_at_rows(shown_rows(entry), entry).ravel().tolist())
 
 
-def own_contributors(entry: OverTemperatureEntry) -> Sequence[TemperatureContributorEntry]:
+def polynomial_contributors(entry: OverTemperatureEntry) -> Sequence[TemperatureContributorEntry]:
     """Return the contributors of the polynomials, without those of the calibration at the reference temperature."""
     return [line for line in entry.contributors if line.name in (NOISE, ORDER, LAG, HYSTERESIS, GRADIENT)]
 
