@@ -11,7 +11,6 @@ from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array, equal_runs
 from rig.observation.windows import Window, inside
 
-OF_MOST = 0.1  # fraction of the largest reading that any part has: beyond most parts' range
 BEYOND, USUAL = 20.0, 0.99  # times the largest of the usual readings, which are this fraction
 CLIPPED, CLIPPED_RAD_S = 4, 1.0  # equal readings in a row at the end of an axis' readings; least range of these
 FINE = 0.5  # of the noise: steps of readings below it, so that equal ones are no chance
