@@ -35,7 +35,7 @@ def check_bias_steady(data: ExternalData) -> None:
     )
 
 
-def bias_variance(data: ExternalData) -> Array:
+def estimate_bias_variance(data: ExternalData) -> Array:
     """Return the variance (3,) of the bias over the rows, (rad/s)²: that of a step, and that from rest to rest.
 
     A step of h is ± h/2 about the mean bias. Zero if the rows show no change.
@@ -47,7 +47,7 @@ def bias_variance(data: ExternalData) -> Array:
 
 def widen_bias(solution: TurnedSolution, data: ExternalData) -> TurnedSolution:
     """Return a solution by turns with the bias's variance over the rows in its covariances and its budget."""
-    variance = bias_variance(data)
+    variance = estimate_bias_variance(data)
     more = np.diag([0, 0, 0, *variance])
     lines = solution.budget.contributors
     return replace(

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rig.analysis.external.bias_of_sweeps import bias_variance
+from rig.analysis.external.bias_of_sweeps import estimate_bias_variance
 from rig.errors import Refused
 from rig.estimation.arrays import Array, bisect
 from rig.estimation.gyroscope.stated_motion import MotionErrors, StatedMotion, motion_errors
@@ -106,7 +106,7 @@ def sweep_errors(solution: VectorSolution, data: ExternalData) -> SweepErrors | 
         return np.asarray(inflation[:, None] * beyond * inflation, dtype=np.float64)
 
     dof = float(max(count_redundant_rows(data), FEWEST_FREEDOM))
-    wander = bias_variance(data)
+    wander = estimate_bias_variance(data)
     of_parameters = inflate(parameter_jacobian(solution.matrix, axes.scale), dof, noise_dof(solution, data))
     return SweepErrors(
         covariance=of_parameters + np.diag([0, 0, 0, *wander]),
