@@ -22,7 +22,7 @@ def instrument(
     memory: KvhMemory, motion_at: Callable[[float], Sequence[float]] = lambda time_s: STILL, ppm: float = 0.0
 ) -> SimulatedKvh1775:
     return SimulatedKvh1775(
-        SensorTruth(section("x", acceleration={}), PERFECT),
+        SensorTruth(section("/dev/ttyUSB0", acceleration={}), PERFECT),
         motion_at,
         memory,
         serial_number="42",

@@ -71,7 +71,7 @@ class AutopilotOnAWire:
         return self.wire.time_s
 
     def switch_on(self) -> None:
-        truth = SensorTruth(section("x"), self._simulated)
+        truth = SensorTruth(section("/dev/ttyUSB0"), self._simulated)
         px4 = self._firmware == "px4"
         imus = [
             SimulatedImu(index, truth, self._motion_at, self.parameters, px4=px4, seed=np.random.SeedSequence(index))

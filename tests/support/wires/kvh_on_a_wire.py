@@ -53,7 +53,7 @@ class KvhOnAWire:
         self.wire.live(self._advance)
 
     def switch_on(self) -> None:
-        sensor = section("x", acceleration={"range_g": 10})
+        sensor = section("/dev/ttyUSB0", acceleration={"range_g": 10})
         truth = SensorTruth(sensor, SimulatedSensorSection(scale=(1, 1, 1), bias_rad_s=(0, 0, 0), noise_rad_s=1e-5))
         self.kvh = SimulatedKvh1775(
             truth,
