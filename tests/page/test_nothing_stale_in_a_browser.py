@@ -111,7 +111,7 @@ def test_after_the_end_no_text_says_that_it_goes_on(driver: Chrome, tmp_path: Pa
         driver.refresh()  # who comes later is told the same
         wait_for(lambda: "as at " in text(driver, "readings"), "when that was")
         consistent(driver)
-    wait_for(lambda: "this is how it ended" in text(driver, "link"), "the end of the line")
+    wait_for(lambda: "this is its last state" in text(driver, "link"), "the end of the line")
     consistent(driver)
 
 
@@ -195,6 +195,6 @@ def untrusted(driver: Chrome) -> None:
     wait_for(lambda: re.search(said, text(driver, "stale")), "the bar")
     consistent(driver)
     assert text(driver, "state-word") == "No news" and facts(driver)["speed"] == "–"
-    assert text(driver, "state-text").startswith("Heard last: ")
+    assert text(driver, "state-text").startswith("Last message: ")
     picture(driver, "no-news")
     legible(driver)

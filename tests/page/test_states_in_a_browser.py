@@ -135,7 +135,7 @@ def test_a_run_is_shown_from_the_question_to_the_verdict(driver: Chrome, tmp_pat
         wait_for(lambda: driver.title == "Certificate", "the certificate")
         driver.close()
         driver.switch_to.window(driver.window_handles[0])
-    wait_for(lambda: "this is how it ended" in text(driver, "link"), "the end of the line")
+    wait_for(lambda: "this is its last state" in text(driver, "link"), "the end of the line")
     tell.word("PASS")
 
 
