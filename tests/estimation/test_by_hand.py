@@ -261,7 +261,7 @@ def test_a_rest_that_creeps_is_left_out_and_costs_no_session(axis: str, rest_s: 
 
 @pytest.mark.slow
 @pytest.mark.one_in(2)
-@pytest.mark.parametrize("after", [2, 16, 9])
+@pytest.mark.parametrize("after", [0, 2, 16, 9])
 def test_a_bias_that_jumps_for_good_ends_a_session_at_the_right_rest(after: int) -> None:
     recorded = handle(SESSION, 3)
     session = segment_session(recorded.time_s, recorded.rates, recorded.acceleration)

@@ -8,14 +8,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.estimation.by_hand.fit import GraphFit, estimate_stds, fit_session, solve_step
+from rig.estimation.by_hand.fit import GraphFit, estimate_stds, solve_step
 from rig.estimation.by_hand.graph import REST, RESTS, Factor
-from rig.estimation.by_hand.session_parts import STATED, drop_rests
+from rig.estimation.by_hand.session_parts import STATED
 
 RATIO = 3.0  # ratio of the bias' random walk with the creeping rests to that without them
-FEWEST = 6  # rests of a session of which one may be left out
 MOST = 0.125  # largest fraction of the rests: if more stand out, the bias itself jumps
 
 
@@ -40,22 +38,6 @@ def find_creeping_rests(fit: GraphFit) -> tuple[int, ...]:
         if estimate_stds(rows, fit.stds)[1].walk_rad_s_sqrt_s * RATIO < fit.stds.walk_rad_s_sqrt_s:
             return tuple(sorted(left_out))
     return ()
-
-
-def drop_first_if_creeping(fit: GraphFit) -> GraphFit:
-    """Return the fit without the first rest if the bias' random walk is much smaller then; else the fit as it is.
-
-    Nothing comes before that rest, so a body that crept in it looks like a bias that jumped after it. Without it the
-    bias is that of the others in either case.
-    """
-    walk = fit.stds.walk_rad_s_sqrt_s
-    if walk <= RATIO * STATED.walk_rad_s_sqrt_s or len(fit.session.rests) < FEWEST:
-        return fit
-    try:
-        without = fit_session(drop_rests(fit.session, (0,)), fit.conditions)
-    except Fault:
-        return fit
-    return without if RATIO * without.stds.walk_rad_s_sqrt_s < walk else fit
 
 
 def _distances_from_neighbours(times_s: Array, biases: Array, left_out: Sequence[int]) -> Array:

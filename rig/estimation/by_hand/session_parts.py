@@ -126,9 +126,7 @@ def drop_rests(session: HandRecording, rows: Collection[int]) -> HandRecording:
         session,
         rests=tuple(session.rests[row] for row in kept),
         moves=tuple(merge_moves(session.moves[first:last]) for first, last in pairwise(kept)),
-        creeping_s=tuple(
-            sorted([*session.creeping_s, *((session.rests[row].start_s, session.rests[row].end_s) for row in rows)])
-        ),
+        creeping_s=tuple((session.rests[row].start_s, session.rests[row].end_s) for row in sorted(rows)),
     )
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rig.errors import Fault
 from rig.estimation import refusals
 from rig.estimation.arrays import Array, scale_of
-from rig.estimation.by_hand.creep import drop_first_if_creeping, find_creeping_rests
+from rig.estimation.by_hand.creep import find_creeping_rests
 from rig.estimation.by_hand.fit import PRIOR_DOF, GraphFit, fit_session, whiten_rows
 from rig.estimation.by_hand.flip_axes import check_axes
 from rig.estimation.by_hand.graph import CLOSURE, MOVE, Factor
@@ -65,8 +65,7 @@ class HandSolution:
 
     - `turned`: the solution in the form of a solution from known rotations; `budget`: its budget.
     - `stds`: standard deviations of the hand by name: estimated, stated, and largest allowed.
-    - `creeping_s`: times at which the body crept during intended rests, which are left out. The first may precede a
-      jump of the bias instead.
+    - `creeping_s`: times at which the body crept during intended rests, which are left out.
     - `expanded_scale` (3,): U (k = 2) by this session and its clock; the budget adds recordings of real hands.
     """
 
@@ -112,7 +111,6 @@ def solve_by_hand(session: HandRecording, conditions: SessionConditions) -> Hand
         if rows := find_creeping_rests(fitted):
             session = drop_rests(session, rows)
             fitted = fit_session(session, conditions)
-        fitted = drop_first_if_creeping(fitted)
         fault = _check_precision(fitted) or find_contradiction(fitted)
     except Fault as error:
         fault = error if all(move.is_usable for move in session.moves) else insufficient_session(session, None)

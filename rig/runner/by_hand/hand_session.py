@@ -26,9 +26,8 @@ from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.run_data import RunData
 from rig.data.recording.settings import HandSettings
 from rig.errors import Fault
-from rig.estimation.by_hand.bad_rest import find_bad_rest
 from rig.estimation.by_hand.progress import SessionProgress, assess_progress
-from rig.estimation.by_hand.session_parts import HandRecording, HandRest, Move, SessionConditions
+from rig.estimation.by_hand.session_parts import HandRest, Move, SessionConditions
 from rig.motion.by_hand import FACES, Face, HandMove, Instruction
 from rig.observation.by_hand.hand_segmentation import Segmenter
 from rig.observation.by_hand.rests_and_moves import (
@@ -49,7 +48,6 @@ HELD_S = 3.0  # time in the hand, after which the operator is reminded to lay it
 MISSED = 3.0  # error of a whole turn's end, in standard deviations
 REFUSED_IN_A_ROW = 10  # after these the session ends, because another error is likely
 NO_REST = frozenset({"held_not_laid_down", "not_flat"})  # the item lies still, but not on a side
-EARLIER = frozenset({"no_fit", "table_moved", "lost_in_move"})  # errors that an earlier rest may cause
 ANEW = frozenset({"bias_jumped", "table_moved"})  # the readings before and after it contradict each other
 MENDED_BY_HAND = frozenset({"clipping", "lost_in_move", "no_fit", "turn_not_closed"}) | NO_REST | ANEW
 
@@ -149,10 +147,6 @@ class HandSession:
         session = self._not_counted.filter_session(self._segmenter.handled)
         now = self._progress = assess_progress(session, self.conditions)
         wrong = now.fault_of_last or self._not_closed(now)
-        if wrong is not None and wrong.name in EARLIER and self._refuse_earlier_rest(session, wrong):
-            session = self._not_counted.filter_session(self._segmenter.handled)
-            now = self._progress = assess_progress(session, self.conditions)
-            wrong = now.fault_of_last or self._not_closed(now)
         read = now.faces[-1] if now.faces else None
         if read is None:
             wrong = wrong or Fault(
@@ -170,19 +164,6 @@ class HandSession:
             self._take(move, now, face)
         self._lay.append(face)
         self._ask(self._next(now, face), wrong)
-
-    def _refuse_earlier_rest(self, session: HandRecording, wrong: Fault) -> bool:
-        """Leave out the one earlier rest that spoils the session, if there is one; return whether there is.
-
-        It costs this rest and the moves before and after it, and not all that was done.
-        """
-        row = find_bad_rest(session, self.conditions)
-        if row is None:
-            return False
-        event = HandRestRefused(*self._board_us(session.rests[row]), wrong.name)
-        self._not_counted.take(event, self._shift_s or 0.0)
-        self.note(event)
-        return True
 
     def _pauses_before(self, rest: HandRest) -> None:
         """Discard rests that are too short to be judged, because they are pauses within a move."""
