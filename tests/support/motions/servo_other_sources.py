@@ -38,7 +38,7 @@ def sample_lines(
     listening = threading.Event()
     ended = threading.Event()
     wanted = sensor_section(
-        "later", rate_hz=RATE_HZ, columns=("time", "gx", "gy", "gz"), acceleration=None,
+        "/dev/ttyUSB0", rate_hz=RATE_HZ, columns=("time", "gx", "gy", "gz"), acceleration=None,
         rate={"unit": "deg/s", "decimals": 3},
     )  # fmt: skip
     assert wanted.lines is not None and wanted.serial is not None
