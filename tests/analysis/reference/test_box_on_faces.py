@@ -110,4 +110,4 @@ def test_too_few_rests_among_many_rows_are_named(tmp_path: Path, capsys: pytest.
     files = unpack("broad", "samples.csv", tmp_path), unpack("broad", "attitudes.csv", tmp_path)
     assert main(["solve", *map(str, (files[0], "--attitudes", files[1], "--json"))]) == 1
     error = json.loads(capsys.readouterr().out)["unsolved"]["imu"]["acceleration"]["error"]
-    assert error.startswith("too_few_observations") and "rows in which the body moves are left out" in error
+    assert error.startswith("too_few_observations") and "left out, because only rests give a reference" in error
