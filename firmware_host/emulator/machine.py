@@ -132,11 +132,6 @@ class EmulatedBoard:
         return self._chip.usart.baud_rate
 
     @property
-    def is_measuring(self) -> bool:
-        """Whether the firmware listens to a sensor's data-ready line."""
-        return self.powered and self._chip.exti.is_listening
-
-    @property
     def heater_duty(self) -> float:
         """The heater's duty, 0 to 1."""
         return self._chip.heater_duty if self.powered else 0.0

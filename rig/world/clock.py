@@ -41,11 +41,6 @@ class WorldClock:
         """Whether the clock is stopped."""
         return self._stop_at is not None and self.tick >= self._stop_at
 
-    @property
-    def is_limited(self) -> bool:
-        """Whether the clock stands still or will soon: somebody counts its ticks."""
-        return self._stop_at is not None
-
     def hold(self) -> None:
         """Stop the clock."""
         self._stop_at = self.tick
@@ -87,7 +82,6 @@ class WorldClock:
         return max(0.0, due_s - now_s)
 
     def count(self) -> None:
-        """Count one tick, which begins now, or began a moment ago."""
+        """Count one tick, which begins now."""
         self.tick += 1
-        now_s = self._wall()
-        self._counted_s = min(now_s, max(self._counted_s + self._tick_s, now_s - self._patience_s))
+        self._counted_s = self._wall()

@@ -38,7 +38,6 @@ if TYPE_CHECKING:
     from rig.world.board.pty_port import PtyPort
 
 IDLE_POLL_S = 0.2
-REST_S = 0.01  # wall time between two ticks while nobody waits for them: those due by then come one after the other
 BUSY_POLL_S = 0.001  # wall time between two polls of the sockets while ticks are due one after the other
 # The threshold of Python's cyclic garbage collection: about the number of objects that ten clients leave behind.
 GARBAGE = 5_000
@@ -91,11 +90,10 @@ class World:
             for name, line in self.instrument_lines.items():
                 self._listen(*_find_port(loaded.config, name), line)
             control_port = section.control_port
-            control = self.network.listen(host, control_port, lambda: ControlSession(self))
+            self.network.listen(host, control_port, lambda: ControlSession(self))
         except Refused:
             self.network.close()
             raise
-        self._unhurried = (self.board_listener, control)
         pty = _open_pty(self.line, self.network.selector) if section.board.pty else None
         ptys = {
             name: _open_pty(line, self.network.selector)
@@ -219,15 +217,14 @@ class World:
     def run(self, alive: Callable[[], None] = lambda: None) -> None:
         """Serve until `end`. A tick ends when its bytes have been delivered to the clients, which set the pace.
 
-        While nobody waits for what is to come, the world runs no faster than a real laboratory, because that would only
-        waste processor time. `alive` is called after every tick, and whenever none is due.
+        While nobody is connected, the world runs no faster than a real laboratory, because that would only waste
+        processor time. `alive` is called after every tick, and whenever none is due.
         """
         polled_s = 0.0
         while not self._is_ended:
-            wait_s = self.clock.wait_s()
-            if not self._is_awaited():
+            if not (self.network.connections or self._ptys):  # nobody waits for what is to come
                 self.clock.dialogue()
-                wait_s = wait_s and max(wait_s, REST_S)
+            wait_s = self.clock.wait_s()
             due = wait_s <= 0.0
             behind_s = self.network.deliver(idle=not due, patient=self.clock.time_scale > 1.0)
             if behind_s or not due or time.monotonic() - polled_s >= BUSY_POLL_S:
@@ -243,19 +240,6 @@ class World:
                 alive()
             elif wait_s > 0.0:
                 alive()
-
-    def _is_awaited(self) -> bool:
-        """Return whether a client waits for what comes next.
-
-        Nobody does while all is at rest, the board reads no sensor, and its client has been silent for a while: it
-        computes, and takes the longer the more of the processor the world takes.
-        """
-        if any(connection.listener not in self._unhurried for connection in self.network.connections) or self._ptys:
-            return True
-        board, source = self.laboratory.board, self.laboratory.motion_source
-        is_measuring = board is not None and board.is_measuring
-        is_active = is_measuring or self.laboratory.body is not None or not source.waiting
-        return self.clock.is_limited or self.line.is_in_use or (is_active and bool(self.network.connections))
 
     def _tick(self) -> None:
         """Simulate one tick, or all that are due, at most `LEAP`, while only a client can make the arm move.

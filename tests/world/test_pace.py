@@ -12,7 +12,6 @@ from pathlib import Path
 
 import pytest
 
-from firmware_host.frames import encode
 from rig.config.load import load
 from rig.motion.carried import FlangeLoad
 from rig.motion.steps import Transfer, trapezoid_duration
@@ -248,22 +247,6 @@ def test_at_the_pace_of_a_real_controller_nobody_is_waited_for(world: World) -> 
 
     wait_for(keeps_pace, "two seconds at the pace of the wall")
     reader.close()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("says_hello", [False, True])
-def test_a_board_at_which_nobody_asks_goes_no_faster_than_a_real_one(world: World, says_hello: bool) -> None:
-    """Its client computes, and needs the processor."""
-    running = world(FAST)
-    host, port = running.board_port.removeprefix("socket://").split(":")
-    with socket.create_connection((host, int(port))) as client:
-        if says_hello:
-            client.sendall(encode("hello", 1, {}))
-            asked_s = running.state()["time_s"]
-            wait_for(lambda: running.state()["time_s"] > asked_s + 2.5, "that the question is long past")
-        began_s, began_world_s = time.monotonic(), running.state()["time_s"]
-        wait_for(lambda: running.state()["time_s"] > began_world_s + 0.5, "half a second of the world")
-        assert running.state()["time_s"] - began_world_s < time.monotonic() - began_s + DIALOGUE_S
 
 
 def turn(arm: Arm) -> Transfer:

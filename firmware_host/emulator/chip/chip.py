@@ -50,7 +50,7 @@ class Chip:
         self.nvic = nvic = Nvic(timeline)
         self._ports = {letter: Port(letter) for letter in "AB"}
         syscfg = Syscfg()
-        self.exti = exti = Exti(nvic, syscfg)
+        exti = Exti(nvic, syscfg)
         dma = Dma1(engine, nvic, TDR_ADDRESS)
         self.usart = Usart2(
             timeline=timeline, clocks=clocks, nvic=nvic, dma=dma, pins_connected=self._make_pin_check(_SERIAL_FUNCTIONS)

@@ -11,7 +11,6 @@ _PORTS = {"A": 0, "B": 1}
 _MODE_AFTER_RESET = {"A": 0xABFF_FFFF, "B": 0xFFFF_FEBF}
 _SPEED_AFTER_RESET = {"A": 0x0C00_0000, "B": 0}
 _PULLS_AFTER_RESET = {"A": 0x6400_0000, "B": 0x0000_0100}
-_LINES = 0xFFFF  # those of the pins
 # Interrupt → mask of the EXTI lines that request it
 _EXTI_LINES = {**{6 + line: 1 << line for line in range(5)}, 23: 0x03E0, 40: 0xFC00}
 
@@ -146,11 +145,6 @@ class Exti:
             self._rising.map_to(0x08),
             Register(0x14, "PR1", lambda: self._pending, self._clear),
         )
-
-    @property
-    def is_listening(self) -> bool:
-        """Whether any line is not masked."""
-        return bool(self._mask.value & _LINES)
 
     def rising_edge(self, port: Port, pin: int) -> None:
         """Pend the line of a pin whose level rose."""

@@ -5,7 +5,6 @@ from typing import Protocol
 
 import numpy as np
 
-IN_USE_TICKS = 1000  # since the host's last byte: a board answers, and even restarts, within these two seconds
 TOLERANCE = 0.03  # relative error of the baud rate at which a receiver still reads ten bits correctly
 
 
@@ -60,7 +59,6 @@ class SerialLine:
         self.bit_error_rate = 0.0
         self.stolen = 0.0
         self.fresh = b""  # the device's bytes of the last tick, as the line carries them
-        self._ticks = IN_USE_TICKS  # since the host's last byte
 
     @property
     def baud(self) -> float | None:
@@ -68,13 +66,7 @@ class SerialLine:
         device = self._device()
         return device.baud_rate if device is not None else None
 
-    @property
-    def is_in_use(self) -> bool:
-        """Whether the host has sent something in the last seconds."""
-        return self._ticks < IN_USE_TICKS
-
     def tick(self) -> None:
-        self._ticks += 1
         device = self._device()
         self.fresh = device.take_sent() if device is not None else b""
         if self.stolen and self.fresh and self._random.random() < self.stolen:
@@ -92,7 +84,6 @@ class SerialLine:
 
     def send_to_device(self, data: bytes, host_baud: float | None) -> None:
         """Send the bytes of a host at `host_baud`."""
-        self._ticks = 0
         device, baud = self._device(), self.baud
         if self.silent or device is None or not baud:
             return
