@@ -77,6 +77,13 @@ class Fixes:
     walk: tuple[float, float] = (0.0, 0.0)
     on_arrival: bool = False
 
+    @property
+    def stated_std_rad(self) -> float | None:
+        """The median of the stated standard deviations, without those that are stated to be exact; None without any."""
+        if self.std_rad is None or not self.std_rad.any():
+            return None
+        return float(np.median(self.std_rad[self.std_rad > 0]))
+
 
 @dataclass(frozen=True, slots=True)
 class AttitudeSamples:
@@ -150,10 +157,9 @@ def average_fixes(recorded: AttitudeSamples, state: DriftState) -> FixedAttitude
 
 def _relative(fixes: Fixes) -> Array:
     """Return each sample's stated standard deviation (k,) divided by the median of all."""
-    if fixes.std_rad is None or not fixes.std_rad.any():
+    if fixes.std_rad is None or fixes.stated_std_rad is None:
         return np.ones(len(fixes.at_s))
-    usual = float(np.median(fixes.std_rad[fixes.std_rad > 0]))
-    return np.maximum(fixes.std_rad / usual, LEAST)
+    return np.maximum(fixes.std_rad / fixes.stated_std_rad, LEAST)
 
 
 def find_inliers(recorded: AttitudeSamples, fixes: FixedAttitudes) -> NDArray[np.bool_]:
@@ -208,9 +214,8 @@ def drift_model(averaged: FixedAttitudes, fixes: Fixes) -> DriftModel:
     }
     causes = tuple(name for name in SCALES if name in errors and errors[name].any())
     scales = np.array([SCALES[name] for name in causes])
-    if fixes.std_rad is not None and fixes.std_rad.any():
-        stated = float(np.median(fixes.std_rad[fixes.std_rad > 0]))
-        scales = np.where(np.isin(causes, (NEW_AT_REST, NEW_IN_MOTION)), stated, scales)
+    if (stated_rad := fixes.stated_std_rad) is not None:
+        scales = np.where(np.isin(causes, (NEW_AT_REST, NEW_IN_MOTION)), stated_rad, scales)
     blind = np.zeros(increments) if fixes.blind_rad is None else fixes.blind_rad[joined]
     alone = np.array([fixes.walk if cause == WALK else (0.0, 0.0) for cause in causes])
     mixed = Mixed(
@@ -244,11 +249,11 @@ def _list_errors(averaged: FixedAttitudes, fixes: Fixes, correlation: Array, ste
     late /= np.bincount(fixes.fix).astype(np.float64)[:, None, None]
     _, rest = np.unique(fixes.placement, return_inverse=True)  # the error does not change while the body lies still
     at_s = (np.bincount(rest, weights=averaged.middles_s) / np.bincount(rest))[rest]
-    apart = np.sqrt(3) * np.abs(at_s[:, None] - at_s) / VISIT_S
+    same_visit = matern(np.abs(at_s[:, None] - at_s), VISIT_S)
     together = averaged.turning[:, :, None] * averaged.turning[:, None, :]
     return {
         FIELD: _expand_axes(step @ correlation @ step.T),
-        VISIT: _expand_axes(step @ (correlation * (1 + apart) * np.exp(-apart)) @ step.T),
+        VISIT: _expand_axes(step @ (correlation * same_visit) @ step.T),
         NEW_AT_REST: _expand_axes(step @ (same * at_rest * at_rest[:, None]) @ step.T),
         NEW_IN_MOTION: _expand_axes(step @ (same * ~at_rest * ~at_rest[:, None]) @ step.T),
         JITTER: _combine_blocks(step, late + WANDER * together),
@@ -266,11 +271,26 @@ def _correlate(fixes: Fixes) -> Array:
     begins = np.cumsum(counts) - counts
     looks = np.unique(begins[:, None] + (counts[:, None] * LOOKS_AT).astype(np.intp))
     flat = fixes.attitudes[looks].reshape(-1, 9)
-    scaled = np.sqrt(3 * np.maximum(3 - flat @ flat.T, 0.0)) / REACH
+    distances = np.sqrt(np.maximum(3 - flat @ flat.T, 0.0))
     mean = np.zeros((len(counts), len(looks)))
     mean[fixes.fix[looks], np.arange(len(looks))] = 1.0
     mean /= mean.sum(axis=1, keepdims=True)
-    return np.asarray(mean @ ((1 + scaled) * np.exp(-scaled)) @ mean.T, dtype=np.float64)
+    return np.asarray(mean @ matern(distances, REACH) @ mean.T, dtype=np.float64)
+
+
+def matern(distances: Array, reach: float) -> Array:
+    """Return Matérn's correlation, ν = 3/2, at distances of any shape with a correlation length of `reach`."""
+    scaled = np.sqrt(3) * distances / reach
+    return np.asarray((1 + scaled) * np.exp(-scaled), dtype=np.float64)
+
+
+def correlate_effects(effects: Array, correlation: Array) -> Array:
+    """Return the covariance (3n, 3n) of n increments, from the effects (n, 3, p) of p unit causes on them.
+
+    `correlation` (n, n) is that of each cause between the increments; the causes are independent.
+    """
+    flat = effects.reshape(-1, effects.shape[-1])
+    return np.asarray((flat @ flat.T) * np.kron(correlation, np.ones((3, 3))), dtype=np.float64)
 
 
 def _find_matrix_changes(sensitivities: Array, nearby: Array) -> Array:
@@ -279,8 +299,7 @@ def _find_matrix_changes(sensitivities: Array, nearby: Array) -> Array:
     `nearby` (n, n) is the correlation between the increments. Causes of such a variation are the sensor's nonlinearity,
     its sensitivity to gravity, and gears in the reference.
     """
-    flat = sensitivities[..., MATRIX].reshape(-1, 9)
-    return np.asarray((flat @ flat.T) * np.kron(nearby, np.ones((3, 3))), dtype=np.float64)
+    return correlate_effects(sensitivities[..., MATRIX], nearby)
 
 
 def _weigh_bias(averaged: FixedAttitudes, fixes: Fixes) -> Array:
@@ -305,8 +324,7 @@ def _find_bias_changes(sensitivities: Array, nearby: Array, middles_s: Array, we
     apart = np.abs(middles_s[:, None] - middles_s) / (np.ptp(middles_s) / INTERVALS + 1e-9)
     from_mean = np.eye(len(weights)) - weights
     changes = from_mean @ (nearby + np.exp(-apart)) @ from_mean.T / 2
-    flat = sensitivities[..., BIAS].reshape(-1, 3)
-    return np.asarray((flat @ flat.T) * np.kron(changes, np.ones((3, 3))), dtype=np.float64)
+    return correlate_effects(sensitivities[..., BIAS], changes)
 
 
 def _expand_axes(covariance: Array) -> Array:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig.estimation.arrays import Array, rotation_vectors
-from rig.estimation.external.attitude_drift import MATRIX, FixedAttitudes, Fixes
+from rig.estimation.external.attitude_drift import MATRIX, FixedAttitudes, Fixes, correlate_effects, matern
 from rig.estimation.statistics.variance_components import MixedFit, MixedModel, find_half_width
 
 PRIOR_MEDIAN = 5e-3  # rad: of the half-Cauchy prior of the inclinations' standard deviation
@@ -85,17 +85,14 @@ def find_inclinations(averaged: FixedAttitudes, fixes: Fixes, matrix: Array) -> 
     cross_products = np.array([np.cross(np.eye(3), -axis) for axis in np.eye(3)])
     changes = (matrix @ cross_products).reshape(3, 9)  # F changes so by an inclination δ = 1 about x, y, z: F (δ × ω)
     sensitivities = np.diff(averaged.sensitivities[..., MATRIX], axis=0)[joined]
-    response = (sensitivities @ changes.T).reshape(-1, 3)
     moments = _find_moments(fixes)
     between = moments[joined] + moments[joined + 1]
     axes = between / (between[:, ::4].sum(axis=1, keepdims=True) + LEAST_RAD2)
-    scaled = np.sqrt(3) * np.linalg.norm(axes[:, None] - axes, axis=2) / np.sqrt(2) / REACH
-    correlation = np.kron((1 + scaled) * np.exp(-scaled), np.ones((3, 3)))
-    values, vectors = np.linalg.eigh((response @ response.T) * correlation)
+    correlation = matern(np.linalg.norm(axes[:, None] - axes, axis=2) / np.sqrt(2), REACH)
+    values, vectors = np.linalg.eigh(correlate_effects(sensitivities @ changes.T, correlation))
     explained = values > EXPLAINED**2 * values[-1]
-    prior_median_rad = PRIOR_MEDIAN
-    if fixes.std_rad is not None and fixes.std_rad.any():
-        prior_median_rad = min(PRIOR_MEDIAN, float(np.median(fixes.std_rad[fixes.std_rad > 0])))
+    stated_rad = fixes.stated_std_rad
+    prior_median_rad = PRIOR_MEDIAN if stated_rad is None else min(PRIOR_MEDIAN, stated_rad)
     return Inclinations(vectors[:, explained] * np.sqrt(values[explained]), prior_median_rad)
 
 

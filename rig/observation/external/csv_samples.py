@@ -193,15 +193,14 @@ def samples_in(table: Columns, where: str) -> Samples:
                 "Leave out what was not measured, or record again",
             )
     check_times(ordered.time_s, where)
-    for quantity in present:
-        values = np.column_stack([table[name] for name in quantity.columns])[rows]
+    readings = {quantity: np.column_stack([table[name][rows] for name in quantity.columns]) for quantity in present}
+    for quantity, values in readings.items():
         check_possible(values, rows, quantity, where)
         check_unwrapped(ordered.time_s, values, rows, quantity, where)
     temperature_c = table.get(TEMPERATURE.columns[0])
     if temperature_c is not None:
         check_temperatures(temperature_c[rows], rows, where)
     total = len(table[TIME])
-    readings = {quantity: np.column_stack([table[name][rows] for name in quantity.columns]) for quantity in present}
     omitted = [
         Omitted("samples", finding.count, total, finding.reason, str(finding))
         for finding in ordered.findings
