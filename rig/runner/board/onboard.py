@@ -12,6 +12,8 @@ from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
+import numpy.fft  # NumPy loads this and the next one at their first use, which would be while the arm moves
+import numpy.ma
 
 from firmware_host.client import Board, BoardObservation
 from firmware_host.errors import BoardError
