@@ -1,4 +1,4 @@
-"""The array type of all numeric code, and small functions of arrays."""
+"""The array type of numeric code, and small functions of arrays."""
 
 from collections.abc import Callable
 from typing import Any
@@ -72,7 +72,7 @@ def equal_runs(values: NDArray[Any]) -> NDArray[np.intp]:
 
 
 def bisect(is_too_small: Callable[[Array], Array | NDArray[np.bool_]], highest: Array) -> Array:
-    """Return by bisection the values (q,), 0 to `highest` (q,), up to which `is_too_small` is true."""
+    """Return the values (q,), between 0 and `highest` (q,), below which `is_too_small` is true, by bisection."""
     low, high = np.zeros_like(highest), highest
     for _ in range(BISECTIONS):
         middle = (low + high) / 2

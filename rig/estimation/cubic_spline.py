@@ -11,8 +11,9 @@ NEGLIGIBLE = 1e-18  # weight of a distant neighbour in a slope: far below the re
 class CubicSpline:
     """The not-a-knot cubic spline through values at rising abscissae (de Boor, A Practical Guide to Splines, ch. IV).
 
-    x: (n,), strictly rising, n ≥ 2; y: (n, …). Called with abscissae of any shape it returns values of that shape
-    followed by …; beyond the ends it continues the first and the last polynomial. Raises ValueError for other x and y.
+    x: (n,), strictly rising, n ≥ 2; y: (n, …). Called with abscissae of any shape, the spline returns values of that
+    shape followed by …; beyond the ends it extrapolates the first and the last polynomial. Raises ValueError for other
+    x and y.
     """
 
     def __init__(self, x: Array, y: Array) -> None:

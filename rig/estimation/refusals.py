@@ -41,7 +41,7 @@ CONSISTENT = 3.0  # ratio of residuals to their standard deviations, from which 
 
 
 def require_shape(name: str, array: Array, shape: tuple[int, ...]) -> None:
-    """Raise ValueError for a wrong shape, which is the caller's mistake, not the measurement's."""
+    """Raise ValueError for a wrong shape: a mistake of the caller, not of the measurement."""
     if array.shape != shape:
         raise ValueError(f"{name} must be {shape}, not {array.shape}")
 
@@ -102,7 +102,7 @@ def check_signal(means: Array) -> None:
 def check_revolutions(means: Array, speeds_rad_s: Array, variances: Array, speed_std_rad_s: Array) -> None:
     """Check averaged revolutions: means, variances (N, 3), speeds and their standard deviations (N,).
 
-    Raise Fault  `not_finite`, `bad_variance`, `bad_speed`, `zero_reading`; ValueError for a wrong shape.
+    Raise Fault `not_finite`, `bad_variance`, `bad_speed`, `zero_reading`; ValueError for a wrong shape.
     """
     count = len(means)
     require_shape("means", means, (count, 3))
@@ -142,26 +142,26 @@ def check_reads(matrix: Array) -> None:
 
 
 def check_unit(scale: Array, confusions: Sequence[tuple[float, str]] = CONFUSED_ANGLES) -> None:
-    """Raise Fault `wrong_unit` for a scale factor (3,) above 4 or below 1/4; name the likely unit if there is one."""
+    """Raise Fault `wrong_unit`, which names the likely unit if any, for a scale factor (3,) above 4 or below 1/4."""
     if not is_plausible(scale).all():
         typical = float(np.exp(np.mean(np.log(scale))))
         raise wrong_unit(f"the scale factors come out near {typical:.3g}", 1 / typical, confusions)
 
 
 def check_reading_ratio(ratio: float, where: str) -> None:
-    """Raise Fault `wrong_unit` if readings are more than 4 times, or less than a quarter of, the turn rate."""
+    """Raise Fault `wrong_unit` if the ratio of readings to the turn rate is above 4 or below 1/4."""
     if not is_plausible(ratio).all():
         raise wrong_unit(f"in {where} the gyroscope reads {ratio:.3g} times the turn rate", ratio, CONFUSED_ANGLES)
 
 
 def is_plausible(ratio: ArrayLike) -> NDArray[np.bool_]:
-    """Return which ratios a sensor can have, of reading to true value or of true value to reading."""
+    """Return which ratios of reading to true value, or of true value to reading, a sensor can have."""
     ratios = np.asarray(ratio, dtype=np.float64)
     return (ratios < MAX_SCALE) & (ratios > 1 / MAX_SCALE)
 
 
 def wrong_unit(what: str, ratio: float, confusions: Sequence[tuple[float, str]]) -> Fault:
-    """Return the error `wrong_unit` for a `ratio`, with the confusion that gives it, if one of `confusions` does."""
+    """Return the error `wrong_unit` for a `ratio`; it names the one of `confusions` that explains the ratio, if any."""
     likely = (guess for confused, guess in confusions if 0.7 < ratio / confused < 1.4)
     return Fault(
         "wrong_unit",
@@ -270,7 +270,7 @@ def report_inverted() -> Fault:
 
 @contextmanager
 def convergence_required() -> Iterator[None]:
-    """Raise Fault `attitude_untrustworthy` if a fit in attitudes fails numerically."""
+    """Raise Fault `attitude_untrustworthy` if the block, a fit in attitudes, fails numerically."""
     try:
         yield
     except np.linalg.LinAlgError:

@@ -19,7 +19,7 @@ ORDER = np.roll(np.eye(3), -1, axis=1) - np.roll(np.eye(3), 1, axis=1)
 
 @dataclass(frozen=True, slots=True)
 class SensorAxes:
-    """The axes of F: `scale` factors (3,), unit vectors (3, 3) as rows, and the rotation (3, 3) nearest to them."""
+    """The axes of F: `scale` factors (3,), unit vectors (3, 3) as rows, and the rotation (3, 3) nearest to these."""
 
     scale: Array
     axes: Array
@@ -34,7 +34,7 @@ class SensorAxes:
 
     @property
     def non_orthogonality_rad(self) -> Array:
-        """The non-orthogonality (3,) of the axes."""
+        """The non-orthogonality (3,) of the axes, rad."""
         return non_orthogonality(self.axes)
 
     @property

@@ -1,7 +1,7 @@
 """The relative rotation of two triads on one flange, above all of a gyroscope and an accelerometer.
 
-Each triad's right-angled frame is the one nearest to its axes, the orthogonal factor of their polar decomposition, as
-`rig.estimation.sensor_axes` and the correction of readings have it. Both F include the mounting on the same flange.
+A triad's right-angled frame is the one nearest to its axes, the orthogonal factor of their polar decomposition, as in
+`rig.estimation.sensor_axes`. Both F include the mounting on the same flange.
 """
 
 from dataclasses import dataclass
@@ -35,8 +35,8 @@ def align_triads(
 ) -> Alignment:
     """Return the alignment of two triads from F (3, 3) of both and the covariances (9, 9) of their rows.
 
-    The two are treated as independent, so errors of the arm that both share are counted twice. Raise Fault
-    `not_finite`, `mirrored_axis`; ValueError for a wrong shape.
+    The two are treated as independent, so shared errors of the arm count twice. Raise Fault `not_finite`,
+    `mirrored_axis`; ValueError for a wrong shape.
     """
     gyroscope_frame, gyroscope_turns = _frame(gyroscope, gyroscope_covariance)
     accelerometer_frame, accelerometer_turns = _frame(accelerometer, accelerometer_covariance)

@@ -1,4 +1,4 @@
-"""A gyroscope calibrated by hand: a body that is turned on a table and lies still in between, as a graph."""
+"""Calibration of a gyroscope by hand: a body is turned on a table and lies still in between, as a factor graph."""
 
 from rig.estimation.by_hand.progress import SessionProgress, assess_progress
 from rig.estimation.by_hand.session_parts import HandRecording, HandRest, Move, SessionConditions

@@ -1,7 +1,7 @@
-"""Rests in which the body crept: it turned slowly where it lay.
+"""Rests in which the body crept, that is, turned slowly while it lay.
 
-The reading of such a rest differs from those before and after it. In the graph this is a bias that jumps and jumps
-back, which inflates the bias' random walk, and no move contains the rotation within the rest.
+The reading of such a rest differs from its neighbours'. In the graph this is a bias that jumps there and back, which
+inflates the bias' random walk; no move contains the rotation within the rest.
 """
 
 from collections.abc import Sequence
@@ -20,8 +20,7 @@ MOST = 0.125  # largest fraction of the rests: if more stand out, the bias itsel
 def find_creeping_rests(fit: GraphFit) -> tuple[int, ...]:
     """Return the smallest set of rests without which the bias' random walk is much smaller; empty if the set is large.
 
-    A creeping rest needs a used rest before and after it. Otherwise the creep cannot be distinguished from a jump of
-    the bias.
+    A creeping rest needs a used rest on either side: otherwise it looks like a jump of the bias.
     """
     if fit.stds.walk_rad_s_sqrt_s <= RATIO * STATED.walk_rad_s_sqrt_s:
         return ()

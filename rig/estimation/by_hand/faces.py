@@ -1,4 +1,4 @@
-"""The faces on which the body lay: determined by an accelerometer, or tracked from the first face."""
+"""The face on which the body lay in each rest, by the accelerometer or by tracking from the first face."""
 
 import numpy as np
 
@@ -55,7 +55,7 @@ def _track_verticals(conditions: SessionConditions, integrals: MoveIntegrals) ->
 def _count_turns(
     session: HandRecording, integrals: MoveIntegrals, faces: tuple[str | None, ...], up: Array, row: int
 ) -> int:
-    """Return the signed number of whole turns of a move about its face's axis; 0 if the move is not a turn."""
+    """Return the signed number of whole turns of a move about its face's axis; 0 if it is no such turn."""
     if faces[row] is None or faces[row] != faces[row + 1] or not session.moves[row].is_usable:
         return 0
     angle = float(up[row] @ integrals.swept_rad[row])

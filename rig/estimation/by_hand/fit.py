@@ -68,8 +68,8 @@ class GraphFit:
 def fit_session(session: HandRecording, conditions: SessionConditions, trusted: int | None = None) -> GraphFit:
     """Fit the gyroscope and all attitudes and biases to a session of at least one rest.
 
-    The variance components are estimated from its first `trusted` rests, or from all. Raise Fault `no_fit`, Refused
-    `first_face_not_told`.
+    The variance components are estimated from the first `trusted` rests, by default from all. Raise Fault `no_fit`,
+    Refused `first_face_not_told`.
     """
     biases = np.array([rest.mean_rad_s for rest in session.rests])
     stds = STATED
@@ -162,7 +162,7 @@ def _leverages(design: Array, covariance: Array) -> Array:
 def estimate_stds(rows: Sequence[Factor], now: HandStds, trusted: int | None = None) -> tuple[list[Factor], HandStds]:
     """Return the rows with re-estimated standard deviations, and these standard deviations.
 
-    They are estimated from the residuals of the first `trusted` rests, or of all; `now` are the current ones.
+    They come from the residuals of the first `trusted` rests, by default of all; `now` holds the current ones.
     """
     rows = list(rows)
     for _ in range(SIZED):

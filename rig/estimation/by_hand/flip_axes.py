@@ -17,10 +17,10 @@ FASTEST_RAD_S = 150.0  # no gyroscope of this kind reads as much: the unit is de
 
 
 def check_axes(session: HandRecording) -> None:
-    """Raise Fault `wrong_unit`, `mirrored_axis`, `swapped_axes` or `wrong_mounting` if the quarter turns show it.
+    """Raise Fault `wrong_unit`, `mirrored_axis`, `swapped_axes` or `wrong_mounting` if quarter turns show this.
 
-    They show nothing if one map from the accelerometer's axes to the gyroscope's does not explain them: then rests were
-    not found, and several moves look like one.
+    Nothing is raised if no single map from the accelerometer's axes to the gyroscope's explains all of them: then rests
+    were missed, and several moves look like one.
     """
     if max((move.peak_rad_s for move in session.moves), default=0.0) > FASTEST_RAD_S:
         raise Fault("wrong_unit", "the readings look like degrees per second given as rad/s", "Give them in rad/s")
@@ -53,7 +53,7 @@ def check_axes(session: HandRecording) -> None:
 
 
 def _check_turned(unit: Array) -> None:
-    """Raise Fault `wrong_mounting` if axes, the rows of (3, 3), are turned farther than a session's fit begins."""
+    """Raise Fault `wrong_mounting` if axes, the rows of (3, 3), are turned too far for a fit to begin."""
     angle_rad = float(np.linalg.norm(rotation_vectors(nearest_rotation(unit)[None])[0]))
     if angle_rad > TURNED_RAD:
         raise Fault(

@@ -6,7 +6,7 @@ deviation of each cause of their errors (Dellaert and Kaess, Factor Graphs for R
 
 - move: Log(R (Qᵢᵀ Qⱼ)ᵀ), with the gyroscope's noise and an error in proportion to the angle
 - rest: m̄ − b − G f; walk: the change of the bias from rest to rest
-- flat: the table's normal in the body equals that of the face below; box: that normal equals the nominal one
+- flat: the table's normal in the body equals the face's normal; box: the face's normal equals the nominal one
 - closure: the heading after a whole turn; lean: the mean axis of a turn is the face's normal
 - acceleration: ā − F_a Qᵀ g − b_a, used as a level, so the component along the vertical has little weight
 """
@@ -145,33 +145,32 @@ class Graph:
 
     @cached_property
     def noise_rad_s(self) -> float:
-        """The standard deviation of a reading at rest."""
+        """The standard deviation of a reading at rest, rad/s."""
         return reading_noise(self.session)
 
     @cached_property
     def walk_rad_sqrt_s(self) -> float:
-        """The angle random walk, if the scatter at rest is white noise."""
+        """The angle random walk, rad/√s, if the scatter at rest is white noise."""
         return self.noise_rad_s * float(np.sqrt(np.median(np.diff(self.session.time_s))))
 
     @cached_property
     def stamp_std_s(self) -> float:
         """The standard deviation of time stamps, from their second differences.
 
-        The largest differences are omitted, because gaps cause them. True irregular sampling cannot be distinguished
-        from wrong stamps.
+        The largest differences are omitted, because gaps cause them. Irregular sampling counts as wrong stamps.
         """
         differences = np.sort(np.abs(np.diff(self.session.time_s, 2)))
         return float(np.sqrt(np.mean(np.square(differences[: round(BUT_GAPS * len(differences))])) / 6))
 
     @cached_property
     def quiet_m_s2(self) -> float:
-        """The standard deviation of an accelerometer's reading at the quietest rest."""
+        """The standard deviation of an accelerometer's reading in the quietest rest, m/s²."""
         stds = [rest.acceleration_noise_m_s2 for rest in self.session.rests]
         return float(np.sqrt(np.min([np.mean(std**2) for std in stds if std is not None])))
 
 
 def linearise(graph: Graph) -> Iterator[Factor]:
-    """Yield every factor of the graph, linearised at its current values."""
+    """Yield every factor, linearised at the graph's current values."""
     session, faces = graph.session, graph.faces
     yield from _priors(graph)
     for row, move in enumerate(session.moves):
@@ -205,7 +204,7 @@ def reading_noise(session: HandRecording) -> float:
 
 
 def _hand_held_std(scatter: Array, quiet: float, lasting_s: float) -> float:
-    """Return the standard deviation of the mean of a rest in the hand, from the low-frequency part of its readings."""
+    """Return the standard deviation of the mean of a rest held in the hand, from the readings' low frequencies."""
     beyond = float(np.mean(scatter**2)) - (AS_QUIET * quiet) ** 2
     return float(np.sqrt(max(beyond, 0.0) / max(TREMOR_HZ * lasting_s, 1.0)))
 

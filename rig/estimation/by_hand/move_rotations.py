@@ -2,8 +2,8 @@
 
     m = r + even r² + odd r |r| + b + G f,   r = F ω
 
-f is the specific force in units of gravity, which at a hand's speeds is the vertical in body axes. It has to be tracked
-during the move: with its values at the ends only, the scale errs by 1.7 standard uncertainties.
+f is the specific force in units of gravity: at a hand's speeds the vertical in body axes. It is tracked during the
+move, because with its values at the ends alone the scale errs by 1.7 standard uncertainties.
 """
 
 from collections.abc import Sequence
@@ -24,8 +24,8 @@ class MoveIntegrals:
       `by_matrix` (k, 3, 9), `by_bias` (k, 3, 3), `by_gravity` (k, 3, 9), `by_bends` (k, 3, 6).
     - `swept_rad` (k, 3): the integral of the reading minus offset, g-sensitivity and nonlinearity.
     - `durations_s` (k,), `paths_rad` (k,): the total angle, there and back.
-    - `changes_rad_s` (k,): the root of the summed squares of the rate's changes from sample to sample; multiplied by
-      the error of a time stamp it is an angle.
+    - `changes_rad_s` (k,): the root sum of squares of the rate's changes from sample to sample; times the error of a
+      time stamp, an angle.
     """
 
     rotations: Array

@@ -1,4 +1,4 @@
-"""The board's own calibration by hand in double precision: one move after the other, each used once.
+"""The board's own algorithm for calibration by hand, in double precision: it uses one move after the other, once.
 
 The equations are those of `firmware_host/firmware/core/by_hand/hand_solver.c`; only the arithmetic differs. The board
 reports the rests and moves, and their faces.

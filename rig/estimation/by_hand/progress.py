@@ -1,4 +1,4 @@
-"""The progress of a session: the uncertainty after each move, the fault of the last move, the missing faces."""
+"""The progress of a session: its uncertainty, the fault of the last move, and the missing faces."""
 
 from dataclasses import dataclass
 
@@ -44,7 +44,7 @@ class SessionProgress:
 
 
 def assess_progress(session: HandRecording, conditions: SessionConditions) -> SessionProgress:
-    """Assess an unfinished session of one rest or more; it is no error if there are few.
+    """Assess an unfinished session of one rest or more; few rests are no error.
 
     Raise Fault `mirrored_axis`, `swapped_axes`, `wrong_unit`; Refused `first_face_not_told`.
     """

@@ -1,10 +1,10 @@
 """The search for the rest or move that contradicts the others: outlier tests of a session by hand.
 
 A fault hypothesis is that some factors are wrong: each of their equations gets its own column (Baarda's mean-shift
-model, 1968), and the decreases of χ² are compared. The hypothesis with the largest drop is reported.
+model, 1968), and the decreases of χ² are compared. The largest decrease is reported.
 
-A single large outlier inflates the hand's standard deviations and is masked by them: the result holds, with a larger
-U. `find_masked_fault` finds it with standard deviations estimated without it. Biases are excluded: real ones jump.
+A single large outlier inflates the hand's standard deviations and is masked by them: the result holds, with a larger U.
+`find_masked_fault` finds it with standard deviations estimated without it. Biases are excluded: real ones jump.
 """
 
 from collections.abc import Iterator, Sequence
@@ -36,7 +36,7 @@ AT_ONCE = 8.0  # the same during the session, in which a move can be repeated: 1
 
 @dataclass(frozen=True, slots=True)
 class FaultHypothesis:
-    """A fault of a rest or move, and the drop of χ² if its equations are left out."""
+    """A fault of the rest or move `index`, and the drop of χ² without its equations."""
 
     name: str
     index: int
@@ -44,7 +44,7 @@ class FaultHypothesis:
 
 
 def find_contradiction(fit: GraphFit, since: int | None = None) -> Fault | None:
-    """Return the fault of a session, or of the part `since` a rest; None if there is none."""
+    """Return the fault of a session, or of its part `since` a rest, or None."""
     worst = max(_test_hypotheses(fit, since), key=lambda hypothesis: hypothesis.chi_square_drop, default=None)
     if worst is not None and worst.chi_square_drop > (BY_MUCH if since is None else AT_ONCE):
         return describe_fault(fit, worst)
@@ -82,7 +82,7 @@ def _hypotheses(fit: GraphFit, since: int | None) -> Iterator[tuple[str, int]]:
 
 
 def _test_hypotheses(fit: GraphFit, since: int | None) -> list[FaultHypothesis]:
-    """Return each hypothesis with its decrease of χ², minus the decrease from as many equations left out at random.
+    """Return each hypothesis with its decrease of χ², minus that of as many equations left out at random.
 
     The fault's columns are made orthogonal to the model's, so the graph need not be solved for each hypothesis.
     """
@@ -134,7 +134,7 @@ def _fault_columns(fit: GraphFit, name: str, index: int) -> Array:
 def _tilt_columns(fit: GraphFit, row: Factor, index: int) -> Array:
     """Return the columns (r, 2) of a factor for a table that tilts at rest `index`, and for the move before it.
 
-    At the last rest a tilted table looks like a body that does not lie flat, so there are no such columns.
+    At the last rest there are none: a tilted table looks like a body that does not lie flat.
     """
     other = np.zeros((len(row.design), 2))
     if row.kind == ACCELERATION and row.index >= index:

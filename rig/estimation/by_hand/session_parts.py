@@ -34,8 +34,8 @@ class HandRest:
 class Move:
     """A move, from inside the rest before it to inside the rest after; `peak_rad_s` is its largest reading of an axis.
 
-    `lost`: readings are missing; `clipped`: the gyroscope was at the end of its range; `left_out`: the operator took it
-    back. The rotation of such a move is unknown.
+    The rotation is unknown if readings are missing (`lost`), the gyroscope was at the end of its range (`clipped`), or
+    the operator withdrew the move (`left_out`).
     """
 
     start_s: float
@@ -55,8 +55,7 @@ class Move:
 class HandRecording:
     """All readings (n, 3) at times (n,), rests (N,), the N − 1 moves between them.
 
-    `held_in_air_s`: times at which the body was held still in the air; `creeping_s`: times at which it crept on the
-    table.
+    `held_in_air_s`, `creeping_s`: times at which the body was held still in the air, or crept on the table.
     """
 
     time_s: Array
@@ -70,7 +69,7 @@ class HandRecording:
 
 @dataclass(frozen=True, slots=True)
 class SessionConditions:
-    """Statements about a session that its readings do not show, except the faces' squareness.
+    """Statements of the operator about a session.
 
     - `clock_ppm`: half-width of the clock's error; `clock_source` states where it comes from.
     - `box_rad`: standard deviation of the faces from a rectangular box.
@@ -109,7 +108,7 @@ LARGEST = HandStds(5e-3, 2e-2, 3e-3, 1e-3, 0.05)
 
 @dataclass(frozen=True, slots=True)
 class RestFaces:
-    """The axis of the body that pointed upwards at each rest (N,), None on no face; `up` (N, 3): that axis, or as read.
+    """The face of each rest (N,), the axis that pointed upwards or None; `up` (N, 3): this axis, or as read.
 
     `turns` (N − 1,): the whole turns of each move on its face, else 0.
     """

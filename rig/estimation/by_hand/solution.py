@@ -98,9 +98,9 @@ class HandSolution:
 
 
 def solve_by_hand(session: HandRecording, conditions: SessionConditions) -> HandSolution:
-    """Solve a session.
+    """Solve a session by hand.
 
-    Raise Fault  `too_few_moves`, `clipping`, `lost_in_move`, `held_not_laid_down`, `turn_not_closed`, `not_flat`,
+    Raise Fault `too_few_moves`, `clipping`, `lost_in_move`, `held_not_laid_down`, `turn_not_closed`, `not_flat`,
     `table_moved`, `bias_jumped`, `wrong_face`, `mirrored_axis`, `swapped_axes`, `wrong_unit`, `no_fit`, `zero_reading`,
     `too_many_moves`; Refused `first_face_not_told`.
     """
@@ -193,7 +193,7 @@ def parameter_columns(fit: GraphFit) -> NDArray[np.intp]:
 
 
 def insufficient_session(session: HandRecording, expanded: Array | None) -> Fault:
-    """Return the Fault that explains why a session has no result: unusable moves, or else too few moves."""
+    """Return the Fault that explains why a session has no result: unusable moves, or too few."""
     clipped = sum(move.clipped for move in session.moves)
     lost = sum(move.lost for move in session.moves)
     if clipped:
@@ -240,7 +240,7 @@ def _looseness(fit: GraphFit) -> float:
 
 
 def _find_first_face(session: HandRecording, conditions: SessionConditions, but: GraphFit | None) -> Fault | None:
-    """Return the Fault of a wrong first face if another one gives a consistent session, else None."""
+    """Return the Fault of a wrong first face if another first face gives a consistent session, else None."""
     if session.acceleration is not None or conditions.first_face is None:
         return None
     for face in (face for face in FACES if face != conditions.first_face):

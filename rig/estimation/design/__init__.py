@@ -1,1 +1,1 @@
-"""Bounds and optimality of a design, before anything is measured."""
+"""Bounds and optimality of a planned measurement."""

@@ -1,7 +1,7 @@
-"""The information of a set of attitudes on an accelerometer at rest in them, before anything is measured.
+"""The information of a planned set of attitudes on an accelerometer at rest in them.
 
 The model is that of `rig.estimation.reference.reference_model` with v̄ = 0 and ‖v_ref‖ known, TRIAX, Eqs. (10), (11),
-about an ideal sensor: F = 1, b = 0, φ = 0. Of an attitude error δ the readings' covariance is V = σ² 1 + δ² E Eᵀ
+about an ideal sensor: F = 1, b = 0, φ = 0. With an attitude error δ the readings' covariance is V = σ² 1 + δ² E Eᵀ
 (`rig.estimation.reference.attitude_error`).
 
 Attitudes R (N, 3, 3) take body to table coordinates, `up` (3,) is a unit vector of the table. `order` 1 is the model

@@ -1,4 +1,4 @@
-"""Cramér–Rao bounds: the smallest covariance any unbiased estimator of a model can have with a given design.
+"""Cramér–Rao bounds: the smallest covariance that an unbiased estimator can have with a given design.
 
 The noise is Gaussian with known variances, so the Fisher information is Σ Jᵀ V⁻¹ J. Unknown directions of rotation and
 mounting are nuisance parameters in it. `efficiency` compares an estimator with the bound.
@@ -17,7 +17,7 @@ def six_observation_bound(scale: ArrayLike, rates_rad_s: ArrayLike, variances_ra
     """Return the bound (6, 6) for kx ky kz bx by bz if only ‖g‖ of each sweep is given: SIX (1)–(4).
 
     `scale` (3,); `rates_rad_s` (N, 3): true g in the sensor frame; `variances_rad2_s2` (N, 3) of the mean readings. The
-    two unknown components of each sweep's direction take two of its three readings; the third determines ‖g‖², with the
+    two unknown components of a sweep's direction take two of its three readings; the third determines ‖g‖², with the
     variance Σ 4 k⁴ (m + b)² v. The bias has no effect. Raise LinAlgError for a singular design.
     """
     k, rates, variances = (np.asarray(a, dtype=np.float64) for a in (scale, rates_rad_s, variances_rad2_s2))

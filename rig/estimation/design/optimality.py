@@ -53,7 +53,7 @@ def maximum_prediction_variance(directions: ArrayLike, model: Model = "squared")
 
 
 def g_efficiency(directions: ArrayLike, model: Model = "squared") -> float:
-    """Return p over the worst prediction variance: 1 for a G-optimal design, 0 for a singular design."""
+    """Return p over the worst prediction variance: 1 for a G-optimal design, 0 for a singular one."""
     return PARAMETER_COUNT[model] / maximum_prediction_variance(directions, model)
 
 

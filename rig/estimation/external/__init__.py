@@ -1,1 +1,1 @@
-"""Estimators for external recordings only: attitudes that a reference states, and bodies that are placed repeatedly."""
+"""Estimators for external recordings only: by stated attitudes, and of bodies that are placed repeatedly."""

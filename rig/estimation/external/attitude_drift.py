@@ -79,7 +79,7 @@ class Fixes:
 
     @property
     def stated_std_rad(self) -> float | None:
-        """The median of the stated standard deviations, without those that are stated to be exact; None without any."""
+        """The median of the stated standard deviations above zero; None without any."""
         if self.std_rad is None or not self.std_rad.any():
             return None
         return float(np.median(self.std_rad[self.std_rad > 0]))
@@ -111,7 +111,7 @@ class DriftState:
 
 @dataclass(frozen=True, slots=True)
 class FixedAttitudes:
-    """N fixes: E (N, 3, 3), S (N, 3, 12), C ω (N, 3), middle times (N,), windows (N, 2).
+    """The integrated attitudes at N fixes: E (N, 3, 3), S (N, 3, 12), C ω (N, 3), middle times (N,), windows (N, 2).
 
     Of all samples: E (k, 3, 3) and C ω (k, 3).
     """
@@ -231,10 +231,10 @@ def drift_model(averaged: FixedAttitudes, fixes: Fixes) -> DriftModel:
 
 
 def _list_errors(averaged: FixedAttitudes, fixes: Fixes, correlation: Array, step: Array) -> dict[str, Array]:
-    """Return the covariances (3n, 3n) of the increments due to unit errors of the reference and the times, by cause.
+    """Return by cause the covariance (3n, 3n) of the increments due to unit errors of the reference or the times.
 
-    Errors of the reference vary with attitude, or are new in each visit, rest, or fix in motion. Errors of times are
-    jitter of the stamps, and intervals between readings that a drift of the sampling lengthens.
+    Errors of the reference vary with attitude, or are new in each visit, rest, or fix in motion. Times err by jitter of
+    the stamps, and by a drift of the sampling interval.
     """
     count = len(fixes.placement)
     first = np.searchsorted(fixes.fix, np.arange(count))
@@ -264,8 +264,8 @@ def _list_errors(averaged: FixedAttitudes, fixes: Fixes, correlation: Array, ste
 def _correlate(fixes: Fixes) -> Array:
     """Return the correlation (N, N) between fixes of an error that varies smoothly with attitude, averaged in each fix.
 
-    It is Matérn's function, ν = 3/2, of the chordal distance ‖R − R′‖/√2, which equals the angle if small. It is
-    positive definite on SO(3) (Rasmussen and Williams, Gaussian Processes for Machine Learning (2006), 4.2).
+    Matérn's function, ν = 3/2, of the chordal distance ‖R − R′‖/√2, about the angle if small; it is positive definite
+    on SO(3) (Rasmussen and Williams, Gaussian Processes for Machine Learning (2006), 4.2).
     """
     counts = np.bincount(fixes.fix)
     begins = np.cumsum(counts) - counts
@@ -318,8 +318,8 @@ def _weigh_bias(averaged: FixedAttitudes, fixes: Fixes) -> Array:
 def _find_bias_changes(sensitivities: Array, nearby: Array, middles_s: Array, weights: Array) -> Array:
     """Return the covariance (3n, 3n) of the increments due to unit changes of b with attitude and time.
 
-    `nearby` (n, n) is the correlation by attitude, `middles_s` (n,) are the increments' middle times. b is the mean
-    with `weights` (n,), and changes are relative to this mean, whose difference from other recordings is no error.
+    `nearby` (n, n) is the correlation by attitude, `middles_s` (n,) are the increments' middle times. Changes are
+    relative to b, the mean with `weights` (n,).
     """
     apart = np.abs(middles_s[:, None] - middles_s) / (np.ptp(middles_s) / INTERVALS + 1e-9)
     from_mean = np.eye(len(weights)) - weights

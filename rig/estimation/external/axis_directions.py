@@ -1,9 +1,9 @@
-"""Errors of the directions about which a reference turns the body: those of an arm's joints, if their zeros are off.
+"""Errors of the directions about which a reference turns the body: those of an arm's joints, with wrong zeros.
 
-An inclination δ of such an axis changes the stated rate ω by δ × ω, each time alike. If the body turns about few axes,
-this looks like a matrix F with other angles between its axes, and with other scale factors where the axes of motion are
-not orthogonal. The residuals then do not show it, so F is estimated without δ, and its uncertainty contains what δ adds
-to the estimate (JCGM 100, F.2.4.5): the size of δ is as probable as prior and residuals make it.
+An inclination δ of such an axis always changes the stated rate ω by δ × ω. If the body turns about few axes, this looks
+like a matrix F with other angles between its axes, and with other scale factors where the axes of motion are not
+orthogonal. The residuals then do not show it, so F is estimated without δ, and its uncertainty contains what δ adds to
+the estimate (JCGM 100, F.2.4.5): the size of δ is as probable as prior and residuals make it.
 """
 
 from dataclasses import dataclass
@@ -36,9 +36,9 @@ class Inclinations:
     def widen(self, model: MixedModel, std: Array, fit: MixedFit, wanted: Array, variances: Array) -> Array:
         """Return the covariance (q, q) that inclinations add to `wanted` (q, p) combinations of θ.
 
-        Only those count that the residuals do not show: the model's other errors contain the effect of all others.
-        `variances` (q,) are due to these other errors, which have the standard deviations `std` (k,). With both, 2 u is
-        the half-width of the 95.45 % interval.
+        Only inclinations that the residuals do not show count. `variances` (q,) are due to the model's other errors,
+        with standard deviations `std` (k,), which contain the visible inclinations. With both, 2 u is the half-width of
+        the 95.45 % interval.
         """
         from scipy.linalg import cho_factor, cho_solve
 
@@ -64,8 +64,8 @@ class Inclinations:
 def _weigh_sizes(sizes_rad: Array, values: Array, scores: Array) -> Array:
     """Return the probabilities (j,) of the inclinations' standard deviations: prior times restricted likelihood.
 
-    In the eigenvectors of the information Hᵀ P H on the inclinations the likelihood is a product, of factors with an
-    eigenvalue of `values` (r,) and one of the residuals' `scores` (r,). All other errors keep their sizes.
+    In the eigenvectors of the information Hᵀ P H on the inclinations the likelihood is a product over the eigenvalues
+    `values` (r,) and the residuals' `scores` (r,). All other errors keep their sizes.
     """
     variances = np.square(sizes_rad)[:, None]
     ratio = 1 + variances * values

@@ -1,4 +1,4 @@
-"""A step of a gyroscope's bias between two of the rows that state its motion: a mean-shift test.
+"""A step of a gyroscope's bias between two rows of stated motion: a mean-shift test.
 
     m_j = F ω_j + c + h [j > r] + noise
 
@@ -28,7 +28,7 @@ class SteppedBias:
 
 
 def find_bias_step(means: Array, variances: Array, rates_rad_s: Array) -> SteppedBias | None:
-    """Return the step that rows in the order of time show, None if there is none.
+    """Return the bias step that rows in the order of time show, or None.
 
     `means` (N, 3) of the readings, their `variances` (N, 3) and the stated rates (N, 3), zero at rest.
     """

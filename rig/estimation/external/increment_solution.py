@@ -1,7 +1,7 @@
 """A gyroscope's matrix and bias from its rotations between attitudes of a reference: cameras, a table.
 
-The reference's rates are not used: their noise would be among the regressors and bias the scale (errors in variables).
-The rotation between fixes is used (`attitude_drift`), in which a gyroscope's noise grows only with the root of time.
+The reference's rates are not used: noise in the regressors would bias the scale (errors in variables). The rotation
+between fixes is used (`attitude_drift`), whose noise by the gyroscope grows only with the root of time.
 
 The variances of the errors of fixes and gyroscope are estimated from the residuals (`variance_components`), together
 with those of the changes of matrix and bias between intervals of the recording: nonlinearity, g-sensitivity,
@@ -65,7 +65,7 @@ REMEDY = "Turn the body about all its axes, by a right angle and more"
 
 @dataclass(frozen=True, slots=True)
 class EarthSeen:
-    """The Earth's rate (3,) in table coordinates and its covariance (3, 3), detected to a tenth."""
+    """The Earth's rate (3,) in table coordinates, determined to a tenth, and its covariance (3, 3)."""
 
     rate_rad_s: Array
     covariance_rad2_s2: Array
@@ -85,12 +85,12 @@ class KnownIncrements:
     - covariance (15, 15): of F row by row, ω_E, b.
     - causes: parts (15, 15) of the covariance, by name.
     - earth: the Earth's rate from the increments, or the fault.
-    - clock_s, clock_std_s: τ, where the reference's attitude of the time t was that of t + τ.
+    - clock_s, clock_std_s: τ; the reference's attitude stamped t is that of t + τ.
     - fix_std_rad: error of a fix about each axis.
     - random_walk_rad_sqrt_s: random walk of the gyroscope's angle.
     - matrix_scatter, bias_scatter_rad_s: standard deviation of each element between intervals of the recording.
     - residuals_rad (n, 3): of the increments.
-    - aside_s (k,): start of each outlier that was left out.
+    - aside_s (k,): start of each omitted outlier.
     - condition: of the scaled design.
     - iterations: number of Gauss-Newton steps.
     """
@@ -188,7 +188,7 @@ def _settle(recorded: AttitudeSamples, state: DriftState) -> _Settled:
 
 
 def _find_outliers(settled: _Settled) -> NDArray[np.bool_]:
-    """Return the increments (n,) far beyond the ninth decile of errors, which few outliers cannot inflate."""
+    """Return a mask (n,) of increments far beyond the ninth decile of errors, which a few outliers cannot inflate."""
     expected = np.sqrt(np.diag(settled.model.covariance(settled.std)).reshape(-1, 3).max(axis=1))
     errors = np.abs(settled.solved.residuals.reshape(-1, 3)).max(axis=1)
     decile = float(np.quantile(errors / expected, 0.9))
@@ -315,7 +315,7 @@ def _causes(settled: _Settled) -> dict[str, Array]:
 
 
 def _earth(rate_rad_s: Array, covariance: Array) -> EarthSeen | Fault:
-    """Return the Earth's rate from the increments, without a prior of its norm, or the Fault if it is undetected."""
+    """Return the Earth's rate from the increments, without the prior of its norm; the Fault if it is undetected."""
     information = np.linalg.inv(covariance)
     data_information: Array = information - EARTH_PRECISION * np.eye(3)
     data_information = data_information + 1e-9 * EARTH_PRECISION * np.eye(3)

@@ -1,4 +1,4 @@
-"""Errors of repeated placements: the effect of a placement itself on a reading, besides noise and tilt.
+"""Errors of repeated placements: what a placement adds to a reading besides noise and tilt.
 
     v_m = F (s + φ s²) + b + E ε + η,   ε ~ N(0, δ² 1),   η ~ N(0, ζ² 1)
 
@@ -26,7 +26,7 @@ ANY_RAD = 1.0  # standard deviation of an unknown attitude
 
 @dataclass(frozen=True, slots=True)
 class LaidDown:
-    """θ (p,) with its covariance (p, p), the sum of `causes` by name, and the estimated standard deviations.
+    """The solution θ (p,) with placement errors: its covariance (p, p) is the sum of `causes`, by name.
 
     `placement_std` is ζ in the unit of the readings, `attitude_error` δ.
     """
@@ -46,7 +46,7 @@ NOISE, ATTITUDES, PLACEMENTS = "noise", "attitudes", "placements"
 class _Linear:
     """The linearised readings of N placements.
 
-    They are residuals (N, 3), design (N, 3, q), noise (N, 3), E and the stated standard deviations (N,).
+    Residuals (N, 3), design (N, 3, q), variances of the noise (N, 3), E, and the stated standard deviations (N,).
     """
 
     residuals: Array
@@ -84,7 +84,7 @@ class _Linear:
 
 @dataclass(frozen=True, slots=True)
 class _PlacementFits:
-    """Steps (k, q), their covariances (k, q, q) by causes, the log-likelihoods (k,)."""
+    """The fits for k values of ζ: steps (k, q), their covariances (k, q, q) by cause, log-likelihoods (k,)."""
 
     steps: Array
     causes: dict[str, Array]
@@ -92,7 +92,7 @@ class _PlacementFits:
 
 
 def laid_down(theta: Array, placed: Placed, unplaced: Array, unplaced_variances: Array) -> LaidDown:
-    """Return θ (p,) re-estimated with placement errors, from a solution and means (k, 3) in unknown attitudes."""
+    """Re-estimate the solution `theta` (p,) with placement errors, also by means (k, 3) in unknown attitudes."""
     all_rests = _add_unplaced(theta, placed, unplaced, unplaced_variances)
     free = free_directions(theta, norm_known=all_rests.norm_known)
     linear = _Linear(

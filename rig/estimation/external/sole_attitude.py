@@ -1,7 +1,7 @@
-"""The attitude on which a scale factor depends: no other one determines the scale, so none contradicts its error.
+"""The attitude on which a scale factor depends: no other attitude determines it, so none contradicts its error.
 
-Repeated rests in one attitude agree regardless of its error, which is the same each time. They show that placements
-repeat, and not that an attitude is right.
+Repeated rests in one attitude agree whatever its error. They show that placements repeat, not that the attitude is
+right.
 """
 
 import numpy as np
@@ -21,8 +21,8 @@ SMALLEST = 1e-9  # least eigenvalue of the information: a smaller one is none
 def find_sole_attitude(theta: Array, placed: Placed) -> tuple[int, int] | None:
     """Return the axis whose scale factor depends on a single placement, and that placement; None if there is none.
 
-    Without that placement, its standard deviation exceeds `UNDETERMINED`. Return None also if no attitude was repeated.
-    `theta` (p,) is the solution: SI units, scale factors about 1.
+    Without that placement, the scale factor's standard deviation exceeds `UNDETERMINED`. None also if no attitude was
+    repeated. `theta` (p,) is the solution: SI units, scale factors about 1.
     """
     size = np.linalg.norm(theta[REFERENCE])
     verticals = np.einsum("nji,j->ni", placed.attitudes, theta[REFERENCE] / size)

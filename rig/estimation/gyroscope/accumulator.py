@@ -78,7 +78,7 @@ class Accumulator:
     ) -> Self:
         """Return the sums with one more revolution.
 
-        Its mean reading is `mean_rad_s` (3,) with `variance_rad2_s2` (3,), its mean speed 2π/T with a standard
+        The revolution's mean reading `mean_rad_s` (3,) has `variance_rad2_s2` (3,), its mean speed 2π/T a standard
         deviation. The default weight is the inverse variance of ω² − ‖m + b‖² at k = 1 with equal noise on all axes;
         SIX uses 1. Raise Fault `not_finite`, `bad_speed`, `zero_reading`, `bad_variance`.
         """
@@ -146,8 +146,8 @@ class Accumulator:
     def _covariance(self, scale: Array, bias: Array, centre: Array) -> Array:
         """Return the covariance (6, 6) to first order in the errors e of the means.
 
-        δβ = (XᵀW X + XᵀW 1 ∂Γ/∂β)⁻¹ XᵀW e, then k and b from β. `bias` (3,) is the bias of the readings minus `centre`
-        (3,); a translation of the origin does not change the covariance.
+        δβ = (XᵀW X + XᵀW 1 ∂Γ/∂β)⁻¹ XᵀW e, then k and b from β. `bias` (3,) is that of the readings minus `centre`
+        (3,); the covariance does not depend on the centre.
         """
         translation = _translation(centre)[:6]
         powers = np.stack([(bias - centre) ** 2, 2 * (bias - centre), np.ones(3)], axis=1) * 4 * scale[:, None] ** 4

@@ -33,9 +33,8 @@ class Contributor:
     """One contributor of the budget.
 
     - `kind`: the type of evaluation (JCGM 100, 4.2 and 4.3).
-    - `half_width`: the assumed half-width, in `unit`; for a normal distribution the stated expanded uncertainty (k =
-      2); None if estimated.
-    - `dof`: its degrees of freedom, infinite for an exact uncertainty.
+    - `half_width`: as assumed, in `unit`; for a normal distribution the stated U (k = 2); None if estimated.
+    - `dof`: degrees of freedom, infinite for an exact uncertainty.
     - `covariance` (6, 6): of kx ky kz bx by bz.
     """
 
@@ -57,7 +56,7 @@ class Contributor:
 
 @dataclass(frozen=True, slots=True)
 class Budget:
-    """All contributors, independent of each other. U has the coverage factor of the effective degrees of freedom."""
+    """All contributors, independent of each other; U has the coverage factor of the effective degrees of freedom."""
 
     contributors: tuple[Contributor, ...]
 
@@ -123,8 +122,8 @@ class Unknown:
     - g_sensitivity_rad_s_per_g: half-width of the change of a reading by 1 g.
     - earth_rate: whether the Earth's rate is unknown.
     - earth_covariance_rad2_s2 (3, 3): in the base frame, None if it was not estimated.
-    - clock_dof, state_jitter_dof, earth_dof: degrees of freedom of those estimated from readings.
-    - clock_half_width: half-width of a clock with stated limits, else None.
+    - clock_dof, state_jitter_dof, earth_dof: degrees of freedom of the estimated ones.
+    - clock_half_width: that of a clock with stated limits, else None.
     - repeatability_rad: half-width of the return to an angle.
     - angle_std_rad: error of a joint's encoder at the ends of arcs.
     - mount_rad: half-width of a mounted item's tilt about each axis.
@@ -161,7 +160,7 @@ def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributo
     matrix = solution.matrix
 
     def propagate(patterns: Array) -> Array:
-        """Return the covariance (6, 6) due to independent patterns (k, N, 3) in rad/s of one standard uncertainty."""
+        """Return the covariance (6, 6) of scale and bias due to independent patterns (k, N, 3), rad/s, of one std."""
         effects = np.einsum("qni,kni->kq", solution.response, patterns)
         covariance: Array = effects.T @ effects
         return covariance
@@ -252,7 +251,7 @@ def _evaluate_times(
 
 
 def _find_noise_dof(explained: Explained) -> float:
-    """Return the smallest degrees of freedom of the noise in scale and bias (JCGM 100, G.4.1)."""
+    """Return the noise's smallest degrees of freedom in scale and bias (JCGM 100, G.4.1)."""
     variances = explained.solution.response**2 * explained.inputs.variances_rad2_s2
     dof = np.broadcast_to(explained.inputs.noise_dof, variances.shape)
     parts, dofs = (array.reshape(len(variances), -1).T for array in (variances, dof))
@@ -278,7 +277,7 @@ def _evaluate_readings(explained: Explained) -> Iterator[Contributor]:
 
 
 def _split_bias_covariance(explained: Explained) -> tuple[Array, Array]:
-    """Return the two parts (6, 6) of the bias drift's covariance: flicker, and the rest."""
+    """Return the covariances (6, 6) due to the bias' flicker, and due to the rest of its drift."""
     bias, response, windows_s = explained.bias, explained.solution.response, explained.inputs.windows_s
 
     def propagate(part: BiasProcess) -> Array:

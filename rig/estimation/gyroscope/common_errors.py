@@ -6,7 +6,7 @@ fast sweep. Each such error e (zero on average, of standard deviation 1 in its o
     m = F ω + c (+ G a) + B e,   e ~ N(0, I)
 
 F, c, G and e are estimated together (the mixed model of Henderson, Biometrics 31 (1975) 423). The result is corrected
-for the part of e that sweeps and rests determine; the other part remains zero and has no effect.
+for the part of e that sweeps and rests determine; the other part is predicted as zero.
 """
 
 from collections.abc import Callable
@@ -102,7 +102,7 @@ def solve_with_common_errors(
 
 
 def _gain(design: Array, effects: Array, noise: Array) -> tuple[Array, Array]:
-    """Return the gain (P, N, 3) from readings to the estimated errors, and the posterior covariance (P, P) of these."""
+    """Return the gain (P, N, 3) from readings to the estimated errors, and their posterior covariance (P, P)."""
     weights = np.linalg.inv(noise)
     weighted = weights @ design
     # The weights after removing what F, c and G explain (Frisch and Waugh, Econometrica 1 (1933) 387; Lovell 1963).
@@ -118,9 +118,8 @@ def _add_covariances(
 ) -> VectorSolution:
     """Return the solution with the covariances and the response of F, c, G and the errors estimated together.
 
-    `gain` (3, p, 3, N) maps readings to the coefficients, `remaining` (3, p, P) is their error by the unresolved part
-    of the errors. `noise` (3, N, N) excludes the noise of the speed, `speed_noise` (N, 3), which is common to all three
-    axes.
+    `gain` (3, p, 3, N) maps readings to the coefficients; `rest` (3, p, P) is the coefficients' error by the unresolved
+    part of the common errors. `noise` (3, N, N) excludes `speed_noise` (N, 3), which the three axes share.
     """
     columns = gain.shape[1]
     of_speed = np.einsum("ipjn,nj->ipn", gain, speed_noise).reshape(3 * columns, -1)

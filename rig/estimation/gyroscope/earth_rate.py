@@ -4,10 +4,10 @@
 
 R maps the arm's base frame to the flange's, ω_E (3,) is the Earth's rate in the base frame; F, c, G, e as in
 `rig.estimation.gyroscope.vector_fit`. Rests in many attitudes separate the bias from rates that turn with the flange.
-So does a sweep: in the mean of a revolution only the component of the Earth's rate along its axis remains. So 15
-parameters are estimated: F, c and ω_E.
+So does a sweep: in the mean of a revolution only the Earth's rate along its axis remains. In all, 15 parameters are
+estimated: F, c and ω_E.
 
-The arm's errors are among the e: its angles, as in `explain`, and its repeatability, which tilts the axis of each sweep
+e contains the arm's errors: its angles, as in `explain`, and its repeatability, which tilts the axis of each sweep
 independently. A tilt of a hundred microradians at 1 rad/s is 20 °/h across the axis, where a sweep determines only its
 bias, so the attitudes determine the Earth's rate. An error in the end time of a revolution is a wrong speed, along the
 axis.
@@ -16,7 +16,7 @@ Gravity and the Earth's axis are both fixed in the room. A g-sensitivity G = λ 
 along the vertical, so one of them must be given: G, which is zero for an optical gyroscope, or the vertical component
 of the Earth's rate, which follows from the latitude.
 
-The readings decide if the Earth's rate was detected: the estimate must be large relative to its uncertainty, which
+The readings decide whether the Earth's rate was detected: the estimate must be large relative to its uncertainty, which
 includes the drift of the bias between rests, and it must agree with the Earth's rate.
 """
 
@@ -45,10 +45,12 @@ REMEDY = "Add rests in attitudes turned about two axes (procedure imu), or leave
 class EarthRatePrior:
     """The given properties of arm and sensor.
 
-    `up` (3,): unit vector upwards in the base frame; `latitude_rad` if given; `g_sensitivity`: True if the sensor may
-    be sensitive to gravity, which is then estimated, with the vertical component of the Earth's rate fixed by the
-    latitude; `repeatability_rad`: standard deviation of the arm's return about each axis across the rotation;
-    `state_jitter_s`: standard deviation of the end time of a revolution.
+    - `up` (3,): unit vector upwards in the base frame.
+    - `latitude_rad`: as given, or None.
+    - `g_sensitivity`: whether to estimate the sensor's sensitivity to gravity; the latitude then fixes the Earth's rate
+      along the vertical.
+    - `repeatability_rad`: standard deviation of the arm's return about each axis across the rotation.
+    - `state_jitter_s`: standard deviation of the end time of a revolution.
     """
 
     up: Array
@@ -116,7 +118,7 @@ class EarthRate:
         return self._std((forward * to_left - sideways * ahead) / (forward**2 + sideways**2))
 
     def _level(self) -> tuple[Array, Array] | None:
-        """Return two level unit vectors: below the base's x axis, and to its left; None if that axis is vertical."""
+        """Return two level unit vectors: the projected x axis of the base, and to its left; None if x is vertical."""
         ahead = np.array([1.0, 0.0, 0.0]) - self.up[0] * self.up
         size = float(np.linalg.norm(ahead))
         return None if size < MIN_LEVEL else (ahead / size, np.cross(self.up, ahead / size))
@@ -208,7 +210,7 @@ def _find_birge_ratio(fit: _EarthRateFit, dof: int) -> float:
 
 
 def _tilt_sweeps(turns_rad_s: Array) -> Array:
-    """Return the changes (2 M, N, 3) of the rates by a 1 rad tilt of each of M sweeps about two directions."""
+    """Return the changes (2 M, N, 3) of the rates if each of M sweeps is tilted by 1 rad about two directions."""
     patterns: list[Array] = []
     for index in np.flatnonzero(turns_rad_s.any(axis=1)):
         rate = turns_rad_s[index]

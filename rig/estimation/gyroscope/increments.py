@@ -96,7 +96,7 @@ def course(time_s: Array, readings: Array, matrix: Array, bias: Array, at_s: Arr
 
 
 def track(time_s: Array, readings: Array, matrix: Array) -> Track:
-    """Integrate readings from which the bias was subtracted to their own times; otherwise as `course`."""
+    """Integrate readings without bias, at their own times; otherwise as `course`."""
     inverse = np.asarray(np.linalg.inv(matrix), dtype=np.float64)
     interval = _find_slopes(time_s, readings @ inverse.T)
     steps = _whole_steps(interval)
@@ -108,7 +108,7 @@ def track(time_s: Array, readings: Array, matrix: Array) -> Track:
 
 
 def increments(time_s: Array, readings: Array, matrix: Array, bias: Array, windows_s: Array) -> Increments:
-    """Return the rotations in windows (w, 2) from start to end, which may overlap; otherwise as `course`."""
+    """Return the rotations over windows (w, 2) [start, end], which may overlap; otherwise as `course`."""
     at_s, index = np.unique(windows_s, return_inverse=True)
     path = course(time_s, readings, matrix, bias, at_s)
     start, end = index.reshape(-1, 2).T
@@ -128,7 +128,7 @@ def _split_into_blocks(time_s: Array, at_s: Array) -> Iterator[tuple[slice, slic
 
 @dataclass(frozen=True, slots=True)
 class _Interval:
-    """Times (n,), rates (n, 3) at them, and the slopes (n, 3) of these per step."""
+    """The rates (n, 3) at times (n,), and their slopes (n, 3) per step."""
 
     time_s: Array
     rates: Array
@@ -147,7 +147,7 @@ def _find_slopes(time_s: Array, rates: Array) -> _Interval:
 
 
 def _integrate_block(interval: _Interval, at_s: Array, inverse: Array) -> tuple[Array, Array, Array]:
-    """Return C and S at the instants and the end of a block, relative to the body at its start, and the rates."""
+    """Return attitudes C and sensitivities S relative to the block's start, at its k instants and end, and k rates."""
     before = np.clip(np.searchsorted(interval.time_s, at_s, side="right") - 1, 0, len(interval.time_s) - 2)
     whole = _whole_steps(interval)
     attitudes = _running_product(whole.vectors)
@@ -161,7 +161,7 @@ def _integrate_block(interval: _Interval, at_s: Array, inverse: Array) -> tuple[
 
 @dataclass(frozen=True, slots=True)
 class _IncrementSteps:
-    """Steps from readings on: rotation vectors φ (k, 3), `turned` (k, 3) without coning, durations (k, 1)."""
+    """Steps that begin at readings: rotation vectors φ (k, 3), `turned` (k, 3) without coning, durations (k, 1)."""
 
     vectors: Array
     turned: Array
@@ -170,7 +170,7 @@ class _IncrementSteps:
     def middle(self, inverse: Array) -> Array:
         """Return the rotation (k, 3, 3) of each step per unit of rate error, in the body's coordinates at its start.
 
-        The attitude half-way is used for the whole step, which causes an error of about φ²/24.
+        The attitude half-way stands for the whole step, with an error of about φ²/24.
         """
         return np.asarray(-_matrices(self.vectors / 2) @ inverse, dtype=np.float64)
 

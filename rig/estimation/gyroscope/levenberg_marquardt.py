@@ -1,7 +1,7 @@
 """The six-observation model solved by Levenberg–Marquardt, with which SIX compares Algorithm 1 (Figs. 2 and 5).
 
-The residuals are ω² − ‖K (m + b)‖², Eqs. (2)–(4), weighted if weights are given, in the six parameters themselves, so
-that β0 needs no special care. With six sweeps the solution equals that of `closed_form`, except for rounding.
+The residuals are ω² − ‖K (m + b)‖², Eqs. (2)–(4), weighted if weights are given, in the six parameters themselves,
+which makes β0 no unknown. With six sweeps the solution equals that of `closed_form`, except for rounding.
 """
 
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ REMEDY = "Sweep every wrist in both directions; a second sweep in one direction 
 
 @dataclass(frozen=True, slots=True)
 class LevenbergMarquardtSolution:
-    """Scale (3,), bias_rad_s (3,), covariance (6, 6) in the order kx ky kz bx by bz, of g = K (m + b).
+    """A result of g = K (m + b): scale (3,), bias_rad_s (3,), covariance (6, 6) in the order kx ky kz bx by bz.
 
     `iterations` counts evaluations of the model. `rank` and `condition` belong to the scaled design.
     """

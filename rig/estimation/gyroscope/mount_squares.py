@@ -1,4 +1,4 @@
-"""The second-order effect of mounting errors on scale and bias: a rotation's component along an axis falls as a cosine.
+"""The second-order effect of mounting errors on scale and bias: a tilt reduces a rate by its cosine.
 
 If sweeps do not determine an item's mounting, the solution has only the size of the angular errors of the rates. Their
 first order is a pattern of error like any other. The mean and the covariance of their second order, 150 ppm for 1°,

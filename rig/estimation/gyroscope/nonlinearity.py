@@ -1,7 +1,7 @@
 """A gyroscope's nonlinearity: m = (g + odd |g| g + even g²) / k − b.
 
-g is the rate along the sensor's axis. At one speed the odd part is a part of the scale factor; several speeds separate
-both. Data sheets state the largest distance from the best straight line through ± full scale: a smooth curve is a cubic
+g is the rate along the sensor's axis. At one speed the odd part belongs to the scale factor; several speeds separate
+them. Data sheets state the largest distance from the best straight line through ± full scale: a smooth curve is a cubic
 and a square, whose distances are a quarter and a half of their values at full scale.
 """
 
@@ -18,7 +18,7 @@ DISTINCT = 1.05  # ratio from which on two speeds count as different
 
 @dataclass(frozen=True, slots=True)
 class Nonlinearity:
-    """`odd_per_rad_s`, `even_per_rad_s` (3,) by axis and their standard deviations."""
+    """The parts `odd_per_rad_s`, `even_per_rad_s` (3,) of each axis, and their standard deviations."""
 
     odd_per_rad_s: Array
     even_per_rad_s: Array

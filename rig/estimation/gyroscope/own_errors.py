@@ -1,4 +1,4 @@
-"""A gyroscope's errors outside the vector model, of which the data sheet states the likely size.
+"""A gyroscope's errors outside the vector model, whose likely size the data sheet states.
 
 These are nonlinearity and sensitivity to temperature. Each is an error common to many readings
 (`rig.estimation.gyroscope.common_errors`): the result is corrected for the part that sweeps and rests determine, the
@@ -27,7 +27,7 @@ class KnownSensor:
     - `nonlinearity`: largest distance from the best straight line by either part, as a fraction of `full_scale_rad_s`.
     - `bias_rad_s_per_k`, `scale_per_k`: changes with temperature.
     - `temperature_c` (N,): recorded in steps of `temperature_step_k`, NaN if not recorded.
-    - `temperature_words`: its source, if no thermometer.
+    - `temperature_words`: source of the temperature, if no thermometer.
     - `instability_rad_s`: the least Allan deviation of the bias.
     """
 
@@ -58,10 +58,10 @@ class OwnError:
 def own_errors(
     sensor: KnownSensor, matrix: Array, turns_rad_s: Array, windows_s: Array, speeds_rad_s: tuple[float, ...]
 ) -> Iterator[OwnError]:
-    """Yield errors of a sensor with matrix F (3, 3) at rates `turns_rad_s` (N, 3), zero at rest, in `windows_s` (N, 2).
+    """Yield nonlinearity and temperature errors for F (3, 3), rates (N, 3), zero at rest, and windows (N, 2).
 
     If all sweeps have one speed, the scale refers to this speed along an axis: an oblique rotation has a lower rate
-    along the axis, so its scale may differ. Several speeds determine the nonlinearity themselves.
+    along the axis, so its scale may differ. With several speeds the model contains the nonlinearity.
     """
     if len(speeds_rad_s) == 1:
         curved = bending(matrix, turns_rad_s, sensor.full_scale_rad_s, speeds_rad_s[0])
@@ -81,9 +81,8 @@ def own_errors(
 def rounding_errors(means_rad_s: Array, roundings_rad_s: Array | float, variances_rad2_s2: Array) -> Iterator[OwnError]:
     """Yield the rounding errors that means (N, 3) share, as the standard uncertainty (N, 3) of each mean.
 
-    Means that differ by less than a step, such as those of all rests, have the same error: averaging does not reduce
-    it. So each axis has one error for each group of such means. The independent part of rounding is in their variance
-    (N, 3). Negligible errors are omitted.
+    Means that differ by less than a step, such as those of all rests, share one error, which averaging does not reduce.
+    The variances (N, 3) contain the independent part of rounding. Negligible errors are omitted.
     """
     roundings = np.broadcast_to(roundings_rad_s, means_rad_s.shape)
     matters = roundings**2 > NEGLIGIBLE * variances_rad2_s2
@@ -111,7 +110,7 @@ def _temperature_deviations_k(sensor: KnownSensor, windows_s: Array, weights: Ar
 def unseen_k(step_k: float, windows_s: Array, weights: Array) -> Array:
     """Return the temperature change (N,), K, below the thermometer's resolution: ± half a step as a linear drift.
 
-    It is counted from the mean over the windows (N, 2) by their weights (N,).
+    It is relative to the mean over the windows (N, 2) with weights (N,).
     """
     middle = windows_s.mean(axis=1)
     return np.asarray(step_k * subtract_mean(middle, weights) / np.ptp(middle), dtype=np.float64)

@@ -5,10 +5,9 @@ The rate during a rotation does not matter, so a hand may turn the gyroscope. It
 
     Log(exp(n α) R(F, c)ᵀ) = J δθ + e
 
-R is the body's rotation by its gyroscope (m = F ω + c), n the axis in the body's frame, α the angle. e contains the
-error of the end attitude about all three axes, the effect of a tilted axis on it, and the gyroscope's noise. A whole
-revolution determines nᵀ F n alone; the mean reading determines the components across, as far as the axis is fixed in
-the body:
+R is the body's rotation by its gyroscope (m = F ω + c), n the axis in the body's frame, α the angle. e contains the end
+attitude's error about all three axes, the effect of a tilted axis, and the gyroscope's noise. A whole revolution
+determines nᵀ F n alone; the mean reading determines the components across, as far as the axis is fixed in the body:
 
     m̄ = F n α/T + c                                                      across F n
 
@@ -102,7 +101,7 @@ class TurnedSolution:
 
 @dataclass(frozen=True, slots=True)
 class _NormalEquations:
-    """`observed` (r,) = `design` (r, 12) δθ + errors; patterns (r, q) of one standard uncertainty by cause."""
+    """The equations `observed` (r,) = `design` (r, 12) δθ + errors; `causes`: patterns (r, q) of one std, by name."""
 
     observed: Array
     design: Array
@@ -114,7 +113,7 @@ class _NormalEquations:
         return total
 
     def inflate(self, ratio: float) -> "_NormalEquations":
-        """Return the equations with the errors of rotations multiplied by a ratio."""
+        """Return the equations with the rotations' errors multiplied by a ratio."""
         return replace(
             self, causes={name: ratio * cause if name in (ENDS, AXES) else cause for name, cause in self.causes.items()}
         )
@@ -181,7 +180,7 @@ def solve_turned(
 def _equate(
     gyroscope: Gyroscope, turns: Sequence[Turn], means: Sequence[RateMean], state: _TurnsEstimate
 ) -> list[_NormalEquations]:
-    """Return the equations of the means, then the equations of the rotations as mean rates."""
+    """Return the equations of the means, then those of the rotations as mean rates."""
     windows_s = np.array([(turn.start_s, turn.end_s) for turn in turns])
     turned = increments(gyroscope.time_s, gyroscope.readings, state.matrix, state.offset, windows_s)
     return [
@@ -263,7 +262,7 @@ def _conditioning(equations: Sequence[_NormalEquations]) -> refusals.Conditionin
 
 
 def _find_birge_ratio(turns: Sequence[_NormalEquations], covariance: Array) -> tuple[float, float]:
-    """Return the Birge ratio of the rotations and its degrees of freedom; 1 and infinity if χ² is no larger."""
+    """Return the rotations' Birge ratio and its degrees of freedom; 1 and infinity if χ² is at most its expectation."""
     chi_square, dof = 0.0, 0.0
     for turn in turns:
         weight = np.linalg.inv(turn.covariance)

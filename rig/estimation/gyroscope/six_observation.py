@@ -6,8 +6,8 @@ Algorithm 1 are this one. Each revolution gives one equation ‖g‖² = ω², E
     ω² = β0 + x β,   x = [mx² my² mz² mx my mz],   β = [k² …, 2 k² b …],   β0 = Σ k² b² = Σ β_l² / (4 β_s)
 
 with s the three squares and l the three linear terms. The columns of X have the squares first, in the order of β; Eq.
-(7) prints them the other way round. m is the mean reading of the revolution, squared afterwards: averaging m², as Eq.
-(8) reads, adds the noise's variance to every square and shrinks the scale.
+(7) prints them last. m is the mean reading of the revolution, squared afterwards: averaging m², as Eq. (8) reads, adds
+the noise's variance to every square and shrinks the scale.
 
 β depends on the unknown β0 = γ through one scalar only: β(γ) = p − γ q with p = X⁺ω² and q = X⁺1 (X⁺: least squares).
 Both solvers find the fixed point of γ: `solve_by_newton`, and `solve_by_algorithm_1` as SIX publishes it.
@@ -112,7 +112,7 @@ def solve_linear(matrix: Array, right: Array) -> Array:
 
 
 def rank_deficient(axis: str) -> Fault:
-    """Return the error for a design without full rank."""
+    """Return the Fault of a design without full rank; `axis` is the undetermined one."""
     return Fault(
         "rank_deficient",
         f"the sweeps cannot separate scale and bias: {axis} was not swept in both directions",
@@ -131,7 +131,7 @@ def _gamma_at_one_speed(q: list[float], square: float) -> float:
 
 
 def negative_square(axis: int) -> Fault:
-    """Return the error of an axis (0, 1 or 2) whose readings give no positive square of its scale factor."""
+    """Return the Fault of an axis (0–2) whose readings give no positive square of its scale factor."""
     return Fault(
         "negative_square",
         f"the squared scale factor of {'xyz'[axis]} is zero, negative or not a number",

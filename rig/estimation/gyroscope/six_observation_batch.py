@@ -1,7 +1,7 @@
 """Six-observation estimates of many runs at once, for studies: the equations of `six_observation`, vectorised.
 
-Runs are along the first axis. A run without a solution is NaN and not marked as converged, so it does not stop the
-others; `Accumulator.solve` solves a single run and raises named faults.
+Runs are along the first axis. A run without a solution is NaN and not marked as converged. `Accumulator.solve` solves
+one run and raises named faults.
 """
 
 from dataclasses import dataclass

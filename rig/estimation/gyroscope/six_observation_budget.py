@@ -1,7 +1,7 @@
 """The uncertainty budget of the six-observation solution, from its response to the mean readings.
 
-That model uses speeds alone, so it is insensitive to the direction of the rates and to the mounting; but it assumes
-orthogonal sensor axes, which adds a contributor.
+That model uses speeds alone, so directions of rates and mounting do not matter. It assumes orthogonal sensor axes,
+which adds a contributor.
 """
 
 from dataclasses import replace

@@ -3,9 +3,8 @@
 Gravity is fixed in the room and rotates in the flange's frame, so attitudes separate g-sensitivity from bias; at rest
 the sensor reads only bias, Earth's rate and the effect of gravity. In a sweep the flange circles about the swept axis
 with a centripetal acceleration that the arm's geometry determines. Sweeps about more than three axes separate the
-angles between the sensor's axes from those between the arm's, sweeps at several speeds determine the nonlinearity. None
-of this is assumed: effects that sweeps and rests do not separate are excluded from the model and belong to the
-uncertainty.
+angles between the sensor's axes from those between the arm's, sweeps at several speeds determine the nonlinearity.
+Effects that sweeps and rests do not separate are left out of the model and belong to the uncertainty.
 """
 
 from collections.abc import Callable
@@ -46,7 +45,7 @@ class VectorInputs:
       last).
     - arms_m (N, 3): lever arms from the rotation axis to the sensor in the flange frame, None to neglect them.
     - noise_dof (N, 3): degrees of freedom of the variances.
-    - sensor: the properties by the data sheet, None if unknown.
+    - sensor: its properties by the data sheet, None if unknown.
     - encoder_errors_rad_s (P, N, 3): effect of encoders at the ends of arcs, None for whole revolutions.
     - ripples (N,): RMS ripple of each rotation as a fraction of its rate.
     - roundings_rad_s (N, 3): standard uncertainty of each mean by rounding.
@@ -113,7 +112,7 @@ class VectorInputs:
 
     @property
     def arm_errors_rad_s(self) -> Array:
-        """The effects (P, N, 3) of all errors of the arm's angles on the rates, those of the mounts last."""
+        """The effects (P, N, 3) of all errors of the arm's angles on the rates, then those of the mounts."""
         none = np.zeros((0, *self.means_rad_s.shape))
         kinds = (self.axis_errors_rad_s, self.return_errors_rad_s, self.encoder_errors_rad_s, self.mount_errors_rad_s)
         return np.concatenate([none, *(kind for kind in kinds if kind is not None)])
@@ -219,7 +218,7 @@ def _explain(
     arm_errors = inputs.arm_errors_rad_s
 
     def arm_and_speed_patterns(matrix: Array) -> Array:
-        """Return the effects (P, N, 3) on the readings, of one standard deviation each."""
+        """Return the effects (P, N, 3) on the readings of one standard deviation of each arm angle, mount and speed."""
         curved = [curvature(matrix, inputs.rates_rad_s)] if several else []
         return np.concatenate([arm_errors @ matrix.T, *curved])
 

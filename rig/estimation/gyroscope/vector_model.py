@@ -3,10 +3,10 @@
     m = F ω + c (+ G a),   F_i = a_i / k_i,   c = −b
 
 m is the mean reading (rad/s), ω the mean angular rate in the flange frame (unit axis × speed, zero for a rest), a_i the
-unit vector of sensor axis i in the flange frame. It is g = K (m + b), the convention of SIX, with a known direction of
-g: k_i = 1 / ‖row i of F‖ and b = −c, so every sweep and every rest determines all three biases. The mounting rotation
-and the non-orthogonality of the axes are estimated, not assumed. With gravity in the flange frame (m/s²) given, G (3×3,
-rad/s per m/s²) is the g-sensitivity.
+unit vector of sensor axis i in the flange frame. It is g = K (m + b), as in SIX, with a known direction of g: k_i = 1 /
+‖row i of F‖ and b = −c, so every sweep and every rest determines all three biases. The mounting rotation and the
+non-orthogonality of the axes are estimated, not assumed. With gravity in the flange frame (m/s²) given, G (3×3, rad/s
+per m/s²) is the g-sensitivity.
 
 The equations are linear in F, c and G, one weighted regression for each axis (Aitken's generalised least squares):
 efficient if the noise is Gaussian.
@@ -212,7 +212,7 @@ def design_matrix(rates: Array, gravity: Array | None) -> Array:
 
 
 def _unit(design: Array) -> Array:
-    """Return the size (p,) of each block of columns. Divided by it, blocks are comparable, and a missing axis shows."""
+    """Return the size (p,) of each column's block; divided by it, blocks are comparable and a missing axis shows."""
     squares = np.einsum("np,np->p", design, design).tolist()
     of_rates, of_gravity = ((sum(squares[block]) / len(design)) ** 0.5 or 1.0 for block in (slice(0, 3), slice(4, 7)))
     return np.array([*[of_rates] * 3, 1.0, *[of_gravity] * len(squares[4:])])
@@ -264,7 +264,7 @@ def index_coefficients(columns: int) -> tuple[NDArray[np.intp], NDArray[np.intp]
 
 
 def _all_variances(variances: Array, speed_noise: Array, shared: Array | None) -> Array:
-    """Return the variances (N, 3) of each mean reading from all causes."""
+    """Return the variances (N, 3) of the mean readings from all causes."""
     common = 0.0 if shared is None else np.diag(shared)[:, None]
     total: Array = variances + speed_noise**2 + common
     return total
@@ -273,8 +273,7 @@ def _all_variances(variances: Array, speed_noise: Array, shared: Array | None) -
 def _response(to_parameters: Array, inverse: Array) -> Array:
     """Return the derivative (6, N, 3) of k and b with respect to the mean readings, by the chain rule.
 
-    The factors are their derivative (6, 12) with respect to the coefficients, and the linear map (3, p, N) from
-    readings to coefficients.
+    `to_parameters` (6, 12): derivative with respect to the coefficients; `inverse` (3, p, N): readings to coefficients.
     """
     by_axis = np.concatenate([to_parameters[:, :9].reshape(6, 3, 3), to_parameters[:, 9:, None]], axis=2)
     response: Array = np.matmul(np.swapaxes(by_axis, 0, 1), inverse[:, :4]).transpose(1, 2, 0)

@@ -2,7 +2,7 @@
 
     a_m = F (s + F̄ s²) + b,   s = −Rᵀ g
 
-s is the specific force: at rest the opposite of gravity. Eq. (10) writes g for it and Eq. (11) −Rᵀ g in the first-order
+s is the specific force: at rest the opposite of gravity. Eq. (10) writes g for s, Eq. (11) −Rᵀ g in the first-order
 term; in the second-order term the sign does not matter. F̄ = diag(φ).
 """
 

@@ -1,13 +1,12 @@
 """An accelerometer's errors with prior variances: nonlinearity, temperature and bias drift.
 
-Its reading r is slightly nonlinear in the specific force v along its axis, and scale and bias follow its temperature:
+The reading r is slightly nonlinear in the specific force v along an axis; scale and bias follow the temperature:
 
     r = (1 + κ ΔT) v + φ v² + χ (v³ − g² v) + b + β ΔT + w(t)
 
 φ, χ, β and κ of each axis are zero on average, w is flicker and a random walk. So the scale refers to the readings at 1
-g up and 1 g down, which φ and χ do not change, and b is the reading at 0 g, as data sheets define both (ST DS12140,
-sections 4.6.1 and 4.6.2). Both refer to the mean temperature of the readings, and b includes the mean of w over their
-time.
+g up and 1 g down, which φ and χ do not change, and b is the reading at 0 g, as in data sheets (ST DS12140, sections
+4.6.1 and 4.6.2). Both refer to the readings' mean temperature; b includes the mean of w over their time.
 """
 
 from dataclasses import dataclass, replace
@@ -27,11 +26,11 @@ class AccelerometerErrors:
     - bias_m_s2_k, scale_per_k: β and κ.
     - warmer_k (K',): ΔT as recorded.
     - unseen_k (K',): ΔT below the recorded steps.
-    - windows_s (K', 2): start and end of each.
+    - windows_s (K', 2): start and end of each dwell or sweep.
     - instability_m_s2: the least Allan deviation of the flicker in w.
     - walk_m_s2_sqrt_s: random walk of w, estimated from the readings.
-    - louder (K',): extra variance of a disturbed dwell or sweep relative to its noise, estimated.
-    - turning_m_s2: difference of the bias in all sweeps, estimated.
+    - louder (K',): estimated extra variance of a disturbed dwell or sweep, relative to its noise.
+    - turning_m_s2: estimated difference of the bias in sweeps from that in dwells.
     """
 
     even_s2_m: float

@@ -14,9 +14,9 @@ A joint turns unevenly. The weights that form mean, cosine and sine of the readi
 encoders (`Sweeps.turning_rad2_s2`); c is the sum of these, times (a aᵀ − 1) (p + r) and a × (p + r). In uneven
 rotation, ω² and α are those of the time τ earlier, and gravity is rotated by a further (ω − ω₀) τ.
 
-ψ = ω τ is the joint's rotation during the lag τ of the accelerometer behind the clock of its time stamps: with opposite
-signs for opposite directions. If a gyroscope's readings have set that clock, τ is the lag behind the gyroscope. The
-filter's attenuation, (ω τ)²/2 at most, is neglected: 14 ppm at 60°/s and 5 ms.
+ψ = ω τ is the joint's rotation during the lag τ of the accelerometer behind the clock of its time stamps; its sign is
+that of ω. If a gyroscope's readings have set that clock, τ is the lag behind the gyroscope. The filter's attenuation,
+(ω τ)²/2 at most, is neglected: 14 ppm at 60°/s and 5 ms.
 
 Dwells and sweeps form one list of K = N + 3 M vectors: the N dwells, then mean, cosine and sine of each of M sweeps. θ
 (22,) contains F row by row, v_ref, b, r, τ and φ.
@@ -56,8 +56,8 @@ class Dwells:
 class Sweeps:
     """Whole revolutions at nearly constant speed.
 
-    - `harmonics_m_s2` (M, 3, 3): mean, cosine and sine over the joint's angle (rows) of the axes x y z, with the
-    - `covariances_m2_s4` (M, 9, 9) of these nine, row by row, by `rig.estimation.reference.sweep_harmonics`.
+    - `harmonics_m_s2` (M, 3, 3): mean, cosine and sine over the joint's angle (rows) of the axes x y z.
+    - `covariances_m2_s4` (M, 9, 9): of these nine, row by row, by `rig.estimation.reference.sweep_harmonics`.
     - `axes_flange` (M, 3): unit vector of a rotation with increasing angle; `speeds_rad_s` (M,): negative if the angle
       decreases.
     - `attitudes` (M, 3, 3): flange to base at the angle zero.
@@ -97,8 +97,7 @@ NO_SWEEPS = Sweeps(
 class Movement:
     """Dwells and sweeps together.
 
-    - `repeatability_rad`: standard deviation of the independent rotations of each sweep; a station shares all other
-      errors.
+    - `repeatability_rad`: standard deviation of each sweep's independent rotations; a station shares all other errors.
     - `sensor_errors`: errors of the sensor itself; None if unknown.
     - `arm_turns` (P, 3 N + 10 M): effects of P errors of the arm per δ, in the order of `effects`; None if unknown.
     - `own_share`: the fraction of δ² that is independent in each dwell.
@@ -139,13 +138,13 @@ class Movement:
         return noise
 
     def segments(self) -> list[slice]:
-        """Return each dwell's slice of all 3 K readings, then each sweep's slice."""
+        """Return the slice of each dwell, then of each sweep, among all 3 K readings."""
         still, turning = len(self.dwells.readings_m_s2), len(self.sweeps.speeds_rad_s)
         first = [3 * dwell for dwell in range(still)] + [3 * still + 9 * sweep for sweep in range(turning + 1)]
         return [slice(*ends) for ends in pairwise(first)]
 
     def constant(self) -> Array:
-        """Return 1 for a reading that contains the bias, 0 for a cosine and a sine (K,)."""
+        """Return (K,) 1 for a reading that contains the bias, 0 for a cosine and a sine."""
         return np.concatenate(
             [np.ones(len(self.dwells.readings_m_s2)), np.tile([1.0, 0.0, 0.0], len(self.sweeps.speeds_rad_s))]
         )
@@ -159,7 +158,7 @@ def predicted(theta: Array, movement: Movement) -> Array:
 
 
 def find_force(theta: Array, movement: Movement) -> Array:
-    """Return the specific force s (K, 3) in dwells and sweeps."""
+    """Return the specific force s (K, 3), m/s², in dwells and sweeps."""
     gravity, lever = project_reference(theta[DELAY], movement), project_lever_arm(theta[DELAY], movement)
     s: Array = gravity @ theta[REFERENCE] + lever @ theta[LEVER]
     return s + find_flange_acceleration(theta[DELAY], movement)
@@ -197,7 +196,7 @@ def project_lever_arm(delay_s: float, movement: Movement) -> Array:
 
 
 def _around_axes(turning_rad2_s2: Array, movement: Movement) -> Array:
-    """Return the matrices (K, 3, 3) that map a lever arm to its acceleration in sweeps, due to ω² and α (M, 2, 3)."""
+    """Return the matrices (K, 3, 3) that map a lever arm to its acceleration in sweeps by ω² and α (M, 2, 3)."""
     axes = movement.sweeps.axes_flange
     centripetal, euler = axes[:, :, None] * axes[:, None, :] - np.eye(3), cross(axes)
     squares, accelerations = np.moveaxis(turning_rad2_s2, 1, 0)[..., None, None]
@@ -250,14 +249,14 @@ def effects(theta: Array, movement: Movement) -> Array:
     """Return the effect (3 K, P) of each of the arm's errors on the readings, per radian; P = 3 N + 10 per station.
 
     Each dwell has three errors. The sweeps of a station share ten: small rotations of flange and base, and waves of the
-    joint's angle, A cos θ + B sin θ + C cos 2θ + D sin 2θ, of which the first harmonic remains. If the wrists' errors
-    are given by kind, they come last and are common to all stations.
+    joint's angle, A cos θ + B sin θ + C cos 2θ + D sin 2θ. Errors of the wrists that are given by kind come last and
+    are common to all stations.
     """
     return combine_effects(*split_effects(theta, movement), movement.own_share)
 
 
 def split_effects(theta: Array, movement: Movement) -> tuple[Array, Array | None]:
-    """Return the columns of `effects` in two parts: independent errors, and the wrists' constant errors if known."""
+    """Return the columns of `effects` in two parts: independent errors, and the wrists' constant ones if known."""
     independent = turned(theta, movement)
     if movement.arm_turns is None:
         return independent, None
@@ -290,9 +289,9 @@ def turned(theta: Array, movement: Movement) -> Array:
 def _differentiate_angle(apparent: Array, theta: Array, sweeps: Sweeps) -> Array:
     """Return the change (3 M, 3, 4) of the specific force due to waves w of the angle.
 
-    Gravity `apparent` turns by w times the derivative of its first harmonic, the rate grows by ω w′; centripetal 2 ω²
-    w′ (a aᵀ − 1) (p + r) and Euler ω² w″ a × (p + r) have a first harmonic for the waves of one period per revolution.
-    The change of this with the delay is neglected.
+    Gravity `apparent` changes by w times the derivative of its first harmonic. The rate grows by ω w′, so waves of one
+    period per revolution also add the first harmonics of the centripetal acceleration 2 ω² w′ (a aᵀ − 1) (p + r) and
+    the Euler acceleration ω² w″ a × (p + r). The effect of the delay on these is neglected.
     """
     axes, arms, squares = sweeps.axes_flange, sweeps.arms_m + theta[LEVER], sweeps.speeds_rad_s[:, None] ** 2
     _, cos, sin = np.moveaxis(apparent.reshape(-1, 3, 3), 1, 0)
@@ -316,7 +315,7 @@ def _read(changes: Array, s: Array, theta: Array, movement: Movement) -> Array:
 
 
 def _product(one: Array, other: Array, movement: Movement) -> Array:
-    """Return the elementwise product (K, 3, …). For sweeps it is the product of two harmonics, without higher ones."""
+    """Return the elementwise product (K, 3, …), in sweeps that of two harmonics up to the first order."""
     count = len(movement.dwells.readings_m_s2)
     mean, cos, sin = np.moveaxis(_harmonics_of_sweeps(one, movement), 1, 0)
     others = np.moveaxis(_harmonics_of_sweeps(other, movement), 1, 0)

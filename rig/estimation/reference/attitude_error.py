@@ -1,10 +1,10 @@
-"""Uncertain attitudes: their standard deviation, and the fit with it.
+"""Uncertain attitudes: their standard deviation, and the fit that includes it.
 
 A small rotation ε of the body, (3,) rad, turns the reference in the body's frame and does not change its size:
 
     v_m = F (s + φ s²) + b + E ε,   s = Rᵀ v_ref + v̄,   E = F diag(1 + 2 φ s) [Rᵀ v_ref]×
 
-So with ε ~ N(0, δ² 1) in every attitude a reading's covariance is V = diag(σ²) + δ² E Eᵀ: along the reference it does
+With ε ~ N(0, δ² 1) in every attitude a reading's covariance is V = diag(σ²) + δ² E Eᵀ, which along the reference does
 not depend on δ. For δ → 0 this is the fit to the reference as a vector, for δ → ∞ the fit to its size alone. δ is the
 restricted maximum likelihood estimate (Patterson and Thompson, Biometrika 58 (1971) 545).
 """
@@ -34,9 +34,9 @@ SETTLED = 1e-3  # relative change of δ at convergence
 
 @dataclass(frozen=True, slots=True)
 class AttitudeError:
-    """δ in rad about each axis, beyond the stated uncertainty of attitudes; `uncertainty_rad` is one std.
+    """The std δ of attitudes about each axis, rad, beyond their stated uncertainty; `uncertainty_rad` is δ's own std.
 
-    Near zero the likelihood is one-sided, and the std is that upwards.
+    Near zero the likelihood is one-sided: the std is that upwards.
     """
 
     std_rad: float
@@ -73,7 +73,7 @@ class Placed:
 
 @dataclass(frozen=True, slots=True)
 class AttitudeWeighted:
-    """θ (p,) and its covariance (p, p), the attitude error, whiteners (N, 3, 3) of the readings, the iterations."""
+    """The solution θ (p,), its covariance (p, p), the attitude error, the readings' whiteners (N, 3, 3), iterations."""
 
     theta: Array
     covariance: Array
@@ -108,7 +108,7 @@ def solve_attitude_weighted(start: Array, placed: Placed) -> AttitudeWeighted:
 def find_worst_attitude(start: Array, placed: Placed, fit: AttitudeWeighted) -> tuple[int, float, float]:
     """Return the attitude that fits worst, its error in rad relative to the others, and the error to be expected.
 
-    Only the other attitudes determine the expected error, because a wrong attitude would inflate it.
+    The expected error is determined without that attitude, which would inflate it.
     """
     residuals = placed.readings - predicted(fit.theta, placed.attitudes, placed.v_bar)
     worst = int(np.argmax(np.sum(whitened(fit.whiteners, residuals) ** 2, axis=1)))

@@ -32,7 +32,7 @@ ODDS = 1 / 19
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """θ (22,), decorrelated readings, J (3 K, q) of the free directions (22, q), δ, and the iterations."""
+    """The fitted θ (22,), decorrelated readings, J (3 K, q) of the free directions (22, q), δ, and the iterations."""
 
     theta: Array
     readings: Decorrelation
@@ -119,7 +119,7 @@ def _least_squares(theta: Array, movement: Movement, fixed: list[int], whitener:
 def refit_with_components(
     fit: Fit, movement: Movement, sensor: AccelerometerErrors, fixed: list[int], own_shares: Sequence[float]
 ) -> tuple[Movement, Fit]:
-    """Return the movement and the fit with variance components and disturbances estimated from the residuals."""
+    """Return movement and fit with variance components and disturbances estimated from the fit's residuals."""
     residuals = (movement.readings() - predicted(fit.theta, movement)).ravel()
     modelled, variances = noise(fit.theta, movement), np.diag(movement.noise())
     of_arm = partial(combine_effects, *split_effects(fit.theta, movement))
@@ -146,7 +146,7 @@ def list_fixed(movement: Movement, *, second_order: bool) -> list[int]:
 
 
 def find_free_directions(theta: Array, fixed: list[int]) -> Array:
-    """Return the free directions (22, q) of θ: v_ref keeps its norm, and `fixed` parameters keep their values."""
+    """Return the free directions (22, q) of θ: v_ref keeps its norm, the elements `fixed` their values."""
     directions = free_directions(theta, norm_known=True)
     free: Array = np.delete(directions, [index - 1 for index in fixed], axis=1)  # v_ref has one column fewer
     return free

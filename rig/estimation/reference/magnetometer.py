@@ -3,8 +3,8 @@
     m_m = F Rᵀ m + b,   F = M C_NO C_SI,   b = M C_NO b_HI + b_O
 
 C_SI and b_HI are the soft and hard iron, C_NO the non-orthogonality, M the scale factors, b_O the sensor's own offset.
-(Below Eq. (7) TRIAX writes S C_NO b_HI; the line above it in TRIAX defines that as M.) Only the products F and b are
-identifiable: iron and sensor are not separated, and need not be, because the correction m = F⁻¹ (m_m − b) removes both.
+(Below Eq. (7) TRIAX writes S for M.) Only the products F and b are identifiable: the correction m = F⁻¹ (m_m − b)
+removes the effects of iron and sensor together.
 """
 
 from dataclasses import dataclass
@@ -57,7 +57,7 @@ def uniformity(
 ) -> Uniformity:
     """Return the test of a uniform field: a fit of the readings with the given error of the attitudes.
 
-    `solution` is that of these `readings_t`, `variances_t2` (N, 3) in `attitudes` (N, 3, 3). Raise Fault
+    `solution` is that of the `readings_t` with `variances_t2` (N, 3) in `attitudes` (N, 3, 3). Raise Fault
     `attitude_untrustworthy` if no fit exists.
     """
     from scipy.special import chdtri
@@ -75,9 +75,9 @@ def uniformity(
 
 @dataclass(frozen=True, slots=True)
 class FieldDrift:
-    """The largest change (3,) of the readings in one attitude, by the χ² of its components, and its std (3,).
+    """The most significant change (3,) of the readings in one attitude, and its std (3,).
 
-    `limit` is the critical value of that χ², with a Bonferroni correction for the number of changes.
+    `limit` is the critical value of its χ², with a Bonferroni correction for the number of changes.
     """
 
     change_t: Array
@@ -92,7 +92,7 @@ class FieldDrift:
 
 
 def field_drift(means_t: ArrayLike, variances_t2: ArrayLike, repeatability_rad: float) -> FieldDrift:
-    """Return the largest change of readings (N, 3), N ≥ 2, in one attitude since the first reading.
+    """Return the most significant change of readings (N, 3), N ≥ 2, in one attitude since the first of them.
 
     `variances_t2` (N, 3); attitudes repeat with a standard deviation of `repeatability_rad` about each axis.
     """

@@ -1,7 +1,7 @@
 """The errors of readings besides the arm's attitudes: noise, the arm's repeatability, the sensor's own errors.
 
-All are zero on average and have prior variances, so the readings' covariance includes them: they are predicted together
-with θ, and θ's uncertainty includes their undetermined part (Henderson, Biometrics 31 (1975) 423).
+All are zero on average with prior variances, so they are part of the readings' covariance: they are predicted together
+with θ, whose uncertainty includes their undetermined part (Henderson, Biometrics 31 (1975) 423).
 """
 
 from collections.abc import Callable
@@ -47,7 +47,7 @@ def bending(theta: Array, movement: Movement) -> Array:
 
 
 def bias_warming(movement: Movement) -> Array:
-    """Return the patterns (6, 3 K) of one standard uncertainty of β, the bias's temperature coefficient, by axis.
+    """Return the patterns (6, 3 K) of one standard uncertainty of β, the temperature coefficient of each axis's bias.
 
     Three are for the recorded temperature, three for changes smaller than a step of the thermometer.
     """
@@ -84,7 +84,7 @@ def flickering(movement: Movement) -> Array:
 
 
 def wandering(movement: Movement) -> Array:
-    """Return the covariance (3 K, 3 K) of the estimated bias drift: random walk, and disturbances of segments."""
+    """Return the covariance (3 K, 3 K) of the estimated bias drift: random walk and segments' disturbances."""
     sensor, covariance = movement.sensor_errors, np.zeros((movement.readings().size,) * 2)
     if sensor is not None and sensor.walk_m_s2_sqrt_s:
         covariance += sensor.walk_m_s2_sqrt_s**2 * walking(sensor, movement)
@@ -109,7 +109,7 @@ def _expand_bias(covariance: Array, movement: Movement) -> Array:
 
 
 def select_sweeps(movement: Movement) -> Array:
-    """Return the pattern (3 K, 3) of a bias that is different in sweeps, by axis."""
+    """Return the patterns (3 K, 3) of a bias of each axis that occurs in sweeps only."""
     turning = movement.constant()
     turning[: len(movement.dwells.readings_m_s2)] = 0.0
     return per_axis(turning[:, None] * np.ones(3))

@@ -1,8 +1,8 @@
 """The uncertainty budget of a sensor calibrated in a constant reference of given norm: gravity, a field.
 
-The readings determine their noise and the error of the arm's attitudes. They do not fully determine the error of the
-reference's norm, the attenuation of the sensor's filter and the drift of the reference. The solution's response
-propagates each to scale and bias (JCGM 100, 5.1).
+The readings determine their noise and the error of the arm's attitudes. They do not determine the error of the
+reference's norm, the attenuation of the sensor's filter and the drift of the reference, which the solution's response
+propagates to scale and bias (JCGM 100, 5.1).
 """
 
 from collections.abc import Sequence
@@ -25,9 +25,9 @@ ATTITUDES = "arm's attitudes"
 
 @dataclass(frozen=True, slots=True)
 class Spread:
-    """The uncertainty of scale and bias from the readings: kx ky kz bx by bz, n readings.
+    """The uncertainty of scale and bias, kx ky kz bx by bz, from n readings.
 
-    - `scale` (3,), `covariance` (6, 6) of noise and attitudes, `response` (6, n) to the readings.
+    - `scale` (3,); `covariance` (6, 6): by noise and attitudes; `response` (6, n): to the readings.
     - `noise` (n, n): covariance of the readings' own noise.
     - `attitude_error`: the error of the attitudes.
     - `chi_square` of the residuals, and its `dof`.
@@ -49,7 +49,7 @@ class Spread:
         return fewest_dof(self.response, np.diag(self.noise), self.noise_dof)
 
     def covariance_of(self, patterns: Array) -> Array:
-        """Return the covariance (6, 6) of independent patterns (k, n) of one standard uncertainty in the readings."""
+        """Return the covariance (6, 6) due to independent patterns (k, n) of one standard deviation in the readings."""
         effect = self.response @ patterns.T
         covariance: Array = effect @ effect.T
         return covariance
@@ -73,7 +73,7 @@ class KnownSize:
 def scale_and_bias(matrix: Array, scale: Array, parameters: int) -> Array:
     """Return the derivative (6, p) of scale and bias with respect to θ (p,), which begins with F, the reference and b.
 
-    The bias changes sign: in θ it is a part of the reading, in a gyroscope's result it is added to the reading.
+    The bias changes sign: θ has it as a part of the reading, a gyroscope's result adds it to the reading.
     """
     derivative = np.zeros((6, parameters))
     derivative[:, np.r_[F, BIAS]] = parameter_jacobian(matrix, scale) * np.repeat([1.0, -1.0], 3)[:, None]
@@ -145,7 +145,7 @@ def _evaluate_norm(scale: Array, size: KnownSize) -> Contributor:
 
 
 def find_uncertainty_dof(error: AttitudeError) -> float:
-    """Return the degrees of freedom of an uncertain uncertainty (JCGM 100, G.4.2)."""
+    """Return the degrees of freedom of an attitude error with an uncertainty of its own (JCGM 100, G.4.2)."""
     if error.uncertainty_rad == 0.0:
         return np.inf
     return max(1.0, 0.5 * (error.std_rad / error.uncertainty_rad) ** 2)

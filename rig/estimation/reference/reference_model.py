@@ -1,4 +1,4 @@
-"""The forward model of TRIAX, Eqs. (3), (9), (10), a sensor's readings in known attitudes, and its best fit.
+"""The forward model of a sensor's readings in known attitudes, TRIAX, Eqs. (3), (9), (10), and its best fit.
 
     v_m = F (s + φ s²) + b,   s = Rᵀ v_ref + v̄
 
@@ -26,7 +26,7 @@ STEP_TOLERANCE = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class KnownVector:
-    """v̄ (N, 3) in body coordinates, the table's own motion in each attitude: its rate, for a gyroscope."""
+    """The prior v̄ (N, 3), body coordinates: the table's own motion in each attitude, for a gyroscope its rate."""
 
     added: ArrayLike
 
@@ -37,7 +37,7 @@ class KnownVector:
 
 @dataclass(frozen=True, slots=True)
 class KnownNorm:
-    """v̄ = 0, with a given ‖v_ref‖ = `norm`, and a table vector `side` (3,) whose product with v_ref is positive."""
+    """The prior v̄ = 0 and ‖v_ref‖ = `norm`, with a table vector `side` (3,) whose product with v_ref is positive."""
 
     norm: float
     side: ArrayLike
@@ -88,7 +88,7 @@ def jacobian(theta: Array, attitudes: Array, v_bar: Array) -> Array:
 
 
 def free_directions(theta: Array, *, norm_known: bool) -> Array:
-    """Return the free directions (…, p, q) of θ. If its norm is given, v_ref only rotates, so q = p − 1."""
+    """Return the free directions (…, p, q) of θ: q = p, or p − 1 if v_ref keeps its given norm."""
     p = theta.shape[-1]
     free = np.zeros((*theta.shape[:-1], p, p))
     free[...] = np.eye(p)

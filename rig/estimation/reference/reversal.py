@@ -6,9 +6,9 @@ field a of its carrier (the arm's iron, as far as it rotates with the flange) is
     b_k = b + F_k M_k a
 
 b_k is the bias estimated in run k and F_k the matrix estimated with it, which includes the real mounting. With half a
-revolution about one axis, b is half the sum and the field half the difference on the other two axes; along that axis
-only their sum is identifiable. A second one about another axis separates all three. The field of the arm's other links
-at the sensor is the same in all runs with the same attitudes, to first order, and is included in a.
+revolution about one axis, on the other two axes b is half the sum and the field half the difference; along the axis
+only the sum is identifiable. Half a revolution about another axis separates all three. a includes the field of the
+arm's other links, the same to first order in all runs with the same attitudes.
 """
 
 from dataclasses import dataclass
@@ -24,9 +24,9 @@ SAME = 1e-6  # tolerance of mountings, which are nominal and exact
 
 @dataclass(frozen=True, slots=True)
 class Reversal:
-    """`bias_t` b (3,) in the sensor's axes, `arm_field_t` (3,) in its axes of the first run, `covariance` (6, 6).
+    """The bias (3,) in the sensor's axes, the arm's field (3,) in those of the first run, and their covariance (6, 6).
 
-    If an axis was not turned over, `arm_field_in_bias` is True, the bias contains the sum of both and the field is 0.
+    If an axis was not turned over, `arm_field_in_bias` is True: the bias contains the sum of both, the field is 0.
     `chi_square` tests the agreement of the runs.
     """
 
@@ -81,7 +81,7 @@ def separate(biases_t: Array, covariances_t2: Array, matrices: Array, mountings:
 
 
 def _find_common_directions(mountings: Array) -> Array:
-    """Return the holder's orthonormal directions (3, n) whose fields are equal in all mountings, as a bias is."""
+    """Return orthonormal directions (3, n) of the holder along which a field looks like a bias in all mountings."""
     differences = (mountings[1:] - mountings[0]).reshape(-1, 3)
     _, sizes, rows = np.linalg.svd(differences)
     alike = np.ones(3, dtype=np.bool_)

@@ -1,4 +1,4 @@
-"""Readings of given noise with shared errors of one unknown standard deviation.
+"""Readings with given noise, and shared errors of one unknown standard deviation.
 
     y = J x + E e + n,   n ~ N(0, V),   e ~ N(0, δ² 1)
 
@@ -16,7 +16,7 @@ from rig.estimation.reference.attitude_error import AttitudeError, maximise_like
 
 @dataclass(frozen=True, slots=True)
 class Decorrelation:
-    """`transform` (n, n) maps readings to independent ones, `growth` (n,) is γ there."""
+    """The map `transform` (n, n) from readings to independent ones, of variance 1 + δ² γ; `growth` (n,) is γ."""
 
     transform: Array
     growth: Array

@@ -5,8 +5,8 @@ F⁻¹ v_m − Rᵀ v_ref − b* − φ s² = v̄ with b* = F⁻¹ b is linear i
     X β = V̄,   X = [D(v_m)  −Rᵀ  −I  −diag(s²)]
 
 v̄ ≠ 0: linear least squares, Eq. (6). v̄ = 0: the last right singular vector, Eq. (5), scaled to the given ‖v_ref‖ and
-sign. That vector of unit length depends on the units of the columns, which TRIAX does not state; here every block of
-columns is scaled to unit RMS first.
+sign. It depends on the units of the columns, which TRIAX does not state; here every block of columns is scaled to unit
+RMS first.
 
 All functions broadcast over runs: readings (…, N, 3). θ is as in `reference_model`: F itself and b, not their inverses.
 """
@@ -66,7 +66,7 @@ def null_vector(x: Array, sizes: Array, norm: float, side: Array) -> Array:
 
 
 def to_theta(beta: Array) -> Array:
-    """Return θ of the forward model from β: F from its inverse, b = F b*."""
+    """Return θ of the forward model from β: F is the inverse of β's rows, b = F b*."""
     theta = beta.copy()
     f = np.linalg.inv(matrix(beta))
     theta[..., F] = f.reshape(*f.shape[:-2], 9)
@@ -111,8 +111,7 @@ def published_covariance(
     """Return the covariance (p, p) of a published θ, to first order in errors of `variances` (N, 3).
 
     An error e of a reading enters equation k as F⁻¹ e_k, because the readings are in X: δβ = −X⁺ F⁻¹ e, projected to
-    the normalisation. With second-order terms, the change of s² with v_ref is added, because they are iterated. F and b
-    follow from β.
+    the normalisation. With second-order terms the change of s² with v_ref is included. F and b follow from β.
     """
     second_order = len(theta) > 15
     norm_known = isinstance(prior, KnownNorm)

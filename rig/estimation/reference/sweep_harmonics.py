@@ -1,12 +1,12 @@
 """The first harmonic of one revolution: mean, cosine and sine of accelerometer readings over the joint's angle.
 
-It is the counterpart of the mean to which a gyroscope's revolution is reduced. The effects of the servo's vibration
-follow from the joint's own speed: centripetal acceleration by ω² minus the square of its mean, Euler acceleration by
-the angular acceleration α, and gravity by the joint's extra rotation during the filter's lag. One regression removes
-them all, so they neither bias the result nor count as noise. It also removes the second and the third harmonic, by
-angle errors and a nonlinear sensor. A speed with one to four periods per revolution cannot be separated from gravity;
-its effect remains. If the arm also oscillates at a frequency that its encoders do not measure, the residuals have a
-spectral line; it is removed as well, since a revolution is not a whole number of its periods.
+For an accelerometer it replaces the mean of a gyroscope's revolution. The effects of the servo's vibration follow from
+the joint's own speed: centripetal acceleration by ω² minus the square of its mean, Euler acceleration by the angular
+acceleration α, and gravity by the joint's extra rotation during the filter's lag. One regression removes them all, so
+they neither bias the result nor count as noise. It also removes the second and the third harmonic, due to angle errors
+and a nonlinear sensor. Changes of the speed with one to four periods per revolution cannot be separated from gravity;
+their effect remains. An oscillation of the arm that its encoders do not measure is a spectral line of the residuals. It
+is removed as well, because a revolution is not a whole number of its periods.
 """
 
 from collections.abc import Callable
@@ -34,9 +34,8 @@ class FirstHarmonic:
     - `speed_rad_s`: 2π over the time of a revolution, negative if the angle falls.
     - `noise_m_s2` (3,): std of one sample, with `dof` degrees of freedom; `residuals_m_s2` (n, 3).
     - `vibration_m_s2` (3,): RMS of the removed vibration of servo and arm.
-    - `turning_rad2_s2` (6, 3): mean, cosine and sine, by the same weights, of ω² and α, of the derivatives of both per
-      radian of the mean rotation, and of ω₀ (ω − ω₀) cos θ and sin θ with the mean rate ω₀: the filter's lag needs
-      these four.
+    - `turning_rad2_s2` (6, 3): mean, cosine and sine, by the same weights, of ω² and α; and for the filter's lag of
+      their derivatives per radian of the mean rotation, and of ω₀ (ω − ω₀) cos θ and sin θ with the mean rate ω₀.
     """
 
     harmonic_m_s2: Array
@@ -116,8 +115,8 @@ def _regression(columns: Array, readings: Array) -> tuple[Array, Array]:
 def _find_long_run_covariance(residuals: Array, scatter: Array, coloured: Callable[[Array], float]) -> Array:
     """Return the long-run covariance (3, 3) of residuals (n, 3), by their autocorrelation along principal axes.
 
-    A vibration is along one of these and averages out almost entirely, unlike the noise along the others. Along x, y, z
-    both are mixed, and the noise would seem to have the vibration's correlation.
+    A vibration is along one of these axes and averages out almost entirely, unlike the noise along the others. Along x,
+    y, z the noise would seem to have the vibration's correlation.
     """
     variances, directions = np.linalg.eigh(scatter)
     projected = residuals @ directions
@@ -147,7 +146,7 @@ def _fourier_columns(angle_rad: Array, count: int) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class _Uneven:
-    """The joint's `rate` (n,) minus its mean, `acceleration` (n,) and `jerk` (n,), and their fast part.
+    """The joint's `rate` (n,) minus its mean, `acceleration` (n,) and `jerk` (n,), and their fast part, SI units.
 
     `fast` (4, n): the rate and its first three derivatives, without the lowest four harmonics of a revolution.
     """

@@ -7,11 +7,11 @@ motion: for a gyroscope its rate (v_ref is then the Earth's rate), zero for an a
 = 0 the factor between F and v_ref is unknown, so ‖v_ref‖ and its half-space must be given.
 
 Three methods: "as_published" solves the stacked equations (`rig.estimation.reference.stacked`). The readings are in X,
-so their noise σ shrinks F⁻¹ by about (σ/v_rms)², whatever their number (errors in variables); it is significant if √N
-σ/v_rms nears one. Averages of minutes are far below it, single samples at slow rates are not. "maximum_likelihood"
-continues with weighted least squares in the readings themselves (`rig.estimation.reference.reference_model`): it is
-unbiased, independent of the scaling of columns, and efficient. "attitude_weighted" also estimates attitude errors, such
-as those of an arm (`rig.estimation.reference.attitude_error`).
+so their noise σ shrinks F⁻¹ by about (σ/v_rms)², whatever their number (errors in variables). This is significant if √N
+σ/v_rms nears one: not for averages of minutes, but for single samples at slow rates. "maximum_likelihood" continues
+with weighted least squares in the readings themselves (`rig.estimation.reference.reference_model`): it is unbiased,
+independent of the scaling of columns, and efficient. "attitude_weighted" also estimates attitude errors, such as those
+of an arm (`rig.estimation.reference.attitude_error`).
 """
 
 from collections.abc import Callable
@@ -97,7 +97,7 @@ class TriaxialSolution:
 
     @property
     def attitude_std_rad(self) -> float:
-        """The estimated error of attitudes about each axis; zero if the method takes them as exact."""
+        """The estimated error of attitudes about each axis, rad; zero if the method takes attitudes as exact."""
         return 0.0 if self.attitude_error is None else self.attitude_error.std_rad
 
 
@@ -253,8 +253,8 @@ def _check_attitudes(start: Array, placed: Placed, fit: AttitudeWeighted) -> Non
 def check_trustworthy(error_rad: float, furthest: Callable[[], tuple[int, float, float]], *, enough: bool) -> None:
     """Raise Fault `attitude_untrustworthy` for large attitude errors: of all attitudes, or of the worst one.
 
-    `error_rad` is the error of all. `furthest` returns the worst one's index, its error in rad relative to the others,
-    and the others' own. It is called if `enough` others remain.
+    `error_rad` is the error of all. `furthest`, called if `enough` others remain, returns the index of the worst
+    attitude, its error in rad relative to the others, and the others' error.
     """
     message = f"the readings say that the attitudes are off by {1e3 * error_rad:.2g} mrad each"
     if error_rad > SUSPICIOUS_RAD and enough:

@@ -1,1 +1,1 @@
-"""Noise, means, coverage and variance components: statistics that any estimator may use."""
+"""Noise, means, coverage and variance components: statistics for all estimators."""

@@ -3,12 +3,12 @@
     σ²(τ) = ⟨(ȳ_{k+m} − ȳ_k)²⟩ / 2,   τ = m τ₀
 
 over all overlapping pairs of adjacent means ȳ of m readings (NIST SP 1065, section 5.2.4, with readings instead of
-frequencies). Pairs lie within one interval of readings, never across two: between them the sensor may have turned.
+frequencies). A pair lies within one interval of readings, because the sensor may have turned between two.
 
 The equivalent degrees of freedom of σ² (Howe, Allan and Barnes 1981; NIST SP 1065, table 5) are those of the noise that
-dominates about τ, by the slope of the curve. Multiplied by these degrees of freedom and divided by its true value, σ²
-is χ². White noise has the slope −1/2 and σ = N/√τ, N being the random walk; the least σ, at the flat part of the curve,
-is 0.664 times the bias instability B (IEEE Std 952-1997, C.1.1 and C.1.3).
+dominates about τ, by the slope of the curve. σ² times these degrees of freedom over its true value is χ². White noise
+has the slope −1/2 and σ = N/√τ, N being the random walk; the least σ, at the flat part of the curve, is 0.664 times the
+bias instability B (IEEE Std 952-1997, C.1.1 and C.1.3).
 """
 
 from collections.abc import Sequence
@@ -38,7 +38,7 @@ ENOUGH_FOR_A_FLOOR_S = 600.0  # few gyroscopes reach their least deviation soone
 
 @dataclass(frozen=True, slots=True)
 class AllanCurve:
-    """Overlapping Allan deviation: `tau_s` (T,), `deviation`, `low`, `high` (T, 3) in the unit of the readings.
+    """The overlapping Allan deviation: `tau_s` (T,), and `deviation`, `low`, `high` (T, 3) in the readings' unit.
 
     `low` and `high` bound the true value with a probability of 95 %; `dof` (T, 3): equivalent degrees of freedom.
     `total_s` is the total duration.
@@ -53,7 +53,7 @@ class AllanCurve:
 
     @property
     def relative_std(self) -> Array:
-        """The standard deviation (T, 3) of each deviation, as a fraction of it."""
+        """The relative standard deviation (T, 3) of each Allan deviation."""
         std: Array = 1 / np.sqrt(2 * self.dof)
         return std
 
@@ -69,7 +69,7 @@ class AllanReading:
 
 @dataclass(frozen=True, slots=True)
 class AllanAxis:
-    """The noise of one axis: N in the readings' unit times √s, B in that unit; or the Fault that prevents it."""
+    """The noise of one axis: N in the readings' unit times √s, B in their unit; or the Fault that prevents either."""
 
     random_walk: AllanReading | Fault
     bias_instability: AllanReading | Fault
@@ -139,7 +139,7 @@ def _average_squares(phases: Sequence[Array], factor: int) -> Array:
 
 
 def _dof(points: Sequence[int], factor: int, noise: Noise) -> float:
-    """Return the dof of all intervals together, independent and weighted by their numbers of pairs (Satterthwaite)."""
+    """Return the dof of all independent intervals together, weighted by their numbers of pairs (Satterthwaite)."""
     reach = [n for n in points if n > 2 * factor]
     pairs = np.array([n - 2 * factor for n in reach], dtype=np.float64)
     of_interval = np.array([equivalent_dof(n, factor, noise) for n in reach])

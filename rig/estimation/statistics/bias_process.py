@@ -1,10 +1,10 @@
 """Bias drift: flicker, a random walk, and scatter between averages.
 
 The readings are averaged over windows. A random walk of rate q (rad/s per √s) changes the bias more the longer the time
-between two windows; flicker noise is between that and a scatter s without memory. The size of the flicker is given,
-because a few averages do not determine it; walk and scatter are estimated from the averages by restricted maximum
-likelihood (Patterson and Thompson, Biometrika 58 (1971) 545), the likelihood of the contrasts that do not depend on the
-fitted parameters.
+between two windows; a scatter s has no memory; flicker noise is in between. The size of the flicker is given, because a
+few averages do not determine it; walk and scatter are estimated from the averages by restricted maximum likelihood
+(Patterson and Thompson, Biometrika 58 (1971) 545), the likelihood of the contrasts that do not depend on the fitted
+parameters.
 """
 
 from collections.abc import Callable
@@ -79,9 +79,9 @@ def walk_covariance(windows_s: ArrayLike) -> Array:
 def flicker_covariance(windows_s: ArrayLike) -> Array:
     """Return the covariance (N, N) of the means of flicker noise of Allan deviation 1 over windows (N, 2) [start, end].
 
-    Values a time τ apart have the covariance −ln(τ)/(2 ln 2), plus an infinite constant: this Allan deviation belongs
-    to noise of power B²/(2π f), B √(2 ln 2/π) (IEEE Std 952-1997, C.1.3). Relative to the mean over the whole time from
-    the first start to the last end the constant cancels.
+    Noise of power B²/(2π f) has the Allan deviation B √(2 ln 2/π) (IEEE Std 952-1997, C.1.3), so values a time τ apart
+    have the covariance −ln(τ)/(2 ln 2), plus an infinite constant. It cancels relative to the mean over the whole time
+    from the first start to the last end.
     """
     windows = np.asarray(windows_s, dtype=np.float64)
     span = [windows.min(), windows.max()]
@@ -114,8 +114,8 @@ def _flicker(instability_rad_s: float, windows_s: ArrayLike) -> Array:
 def average_posterior(sizes: Array, likelihood: Array) -> Array:
     """Return the posterior mean (2,) of sizes (K, 2), with a spike-and-slab prior, log-uniform in the slab.
 
-    The maximum of the likelihood, and with it every uncertainty, is by chance far too small in one run and too large in
-    another (Mitchell and Beauchamp, J. Am. Stat. Assoc. 83 (1988) 1023).
+    The maximum of the likelihood, and with it every uncertainty, would by chance be far too small in one run and too
+    large in another (Mitchell and Beauchamp, J. Am. Stat. Assoc. 83 (1988) 1023).
     """
     log_posterior = likelihood - np.log(STEPS) * np.count_nonzero(sizes, axis=1)
     weights = np.exp(log_posterior - log_posterior.max())
@@ -128,7 +128,7 @@ def average_walks(sizes: Array, likelihood: Array) -> Array:
     The scatter has the prior of `average_posterior`. This is for parameters over a long time, such as slopes over
     temperature: their uncertainty may come mostly from a walk that the averages hardly show. So a walk is assumed to
     exist, with a uniform prior (Gelman, Bayesian Analysis 1 (2006) 515), and the covariance is the posterior mean.
-    Sizes are on a geometric grid, so the prior of one is proportional to the step to the next.
+    Sizes are on a geometric grid, so a size's prior is proportional to the step to the next.
     """
     log_posterior = likelihood - np.log(STEPS) * np.count_nonzero(sizes[:, 1:], axis=1)
     weights = sizes[:, 0] * np.exp(log_posterior - log_posterior.max())
@@ -138,7 +138,7 @@ def average_walks(sizes: Array, likelihood: Array) -> Array:
 def select_by_akaike(sizes: Array, likelihood: Array) -> Array:
     """Return the sizes (2,) of maximum likelihood of (K, 2), zero unless they reduce Akaike's information criterion.
 
-    No walk is included if noise alone explains the averages. So residuals are not explained by a walk that is absent.
+    No walk is included if noise alone explains the averages.
     """
     return np.asarray(sizes[np.argmax(likelihood - PRICE * np.count_nonzero(sizes, axis=1))], dtype=np.float64)
 

@@ -36,7 +36,7 @@ def coverage_probability(factors: ArrayLike, dof: ArrayLike) -> Array:
 
 
 def tail_probability(distances: ArrayLike, dof: ArrayLike) -> Array:
-    """Return the one-sided probability that the true value is farther away than this many standard uncertainties."""
+    """Return the one-sided probability that the true value is more than `distances` standard uncertainties away."""
     distance, whole_dof = np.broadcast_arrays(np.asarray(distances, dtype=np.float64), _round_down(dof))
     tails = np.array([math.erfc(value / math.sqrt(2)) / 2 for value in distance.ravel()]).reshape(distance.shape)
     if np.isfinite(whole_dof).any():
@@ -50,7 +50,7 @@ def tail_probability(distances: ArrayLike, dof: ArrayLike) -> Array:
 def false_alarm_of_each(of_all: float, tests: int) -> float:
     """Return the false-alarm probability of each of `tests` tests for the probability `of_all` that any fails.
 
-    By Bonferroni's inequality, which also holds for dependent tests.
+    Bonferroni's inequality also holds for dependent tests.
     """
     return of_all / tests
 
@@ -59,7 +59,7 @@ def joint_factors(values: int, dof: ArrayLike, probability: float) -> Array:
     """Return the simultaneous coverage factor: k so that all of `values` intervals ± k u contain their true values.
 
     They do so with at least that `probability`, by Bonferroni's inequality. `dof`: degrees of freedom of any shape. For
-    one value and `PROBABILITY` it equals `coverage_factors`.
+    one value and `PROBABILITY` the factor is that of `coverage_factors`.
     """
     whole_dof, tail = _round_down(dof), false_alarm_of_each(1 - probability, values) / 2
     factors = np.full(np.shape(dof), -NormalDist().inv_cdf(tail))
@@ -74,8 +74,8 @@ def joint_factors(values: int, dof: ArrayLike, probability: float) -> Array:
 def find_ellipsoid_factor(values: int, dof: ArrayLike) -> float:
     """Return the factor of the ellipsoid that contains `values` values at once with 95 %, by the fewest of `dof`.
 
-    It is √χ² of a normal distribution (JCGM 102, 6.5). For p values with a multivariate t distribution it is √(p F),
-    with the quantile of F for p and ν degrees of freedom.
+    For p values with a multivariate t distribution the factor is √(p F), with the quantile of F for p and ν degrees of
+    freedom; for a normal distribution √χ² (JCGM 102, 6.5).
     """
     fewest = float(np.min(_round_down(dof)))
     if math.isinf(fewest):

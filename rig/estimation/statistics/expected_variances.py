@@ -1,6 +1,6 @@
-"""Expected variance components of readings with shared errors, in place of the most likely ones.
+"""Expected instead of most likely variance components of readings with shared errors.
 
-They are the arm's errors, the bias random walk, and the disturbance of single dwells, as in
+These are the arm's errors, the bias random walk, and the disturbance of single dwells, as in
 `rig.estimation.statistics.bias_process` and `rig.estimation.reference.shared_errors`, together. Only a few readings
 determine them: the most likely values, and with them every uncertainty, would by chance be too small in one run and too
 large in the next.
@@ -25,9 +25,10 @@ LOUDEST, VOLUMES = 30.0, 8  # grid of a disturbance's size, in standard deviatio
 class ResidualInputs:
     """Residuals (n,) of a fit, its columns `slopes` (n, q), and the covariances of the errors.
 
-    `covariance` (n, n): without arm and walk; `effects(fraction)` (n, P): effects of the arm's errors, of which this
-    fraction is independent in each dwell; `walk` (n, n): the covariance of a walk of rate 1; `noise` (n,): the
-    variances of the readings' own noise, the scale of the walk's grid.
+    - `covariance` (n, n): without arm and walk.
+    - `effects(fraction)` (n, P): effects of the arm's errors, of which this fraction is independent in each dwell.
+    - `walk` (n, n): covariance of a walk of rate 1.
+    - `noise` (n,): variances of the readings' own noise.
     """
 
     residuals: Array
@@ -79,7 +80,7 @@ def expected_sizes(fit: ResidualInputs, shares: Sequence[float]) -> ErrorSizes:
 def expected_disturbances(
     fit: ResidualInputs, sizes: ErrorSizes, causes: Sequence[Array], odds: Sequence[float]
 ) -> Array:
-    """Return the expected variance (k,) of each of the `causes`; a cause's columns (n, …) are for one std.
+    """Return the expected variance (k,) of each of `causes`, which hold the columns (n, …) of one std.
 
     Priors: log-uniform, with `odds` (k,) that the cause exists.
     """

@@ -1,4 +1,4 @@
-"""Weights of a mean: one linear functional for all quantities averaged over the same samples.
+"""Weights of a mean, the same for all quantities averaged over the same samples.
 
 A reading is F ω + c plus nuisance effects. Weights w orthogonal to the nuisance columns N give wᵀ m = F wᵀ ω + c: the
 mean of the readings corresponds to the mean of ω with the same weights, even if the samples cover a vibration

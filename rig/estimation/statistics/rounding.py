@@ -1,4 +1,4 @@
-"""The rounding error of a mean of readings in steps: a part of it remains even in the average of many readings.
+"""The rounding error of a mean of rounded readings, a part of which remains however many are averaged.
 
 The mean of x + noise, rounded to multiples of q, has the error Σ (−1)ⁿ q/(πn) exp(−2(πnσ/q)²) sin(2πnx/q): the sawtooth
 of the rounding error, each harmonic damped by the characteristic function of the noise that carries the reading across
@@ -28,7 +28,7 @@ ALIKE = 0.5  # least length of the mean of unit vectors that have one direction
 
 @dataclass(frozen=True, slots=True)
 class Steps:
-    """The steps of numbers: `unit` is that of each axis (3,), or of all.
+    """The steps of rounded numbers: `unit` (3,) of each axis, or one of all.
 
     A number truncated (`cut`) toward zero is shifted to the middle of its interval. Zero then represents all values
     within one unit in either direction, so its neighbours are a unit and a half away. `zero` (3,) is the value of a
@@ -51,7 +51,7 @@ class Steps:
         return result
 
     def widths(self, readings: Array) -> Array:
-        """Return the widest interval (3,) of values that one recorded reading (n, 3) may represent."""
+        """Return the widest interval (3,) of values that one of the readings (n, 3) may represent."""
         if not self.cut:
             return self.units
         wide = [bool(self.reads_zero(axis, readings[:, axis]).any()) for axis in range(3)]
@@ -70,8 +70,8 @@ class Steps:
 def cut_steps(readings: Array, unit: float) -> Steps:
     """Return the resolution steps of readings (n, 3) that the source has truncated toward zero to multiples of `unit`.
 
-    The source may have applied an offset and a scale factor near one after truncation. Truncated values lie half a unit
-    off the integers except at zero, which shows the position of zero.
+    The source may have applied an offset and a scale factor near one after truncation. Nonzero truncated values then
+    lie half a unit off the integers relative to zero, which shows where zero is.
     """
     steps = find_steps(readings)
     units = np.where(np.abs(steps / unit - 1) < NEAR, steps, unit)
@@ -99,9 +99,9 @@ def find_steps(readings: Array) -> Array:
 def bound_rounding_variance(readings: Array, steps: Steps, smooth: Array, scatter: Array) -> Array:
     """Return an upper bound of the variance (3,) that rounding adds to a mean of readings (n, 3).
 
-    `smooth` (n, 3) is their known variation, such as the ripple of the arm, which makes readings cross steps; `scatter`
-    (3,) is the variance of the rest, noise and rounding together (Sheppard). Readings with fewer than three different
-    values do not determine their noise, which may be zero.
+    `smooth` (n, 3) is the readings' known variation across steps, such as the ripple of the arm; `scatter` (3,) is the
+    remaining variance, by noise and rounding (Sheppard). Readings with fewer than three different values do not
+    determine their noise, which may be zero.
     """
     units = steps.units
     coarse, bounds = np.flatnonzero((units > 0) & (scatter <= (LARGE_NOISE * units) ** 2)), np.zeros(3)

@@ -38,11 +38,11 @@ UNLIKELY = 1e30  # negative log-posterior if it cannot be computed
 
 @dataclass(frozen=True, slots=True)
 class Mixed:
-    """`observed` (m,), `design` (m, p), C₀ `fixed` (m, m) and A_k `components` (k, m, m).
+    """The model of `observed` (m,): `design` (m, p), C₀ `fixed` (m, m), A_k `components` (k, m, m).
 
-    `precision` (p,): the prior precision of each column's coefficient, 0 if none. `scales` (k,): the medians of the
-    half-Cauchy priors of σ. `alone` (k, 2): sum of squares and dof of residuals of each cause alone, measured
-    separately from y; 0 if there are none.
+    - `precision` (p,): the prior precision of each coefficient, 0 if none.
+    - `scales` (k,): the medians of the half-Cauchy priors of σ.
+    - `alone` (k, 2): sum of squares and dof of each cause's residuals, measured separately from y; 0 if not measured.
     """
 
     observed: Array
@@ -56,7 +56,7 @@ class Mixed:
 
 @dataclass(frozen=True, slots=True)
 class MixedFit:
-    """θ (p,) with its `covariance` (p, p), the log-likelihood, and `residuals` (m,)."""
+    """The fitted θ (p,), its `covariance` (p, p), the log-likelihood, and `residuals` (m,)."""
 
     theta: Array
     covariance: Array
@@ -87,9 +87,9 @@ class MixedModel:
     def find_maxima(self, start: Array | None = None) -> Array:
         """Return the standard deviations (n, k) at the maxima of the posterior, the most probable first.
 
-        Few residuals may have several maxima, in which one cause or another explains the largest. Without a `start` the
-        search begins at the priors' medians and at points where one cause exceeds all others. Maxima that are less
-        probable than the first by more than `NEGLIGIBLE` are left out.
+        Few residuals may have several maxima, in which different causes explain the largest. Without a `start` the
+        search begins at the priors' medians and at points where one cause exceeds all others. Maxima less probable than
+        the first by more than `NEGLIGIBLE` are left out.
         """
         if start is not None:
             return np.exp([self._climb(np.log(start)).x])
@@ -140,7 +140,7 @@ class MixedModel:
     def expand(self, maxima: Array, wanted: Array) -> Array:
         """Return the half-widths (q,) of 95.45 % intervals of `wanted` (q, p) combinations of θ about their estimates.
 
-        The estimates are those at the first of `maxima` (n, k). The intervals integrate over all standard deviations.
+        The estimates are those at the first of `maxima` (n, k); the intervals integrate over all standard deviations.
         """
         top = wanted @ self.solve(maxima[0]).theta
         offsets = []
@@ -222,8 +222,8 @@ def sample_adaptively(log_density: Callable[[Array], float], begins: Sequence[tu
     """Draw s samples of k variables, call the log-density at each, and return their weights (s,) in the same order.
 
     Adaptive multiple importance sampling (Cornuet et al., Scand. J. Stat. 39 (2012) 798). It begins at each maximum
-    (k,) of `begins` with the curvature (k, k) there: each further round draws from Student's t with the mean and
-    covariance of the samples around this maximum. The weights are normalised over all samples.
+    (k,) of `begins` with the curvature (k, k) there; each further round draws from Student's t with the mean and
+    covariance of the samples around the maximum. The weights are normalised over all samples.
     """
     rng = np.random.default_rng(0)
     size = len(begins[0][0])
@@ -276,7 +276,7 @@ def _temper(weights: Array, fewest: float) -> Array:
 
 
 def find_half_width(offsets: Array, variances: Array, weights: Array) -> Array:
-    """Return h (q,) so that a mixture of normals (s, q) with `weights` (s,) is within ± h with 95.45 % probability."""
+    """Return h (q,): a mixture of normals (s, q) with `weights` (s,) is within ± h with 95.45 % probability."""
     from scipy.special import ndtr
 
     std = np.sqrt(variances)

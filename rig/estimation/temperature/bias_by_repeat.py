@@ -3,9 +3,9 @@
 Scale, axes and reference are fixed: their errors, and those of the arm's attitudes, are the same in every repeat of an
 attitude and cancel in the differences between repeats.
 
-The bias stepped before a repeat if the mean from this repeat on differs significantly from the mean before it. For a
-steady bias this occurs in at most 2 % of runs, over all repeats and axes together (Bonferroni's inequality). Both sides
-are then tested again (binary segmentation: Scott and Knott 1974).
+The bias stepped before a repeat if the means before and from this repeat differ significantly: for a steady bias in at
+most 2 % of runs, over all repeats and axes together (Bonferroni's inequality). Both sides are then tested again (binary
+segmentation: Scott and Knott 1974).
 """
 
 from collections.abc import Iterator
@@ -40,7 +40,7 @@ class BiasByRepeat:
 
     - `bias` (R, 3); `std` (R, 3): standard deviation of its differences; `moves`: its steps.
     - `excess` (3,): the ratio of the scatter of means in an attitude to their standard deviation, at least 1 (Birge
-      ratio). The arm does not repeat its attitudes exactly, or the bias drifts within a repeat. `std` includes it.
+      ratio). Causes: inexact repeats of attitudes, or bias drift within a repeat. `std` includes it.
     - `dof` (3,): degrees of freedom of the excess if there is one, else infinite.
     """
 
@@ -73,8 +73,8 @@ def bias_by_repeat(readings: Array, variances: Array, modelled: Array, bias: Arr
     """Return the bias of R ≥ 2 repeats of N attitudes.
 
     `readings` (R, N, 3) are mean readings, `variances` their variances, `modelled` the model's readings without a bias.
-    `bias` (3,) is the bias of the first repeat if a fit has estimated it; the other biases are then relative to it.
-    Raise Fault `too_few_observations`, `not_finite`, `bad_variance`; ValueError for a wrong shape.
+    `bias` (3,) is the bias of the first repeat if a fit has estimated it, and the others are relative to it. Raise
+    Fault `too_few_observations`, `not_finite`, `bad_variance`; ValueError for a wrong shape.
     """
     repeats, attitudes = readings.shape[:2]
     require_shape("readings", readings, (repeats, attitudes, 3))

@@ -2,7 +2,7 @@
 
     b = b₀ + slope (T − T₀) + rate (t − t₀)
 
-A sensor that only warms up does not separate temperature from time: then there is no result.
+A sensor that only warms up does not separate temperature from time, so there is no result.
 """
 
 from dataclasses import dataclass
@@ -20,10 +20,10 @@ FEWEST = 4  # fewest repeats, for three parameters
 
 @dataclass(frozen=True, slots=True)
 class BiasOverTemperature:
-    """`slope` (3,) per °C, its standard deviation (3,), and the range of temperatures in which it is valid.
+    """The `slope` (3,) per °C, its standard deviation (3,), and the range of temperatures in which it is valid.
 
-    `dof` (3,): degrees of freedom of the deviations, finite if they come from residuals. `correlation` is the
-    correlation of temperature and time, whose slopes are estimated together.
+    `dof` (3,): degrees of freedom of the deviations, finite if they come from residuals. `correlation` is that of
+    temperature and time, whose slopes are estimated together.
     """
 
     slope: Array
@@ -36,7 +36,7 @@ class BiasOverTemperature:
 def bias_over_temperature(bias: Array, std: Array, temperature_c: Array, time_s: Array) -> BiasOverTemperature:
     """Fit the slope of biases (R, 3) of uncertainty `std` (R, 3) at mean temperatures (R,) and times (R,).
 
-    Larger residuals increase the deviations (Birge ratio). Raise Fault  `too_few_observations`,
+    Larger residuals increase the deviations (Birge ratio). Raise Fault `too_few_observations`,
     `temperature_not_recorded`, `temperature_range_too_small`, `temperature_and_time_confounded`.
     """
     check_count(len(bias), FEWEST, 3)

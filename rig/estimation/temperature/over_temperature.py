@@ -7,8 +7,8 @@ plan. Only the changes from repeat to repeat depend on temperature:
 
 q and c are polynomials in T − reference without a constant. The order of q and the order of c, each common to all axes,
 minimise AICc (Hurvich and Tsai, Biometrika 76 (1989) 297). The results of the other orders, with their Akaike weights
-(Burnham and Anderson, Model Selection, 2002, 4.3), contribute to the uncertainty. The difference of warming and cooling
-is a loop that closes at both ends of the range. A thermometer's lag is fitted with the rest.
+(Burnham and Anderson, Model Selection, 2002, 4.3), contribute to the uncertainty. The hysteresis, the difference of
+warming and cooling, closes at both ends of the range. The thermometer's lag is fitted too.
 """
 
 from collections.abc import Iterator
@@ -72,7 +72,7 @@ class TemperatureLine:
 
 @dataclass(frozen=True, slots=True)
 class ValuesAtTemperature:
-    """The scale and bias of readings (6,) at a temperature, u (6,) and U (6,)."""
+    """Scale and bias (6,) at a temperature, u (6,) and U (6,)."""
 
     values: Array
     std: Array
@@ -81,13 +81,13 @@ class ValuesAtTemperature:
 
 @dataclass(frozen=True, slots=True)
 class OverTemperature:
-    """k(T) and c(T) = Σ coefficient (T − reference)ⁿ, n from 0, with c added to a reading.
+    """The polynomials k(T) and c(T) = Σ coefficient (T − reference)ⁿ, n from 0; c is part of the reading.
 
     - `scale`, `bias` (4, 3): the coefficients of k and c, SI units per Kⁿ; `orders` of k and of c.
     - `range_c`: the only range in which both are valid. `zero` (3,): the readings at the reference for zero input.
-    - `lag_s`, `lag_std_s`: of the thermometer.
+    - `lag_s`, `lag_std_s`: the thermometer's.
     - `hysteresis`: in mid-range, the difference (6,) of a warming sensor from the mean of both directions, and its
-      standard deviation; None if only one direction was measured.
+      standard deviation; None with one direction only.
     """
 
     reference_c: float
@@ -209,7 +209,7 @@ def combine_with_reference(
 ) -> OverTemperature:
     """Return the polynomials with k and c (6,) at the reference from a solve of readings corrected to it.
 
-    `lines`: contributors to these, with the covariance (6, 6) of their means over all temperatures.
+    `lines`: contributors to `values`, with the covariance (6, 6) of their means over all temperatures.
     """
     scale, bias = polynomials.scale * values[:3] / polynomials.scale[0], polynomials.bias.copy()
     bias[0] = values[3:]
@@ -394,7 +394,7 @@ class _ParameterFits:
         return _TemperatureFit(relative, bias, covariance, without_lag, aicc, float(values[-1]), lag_std_s, loop)
 
     def centre(self, fit: _TemperatureFit) -> Array:
-        """Return the weighted mean powers (2, 3, 3) of T − reference, with the weights of k and of c."""
+        """Return the weighted mean powers (2, 3, 3) of T − reference, by the weights of k and of c."""
         powers = self.powers[:, 1:] * self.span ** np.arange(1.0, HIGHEST + 1)
         centre: Array = np.einsum("qan,np->qpa", self.weights, powers) / self.weights.sum(axis=2)[:, None, :]
         return centre
@@ -414,7 +414,7 @@ class _ParameterFits:
 def _coefficients_from_changes(centre: Array, which: int) -> Array:
     """Return the matrix (12, 18) from changes of k (0) or c (1) to its coefficients at a fixed mean of the readings.
 
-    A change that is too large makes the value at the reference too small, hence the negative mean power.
+    An overestimated change makes the value at the reference too small, hence the negative mean power.
     """
     matrix = np.zeros((3 * (HIGHEST + 1), 6 * HIGHEST))
     first = 3 * HIGHEST * which
