@@ -1,1 +1,1 @@
-"""Recording → averaged observations: time base, revolution, rest; pure."""
+"""From a recording to averaged observations: time base, revolutions, rests. Pure."""

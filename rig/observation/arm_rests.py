@@ -24,8 +24,8 @@ def average_rests(
 ) -> tuple[Average, ...]:
     """Average all sufficiently long rests of the arm, except those next to a step in `superseded`.
 
-    The encoders measure an oscillation of the resting arm; `response` (3, 3) converts it to the sensor's readings. The
-    means are corrected for this oscillation.
+    The means are corrected for the resting arm's oscillation: `response` (3, 3) converts it from the encoders to
+    readings.
     """
     rests = (_average_rest(stream, motion, window, response) for window in iterate_rests(run, superseded))
     return tuple(rest for rest in rests if rest is not None)

@@ -28,13 +28,13 @@ class Average:
     """The average of a gyroscope's readings over a window, and its uncertainty.
 
     - mean_rad_s (3,): the mean.
-    - variance_rad2_s2 (3,): variance of the mean. It includes the drift of the bias and the rounding.
+    - variance_rad2_s2 (3,): variance of the mean, including bias drift and rounding.
     - noise_rad_s (3,): standard deviation of one sample.
     - start_s, end_s: the window on the controller's clock.
     - attitude (3, 3): mean rotation from the arm's base frame into the flange's; None without an arm.
-    - drift_rad2_s2 (3,): the part of the variance by drift of the bias from rest to rest.
-    - freedom (3,): degrees of freedom of the noise's part of the variance, infinite if they were not counted.
-    - lines_hz (k,): frequencies of the vibrations that were removed from the mean.
+    - drift_rad2_s2 (3,): the part of the variance by bias drift from rest to rest.
+    - dof (3,): degrees of freedom of the noise's part of the variance, infinite if they were not counted.
+    - lines_hz (k,): frequencies of the vibrations removed from the mean.
     - rounding_rad2_s2 (3,): the part of the variance by rounding to steps.
     """
 
@@ -53,7 +53,7 @@ class Average:
 
     @property
     def duration_s(self) -> float:
-        """Duration of the average."""
+        """Duration of the window, s."""
         return self.end_s - self.start_s
 
     @property
@@ -72,7 +72,7 @@ class Average:
 class Stream:
     """A sensor's n samples in physical units, on the controller's clock.
 
-    Rates are recorded in `steps`. If there are `polynomials`, readings are corrected to one temperature.
+    Rates are recorded in `steps`; `polynomials`, if any, correct readings to one temperature.
     """
 
     sensor: RecordedSensor
@@ -90,7 +90,7 @@ class Stream:
         return replace(stream, readings_rad_s=stream.correct_temperature(RATE, self.readings_rad_s, slice(None)))
 
     def correct_temperature(self, quantity: Quantity, readings: Array, inside: slice) -> Array:
-        """Return readings (n, 3) of the samples `inside` at the reference temperature, if there are polynomials."""
+        """Return readings (n, 3) of the samples `inside`, at the reference temperature if there are polynomials."""
         if quantity not in self.polynomials:
             return readings
         warm = self.sensor.channel(TEMPERATURE).values(self.raw[inside])
@@ -126,13 +126,13 @@ def convert_stream(raw: NDArray[Any], sensor: RecordedSensor, clock: TimeBase) -
 
 
 def steps_of(raw: NDArray[Any], sensor: RecordedSensor, quantity: Quantity) -> Steps:
-    """Return the resolution steps of a quantity in a sensor's samples (n,). A board records the converter's counts."""
+    """Return the resolution steps of a quantity in a sensor's samples (n,): on a board, the converter's."""
     channel = sensor.channel(quantity)
     return channel.steps(channel.values(raw), trusts_counts=sensor.on_board)
 
 
 def slice_time(stream: Stream, start_s: float, end_s: float) -> slice:
-    """Return the samples between two controller times."""
+    """Return the slice of the samples between two controller times."""
     return slice(*np.searchsorted(stream.time_s, [start_s, end_s]).tolist())
 
 

@@ -1,6 +1,6 @@
 """Checks for numbers in a log that are no readings.
 
-They are a logger's mark of a missing value, an axis that is frozen, or the end of a sensor's range.
+Such are a logger's mark of a missing value, a frozen axis, and the end of a sensor's range.
 """
 
 import numpy as np
@@ -29,8 +29,8 @@ TOGGLES = 10  # readings between a jump and the one back, of a rate close to the
 def check_possible(readings: Array, rows: NDArray[np.intp], quantity: Quantity, where: str) -> None:
     """Raise Refused `not_a_number` if a few readings (n, 3) are far beyond all others and most parts' range.
 
-    `rows` (n,) are their numbers in the file, from 0, and messages call the file `where`. If more than a few are, the
-    unit is wrong.
+    `rows` (n,) are the readings' numbers in the file, from 0; messages call the file `where`. Many such readings are no
+    error here: the unit is wrong.
     """
     if quantity.mistaken is None or not len(readings):
         return
@@ -50,7 +50,7 @@ def check_possible(readings: Array, rows: NDArray[np.intp], quantity: Quantity, 
 
 
 def check_temperatures(temperature_c: Array, rows: NDArray[np.intp], where: str) -> None:
-    """Raise Refused `wrong_unit` for a temperature (n,) that nothing in a laboratory has; arguments as above."""
+    """Raise Refused `wrong_unit` for a temperature (n,) too low or high for a laboratory; see `check_possible`."""
     wrong = np.flatnonzero((temperature_c < COLDEST_C) | (temperature_c > HOTTEST_C))
     if len(wrong):
         raise Refused(
@@ -64,7 +64,8 @@ def check_temperatures(temperature_c: Array, rows: NDArray[np.intp], where: str)
 def check_unwrapped(time_s: Array, readings: Array, rows: NDArray[np.intp], quantity: Quantity, where: str) -> None:
     """Raise Refused `readings_overflow` if an axis of readings (n, 3) jumps from one end of its span to the other.
 
-    A counter of too few bits does so, as a signed one of 16 bits after 32767. Arguments as above, with times (n,).
+    A number of too few bits overflows, a signed one of 16 bits after 32767. Arguments as in `check_possible`; times
+    (n,).
     """
     if quantity not in NARROWEST or len(readings) < 2:
         return
@@ -86,8 +87,8 @@ def check_unwrapped(time_s: Array, readings: Array, rows: NDArray[np.intp], quan
 def _find_overflows(time_s: Array, axis: Array, narrowest: float) -> NDArray[np.intp]:
     """Return the indices (k,) of the readings (n,) before an overflow of the number that they are stored in.
 
-    A change of sign between two parts that somebody joined looks like it. But before an overflow the readings rise
-    towards the end of the range, and go on rising after it; close to the end, noise takes them over it and back.
+    A change of sign between two joined recordings looks similar. But before an overflow the readings rise towards the
+    end of the range, and go on rising after it; close to the end, noise causes overflows to and fro.
     """
     none = np.zeros(0, dtype=np.intp)
     span, steps, steps_s = float(np.ptp(axis)), np.diff(axis), np.diff(time_s)
@@ -111,9 +112,9 @@ def _find_overflows(time_s: Array, axis: Array, narrowest: float) -> NDArray[np.
 
 
 def find_clipped(readings: Array) -> NDArray[np.bool_]:
-    """Return which readings (n,) repeat the largest or smallest value of their axis several times.
+    """Return a mask of the readings (n,) that repeat the largest or smallest value of their axis several times.
 
-    A sensor at rest repeats values too, but then its largest and smallest ones are close together.
+    A sensor at rest repeats values too, but its largest and smallest ones are close together.
     """
     clipped = np.zeros(len(readings), dtype=np.bool_)
     for axis in readings.T:
@@ -128,7 +129,7 @@ def find_clipped(readings: Array) -> NDArray[np.bool_]:
 def check_unclipped(time_s: Array, readings: Array, windows: list[Window]) -> None:
     """Raise Fault `saturation` if rates (n, 3) in a window are at the end of their range.
 
-    An axis in steps as coarse as its noise repeats its largest reading without being at an end, and is not judged.
+    An axis with steps as coarse as its noise repeats its largest reading anyway, and is not judged.
     """
     for axis, letter in enumerate(RATE.axes):
         column = readings[:, axis]

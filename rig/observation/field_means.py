@@ -1,4 +1,4 @@
-"""Averages of a magnetometer's readings at rest: in dwells, with the arm's attitude, and at the home position. Pure."""
+"""Averages of a magnetometer's readings in dwells, with the arm's attitude, and in rests at home. Pure."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
@@ -23,7 +23,7 @@ SETTLING_S = 0.2  # time removed at either end of a rest
 
 
 def find_companion(recording: ObservedRun, name: str) -> str | None:
-    """Return the sensor on the magnetometer's clock whose accelerometer was read in dwells, or None."""
+    """Return the sensor on the magnetometer's clock with an accelerometer that was read in dwells, or None."""
     return find_dwelling_companion(
         recording.run, name, (sensor for sensor, observations in recording.sensors.items() if observations.dwells)
     )
@@ -37,8 +37,8 @@ def find_dwelling_companion(run: RunData, name: str, sensors: Iterable[str]) -> 
 def field_readings(recording: ObservedRun, name: str, thresholds: ObservationThresholds) -> tuple[StaticReading, ...]:
     """Average a magnetometer's readings in the dwells in which an accelerometer on its clock was read.
 
-    The gyroscope's time base serves both, as a delay of the magnetometer does not affect a mean at rest. Raise Fault
-    `lost_samples` or `saturation`.
+    The gyroscope's time base serves both, because a delay does not affect a mean at rest. Raise Fault `lost_samples` or
+    `saturation`.
     """
     other = find_companion(recording, name)
     if other is None:
@@ -80,8 +80,8 @@ def field_tests(
 ) -> tuple[Mean, ...]:
     """Average the magnetometer's readings, in tesla, in the rests at home, in order.
 
-    Raise Fault as `field_readings` does. Rests with fewer samples than a dwell needs are skipped, as the last samples
-    of a run may arrive after its end.
+    Raise Fault as `field_readings` does. Rests with fewer samples than a dwell needs are skipped: the last samples of a
+    run may arrive after its end.
     """
     other = find_companion(recording, name)
     if other is None:

@@ -23,8 +23,9 @@ class LogSurvey:
 
     - rests: windows in which the body lay still.
     - turns: the number of turns from rest to rest by axis ("+x"; "other" without an axis).
-    - at_rest: by quantity, the mean norm of the readings at rest minus the bias of rates; largest: by quantity.
-    - faces: number of directions of gravity at rest that differ by more than 45°.
+    - at_rest: by quantity, the mean norm of readings at rest, of rates minus the bias; largest: the largest norm, by
+      quantity.
+    - faces: the number of directions of gravity at rest more than 45° apart.
     """
 
     span_s: float

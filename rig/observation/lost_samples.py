@@ -1,4 +1,4 @@
-"""The error for missing samples. The path of the samples to the recording decides what to check."""
+"""The error for missing samples, with remedies by the samples' path to the recording."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -28,7 +28,7 @@ def lost_samples(sensor: RecordedSensor, samples: NDArray[Any], where: str, what
     """Return the Fault `lost_samples` for samples (n,) of a sensor:
 
     `where` and `what` state what is missing, `then` the remedy. If only every k-th sample is present, the message says
-    that the source sent fewer, and that the link lost none.
+    that the source sent fewer and the link lost none.
     """
     steps = np.diff(samples["sequence"].astype(np.int64))
     stride = int(np.median(steps)) if len(steps) else 1

@@ -1,10 +1,10 @@
-"""Averaged revolutions of a recording, which the estimators take as input.
+"""Averaged revolutions of a recording, the input of the estimators.
 
 An observation is the mean reading over exactly one turn of a joint, or over an arc of it. Over a whole turn the mean
 speed is 2π/T whatever the servo's vibration; over an arc it is Δθ/T by the encoders at its ends. The same weights
-average the readings and the arm's rate, so a vibration that the encoders measure adds no noise. The mean comes first.
+average the readings and the arm's rate, so a vibration that the encoders measure adds no noise.
 
-Nothing doubtful is averaged: whatever does not belong in a calibration raises a Fault with a name of its own.
+Whatever does not belong in a calibration raises a Fault with a name of its own.
 """
 
 from collections.abc import Collection, Sequence
@@ -45,18 +45,17 @@ MISREAD = {"wrong_axis", "wrong_sign", "wrong_unit"}  # a stuck sensor causes th
 class Observation:
     """One revolution, or one arc of a joint, averaged.
 
-    - sweep: index of the sweep in the plan. joint_name, direction: what turned; None in data recorded elsewhere.
+    - sweep: index of the sweep in the plan. joint_name, direction: of the turn; None in external data.
     - axis ("x", "y", "z"), sign: the sensor axis that is nominally along the turn.
-    - axis_flange (3,), speed_rad_s: the arm's mean rate with the weights of the mean reading: its unit vector in the
-      flange's frame, and its size (nominally 2π/T; Δθ/T for an arc).
+    - axis_flange (3,), speed_rad_s: unit vector, in the flange's frame, and size (nominally 2π/T; Δθ/T for an arc) of
+      the arm's mean rate, with the weights of the mean reading.
     - speed_std_rad_s: standard deviation of the speed, if the arm's states are too far apart to locate the turn's ends.
     - lost: number of samples missing from the average.
     - axis_errors (13, 3): change of the axis per radian of each of the arm's errors
       (`rig.motion.geometry.AXIS_ERRORS`).
-    - arm_m (3,): a vector from the joint's axis to the flange's origin, in the flange's frame.
+    - arm_m (3,): vector from the joint's axis to the flange's origin, in the flange's frame.
     - acceleration: the accelerometer's readings in the same turn, if one is to be calibrated.
-    - angle_rad: angle of an arc; arc_rad: the joint's angles at its ends, the lower first. None for whole turns, over
-      which an encoder's periodic error cancels.
+    - angle_rad: angle of an arc; arc_rad: the joint's angles at its ends, the lower first. None for whole turns.
     - ripple: RMS unevenness of the turn, relative to its rate.
     """
 
@@ -97,8 +96,8 @@ def observe_sensor(
 ) -> SensorObservations:
     """Average every finished sweep of a recording; `motion` is the arm's motion in it.
 
-    Interrupted sweeps are left out. So are sweeps and dwells whose index is in `superseded`, which a later recording of
-    the run repeats, and the rests next to them. Raise Fault `incomplete_revolution`, `arm_states_lost`, `speed_slider`,
+    Interrupted sweeps are left out, as are sweeps and dwells in `superseded`, which a later recording of the run
+    repeats, and the rests next to them. Raise Fault `incomplete_revolution`, `arm_states_lost`, `speed_slider`,
     `speed_not_constant`, `other_joint_moved`, `lost_samples`, `saturation`, `stuck_sensor`, `stuck_axis`, `wrong_axis`,
     `wrong_sign`, `wrong_unit`, `not_finite`, `time_base_not_found`, `board_clock_restarted`, `duplicated_samples`,
     `impossible_times`, and as `dwell_readings` does.
@@ -141,7 +140,7 @@ def observe_each_sweep(
 
 
 def nearest_axis(vector: Array) -> tuple[str, int]:
-    """Return the axis, "x", "y" or "z", nearest to a direction (3,), and the sign (1, −1) of the direction along it."""
+    """Return the axis, "x", "y" or "z", nearest to a direction (3,), and the direction's sign (1, −1) along it."""
     nearest = int(np.argmax(np.abs(vector)))
     return "xyz"[nearest], 1 if vector[nearest] > 0 else -1
 
@@ -274,7 +273,7 @@ def _check_saturation(stream: Stream, inside: slice, where: str) -> None:
 
 
 def _check_stuck(stream: Stream, inside: slice, where: str) -> None:
-    """Raise Fault `stuck_sensor` if no reading changes on any axis although the noise exceeds one count."""
+    """Raise Fault `stuck_sensor` if no axis' readings change although the noise exceeds one count."""
     counts = stream.sensor.channel(RATE).counts(stream.raw)
     if np.median(np.abs(np.diff(counts, axis=0)), axis=0).min() < 1:
         return
@@ -305,7 +304,7 @@ def _check_frozen(readings: Array, rate_read: Array, expected_rad_s: Array, wher
 
 
 def _check_direction(rate_read: Array, expected: Array, where: str, settings: ObservationThresholds) -> None:
-    """Raise Fault `wrong_sign` or `wrong_axis` if the reading minus that at rest is not along the nominal axis."""
+    """Raise Fault `wrong_sign` or `wrong_axis` if the reading without bias is not along the nominal axis."""
     cosine = float(rate_read @ expected / (np.linalg.norm(rate_read) * np.linalg.norm(expected)))
     angle = float(np.degrees(np.arccos(np.clip(cosine, -1, 1))))
     limit = settings.max_axis_deviation_deg

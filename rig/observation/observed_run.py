@@ -1,4 +1,4 @@
-"""An observed recording: the arm's motion, and of each sensor its time base, revolutions and rests."""
+"""An observed recording: the arm's motion, and each sensor's time base, revolutions and rests."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -55,9 +55,8 @@ class ObservedRun:
     def time_s(self, sensor: str, gyroscope: str | None = None) -> Array:
         """Return the times (n,) of all samples of a sensor on the arm's clock.
 
-        They use the time base of `gyroscope`, by default the sensor's own; if it has none, that of the first gyroscope
-        on the same clock. Without any, they are the arrival times of samples and arm states at the computer, accurate
-        to milliseconds.
+        They use the time base of `gyroscope`, by default the sensor's own, or else that of the first gyroscope on the
+        same clock. Without any time base, arrival times at the computer relate samples to arm states, to milliseconds.
         """
         bases = {name: observations.time_base for name, observations in self.sensors.items()}
         return times_s(self.run, sensor, bases, gyroscope)
@@ -109,10 +108,10 @@ def observe_run(
 
 
 def observe_runs(runs: Sequence[RunData], corrections: Mapping[int, Array] = AS_STATED) -> tuple[ObservedRun, ...]:
-    """Observe each recording of a run with a finished sweep or dwell; of repeated steps the last counts.
+    """Observe each recording of a run with a finished sweep or dwell; the last of repeated steps counts.
 
-    The first recording's thresholds are used. `corrections` by the procedure's stage, as in `observe_run`. Raise as
-    `turner_of` does, and Fault as `observe_run` does.
+    The first recording's thresholds apply to all. `corrections`: by the procedure's stage, as in `observe_run`. Raise
+    as `turner_of` does, and Fault as `observe_run` does.
     """
     for run in runs:
         turner_of(run)
@@ -132,8 +131,8 @@ def observe_runs(runs: Sequence[RunData], corrections: Mapping[int, Array] = AS_
 def _clock_offsets_s(recordings: Sequence[ObservedRun]) -> list[float]:
     """Return the offset of each recording's clock to that of the first; the controller may restart in between.
 
-    A recording begins after the previous one has ended, even if the computer's clock disagrees: it may have been set,
-    and time in an accelerated laboratory passes faster.
+    A recording begins after the previous one has ended, even if the computer's clock, which may have been set,
+    disagrees; time in an accelerated laboratory passes faster.
     """
     offsets_s = [0.0] * bool(recordings)
     for last, recording in pairwise(recordings):

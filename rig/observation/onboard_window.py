@@ -1,4 +1,4 @@
-"""The revolution's window that the board averages, and the sweeps for which the board has an average. Pure."""
+"""The window of a revolution that the board is to average, and the sweeps that the board has averaged. Pure."""
 
 from collections.abc import Collection, Sequence
 from typing import Any
@@ -30,9 +30,9 @@ def revolution_on_the_board(
 ) -> tuple[int, int, float]:
     """Return a revolution's start and end on the board's clock, µs, and its speed by the arm's joints, rad/s.
 
-    The sweep began after the state `first`. `samples` (n,) SAMPLE_DTYPE and the turner's `states` (m,) should begin
-    earlier, because the fast motion to its start determines the time base, for which a slow sweep may not suffice.
-    Raise Fault as `estimate_time_base` and `ArmMotion.turn` do.
+    The sweep began after the state `first`. `samples` (n,) SAMPLE_DTYPE and the turner's `states` (m,) should include
+    the motion to the sweep's start: a slow sweep may not determine the time base. Raise Fault as `estimate_time_base`
+    and `ArmMotion.turn` do.
     """
     names = [f"joint {number}" for number in range(kinematics.joints)]
     motion = ArmMotion(states, kinematics, names, reading_std_rad=reading_std_rad)

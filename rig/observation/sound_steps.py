@@ -41,7 +41,7 @@ def _find_sound_steps_of(
 ) -> frozenset[int]:
     """Return one sensor's sweeps and dwells that have no fault.
 
-    Return None if the sensor ever failed to follow the arm, because the onset of that fault is unknown.
+    Return no step if the sensor ever failed to follow the arm, because the fault's onset is unknown.
     """
     try:
         stream = synchronize_stream(run.samples[sensor], run.sensors[sensor], motion)
@@ -59,7 +59,7 @@ def _find_sound_steps_of(
 
 
 def _has_spike(stream: Stream, window: Window) -> bool:
-    """Return whether a sweep has a spike, which fails the verdict regardless of the mean."""
+    """Return whether a window of a sweep or dwell has a spike, which fails the verdict whatever the mean."""
     inside = slice_time(stream, window.start_s, window.end_s)
     counts = stream.sensor.channel(RATE).counts(stream.raw)[inside].astype(np.float64)
     if not len(counts):

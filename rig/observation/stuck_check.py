@@ -21,7 +21,7 @@ REMEDY = "Check the sensor's supply and its bus wiring, then repeat the run"
 
 
 def check_rests(rests: Sequence[Average], slowest_rad_s: float) -> None:
-    """Raise Fault `stuck_sensor` if rests differ as in rotation; `stuck_axis` if the axis that differs has no noise."""
+    """Raise Fault `stuck_sensor` if rests differ as rotations do; `stuck_axis` if the differing axis has no noise."""
     if len(rests) < 2:
         return
     apart = np.ptp([rest.mean_rad_s for rest in rests], axis=0)
@@ -39,13 +39,13 @@ def check_rests(rests: Sequence[Average], slowest_rad_s: float) -> None:
 
 
 def check_other_direction(sweep: Sweep, valid_joints: Collection[str | None], fault: Fault) -> None:
-    """Raise Fault `stuck_sensor` if an earlier sweep of the joint read correctly, so the mounting is right."""
+    """Raise Fault `stuck_sensor` if an earlier sweep of the joint read correctly, so the mounting is not to blame."""
     if sweep.joint_name in valid_joints:
         raise Fault("stuck_sensor", f"{fault.what}; in the other direction it read correctly", REMEDY) from fault
 
 
 def check_dwells(dwells: Sequence[DwellReading], site: Site) -> None:
-    """Raise Fault `stuck_sensor` if the readings in two attitudes differ less than gravity does."""
+    """Raise Fault `stuck_sensor` if readings in two attitudes differ much less than gravity does."""
     for one, other in pairwise(dwells):
         differ = float(np.linalg.norm((one.attitude - other.attitude) @ site.up))
         sensed_m_s2 = float(np.linalg.norm(one.reading.mean - other.reading.mean))

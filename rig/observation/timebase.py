@@ -47,11 +47,10 @@ SLOW_STEPS, LEAP_STEPS, FARTHEST = 300, 20, 100.0
 
 @dataclass(frozen=True, slots=True)
 class TimeBase:
-    """Controller time = board time + `offset_s` + `drift` × (board time − `reference_s`), all in seconds.
+    """A clock: controller time = board time + `offset_s` + `drift` × (board time − `reference_s`), in seconds.
 
     `reference_s` is the board's time in the middle of the data, where offset and drift are nearly uncorrelated.
-    `covariance` (2, 2) is the covariance of (`offset_s`, `drift`). `zero_rate_rad_s` (3,) is the fitted reading at
-    rest.
+    `covariance` (2, 2) is that of (`offset_s`, `drift`). `zero_rate_rad_s` (3,) is the fitted reading at rest.
     """
 
     offset_s: float
@@ -62,12 +61,12 @@ class TimeBase:
 
     @property
     def offset_std_s(self) -> float:
-        """Standard deviation of the offset."""
+        """The standard deviation of the offset, s."""
         return float(np.sqrt(self.covariance[0, 0]))
 
     @property
     def drift_std(self) -> float:
-        """Standard deviation of the drift."""
+        """The standard deviation of the drift."""
         return float(np.sqrt(self.covariance[1, 1]))
 
     def controller_time_s(self, board_time_s: Array) -> Array:
@@ -131,7 +130,7 @@ def _check_samples(board_time_s: Array, readings: Array, motion: KnownMotion) ->
 
 
 def _turns_every_axis(motion: KnownMotion) -> bool:
-    """Return whether the motion turns every sensor axis in any mounting; if not, one may repeat its reading."""
+    """Return whether the motion turns every sensor axis in any mounting; otherwise an axis may repeat its reading."""
     rates = motion.rate(motion.time_s[motion.covered(motion.time_s)])
     return bool(np.linalg.eigvalsh(rates.T @ rates).min() > TURNED_RAD_S**2 * len(rates))
 
@@ -187,7 +186,7 @@ def _count_until(board_time_s: Array, span_s: float) -> int:
 
 
 def _search_clock(board_time_s: Array, readings: Array, motion: KnownMotion) -> TimeBase:
-    """Return the clock with which the arm's motion explains most of the readings, as a start of the fine fit."""
+    """Return the clock with which the arm's motion explains most of the readings, to start the fine fit."""
     reference, half_s = (board_time_s[0] + board_time_s[-1]) / 2, (board_time_s[-1] - board_time_s[0]) / 2
     spacing = 2 * COARSE_REACH_S / half_s
     count = round(max(min(MAX_DRIFT, MAX_DRIFT_STEPS * spacing), MAX_DRIFT_LONG_RUN) / spacing)
@@ -203,14 +202,14 @@ def _search_clock(board_time_s: Array, readings: Array, motion: KnownMotion) -> 
 
 
 def estimate_coarse_offset(board_time_s: Array, readings_rad_s: Array, motion: KnownMotion) -> tuple[float, float]:
-    """Return the fraction of the readings' variance (n, 3) explained, and the offset of clocks without drift, s."""
+    """Return the explained fraction of the variance of readings (n, 3), and the clock's offset without drift, s."""
     reference_s = float(board_time_s[0] + board_time_s[-1]) / 2
     explained, offset_s = _coarse_offset(board_time_s - reference_s, readings_rad_s, partial(_arm_rate, motion))
     return explained, offset_s - reference_s
 
 
 def _arm_rate(motion: KnownMotion, step_s: float) -> tuple[float, Array]:
-    """Return the time at which the motion starts, and from then its rate (3, n) at even steps, minus its mean."""
+    """Return the start of the motion, s, and from then its rate (3, n) at even steps, minus the mean."""
     grid = np.arange(motion.time_s[0], motion.time_s[-1], step_s)
     rate = motion.rate(grid).T
     return float(grid[0]), rate - rate.mean(axis=1, keepdims=True)
@@ -219,7 +218,7 @@ def _arm_rate(motion: KnownMotion, step_s: float) -> tuple[float, Array]:
 def _coarse_offset(
     time_s: Array, readings: Array, arm_rate: Callable[[float], tuple[float, Array]]
 ) -> tuple[float, float]:
-    """Return the fraction of the variance explained, and the offset (controller − `time_s`) to within a step.
+    """Return the explained fraction of the variance, and the offset (controller − `time_s`) to within a step.
 
     Every pair of axes is cross-correlated (magnitudes could hide a rotation in a bias); the vector fit judges the
     peaks. A step contains at least one sample.
@@ -247,7 +246,7 @@ def _coarse_offset(
 
 
 def _fast_length(least: int) -> int:
-    """Return the next number without prime factors beyond 5, a length for which a Fourier transform is fast."""
+    """Return the next number without prime factors above 5: a fast length of a Fourier transform."""
     threes = (3**power for power in range(least.bit_length()))
     odd = (three * 5**power for three in threes for power in range(least.bit_length()) if three * 5**power < 2 * least)
     length: int = min(number << (-(-least // number) - 1).bit_length() for number in odd)
@@ -298,9 +297,9 @@ def _average_samples(time_s: Array, readings: Array, count: int) -> tuple[Array,
 def _fit_clock(clock: TimeBase, board_time_s: Array, readings: Array, motion: KnownMotion) -> TimeBase:
     """Return the clock with the best fit of readings and motion, first by their slow parts.
 
-    A ripple shifted by a period is the same, and a fast ripple differs between readings and states, which have
-    different filters. If it leaves the finest fit without an optimum, the clock is that of the slow parts, with its own
-    uncertainty. Raise Fault `time_base_not_found`.
+    A ripple is the same after a period, and a fast ripple differs between readings and states because of their filters.
+    If the finest fit has no optimum therefore, the clock of the slow parts remains, with its own uncertainty. Raise
+    Fault `time_base_not_found`.
     """
     first, *finer = _list_stages(clock, board_time_s, readings, motion)
     clock = _iterate_clock(clock, *first)
@@ -313,7 +312,7 @@ def _fit_clock(clock: TimeBase, board_time_s: Array, readings: Array, motion: Kn
 def _list_stages(
     clock: TimeBase, board_time_s: Array, readings: Array, motion: KnownMotion
 ) -> Iterator[tuple[Array, Array, KnownMotion]]:
-    """Yield times, readings and motion for each fit: averaged over long times, over short ones, and not averaged."""
+    """Yield times, readings and motion for each fit: averaged over long times, over short times, and not averaged."""
     start_s, end_s = clock.controller_time_s(board_time_s[[0, -1]]).tolist()
     step_s = float(np.median(np.diff(board_time_s)))
     for over_s in (SLOW_S, FINE_S):

@@ -1,11 +1,10 @@
 """The mean of readings over a turn or an arc, and the mean rate of the arm with the same weights.
 
 In an unweighted mean a vibration leaves a remainder that depends on its phase at both ends: 3 mrad/s at 8.5 Hz leave 20
-µrad/s in six seconds, more than the noise of a good gyroscope. A vibration that the encoders measure has the same
-effect on both means, which does no harm. Another one is found in the readings as spectral lines, and the weights cancel
-these. The same weights then average the arm's rate, so that a ripple has the same effect on both (`mean_weights`).
+µrad/s in six seconds, more than the noise of a good gyroscope. A vibration that the encoders measure affects both means
+alike. Any other vibration shows in the readings as spectral lines, which the weights cancel (`mean_weights`).
 
-The residual of the readings after lines and rate is the noise, which is usually white.
+The readings' residual after lines and rate is the noise, usually white.
 """
 
 from dataclasses import dataclass, replace
@@ -41,11 +40,10 @@ class SampledTurn:
 
     - `share` (n,): elapsed fraction of its time.
     - `rates_rad_s` (n, 3): the flange's mean rate around each sample, by the encoders.
-    - `uneven_rad_s` (n,): the component of that rate along the axis, minus its mean over the turn by the angles at both
-      ends.
-    - `passing` (n, k): columns of what comes once, twice and so on in a turn; for an arc minus their means.
-    - `beats`: number of sidebands of its lines, see `Revolution`.
-    - `encoders_true`: whether the encoders are right within a turn, and not only over whole turns.
+    - `uneven_rad_s` (n,): that rate along the axis, minus its mean over the turn by the angles at both ends.
+    - `passing` (n, k): columns of the turn's harmonics; for an arc minus their means.
+    - `beats`: number of sidebands of spectral lines, see `Revolution`.
+    - `encoders_true`: whether the encoders are right within a turn, not only over whole turns.
     - `closed`: whether it consists of whole turns.
     - `complete`: whether samples follow each other closely, and no long gap is among them.
     """
@@ -62,12 +60,13 @@ class SampledTurn:
 
 @dataclass(frozen=True, slots=True)
 class Lines:
-    """Lines to remove from a mean: `cycles` (k,) of each in the turn, the last `not_encoded` of which no encoder shows.
+    """Lines to remove from a mean: their `cycles` (k,) in the turn; the encoders do not show the last `not_encoded`.
 
-    A slow ripple that the encoders measure needs no line: it is a column of `encoded` (n, m), as are its changes and
-    the remainder of the encoders' rate, mostly noise. Columns (n, 0 to 2) of the `rate` are removed: the rate itself if
-    few samples or a gap do not sample a ripple evenly; otherwise the changes of the slow ripple in a whole turn, which
-    a lagging sensor reads too. Even weights cancel those changes; weights without slow lines do not.
+    - `encoded` (n, m): columns of a slow ripple that the encoders measure, its changes, and the remainder of their
+      rate, mostly noise.
+    - `rate` (n, 0 to 2): columns to remove: the rate itself if few samples or a gap do not sample a ripple evenly;
+      otherwise the changes of the slow ripple in a whole turn, which a lagging sensor reads too, and which weights
+      without slow lines do not cancel.
     """
 
     cycles: Array
@@ -79,8 +78,7 @@ class Lines:
 def turn_mean(readings: Array, steps: Steps, turn: SampledTurn) -> tuple[Mean, Array]:
     """Return the mean of readings (n, 3) with resolution `steps`, and its weights (n,), also for the arm's rate.
 
-    A line slower than `SLOW` is poorly determined: its effect on the mean, or the effect of a line of its size, adds
-    variance.
+    A line slower than `SLOW` is poorly determined, so its possible effect on the mean adds variance.
     """
     ones = whole(readings)
     steady = np.column_stack([ones, turn.passing])
@@ -107,8 +105,7 @@ def turn_mean(readings: Array, steps: Steps, turn: SampledTurn) -> tuple[Mean, A
 def _line_variance(slow: Array, weights: Array, residuals: Array) -> Array:
     """Return the variance (3,) of a mean with weights (n,) due to slow columns (n, k) fitted to residuals (n, 3).
 
-    Only their amplitude is used, because the phase is arbitrary: with some phases even a large line hardly changes this
-    mean.
+    Only their amplitude counts, because with some phases even a large line hardly changes the mean.
     """
     powers = (fit_columns(slow, residuals) ** 2).reshape(-1, 2, 3).sum(axis=1)
     kept = ((weights @ slow) ** 2).reshape(-1, 2).sum(axis=1)
@@ -164,7 +161,7 @@ def lag_columns(rate: Array, columns: Array, share: Array) -> Array:
 
 
 def _changes(slow: Array) -> Array:
-    """Return the first and second differences (n, 2) of a rate (n, 1): the effects of a lag and of a filter."""
+    """Return the first and second differences (n, 2) of a rate (n, 1), the effects of a lag and a filter."""
     change = np.gradient(slow, axis=0)
     return np.column_stack([change, np.gradient(change, axis=0)])
 
@@ -172,7 +169,7 @@ def _changes(slow: Array) -> Array:
 def slow_part(rates: Array, share: Array) -> Array:
     """Return the part of rates (n, m) with less than `SLOW` cycles per turn; `share` (n,) is elapsed time.
 
-    It is described by waves of half a turn, because a vibration is not periodic in the turn.
+    Waves of half a turn describe it, because a vibration is not periodic in the turn.
     """
     halves = harmonics(np.pi * share, int(2 * SLOW))
     slow: Array = halves @ fit_columns(halves, rates)

@@ -60,8 +60,8 @@ def swept(run: RunData) -> Iterator[FinishedSweep]:
 def iterate_rests(run: RunData, superseded: Collection[int] = ()) -> Iterator[Window]:
     """Yield the rests and dwells that were started and finished, in order.
 
-    A step whose index is in `superseded` is left out, as are rests just before or after it, because the disturbance may
-    have begun earlier or lasted longer.
+    Steps whose index is in `superseded`, and rests next to them, are left out: the disturbance may have begun earlier
+    or lasted longer.
     """
     rests = [
         window
@@ -92,7 +92,7 @@ def _is_superseded(run: RunData, rest: Window, superseded: Collection[int]) -> b
 
 
 def _pair_events(run: RunData, begin: type[Event], end: type[Ending]) -> Iterator[tuple[Ending, Window]]:
-    """Yield every event of type `end` after one of type `begin`, with its window, if both have a controller time."""
+    """Yield every event of type `end` after one of type `begin`, with the window, if both have a controller time."""
     started_s = None
     for recorded in run.events:
         event, time_s = recorded.event, recorded.controller_time_s

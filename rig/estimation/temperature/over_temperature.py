@@ -243,7 +243,7 @@ def heating_rate(windows_s: Array, temperature_c: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, slots=True)
 class _TemperatureFit:
-    """Coefficients in T − reference: relative of k (3 orders, 3), of c; covariances (18, 18), with and without lag."""
+    """Coefficients (3 orders, 3) in T − reference, of k (relative) and c; covariances (18, 18) with, without lag."""
 
     relative: Array
     bias: Array

@@ -1,1 +1,1 @@
-"""A body that is moved by hand: its rests, and the moves in between."""
+"""A body moved by hand: its rests, and the moves in between."""

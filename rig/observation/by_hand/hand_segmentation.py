@@ -59,7 +59,7 @@ def _find_gaps(time_s: Array, rates: Array) -> NDArray[np.bool_]:
 
 
 def _began_still(time_s: Array, rates: Array) -> bool:
-    """Return whether the body hardly moved in the first second; a hand that held it then may also hold it later."""
+    """Return whether the body hardly moved in the first second; otherwise a hand held it, then and perhaps later."""
     first = rates[time_s < time_s[0] + FIRST_S]
     return bool(len(first) > 1 and first.std(axis=0).max() < STILL_RAD_S)
 
@@ -86,7 +86,7 @@ def _rest(time_s: Array, rates: Array, acceleration: Array | None, window: Windo
 def _find_clipped(rates: Array, range_rad_s: float | None) -> NDArray[np.bool_]:
     """Return which readings (n,) are at the limit of the range.
 
-    If the range is unknown, a long series of equal readings counts as clipped.
+    If the range is unknown, long series of equal readings count as clipped.
     """
     if range_rad_s is not None:
         return np.asarray((np.abs(rates) >= NEAR_RANGE * range_rad_s).any(axis=1))
@@ -100,7 +100,7 @@ def _find_clipped(rates: Array, range_rad_s: float | None) -> NDArray[np.bool_]:
 
 
 def _find_held_intervals(time_s: Array, rates: Array, rests: tuple[HandRest, ...]) -> tuple[tuple[float, float], ...]:
-    """Return the intervals in which a hand held the body: it turned less than in a move, and more than at rest."""
+    """Return the intervals in which a hand held the body, which turned less than in a move and more than at rest."""
     if not rests:
         return ()
     width = max(2, int(np.ceil(PAUSE_S / find_sampling(time_s).interval_s - ROUNDING)))
@@ -124,7 +124,7 @@ State = Literal["starting", "resting", "moving", "held"]
 
 @dataclass(frozen=True, slots=True)
 class Live:
-    """The body's state at `time_s`, and its beginning; the rotation (3,) of the present move and its peak rate."""
+    """The body's state at `time_s` and since when; rotation (3,), rad, and peak rate, rad/s, of the present move."""
 
     time_s: float
     state: State
@@ -134,7 +134,7 @@ class Live:
 
 
 class Segmenter:
-    """A segmentation in progress: it finds what `segment_session` would find in the readings so far.
+    """A segmentation in progress, equal to that by `segment_session` of the readings so far.
 
     A rest is settled after `SETTLED_S`. `range_rad_s` is the range of the gyroscope, None if unknown.
     """
@@ -167,7 +167,7 @@ class Segmenter:
 
     @property
     def handled(self) -> HandRecording:
-        """The recording, with its rests and moves up to the last rest that lasted `SETTLED_S`."""
+        """The recording's rests and moves up to the last rest of `SETTLED_S`."""
         session = self._session
         count = len(session.rests)
         while count and session.rests[count - 1].end_s - session.rests[count - 1].start_s < SETTLED_S - 2 * MARGIN_S:

@@ -1,4 +1,4 @@
-"""Single readings at rest that are due to a knock against the table: they show neither gravity nor a field."""
+"""Single readings at rest that are due to a knock against the table, not to gravity or a field."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ FEWEST = 5  # fewest readings that show which of them are undisturbed
 
 
 def mask_knocks(readings: Array, quantity: Quantity) -> NDArray[np.bool_]:
-    """Return a mask (n,) of the readings (n, 3) at rest without those during knocks."""
+    """Return a mask (n,) of the readings (n, 3) at rest that are free of knocks."""
     kept: NDArray[np.bool_] = np.ones(len(readings), dtype=np.bool_)
     if len(readings) < FEWEST:
         return kept

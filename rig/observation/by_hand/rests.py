@@ -1,13 +1,12 @@
 """The rests of a body, from its sensors' readings alone.
 
-A recording is divided into blocks of a quarter of a second. A block is at rest if its readings scatter no more than a
-few times as much as in the quietest tenth of all blocks, and if a gyroscope reads its value at rest. This is the
-reading that most of the quiet blocks have in common, for any bias. A steady turn is as quiet as a rest, so if several
-readings are nearly equally frequent, the smallest counts. Adjacent blocks with equal readings form one rest. A few
-missing readings do not end it.
+A recording is divided into blocks of a quarter of a second. A block is at rest if its readings scatter at most a few
+times as much as in the quietest tenth of all blocks, and if a gyroscope reads its bias: the most frequent reading of
+quiet blocks. A steady turn is as quiet as a rest, so the smallest of several nearly equally frequent readings counts.
+Adjacent blocks with equal readings form one rest, which a few missing readings do not end.
 
-If there is a gyroscope, it decides alone: it measures every turn, and hardly a knock against the table. Without a
-gyroscope, a few readings that are due to a knock do not count.
+A gyroscope decides alone: it measures every turn, and hardly a knock against the table. Without a gyroscope, a few
+readings due to a knock do not count.
 """
 
 from collections.abc import Mapping, Sequence
@@ -44,8 +43,8 @@ def find_rests(
 ) -> tuple[Window, ...]:
     """Return the rests of at least two blocks, from readings (n, 3) of one or several quantities at rising times (n,).
 
-    `still_at_first`: whether the body was at rest in the first second, so that its scatter there counts as rest.
-    `lying`: windows of rests that the user declared; the body lies still for at least a part of each.
+    `still_at_first`: whether the scatter of the first second is that of a rest. `lying`: declared rests; the body lies
+    still for at least a part of each.
     """
     quantity = next(quantity for quantity in quantities().values() if quantity in readings)
     if len(time_s) < 2 * FEWEST:
@@ -81,7 +80,7 @@ def find_rests(
 def _average_unknocked(blocks: Array, noise: Array) -> tuple[Array, Array]:
     """Return means and scatter (count, 3) of blocks (count, width, 3), each without the few readings of a knock.
 
-    A knock is a disturbance with equal readings before and after it. Not for a gyroscope, as a knock may turn the body.
+    A knock is a disturbance with equal readings before and after. Not for a gyroscope: a knock may turn the body.
     """
     before, after = np.concatenate([blocks[:1, 0], blocks[:-1, -1]]), np.concatenate([blocks[1:, 0], blocks[-1:, -1]])
     widened = np.concatenate([before[:, None], blocks, after[:, None]], axis=1)
@@ -110,7 +109,7 @@ def _mask_blocks(times: Array, windows: Sequence[Window]) -> NDArray[np.bool_]:
 def _find_unturned(
     means: Array, steady: NDArray[np.bool_], tolerance: Array, lying: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """Return a mask (count,) of blocks with the gyroscope's reading at rest, the most frequent in declared rests."""
+    """Return a mask (count,) of blocks with the most frequent reading, in declared rests above all: that at rest."""
     declared = steady & lying
     pool = means[declared if declared.any() else steady]
     candidates = pool[:: -(-len(pool) // CANDIDATES)]

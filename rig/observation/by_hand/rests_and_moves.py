@@ -1,4 +1,4 @@
-"""The rests and moves of a session by hand, from its recordings. Moves that were refused do not count."""
+"""The rests and moves of a session by hand, from its recordings, without refused moves."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -36,12 +36,12 @@ Readings = tuple[Array, Array, Array | None]  # times (n,), rates (n, 3), accele
 
 
 def microsecond_of(sensor: RecordedSensor) -> float:
-    """Return the duration, s, of a microsecond in a sensor's time stamps, which is not exact on a board's clock."""
+    """Return the true duration, s, of a microsecond of a sensor's time stamps; a board's clock is not exact."""
     return MICROSECOND_S if sensor.on_board else 1e-6
 
 
 def readings_of(sensor: RecordedSensor, samples: NDArray[np.void], from_s: float = 0.0) -> Readings:
-    """Return samples (n,) in SI units, with times on the clock of the crystal that stamps them, shifted by `from_s`."""
+    """Return samples (n,) in SI units, with times on the clock that stamps them, shifted by `from_s`."""
     time_s = from_s + microsecond_of(sensor) * samples["board_time_us"].astype(np.float64)
     force = sensor.channel(ACCELERATION).values(samples) if sensor.measures(ACCELERATION) else None
     return time_s, sensor.channel(RATE).values(samples), force
@@ -55,10 +55,10 @@ def range_of(sensor: RecordedSensor) -> float | None:
 
 @dataclass(slots=True)
 class NotCounted:
-    """The parts of a session that do not count, in the session's seconds.
+    """The parts of a session that are left out, in the session's seconds.
 
-    `moves` and `rests`: their intervals; `seams`: the middle between two recordings; `from_s`: the time from which on
-    anything counts. Events give times in microseconds of `microsecond_s`.
+    `moves` and `rests`: their intervals; `seams`: the middles between recordings; `from_s`: the time before which
+    everything is left out. Events have times in microseconds of `microsecond_s`.
     """
 
     moves: list[tuple[float, float]] = field(default_factory=list)
@@ -68,7 +68,7 @@ class NotCounted:
     microsecond_s: float = MICROSECOND_S
 
     def take(self, event: Event, shift_s: float) -> None:
-        """Add an event of a recording whose board's clock is behind the session's by `shift_s`."""
+        """Add an event of a recording whose clock is `shift_s` behind the session's."""
         match event:
             case HandMoveRefused(begin_us, end_us):
                 self.moves.append(self._span_s(begin_us, end_us, shift_s))
@@ -112,10 +112,10 @@ def _is_within(part: HandRest | Move, spans: Sequence[tuple[float, float]]) -> b
 
 
 def replay_runs(runs: Sequence[RunData], name: str) -> tuple[Segmenter, NotCounted, float]:
-    """Return one sensor's rests and moves so far, the parts that do not count, and the time at which to continue.
+    """Return one sensor's rests and moves so far, the omitted parts, and the time at which to continue.
 
-    The item may have been moved in any way between two recordings, so no move connects the last rest of one with the
-    first of the next. Raise Fault as `check_readings` does.
+    The item may have been moved between two recordings, so no move connects their rests. Raise Fault as
+    `check_readings` does.
     """
     microsecond_s, ends_s = microsecond_of(runs[0].sensors[name]), None
     segmenter, refused = Segmenter(range_of(runs[0].sensors[name])), NotCounted(microsecond_s=microsecond_s)
@@ -146,8 +146,8 @@ def session_of(runs: Sequence[RunData], name: str) -> HandRecording:
 def collect_inputs(settings: RunSettings, provenance: Provenance, sensor: RecordedSensor) -> SessionConditions:
     """Return the inputs of a session's solution besides a sensor's readings.
 
-    Raise Refused `clock_unknown`. The readings do not show an error of the clock that stamps them. Without an
-    accelerometer to determine the side that is up, the first face is the one requested first.
+    Without an accelerometer, the first face is the one requested first. Raise Refused `clock_unknown` if the error of
+    the clock that stamps the readings is not stated.
     """
     by_hand, uncertainty = settings.by_hand, settings.uncertainty
     if by_hand is None or uncertainty is None or (sensor.on_board and not provenance.board_follows_crystal):

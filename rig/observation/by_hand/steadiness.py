@@ -20,7 +20,7 @@ NORMAL = 1.4826  # standard deviation over median absolute deviation
 def contiguous_slices(time_s: Array, sampling: Sampling) -> Iterator[slice]:
     """Yield the rows between the gaps of a log with increasing times (n,); a few missing readings are not a gap.
 
-    `fill_missing` can interpolate as few readings with hardly any loss of noise.
+    So few readings `fill_missing` interpolates with hardly any loss of noise.
     """
     gaps = sampling.gaps(time_s)
     short = gaps & (np.diff(time_s) <= BRIDGED_S)
@@ -38,7 +38,7 @@ def fill_missing(readings: Array, numbers: NDArray[np.intp]) -> Array:
 
 
 def check_at_rest(time_s: Array, readings: Array, quantity: Quantity) -> None:
-    """Raise Fault `not_at_rest` if readings (n, 3) at times (n,) change from second to second by more than noise."""
+    """Raise Fault `not_at_rest` if readings (n, 3) at times (n,) differ from second to second by more than noise."""
     block = np.floor((time_s - time_s[0]) / BLOCK_S).astype(np.intp)
     block = np.unique(block, return_inverse=True)[1]  # none is empty
     count = np.bincount(block)

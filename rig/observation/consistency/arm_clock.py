@@ -20,7 +20,7 @@ EVEN_S = 1e-4  # states count as evenly spaced if their time steps differ by les
 
 @dataclass(frozen=True, slots=True)
 class Jitter:
-    """Scatter of the times of the arm's states: standard deviation in s, and its degrees of freedom."""
+    """The standard deviation of the times of the arm's states, s, and its degrees of freedom."""
 
     std_s: float
     dof: float
@@ -52,9 +52,9 @@ def compare_with_computer(motion: ArmMotion) -> ClockRate:
 def state_jitter(recordings: Sequence[ObservedRun]) -> Jitter:
     """Return the jitter of the times of the arm's states, from the scatter of the joint angles in all sweeps of a run.
 
-    Differences of the sixth order remove the servo's motion, which is slow compared with the states. They contain the
-    times' errors, and the noise and the steps of the encoder. Neighbouring differences share states: n of them have n /
-    Σ ρ² degrees of freedom, with Σ ρ² = C(24, 12) / C(12, 6)² over all lags.
+    Differences of the sixth order remove the servo's motion, which is slow compared with the states, and keep the
+    errors of the times and the noise and steps of the encoder. Neighbouring differences share states: n of them have n
+    / Σ ρ² degrees of freedom, with Σ ρ² = C(24, 12) / C(12, 6)² over all lags.
     """
     count = 0
     scatter = []
@@ -71,8 +71,8 @@ def state_jitter(recordings: Sequence[ObservedRun]) -> Jitter:
 def find_encoder_noise_rad(recordings: Sequence[ObservedRun]) -> float:
     """Return the noise of one reading of a joint's angle, rad, from the joints that are at rest during a sweep.
 
-    It uses differences of the sixth order, as `state_jitter` does; the steps of the encoders count as noise. It is zero
-    for a turner with one shaft, and for one whose single readings scatter.
+    Differences of the sixth order contain it, as in `state_jitter`; the encoders' steps count as noise. Zero for a
+    turner with one shaft, or whose single readings scatter.
     """
     squares = [
         np.mean(np.delete(steps_rad, sweep.joint, axis=1) ** 2)

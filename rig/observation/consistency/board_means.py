@@ -1,8 +1,9 @@
 """The board's own average of each sweep, compared with the computer's mean of the same turn. Pure.
 
 Both average the same samples, with different weights. The board's weights are equal over whole blocks of readings, so
-its window begins and ends a little before or after the turn; the computer's cancel the spectral lines that it found.
-The arm's rotation under the board's weights is known, and so is their response to the lines. The rest must agree.
+its window begins and ends a little before or after the turn; the computer's weights cancel the spectral lines that it
+found. The arm's rotation under the board's weights and their response to the lines are subtracted. The remainder must
+agree.
 """
 
 from collections.abc import Sequence
@@ -23,8 +24,8 @@ NEXT_S = 1e-7  # rounding of a sample's time, at most
 def compare_board_means(sensor: str, recordings: Sequence[ObservedRun]) -> dict[int, float]:
     """Return the deviation of the board's average from the computer's mean, by the index of the sweep.
 
-    It is the largest of the three axes, in standard deviations of the computer's mean. Sweeps that the board did not
-    average are absent.
+    The largest deviation of the three axes counts, in standard deviations of the computer's mean. Sweeps that the board
+    did not average are absent.
     """
     deviations = dict[int, float]()
     for recording in recordings:
@@ -63,8 +64,7 @@ def _deviation(recording: ObservedRun, stream: Stream, turn: Observation, observ
 def _nuisance_columns(time_s: Array, turn: Observation, rates_rad_s: Array) -> Array:
     """Return columns (n, k) whose effect the computer's mean excludes, at times (n,) with rates (n,) about the axis.
 
-    They are the first two harmonics of the turn, spectral lines, and the effect of a slow ripple on a sensor with a
-    lag.
+    These are the turn's first two harmonics, spectral lines, and the effect of a slow ripple on a lagging sensor.
     """
     average = turn.average
     fraction = (time_s - average.start_s) / average.duration_s

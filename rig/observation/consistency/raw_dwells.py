@@ -20,8 +20,8 @@ from rig.observation.windows import Window
 class RawDwell:
     """The raw readings of one dwell: counts (n, 3) at controller times (n,) within the `window`.
 
-    The arm stood at `q_rad` (6,); `clock_offset_s` converts those times to the clock of the first recording.
-    `swing_counts` (n, 3): readings less their mean because of the arm's oscillation, as its encoders measure it.
+    The arm stood at `q_rad` (6,); `clock_offset_s` converts times to the clock of the first recording. `swing_counts`
+    (n, 3): the effect of the arm's oscillation, as encoders measure it.
     """
 
     index: int

@@ -20,10 +20,12 @@ NORMAL = 1.4826  # standard deviation over median absolute deviation
 class RawReadings:
     """Raw readings of one revolution, rest or dwell.
 
-    sweep: the index of the revolution among all of the sensor's, −1 for a rest. counts (n, 3): the readings as
-    recorded. residual_counts (m, 3): readings minus the mean of their segment and the arm's vibration, or in a rest any
-    vibration. Only samples for which the arm's motion is recorded. vibration_counts (3,): RMS of the arm's vibration.
-    swing_rad2 (3,): mean square difference of the vibration's angle between two times in a rest.
+    - sweep: index among the sensor's revolutions, −1 for a rest.
+    - counts (n, 3): the readings as recorded.
+    - residual_counts (m, 3): readings minus the mean of their segment and the vibration, for samples with recorded
+      motion.
+    - vibration_counts (3,): RMS of the arm's vibration.
+    - swing_rad2 (3,): mean square difference of the vibration's angle between two times in a rest.
     """
 
     sweep: int
@@ -42,7 +44,7 @@ def counts_of(stream: Stream, quantity: Quantity, inside: slice) -> NDArray[np.i
 def innovation_std(counts: NDArray[np.int64]) -> Array:
     """Return the standard deviation (3,), in counts, of a reading's prediction error.
 
-    Previous readings predict it, so drift and vibration, which shift neighbouring readings together, are excluded.
+    The prediction by previous readings excludes drift and vibration, which shift neighbouring readings together.
     """
     return np.array([_innovation_std(axis - axis.mean()) for axis in counts.T])
 

@@ -1,7 +1,7 @@
-"""Revolutions and rests in segments of equal length, each averaged like the whole, with weights of its own.
+"""Revolutions and rests in segments of equal length, each averaged like the whole.
 
-The spectral lines that were removed from a revolution's mean are removed from its segments' means, and the same weights
-average the readings and the arm's rate. Both are `weighted_means`: of one group of readings, or of several.
+The spectral lines removed from a revolution's mean are removed from its segments' means, and the same weights average
+readings and the arm's rate.
 """
 
 from collections.abc import Sequence
@@ -49,7 +49,7 @@ def segment_counts(revolutions: int) -> tuple[int, int]:
 
 @dataclass(frozen=True, slots=True)
 class MotionInterval:
-    """An interval of time in which the arm made a motion, on the clock of its states.
+    """The interval of a motion of the arm, on the clock of its states.
 
     `unseen_rad`: angle at the motion's beginning or end that the samples may miss.
     """
@@ -64,9 +64,10 @@ class MotionInterval:
 class Segment:
     """A part of a revolution or rest, averaged.
 
-    position: from −1 in the first segment to 1 in the last. mean: of the readings, rad/s. rate_rad_s (3,): mean rate of
-    the flange relative to the base, in the flange's frame, with the weights of that mean. attitude (3, 3): mean
-    rotation from the base into the flange's frame.
+    - position: from −1 in the first segment to 1 in the last.
+    - mean: of the readings, rad/s.
+    - rate_rad_s (3,): the flange's mean rate relative to the base, in the flange's frame, by the weights of `mean`.
+    - attitude (3, 3): mean rotation from the base into the flange's frame.
     """
 
     position: float
@@ -78,9 +79,9 @@ class Segment:
 
 @dataclass(frozen=True, slots=True)
 class SegmentedAverage:
-    """A revolution or rest: its `average` as a whole, its segments, its raw readings.
+    """A revolution or rest: its average as a whole, its segments, its raw readings.
 
-    `speed_std` is the standard deviation of the mean speed, relative to it; zero for a rest.
+    `speed_std`: relative standard deviation of the mean speed, zero for a rest.
     """
 
     average: Average
@@ -116,8 +117,9 @@ def segment_recordings(name: str, recordings: Sequence[ObservedRun]) -> tuple[Se
 class _Division:
     """Samples of a window that lie in segments.
 
-    inside: all samples of the window. used (n,): mask of the samples in a segment with `enough`. time_s (m,),
-    readings_rad_s (m, 3): these samples. groups (m, p): their segments. ends_s (p + 1,): the segments' ends.
+    - inside: all n samples of the window; used (n,): those in a segment with `enough` samples.
+    - time_s (m,), readings_rad_s (m, 3): the used samples; groups (m, p): their segments.
+    - ends_s (p + 1,): the segments' ends.
     """
 
     inside: slice
@@ -159,9 +161,8 @@ def _segment_revolution(
 ) -> SegmentedAverage:
     """Average a revolution or an arc in segments, without the spectral lines of the whole average.
 
-    Lines slower than `SLOW` remain, because they are almost collinear with segments: weights that cancel them would
-    amplify the encoders' noise. The variance of the whole average allows for them. A vibration that the encoders
-    measure only in part does not count as noise of a segment.
+    Lines slower than `SLOW` remain, because weights that cancel them would amplify the encoders' noise; the variance of
+    the whole average contains them. A vibration that the encoders measure only in part does not count as noise.
     """
     average, axis = turn.average, turn.axis_flange
     times_s = stream.time_s[slice_time(stream, average.start_s, average.end_s)]

@@ -1,11 +1,11 @@
-"""Transfers between sweeps and rests, each averaged whole: the only rotation about some axes at another time.
+"""Transfers between sweeps and rests, each averaged whole: rotations about other axes than the sweeps around them.
 
-The sweeps about an axis are all in one interval of time, so they do not show whether its scale factor changed before or
-after. In a transfer two wrists turn by half a revolution, from standstill to standstill: the arm states the mean rate
-as well as in a sweep, about axes other than that of the sweep.
+The sweeps about an axis follow each other, so they do not show a change of its scale factor at another time. In a
+transfer two wrists turn by half a revolution, from standstill to standstill, and the arm states the mean rate as well
+as in a sweep.
 
-No spectral lines are sought in a transfer: it is short, and the servo's vibration sweeps up and down in it. At the data
-rate that vibration aliases to zero, and the mean is in error by more than the scatter shows: see
+No spectral lines are sought in a transfer: it is short, and the servo's vibration sweeps up and down. At the data rate
+the vibration aliases to zero, an error of the mean that the scatter does not show: see
 `rig.analysis.consistency.gyroscope_checks`.
 """
 
@@ -52,11 +52,12 @@ LOW = 0.0  # fraction of the data rate: as few low frequencies as possible, beca
 class WristTransfer:
     """A transfer in which only the wrists turned, averaged; times are on the clock of its recording.
 
-    clock_offset_s: converts its times to the clock of the first recording. mean_rad_s (3,): mean of the readings.
-    scatter_rad2_s2 (3,): variance of the mean, from the residuals of a fit of the arm's rate and gravity.
-    rounding_rad2_s2 (3,): variance of the mean due to rounding. rate_rad_s (3,): mean rate of the flange relative to
-    the base, in the flange's frame. gravity_m_s2 (3,): gravity minus the acceleration at the sensors' position, in the
-    same frame. attitude (3, 3): from the base into that frame.
+    - clock_offset_s: converts its times to the clock of the first recording.
+    - mean_rad_s (3,): mean of the readings; scatter_rad2_s2, rounding_rad2_s2 (3,): its variances by the residuals of a
+      fit of the arm's rate and gravity, and by rounding.
+    - rate_rad_s (3,): the flange's mean rate relative to the base, in the flange's frame.
+    - gravity_m_s2 (3,): gravity minus the acceleration at the sensors' position, in the same frame.
+    - attitude (3, 3): from the base into that frame.
     """
 
     clock_offset_s: float
@@ -74,7 +75,7 @@ def average_transfers(
 ) -> list[WristTransfer]:
     """Average all transfers of a gyroscope with matrix F (3, 3), mounted at `extension_m` (3,) in the flange's frame.
 
-    Transfers with a missing sample or one out of range are left out.
+    Transfers with a missing or saturated sample are left out.
     """
     transfers = list[WristTransfer]()
     for recording in recordings:
@@ -137,8 +138,8 @@ def mean_specific_force_m_s2(interval: MotionInterval, down_m_s2: Array, extensi
 def _scatter(readings: Array, time_s: Array, motion: ArmMotion, down_m_s2: Array) -> Array:
     """Return the variance (3,) of the mean of readings (n, 3), after removal of the arm's rate and gravity.
 
-    The arm's rates of adjacent samples are also removed, because a sensor's filter combines them. A ripple above half
-    the data rate is aliased to low frequencies, where it looks like noise.
+    The arm's rates at adjacent samples are also removed, because a sensor's filter combines them. A ripple above half
+    the data rate counts as noise.
     """
     step_s = float(np.median(np.diff(time_s)))
     rates = [motion.rates_at_samples(time_s + shift * step_s) for shift in FILTERED]

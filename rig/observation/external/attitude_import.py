@@ -4,15 +4,14 @@ samples: see `rig.observation.external.csv_samples`.
 
 attitudes: `start_s`, `end_s` on the same clock, or `time_s` alone, and `qw qx qy qz`, the unit quaternion that takes
 body to table coordinates; while the table turns `rate_x_rad_s rate_y_rad_s rate_z_rad_s`, its rate in body coordinates;
-and `attitude_std_rad` about each axis, if it is known. While the table turns, a row refers to its middle and should be
-short. It may be a single sample, whose noise is then estimated from the scatter of all rows about the model. Only a
-gyroscope is solved from rows in which the body moves; accelerometers and magnetometers use those at rest
-(`rig.observation.external.placements`).
+and optionally `attitude_std_rad` about each axis. While the table turns, a row refers to its middle and should be
+short. A row may be a single sample, whose noise is then estimated from the scatter of all rows about the model.
+Accelerometers and magnetometers use only the rows in which the body is at rest (`rig.observation.external.placements`).
 
 Columns may have any order; the first row holds their names.
 
-If the table has a clock of its own, its offset is found from the rotation that both files show, like a board's on the
-arm (`rig.observation.timebase`).
+If the table has a clock of its own, the rotation that both files show determines its offset, as on the arm
+(`rig.observation.timebase`).
 """
 
 from collections.abc import Iterator, Mapping
@@ -62,8 +61,8 @@ MOMENTS = Header(  # forms of a file: rows with a duration, or with a moment eac
 class Rows:
     """A gyroscope's averages in N rows: `means` (N, 3), their `variances` (N, 3) and the `dof` (N, 3) of these.
 
-    No variances if rows hold too few samples to show their noise. `samples` (N,); `attitudes` (N, 3, 3), body to table;
-    `rates_rad_s` (N, 3) of the table in body coordinates and `attitude_std_rad` (N,), if they were given.
+    `variances` is None if rows hold too few samples to show their noise. `samples` (N,) are counts; `attitudes` (N, 3,
+    3), body to table; `rates_rad_s` (N, 3) of the table in body coordinates and `attitude_std_rad` (N,), if given.
     """
 
     means: Array
@@ -79,10 +78,10 @@ class Rows:
 class PlacedReadings:
     """The contents of the two files, for the `quantities` that were recorded.
 
-    A gyroscope's `rows`, and in `turning` its own readings and all rows, for a solution by rotation angles; for the
-    other sensors `placements`, or the fault. `clock` if it had to be found. Left out are the `omitted` rows, which the
-    recording does not cover, and for missing samples the `incomplete` rows, without a mean rate. Rows without a
-    placement are omitted there.
+    - `rows`: a gyroscope's averages; `turning`: its readings and all rows, for a solution by rotation angles.
+    - `placements`: of the other sensors, or the fault.
+    - `clock`: of the table, if it had to be found.
+    - `omitted`: rows that the recording does not cover; `incomplete`: rows with missing samples and no mean rate.
     """
 
     quantities: tuple[Quantity, ...]
@@ -99,8 +98,8 @@ def read_attitudes(
 ) -> dict[str, Array]:
     """Return the columns (N,) of a file of attitudes in any format; `mapped` if its columns have other names.
 
-    Times of a text table count from `origin_s`. A table with `time_s` in place of `start_s` and `end_s` has a moment in
-    each row. `inverse` quaternions take table to body coordinates. Raise as `attitudes_in`; Refused `no_file`,
+    Times of a text table count from `origin_s`. A row with `time_s` in place of `start_s` and `end_s` holds for a
+    moment. `inverse` quaternions take table to body coordinates. Raise as `attitudes_in`; Refused `no_file`,
     `wrong_columns`, `wrong_unit`, `not_a_number`.
     """
     in_format = attitudes_in(path)
@@ -118,7 +117,8 @@ def read_attitudes(
 def _drop_other_rows(path: Path, table: CsvTable) -> dict[str, Array]:
     """Return the rows that hold a quaternion.
 
-    Loggers with several rates leave it blank in the other rows. Raise Refused `not_a_number` for any other blank cell.
+    Loggers with several rates leave the quaternion blank in the other rows. Raise Refused `not_a_number` for any other
+    blank cell.
     """
     kept = ~np.isnan([table.columns[name] for name in QUATERNION]).all(axis=0)
     for name, column in table.columns.items():
@@ -130,8 +130,8 @@ def _drop_other_rows(path: Path, table: CsvTable) -> dict[str, Array]:
 def average_placements(samples: Samples, table: Mapping[str, Array], *, find_clock: bool = False) -> PlacedReadings:
     """Average the samples of each attitude in `table`, the columns of a file of attitudes.
 
-    With `find_clock` the table has a clock of its own, which is estimated, and its rows without samples are left out.
-    Raise Refused `bad_quaternion`, `bad_attitude_row`, `overlapping_attitudes`; Fault `clocks_apart`, `lost_samples`,
+    With `find_clock` the table's clock is estimated, and rows without samples are left out. Raise Refused
+    `bad_quaternion`, `bad_attitude_row`, `overlapping_attitudes`; Fault `clocks_apart`, `lost_samples`,
     `too_few_observations`, `wrong_unit`, and with `find_clock` those of `find_reference_clock`.
     """
     time_s, readings = samples.time_s, samples.readings
@@ -189,7 +189,7 @@ def average_placements(samples: Samples, table: Mapping[str, Array], *, find_clo
 
 @dataclass(frozen=True, slots=True)
 class _ReferenceRows:
-    """The rows of a reference: `attitudes` (N, 3, 3), `rates_rad_s` (N, 3) and `std_rad` (N,), if they were given.
+    """The rows of a reference: `windows` (N, 2), `attitudes` (N, 3, 3), and if given rates (N, 3) and stds (N,).
 
     `numbers` (N,) are those of the rows in the file, from 1.
     """
@@ -217,19 +217,19 @@ def _select_different_times(rows: Mapping[str, Array]) -> NDArray[np.intp]:
 
 
 def _list_repeated(numbers: NDArray[np.intp], total: int) -> Iterator[Omitted]:
-    """Yield an entry for the rows out of `total` that repeat the time of another one, if there are any."""
+    """Yield an entry for the rows out of `total` that repeat another row's time, if any."""
     if len(repeated := np.setdiff1d(np.arange(1, total + 1), numbers)):
         yield Omitted("rows", len(repeated), total, "they repeat the time of another one", f"row {repeated[0]}")
 
 
 def _is_covered(rows_s: Array, time_s: Array) -> NDArray[np.bool_]:
-    """Return which of the rows (N, 2) lie within a recording with samples at `time_s` (n,)."""
+    """Return a mask of the rows (N, 2) that lie within a recording with samples at `time_s` (n,)."""
     within: NDArray[np.bool_] = (rows_s[:, 0] >= time_s[0]) & (rows_s[:, 1] <= time_s[-1])
     return within
 
 
 def _list_omitted(rows: _ReferenceRows, kept: _ReferenceRows, reason: str) -> Iterator[Omitted]:
-    """Yield an entry for the rows that were given and not used, if there are any."""
+    """Yield an entry for the given rows that are not used, if any."""
     if lost := np.setdiff1d(rows.numbers, kept.numbers).tolist():
         window = rows.windows[rows.numbers.tolist().index(lost[0])]
         yield Omitted("rows", len(lost), len(rows.windows), reason, f"row {lost[0]}, from {window.start_s:.10g} s")

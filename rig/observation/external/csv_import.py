@@ -1,15 +1,15 @@
 """External data: a CSV file of samples and one of sweeps, solved like the rig's own recordings.
 
-samples: see `rig.observation.external.csv_samples`, including a gyroscope's; those of other sensors are not used.
+samples: a gyroscope's, see `rig.observation.external.csv_samples`; those of other sensors are not used.
 
 sweeps: `start_s`, `end_s` on the same clock, `axis_x`, `axis_y`, `axis_z` (unit vector of the turn in a frame fixed to
 the sensor's carrier, right-handed), and either `speed_rad_s` (mean speed) or `angle_rad` (angle turned from start to
-end). A row of speed or angle 0 is a rest, without an axis. If the table or servo vibrates, the sweep should be a whole
-turn: over that its mean speed is 2π/T in any case. Standard deviations may be given: `angle_std_rad` of the angle
-reached, and `axis_std_rad` of the direction of the axis.
+end). A row of speed or angle 0 is a rest, without an axis. If the table or servo vibrates, a sweep should be a whole
+turn, whose mean speed is 2π/T in any case. Standard deviations may be given: `angle_std_rad` of the angle reached, and
+`axis_std_rad` of the direction of the axis.
 
-A row with an angle and with the body at rest at both ends is solved by the angle that the gyroscope measured
-(`rig.estimation.gyroscope.rotations_by_angle`), as for a turn by hand, or by a servo that starts and stops.
+A row with an angle whose body is at rest at both ends is solved by the angle that the gyroscope measured
+(`rig.estimation.gyroscope.rotations_by_angle`).
 
 Columns may have any order; the first row holds their names.
 """
@@ -61,11 +61,13 @@ SWEEPS_MB = 1  # some ten thousand sweeps
 
 @dataclass(frozen=True, slots=True)
 class ExternalData:
-    """The contents of the two files: averaged sweeps and rests, in the order of the rows; `turned` if a body was.
+    """The contents of the two files: averaged sweeps and rests, in the order of the rows, and turns by angle.
 
-    `at_reference`: corrected to one temperature by polynomials that include the contradictions of repeats. `by_mean`:
-    numbers of the rows with an angle of which only the mean speed counts, because the body did not lie still before or
-    after. `omitted`: rows that are left out for missing readings, and the readings that are missing in the others.
+    - `at_reference`: whether readings are corrected to one temperature by polynomials that include contradictions of
+      repeats.
+    - `by_mean`: numbers of the rows with an angle that count by their mean speed, because the body moved before or
+      after.
+    - `omitted`: rows left out for missing readings, and the readings missing in the others.
     """
 
     sweeps: tuple[Observation, ...]
@@ -110,7 +112,7 @@ def average_sweeps(samples: Samples, sweeps: Mapping[str, Array]) -> ExternalDat
 
 
 def _list_hiding(by_angle: TurnedData, data: ExternalData) -> Iterator[Omitted]:
-    """Yield an entry for the turns left out because missing readings may hide a part of them, if there are any."""
+    """Yield an entry for the turns left out because missing readings may hide a part, if any."""
     if by_angle.hiding:
         first = next(sweep for sweep in data.sweeps if sweep.sweep in by_angle.hiding)
         where = f"row {first.sweep}, from {first.average.start_s:.10g} s"
@@ -235,7 +237,7 @@ def _observation(row: int, mean: Average, speed_rad_s: float, axis: Array) -> Ob
 
 
 def _check_noisy(mean: Average, row: int) -> None:
-    """Raise Fault `stuck_sensor` if an axis has one value throughout a row: its mean is known to a step alone."""
+    """Raise Fault `stuck_sensor` if an axis has one value throughout a row, so its mean is unknown within a step."""
     quiet = np.flatnonzero(mean.noise_rad_s <= ROUNDING * np.abs(mean.mean_rad_s))
     if len(quiet):
         axis = int(quiet[0])
@@ -249,7 +251,7 @@ def _check_noisy(mean: Average, row: int) -> None:
 
 
 def _check_unit(turns: Sequence[Observation]) -> None:
-    """Raise Fault `wrong_unit` if readings minus their mean, hence without bias, differ in size from the speeds."""
+    """Raise Fault `wrong_unit` if readings minus their mean (the bias) differ in size from the speeds."""
     if len(turns) < 2:
         return
     means = np.array([turn.average.mean_rad_s for turn in turns])
@@ -258,7 +260,7 @@ def _check_unit(turns: Sequence[Observation]) -> None:
 
 
 def _check_directions(turns: Sequence[Observation], rests: Sequence[Average]) -> None:
-    """Raise Refused `bad_sweep` if the readings of two sweeps about one axis contradict the directions of the two."""
+    """Raise Refused `bad_sweep` if two sweeps about one axis have readings that contradict their directions."""
     if len(turns) < 2:
         return
     means = np.array([turn.average.mean_rad_s for turn in turns])

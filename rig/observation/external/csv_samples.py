@@ -1,11 +1,10 @@
 """An external file of samples: a column for each axis of each quantity, in SI units.
 
-`time_s`, which must increase, and any of `x_rad_s y_rad_s z_rad_s` (rate), `x_m_s2 y_m_s2 z_m_s2` (specific force: at
-rest the opposite of gravity) and `x_t y_t z_t` (magnetic field, tesla). `temperature_c` may be there too, as `rig
-export` writes it, for a calibration over temperature. Columns may have any order; the first row holds their names. One
-recording serves every command: each uses the quantities that it needs.
+Columns: `time_s`, and any of `x_rad_s y_rad_s z_rad_s` (rate), `x_m_s2 y_m_s2 z_m_s2` (specific force: at rest the
+opposite of gravity) and `x_t y_t z_t` (magnetic field, tesla). `temperature_c` serves a calibration over temperature.
+Columns may have any order; the first row holds their names. Each command uses the quantities that it needs.
 
-Loggers of several sensors leave cells blank if a row belongs to another one. Such rows are left out, and counted.
+Loggers of several sensors leave cells blank in rows of another sensor. Such rows are left out, and counted.
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -37,10 +36,9 @@ SPIKES = "spikes: each stands alone, far from those before and after, as no body
 
 @dataclass(frozen=True, slots=True)
 class SampleTable:
-    """The `columns` (n,) of a file of readings by name, without a blank; times count from `origin_s`.
+    """The columns (n,) of a file of readings by name, without blanks; times count from `origin_s`.
 
-    `others`: number of further rows of the file without the readings that were wanted. `note`: what the readings lack,
-    "" if nothing.
+    `others`: number of rows without the wanted readings. `note`: what the readings lack, "" if nothing.
     """
 
     columns: Columns
@@ -55,8 +53,8 @@ class Samples:
 
     - `time_s` (n,): smoothed if the time stamps are too inexact; `sampling` describes the stamps.
     - `readings` (n, 3) by quantity; `temperature_c` (n,), None without such a column.
-    - `omitted`: rows of the file that are no readings of their own, and spikes, which are interpolated.
-    - `notes`: how stamps were read, in words.
+    - `omitted`: rows that are left out, such as repetitions, and spikes, which are interpolated.
+    - `notes`: how stamps were interpreted, in words.
     """
 
     time_s: Array
@@ -78,9 +76,9 @@ def read_sample_table(
 ) -> SampleTable:
     """Return the columns of a file in any format: the quantities `needed` and all others it holds.
 
-    `mapped` is for a table whose columns have other names. Rows with blank cells count if they hold all quantities of
-    the sensors in `only`, or all that the file has. Raise Refused `no_file`, `wrong_columns`, `wrong_unit`,
-    `not_a_number`, `blank_cells`, and as `readings_in` does.
+    `mapped` is for a table whose columns have other names. Rows with blank cells count if they hold all quantities in
+    `only`, or all that the file has. Raise Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`,
+    `blank_cells`, and as `readings_in` does.
     """
     readings = readings_in(path)
     if readings is not None:
@@ -134,7 +132,7 @@ def _read(path: Path, table: CsvTable, quantity: Quantity) -> NDArray[np.bool_]:
 def _drop_blanks(
     path: Path, table: CsvTable, read: Mapping[Quantity, NDArray[np.bool_]], wanted: Sequence[Quantity]
 ) -> SampleTable:
-    """Return the rows that hold every required column. Raise Refused `blank_cells` if no row does, or only some do."""
+    """Return the rows that hold every wanted quantity. Raise Refused `blank_cells` if these are in different rows."""
     columns, time_s = dict(table.columns), table.columns[TIME]
     if not wanted or all(read[quantity].all() for quantity in read):
         kept = np.ones(len(time_s), dtype=np.bool_)

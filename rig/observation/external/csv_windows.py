@@ -21,7 +21,7 @@ MOSTLY = 0.5  # least fraction of a row's readings that determines its mean
 
 
 def check_times(time_s: Array, where: str = "the samples") -> None:
-    """Raise Refused `time_not_increasing`, naming `where`, if samples are too few or their times do not rise."""
+    """Raise Refused `time_not_increasing`, naming `where`, for too few samples or times that do not rise."""
     what = f"{where} has {len(time_s)} samples, {MIN_SAMPLES} are the least" if len(time_s) < MIN_SAMPLES else None
     steps_back = np.flatnonzero(~(np.diff(time_s) > 0))
     if len(steps_back):
@@ -50,7 +50,7 @@ def find_overlap(windows: Sequence[Window]) -> tuple[int, int] | None:
 def scatter_of(readings: Array) -> tuple[Array, Array, Array]:
     """Return the variance of the mean of readings (n, 3), its degrees of freedom, and one reading's std, (3,) each.
 
-    They come from the scatter about the mean. A vibration counts as noise, because no arm measures it.
+    A vibration counts as noise, because no arm measures it.
     """
     variance = readings.var(axis=0, ddof=1)
     residuals = (readings - readings.mean(axis=0)).T
@@ -90,7 +90,7 @@ def average_bridged(readings: Array, numbers: NDArray[np.intp], window: Window, 
 
 @dataclass(frozen=True, slots=True)
 class RowGaps:
-    """The readings of a row: their `count`, the number `expected`, and that `missing` in `gaps` between them.
+    """The readings of a row: their `count`, the numbers `expected`, and `missing` in `gaps` between them.
 
     `hidden_rad`: standard deviation of the rotation that the gaps hide; `first_s`: time before the first of them;
     `is_inside`: whether the recording covers the row.
@@ -112,7 +112,7 @@ class RowGaps:
 
 
 def find_row_gaps(time_s: Array, readings: Array, sampling: Sampling, windows: Sequence[Window]) -> list[RowGaps]:
-    """Return the gaps of readings (n, 3), rad/s at times (n,), in the windows."""
+    """Return the gaps between readings (n, 3), rad/s at times (n,), in each window."""
     expected = sampling.count_expected(time_s, np.array([(window.start_s, window.end_s) for window in windows]))
     rows = []
     for window, wanted in zip(windows, expected.tolist(), strict=True):

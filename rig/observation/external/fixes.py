@@ -1,11 +1,9 @@
-"""Attitude fixes from a reference's rows, between which a gyroscope is integrated, and the intervals left out, by name.
+"""Attitude fixes from a reference's rows, between which a gyroscope is integrated, and the omitted intervals.
 
-Rows that follow each other while the body moves are gathered over windows; each holds for its middle. If the gyroscope
-shows that the body lay still during a row, the row is valid from its beginning to its end: both are fixes, and share
-the row's error.
+Rows that follow each other while the body moves are gathered over windows; a row holds for its middle. If the gyroscope
+shows that the body lay still during a row, both ends of the row are fixes, which share the row's error.
 
-A gyroscope cannot be integrated over missing samples, if it is saturated, or if it turns too far between two readings
-for interpolation.
+A gyroscope cannot be integrated over missing or saturated samples, or if it turns too far between two readings.
 """
 
 from collections.abc import Iterator
@@ -37,7 +35,7 @@ THIN = 0.25  # least fraction of a fix's usual number of rows
 
 @dataclass(frozen=True, slots=True)
 class LeftOut:
-    """Increments that could not be made: the error's name, their number, and when the first of them began.
+    """Increments that could not be made for one reason: the error's name, their number, the first one's start.
 
     `longest_s`: the longest step from one reading to the next over which the motion is unknown.
     """
@@ -50,7 +48,7 @@ class LeftOut:
 
 @dataclass(frozen=True, slots=True)
 class Gathered:
-    """Fixes, windows of `window_s`, and what had to be left out."""
+    """Fixes, gathered over windows of `window_s`, and the omitted increments."""
 
     fixes: Fixes
     window_s: float
@@ -65,9 +63,9 @@ class Gathered:
 def gather(turning: Turning, window_s: float | None = None, clock_s: float = 0.0) -> Gathered:
     """Return the fixes of a reference's rows, in windows of a given or a suitable length.
 
-    Time t of the reference is time t + `clock_s` of the readings. Raise Fault `too_few_observations` if too few
-    increments remain in which the body moves. Raise `lost_samples`, `saturation` or `turned_too_fast` instead if that
-    is the cause, or if more increments are left out for that reason than remain.
+    Time t of the reference is time t + `clock_s` of the readings. Raise Fault `too_few_observations` if the body moves
+    in too few of the remaining increments; `lost_samples`, `saturation` or `turned_too_fast` if this is the cause, or
+    leaves out more increments than remain.
     """
     turning = select_covered(turning, clock_s)
     if len(turning.rows_s) < 2:
@@ -92,7 +90,7 @@ def _suitable_s(span_s: float) -> float:
 def _fixes(turning: Turning, still: NDArray[np.bool_], window_s: float) -> Fixes:
     """Group the reference's attitudes into fixes: start and end of each row at rest, and one per window between rests.
 
-    `placement` is equal at both ends of a rest. The gaps of the gyroscope are not considered yet.
+    `placement` is equal at both ends of a rest. The gyroscope's gaps are ignored.
     """
     rows_s = turning.rows_s
     passed = np.cumsum(still)
@@ -131,7 +129,7 @@ def _measure_walk(turning: Turning, rests_s: Array) -> tuple[float, float]:
 
 
 def _drop_thin(fixes: Fixes) -> Fixes:
-    """Return the fixes without windows in which the reference has hardly any rows."""
+    """Return the fixes without windows that hold hardly any rows."""
     counts = np.bincount(fixes.fix)
     moving = fixes.placement >= 0
     kept = ~moving | (counts >= THIN * np.median(counts[moving] if moving.any() else counts))

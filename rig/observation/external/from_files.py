@@ -1,4 +1,4 @@
-"""A recording of external readings, from a file of readings and usually a file of their motion."""
+"""A recording of external readings, from a file of readings and usually one of their motion."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -35,10 +35,10 @@ NOTHING_LOST = ObservationThresholds(max_lost_fraction=0.01, max_speed_deviation
 
 @dataclass(frozen=True, slots=True)
 class Files:
-    """The two files and their item; `recorded`: None means the time at which the readings' file was last written.
+    """The two files and their item; `recorded`: None for the time at which the readings' file was last written.
 
-    `columns` map columns that are not named as in the rig. For "turns" no file contains the motion: `motion` is what
-    the user declared, by column.
+    `columns` map columns with other names than the rig's. For "turns" there is no file of motion: `motion` has the
+    user's declarations, by column.
     """
 
     readings: Path

@@ -1,4 +1,4 @@
-"""A gyroscope's mean readings in rests that its readings and a reference's attitudes both show."""
+"""A gyroscope's mean readings in rests that both its readings and a reference's attitudes show."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -25,9 +25,9 @@ class MeansAtRest:
 
 
 def means_at_rest(turning: Turning, clock_s: float) -> MeansAtRest | None:
-    """Return the means in the rests, in the body's coordinates; None if all rests together are too short.
+    """Return the means in the rests, in body coordinates; None if all rests together are too short.
 
-    `clock_s` is added to the times of the rows to give those of the readings.
+    Time t of the rows is time t + `clock_s` of the readings.
     """
     rows_s = turning.rows_s.mean(axis=1) + clock_s
     lying = still_windows(turning.rows_s + clock_s, turning.attitudes)
@@ -53,10 +53,9 @@ def means_at_rest(turning: Turning, clock_s: float) -> MeansAtRest | None:
 def find_rests_otherwise(
     time_s: Array, readings: Array, lying: Sequence[Window], rests: Sequence[Window]
 ) -> list[Window]:
-    """Return the windows in which the body should lie still, and the readings are as quiet as in the rests.
+    """Return the declared rests without an observed rest, in which readings are quiet but differ: the bias changed.
 
-    They contain another reading than the rests, because the bias has changed. `lying` are the windows that somebody
-    states, `rests` those that the readings (n, 3) at times (n,) show.
+    `lying` are the declared windows, `rests` those that the readings (n, 3) at times (n,) show.
     """
     if not rests:
         return []
@@ -83,8 +82,8 @@ def _split_single(windows: Sequence[Window]) -> Sequence[Window]:
 def _rate_rad_s(times_s: Array, attitudes: Array) -> Array:
     """Return the body's rate (3,) from its attitudes at increasing times; zero for a single attitude.
 
-    The rate is the median over pairs of rows that are half of all rows apart (Theil's incomplete method, 1950), so a
-    few rows at either end in which the body already moves have no effect. A single row states that the body lay still.
+    The median over pairs of rows half of all rows apart (Theil's incomplete method, 1950): a few rows at either end in
+    which the body already moves have no effect. A single row states that the body lay still.
     """
     half = len(times_s) // 2
     if not half:

@@ -1,13 +1,13 @@
-"""Parts of a recording that a solution leaves out: counted, with the reason and the first of them."""
+"""Parts of a recording that a solution leaves out: their count, the reason, and the first of them."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
 class Omitted:
-    """The number, out of a `total`, of `what` (rows, increments, readings) was left out, for a `reason` in words.
+    """An omission: `count` out of a `total` of `what` (rows, increments, readings), for a `reason` in words.
 
-    `first` locates the first of them: its row, its time.
+    `first` locates the first one: its row, its time.
     """
 
     what: str

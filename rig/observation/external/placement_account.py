@@ -1,4 +1,4 @@
-"""The rows of a reference and the readings in them that are not a placement: counted, with reason, row and time."""
+"""The rows of a reference, and the readings in them, that are not a placement: count, reason, first row and time."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -29,10 +29,9 @@ class AttitudeRows:
 
 @dataclass(frozen=True, slots=True)
 class Account:
-    """The placements among `rows` (N,) of a reference, for readings at `time_s` (n,): the `rest` of each, or −1.
+    """The placements among `rows` (N,) of a reference, for readings at `time_s` (n,): each row's `rest`, or −1.
 
-    `cuts` (N,) are the samples of each row that are at rest. `dwells` (N,) marks the rows so long that they declare the
-    body to be at rest; in the other rows it may move.
+    `cuts` (N,) are each row's samples at rest. `dwells` (N,) marks the rows that are so long that they declare a rest.
     """
 
     time_s: Array
@@ -44,7 +43,7 @@ class Account:
     def check_mostly_at_rest(self) -> None:
         """Raise Fault `not_at_rest` if the body moves in all rows, or in more than half of the dwells.
 
-        Raise `lost_samples` if most of these lack readings, which therefore do not show it.
+        Raise `lost_samples` if most of these lack the readings that would show a rest.
         """
         left_out, windows = int((self.rest[self.dwells] < 0).sum()), self.rows.windows
         if (self.rest >= 0).any() and 2 * left_out <= int(self.dwells.sum()):
@@ -65,7 +64,7 @@ class Account:
         )
 
     def list_omitted(self, knocked: NDArray[np.intp]) -> Iterator[Omitted]:
-        """Yield entries for rows left out, and for readings left out of dwells because of a knock, motion or a gap."""
+        """Yield entries for omitted rows, and for readings omitted from dwells because of a knock, motion or a gap."""
         yield from self._moving(np.ones_like(self.dwells))
         kept = [self._inside(row) for row in self._kept]
         total = sum(map(len, kept))
@@ -85,7 +84,7 @@ class Account:
         yield from self._missing(kept)
 
     def _missing(self, kept: Sequence[NDArray[np.intp]]) -> Iterator[Omitted]:
-        """Yield an entry for the readings that are missing in dwells with the samples `kept`, if there are any."""
+        """Yield an entry for the readings missing in dwells with the samples `kept`, if any."""
         sampling = find_sampling(self.time_s)
         windows_s = np.array([(samples.start_s, samples.end_s) for samples in self.rows.windows]).reshape(-1, 2)
         expected = np.floor(sampling.count_expected(self.time_s, windows_s[self._kept])).astype(int)
@@ -112,7 +111,7 @@ class Account:
         return [int(row) for row in np.flatnonzero((self.rest >= 0) & self.dwells)]
 
     def _moving(self, rows: NDArray[np.bool_]) -> Iterator[Omitted]:
-        """Yield entries for those of the given rows with a gap or in which the body moves, if there are any."""
+        """Yield entries for the given rows with a gap, and for those in which the body moves, if any."""
         left_out, gaps_s, total = (self.rest < 0) & rows, self._find_gaps_s(rows), int(rows.sum())
         if len(lacking := np.flatnonzero(gaps_s > 0)):
             first = int(lacking[0])
@@ -127,7 +126,7 @@ class Account:
             yield Omitted("rows", len(moving), total, "not_at_rest: the body moves in them", where)
 
     def _find_gaps_s(self, rows: NDArray[np.bool_]) -> Array:
-        """Return the longest gap (N,) between the readings of each of the given rows that is left out; else 0."""
+        """Return the longest gap (N,), s, above a block in each of `rows` without a rest; 0 for other rows."""
         gaps_s = np.zeros(len(rows))
         for row in np.flatnonzero((self.rest < 0) & rows).tolist():
             longest_s = float(np.diff(self.time_s[self._inside(row)]).max(initial=0.0))
@@ -140,7 +139,7 @@ class Account:
     def _find_moved(self, row: int) -> NDArray[np.intp]:
         """Return the samples of a dwell in which the body moves.
 
-        The ends of a rest are uncertain by a block, those of the dwell and those at a gap.
+        The ends of a rest are uncertain by a block, also at the ends of the dwell and at a gap.
         """
         window, samples = self.rows.windows[row], self._inside(row)
         gaps = np.flatnonzero(np.diff(self.time_s[samples]) > BLOCK_S)

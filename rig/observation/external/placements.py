@@ -1,10 +1,9 @@
-"""Sensor readings in the attitudes in which a body was laid down: only rests show gravity, or a field.
+"""Sensor readings in the attitudes in which a body was laid down; only rests show gravity, or a field.
 
-A placement is a rest of the recording (`rig.observation.by_hand.rests`) and the rows of a reference within it.
-Consecutive rows without a movement in between are one placement. Rests without a row of the reference still show the
-size of the quantity.
+A placement is a rest of the recording (`rig.observation.by_hand.rests`) with the rows of a reference in it. Consecutive
+rows without a movement in between are one placement. Rests without a row still show the quantity's norm.
 
-A knock, or a gap, costs only the readings during it: if the readings before and after are equal, the body lay still.
+Only the readings during a knock or a gap are lost: if those before and after are equal, the body lay still.
 """
 
 from collections.abc import Mapping, Sequence
@@ -34,7 +33,7 @@ MOSTLY = 0.5  # fraction of a dwell: if the body lies still for longer, only the
 
 @dataclass(frozen=True, slots=True)
 class Rested:
-    """Averages in N rests: `means` (N, 3) of every quantity, their `variances` (N, 3), the `dof` (N, 3) of these.
+    """Averages in N rests: `means` (N, 3) of every quantity, their `variances` (N, 3), and the variances' `dof` (N, 3).
 
     `windows` reach from the first to the last of the `samples` (N,) of each rest.
     """
@@ -56,8 +55,8 @@ class Rested:
 class Placements:
     """N placements: the averages `read`, `attitudes` (N, 3, 3), body to table, and `attitude_std_rad` (N,) as stated.
 
-    `unplaced` are rests without an attitude; `left_out` is the number of rows without a placement, in which the body
-    moved. `omitted` lists what else is left out.
+    `unplaced` are rests without an attitude; `left_out` is the number of rows in which the body moved; `omitted` lists
+    everything else that is left out.
     """
 
     read: Rested
@@ -70,7 +69,7 @@ class Placements:
 
 @dataclass(frozen=True, slots=True)
 class _PlacedRest:
-    """A rest in `windows` between knocks, and the indices of its `samples`."""
+    """The rest of this `number`: its `windows` between knocks, and the indices of its `samples`."""
 
     number: int
     windows: tuple[Window, ...]
@@ -128,7 +127,7 @@ def _closed_slice(time_s: Array, window: Window) -> NDArray[np.intp]:
 
 
 def _join_rests(time_s: Array, readings: Mapping[Quantity, Array], rests: Sequence[Window]) -> list[tuple[Window, ...]]:
-    """Return rests joined across knocks: readings are equal before and after, and the body has not turned between."""
+    """Return rests joined across knocks if readings are equal before and after, and the body has not turned between."""
     joined: list[tuple[Window, ...]] = []
     for rest in rests:
         if joined and _same_rest(time_s, readings, joined[-1][-1], rest):
@@ -141,7 +140,7 @@ def _join_rests(time_s: Array, readings: Mapping[Quantity, Array], rests: Sequen
 def _same_rest(time_s: Array, readings: Mapping[Quantity, Array], before: Window, after: Window) -> bool:
     """Return whether the body lay still between two rests.
 
-    In a gap of a gyroscope's readings it may have turned; then the other quantities must show that it lies as before.
+    In a gap of a gyroscope's readings the body may have turned; then the other quantities must show that it has not.
     """
     between = _closed_slice(time_s, Window(before.end_s, after.start_s))
     gap_s = float(np.diff(time_s[between]).max())
@@ -162,7 +161,7 @@ def _same_rest(time_s: Array, readings: Mapping[Quantity, Array], before: Window
 
 
 def _reads_alike(read: Array, quantity: Quantity, before: NDArray[np.intp], after: NDArray[np.intp]) -> bool:
-    """Return whether two parts of readings (n, 3) of a body at rest have one mean, as well as their noise shows."""
+    """Return whether two parts of readings (n, 3) at rest have the same mean within their noise."""
     one, other = read[before], read[after]
     noise = np.maximum(np.minimum(one.std(axis=0), other.std(axis=0)), COUNTS * quantity.steady)
     tolerance = quantity.steady + BEYOND * noise * np.sqrt(1 / len(one) + 1 / len(other))
@@ -197,7 +196,7 @@ def _find_rest(time_s: Array, window: Window, rests: Sequence[_PlacedRest]) -> t
 def _mask_inner(rest: NDArray[np.intp], windows_s: Array, starts_s: Array, ends_s: Array) -> NDArray[np.bool_]:
     """Return a mask of the rows (N,) at rest far enough from the ends of their rest; all rows of a rest if none is.
 
-    A late reference shows the body in motion when it already lies still.
+    A late reference shows motion while the body already lies still.
     """
     at_rest = np.flatnonzero(rest >= 0)
     middles_s, number = windows_s[at_rest].mean(axis=1), rest[at_rest]
@@ -229,7 +228,7 @@ def _angle_between_rad(one: Array, other: Array) -> float:
 def _read(
     time_s: Array, readings: Mapping[Quantity, Array], cuts: Sequence[NDArray[np.intp]]
 ) -> tuple[Rested, NDArray[np.intp]]:
-    """Return the means of the rests, and the knocked samples. Rests with few samples get the noise of the others."""
+    """Return the means of the rests, and the samples of knocks. Rests with few samples get the others' noise."""
     means = {}
     variances = {}
     dof = {}

@@ -1,9 +1,9 @@
-"""The offset of a reference's clock relative to that of the readings, from the rotation that both show.
+"""The offset of a reference's clock relative to the readings' clock, from the rotation that both show.
 
 The rates of densely written, evenly stamped rows determine offset and drift to a fraction of a millisecond
-(`rig.observation.timebase`). Reports that come slowly, or are stamped on arrival, have no such rates: a drift that is
-fitted to them would be caused by time-stamp errors. Their offset, without drift, minimises the absolute deviations
-between the rotations from row to row (`robust_start`).
+(`rig.observation.timebase`). Rows that come slowly, or are stamped on arrival, have no such rates, and a fitted drift
+would be a time-stamp error. Their offset, without drift, minimises the absolute deviations between the rotations from
+row to row (`robust_start`).
 """
 
 from dataclasses import replace
@@ -55,9 +55,9 @@ def _estimate_clock(turning: Turning, rates_rad_s: Array | None) -> TimeBase:
 
 
 def check_one_clock(turning: Turning, rates_rad_s: Array | None) -> None:
-    """Raise Fault `clocks_apart` if the rotation shows that the clock of the rows runs at another rate.
+    """Raise Fault `clocks_apart` if the rotation shows that the rows' clock runs at another rate than the readings'.
 
-    A gap of the readings may be a step of a clock, which looks like another rate.
+    A gap of the readings may also be a step of a clock, which looks like another rate.
     """
     drift = 0.0
     for find in (_estimate_clock, find_reference_clock):  # the first is fast, and shows that nothing is wrong
@@ -78,7 +78,7 @@ def check_one_clock(turning: Turning, rates_rad_s: Array | None) -> None:
 
 
 def _find_steady_clock(turning: Turning, motion: TableMotion) -> tuple[TimeBase, float]:
-    """Return the clock without drift, and the fraction (0 to 1) of the rotation that it leaves unexplained."""
+    """Return the clock without drift, and the fraction (0 to 1) of the rotation that remains unexplained."""
     time_s = turning.time_s
     explained, offset_s = estimate_coarse_offset(time_s, turning.readings_rad_s, motion)
     unexplained, bias_rad_s = 1.0, np.zeros(3)

@@ -1,7 +1,7 @@
 """A gyroscope's readings with the rows of a reference, and the rests among the rows.
 
 Rows that follow each other densely while the body lies still are combined in one long row, valid from the beginning of
-the rest to its end. The readings and the rows must both show the rest.
+the rest to its end. Both the readings and the rows must show the rest.
 """
 
 from dataclasses import dataclass, replace
@@ -95,7 +95,7 @@ def _find_dense_rests(turning: Turning, clock_s: float) -> list[tuple[float, flo
 def _find_rate_rad_s(attitudes: Array, times_s: Array) -> float:
     """Return the size of the body's mean rate over attitudes (k, 3, 3) at times (k,).
 
-    It comes from the rotation between the mean attitudes of the first and the second half.
+    It is that between the mean attitudes of the first and the second half.
     """
     half = len(times_s) // 2
     if not half:
@@ -106,7 +106,7 @@ def _find_rate_rad_s(attitudes: Array, times_s: Array) -> float:
 
 
 def _find_still(turning: Turning, clock_s: float) -> NDArray[np.bool_]:
-    """Return the rows (N,) in which the body lay still: long rows with equal means and with nothing but noise."""
+    """Return a mask (N,) of rows in which the body lay still: long rows with equal means and only noise."""
     rows_s = turning.rows_s
     start, end = np.searchsorted(turning.time_s, rows_s.T + clock_s)
     still: NDArray[np.bool_] = (rows_s[:, 1] - rows_s[:, 0] >= STILL_S) & (end - start >= STILL_SAMPLES)

@@ -1,10 +1,10 @@
-"""A robust start for a gyroscope's F, bias and clock: its readings against a reference's rotations from row to row.
+"""Robust initial values of a gyroscope's F, bias and clock, from a reference's rotations from row to row.
 
     ∫ m dt = F φ + b Δt        from t₁ + τ to t₂ + τ, φ the rotation vector from the row at t₁ to the row at t₂
 
 holds to second order for any φ below π, however far apart the rows are. The fit minimises the sum of the residuals'
 lengths (least absolute deviations by reweighting), over a grid of τ. Only pairs between which the body moves determine
-F and τ, so a few bad rows have no effect, nor long rests of the body.
+F and τ, so neither a few bad rows nor long rests have an effect.
 """
 
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ EXPLAINED = 0.5  # least fraction of the readings' variance that F explains
 
 @dataclass(frozen=True, slots=True)
 class RobustStart:
-    """Start values, and the fraction of the readings' rotation that they leave unexplained: 1 if there are none."""
+    """Initial values, and the fraction of the readings' rotation that they do not explain: 1 without any."""
 
     state: DriftState
     unexplained: float
@@ -37,7 +37,7 @@ class RobustStart:
 
 @dataclass(frozen=True, slots=True)
 class _Pairs:
-    """`begin_s` and `end_s` (k,) of pairs of rows, and the rotation vectors (k, 3) between them."""
+    """Pairs of rows: their times `begin_s` and `end_s` (k,), and the rotation vectors (k, 3) between them."""
 
     begin_s: Array
     end_s: Array
@@ -45,7 +45,7 @@ class _Pairs:
 
 
 def find_start(turning: Turning) -> RobustStart:
-    """Return initial values of F, b and τ; if rows do not show them, those of an aligned sensor on the same clock."""
+    """Return initial values of F, b and τ; without suitable rows those of an aligned sensor on the same clock."""
     aligned = RobustStart(DriftState(np.eye(3), np.zeros(3), 0.0), 1.0)
     pairs = _find_pairs(turning)
     if len(pairs.begin_s) < FEWEST:
@@ -92,12 +92,12 @@ def _find_pairs(turning: Turning) -> _Pairs:
 
 
 def _select_evenly(indices: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return at most `PAIRS` indices, evenly spaced among those given."""
+    """Return at most `PAIRS` of the given indices, evenly spaced."""
     return indices if len(indices) <= PAIRS else indices[np.linspace(0, len(indices) - 1, PAIRS).astype(np.intp)]
 
 
 def _fit(design: Array, turned: Array) -> tuple[float, Array]:
-    """Return the fraction of rotations (k, 3) that a fit leaves unexplained, and the fit (4, 3): Fᵀ and b."""
+    """Return the fraction of rotations (k, 3) that a fit does not explain, and the fit (4, 3): Fᵀ and b."""
     aligned = np.concatenate([np.eye(3), np.zeros((1, 3))])
     weight = np.ones(len(design))
     solution = aligned

@@ -1,4 +1,4 @@
-"""The rests of a body by a reference's attitudes: long rows, and rows that follow each other without a turn."""
+"""The rests of a body by a reference's attitudes: long rows, and consecutive rows without a rotation."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""The motion of a table, from a file of attitudes, by which the clock of a recording is found."""
+"""The motion of a table from a file of attitudes, to find the clock of a recording."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,7 @@ UNEVEN, EVEN_S = 0.2, 0.05
 
 
 class TableMotion:
-    """A `KnownMotion` from rows that follow each other closely, each of which refers to its middle.
+    """A `KnownMotion` from rows that follow each other closely; a row holds for its middle.
 
     `middles_s` (n,) in any order, on the table's clock; `attitudes` (n, 3, 3) transform body to table coordinates;
     `rates_rad_s` (n, 3) in body coordinates, None if only the attitudes are known. Raise Fault `time_base_not_found`.
@@ -61,10 +61,10 @@ class TableMotion:
 
 
 def check_rates_agree(middles_s: Array, attitudes: Array, rates_rad_s: Array) -> None:
-    """Raise Fault `wrong_unit` if a table's rates (N, 3) are some times what its attitudes (N, 3, 3) turn.
+    """Raise Fault `wrong_unit` if a table's rates (N, 3) differ by a factor from those of its attitudes (N, 3, 3).
 
-    Each row holds at its middle (N,). A solution by rates alone would not show that they are in another unit, if the
-    readings are in the same.
+    Rows hold for their middles (N,). If the readings have the same wrong unit, a solution by rates alone does not show
+    it.
     """
     order = np.argsort(middles_s)
     time_s, rates = middles_s[order], rates_rad_s[order]
@@ -89,7 +89,7 @@ def check_rates_agree(middles_s: Array, attitudes: Array, rates_rad_s: Array) ->
 
 
 def _thin(time_s: Array) -> NDArray[np.intp]:
-    """Return rows at rising times (n,), so far apart that errors of their time stamps hardly change a rate."""
+    """Return the indices of rows at rising times (n,) far enough apart that time-stamp errors hardly change a rate."""
     steps_s = np.diff(time_s)
     median_s = float(np.median(steps_s)) if len(steps_s) else 0.0
     if median_s >= EVEN_S or not len(steps_s) or np.abs(steps_s - median_s).mean() <= UNEVEN * median_s:

@@ -1,6 +1,6 @@
 """Turns from rest to rest among the rows of a table of sweeps; the other rows are sweeps at a constant speed.
 
-A turn is solved by the angle that the gyroscope measured, at any speed; a sweep by its mean.
+A turn is solved by the angle that the gyroscope measured, at any speed; a sweep by its mean rate.
 """
 
 from collections.abc import Iterator, Sequence
@@ -32,10 +32,12 @@ BY_HAND_AXIS_RAD = 0.02  # default tilt during the turn
 
 @dataclass(frozen=True, slots=True)
 class TurnedData:
-    """The input of a solution by increments: the gyroscope, the turns, the numbers of their rows, and the means.
+    """The input of a solution by increments.
 
-    `noise_dof`, `bias_dof`: degrees of freedom of its noise, and of its bias' change between `rests`, which are stated
-    or found. `hiding`: numbers of rows that are left out, for missing readings may hide a part of the turn.
+    - `gyroscope`: its readings; `turns`: from rest to rest, with the numbers `rows` in the file; `means`: of the
+      sweeps.
+    - `noise_dof`, `bias_dof`: degrees of freedom of its noise, and of its bias' change between `rests`.
+    - `hiding`: numbers of omitted rows, in which missing readings may hide a part of the turn.
     """
 
     gyroscope: Gyroscope
@@ -113,7 +115,7 @@ def find_turns(
 def _find_other_bias(
     time_s: Array, rates: Array, pauses: Sequence[Window], lying: Sequence[Window]
 ) -> Iterator[Window]:
-    """Yield the pauses with a quiet reading that may be another bias, by rates (n, 3) less the usual bias."""
+    """Yield the pauses with a quiet reading that may be another bias, by rates (n, 3) minus the usual bias."""
     middles = [
         Window(pause.start_s + (pause.end_s - pause.start_s) / 4, pause.end_s - (pause.end_s - pause.start_s) / 4)
         for pause in pauses
@@ -124,7 +126,7 @@ def _find_other_bias(
 
 
 def _find_others(lying: Sequence[Window], rests: Sequence[Average]) -> list[Window]:
-    """Return the rests that were found and do not overlap a stated one."""
+    """Return the found rests that do not overlap a stated one."""
     return [
         window
         for window in lying
@@ -133,7 +135,7 @@ def _find_others(lying: Sequence[Window], rests: Sequence[Average]) -> list[Wind
 
 
 def _find_pauses(time_s: Array, sweeps: Sequence[Observation]) -> list[Window]:
-    """Return the intervals between sweeps, the only ones in which the body is declared to lie still."""
+    """Return the intervals between sweeps, the only ones in which the body is assumed to lie still."""
     intervals = sorted((sweep.average.start_s, sweep.average.end_s) for sweep in sweeps)
     starts = [float(time_s[0]), *(end_s for _, end_s in intervals)]
     ends = [*(start_s for start_s, _ in intervals), float(time_s[-1])]
@@ -151,7 +153,7 @@ def _enclosing_window(sweep: Observation, lying: Sequence[Window]) -> Window | N
 
 
 def _starts_and_stops(time_s: Array, rates: Array, sweep: Observation) -> bool:
-    """Return whether a sweep hardly turns at either end; if not, it was cut out of a longer turn."""
+    """Return whether a sweep hardly turns at either end; otherwise it was cut out of a longer turn."""
     for at_s in (sweep.average.start_s, sweep.average.end_s):
         index = int(np.searchsorted(time_s, at_s))
         around = rates[max(index - EDGE_SAMPLES, 0) : index + EDGE_SAMPLES]

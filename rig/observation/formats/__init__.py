@@ -1,1 +1,1 @@
-"""File formats of others, read into columns of numbers: CSV, ROS 2 bags, PX4's logs."""
+"""File formats of other programs, read into columns of numbers: CSV, MATLAB, ROS bags, PX4's logs."""

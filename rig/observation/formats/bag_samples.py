@@ -1,8 +1,8 @@
 """Readings and attitudes from a bag of ROS 2 or ROS 1, without ROS: `sensor_msgs/Imu` and `MagneticField`, and poses.
 
-A reading has the time in its message's header, so readings and poses are on the clock that stamped them. A pose
-(`geometry_msgs/PoseStamped` or `TransformStamped`) is the body's in the room. The reader runs in a process of its own
-(`rig.observation.formats.sample_files`) and holds one block of the bag at a time.
+Times are those in the messages' headers. A pose (`geometry_msgs/PoseStamped` or `TransformStamped`) is the body's in
+the room. The reader runs in a process of its own (`rig.observation.formats.sample_files`) and holds one block of the
+bag at a time.
 """
 
 from collections.abc import Iterator, Sequence
@@ -54,7 +54,7 @@ def bag_readings(path: Path, inside: str | None) -> Iterator[Part]:
     """Yield, in blocks, the readings of the topic `inside` a bag, or of its only topic of type Imu.
 
     The columns are those of a CSV file, times count from the beginning of the bag, and rows have the order of the bag.
-    Messages without a rate are left out and counted. If any other message lacks an acceleration, all accelerations are
+    Messages without a rate are left out and counted. If another message lacks an acceleration, all accelerations are
     left out. Raise Refused `missing_extra` or `bag_topic`, and any error of the parser for a damaged bag.
     """
     with _open_bag(path) as reader:
@@ -81,8 +81,8 @@ def _inertial(
 ) -> Iterator[tuple[float, ...]]:
     """Yield the time, rate and acceleration of `sensor_msgs/Imu`; absent columns are set to None.
 
-    Messages without a rate are buffered until a message with a rate comes; they are then left out and counted in
-    `counts`. Raise Refused `bag_topic` if no message holds a rate or an acceleration.
+    Messages without a rate are left out and counted in `counts`. Raise Refused `bag_topic` if no message holds a rate
+    or an acceleration.
     """
     forces: list[tuple[float, ...]] = []
     has_rates, all_forces = False, True
@@ -155,7 +155,7 @@ def _select_topic(reader: Any, types: Sequence[str], topic: str | None, what: st
 
 
 def _list_topics(reader: Any, types: Sequence[str]) -> list[tuple[str, str]]:
-    """Return the topics and their types, those with messages of the requested types first."""
+    """Return the topics and their types, first the topics of the requested types."""
     topics = {(connection.topic, connection.msgtype) for connection in reader.connections}
     return sorted(topics, key=lambda topic: (topic[1] not in types, topic))
 
@@ -163,7 +163,7 @@ def _list_topics(reader: Any, types: Sequence[str]) -> list[tuple[str, str]]:
 def _read_messages(reader: Any, connections: Any) -> Iterator[tuple[float, Any]]:
     """Yield each message with the time in its header, in seconds from the beginning of the bag.
 
-    A float of the seconds since 1970 would lose the microseconds. All topics share one beginning.
+    All topics share one beginning. A float of the seconds since 1970 would lose the microseconds.
     """
     from rosbags.typesys import Stores, get_typestore
 
@@ -186,7 +186,7 @@ def _read_messages(reader: Any, connections: Any) -> Iterator[tuple[float, Any]]
 def _check_layout(store: Any, connections: Any) -> None:
     """Raise ValueError if the messages' own definition differs from ROS's.
 
-    It is only compared, because rosbags would generate code from it and execute it.
+    The definition is only compared, because rosbags would generate code from it and execute it.
     """
     from rosbags.interfaces import MessageDefinitionFormat
     from rosbags.typesys import get_types_from_idl, get_types_from_msg

@@ -1,4 +1,4 @@
-"""The required columns in a file of another program: by its heading, or by the map that `--columns` names."""
+"""The required columns in a file of another program, by its heading or by the map that `--columns` names."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -79,7 +79,7 @@ def _build_map(
 
 
 def unwrap_times(columns: Mapping[str, Array], mapped: Mapped | None, *, by_day: bool) -> dict[str, Array]:
-    """Return the columns with continuous times, although a counter, or a time of day `by_day`, restarts at 0."""
+    """Return the columns with continuous times: without a counter's restarts at 0, or with `by_day` at midnight."""
     unwrapped = dict(columns)
     for name in TIMES:
         period_s: float | None = DAY_S if by_day else None
@@ -119,7 +119,7 @@ def _select_mapped(path: Path, headings: Sequence[str], width: int, header: Head
 
 
 def _find_column(path: Path, headings: Sequence[str], width: int, name: str, column: str) -> int:
-    """Return the index of a column that is named by the heading, or by its number from 1."""
+    """Return the index of a column that the map names by its heading, or by its number from 1."""
     named = [index for index, heading in enumerate(headings) if heading == column]
     named = named or [index for index, heading in enumerate(headings) if heading.strip() == column.strip(" #%")]
     if not named and column.isdecimal():
@@ -172,7 +172,7 @@ def _check_columns(path: Path, names: Sequence[str], header: Header) -> None:
 
 
 def _check_unit(path: Path, name: str, names: Sequence[str], header: Header) -> None:
-    """Raise Refused `wrong_unit` for a name that is unknown but has the quantity of a missing column."""
+    """Raise Refused `wrong_unit` for an unknown name with the quantity of a missing column."""
     own_names = header.names
     if name in own_names or "_" not in name or name.startswith("axis"):
         return
@@ -194,7 +194,7 @@ def _list_missing(names: Sequence[str], header: Header) -> list[str]:
 
 
 def _find_unexpected(names: Sequence[str], header: Header) -> Iterator[str]:
-    """Yield the faults of a file's column names, except missing ones."""
+    """Yield the faults of a file's column names, except missing columns."""
     own_names = header.names
     yield from (f"names {name} twice" for name in own_names if names.count(name) > 1)
     present = [name for name in names if name in header.one_of]

@@ -42,7 +42,7 @@ def is_time_of_day(cell: str) -> bool:
 def seconds_of(cell: str, factor: float) -> Decimal:
     """Return the time, s, in a cell: a number in units of `factor` s, or a text, counted from 1970 or midnight.
 
-    Raise ValueError or ArithmeticError if it is neither, or if a text has a unit.
+    Raise ValueError or ArithmeticError for another cell, or a text with a unit.
     """
     match = TIME_OF_DAY.fullmatch(cell.strip())
     if match is None:
@@ -61,7 +61,7 @@ def seconds_of(cell: str, factor: float) -> Decimal:
 
 
 def origin_of(times_s: Iterable[float]) -> int:
-    """Return the origin of times, in whole seconds, from the first time; 0 for a clock that starts at its own zero."""
+    """Return the origin of times, in whole seconds, from the first time; 0 for a clock that starts near 0."""
     first_s = next(iter(times_s), 0.0)
     return int(first_s) if abs(first_s) >= LONG_AGO_S else 0
 
@@ -85,7 +85,7 @@ def unit_of(cell: str) -> Unit | None:
 
 
 def strip_blank_end(headings: Sequence[str]) -> list[str]:
-    """Return headings without the blank ones at the end, which loggers write that end every line by a separator."""
+    """Return headings without blank ones at the end: some loggers end every line by a separator."""
     count = max((index for index, name in enumerate(headings, start=1) if name), default=0)
     return [*headings[:count]]
 

@@ -1,4 +1,4 @@
-"""Columns of numbers from another program's CSV file: within bounds, or refused by name."""
+"""Columns of numbers from another program's CSV file, of limited size."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -73,12 +73,12 @@ def read_table(
 ) -> CsvTable:
     """Return the columns of a file by the names in its header; each group of optional columns is complete or absent.
 
-    The first row holds the names. If its separators are semicolons, as in spreadsheets with a decimal comma, or tabs,
-    so are those of all rows. Empty rows, rows of units below the heading, and repetitions of the heading are skipped.
-    Of a `mapped` file, only columns named in the map, or by the rig's names, are returned. A file packed by gzip is
-    unpacked. Times count from `origin_s`; with None, the first time determines it. A packed or long file is read in a
-    process of its own, as it might exhaust the memory. Raise Refused `no_file`, `file_too_costly`,
-    `temporary_folder_full`, `wrong_columns`, `wrong_unit`, `not_a_number`.
+    The first row holds the names. Its separators, commas, tabs, or semicolons as in spreadsheets with a decimal comma,
+    are those of all rows. Empty rows, rows of units below the heading, and repetitions of the heading are skipped. Of a
+    `mapped` file, only columns in the map, or with the rig's names, are returned. A file packed by gzip is unpacked.
+    Times count from `origin_s`, by default determined by the first time. A packed or long file is read in a process of
+    its own, because it might exhaust the memory. Raise Refused `no_file`, `file_too_costly`, `temporary_folder_full`,
+    `wrong_columns`, `wrong_unit`, `not_a_number`.
     """
     rate_hz = None if mapped is None else mapped.rate_hz
     if rate_hz is not None:
@@ -110,8 +110,8 @@ def csv_parts(
 ) -> Iterator[Part]:
     """Yield the parts that `read_table` reads; `names` are fields of a header, `mapped` fields of a column map.
 
-    The rows come in blocks, with each row's line number as an additional column. Last come `origin_s`, and whether
-    times are times of day.
+    The rows come in blocks, with the line number as an additional column, and last `origin_s`, and whether times are
+    times of day.
     """
     return _parts(path, Header(*names), largest_mb, None if mapped is None else Mapped(**mapped), origin_s)
 
@@ -170,7 +170,7 @@ def _parts(path: Path, header: Header, largest_mb: int, mapped: Mapped | None, o
 class _Wanted:
     """The columns to read from a file: their `names` by index, out of `width`, and their `factors` to SI.
 
-    A cell with a text of `missing` is blank. `in_any_unit`: the units that a row states do not matter.
+    A cell with a text of `missing` is blank. `in_any_unit`: units that a row states are ignored.
     """
 
     path: Path
@@ -234,7 +234,7 @@ class _Wanted:
             return 0
 
     def numbers(self, line: int, cells: Sequence[str], origin_s: int) -> list[float]:
-        """Return a row's numbers in SI units, NaN for a blank cell. Raise Refused `not_a_number`."""
+        """Return a row's numbers in SI units, with NaN for a blank cell. Raise Refused `not_a_number`."""
         try:
             numbers = [
                 since(cell, factor, origin_s)

@@ -1,4 +1,4 @@
-"""The rows of cells in another program's text file: packed or not, in any encoding, within bounds."""
+"""The rows of cells in another program's text file, packed or not, in any encoding, of limited size."""
 
 import codecs
 import csv
@@ -47,7 +47,7 @@ def is_divided_by_spaces(line: str) -> bool:
 
 
 def is_harmless(path: Path, largest_mb: int) -> bool:
-    """Return whether a file is short and not packed, so that it cannot grow in memory.
+    """Return whether a file is short and not packed.
 
     Raise Refused `no_file`, also if it is too large.
     """
@@ -57,7 +57,7 @@ def is_harmless(path: Path, largest_mb: int) -> bool:
 
 @contextmanager
 def _raise_no_file(path: Path) -> Iterator[None]:
-    """Raise Refused `no_file` for a file that cannot be read, for any error of its reader."""
+    """Raise Refused `no_file` for any error of the block, which reads a file."""
     try:
         yield
     except (UnfitFile, OSError, EOFError, zlib.error, ValueError, csv.Error) as error:
@@ -67,8 +67,8 @@ def _raise_no_file(path: Path) -> Iterator[None]:
 def _text(file: BinaryIO | GzipFile) -> TextIOWrapper:
     """Return a file's text, unpacked, in the encoding that its beginning shows.
 
-    Raise UnfitFile if it is not text. If it is not UTF-8, headings such as "°/s" and "µT" are mostly in the Windows
-    encoding. Damaged characters further on are replaced; the row that contains them is refused by its line number.
+    Raise UnfitFile if it is not text. A text that is not UTF-8 is taken for the Windows encoding. Later damaged
+    characters are replaced; the row that contains them is refused by its line number.
     """
     if _read_beginning(file).startswith(GZIP):
         file = GzipFile(fileobj=file)
@@ -91,7 +91,7 @@ def _read_beginning(file: BinaryIO | GzipFile) -> bytes:
 
 
 def _lines(text: TextIOWrapper, most: int) -> Iterator[str]:
-    """Yield the lines. Limit each line and their sum, since a packed file may hold a thousand times its size."""
+    """Yield the lines, of limited length and sum: a packed file may hold a thousand times its size."""
     while line := text.readline(LONGEST_LINE):
         most -= len(line)
         if len(line) == LONGEST_LINE:

@@ -27,15 +27,15 @@ OBJECT = ("s0", "s1", "s2", "arr")  # fields by which SciPy represents a MATLAB 
 
 
 def is_mat(path: Path) -> bool:
-    """Return whether a path names a MATLAB file, by its suffix."""
+    """Return whether a path has the suffix of MATLAB files."""
     return path.suffix.lower() == SUFFIX
 
 
 def read_mat_rows(path: Path, header: Header, mapped: Mapped | None) -> Iterator[list[str]]:
     """Yield the names of all columns of a file, then its rows, in which cells of unneeded columns are blank.
 
-    The columns of the map, and those with the rig's own names, are needed. Raise Refused `wrong_columns` if they differ
-    in length, and any error of the parser for a damaged file.
+    Columns in the map, or with the rig's names, are needed. Raise Refused `wrong_columns` if they differ in length, and
+    any error of the parser for a damaged file.
     """
     columns = read_mat_columns(path)
     names = [*columns]

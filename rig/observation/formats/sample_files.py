@@ -1,6 +1,6 @@
-"""Files of readings and attitudes that are not tables, each with its reader, recognized by name or content.
+"""Files of readings and attitudes that are not tables: their readers, by name or content of the file.
 
-A path may select a part of the file behind two colons: `session::/imu/data` is a topic of a bag, `flight.ulg::1` an
+A path may select a part of the file after two colons: `session::/imu/data` is a topic of a bag, `flight.ulg::1` an
 instance in PX4's log.
 """
 
@@ -26,11 +26,11 @@ LONGEST_MOMENT_S = 0.4  # a row of attitudes with a longer duration declares a r
 
 @dataclass(frozen=True, slots=True)
 class Format:
-    """A kind of file, its `name` in messages, and its readers, which run in a process of their own.
+    """A kind of file: its `name` in messages, and its readers, which run in a process of their own.
 
     `readings` and `attitudes` are readers ("module:function", as in `rig.data.processes.reading_process`), None if a
-    file cannot hold them. They take the path that `reads` returns for the user's, and the part `inside`, and yield
-    columns `read_blocks` (`rig.observation.formats.table_parts`), with the names of a CSV file; attitudes are times and
+    file cannot hold them. They take the path that `reads` returns for the user's path, and the part `inside`, and yield
+    columns by `rig.observation.formats.table_parts.read_blocks`, named as in a CSV file; attitudes are times and
     quaternions. `remedy` is for a file that cannot be read.
     """
 
@@ -61,15 +61,15 @@ def is_in_format(path: Path) -> bool:
 
 
 def whole(path: Path) -> Path:
-    """Return the file or folder itself, without the part inside that a path may select."""
+    """Return the path of the file or folder, without the part inside that it may select."""
     return Path(str(path).partition(INSIDE)[0])
 
 
 @dataclass(frozen=True, slots=True)
 class FormatColumns:
-    """The `columns` (n,) of a file, ordered by time, the number of `others`: rows without any, and the reader's `note`.
+    """The `columns` (n,) of a file, ordered by time; `others`: the number of rows without any.
 
-    The note states what the readings lack, "" if nothing.
+    The reader's `note` states what the readings lack, "" if nothing.
     """
 
     columns: Columns
@@ -87,7 +87,7 @@ def readings_in(path: Path) -> FormatColumns | None:
 
 
 def attitudes_in(path: Path) -> Columns | None:
-    """Return the attitudes in a file, each with a short interval about its time; None for a table.
+    """Return the attitudes in a file, each with a short interval about its time; None for a text table.
 
     The file has a format of `FORMATS`; the intervals are those of `rows_around`. Raise Refused `no_attitudes` if the
     file holds none, and as `readings_in` does.
@@ -109,8 +109,8 @@ def attitudes_in(path: Path) -> Columns | None:
 def rows_around(time_s: Array, path: Path) -> dict[str, Array]:
     """Return intervals, `start_s` and `end_s` (n,), about the times of attitudes.
 
-    The times may be in any order. An interval reaches at most half-way to its neighbours and is too short to count as a
-    rest; it is empty if an earlier row has the same time. Raise Refused `no_attitudes` for a single attitude.
+    The times may be in any order. An interval reaches at most half-way to its neighbours, is too short for a rest, and
+    is empty if an earlier row has the same time. Raise Refused `no_attitudes` for a single attitude.
     """
     rising_s, first = np.unique(time_s, return_index=True)
     if len(rising_s) < 2:

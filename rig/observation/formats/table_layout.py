@@ -39,9 +39,9 @@ class TableLayout:
     - skip_lines: lines before the heading.
     - headings: the names of the columns, "" without one; units: as stated by the heading or the row below it, or "".
     - numbers: the indices of the columns of numbers; texts: of the others that are not blank.
-    - time: the index of the column of time, or None; time_unit: of its numbers, None if it is a text.
+    - time: the index of the column of time, or None; time_unit: of its numbers, None for texts.
     - missing: the texts that stand for missing values.
-    - rows: their number.
+    - rows: the number of rows.
     """
 
     skip_lines: int
@@ -82,7 +82,7 @@ def find_layout(path: Path, largest_mb: int) -> TableLayout:
 
 
 def layout_parts(path: Path, largest_mb: int) -> Iterator[Part]:
-    """Yield the layout of a file as one part. Raise Refused `wrong_columns` if no rows of numbers are in it."""
+    """Yield the layout of a file as one part. Raise Refused `wrong_columns` if the file has no rows of numbers."""
     if is_mat(path):
         columns = read_mat_columns(path)
         rows = max(map(len, columns.values()))
@@ -174,7 +174,7 @@ def _strip_columns(cells: Sequence[Sequence[str]], missing: Sequence[str]) -> li
 
 
 def _select_indices(columns: Sequence[Sequence[str]], accept: Callable[[str], bool]) -> list[int]:
-    """Return the indices of the columns that have cells, all of which satisfy the condition."""
+    """Return the indices of the columns that have cells and whose cells all satisfy the condition."""
     return [index for index, column in enumerate(columns) if column and all(map(accept, column))]
 
 
@@ -195,9 +195,9 @@ def _largest_number(column: Sequence[str]) -> float:
 def _find_time(
     headings: Sequence[str], units: Sequence[str], columns: Sequence[Sequence[str]], times: Sequence[int]
 ) -> int | None:
-    """Return the index of the time column: by its name or unit, or else the first that increases.
+    """Return the index of the time column: by its name or unit, or else the first column that increases, or None.
 
-    A column with such a name counts only if its values rise.
+    A column with a time's name counts only if its values rise.
     """
     rising = [index for index in times if _rises(columns[index])]
     for index in rising:
@@ -225,7 +225,7 @@ def _increases_by_one(column: Sequence[str]) -> bool:
 
 
 def _time_unit(heading: str, unit: str, column: Sequence[str]) -> str:
-    """Return the time unit in the heading, or one for which the numbers are dates or the sample rate is likely."""
+    """Return the time unit in the heading, or the unit for which numbers are dates or the sample rate is likely."""
     if unit in ALLOWED and UNITS[unit].quantity == TIME:
         return unit
     name = heading.lower()

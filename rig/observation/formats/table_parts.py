@@ -23,10 +23,10 @@ NOTE = "note"  # what the readings lack, in words
 def read_blocks(
     rows: Iterable[Sequence[float]], columns: Sequence[str | None], counts: Mapping[str, Any] | None = None
 ) -> Iterator[Part]:
-    """Yield the rows in blocks (n, columns), then the names of the columns. A row has a number for each column.
+    """Yield rows, with a number for each column, in blocks (n, columns), then the names of the columns.
 
-    The names are read after the last row: by then the reader may have replaced a name by None, which omits the column.
-    `counts` are entries in addition to the names: the number of `LEFT_OUT` rows, and a `NOTE`.
+    The names are read after the last row: until then the reader may replace a name by None, which omits the column.
+    `counts` are further entries: the number of `LEFT_OUT` rows, and a `NOTE`.
     """
     values, width = array("d"), len(columns)
     for row in rows:
@@ -62,7 +62,7 @@ def note_of(parts: Sequence[Part]) -> str:
 def parts_read_apart(reader: str, path: Path, arguments: Mapping[str, Any], *, else_: str, remedy: str) -> list[Part]:
     """Return the parts of a file that a `reader` ("module:function") yields in a process of its own.
 
-    Raise Refused as the reader does, `temporary_folder_full`, and the error that `else_` names, `no_file` or
+    Raise Refused as the reader does, `temporary_folder_full`, and the error named `else_`, `no_file` or
     `file_too_costly`.
     """
     try:

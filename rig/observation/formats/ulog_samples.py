@@ -1,12 +1,11 @@
 """Readings from PX4's log (`.ulg`), by `pyulog`: the sensors' readings before the autopilot corrects them.
 
 `sensor_gyro` and `sensor_accel` of one instance each, in rad/s and m/s²; `timestamp_sample` is the autopilot's time of
-the sample in µs. An accelerometer with other sample times is interpolated to the gyroscope's times. Both usually belong
-to one part, and then their times are equal.
+the sample in µs. An accelerometer with other sample times is interpolated to the gyroscope's times; in one part their
+times are equal.
 
-PX4's default profile logs these once a second or not at all, and `sensor_combined` at 200 Hz or so. Then that message
-is read, with a note about what it lacks. The reader runs in a process of its own
-(`rig.observation.formats.sample_files`).
+PX4's default profile logs these once a second or not at all. Then `sensor_combined`, at about 200 Hz, is read, with a
+note about what it lacks. The reader runs in a process of its own (`rig.observation.formats.sample_files`).
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -63,7 +62,7 @@ def ulog_readings(path: Path, inside: str | None = None) -> Iterator[Part]:
 
 
 def _is_combined(path: Path, topics: Mapping[tuple[str, int], Any], inside: str | None) -> bool:
-    """Return whether to read `sensor_combined`: if it is named, or if the raw topic is rare or missing.
+    """Return whether to read `sensor_combined`, that is if it is named, or the raw topic is rare or missing.
 
     Raise Refused `ulog_topic` if the log does not hold the named topic.
     """

@@ -44,10 +44,10 @@ class ArmMotion:
     """The `KnownMotion` of a chain of k joints: `angles(t)` (n, k) rad of them, `rate(t)` (n, 3) rad/s of the flange.
 
     Rates come from the recorded joint angles, because the controller filters its velocity signal. `states` (m,) are
-    rows of `state_dtype`, for joints of that `kinematics` and those `names`. All vectors in the flange's frame are
-    transformed to the item's by `mount` (3, 3): the identity unless a stage mounts the item differently. If single
-    readings of an angle scatter (`reading_std_rad`), angles and rates are fitted over a window, and a turn ends at the
-    same reading one turn later. Raise Fault `no_motion`, `not_finite`, `impossible_times`, `arm_clock_stepped`.
+    rows of `state_dtype`; `kinematics` and `names` are those of the joints. `mount` (3, 3) transforms all vectors in
+    the flange's frame to the item's: the identity unless a stage mounts the item differently. If single readings of an
+    angle scatter (`reading_std_rad`), angles and rates are fitted over a window, and a turn ends where the reading
+    recurs. Raise Fault `no_motion`, `not_finite`, `impossible_times`, `arm_clock_stepped`.
     """
 
     def __init__(
@@ -113,18 +113,18 @@ class ArmMotion:
         return errors
 
     def covered(self, time_s: Array) -> NDArray[np.bool_]:
-        """Return which times (n,) lie between states that are close enough together for `rate` to be valid."""
+        """Return a mask of the times (n,) between states that are close enough together for `rate` to be valid."""
         return closely_followed(self.time_s, self._covered, time_s)
 
     @property
     def has_accurate_angles(self) -> bool:
-        """Whether single angles are accurate, and not only differences between equal readings a turn apart."""
+        """Whether single angles are accurate, not only the difference between equal readings a turn apart."""
         return not self._scatters
 
     def travel_rad(self, window: Window) -> float | None:
-        """Return the travel of the joint that moved most in a window; None if it contains fewer than two states.
+        """Return the travel, rad, of the joint that moved most in a window; None for fewer than two states.
 
-        The oscillation of an arm at rest is excluded, because angles and means are corrected for it.
+        The oscillation of an arm at rest is excluded, because means are corrected for it.
         """
         q_rad = self._q_rad(window)
         if self._scatters and len(q_rad) >= PARTS:
@@ -137,7 +137,7 @@ class ArmMotion:
         return travel_rad
 
     def swing_rates(self, time_s: Array) -> Array:
-        """Return the `rates_at_samples` (n, 3) at rising times (n,) if the arm oscillates at rest, else zero.
+        """Return the `rates_at_samples` (n, 3) at rising times (n,) if the resting arm oscillates, else zero.
 
         Without an oscillation the encoders show only noise, which is not added as a rate.
         """
@@ -161,8 +161,8 @@ class ArmMotion:
     def mean_rates(self, time_s: Array, lasting_s: float) -> Array:
         """Return the flange's mean rate (n, 3), rad/s, over `lasting_s` around each of the times (n,).
 
-        It is the difference of the joints' angles, so the error of one angle cancels between adjacent rates, and the
-        mean over consecutive samples depends only on the first and the last.
+        Rates are differences of joint angles, so an angle's error cancels between adjacent rates, and the mean over
+        consecutive samples depends only on the first and the last angle.
         """
         travel_rad = self.angles(time_s + lasting_s / 2) - self.angles(time_s - lasting_s / 2)
         rates: Array = flange_rate(self.angles(time_s), travel_rad / lasting_s, self.kinematics) @ self.mount.T
@@ -171,8 +171,8 @@ class ArmMotion:
     def rates_at_samples(self, time_s: Array) -> Array:
         """Return the flange's rate (n, 3), rad/s, around consecutive evenly spaced samples at times (n,).
 
-        It is the mean from half-way to the previous sample to half-way to the next. If samples are far apart, it is the
-        rate at the sample's time.
+        This is the mean between the half-ways to the previous and the next sample; if samples are far apart, the rate
+        at the sample's time.
         """
         return self.rate(time_s) if is_sparse(time_s) else self.mean_rates(time_s, float(np.median(np.diff(time_s))))
 
@@ -227,8 +227,8 @@ def is_sparse(time_s: Array) -> bool:
 def motion_of(run: RunData, correction: Array | None = None) -> ArmMotion:
     """Return the turner's motion in a recording, in the item's frame.
 
-    `correction` (3, 3) is the rotation from the nominal mount. Raise as `turner_of` does; Fault `no_motion`,
-    `not_finite`, `impossible_times`, `arm_clock_stepped`.
+    `correction` (3, 3) is the rotation from the nominal to the actual mount. Raise as `turner_of` does; Fault
+    `no_motion`, `not_finite`, `impossible_times`, `arm_clock_stepped`.
     """
     turner = turner_of(run)
     mount = np.array(run.settings.mount)
@@ -252,7 +252,7 @@ def _check_order(time_s: Array) -> None:
 def turner_of(run: RunData) -> "RecordedTurner":
     """Return the turner of a recording.
 
-    Raise Refused `recorded_elsewhere` for a recording from files, which has no turner.
+    Raise Refused `recorded_elsewhere` for a recording from files.
     """
     if run.turner is None:
         raise Refused(
@@ -264,7 +264,7 @@ def turner_of(run: RunData) -> "RecordedTurner":
 
 
 def check_arms_times(states: NDArray[Any]) -> None:
-    """Raise Fault `not_finite` or `impossible_times` if times of states are not finite or too far apart."""
+    """Raise Fault `not_finite` or `impossible_times` if the states' times are not finite or too far apart."""
     time_s = np.unique(states["time_s"])
     if not np.isfinite(time_s).all():
         raise not_finite("an arm state")

@@ -1,9 +1,9 @@
-"""A whole turn of a shaft whose single readings scatter, found by the recurrence of a reading one turn later.
+"""A whole turn of a shaft whose single readings scatter, from a reading to its recurrence one turn later.
 
-An arm's encoder shows a joint's angle to microradians, so its turn begins and ends at a reading. A servo's encoder
-shows it to a milliradian, with an error of a degree besides. That error is the same at the same angle of the shaft, and
-a quarter of a turn of recurring readings averages the scatter. During the time of one turn the gyroscope rotates by 2π,
-wherever that time begins in the even part of the sweep; this module chooses the middle.
+An arm's encoder resolves microradians, so a turn begins and ends at a reading. A servo's encoder resolves a
+milliradian, and has errors of a degree that recur at the same angle of the shaft. A quarter of a turn of recurring
+readings averages the scatter. In the time of one turn the gyroscope rotates by 2π, wherever this time begins in the
+even part of the sweep; this module chooses the middle.
 """
 
 from typing import Any
@@ -29,7 +29,7 @@ GUARD_RAD = float(np.radians(1.5))  # angle left out next to the ramps: the shaf
 def well_timed(states: NDArray[Any]) -> NDArray[Any]:
     """Return the states without those of slow requests, if the duration of requests was recorded.
 
-    The measurement is made at an unknown moment of the request.
+    The servo measures at an unknown moment of the request.
     """
     if "took_s" not in (states.dtype.names or ()) or not len(states):
         return states
@@ -89,7 +89,7 @@ def find_even_turn(states: NDArray[Any], sweep: Sweep, settings: ObservationThre
 
 
 def _check_speed(time_s: Array, travelled: Array, where: str, settings: ObservationThresholds) -> None:
-    """Raise Fault `speed_not_constant` if the smoothed rate strays from its mean: a ripple does not, a halt does."""
+    """Raise Fault `speed_not_constant` if the smoothed rate strays from its mean, as by a halt, not by a ripple."""
     rates = fit_lines(time_s, travelled[:, None])[2][:, 0]
     deviation = float(np.max(np.abs(rates / rates.mean() - 1)))
     if deviation > settings.max_speed_deviation:

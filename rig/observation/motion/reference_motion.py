@@ -1,4 +1,4 @@
-"""The motion of the turner that observations need: an arm's states, or a table's own file."""
+"""The turner's motion that observations need: from an arm's states, or from a table's file."""
 
 from typing import Protocol
 
@@ -13,7 +13,7 @@ MAX_SPAN_S = 48 * 3600.0  # longest recording: times farther apart are damage, a
 
 
 class RateFunction(Protocol):
-    """Rates (n, 3), rad/s, at times (n,); their derivative if `derivative` is 1."""
+    """A function of times (n,): rates (n, 3), rad/s, or their derivative if `derivative` is 1."""
 
     def __call__(self, time_s: Array, derivative: int = 0, /) -> Array:
         """Return the rates or their derivative."""
@@ -23,7 +23,7 @@ class RateFunction(Protocol):
 class KnownMotion(Protocol):
     """A body's rotation as a function of its turner's time, in axes fixed to the body.
 
-    The mounting of the sensors on the body does not matter for finding the clock.
+    The sensors' mounting on the body does not matter for finding the clock.
     """
 
     @property
@@ -37,12 +37,12 @@ class KnownMotion(Protocol):
         ...
 
     def covered(self, time_s: Array) -> NDArray[np.bool_]:
-        """Return which times (n,) lie between states that are close enough together for `rate` to be valid."""
+        """Return a mask of the times (n,) between states that are close enough together for `rate` to be valid."""
         ...
 
 
 def closely_followed(states_s: Array, close: NDArray[np.bool_], time_s: Array) -> NDArray[np.bool_]:
-    """Return which times (n,) lie between two states (m,) that are `close` (m − 1,) together."""
+    """Return a mask of the times (n,) that lie between two states (m,) marked as `close` (m − 1,)."""
     interval = np.searchsorted(states_s, time_s, side="right") - 1
     inside = (interval >= 0) & (interval < len(close))
     covered: NDArray[np.bool_] = inside & close[np.clip(interval, 0, len(close) - 1)]
@@ -50,7 +50,7 @@ def closely_followed(states_s: Array, close: NDArray[np.bool_], time_s: Array) -
 
 
 def check_span(time_s: Array, what: str) -> None:
-    """Raise Fault `impossible_times` if rising times (n,) span too long a time."""
+    """Raise Fault `impossible_times`, about `what`, if rising times (n,) span too long a time."""
     span_s = time_s[-1] - time_s[0]
     if span_s > MAX_SPAN_S:
         raise Fault(

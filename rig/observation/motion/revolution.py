@@ -1,4 +1,4 @@
-"""A joint's exact revolution or arc: its ends in time, and checks that it was turned properly."""
+"""A joint's exact revolution or arc: its ends in time, and checks of its motion."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -25,7 +25,7 @@ class Revolution:
 
     - `duration_std_s`: uncertainty by interpolation between arm states.
     - `axis_flange` (3,): unit vector of the turn in the flange frame, by the measured joints.
-    - `axis_errors` (13, 3): its change per radian of each arm error (`rig.motion.geometry.AXIS_ERRORS`).
+    - `axis_errors` (13, 3): the axis' change per radian of each arm error (`rig.motion.geometry.AXIS_ERRORS`).
     - `attitude` (3, 3): transforms a vector from the arm's base frame to the flange's, at the start.
     - `arm_m` (3,): a vector from the joint's axis to the flange's origin, in the flange's frame.
     - `station`: the joint, from 0 at the base, and the pose in which it turned.
@@ -47,13 +47,13 @@ class Revolution:
     def beats(self) -> int:
         """The number of sidebands of each spectral line: the highest harmonic of a turn in the shaft's speed.
 
-        An encoder with a large error errs once and twice a turn; products of these errors come up to four times.
+        A bad encoder errs once and twice a turn; products of these errors come up to four times a turn.
         """
         return 2 if self.uneven else BEATS
 
     @property
     def closed(self) -> bool:
-        """Whether the sweep consists of whole turns, over which an encoder's error cancels and gravity averages out."""
+        """Whether the sweep consists of whole turns, over which encoder errors cancel and gravity averages out."""
         return closes(self.angle_rad)
 
     @property
@@ -118,7 +118,7 @@ def arm_states_lost(where: str, extent: str) -> Fault:
 
 
 def _find_inner_states(travelled: Array, turn_rad: float, sweep: Sweep) -> tuple[int, int]:
-    """Return the indices of the first and last state within the revolution. There are states before and after it."""
+    """Return the indices of the first and last state within the revolution, which has states before and after it."""
     entries = np.flatnonzero((travelled[:-1] < 0) & (travelled[1:] >= 0)) + 1
     exits = np.flatnonzero((travelled[:-1] < turn_rad) & (travelled[1:] >= turn_rad))
     if len(entries) and len(exits) and exits[0] > entries[0]:
@@ -138,8 +138,8 @@ def _describe_extent(sweep: Sweep) -> str:
 def _find_ends(time_s: Array, travelled: Array, first: int, last: int, turn_rad: float) -> tuple[float, float, float]:
     """Return the start and end of the revolution, and the standard deviation of the time between, s.
 
-    The angle is interpolated between two neighbouring states. If states are missing there, the joint might already be
-    in a ramp, so the straight line through the whole revolution gives the time, to within its ripple.
+    The angle is interpolated between two neighbouring states. If states are missing there, a ramp may be among them, so
+    the straight line through the whole revolution gives the time, to within the ripple.
     """
     t, angle = time_s[first : last + 1], travelled[first : last + 1]
     speed, offset = np.polyfit(t - t[0], angle, 1)
@@ -161,7 +161,7 @@ def _find_ends(time_s: Array, travelled: Array, first: int, last: int, turn_rad:
 
 
 def _check_slider(turning: NDArray[Any], where: str) -> None:
-    """Raise Fault `speed_slider` or `speed_limited` if the arm slowed down. Other turners record neither."""
+    """Raise Fault `speed_slider` or `speed_limited` if the arm recorded either; other turners do not."""
     if not {"target_speed_fraction", "speed_scaling"} <= {*(turning.dtype.names or ())}:
         return
     slider, scaling = (float(turning[name].min()) for name in ("target_speed_fraction", "speed_scaling"))
@@ -181,7 +181,7 @@ def _check_slider(turning: NDArray[Any], where: str) -> None:
 
 
 def _check_speed(time_s: Array, travelled: Array, where: str, settings: ObservationThresholds) -> None:
-    """Raise Fault `speed_not_constant` if the smoothed rate strays from its mean: vibration does not, a halt does."""
+    """Raise Fault `speed_not_constant` if the smoothed rate strays from its mean, as by a halt, not by vibration."""
     middles = np.arange(time_s[0] + SMOOTHING_S / 2, time_s[-1] - SMOOTHING_S / 2, SMOOTHING_S / 5)
     ahead = np.interp(middles + SMOOTHING_S / 2, time_s, travelled)
     behind = np.interp(middles - SMOOTHING_S / 2, time_s, travelled)
@@ -192,7 +192,7 @@ def _check_speed(time_s: Array, travelled: Array, where: str, settings: Observat
 
 
 def not_constant(where: str, deviation: float, settings: ObservationThresholds) -> Fault:
-    """Return the error for a sweep whose speed strayed by a fraction from its mean."""
+    """Return the error for a sweep whose speed strayed from its mean by the fraction `deviation`."""
     return Fault(
         "speed_not_constant",
         f"in {where} the joint's speed differed by {100 * deviation:.0f} % from its mean, "

@@ -32,8 +32,8 @@ LEAVING_S = 0.05
 class DwellReading:
     """A dwell of the procedure, by its `index`: the mean reading in m/s².
 
-    `attitude` (3, 3) is the mean rotation from the arm's base frame into the flange's, weighted like the readings;
-    `window` is in controller times.
+    `attitude` (3, 3): mean rotation from the arm's base frame into the flange's, weighted like the readings; `window`:
+    in controller times.
     """
 
     index: int
@@ -79,7 +79,7 @@ def accelerations(stream: Stream, inside: slice) -> Array:
 def check_acceleration(stream: Stream, inside: slice, where: str, *, turning: bool = False) -> None:
     """Raise Fault `saturation` or `stuck_sensor` for the accelerometer's samples `inside`.
 
-    In a rotation (`turning`), a single axis with equal readings is stuck.
+    In a rotation (`turning`), one axis with equal readings suffices.
     """
     channel, samples = stream.sensor.channel(ACCELERATION), stream.raw[inside]
     counts, saturated = channel.counts(samples), channel.is_saturated(samples)
@@ -131,8 +131,7 @@ def _dwell_reading(
 def gravity_difference(attitudes: Array, expected: Array, sensor: RecordedSensor, site: Site) -> Array:
     """Return gravity at actual attitudes minus gravity at expected ones (n, 3), m/s², in the sensor's nominal axes.
 
-    `attitudes` (n, 3, 3) are actual, from the arm's encoders; `expected` (n, 3, 3) are those assumed by the model of
-    the readings.
+    `attitudes` (n, 3, 3): actual, from the arm's encoders; `expected` (n, 3, 3): assumed by the model of the readings.
     """
     difference: Array = (attitudes - expected) @ -site.down_m_s2 @ np.array(sensor.mounting).T
     return difference

@@ -18,11 +18,11 @@ from rig.observation.statistics.vibration_noise import fit_inflation, line_colum
 
 @dataclass(frozen=True, slots=True)
 class SweptAcceleration:
-    """An accelerometer's first harmonic in sweep `sweep` of the plan; the joint's angle counts from the start.
+    """An accelerometer's first harmonic in the plan's sweep `sweep`; the joint's angle counts from the sweep's start.
 
-    There `attitude` (3, 3) transforms a vector from the arm's base frame to the flange's. `axis_flange` (3,) is the
-    unit vector of a growing angle, `arm_m` (3,) a vector from the axis to the flange's origin, in the flange's frame.
-    `station` contains the `joint`, from 0 at the base, and the pose in which it turned.
+    At the start, `attitude` (3, 3) transforms a vector from the arm's base frame to the flange's. `axis_flange` (3,):
+    unit vector of a growing angle, `arm_m` (3,): from the axis to the flange's origin, both in the flange's frame.
+    `station`: the `joint`, from 0 at the base, and the pose in which it turned.
     """
 
     sweep: int
@@ -39,9 +39,9 @@ def swept_acceleration(
 ) -> SweptAcceleration:
     """Fit the first harmonic of one sweep's revolution, together with its vibrations.
 
-    Joints at rest may oscillate, as the encoders measure. The model has one attitude, which only the sweep's joint
-    changes, so gravity's difference between this and the arm's attitude is subtracted. Raise Fault `saturation`,
-    `stuck_sensor`, `incomplete_revolution` or `not_finite`.
+    In the model only the sweep's joint changes the attitude; other joints may oscillate, so the difference of gravity
+    due to them, by the encoders, is subtracted. Raise Fault `saturation`, `stuck_sensor`, `incomplete_revolution` or
+    `not_finite`.
     """
     inside = slice_time(stream, turn.start_s, turn.end_s)
     check_acceleration(stream, inside, describe(sweep), turning=True)

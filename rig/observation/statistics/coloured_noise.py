@@ -1,4 +1,4 @@
-"""Variance inflation of a mean whose residuals are not white: equal neighbours average out worse, vibration better."""
+"""Variance inflation of a mean with coloured residuals: similar neighbours average out worse, vibration better."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -34,9 +34,8 @@ def correlation_inflation(residuals: Array) -> float:
 def fit_noise_factor(residuals: Array) -> float:
     """Return the factor on a mean's variance from an autoregressive model, below 1 if residuals are mostly vibration.
 
-    Over many periods a vibration averages out, whatever the sum of its correlations is. The variance of a long mean is
-    the spectrum at zero: with coefficients a and innovations e, var(e) / (1 − Σ a)². Akaike's criterion chooses the
-    order.
+    Over many periods a vibration averages out, whatever the sum of its correlations. The variance of a long mean is the
+    spectrum at zero: with coefficients a and innovations e, var(e) / (1 − Σ a)². Akaike's criterion chooses the order.
     """
     return fit_autoregression(residuals).factor
 
@@ -70,7 +69,7 @@ def _spectrum_dof(centred: Array, memory: int) -> float:
 def _autoregression(products: Array, count: int, memory: int) -> tuple[float, float, int]:
     """Return Akaike's criterion and the spectrum at zero for the order `memory`, from `_products` of `count` residuals.
 
-    The spectrum is 0 / 0 for residuals that only repeat, such as coarse readings with few different values.
+    The spectrum is 0 / 0 for residuals that only repeat, such as coarse readings.
     """
     coefficients, power = _predict(products[-memory - 1 :, -memory - 1 :])
     likelihood = count * float(np.log(power / count)) if power else -np.inf
@@ -83,7 +82,7 @@ def _autoregression(products: Array, count: int, memory: int) -> tuple[float, fl
 
 
 def _products(residuals: Array, memory: int) -> Array:
-    """Return sums (memory + 1, memory + 1) of products of each residual (n,) and its predecessors, nearest last."""
+    """Return sums (memory + 1, memory + 1) of products among each residual (n,) and its predecessors, nearest last."""
     lagged = np.array([residuals[lag : len(residuals) - memory + lag] for lag in range(memory + 1)])
     products: Array = lagged @ lagged.T
     return products
@@ -92,7 +91,7 @@ def _products(residuals: Array, memory: int) -> Array:
 def _predict(products: Array) -> tuple[Array, float]:
     """Return the best linear prediction of residuals from the k previous ones, computed from their `_products`.
 
-    Return its coefficients (k,), and the sum of squares of its errors, the innovations.
+    Return the coefficients (k,), and the sum of squares of the prediction errors, the innovations.
     """
     before, now = products[:-1, :-1], products[:-1, -1]
     coefficients = np.asarray(np.linalg.lstsq(before, now, rcond=None)[0], dtype=np.float64)

@@ -18,7 +18,7 @@ from rig.observation.windows import Window
 
 @dataclass(frozen=True, slots=True)
 class Mean:
-    """Mean of readings in any unit.
+    """The mean of readings in any unit.
 
     - `mean` (3,), its `variance` (3,), the `noise` (3,) of one reading, and the number of `samples`.
     - `dof` (3,): degrees of freedom of the variance, fewer than samples if these are not independent.
@@ -42,8 +42,8 @@ class Mean:
 class MeanNoise:
     """Noise of single readings in any unit, by axis.
 
-    `scatter` (3,) is the variance of one reading, `in_a_mean` (3,) the part of it that counts in a long mean, `dof`
-    (3,) the degrees of freedom of the latter.
+    `scatter` (3,) is the variance of one reading, `in_a_mean` (3,) the part of it that counts in a long mean, with
+    `dof` (3,) degrees of freedom.
     """
 
     scatter: Array
@@ -53,7 +53,7 @@ class MeanNoise:
 
 @dataclass(frozen=True, slots=True)
 class StaticReading:
-    """A mean `reading` at rest: in a dwell of the procedure, by its `index`, or in a placement of a file.
+    """A mean `reading` at rest: in the procedure's dwell of this `index`, or in a placement of a file.
 
     `attitude` (3, 3) is the rotation from the arm's base frame into the flange's, or from the table's into the body's.
     """
@@ -79,7 +79,7 @@ class QuantityInDwell:
 class ReadAtRest:
     """The mean `reading` of a quantity in one dwell.
 
-    `expected` is the known size of the quantity there, in SI units; None if it was not stated.
+    `expected` is the stated norm of the quantity in the dwell, in SI units, or None.
     """
 
     subject: QuantityInDwell
@@ -95,7 +95,7 @@ def dof_by_axis(dofs: Iterable[Array | float]) -> Array:
 def weighted_means(
     readings: Array, groups: Array, weights: Array, *, smooth: Array, noise: MeanNoise, steps: Steps
 ) -> tuple[Mean, ...]:
-    """Return the weighted means of p groups of readings: a single group is a whole window, several are its segments.
+    """Return the weighted means of p groups of readings: one for a whole window, several for its segments.
 
     - readings (n, 3): in any unit, recorded in `steps`.
     - groups (n, p): above zero if a reading belongs to a group.
@@ -134,8 +134,8 @@ def whole(readings: Array) -> Array:
 def even_mean(readings: Array, steps: Steps) -> Mean:
     """Return the unweighted mean of readings (n, 3) with resolution `steps`, without vibration.
 
-    The noise is their scatter, and at least the rounding to steps. The variance of the mean includes correlation, by
-    `fit_autoregression` of each axis, and the part of rounding that does not average out.
+    The noise is the readings' scatter, and at least the rounding to steps. The variance of the mean includes their
+    correlation, by `fit_autoregression` of each axis, and the part of rounding that does not average out.
     """
     variance = np.maximum(readings.var(axis=0, ddof=1), steps.variance)
     coloured = [fit_autoregression(axis) for axis in (readings - readings.mean(axis=0)).T]
@@ -153,10 +153,9 @@ def even_mean(readings: Array, steps: Steps) -> Mean:
 def mean_at_rest(readings: Array, time_s: Array, window: Window, steps: Steps) -> tuple[Mean, Window]:
     """Return the mean of readings (n, 3) with resolution `steps`, at times (n,), and the window that it represents.
 
-    If the arm vibrates the weights are tapered, see `average_tapered`: 2 mg at 14 Hz leave 10 µg in an unweighted mean
-    of three seconds. The window reaches from half-way up the first flank to half-way down the last: with a random walk
-    of the bias, the difference between two tapered means equals that between unweighted means of these windows, within
-    a thousandth.
+    If the arm vibrates, weights are tapered (`average_tapered`): 2 mg at 14 Hz leave 10 µg in an unweighted mean of
+    three seconds. The window reaches from half-way up the first flank to half-way down the last: for a random walk of
+    the bias, unweighted means of these windows differ like the tapered means, within a thousandth.
     """
     if vibrates(readings):
         half_s = flank_s(window.end_s - window.start_s) / 2

@@ -1,4 +1,4 @@
-"""Spectral lines in readings: vibrations that exceed the noise's spectrum, whether encoders show them or not.
+"""Spectral lines in readings: vibrations that exceed the noise's spectrum.
 
 A part of a revolution is too short for a vibration to average out: 4 mrad/s at 8 Hz leave 0.1 mrad/s in a second and a
 half, several times the noise of a good gyroscope.
@@ -31,10 +31,9 @@ NONE: Array = np.zeros(0)
 class LineSearch:
     """The criteria of a spectral line.
 
-    Its power exceeds `stands_out` times the median power around it. It also exceeds `floor` as many times: a power in
-    the same window, for data with less noise than the readings with which they are compared. It makes at least
-    `slowest` cycles in all the readings, and has `beats` sidebands: see `waves`. At most `most` are found, previous
-    ones included.
+    Its power exceeds `stands_out` times the median power around it, and as many times `floor`, a power in the same
+    window, for data with less noise than the readings with which they are compared. It makes at least `slowest` cycles
+    in all readings, and has `beats` sidebands (`waves`). At most `most` lines are found, previous ones included.
     """
 
     stands_out: float = 16.0  # one false line in seventy recordings costs nothing
@@ -45,11 +44,10 @@ class LineSearch:
 
 
 def find_lines(residuals: Array, search: LineSearch, previous: Array = NONE, fraction: Array | None = None) -> Array:
-    """Return the number of cycles (k,) of each spectral line in the residuals (n, axes); k may be zero.
+    """Return the numbers of cycles (k,) of the spectral lines in the residuals (n, axes); k may be zero.
 
-    `fraction` (n,): elapsed fraction of the time at each reading, even by default and nearly even except for gaps.
-    Lines are at least `APART` from each other; one that merges with another is dropped. `previous` lines are returned
-    unchanged.
+    `fraction` (n,): elapsed fraction of the time at each reading, by default even. Lines are at least `APART` from each
+    other; a line that merges with another is dropped. `previous` lines are returned unchanged.
     """
     count, merged, fixed = len(residuals), NONE, len(previous)
     cycles = previous
@@ -72,9 +70,8 @@ def find_lines(residuals: Array, search: LineSearch, previous: Array = NONE, fra
 def _are_too_near(cycles: Array, search: LineSearch) -> bool:
     """Return whether lines merge, or the slowest merges with the turn's own waves.
 
-    A refined line below the search's lowest frequency is valid only if its sidebands are apart from those of all other
-    lines. Otherwise two lines, around a vibration and a ripple less than a cycle apart, would explain a part of the
-    mean.
+    A refined line below the search's lowest frequency is valid only if its sidebands are apart from all others'.
+    Otherwise two lines, a vibration and a ripple less than a cycle apart, would explain a part of the mean.
     """
     ordered = np.sort(cycles)
     gaps = np.diff(ordered)
@@ -96,9 +93,9 @@ def column_count(beats: int) -> int:
 def waves(cycles: Array, fraction: Array, beats: int = BEATS) -> Array:
     """Return cosine and sine columns (n, w k) of k lines at elapsed fractions (n,) of the time, w = `column_count`.
 
-    Each line also has two linearly growing columns, for a vibration that begins or ends, and sidebands at one cycle
-    more and one cycle less, which a vibration of the room causes in a rotating sensor. With `beats` b they reach up to
-    b cycles: see `rig.observation.motion.revolution.Revolution`.
+    A line also has two linearly growing columns, for a vibration that begins or ends, and sidebands up to `beats`
+    cycles away: one cycle away a vibration of the room in a rotating sensor, others as in
+    `rig.observation.motion.revolution.Revolution`.
     """
     line, turn = (np.exp(2j * np.pi * np.outer(cycles_each, fraction)) for cycles_each in (cycles, range(1, beats + 1)))
     sidebands = [line * shift for once in turn for shift in (once.conj(), once)]
@@ -113,9 +110,9 @@ def harmonics(angle_rad: Array, most: int) -> Array:
 
 
 def unit_columns(columns: Array) -> Array:
-    """Return columns (n, k), of any units, scaled to unit length; columns that are only rounding errors become zero.
+    """Return columns (n, k), of any units, scaled to unit length; columns of mere rounding errors become zero.
 
-    Otherwise rounding errors, which differ between processors, would become large columns.
+    Otherwise those, which differ between processors, would become large columns.
     """
     sizes = np.linalg.norm(columns, axis=0)
     return columns / np.where(sizes > ROUNDING * sizes.max(initial=0.0), sizes, np.inf)
@@ -130,7 +127,7 @@ def fit_columns(columns: Array, values: Array) -> Array:
 
 
 def line_swing(residuals: Array, columns: Array, lines_hz: Array) -> Array:
-    """Return the mean square (3,), (rad/s)² s², of the change of the lines' angle between two moments.
+    """Return the mean square (3,), rad², of the change of the lines' angle between two moments.
 
     The lines are those of columns (n, w k) in residuals (n, 3). A line of mean square P and frequency f has the angle
     amplitude √(2 P) / (2π f), so its mean square change is P / (2 π² f²).
@@ -149,7 +146,7 @@ def _sampling_step(fraction: Array) -> float:
 
 
 def _find_strongest(residuals: Array, previous: Array, fraction: Array, search: LineSearch) -> float | None:
-    """Return the cycles of the strongest line in residuals (n, axes) besides `previous` lines; None without one."""
+    """Return the cycles of the strongest line in residuals (n, axes) besides `previous` lines, or None."""
     from scipy.ndimage import median_filter
 
     powers = np.abs(np.fft.rfft(apply_window(residuals).T)) ** 2
@@ -171,9 +168,9 @@ def _find_strongest(residuals: Array, previous: Array, fraction: Array, search: 
 
 
 def _choose_middle(peak: float, residuals: Array, previous: Array, fraction: Array, search: LineSearch) -> float:
-    """Return the frequency of the line, given a peak that may be its centre or a sideband: the one that explains most.
+    """Return the frequency that explains most: the peak is the line's centre or a sideband.
 
-    A sensor may sense a vibration in the room only across its axis, in the sidebands and not in the line itself.
+    A sensor may sense a vibration of the room only across its axis, in the sidebands and not in the line itself.
     """
     whitened = residuals / (residuals.std(axis=0) + np.finfo(np.float64).tiny)
     sidebands = [peak + shift for shift in (-1.0, 1.0) if search.slowest <= peak + shift]
@@ -189,8 +186,8 @@ def _choose_middle(peak: float, residuals: Array, previous: Array, fraction: Arr
 def _refine(cycles: Array, residuals: Array, fixed: int, fraction: Array, beats: int) -> Array:
     """Return the frequencies of spectral lines, in cycles, refined from their phase drift.
 
-    The drift is the part of the amplitude that grows in quadrature. The first `fixed` lines are unchanged, as are lines
-    with sidebands only, which have no phase.
+    The drift is the part of the amplitude that grows in quadrature. The first `fixed` lines, and lines with sidebands
+    only, which have no phase, are unchanged.
     """
     for _ in range(PASSES):
         sizes = fit_columns(waves(cycles, fraction, beats), residuals).reshape(len(cycles), column_count(beats), -1)

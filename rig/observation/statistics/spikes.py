@@ -1,10 +1,10 @@
 """Single readings of a gyroscope far from those before and after: bit errors, dropped digits, markers of a logger.
 
-A body needs several readings to turn there and back, if they follow each other fast enough. So a reading that stands
-alone is none, however large it is. A vibration, or a knock that rings, moves its neighbours too, and stays.
+A body needs several readings to turn there and back, so a single deviating reading is no motion, however large it is. A
+vibration, or a knock that rings, moves its neighbours too, and is kept.
 
-A reading is compared with the cubic through two readings on either side. A spike of size 1 leaves deviations of
-1/6, −2/3, 1, −2/3, 1/6, while a step leaves −1/6, 1/2, −1/2, 1/6. What a motion or a vibration leaves is seen in the
+A reading is compared with the cubic through two readings on either side. A spike of size 1 leaves deviations of 1/6,
+−2/3, 1, −2/3, 1/6, while a step leaves −1/6, 1/2, −1/2, 1/6. Remainders of a motion or a vibration also show in the
 readings farther away.
 """
 
@@ -47,7 +47,7 @@ def bridge_spikes(time_s: Array, rates: Array, spikes: NDArray[np.intp]) -> Arra
 
 
 def _changes_around(rates: Array) -> Array:
-    """Return the largest change (n,) of rates (n, 3) from one to another of the two readings before and after each."""
+    """Return the largest change (n,) of rates (n, 3) among the two readings before and the two after each."""
     steps, across = np.abs(np.diff(rates, axis=0)).max(axis=1), np.abs(rates[2:] - rates[:-2]).max(axis=1)
     changes = np.zeros(len(rates))
     changes[2:-2] = np.maximum(np.maximum(steps[:-3], steps[3:]), across[1:-1])

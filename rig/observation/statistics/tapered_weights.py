@@ -2,7 +2,7 @@
 
 In a plain mean over T the remainder of a vibration is its change of angle between both ends, divided by T: 2 mrad/s at
 14 Hz leave 0.7 deg/h RMS in ten seconds, three times the noise of a KVH 1775. Weights with raised-cosine flanks of
-length L (Tukey's window) divide that by 4 (f L)² − 1, two hundred with half a second. White noise averages a little
+length L (Tukey's window) divide it by 4 (f L)² − 1, two hundred with half a second. White noise averages a little
 worse, by n Σ w² with Σ w = 1: 4 % in variance in ten seconds, 10 % in the shortest rests.
 """
 
@@ -46,8 +46,8 @@ def weights(time_s: Array, start_s: float, end_s: float) -> Array:
 def noise_at_zero(readings: Array, low: float = LOW) -> Array:
     """Return the variance (3,) per reading for a long mean: the spectrum near zero without its lines.
 
-    It is the median over low frequencies, which lines do not shift, divided by the median of χ² with two degrees of
-    freedom. Low frequencies reach up to a fraction `low` of the data rate, but have at least `FEWEST_BINS` bins.
+    The median over low frequencies, which lines do not shift, is divided by the median of χ² with two degrees of
+    freedom. Low frequencies reach up to the fraction `low` of the data rate, in at least `FEWEST_BINS` bins.
     """
     powers = np.abs(np.fft.rfft(apply_window(readings), axis=0)[MAIN_LOBE : _count_low_bins(len(readings), low)]) ** 2
     medians: Array = np.median(powers, axis=0) / np.log(2)
@@ -72,7 +72,7 @@ def _window(count: int) -> Array:
 def dof_at_zero(count: int) -> float:
     """Return the degrees of freedom of `noise_at_zero`, a median of m independent powers, from `count` readings.
 
-    Its relative variance is 1 / (m ln² 2), and ν is 2 divided by this (JCGM 100, G.4.2).
+    The median's relative variance is 1 / (m ln² 2), and ν is 2 divided by this (JCGM 100, G.4.2).
     """
     return float(2 * np.log(2) ** 2 * (_count_low_bins(count) - MAIN_LOBE) / NOISE_BINS)
 

@@ -1,7 +1,7 @@
-"""The noise of readings that vibrate: spectral lines model the vibration, and the residuals are the sensor's own noise.
+"""The noise of readings that vibrate: the residuals of a model of the vibration by spectral lines.
 
-The scatter of a vibration is not noise: the few low frequencies without it are too few to show the noise in one turn.
-Without its lines the noise is usually white, and then all residuals determine it; otherwise their correlations do.
+A vibration's scatter is not noise, and one turn has too few low frequencies to show the noise beside it. Without the
+lines the noise is usually white, and all residuals determine it; otherwise their correlations do.
 """
 
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ BRIEF = (1, 2)  # orders that fit coloured noise, but not the remainder of a lin
 
 
 def average_rest(readings: Array, time_s: Array, window: Window, steps: Steps) -> Mean:
-    """Average readings at rest with weights that cancel a vibration (`average_tapered`), which is not noise."""
+    """Average readings at rest with weights that cancel a vibration (`average_tapered`), so it is not noise."""
     residuals = readings - readings.mean(axis=0)
     shaking = _columns(residuals, LineSearch(beats=0))
     columns = np.column_stack([np.ones(len(residuals)), shaking])

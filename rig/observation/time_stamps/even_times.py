@@ -1,4 +1,4 @@
-"""The times at which readings were taken, from time stamps that are too coarse, or are arrival times."""
+"""The times at which readings were taken, from coarse time stamps or arrival times."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ def find_taken_times(time_s: Array, sampling: Sampling) -> Array:
     """Return the strictly rising times (n,) at which readings were taken; good, distinct stamps are unchanged.
 
     Arrival times are never early, so the least late ones determine the times; coarse stamps err in both directions, so
-    their mean does. Stamps do not show a latency that all readings share, so it remains.
+    their mean does. A latency that all readings share remains.
     """
     if sampling.late is not None:
         return _separate(time_s)

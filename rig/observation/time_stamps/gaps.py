@@ -1,9 +1,9 @@
 """The rotation that a gap between readings can hide: the error of bridging it, from the readings on either side.
 
-A gap of a rate is bridged by the trapezoidal rule. The error does not depend on the gap's length alone. If a body is at
-rest or turns evenly, a gap hides nothing; if it starts or swings, a short gap hides much. So gaps of the same length
-are cut into the readings on either side and bridged, and the result is compared with their integral. Between two rates
-that differ by more than readings do on either side, the change may lie anywhere in the gap. All functions are pure.
+A gap of a rate is bridged by the trapezoidal rule. If a body is at rest or turns evenly, a gap hides nothing; if it
+starts or oscillates, a short gap hides much. So gaps of the same length are cut into the readings on either side and
+bridged, and the result is compared with their integral. If the rate changes over the gap by more than on either side,
+the change may lie anywhere in the gap. All functions are pure.
 """
 
 import numpy as np
@@ -52,7 +52,7 @@ def _hidden_rad(time_s: Array, readings: Array, turned: Array, gap: int) -> floa
 def _bridge(time_s: Array, readings: Array, turned: Array, lasts_s: float) -> tuple[float, float] | None:
     """Return the RMS error of interpolating steps of some length, and the largest change of the rate over one.
 
-    None if the readings are too few.
+    Return None for too few readings.
     """
     end = np.searchsorted(time_s, time_s + lasts_s * (1 - 1e-9))
     start = np.flatnonzero(end < len(time_s))

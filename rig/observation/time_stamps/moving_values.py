@@ -1,4 +1,4 @@
-"""The least and the mean of the values around each of a series."""
+"""The least and the mean of the values around each value of a series."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from rig.estimation.arrays import Array
 def find_least_around(values: Array, width: int) -> Array:
     """Return for each value the larger of two minima (n,): of the values ahead, and of the values behind.
 
-    At the ends, where one of them is missing, return the other.
+    At the ends, where one is missing, the other counts.
     """
     ahead, behind = find_least_ahead(values, width), find_least_behind(values, width)
     least = np.maximum(ahead, behind)
@@ -17,7 +17,7 @@ def find_least_around(values: Array, width: int) -> Array:
 
 
 def find_least_ahead(values: Array, width: int) -> Array:
-    """Return for each value (n,) the minimum of it and the next ones, `width` values in all."""
+    """Return for each value (n,) the minimum of this and the next values, `width` in all."""
     least, covered = values.copy(), 1
     while covered < min(width, len(values)):
         more = min(covered, width - covered)
@@ -27,7 +27,7 @@ def find_least_ahead(values: Array, width: int) -> Array:
 
 
 def find_least_behind(values: Array, width: int) -> Array:
-    """Return for each value (n,) the minimum of it and the previous ones, `width` values in all."""
+    """Return for each value (n,) the minimum of this and the previous values, `width` in all."""
     return find_least_ahead(values[::-1], width)[::-1]
 
 

@@ -1,17 +1,17 @@
 """The sampling interval of a log and its missing readings, from time stamps that may be bad.
 
-Loggers round their stamps (8, 9, 8, 9 ms of 119 Hz) or stamp readings on arrival (five at once every 50 ms). So the
-difference of two neighbouring stamps shows neither the interval nor a loss. But a stamp's error does not add up over
-many readings, while every lost reading shifts all later stamps. So the stamps are compared with an even series,
+Loggers round their stamps (8, 9, 8, 9 ms of 119 Hz) or stamp readings on arrival (five at once every 50 ms). So two
+neighbouring stamps show neither the interval nor a loss. But errors of stamps do not add up, while every lost reading
+shifts all later stamps. So the stamps are compared with an even series,
 
     lateness of stamp k = t[k] − T (k + readings missing before it)
 
 A reading is never stamped before it is taken. So the least lateness among `width` readings after a step, minus the
 least among those before it, is the time of the readings missing in between. The width is the smallest for which these
-differences are whole multiples of the interval. It is 1 if the stamps are good to a quarter of an interval.
+differences are whole multiples of the interval: 1 if stamps are good to a quarter of an interval.
 
-Random losses of readings whose stamps are worse cannot be counted one by one. They make the lateness a random walk,
-whose Allan variance (IEEE 952, annex C) gives the number of missing readings.
+Random losses of readings with worse stamps cannot be counted one by one. They make the lateness a random walk, whose
+Allan variance (IEEE 952, annex C) gives the number of missing readings.
 """
 
 from collections.abc import Sequence
@@ -58,10 +58,10 @@ class Sampling:
     - `interval_s`: mean time from one reading to the next.
     - `missing` (n − 1,): number of readings missing between each reading and the next.
     - `scattered`: fraction of readings that are missing at unknown positions.
-    - `width`: number of stamps that have to be compared together; 1 if every stamp is good.
-    - `on_arrival`: readings were stamped when they arrived, several at once, and not when they were taken.
-    - `late` (n,): readings that were stamped much later than others soon after them because they had waited in a
-      buffer; only given if stamps are too bad to count missing readings.
+    - `width`: number of stamps to compare together; 1 if every stamp is good.
+    - `on_arrival`: whether readings were stamped when they arrived, several at once.
+    - `late` (n,): readings that waited in a buffer, stamped much later than the next ones; only given if stamps are too
+      bad to count missing readings.
     """
 
     interval_s: float
@@ -72,9 +72,9 @@ class Sampling:
     late: NDArray[np.bool_] | None = None
 
     def gaps(self, time_s: Array, fewest: int = 1) -> NDArray[np.bool_]:
-        """Return the steps (n − 1,) between readings at times (n,) over which at least `fewest` readings are missing.
+        """Return a mask (n − 1,) of steps between readings at times (n,) with at least `fewest` readings missing.
 
-        With bad stamps: the steps of that length, and those from or to a late reading.
+        With bad stamps, these are the steps of that length, and those from or to a late reading.
         """
         if self.late is None:
             return np.asarray(self.missing >= fewest)
@@ -88,7 +88,7 @@ class Sampling:
 
     @property
     def numbers(self) -> NDArray[np.intp]:
-        """(n,) the readings' numbers, from 0, missing ones counted."""
+        """The readings' numbers (n,), from 0, with missing readings counted."""
         return np.concatenate([[0], np.cumsum(1 + self.missing)])
 
     def count_expected(self, time_s: Array, windows_s: Array) -> Array:
@@ -100,7 +100,7 @@ class Sampling:
 
 @dataclass(frozen=True, slots=True)
 class _PeriodCandidate:
-    """The interval and the missing readings (n − 1,) for a `width`; `fit` is the fraction of differences that agree."""
+    """The interval and missing readings (n − 1,) for a `width`; `fit` is the fraction of differences that agree."""
 
     width: int
     interval_s: float
@@ -109,7 +109,7 @@ class _PeriodCandidate:
 
     @property
     def gap_count(self) -> int:
-        """Number of steps with readings missing."""
+        """The number of steps with missing readings."""
         return int(np.count_nonzero(self.missing))
 
     def median_run_s(self, time_s: Array) -> float:
@@ -136,14 +136,14 @@ def find_sampling(time_s: Array) -> Sampling:
 
 
 def _is_misleading(time_s: Array, interval_s: float, resolution_s: float) -> bool:
-    """Return whether, because of coarse resolution, all steps are whole multiples of a wrong interval."""
+    """Return whether all steps are whole multiples of a wrong interval because of coarse resolution."""
     # Equal steps are as coarse as their resolution, and good.
     is_coarse = resolution_s > COARSE * interval_s and float(np.ptp(np.diff(time_s))) > SETTLED * interval_s
     return is_coarse and abs(interval_s / resolution_s - round(interval_s / resolution_s)) > WHOLE
 
 
 def _has_late(time_s: Array, single: _PeriodCandidate) -> bool:
-    """Return whether readings were late rather than lost: after a late one the step is short."""
+    """Return whether readings were late rather than lost: the step after a late one is short."""
     return bool(np.count_nonzero(np.diff(time_s) < SHORT * single.interval_s) > LATE * single.gap_count)
 
 
@@ -155,7 +155,7 @@ def _list_wider(time_s: Array) -> list[_PeriodCandidate]:
 
 
 def _select_candidate(candidates: Sequence[_PeriodCandidate], typical_s: float) -> _PeriodCandidate | None:
-    """Return the first candidate that fits with few gaps, or None; wider ones would explain losses away."""
+    """Return the first candidate that fits with few gaps, or None; wider ones would hide losses."""
     # The steps inside a burst would make the time between bursts look like a gap.
     fitting = [
         candidate for candidate in candidates if candidate.fit >= MOSTLY and candidate.interval_s > typical_s / 2
@@ -201,8 +201,8 @@ def _count_missing(time_s: Array, width: int, quantile: float) -> _PeriodCandida
 def _is_beat(missing: NDArray[np.intp]) -> bool:
     """Return whether the missing readings (n − 1,) come more regularly than by chance.
 
-    Such a beat is caused by stamps of a polled port, multiples of a time shorter than the interval. A logger that loses
-    every n-th reading has the same effect, but hardly loses as many.
+    Stamps of a polled port, multiples of a time shorter than the interval, cause such a beat. So does a logger that
+    loses every n-th reading, but hardly as many.
     """
     missing = np.minimum(missing, 1)  # a gap counts once
     lost = int(missing.sum())
@@ -227,10 +227,11 @@ def _interval_s(time_s: Array, missing: NDArray[np.intp], width: int) -> float:
 
 
 def _estimate_unlocated_losses(time_s: Array) -> Sampling:
-    """Return the sampling for losses that cannot be located, because stamps are bad or losses too many.
+    """Return the sampling for losses that cannot be located because of bad stamps or their number.
 
-    Random losses of a fraction p of all readings give the lateness the variance p m T² over m readings. It grows
-    fourfold from m to 4 m; errors that do not accumulate stay constant, and the random walk of a clock grows much more.
+    Random losses of a fraction p of all readings give the lateness the variance p m T² over m readings. This grows
+    fourfold from m to 4 m; the variance of errors that do not accumulate is constant, that of a clock's random walk
+    grows much more.
     """
     mean_s = float(time_s[-1] - time_s[0]) / (len(time_s) - 1)
     apart = min(len(time_s) // SEGMENTS, FARTHEST)
@@ -258,7 +259,7 @@ def _walk_variance(walk: Array, apart: int) -> float:
 
 
 def _merge_at_longest(missing: NDArray[np.intp], steps_s: Array) -> NDArray[np.intp]:
-    """Return the missing readings (n − 1,); a loss that neighbouring steps share counts once, at the longest."""
+    """Return the missing readings (n − 1,), with a loss that neighbouring steps share counted once, at the longest."""
     merged = np.zeros_like(missing)
     steps = np.flatnonzero(missing)
     if not len(steps):
@@ -271,7 +272,7 @@ def _merge_at_longest(missing: NDArray[np.intp], steps_s: Array) -> NDArray[np.i
 
 
 def _interval_quantile(time_s: Array, apart: int, quantile: float = MEDIAN) -> float:
-    """Return a quantile, by default the median, of the mean intervals of readings `apart` places apart."""
+    """Return a quantile, by default the median, of the mean intervals of readings `apart` steps apart."""
     apart = min(apart, len(time_s) - 1)
     return float(np.quantile(time_s[apart:] - time_s[:-apart], quantile) / apart)
 

@@ -1,12 +1,11 @@
-"""The time stamps of a log put in order: the readings of the recording, and the time at which each was taken.
+"""The time stamps of a log in order: the readings of the recording, and the time at which each was taken.
 
-Other people's loggers write rows that are not readings (NaN, zeros before the first conversion), the same row twice,
-rows in another order, counters that wrap, and readings that had waited in a buffer: at the start of a recording stale
-ones, which come faster than they were taken, and after a stall of the link those that were taken during it. A stall is
-no gap: after it all readings are there. So a long step between two stamps is compared with the number of readings that
-follow until a reading is on time again.
+Loggers write rows that are not readings (NaN, zeros before the first conversion), the same row twice, rows in another
+order, counters that wrap, and readings that had waited in a buffer: at the start of a recording stale ones, which come
+faster than they were taken, and after a stall of the link those taken during it. A stall loses no readings. So a long
+step between two stamps is compared with the number of readings that follow until a reading is on time again.
 
-Each of these is counted, with the first of them by number and time. The remaining readings have the times of
+Each kind is counted, with its first row and time. The remaining readings have the times of
 `rig.observation.time_stamps.sampling`. All functions are pure.
 """
 
@@ -48,9 +47,9 @@ REACH = 6  # number of readings, in lengths of the step, within which a link has
 
 @dataclass(frozen=True, slots=True)
 class StampFinding:
-    """A kind of rows that are `left_out`, or whose times are `replaced`: their `count`, and the first of them.
+    """A kind of rows that are left out (`left_out`) or have new times: the reason, their `count`, the first of them.
 
-    `sample` is its number in the log, from 1; `time_s` its stamp.
+    `sample` is the first row's number in the log, from 1; `time_s` its stamp.
     """
 
     reason: str
@@ -65,9 +64,9 @@ class StampFinding:
 
 @dataclass(frozen=True, slots=True)
 class OrderedStamps:
-    """The readings of a log in order: their `rows` (m,) in the log, the `time_s` (m,) of each, strictly increasing.
+    """The readings of a log in order: their `rows` (m,) in the log, their strictly increasing times (m,).
 
-    `sampling` describes the stamps; `findings` lists what was left out or has a new time.
+    `sampling` describes the stamps; `findings` lists the rows that are left out or have new times.
     """
 
     rows: NDArray[np.intp]
@@ -78,7 +77,7 @@ class OrderedStamps:
 
 @dataclass(frozen=True, slots=True)
 class _UnorderedLog:
-    """The rows (m,) that remain of a log, with `stamps_s` (m,) and `readings` (m, c)."""
+    """The remaining rows (m,) of a log, with `stamps_s` (m,) and `readings` (m, c)."""
 
     rows: NDArray[np.intp]
     stamps_s: Array
@@ -177,7 +176,7 @@ def _find_repeated_values(values: Array) -> Array:
 
 
 def _sort(log: _UnorderedLog) -> _UnorderedLog:
-    """Return the log in the order of time, if its rows were written in another; unchanged if its clock was set back."""
+    """Return the log in the order of time, but unchanged if its clock was set back."""
     latest_s = np.maximum.accumulate(log.stamps_s)
     early = log.stamps_s < latest_s
     if not early.any():
@@ -227,9 +226,9 @@ def _drop_stale(log: _UnorderedLog) -> _UnorderedLog:
 
 
 def _spread_stalled(log: _UnorderedLog) -> _UnorderedLog:
-    """Return the log with the times at which readings were taken while a link stalled and they waited.
+    """Return the log with the times at which waiting readings were taken during a stall of the link.
 
-    If some were lost in this time, it is unknown which, and all that waited are left out.
+    If some of them were lost, it is unknown which, so all are left out.
     """
     stamps_s, interval_s = log.stamps_s.copy(), find_typical_interval_s(log.stamps_s)
     steps_s = np.diff(stamps_s)
@@ -259,8 +258,8 @@ def _spread_stalled(log: _UnorderedLog) -> _UnorderedLog:
 def _separate_equal(log: _UnorderedLog) -> _UnorderedLog:
     """Return the log without the second of two readings with equal stamps, unless an adjacent interval is free.
 
-    If an interval is missing before or after the two, one of them is moved into it. A log with coarse stamps or stamps
-    of arrival is unchanged: in it equal stamps are usual, and an even series has a time for each reading.
+    If an interval is missing before or after the two, one of them is moved there. A log with coarse stamps or arrival
+    times, in which equal stamps are usual, is unchanged.
     """
     steps_s = np.diff(log.stamps_s)
     equal = np.flatnonzero(steps_s == 0)
@@ -285,5 +284,5 @@ def _separate_equal(log: _UnorderedLog) -> _UnorderedLog:
 
 
 def _estimate_usual_delay_s(late_s: Array, interval_s: float) -> float:
-    """Return the delay that only readings that waited exceed, relative to the shortest delay soon after."""
+    """Return the delay, s, that only waiting readings exceed, relative to the shortest delay soon after."""
     return USUAL * float(np.median(late_s - find_least_ahead(late_s, LONG[-1]))) + ON_TIME * interval_s
