@@ -1,1 +1,1 @@
-"""Observations → typed result: calibration, verdict, verification, alignment, on-board check; pure."""
+"""From observations to typed results: calibration, verdict, verification, alignment, on-board check. Pure."""

@@ -1,7 +1,7 @@
 """The analyses that procedures name: from recordings to the outcome of a run.
 
-Whoever plans a procedure imports this, so the solvers are imported when they are needed. If NumPy or SciPy has no
-solution, each raises Fault `not_solvable`.
+Planning imports this module, so solvers are imported only when needed. If NumPy or SciPy has no solution, every
+analysis raises Fault `not_solvable`.
 """
 
 from collections.abc import Sequence
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 def calibrate(runs: "Sequence[RunData]", estimator: str = DEFAULT_ESTIMATOR, *, drifting: bool = False) -> Outcome:
     """Solve and judge the recordings of a calibration.
 
-    At least one recording is needed, from a run that just ended or from files. If `drifting`, a bias drift does not
-    count as a contradiction. Raise Fault or Refused if the recordings lack something.
+    `runs`: at least one recording, of a run or from files. If `drifting`, a bias drift is no contradiction. Raise Fault
+    or Refused if the recordings lack something.
     """
     if (external := runs[0].external) is not None:
         from rig.analysis.external import external_outcome as external_judging
@@ -66,7 +66,7 @@ def verify_calibration(outcome: Outcome, repeated: "Sequence[RunData]") -> Outco
 
 @solvable()
 def verify_stored_calibrations(repeated: "Sequence[RunData]") -> Outcome:
-    """Verify the calibrations stored on the board, by at least one recording of readings that it corrected.
+    """Verify the calibrations stored on the board, by at least one recording of readings corrected by it.
 
     Raise Fault as `verify_calibration` does.
     """

@@ -1,4 +1,4 @@
-"""One check of the verdict: a measured value and its limit, and the check's name. Pure."""
+"""One check of the verdict: its name, a measured value and the limit. Pure."""
 
 import math
 from collections.abc import Iterable, Iterator
@@ -16,7 +16,7 @@ ONLY_RECORDED = ("no_attitudes", "field_strength_unknown")
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """One limit of the verdict: a check passes if its value is a number not above limit - guard.
+    """One check of the verdict, which passes if its value is a number not above limit - guard.
 
     - name: the check in words, for people; programs read means.
     - value, limit: in unit; None if nothing was measured, or no limit was set.
@@ -47,7 +47,7 @@ class Check:
 
     @property
     def false_acceptance(self) -> float | None:
-        """The probability that the true value of a passed check is beyond the limit; None if it did not pass."""
+        """The probability that the true value of a passed check is beyond the limit; None if the check failed."""
         if self.value is None or self.limit is None or not self.uncertainty or not self.passed:
             return None
         return float(tail_probability((self.limit - self.value) * self.coverage_factor / self.uncertainty, self.dof))

@@ -1,7 +1,7 @@
-"""The controller's clock, the only standard of size, compared with this computer's clock and the board's crystal.
+"""The controller's clock, compared with this computer's clock and the board's crystal.
 
-Every recording has both. A speed is 2π over a time of the controller's clock, so every scale factor has that clock's
-error. A clock with a large error is not left out: the differences are compared with the stated errors of both clocks.
+A speed is 2π over a time of the controller's clock, so every scale factor has that clock's error. No clock is left out:
+each difference is compared with the stated errors of both clocks.
 """
 
 from collections.abc import Iterable, Iterator
@@ -29,8 +29,8 @@ SHORT = {BY_COMPUTER: "computer", BY_CRYSTAL: "crystal"}
 class ClockComparison:
     """The relative error of the controller's clock according to another clock, and its standard uncertainty.
 
-    `half_width` is stated of the other clock, `noise_std` the uncertainty by the recording with `dof` degrees of
-    freedom; `std` combines both.
+    `half_width`: of the other clock's error, as stated; `noise_std`: uncertainty by the recording, with `dof` degrees
+    of freedom.
     """
 
     by: str
@@ -63,7 +63,7 @@ class ClockDifference:
 class ClockCheck:
     """The relative `error` of the controller's clock (positive if it is fast) and its standard uncertainty `std`.
 
-    They are means of all `comparisons` and of the stated `half_width` about zero, weighted by inverse variance.
+    Both come from the mean of all `comparisons` and the stated `half_width` about zero, weighted by inverse variance.
     """
 
     error: float
@@ -72,7 +72,7 @@ class ClockCheck:
     half_width: float
 
     def differences(self) -> Iterator[ClockDifference]:
-        """Yield the difference of each pair of clocks; half-widths add up, as all values within are equally likely."""
+        """Yield the difference of each pair of clocks; in the limit, half-widths of uniform distributions add up."""
         clocks = [("controller", 0.0, self.half_width, 0.0)]
         clocks += [
             (SHORT[comparison.by], comparison.error, comparison.half_width, comparison.noise_std)
@@ -109,7 +109,7 @@ def check_clock(recording: ObservedRun, uncertainty: Uncertainty) -> ClockCheck:
 
 
 def worst_differences(clocks: Iterable[ClockCheck]) -> list[ClockDifference]:
-    """Return the difference of each pair of clocks, from the recording with the largest difference."""
+    """Return the largest difference of each pair of clocks among all recordings."""
     worst: dict[tuple[str, str], ClockDifference] = {}
     for one in (difference for check in clocks for difference in check.differences()):
         worst[one.clocks] = max(worst.get(one.clocks, one), one, key=lambda difference: difference.limit_fraction)

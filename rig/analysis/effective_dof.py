@@ -1,7 +1,7 @@
 """The degrees of freedom of estimates without a budget of their own: angles, sensitivity to gravity.
 
 Their variance is divided among the budget's contributors of type A, each with its degrees of freedom (Welch and
-Satterthwaite, JCGM 100, G.4); the rest, arm errors of a stated size, has infinite degrees of freedom.
+Satterthwaite, JCGM 100, G.4); the remainder, by arm errors of a stated size, has infinite degrees of freedom.
 """
 
 from typing import TYPE_CHECKING
@@ -73,7 +73,7 @@ def field_angle_dof(result: "MagnetometerResult") -> Array:
 def reversal_dof(reversal: "MagnetometerReversal") -> tuple[Array, Array]:
     """Return the degrees of freedom of the mean scale factors (3,), and of bias and arm's field (6,).
 
-    The latter are the fewest of any run's bias: a lower bound for a sum of independent parts.
+    Those of bias and field are the fewest of any run's bias, a lower bound for a sum of independent parts.
     """
     budgets = [run.result.budget for run in reversal.runs]
     # (Σ u_i²)² / ν of one run is Σ u_i⁴ / ν_i: errors common to the runs have infinite ν and add nothing.
@@ -102,8 +102,7 @@ def _attitude_dof(budget: Budget, response: Array, noise: Array, std: Array) -> 
 def _reading_parts(noise: Array, walk: Array, explained: Explained) -> dict[str, Array]:
     """Return the parts of a gyroscope's variances that are estimated from readings, by their contributor.
 
-    If the readings show no bias drift, the drift's part is omitted: it is the data sheet's flicker, whose dof is
-    infinite.
+    If the readings show no bias drift, its part is omitted: the data sheet's flicker has infinite dof.
     """
     return {NOISE: noise, **({WANDERING: walk} if explained.bias.is_drifting else {})}
 

@@ -1,4 +1,4 @@
-"""The surroundings of a run: the site, and the clock by which all speeds are measured."""
+"""The surroundings of a run: the site, and the clock that measures all speeds."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,10 +18,10 @@ BY_SPLINE = 0.935  # the same for an angle between two readings, by the cubic sp
 class Surroundings:
     """The site, the stated uncertainty, the controller's clock, and its states' jitter in s.
 
-    - `clock`: corrects the speeds; `clocks`: of all recordings, for the checks.
+    - `clock`: the comparison that corrects the speeds; `clocks`: those of all recordings, for the checks.
     - `extension_m` (3,): the sensors' position from the flange, in its frame.
     - `reading_noise_rad`: noise of a joint's angle at any time, from the noise of its encoder.
-    - `finds_earth_rate`: the Earth's rate is estimated, not taken from the site.
+    - `finds_earth_rate`: whether the Earth's rate is estimated, not taken from the site.
     """
 
     site: Site
@@ -38,8 +38,8 @@ class Surroundings:
 def surroundings_of(recordings: Sequence[ObservedRun], settings: RunSettings) -> Surroundings:
     """Return the site and the clock comparison of a run.
 
-    The recording with the longest motion determines the clock best, and all recordings share the controller's quartz.
-    `clocks` shows if they do not, or if the computer's time is wrong.
+    The recording with the longest motion determines the clock best, and all share the controller's quartz. `clocks`
+    would show another quartz, or a wrong time of the computer.
     """
     uncertainty = settings.stated_uncertainty
     longest = max(recordings, key=lambda run: float(run.motion.time_s[-1] - run.motion.time_s[0]))

@@ -1,4 +1,4 @@
-"""The kinds of sensors that packages add, with their own solvers, on an arm or from attitudes of a file. Pure."""
+"""Kinds of sensors that packages add, with their own solvers, on an arm or from a file's attitudes. Pure."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from rig.observation.observed_run import ObservedRun
 
 @dataclass(frozen=True, slots=True)
 class OfKind:
-    """The solution by an installed kind's solver, and its checks of fitness."""
+    """The solution by an installed kind's solver, and its checks."""
 
     solution: object
     checks: tuple[Check, ...] = ()
@@ -26,7 +26,7 @@ class OfKind:
 
 @dataclass(frozen=True, slots=True)
 class KindFound:
-    """The solution for the sensor named `sensor`; None if there is none, for the reason in `fault`."""
+    """The solution of one sensor of an installed kind, or None for the reason in `fault`."""
 
     name: str
     sensor: RecordedSensor | Item

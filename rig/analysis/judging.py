@@ -1,4 +1,4 @@
-"""The analyses behind `rig.analysis.analyses`: recordings are solved, verified and judged."""
+"""The implementation of `rig.analysis.analyses`: recordings are solved, verified and judged."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -95,7 +95,7 @@ def calibrate(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Out
 def _check_unsolved(
     magnetometers: "Attempts[str, MagnetometerResult]", installed_kinds: Sequence[KindFound]
 ) -> Iterator[Check]:
-    """Yield the failing checks of sensors that were to be calibrated and have no solution."""
+    """Yield a failing check for each sensor that was to be calibrated and has no solution."""
     yield from list_unsolved((name, FIELD.name, fault) for name, fault in magnetometers.faults.items())
     yield from list_unsolved((kind.name, kind.quantity.name, kind.fault) for kind in installed_kinds if kind.fault)
 
@@ -186,7 +186,7 @@ def _add_polynomials(
     add: Callable[[ResultT, "OverTemperature"], tuple[ResultT, "OverTemperature"]],
     polynomials: "Polynomials",
 ) -> tuple[dict[str, ResultT], "Polynomials"]:
-    """Return a quantity's results, whose uncertainty includes that of the polynomials, and the polynomials."""
+    """Return a quantity's results and its polynomials, each with the uncertainty of the other."""
     settled = {name: add(results[name], fits[quantity]) for name, fits in polynomials.items() if quantity in fits}
     added = {name: result for name, (result, _) in settled.items()}
     combined = {name: {**polynomials[name], quantity: fit} for name, (_, fit) in settled.items()}
@@ -256,9 +256,9 @@ def _gravity_effects(
     after: Sequence[ObservedRun],
     settings: RunSettings,
 ) -> tuple[Array, Array] | None:
-    """Return gravity's effect (N, 3) on the corrected readings of sensor and reference, whose corrections omit it.
+    """Return gravity's effects (N, 3) on the corrected readings of sensor and reference, which contain them.
 
-    The centripetal acceleration acts as gravity does. Return None if the calibration has no g-sensitivity.
+    The centripetal acceleration acts like gravity. None if the calibration has no g-sensitivity.
     """
     from rig.analysis.gyroscope.comparison import list_revolutions
 

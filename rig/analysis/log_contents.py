@@ -1,4 +1,4 @@
-"""The contents of a file of another program, read by the functions that solve it."""
+"""The contents of another program's file, read by the functions that solve it."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -30,13 +30,13 @@ from rig.sensors.lines.log_columns import OPEN, LogColumns, guess_columns
 
 @dataclass(frozen=True, slots=True)
 class LookedFile:
-    """What a file holds.
+    """The contents of a file.
 
     - layout, guess: of a table; None for a bag or a log of an autopilot.
-    - columns: the map of its columns, in the form of `--columns`, to be completed if it contains "?".
+    - columns: the map of its columns, in the form of `--columns`, incomplete if it contains "?".
     - samples, survey: its readings, if any can be read; others: number of rows without readings; note: what the
       readings lack.
-    - origin_s: origin of the readings' times; the attitudes' times begin with 0 of their own clock.
+    - origin_s: origin of the readings' times; the attitudes' times are those of their own clock.
     - attitudes: the rows of its reference, if it has one.
     - refusals: why readings or attitudes could not be read.
     """
@@ -102,7 +102,7 @@ def is_incomplete(columns: Mapping[str, Any]) -> bool:
 
 
 def _read_numbers(path: Path, layout: TableLayout) -> tuple[Array, Array | None]:
-    """Return all numbers (n, k) of a table, NaN where missing, and times (n,) in their column's unit or None."""
+    """Return all numbers (n, k) of a table, NaN if missing, and the times (n,) in their column's unit, or None."""
     unit_s = 1.0 if layout.time_unit is None else UNITS[layout.time_unit].size
     columns = {f"column_{index}": (str(index + 1), 1.0) for index in layout.numbers if index != layout.time}
     if layout.time is not None:
@@ -117,7 +117,7 @@ def _read_numbers(path: Path, layout: TableLayout) -> tuple[Array, Array | None]
 
 
 def _map_of(layout: TableLayout, guess: LogColumns) -> dict[str, Any]:
-    """Return the map of a table's columns, without those that have the rig's names and units."""
+    """Return the map of a table's columns, without columns that have the rig's names and units."""
     columns: dict[str, Any] = {}
     sections = {"samples": guess.samples, "motion": guess.motion}
     for section, entries in sections.items():

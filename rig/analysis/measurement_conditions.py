@@ -1,6 +1,6 @@
-"""The times and temperatures to which a calibration refers: those of the readings from which it is estimated.
+"""The times and temperatures of the readings from which a calibration is estimated.
 
-A gyroscope's scale factors come from the sweeps alone, its bias from sweeps and rests: in a sensor that warms up they
+A gyroscope's scale factors come from the sweeps alone, its bias from sweeps and rests: if the sensor warms up, these
 refer to different temperatures.
 """
 
@@ -19,7 +19,7 @@ from rig.observation.observed_run import ObservedRun
 class When:
     """The times of readings in UTC with their mean, and their mean temperature with its range.
 
-    No temperatures without a thermometer, and no range if the temperature was stated.
+    Temperatures are None without a thermometer; the range is None if the temperature was stated.
     """
 
     from_utc: datetime
@@ -78,7 +78,7 @@ def accelerometer_conditions(recordings: Sequence[ObservedRun], name: str, dwell
 
 
 def magnetometer_conditions(recordings: Sequence[ObservedRun], name: str, dwells: Iterable[int]) -> When:
-    """Return the conditions of a magnetometer's readings in the last dwells of these indices; it has no thermometer."""
+    """Return the conditions, without temperature, of a magnetometer's readings in the last dwells of these indices."""
     wanted = frozenset(dwells)
     times_s = {
         index: (start_s + recording.clock_offset_s, end_s + recording.clock_offset_s)

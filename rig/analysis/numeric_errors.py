@@ -10,7 +10,7 @@ LIBRARIES = ("numpy.", "scipy.")
 
 @contextmanager
 def solvable() -> Iterator[None]:
-    """Raise Fault `not_solvable` if NumPy or SciPy raises ValueError in the block; let errors of our own code pass."""
+    """Raise Fault `not_solvable` if NumPy or SciPy raises ValueError in the block; errors of our own code pass."""
     try:
         yield
     except ValueError as error:  # includes NumPy's LinAlgError

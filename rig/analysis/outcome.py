@@ -43,7 +43,7 @@ class Origin:
 def origin_of(runs: "Sequence[RunData]") -> Origin:
     """Return the origin of a run's recordings, at least one, with the present time of solution.
 
-    A recording of another stage does not resume the previous one, because the item was remounted.
+    A recording of another stage is no resumption, because the item was remounted.
     """
     return Origin(
         recorded=runs[0].provenance,
@@ -65,17 +65,17 @@ class Outcome:
     - checks: the limits of the verdict.
     - results: the calibrations of gyroscopes; empty if stored calibrations were verified.
     - onboard: the board's own calibrations, compared with the host's; empty if stored ones were verified.
-    - verifications: as many as were possible.
-    - clock: comparison of the controller's clock, None if a recording does not state its uncertainty.
+    - verifications: all that were possible.
+    - clock: comparison of the controller's clock, None if its uncertainty is not stated.
     - accelerometers: the calibrations of accelerometers.
-    - magnetometers: the calibrations of magnetometers; no limit of scale and bias judges them.
+    - magnetometers: the calibrations of magnetometers, without limits of scale and bias.
     - drifts: biases by repeat, if attitudes were repeated.
     - detection_limits: of the checks of gyroscopes.
     - reference_detection_limits: of the checks of accelerometers and magnetometers.
     - external: the results of external recordings; their gyroscopes are in results too.
     - installed_kinds: the results of the solvers of installed kinds.
     - mounts: the item's mount in each stage after the first.
-    - polynomials: a calibration over temperature, with which all other results refer to the reference temperature.
+    - polynomials: a calibration over temperature; all other results then refer to the reference temperature.
     """
 
     settings: "RunSettings"
@@ -98,7 +98,7 @@ class Outcome:
 
     @property
     def verdict(self) -> Literal["pass", "fail"]:
-        """The verdict: "pass" if there are checks and all of them passed."""
+        """The verdict: "pass" if there are checks and all passed."""
         from rig.analysis.verdict import verdict
 
         return verdict(self.checks)

@@ -1,7 +1,6 @@
-"""The partial results of a run in progress: observations, refusals, and parameters when they are identifiable.
+"""The partial results of a run in progress: observations, refusals, and parameters once they are identifiable.
 
-They are for display. The final result comes from `rig.analysis.outcome` and may differ; here the uncertainty includes
-only the noise.
+They are for display: the final result may differ, and the uncertainty includes only the noise.
 """
 
 from collections.abc import Mapping, Sequence
@@ -34,8 +33,8 @@ NO_SWEEP_YET = Fault("too_few_observations", "no sweep is averaged yet", "Wait f
 class PartialGyroscope:
     """A gyroscope's partial result: its finished sweeps by index, observed or refused.
 
-    The `solution` of the vector model is None as long as the fault `missing` names what it lacks. `bias_rad_s` (3,) is
-    from the rests alone, with its standard deviation; None without rests.
+    The `solution` of the vector model is None while it lacks data, by the fault `missing`. `bias_rad_s` (3,), by the
+    rests alone, has a standard deviation; None without rests.
     """
 
     sweeps: Attempts[int, Observation]
@@ -54,7 +53,7 @@ class SoFar:
 
 @dataclass(frozen=True, slots=True)
 class _RecordedPart:
-    """One recording's part of a gyroscope, and of its accelerometer; no `clock` if none could be determined."""
+    """One recording's part of a gyroscope and its accelerometer; `clock` is None if it could not be determined."""
 
     clock: TimeBase | None
     sweeps: Attempts[int, Observation]
@@ -63,7 +62,7 @@ class _RecordedPart:
 
 
 def so_far(runs: Sequence[RunData]) -> SoFar:
-    """Return the partial results of raw readings. Of a repeated sweep or dwell, the last one counts."""
+    """Return the partial results of raw readings. The last one of a repeated sweep or dwell counts."""
     sweeps: dict[str, Attempts[int, Observation]] = {}
     rests: dict[str, list[Average]] = {}
     at_rest: Attempts[QuantityInDwell, ReadAtRest] = Attempts()

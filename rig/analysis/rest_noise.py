@@ -1,4 +1,4 @@
-"""The noise of sensors at rest: the Allan deviation of every rest and dwell, or of a log of another program. Pure."""
+"""The noise of sensors at rest: the Allan deviation of all rests and dwells, or of another program's log. Pure."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -28,8 +28,8 @@ FEWEST_TO_JUDGE = 20  # readings: fewer may be equal by chance
 class AtRest:
     """The Allan deviation of one quantity at rest in rad/s or m/s², and the noise parameters of its axes.
 
-    `longest_s` is the longest interval without a gap, `total_s` the sum of all; `temperature_c` the lowest and the
-    highest, None without a thermometer.
+    `longest_s`: the longest interval without a gap; `total_s`: the sum of all; `temperature_c`: lowest and highest,
+    None without a thermometer.
     """
 
     curve: AllanCurve
@@ -42,9 +42,9 @@ class AtRest:
 
 @dataclass(frozen=True, slots=True)
 class SensorAtRest:
-    """A sensor, None if the readings do not name it, and for every quantity its noise, or the Fault if it has none.
+    """A sensor, None if the readings do not name it, and each quantity's noise, or the Fault that prevents it.
 
-    `notes` state what was left out of a log, and how its time stamps were interpreted.
+    `notes`: what was left out of a log, and how its time stamps were interpreted.
     """
 
     sensor: RecordedSensor | None
@@ -73,7 +73,7 @@ def rest_noises(runs: Sequence[RunData]) -> dict[str, SensorAtRest]:
 
 
 def log_at_rest(samples: Samples) -> SensorAtRest:
-    """Return the noise of a sensor at rest during a whole log of another program. Raise Fault `not_at_rest`."""
+    """Return the noise of a sensor at rest during another program's whole log. Raise Fault `not_at_rest`."""
     for quantity, readings in samples.readings.items():
         check_at_rest(samples.time_s, readings, quantity)
     sampling = samples.sampling or find_sampling(samples.time_s)

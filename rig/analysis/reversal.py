@@ -19,7 +19,7 @@ ALIKE = (
 
 @dataclass(frozen=True, slots=True)
 class AsMounted:
-    """The result of one run, which `run` names."""
+    """The result of the run named `run`."""
 
     run: str
     outcome: Outcome
@@ -28,7 +28,7 @@ class AsMounted:
 
 @dataclass(frozen=True, slots=True)
 class MagnetometerReversal:
-    """One magnetometer in several runs; `scale` (3,) and `correction_matrix` (3, 3) are the means of theirs."""
+    """One magnetometer in several runs; `scale` (3,) and `correction_matrix` (3, 3) are means over the runs."""
 
     runs: tuple[AsMounted, ...]
     separation: Reversal

@@ -1,4 +1,4 @@
-"""The verdict: every measured value against its limit. A missing measurement or limit fails."""
+"""The verdict: measured values against their limits. A missing measurement or limit fails."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -51,7 +51,7 @@ class _LimitSet:
         return Check(name_check(self.sensor, self.quantity, what), value, limit, row.unit, means)
 
     def nearest(self, what: str, values: Array, uncertainty: ExpandedUncertainty | None) -> Check:
-        """Return the check of the worst of three axes: its value is nearest to the limit by the decision rule."""
+        """Return the check of the worst of three axes, whose value is nearest to the limit by the decision rule."""
         check = self.check(what, _largest_magnitude(values))
         if uncertainty is None or check.value is None:
             return check
@@ -113,8 +113,8 @@ def judge(
 def verification_checks(sensor: str, verification: "Verification | None", limits: Limits | None) -> tuple[Check, ...]:
     """Return the checks of calibrated readings: the worst axis, and the worst mean over a revolution.
 
-    The same limit applies to the reference's error against the arm, because that may be the cause. None means a
-    verification that did not take place.
+    The same limit applies to the reference's error against the arm, which may be the cause. `verification` is None if
+    it did not take place.
     """
     rms = mean = verified = None
     if verification is not None:
@@ -168,7 +168,7 @@ def drift_checks(
 
 
 def verdict(checks: Sequence[Check]) -> Literal["pass", "fail"]:
-    """Return "pass" if there are checks and all of them passed."""
+    """Return "pass" if there are checks and all passed."""
     return "pass" if checks and all(check.passed for check in checks) else "fail"
 
 

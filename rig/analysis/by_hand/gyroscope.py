@@ -1,4 +1,4 @@
-"""The calibration of a gyroscope from readings of a body that a hand turned on a table. Pure."""
+"""The calibration of a gyroscope from readings of a body turned by hand on a table. Pure."""
 
 from rig.analysis.gyroscope.calibration import ALGORITHM_1, NEWTON, SensorResult
 from rig.analysis.gyroscope.correction import Correction, matrix_correction
@@ -48,7 +48,7 @@ def build_hand_result(sensor: RecordedSensor | Item, solution: HandSolution, cor
 
 
 def read_conditions(columns: Columns) -> SessionConditions:
-    """Return the conditions that the only row of a table "turns" states (`rig.data.recording.motion_file`)."""
+    """Return the conditions in the only row of a table "turns" (`rig.data.recording.motion_file`)."""
     first = columns.get("first_face")
     return SessionConditions(
         clock_ppm=float(columns["clock_ppm"][0]),

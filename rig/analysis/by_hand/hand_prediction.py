@@ -62,7 +62,7 @@ def _move_s(move: Instruction) -> float:
 
 
 def _session(sensor: SensorSection, moves: Sequence[Instruction], rest_s: float) -> HandRecording:
-    """Simulate the readings of a session in the sensor's axes, divided into rests and moves like a recording."""
+    """Simulate the readings of a session in the sensor's axes, segmented into rests and moves."""
     no_rotation, faces = np.zeros(3), [FIRST, *(move.face for move in moves)]
     spans = [_sample_rotation(rest_s, FIRST, no_rotation)]
     for face, move in zip(faces, moves, strict=False):
@@ -94,7 +94,7 @@ def _sample_rotation(lasting_s: float, face: Face, rotation: Array) -> tuple[Arr
 
 
 def _rotation(face: Face, move: Instruction) -> Array:
-    """Return the rotation vector (3,) of a move in the item's axes, from the face that is up to the next one."""
+    """Return the rotation vector (3,), in the item's axes, of a move from the face that is up."""
     up, target = axis_of(face), axis_of(move.face)
     if move.turns:
         return 2 * np.pi * move.turns * up

@@ -1,8 +1,7 @@
 """The comparison of the board's calibration by hand with double precision. Pure.
 
 The host integrates the same readings by the same equations (`rig.estimation.by_hand.on_board`), with the rests and
-moves that the board reports. So only the arithmetic differs. The quality of such a calibration is another matter: that
-is its stated uncertainty, and a verification.
+moves that the board reports, so only the arithmetic differs. The calibration's quality is not judged here.
 """
 
 from collections.abc import Iterator, Sequence
@@ -36,7 +35,7 @@ class BoardReadings:
 
 @dataclass(frozen=True, slots=True)
 class HandAgreement:
-    """A solution in double precision, and the largest difference of the board's matrix, and bias, from it."""
+    """A solution in double precision, and the largest differences of the board's matrix and bias from it."""
 
     host: BoardSolution
     matrix_difference: float

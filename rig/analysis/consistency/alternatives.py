@@ -1,7 +1,7 @@
-"""Possible faults of a gyroscope during a recording: the alternatives that are tested, and fault modes of a given size.
+"""Possible faults of a gyroscope during a recording: the tested alternatives, and fault modes of a given size.
 
-A check tests how much of the residuals its columns explain. A fault mode is a fault as it may really happen: the
-columns of its check are similar, not equal.
+A check tests how much of the residuals its columns explain. A fault mode is a realistic fault, similar but not equal to
+the columns of its check.
 """
 
 from dataclasses import dataclass
@@ -19,9 +19,9 @@ from rig.observation.consistency.raw_readings import REST
 class Means:
     """The mean readings of N sweeps and rests.
 
-    - felt_rad_s (N, 3): rates along the sensor's axes by the arm.
+    - sensed_rad_s (N, 3): rates along the sensor's axes, by the arm.
     - times_s (N, 2): start and end.
-    - sweep (N,): the index of their sweep, negative for none.
+    - sweep (N,): index of the sweep, negative for a rest.
     """
 
     sensed_rad_s: Array
@@ -42,7 +42,7 @@ class Means:
 
 
 def _axis_patterns(columns: Array) -> Array:
-    """Return patterns (3, N, 3): the change (N, 3) on one axis only."""
+    """Return patterns (3, N, 3): a change (N, 3) of each axis alone."""
     return np.moveaxis(split_per_axis(columns), -1, 0).swapaxes(1, 2)
 
 
@@ -82,7 +82,7 @@ FAULT_MODES: tuple[FaultMode[Means], ...] = (  # (k, N, 3) each
 
 
 def changes(segments: Segments, axis_rates: Array) -> Alternatives:
-    """Return columns (3, N, k) of a scale factor, or a mounting, that changes with time, by the name of the check."""
+    """Return by check the columns (3, N, k) of a scale factor, or a mounting, that changes with time."""
     time = normalised_time(segments)
     for sweep in np.unique(segments.sweep):  # a change within a sweep is tested for that sweep
         time[segments.sweep == sweep] = time[segments.sweep == sweep].mean()
@@ -94,7 +94,7 @@ def changes(segments: Segments, axis_rates: Array) -> Alternatives:
 
 
 def differences(segments: Segments, axis_rates: Array, whole: Array | None) -> dict[str, Array | None]:
-    """Return columns (3, N, k) of each check for differences: between directions, sweeps and rests, and residuals.
+    """Return by check the columns (3, N, k) of differences: between directions, sweeps and rests, and all residuals.
 
     `whole` (3, N, k) are the columns that give each sweep its own mean. If it is None, the check `residuals` uses all
     residuals, including the scatter within sweeps.

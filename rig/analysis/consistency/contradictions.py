@@ -1,4 +1,4 @@
-"""The checks of the verdict that compare a recording with itself: a recording that contradicts itself does not pass."""
+"""The checks of the verdict that compare a recording with itself."""
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -59,11 +59,11 @@ def contradictions(
     false_alarms: float = FALSE_ALARMS,
     has_limits: bool = True,
 ) -> ConsistencyChecks:
-    """Return the checks for contradictions in the results of these sensors.
+    """Return the checks for contradictions in the gyroscopes' recordings.
 
-    `surroundings` belong to the recordings, `false_alarms` is the fraction of undamaged runs that may fail. The check
-    of a disturbed sweep has its index in its name, `gyro.disturbed_sweep.3`, and in its meaning. `has_limits`: whether
-    the detection limits are also computed, which takes a third of the time.
+    `surroundings` are those of the recordings, `false_alarms` is the fraction of undamaged runs that may fail. The
+    check of a disturbed sweep has the sweep's index in its name, `gyro.disturbed_sweep.3`, and in its meaning.
+    `has_limits`: whether to compute the detection limits, a third of the time.
     """
     checks: list[Check] = []
     detection_limits: dict[str, tuple[DetectionLimit, ...]] = {}
@@ -112,9 +112,9 @@ def contradictions(
 def _non_orthogonality_deg(solution: VectorSolution, stated_deg: float, false_alarm_probability: float) -> Statistic:
     """Return the largest non-orthogonality relative to the stated one, and its limit, in degrees.
 
-    `stated_deg` is a half-width. The limit adds the uncertainty of the angle at this false-alarm probability. Sweeps
-    about three axes cannot separate a wrist's zero error from a tilted sensor axis. No residual shows it, and if the
-    sensor is mounted askew, its scale factors are wrong.
+    `stated_deg` is a half-width. The limit adds the angle's uncertainty at this false-alarm probability. Sweeps about
+    three axes cannot separate a wrist's zero error from a tilted sensor axis: no residual shows the error, and scale
+    factors of an askew sensor are wrong.
     """
     from scipy.special import ndtri
 
@@ -172,9 +172,9 @@ def _false_alarm_probability(run: RunData, sensors: Sequence[str], settings: Run
 
 
 def contradicting_sweeps(runs: Sequence[RunData]) -> frozenset[int]:
-    """Return the sweeps of an unfinished run that contradict the others for any sensor, judged as in the verdict.
+    """Return the sweeps of an unfinished run that, judged as in the verdict, contradict the others for any sensor.
 
-    Gyroscopes and accelerometers without a solution so far contribute no sweep.
+    A sensor without a solution so far contributes no sweep.
     """
     settings = runs[0].settings if runs else None
     if settings is None or not settings.planned_sweeps:

@@ -41,7 +41,7 @@ BETWEEN_COUNTS = 1.5  # counts: readings in larger steps are not those of a conv
 
 @dataclass(frozen=True, slots=True)
 class Digits:
-    """The recorded numbers of a source: the `steps` of counts between them, and whether they have bits to test."""
+    """The recorded numbers of a source: the steps between them, in counts, and whether they have bits to test."""
 
     has_bits: bool
     steps: Steps
@@ -80,8 +80,8 @@ def judge_readings(
 ) -> Statistics:
     """Return statistic and limit by the check's name, from all readings (n, 3) and the windows of each recording.
 
-    Each statistic has at most the given false-alarm probability. The noise is the median of all windows, so a stuck
-    axis in some of them does not make it zero. `frozen`: the longest run of equal readings of an axis during motion.
+    Each statistic has at most the given false-alarm probability. The noise is the median of all windows, so it is not
+    zero if an axis is stuck in some. `frozen`: the longest run of equal readings of an axis during motion.
     """
     from scipy.special import ndtri
 
@@ -117,7 +117,7 @@ def judge_readings(
 
 
 def _count_constant_bits(counts: NDArray[np.int64]) -> int:
-    """Count the bits, over the axes, that never change although the readings range over both values."""
+    """Count the bits, over the axes, that never change although the readings' range contains both values."""
     constant = 0
     for axis in counts.T:
         if len(np.unique(axis)) < FEWEST_VALUES:
@@ -205,7 +205,7 @@ def _longest_run(counts: NDArray[np.int64]) -> int:
 
 
 def _count_repeated(counts: NDArray[np.int64]) -> int:
-    """Count the sequences of readings that repeat an earlier one."""
+    """Count the sequences of readings that repeat an earlier sequence."""
     stretches = np.lib.stride_tricks.sliding_window_view(counts.astype(np.int16), STRETCH, axis=0)
     rows = np.ascontiguousarray(stretches.reshape(len(stretches), -1))
     return len(rows) - len(np.unique(rows.view(f"V{rows.shape[1] * 2}")))

@@ -1,4 +1,4 @@
-"""Fault modes of a recording with their minimal detectable size, and the error of a result that escapes detection."""
+"""Fault modes of a recording with their minimal detectable size, and the error of a result that goes undetected."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 class DetectionLimit:
     """The `size` of a fault, in `unit`, that its check detects in 95 of 100 recordings, or infinity.
 
-    `off_by_expanded`: the largest error of a scale factor or bias by a fault just below it, in U as then stated, if
-    known.
+    `off_by_expanded`: the largest error of scale factor or bias by a fault just below `size`, in units of the U then
+    stated.
     """
 
     what: str
@@ -76,7 +76,7 @@ def _means_of_solve(explained: Explained) -> Means:
 def _error_over_expanded(patterns: Array, explained: Explained, mounting: Array, inputs: Unknown) -> float | None:
     """Return a result's error, in units of U, due to the worst of the patterns (k, N, 3); None without a solution.
 
-    The means are solved again with the fault, which may look like bias drift and increase U.
+    The means are solved again with the fault, which may also look like bias drift and increase U.
     """
     solution, inputs_of_solve = explained.solution, explained.inputs
     response = np.einsum("qni,kni->kq", solution.response, patterns) / np.sqrt(np.diag(solution.covariance))

@@ -1,4 +1,4 @@
-"""The probability that the checks against contradictions fail an undamaged run, and the fraction of each check."""
+"""The false-alarm probability of the checks for contradictions, divided among them."""
 
 from rig.analysis.consistency import converter_tests, gyroscope_checks
 from rig.analysis.consistency.gyroscope_checks import DISTURBED_SWEEP

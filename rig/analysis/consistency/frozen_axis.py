@@ -1,4 +1,4 @@
-"""The check for an axis that repeats one reading while the arm rotates it: no healthy axis does, however coarse."""
+"""The check for an axis that repeats one reading while its rate changes, which no healthy axis does, however coarse."""
 
 import numpy as np
 
@@ -37,7 +37,7 @@ def find_longest_frozen(recording: ObservedRun, name: str) -> int:
 def _rate_change(recording: ObservedRun, time_s: Array, axis: Array) -> float:
     """Return the change of the rate along an axis (3,) of the flange over times (n,), rad/s.
 
-    Rates are averaged over `SMOOTHED_S`: between two states, the noise of their times would dominate.
+    Rates are averaged over `SMOOTHED_S`: between two states the noise of times would dominate.
     """
     covered_s = time_s[recording.motion.covered(time_s)] if len(time_s) else time_s
     if len(covered_s) < FEWEST:

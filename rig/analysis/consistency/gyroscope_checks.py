@@ -1,13 +1,13 @@
 """The checks of a gyroscope's recording against itself: segments of sweeps and rests against one model.
 
 One calibration must explain all segments: m = F ω + c + G a + d t, the vector model with gravity and a steady bias
-drift, within noise, bias random walk and the known errors of arm and sensor. Each check tests the columns of one fault:
-without this fault, their χ² has as many degrees of freedom as columns. The bias process is estimated from residuals
+drift, within noise, bias random walk and the known errors of arm and sensor. Each check tests the columns of one fault,
+whose χ² without the fault has as many degrees of freedom as columns. The bias process is estimated from residuals
 within sweeps and between rests, so that a disturbed sweep does not mask itself.
 
-A ripple faster than readings and states is in the transfers' mean readings but in no rates. It looks like noise unless
-it is synchronous with the samples. So the unexplained variance of transfers is inflated by their Birge ratio, which
-excludes all changes from quarter to quarter.
+A ripple faster than readings and states affects the transfers' mean readings but no rates, and looks like noise unless
+it is synchronous with the samples. So the unexplained variance of transfers is inflated by their Birge ratio, after a
+fit of all changes from quarter to quarter.
 """
 
 from collections.abc import Iterator
@@ -70,9 +70,9 @@ MOST, TRIED = 16.0, 7  # largest variance inflation by a synchronous ripple; num
 class ErrorPatterns:
     """The known errors of segments, one pattern of one standard deviation each: `patterns_rad_s` (P, N, 3).
 
-    `encoders_rad_s` (E, N, 3) are those among them that the encoders make in arcs. `transfers` are the same segments
-    with the transfers between them, `transfer_patterns_rad_s` (Q, M, 3) their patterns; `instability_rad_s` is the
-    sensor's bias instability.
+    - `encoders_rad_s` (E, N, 3): those among them by the encoders in arcs.
+    - `transfers`: the segments with the M − N transfers; `transfer_patterns_rad_s` (Q, M, 3): their patterns.
+    - `instability_rad_s`: the sensor's bias instability.
     """
 
     patterns_rad_s: Array
@@ -146,7 +146,7 @@ def check_gyroscope(
 def _steady_rates(segments: Segments, matrix: Array) -> Segments:
     """Return the segments with the mean rate of each sweep, and with the deviations from it removed from the readings.
 
-    Encoder noise in the rates appears equally in the residuals of the readings, so noisy columns would explain it.
+    Otherwise noisy columns would explain the encoder noise, which rates and residuals share.
     """
     rates = segments.rates_rad_s.copy()
     for sweep in np.unique(segments.sweep[segments.sweep > REST]):
@@ -188,7 +188,7 @@ def _inflate_transfers(segments_only: _Tested, matrix: Array, allowance: ErrorPa
 def _residual_chi_square(tested: _Tested) -> tuple[float, int]:
     """Return the χ² of segments with all possible changes in the model, and its degrees of freedom.
 
-    Changes that differ from the model only by noise of the rates are ignored; they occur in sweeps without transfers.
+    In sweeps without transfers some changes differ from the model only by noise of the rates: these are ignored.
     """
     changed = [*changes(tested.segments, tested.axis_rates).values(), quarter_columns(tested.means)]
     columns = [apply_whitener(tested.model.whitener, change) for change in changed if change is not None]
@@ -249,11 +249,11 @@ def _detection_limits(
 def _test_bias_jump(
     segments: Segments, axis_rates: Array, scatter: Scatter, false_alarm_probability: float
 ) -> Statistic | None:
-    """Return the χ² of the bias' largest jump between two rests, drift included; None with fewer than three rests.
+    """Return the χ² of the bias' largest jump between two rests, relative to drift; None with fewer than three rests.
 
     The drift is re-estimated with the best jump in the model; otherwise it would contain the jump. Few rests determine
-    the drift poorly. Simulated random walks exceed the critical value about as often as F with one degree of freedom
-    for each possible jump.
+    the drift poorly, so the critical value is from F with one degree of freedom per possible jump, which simulated
+    random walks exceed about as often.
     """
     steady_columns, steps = _steady_columns(segments), step_columns(segments)
     if len(steps) < 2:
@@ -281,7 +281,7 @@ def _test_bias_jump(
 
 
 def _jump_critical_value(segment_sets: int, false_alarm_probability: float) -> float:
-    """Return the critical value for a jump that may occur at any of a number of sweep ends."""
+    """Return the critical value for a jump that may occur at any of several sweep ends."""
     from scipy.special import fdtri
 
     return 3 * float(fdtri(3, segment_sets, 1 - false_alarm_probability / segment_sets))
@@ -311,6 +311,6 @@ def _build_scatter(segments: Segments, patterns_rad_s: Array, allowance: ErrorPa
 
 
 def _steady_columns(segments: Segments, *more: Array) -> Array:
-    """Return orthonormal columns (N, k): a level of each sweep and of all rests, gravity, a steady drift, `more`."""
+    """Return orthonormal columns (N, k): a level of each sweep and of all rests, gravity, steady drift, and `more`."""
     segment_sets = [segments.sweep == sweep for sweep in np.unique(segments.sweep)]
     return orthonormal_basis(np.column_stack([*segment_sets, segments.gravity_m_s2, normalised_time(segments), *more]))

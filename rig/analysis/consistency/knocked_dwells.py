@@ -21,8 +21,7 @@ def compare_dwell_halves(
     The limit is a quantile of the F distribution, because the noise is estimated from the dwells' readings. Flicker
     with the Allan deviation `flicker_counts` makes the halves differ by √2 times as much. A slow oscillation that no
     encoder measures affects every dwell, a knock only one; so the differences in the other dwells are added to the
-    variance. The degrees of freedom of both are combined by Welch–Satterthwaite. `steps` are the resolution steps of
-    the counts.
+    variance, with degrees of freedom by Welch–Satterthwaite. `steps` are those of the counts.
     """
     from scipy.special import fdtri
 
@@ -45,7 +44,7 @@ def compare_dwell_halves(
 
 
 def _swing_variances(differences: Array, noise: Array) -> Array:
-    """Return the mean square (N,) of the halves' differences in the other dwells, minus the noise (3,) of these."""
+    """Return the mean square (N,) of the halves' differences in all other dwells, minus their noise (3,)."""
     beyond = (differences**2 - noise).mean(axis=1)
     others: Array = np.maximum((beyond.sum() - beyond) / max(len(beyond) - 1, 1), 0.0)
     return others

@@ -1,4 +1,4 @@
-"""Possible faults of readings of a constant reference: alternatives that are tested, and fault modes of a given size.
+"""Possible faults of readings of a constant reference: the tested alternatives, and fault modes of a given size.
 
 As `rig.analysis.consistency.alternatives`, for accelerometers and magnetometers.
 """
@@ -17,7 +17,7 @@ from rig.estimation.reference.reference_model import REFERENCE, matrix
 
 @dataclass(frozen=True, slots=True)
 class ReferenceModel:
-    """The model of readings in a reference: θ (22,) estimated from the `movement`, and the known errors of both.
+    """The model of readings in a reference: θ (22,), estimated from the `movement`, and the known errors.
 
     `error_patterns` (P, 3 K): independent errors of the readings, each of one standard uncertainty; `times_s` (N + M,):
     the middles of dwells and sweeps.
@@ -66,7 +66,7 @@ def segment_columns(model: ReferenceModel, segment: int) -> Array:
 
 
 def bias_drift_columns(model: ReferenceModel) -> Array:
-    """Return the columns of a bias that drifts at a constant rate."""
+    """Return columns (3 K, 3) of a bias that drifts at a constant rate."""
     return per_axis((_time(model) * model.movement.constant())[:, None] * np.ones(3))
 
 
@@ -96,7 +96,7 @@ def _axis_components(model: ReferenceModel) -> Array:
 
 
 def _bend_pattern(change: Callable[[Array], Array]) -> Callable[[ReferenceModel], Array]:
-    """Return the patterns of a nonlinear `change` of the specific force, given relative to the reference."""
+    """Return a function for the patterns of a nonlinear `change` of the specific force relative to the reference."""
 
     def patterns(model: ReferenceModel) -> Array:
         size = float(np.linalg.norm(model.theta[REFERENCE]))

@@ -1,9 +1,8 @@
 """The checks of readings in a constant reference against themselves: dwells and sweeps against one model.
 
-The calibration that was computed from them (`rig.estimation.reference.accelerometer_model`) must explain the readings
-of an accelerometer, or of a magnetometer, which has dwells only, within their noise, the arm's attitude error δ and
-stated errors. δ is re-estimated together with every alternative, so that a fault does not mask itself: a
-likelihood-ratio test.
+The calibration (`rig.estimation.reference.accelerometer_model`) must explain the readings of an accelerometer, or of a
+magnetometer, which has dwells only, within their noise, the arm's attitude error δ and stated errors. δ is re-estimated
+with every alternative, so that a fault does not mask itself: a likelihood-ratio test.
 """
 
 from collections.abc import Sequence
@@ -63,10 +62,10 @@ class WhitenedReference:
     ) -> Statistic | None:
         """Return the likelihood-ratio statistic of the columns, and its limit.
 
-        It is twice the logarithm of the ratio, χ² if δ is given. Both likelihoods have their restricted
+        The statistic is twice the logarithm of the ratio, χ² if δ is given. Both likelihoods have their own restricted
         maximum-likelihood δ (Welham and Thompson, J. R. Stat. Soc. B 59 (1997) 701). If δ is estimated, the limit
-        approaches the quantile of F in proportion to δ's part of the variance. Columns None stand for all residuals,
-        and the statistic is their χ².
+        approaches the quantile of F in proportion to δ's part of the variance. Columns None stand for the χ² of all
+        residuals.
         """
         from scipy.special import chdtri
 
@@ -141,7 +140,7 @@ class WhitenedReference:
         return 2 * information(self.growth, delta_rad, model) * delta_rad**4
 
     def _delta_fraction(self, model: Array, columns: Array, delta_rad: float) -> float:
-        """Return which fraction (0 to 1) of the variance of residuals projected onto the columns is due to δ."""
+        """Return the fraction (0 to 1) due to δ of the variance of residuals projected onto the columns."""
         variance = 1 + delta_rad**2 * self.growth
         model_basis, _ = self._whiten_residuals(model, delta_rad)
         projections = remaining_directions(model_basis, columns / np.sqrt(variance)[:, None])

@@ -1,4 +1,4 @@
-"""The checks of accelerometers and magnetometers: bits and noise of readings, halves of dwells, the model."""
+"""The checks of accelerometers and magnetometers: bits and noise of readings, halves of dwells, and the model's fit."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -39,7 +39,7 @@ DISTURBED_DWELL = "disturbed_dwell"
 
 @dataclass(frozen=True, slots=True)
 class SegmentName:
-    """A `sweep` or a `dwell` of the plan, by index; neither if the worst one does not contradict the others."""
+    """A sweep or dwell of the plan, by its index, or neither: the worst one, which does not contradict the others."""
 
     what: str
     sweep: int | None = None
@@ -71,7 +71,7 @@ class ReferenceReadings:
 
 @dataclass(frozen=True, slots=True)
 class ReferenceStatistics:
-    """Every statistic with its critical value, and the detection limits by fault mode.
+    """The statistics of a sensor with their critical values, and the detection limits by fault mode.
 
     `segments`: the dwells and sweeps that contradict the others, or the worst one; `statistics`: of all segments
     together, by the check's name.

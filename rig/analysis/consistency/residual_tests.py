@@ -26,10 +26,10 @@ Alternatives = Mapping[str, Array | None]  # by the check's name; None: all resi
 
 @dataclass(frozen=True, slots=True)
 class FaultMode(Generic[Subject]):
-    """A possible fault, the `check` that detects it, and the unit of its size; None is the reading's own unit.
+    """A possible fault, the `check` that detects it, and the unit of its size, None for the reading's own.
 
-    `patterns` return the readings' change by one unit of the fault, one for each form in which it may occur, without
-    the part that a calibration absorbs: a change half-way through has zero mean.
+    `patterns` return the readings' changes by one unit of the fault, one for each form in which it may occur. A change
+    half-way through has zero mean, as a calibration absorbs the rest.
     """
 
     what: str
@@ -42,9 +42,9 @@ class FaultMode(Generic[Subject]):
 class TestResults:
     """The statistics of one sensor by the name of their check, each with its critical value.
 
-    - `worst`: the statistic of the sweep or dwell that differs most from the others; `disturbed`: the statistics beyond
-      their critical value, by index.
-    - `detection_limits`: the minimal detectable size of each fault mode, by its name, if it is known.
+    - `worst`: of the sweep or dwell that differs most from the others; `disturbed`: of those beyond their critical
+      value, by index.
+    - `detection_limits`: the minimal detectable size of fault modes, by name, if known.
     """
 
     statistics: dict[str, Statistic]
@@ -71,7 +71,7 @@ class WhitenedModel(Protocol):
 def test_alternatives(
     model: WhitenedModel, alternatives: Alternatives, false_alarm_probability: float
 ) -> dict[str, Statistic]:
-    """Test every alternative that the model does not contain, each with `false_alarm_probability`."""
+    """Test every alternative that the model does not contain, each at `false_alarm_probability`."""
     test = {name: model.test(columns, (), false_alarm_probability) for name, columns in alternatives.items()}
     return {name: statistic for name, statistic in test.items() if statistic is not None}
 
@@ -79,7 +79,7 @@ def test_alternatives(
 def find_outliers(
     model: WhitenedModel, segments: Iterable[int], columns: Callable[[int], Array], false_alarm_probability: float
 ) -> list[tuple[int, Statistic]]:
-    """Return the outlier segments, removed one by one until the rest agree or half are removed.
+    """Return the outlier segments, removed one by one until the others agree or half are removed.
 
     If only two segments determine a parameter, either may be the outlier, and both are returned.
     """
@@ -123,8 +123,7 @@ def remaining_directions(model_basis: Array, columns: Array) -> Array:
 def chi_square_of(readings: Array, base: Array, columns: Array | None) -> tuple[float, int]:
     """Return the χ² that columns explain of the residuals of `base`, and its degrees of freedom.
 
-    Columns None explain all residuals. (A decomposition of all these columns would be slow, and LAPACK's fast driver
-    does not always converge.)
+    Columns None explain all residuals, without a decomposition, which would be slow and need not converge.
     """
     model_basis = orthonormal_basis(base)
     unexplained = readings - model_basis @ (model_basis.T @ readings)

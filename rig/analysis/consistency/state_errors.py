@@ -1,7 +1,7 @@
-"""The errors of the arm's states in the segments of a recording: of their times, and of the joint angles read in them.
+"""The errors of the arm's states in the segments of a recording: of their times and of their joint angles.
 
-A mean rate is the difference of two angles. So an error at the edge between two segments of a sweep lengthens one and
-shortens the next. Of the joint that turns, the noise of its encoder looks like jitter, and counts as jitter.
+A mean rate is a difference of two angles, so an error at the edge between two segments of a sweep increases one rate
+and decreases the next. The encoder noise of the turning joint counts as jitter of the times.
 """
 
 from collections.abc import Iterator
@@ -28,8 +28,8 @@ def build_time_patterns(segments: Segments, jitter_s: float) -> Array:
 def build_reading_patterns(segments: Segments, noise_rad: float) -> Array:
     """Return the patterns (P, N, 3) rad/s of joint angles read with noise at the edges of sweeps and transfers.
 
-    In sweeps, only the joints at rest count; in transfers all joints do, because none turns at their ends. At each
-    edge, the joints have as many independent errors as their axes have directions: three at most.
+    In sweeps, only the joints at rest count; in transfers all joints, because none turns at the ends. At each edge, the
+    joints have as many independent errors as their axes have directions: three at most.
     """
     lengths = np.diff(segments.times_s)
     patterns = []

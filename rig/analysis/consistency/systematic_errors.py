@@ -1,8 +1,8 @@
 """The known systematic errors of arm and sensor in the segments of a recording: one pattern for each unknown.
 
 A pattern is the effect of one standard deviation of one error on all readings, as in the model of common errors
-(`rig.estimation.gyroscope.common_errors`). So an error that readings share explains nothing that they do not share.
-Along the swept axis only the arm's clock, encoders and times may have errors.
+(`rig.estimation.gyroscope.common_errors`). Along the swept axis only the arm's clock, encoders and times may have
+errors.
 """
 
 from collections.abc import Sequence
@@ -45,9 +45,9 @@ STEPS = 24  # steps of a transfer within which directions count as constant
 
 @dataclass(frozen=True, slots=True)
 class NonlinearityPrior:
-    """A sensor's nonlinearity: standard deviations of its `cube` and `square` at `full_scale_rad_s`, relative to it.
+    """A sensor's nonlinearity: standard deviations of its `cube` and `square` at, and relative to, `full_scale_rad_s`.
 
-    If it is `free`, nothing is known of it, and it may have a kink at zero.
+    If `free`, it is unknown, and may have a kink at zero.
     """
 
     cube: float
@@ -62,13 +62,13 @@ class KnownErrors:
 
     - angles_rad (17,): sizes of the errors in ANGLES.
     - repeatability_rad: error of a joint that was moved away and back.
-    - encoder_rad: encoder error at one angle of a joint; zero if all sweeps are whole turns.
+    - encoder_rad: encoder error at an angle of a joint; zero if all sweeps are whole turns.
     - mount_rad: mounting error of an item that was remounted, about each axis.
     - jitter_s: jitter of the times of the arm's states.
     - reading_rad: noise of one reading of a joint's angle.
     - earth_rad_s (3, k): error of the Earth's rate in the base's frame, a column for each unknown direction.
     - curve: prior of the sensor's nonlinearity.
-    - sensor: the properties by its data sheet, None if unknown.
+    - sensor: its properties by the data sheet, None if unknown.
     - temperature_times_s: the times of the sensor's temperatures.
     - stamp_s: error of the times of the sensor's samples.
     """
@@ -91,8 +91,8 @@ def collect_known_errors(
 ) -> KnownErrors:
     """Return the standard uncertainties of gyroscope and arm, from the configuration and the recording.
 
-    A solve with several speeds estimates the nonlinearity, so it has no prior here. A solve with one speed states one
-    scale factor for both directions, so only the stated even part is allowed. `stamp_std_s` is as in `RecordedSensor`.
+    A solution at several speeds estimates the nonlinearity, which is then free. A solution at one speed states one
+    scale factor for both directions, so only the stated even part counts. `stamp_std_s` is as in `RecordedSensor`.
     """
     sensor, explained = result.sensor, result.explained
     return build_known_errors(
@@ -147,8 +147,7 @@ def build_error_patterns(
 ) -> ErrorPatterns:
     """Return the patterns of known errors in the means of a sensor with matrix F (3, 3).
 
-    The even part of its nonlinearity is free in transfers, which are faster than sweeps: there it does not indicate a
-    change.
+    In transfers, which are faster than sweeps, the even part of the nonlinearity is free.
     """
     on_transfers = replace(known_errors, curve=replace(known_errors.curve, square=1.0))
     instability_rad_s = 0.0 if known_errors.sensor is None else known_errors.sensor.instability_rad_s
@@ -252,8 +251,8 @@ def _encoder_patterns(segments: Segments, encoder_rad: float) -> Array:
 def _sweeps_between_moves(segments: Segments, joint: int) -> list[list[int]]:
     """Return the sweeps and transfers between successive moves of a joint; a transfer that moves it begins a new list.
 
-    `joint` is negative: it counts from the end of the chain. If a transfer is missing, a changed angle or another
-    recording shows that the joint moved.
+    `joint` counts from the end of the chain, from −1. If a transfer is missing, a changed angle or another recording
+    shows that the joint moved.
     """
     sweeps, firsts = np.unique(segments.sweep, return_index=True)
     patterns_by_mark: list[list[int]] = []
@@ -291,7 +290,7 @@ def rate_errors(intervals: Sequence[MotionInterval], steps: int) -> Array:
 
 
 def _wave_indices(motion: ArmMotion) -> dict[int, int]:
-    """Return the first index in `ANGLES` of each joint's waves: the wrists of an arm, else the last three joints."""
+    """Return the first index in `ANGLES` of the waves of each of the last three joints: the wrists of an arm."""
     beyond = motion.kinematics.joints - 1 - WRIST_3
     return {joint + beyond: first for joint, first in WAVES_OF.items() if joint + beyond >= 0}
 
@@ -322,7 +321,7 @@ def _speed_patterns(segments: Segments) -> list[Array]:
 
 
 def _mount_patterns(segments: Segments, mount_rad: float) -> list[Array]:
-    """Return the patterns of a slightly different mount of the item in every stage but the first."""
+    """Return the patterns of errors of the item's mount in every stage but the first."""
     mounts = [interval.motion.mount.tobytes() for interval in segments.intervals]
     errors = mount_rad * np.cross(np.eye(3)[:, None, :], segments.rates_rad_s)
     _, *others = dict.fromkeys(mounts)

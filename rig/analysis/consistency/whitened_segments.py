@@ -41,7 +41,7 @@ class Scatter:
 
 @dataclass(frozen=True, slots=True)
 class WhitenedSegments:
-    """Whitened readings (3 N,) and model columns (3 N, k); `whitener` is (3 N, 3 N)."""
+    """Whitened segments: the `whitener` (3 N, 3 N), readings (3 N,) and model columns (3 N, k)."""
 
     whitener: Array
     readings: Array
@@ -116,12 +116,12 @@ def _model_columns(segments: Segments) -> Array:
 
 
 def build_whitener(segments: Segments, scatter: Scatter, bias: BiasProcess) -> Array:
-    """Return the whitener W (3 N, 3 N): with it the means' errors are independent with variance 1.
+    """Return the whitener W (3 N, 3 N), which makes the means' errors independent with variance 1.
 
     Noise and bias drift of each axis are whitened first, then the shared errors. Shared errors may be 10⁵ times the
-    noise (a nonlinearity that is free in transfers), so one decomposition of both would lose the noise to rounding. No
-    variance of the first part is below the smallest noise: if a computer's clock was set back between two recordings,
-    windows overlap, and the computed matrix is no covariance.
+    noise (a free nonlinearity), so one decomposition of both would lose the noise to rounding. No variance of the first
+    part is below the smallest noise: after a clock was set back, windows overlap, and the computed matrix is no
+    covariance.
     """
     count, bias_covariance = len(segments.sweep), bias.covariance(segments.times_s)
     noise_whitener, least = np.zeros((3, count, 3, count)), segments.variances_rad2_s2.min()

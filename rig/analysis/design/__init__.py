@@ -1,1 +1,1 @@
-"""Predictions from a plan, before anything moves: uncertainties, detectable faults, the shortest run."""
+"""Predictions from a plan: uncertainties, detectable faults, the shortest run."""

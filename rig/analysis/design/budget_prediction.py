@@ -1,4 +1,4 @@
-"""The prediction of a plan's uncertainty: the budget of a simulated recording of it. Pure.
+"""The prediction of a plan's uncertainty: the budget of a simulated recording. Pure.
 
 The plan determines the joints' motion, the configuration the known errors of turner, site and sensor, the data sheet
 the sensor's noise. Only two parts of a budget come from readings alone: the bias drift beyond flicker, and the
@@ -53,10 +53,10 @@ ASKING_STD_S = 0.9e-3  # standard deviation of the time of a reading within the 
 
 
 def predict_budgets(config: RigConfig, plan: Plan, turner: TurnerIdentity) -> dict[str, Budget]:
-    """Return the predicted budget of each sensor to calibrate, by the solution that judges runs of this turner.
+    """Return the predicted budget of each sensor to calibrate, by the method that solves runs of this turner.
 
-    If single readings of the turner's angle scatter, that solution uses only the speeds. Raise Fault as the estimators
-    do if the plan determines too little, Refused as `settings_of` does.
+    If single readings of the turner's angle scatter, that method uses only the speeds. Raise Fault as the estimators do
+    if the plan determines too little, Refused as `settings_of` does.
     """
     run = plan_run(config, plan, turner.kinematics)
     return {name: _budget(config, run, turner, name, sensor) for name, sensor in config.to_calibrate.items()}
@@ -128,7 +128,7 @@ def _stages(run: PlannedRun) -> Iterator[PlannedRun]:
 def _plan_recording_part(
     config: RigConfig, run: PlannedRun, sensor: SensorSection, turner: TurnerIdentity
 ) -> RecordingPart:
-    """Return a recording's revolutions and rests as the estimators take them."""
+    """Return the revolutions and rests of a planned recording, in the form that estimators take."""
     turns = [
         _plan_observation(sweep, run, sensor, _scatter(config, sweep.step, turner))
         for sweep in time_steps_of(run.plan, Sweep)
@@ -188,7 +188,7 @@ def _plan_observation(timed: Timed[Sweep], run: PlannedRun, sensor: SensorSectio
 def _scatter(config: RigConfig, sweep: Sweep, turner: TurnerIdentity) -> float:
     """Return the relative standard deviation of the mean speed of a shaft whose single readings scatter.
 
-    It comes from pairs of readings one revolution apart, see `rig.observation.motion.turn_speed`.
+    The speed is that of readings one revolution apart: see `rig.observation.motion.turn_speed`.
     """
     if not turner.reading_std_rad or not isinstance(config.turner, ServoSection):
         return 0.0

@@ -15,7 +15,7 @@ NONE: Mapping[str, Budget] = MappingProxyType({})
 
 @dataclass(frozen=True, slots=True)
 class ReachedUncertainty:
-    """U of scale, bias (rad/s) and accelerometers (m/s²) of the worst axis of the worst sensor; 0 without one."""
+    """The largest U of scale and bias (rad/s) of any sensor's axis, and of accelerometers (m/s²); 0 without any."""
 
     scale: float
     bias_rad_s: float
@@ -53,7 +53,7 @@ class Budgets:
 
 @dataclass(frozen=True, slots=True)
 class TargetUncertainty:
-    """The target of each U in `ReachedUncertainty`, infinite if there is none, for a run of at most `at_most_s`."""
+    """The target of each U in `ReachedUncertainty`, infinite without one, for a run of at most `at_most_s`."""
 
     scale: float = inf
     bias_rad_s: float = inf
@@ -72,7 +72,7 @@ class TargetUncertainty:
 
 
 def target_of(section: SixObservationSection) -> TargetUncertainty | None:
-    """Return the target at which a run of several repeats ends; None if it always makes all of them."""
+    """Return the target at which a run of several repeats ends; None if the run makes all repeats."""
     scale, bias_rad_s = section.target_scale_u, section.target_bias_u_rad_s
     return None if scale is bias_rad_s is None else TargetUncertainty(scale or inf, bias_rad_s or inf)
 
@@ -84,8 +84,8 @@ SIZES = tuple(ReachedUncertainty.__dataclass_fields__)  # the possible targets: 
 class Candidate:
     """A possible procedure, and its duration.
 
-    Candidates of one `family` differ in `sizes` (turns, repeats, dwells), of which a larger one never gives a larger U,
-    and in `rests_s` after sweeps. Longer rests may give a larger U, as the bias drifts on.
+    Candidates of one `family` differ in `sizes` (turns, repeats, dwells), and in `rests_s` after sweeps. Larger sizes
+    never give a larger U, but longer rests may, because the bias drifts.
     """
 
     procedure: ProcedureSection
@@ -95,7 +95,7 @@ class Candidate:
     rests_s: tuple[float, ...] = ()
 
     def is_contained_in(self, other: "Candidate") -> bool:
-        """Return whether another candidate contains this one, whose U cannot be smaller then."""
+        """Return whether another candidate contains this one, whose U is then no smaller than the other's."""
         return (self.family, self.rests_s) == (other.family, other.rests_s) and all(
             size <= other_size for size, other_size in zip(self.sizes, other.sizes, strict=True)
         )
@@ -103,7 +103,7 @@ class Candidate:
 
 @dataclass(frozen=True, slots=True)
 class Planned:
-    """A candidate and its predicted budgets."""
+    """A candidate with its predicted budgets."""
 
     candidate: Candidate
     budgets: Budgets
@@ -116,7 +116,7 @@ class Planned:
 
 @dataclass(frozen=True, slots=True)
 class Searched:
-    """The result of a search: the shortest candidate that meets the target, the nearest one, and all budgets."""
+    """The result of a search: the shortest candidate that meets the target, the nearest one, all evaluated budgets."""
 
     best: Planned | None = None
     nearest: Planned | None = None
@@ -128,10 +128,10 @@ class Searched:
 class Shortest:
     """The shortest run for a target.
 
-    - `before`: the procedure in the file, None if it determines nothing.
+    - `before`: the procedure in the file, None if its uncertainty cannot be predicted.
     - `nearest`: the candidate with the smallest ratio to the target if none meets it.
     - `endless`: the budgets of the endless runs of each family, and of all evaluated plans.
-    - `unreachable`: no run of this kind meets the target, however long.
+    - `unreachable`: whether no run of this kind meets the target, however long.
     - `directions` (N, 3): of the sweeps, None if there are none.
     """
 
@@ -160,8 +160,8 @@ def find_shortest(
 ) -> Searched:
     """Return the shortest candidate whose predicted U meets the target.
 
-    A candidate that meets it excludes all longer ones. A candidate that fails excludes all that it contains. `predict`
-    returns None for a candidate that cannot be run, which excludes no other.
+    A candidate that meets the target excludes all longer ones; one that fails excludes all that it contains. `predict`
+    returns None for a candidate that cannot be run.
     """
     remaining = sorted(
         (candidate for candidate in candidates if candidate.duration_s <= target.at_most_s),

@@ -1,4 +1,4 @@
-"""A plan divided into segments as a recording is, with readings without faults. Pure."""
+"""A plan divided into segments like a recording, with faultless readings. Pure."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -24,7 +24,7 @@ class PlannedSegments:
     with_transfers: Segments
 
     def read_with(self, matrix: Array, angle_random_walk_rad_sqrt_s: float, rate_hz: float) -> "PlannedSegments":
-        """Return the segments as read by a sensor with matrix F (3, 3) and the given angle random walk.
+        """Return the segments with the readings of a sensor with matrix F (3, 3) and this angle random walk.
 
         Transfers are omitted if samples are too far apart to resolve them.
         """

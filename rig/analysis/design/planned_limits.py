@@ -1,4 +1,4 @@
-"""The detection limits of a plan's checks, computed for readings without faults. Pure."""
+"""The detection limits of a plan's checks, for faultless readings. Pure."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -34,8 +34,8 @@ class DetectionLimits:
 def predict_limits(config: RigConfig, plan: Plan, turner: DenavitHartenberg) -> DetectionLimits:
     """Predict the detection limits of the gyroscopes to calibrate and, on an arm, of the accelerometers.
 
-    The `turner` is nominal, the noise is the data sheet's, and flicker is the only bias drift. Of a plan over
-    temperature, one set of sweeps is used.
+    The `turner` is nominal, the noise that of the data sheet, and flicker the only bias drift. A plan over temperature
+    counts with one set of sweeps.
     """
     if turner.joints == 0:
         return DetectionLimits({}, {})

@@ -1,4 +1,4 @@
-"""The motion of a plan as if it had been recorded. Pure."""
+"""The motion of a plan, in the form of a recorded motion. Pure."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ StepT_co = TypeVar("StepT_co", bound=Step, covariant=True)
 
 @dataclass(frozen=True, slots=True)
 class PlannedRun:
-    """A recording that a plan will give, of a chain of joints (`arm`), and the stated errors.
+    """A planned recording of a chain of joints (`arm`), and the stated errors.
 
     Its clock begins `clock_offset_s` after that of the run's first recording.
     """
@@ -66,7 +66,7 @@ class Timed(Generic[StepT_co]):
 
 
 def time_steps(plan: Plan) -> Iterator[Timed[Step]]:
-    """Yield every step in order with its times; sensors are assumed to settle at once before a dwell."""
+    """Yield every step in order with its times, if sensors settle at once before a dwell."""
     time_s, q_rad = STANDING_S, plan.start_q_rad
     for step in plan.steps:
         yield Timed(step, time_s, time_s + step.duration_s, q_rad)
@@ -84,12 +84,12 @@ def time_steps_of(plan: Plan, kind: type[StepT]) -> list[Timed[StepT]]:
 
 
 def measuring_steps(plan: Plan) -> Iterator[Timed[Step]]:
-    """Return the plan's sweeps, rests and dwells with their times."""
+    """Yield the plan's sweeps, rests and dwells with their times."""
     return (time_step for time_step in time_steps(plan) if isinstance(time_step.step, (Sweep, Rest, Dwell)))
 
 
 def predict_state_jitter(plan: Plan) -> float:
-    """Return the jitter in s of an arm's states as the sweeps will show it, with the noise of the encoders."""
+    """Return the jitter, s, of an arm's states that sweeps will show, including the noise of the encoders."""
     slow_s_rad = np.mean([1 / sweep.speed_rad_s**2 for sweep in plan.sweeps]) if plan.sweeps else 0.0
     return float(np.sqrt(STATE_JITTER_S**2 + ENCODER_NOISE_RAD**2 * slow_s_rad)) * BETWEEN_TWO
 

@@ -1,4 +1,4 @@
-"""The readings of an accelerometer in a plan's dwells and sweeps without faults. Pure."""
+"""Faultless readings of an accelerometer in a plan's dwells and sweeps. Pure."""
 
 from dataclasses import dataclass, replace
 
@@ -36,7 +36,7 @@ class PlannedAccelerometer:
 
     @property
     def datasheet(self) -> Datasheet:
-        """The sensor errors outside the model, as limited by the data sheet."""
+        """The data sheet's limits of the sensor's errors outside the model."""
         return read_datasheet(self.run.uncertainty, self.name, self.range_m_s2)
 
 

@@ -1,7 +1,7 @@
 """The prediction of the uncertainty of accelerometers by a plan's attitudes and sweeps. Pure.
 
-The plan determines the specific force, the data sheet the noise; the arm's errors are the stated axis errors, and the
-stated repeatability in each dwell. Bias drift beyond flicker, and disturbances of single readings, are left out.
+The plan determines the specific force, the data sheet the noise; the arm's errors are the stated axis errors and
+repeatability. Bias drift beyond flicker, and disturbances of single readings, are left out.
 """
 
 from dataclasses import replace
@@ -61,6 +61,6 @@ def _budget(accelerometer: PlannedAccelerometer) -> Budget:
 
 
 def _new_fraction(dof: Uncertainty) -> float:
-    """Return the stated fraction of δ² that is independent between dwells, limited to those that solutions consider."""
+    """Return the stated fraction of δ² that is independent between dwells, limited to the range of solutions."""
     fraction = dof.repeatability_deg**2 / max(dof.repeatability_deg**2 + dof.axis_deg**2, np.finfo(np.float64).tiny)
     return float(np.clip(fraction, OWN_SHARES[0], OWN_SHARES[-1]))

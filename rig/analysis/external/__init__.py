@@ -1,1 +1,1 @@
-"""Readings recorded elsewhere, whose motion a file states: solved and judged as a run is."""
+"""External readings, whose motion a file states: solved and judged like a run."""

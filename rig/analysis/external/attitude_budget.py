@@ -30,7 +30,7 @@ SOURCES: Mapping[str, tuple[Literal["A", "B"], str]] = {
 
 
 def noise_dof(solution: TriaxialSolution, equations: Equations) -> float:
-    """Return the noise's degrees of freedom from the weights of the readings: the smallest over scale and bias."""
+    """Return the noise's smallest degrees of freedom over scale and bias, by the weights of the readings."""
     response = response_in_attitudes(solution, equations.measurements)
     rows = scale_and_bias(solution.matrix, scale_of(solution.matrix), len(response)) @ response
     return fewest_dof(rows, equations.variances.ravel(), equations.dof.ravel())
@@ -39,9 +39,9 @@ def noise_dof(solution: TriaxialSolution, equations: Equations) -> float:
 def budget_by_causes(matrix: Array, causes: Mapping[str, Array], noise_dof: float | None = None) -> Budget:
     """Return the budget by the contribution of each cause to a reference model's covariance (p, p), F (3, 3) first.
 
-    Estimated variance components are uncertain themselves. If the solution integrates over their likelihood, or
-    inflates the covariance as Student's t, u contains this (JCGM 101, 6.4.9), and the degrees of freedom are infinite,
-    as are those of the noise unless `noise_dof` is given.
+    Degrees of freedom are infinite, also those of the noise unless `noise_dof` is given: a solution that integrates
+    over the likelihood of its variance components, or inflates by Student's t, has their uncertainty in u (JCGM 101,
+    6.4.9).
     """
     scale = scale_of(matrix)
     lines = []

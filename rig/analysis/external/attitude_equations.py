@@ -1,4 +1,4 @@
-"""The readings of a sensor in known attitudes, as the equations that every method of TRIAX solves."""
+"""The readings of a sensor in known attitudes: the equations of every method of TRIAX."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -23,7 +23,7 @@ class Equations:
     """The readings of a sensor and the attitudes in which they were taken.
 
     - `means`, `variances` (N, 3), with `dof` (N, 3) degrees of freedom of the variances.
-    - `attitudes` (N, 3, 3), `std_rad` (N,): their stated standard deviation; `reference`: its size, or its vectors.
+    - `attitudes` (N, 3, 3); `std_rad` (N,): their stated standard deviation; `reference`: its norm, or its vectors.
     """
 
     means: Array
@@ -74,7 +74,7 @@ class Equations:
 
     @property
     def placed(self) -> Placed:
-        """The mean readings with their attitudes, against a constant reference of known size."""
+        """The mean readings with their attitudes, in a constant reference of known norm."""
         std_rad = np.zeros(len(self.means)) if self.std_rad is None else self.std_rad
         nothing = np.zeros_like(self.means)
         return Placed(self.means, self.variances, self.attitudes, nothing, std_rad, norm_known=True)
@@ -102,7 +102,7 @@ class Equations:
 def _estimate_variances(rows: Rows, reference: KnownVector) -> tuple[Array, Array]:
     """Return the variances (N, 3) of the means, equal in all rows, from the residuals, and their dof.
 
-    Rows are weighted equally here, because the model that weighs attitude errors would take noise for such errors.
+    Rows are weighted equally: a model with attitude errors would take noise for such errors.
     """
     counts = rows.samples[:, None]
     quiet = np.full_like(rows.means, (1e-9 * np.abs(rows.means).max()) ** 2) / counts

@@ -48,7 +48,7 @@ class InAttitudes:
     - `other_methods`: the solutions by the other methods, or the Fault of a method that fails.
     - `measurements`: the means in attitudes; `dwells`: the placements.
     - `reference_fault`: why the estimated reference of a gyroscope is not the Earth's rate.
-    - `laid`: the differences of the placements, to which `unplaced_rests` rests without an attitude contributed.
+    - `laid`: the placement errors, to which `unplaced_rests` rests without an attitude contributed.
     - `moving`: the number of rows left out because the body moved.
     """
 
@@ -70,9 +70,9 @@ Result = InAttitudes | InIncrements
 def solve_placed(
     name: str, placed: PlacedReadings, site: Site, options: Elsewhere, method: Chosen | None, *, second_order: bool
 ) -> Attempts[Quantity, Result | OfKind]:
-    """Calibrate every quantity of a sensor that was recorded, by `method`; None chooses one.
+    """Calibrate every recorded quantity of a sensor by `method`; None chooses one.
 
-    The choice is "attitude_weighted". For a gyroscope it is "increments" (over windows of `window_s`), or
+    The choice is "attitude_weighted"; for a gyroscope "increments" (over windows of `window_s`), or
     "maximum_likelihood" with `exact_rates`.
     """
     any_mounting, exact_rates = options.any_mounting, options.exact_rates
@@ -147,7 +147,7 @@ def _solve_rows(equations: Equations, method: Method, *, any_mounting: bool) -> 
 def _solve_placements(
     placements: Placements, quantity: Quantity, equations: Equations, method: Method, *, any_mounting: bool
 ) -> InAttitudes:
-    """Return the calibration from placements, with their differences if the method models wrong attitudes."""
+    """Return the calibration from placements, with placement errors if the method models attitude errors."""
     unplaced, moving = placements.unplaced, placements.left_out
     solution, laid = _solve(equations, method, placements), None
     _check_not_sole(solution, equations, placements, quantity)
@@ -202,7 +202,7 @@ def _dwells(placements: Placements, quantity: Quantity) -> Iterator[StaticReadin
 
 
 def _solve(equations: Equations, method: Method, placements: Placements) -> TriaxialSolution:
-    """Return the solution. If too few rests are left for it, the Fault says that rows were left out."""
+    """Return the solution. For too few rests, the Fault mentions the rows that were left out."""
     try:
         return equations.solve(method)
     except Fault as fault:
@@ -226,5 +226,5 @@ def _replace_parameters(solution: TriaxialSolution, laid: LaidDown) -> TriaxialS
 
 
 def _check_earth_rate(solution: TriaxialSolution) -> Fault | None:
-    """Return why the estimated reference is not the Earth's rate: it must be determined to a tenth, as in a run."""
+    """Return the Fault of an estimated reference that is not the Earth's rate, determined to a tenth, or None."""
     return or_fault(partial(check_earth_seen, solution.reference, solution.covariance[REFERENCE, REFERENCE]))

@@ -1,4 +1,4 @@
-"""The change of a gyroscope's bias over the rows of a file of sweeps: refused if it jumps, else a part of U."""
+"""The change of a gyroscope's bias over a file's rows of sweeps: a jump is refused, other changes are part of U."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ OF_RATE = 0.01  # of the sweeps' rate: without rests, a smaller step may be that
 
 
 def check_bias_steady(data: ExternalData) -> None:
-    """Raise Fault `bias_jumped` if the bias steps by more than it drifts, between two of the rows."""
+    """Raise Fault `bias_jumped` if the bias steps by more than drift between two rows."""
     step, averages = _find_step(data)
     if step is None or data.at_reference:  # then polynomials contain the bias's change
         return
@@ -38,7 +38,7 @@ def check_bias_steady(data: ExternalData) -> None:
 def estimate_bias_variance(data: ExternalData) -> Array:
     """Return the variance (3,) of the bias over the rows, (rad/s)²: that of a step, and that from rest to rest.
 
-    A step of h is ± h/2 about the mean bias. Zero if the rows show no change.
+    A step of h is ± h/2 about the mean bias. The variance is zero if the rows show no change.
     """
     step, _ = _find_step(data)
     of_step = np.zeros(3) if step is None else (step.size_rad_s / 2) ** 2
@@ -61,7 +61,7 @@ def widen_bias(solution: TurnedSolution, data: ExternalData) -> TurnedSolution:
 
 
 def _find_step(data: ExternalData) -> tuple[SteppedBias | None, list[Average]]:
-    """Return the step of the bias, and the averages of the rows in the order of time, to which its row refers."""
+    """Return the bias' step, or None, and the averages in the order of time, which the step's row counts."""
     rows = [(sweep.average, sweep.speed_rad_s * sweep.axis_flange) for sweep in data.sweeps]
     rows += [(rest, np.zeros(3)) for rest in _rests(data)]
     rows.sort(key=lambda row: row[0].start_s)
@@ -72,12 +72,12 @@ def _find_step(data: ExternalData) -> tuple[SteppedBias | None, list[Average]]:
 
 
 def _rests(data: ExternalData) -> tuple[Average, ...]:
-    """Return the rests that are stated, or these and those found between turns."""
+    """Return the stated rests, and with turns also the rests found between them."""
     return data.rests if data.turned is None else data.turned.rests
 
 
 def _is_certain(data: ExternalData, from_s: float, axis: int, size_rad_s: float) -> bool:
-    """Return whether rests on either side show a step of an axis too; without these, whether no rate explains it."""
+    """Return whether rests on either side also show an axis' step; without such rests, whether no rate explains it."""
     before = [rest.mean_rad_s[axis] for rest in _rests(data) if rest.start_s < from_s]
     after = [rest.mean_rad_s[axis] for rest in _rests(data) if rest.start_s >= from_s]
     if before and after:

@@ -1,9 +1,9 @@
-"""The convention of a reference's quaternions, from the readings of a gyroscope that was turned with it.
+"""The convention of a reference's quaternions, from the readings of a gyroscope on the same body.
 
 A quaternion may transform body to room coordinates, or room to body. Under the right convention the body's rates are a
-linear function of the gyroscope's readings. The position of the scalar part, first or last, changes the frames of body
-and room by a constant rotation, so no readings show it. If both positions fit, the accelerometer decides for the one
-whose z axis is vertical. The other one leads to the same calibration, in other axes of the body.
+linear function of the gyroscope's readings. The position of the scalar part, first or last, only rotates the frames of
+body and room, so the gyroscope does not show it. If both positions fit, the accelerometer decides for the one with a
+vertical z axis. The other leads to the same calibration, in other axes of the body.
 """
 
 from dataclasses import dataclass
@@ -28,10 +28,10 @@ UPRIGHT = 0.97  # least component of gravity along the vertical axis of the room
 
 @dataclass(frozen=True, slots=True)
 class Convention:
-    """The convention under which the gyroscope explains a fraction of the rates, `lag_s` after the attitudes.
+    """The convention under which the gyroscope, `lag_s` after the attitudes, explains a fraction of the rates.
 
-    `scalar_last`: the column read as qw contains qx, and so on. `inverse`: the quaternions take room to body
-    coordinates. `up`: the axis of the room that points upwards, as `--up` takes it; "" if no accelerometer shows it.
+    `scalar_last`: the columns read as qw qx qy qz contain qx qy qz qw. `inverse`: quaternions take room to body
+    coordinates. `up`: the room's axis that points upwards, as for `--up`; "" if no accelerometer shows it.
     """
 
     scalar_last: bool
@@ -42,7 +42,7 @@ class Convention:
 
 
 def find_convention(samples: Samples, attitudes: Columns, *, is_order_named: bool) -> Convention | None:
-    """Return the convention of attitudes (N,) on the clock of the samples; None if the motion does not show one.
+    """Return the convention of attitudes (N,) on the samples' clock; None if the motion does not show it.
 
     `is_order_named`: the file states which number is the scalar part.
     """
@@ -100,7 +100,7 @@ def _mean_rates(time_s: Array, total: Array, edges_s: Array, close: NDArray[np.b
 
 
 def _explain(rates: Array, readings: Array) -> tuple[float, Array]:
-    """Return the fraction of variance of rates (n, 3) that a linear map of readings (n, 3) explains, and that map."""
+    """Return the fraction of the variance of rates (n, 3) explained by a linear map of readings (n, 3), and the map."""
     design = np.column_stack([readings, np.ones(len(readings))])
     fit = np.linalg.lstsq(design, rates, rcond=None)[0]
     residuals = rates - design @ fit

@@ -1,4 +1,4 @@
-"""The analysis of external recordings behind `rig.analysis.analyses`: solved and judged."""
+"""The analysis of external recordings for `rig.analysis.analyses`: solved and judged."""
 
 from collections.abc import Sequence
 

@@ -67,10 +67,10 @@ class OfSensor:
     - rates: the gyroscope's solution in attitudes, None by another method.
     - at_rest: the solutions of the other quantities, from rests.
     - unsolved: the faults of recorded quantities without a solution.
-    - turned: the turns from rest to rest from which it was solved, if any.
-    - installed_kinds: the solutions of installed kinds of sensors.
+    - turned: the turns from rest to rest that the solution uses, if any.
+    - installed_kinds: the solutions of kinds of sensors that packages add.
     - polynomials: the calibration over temperature, if any.
-    - omitted: what was left out, by quantity, None for all of them.
+    - omitted: what was left out, by quantity, None for all quantities.
     - notes: what the user should know about reading and solving.
     """
 
@@ -114,10 +114,9 @@ def _add_notes(sensor: OfSensor, read: ReadElsewhere, samples: Samples) -> OfSen
 
 
 def check_external(name: str, sensor: OfSensor) -> Iterator[Check]:
-    """Yield the checks besides the solvers' own: the condition of the equations, the error of attitudes.
+    """Yield checks in addition to the solvers' own: the condition of the equations, the error of attitudes.
 
-    Every quantity without a solution has a failing check. Nothing else is checked, because there is no configuration
-    with limits.
+    Every quantity without a solution has a failing check. There is no configuration with limits for more checks.
     """
     yield from list_unsolved((name, quantity.name, fault) for quantity, fault in sensor.unsolved.items())
     if (gyroscope := sensor.gyroscope) is not None:
@@ -282,7 +281,7 @@ def _gyroscope(item: Item, result: Result, clock: TimeBase | None) -> SensorResu
 
 
 def _describe_as_swept(result: Result) -> TurnedSolution:
-    """Return a solution for m = F ω + b in the form of one for g = K (m + b), with the budget of its covariance."""
+    """Return a solution for m = F ω + b in the form of a solution for g = K (m + b), with its budget."""
     solution, matrix = result.solution, result.solution.matrix
     axes = SensorAxes.from_matrix(matrix)
     of_matrix = np.r_[F, OFFSET]
@@ -319,7 +318,7 @@ def _describe_as_swept(result: Result) -> TurnedSolution:
 
 
 def _nothing_solved(unsolved: Mapping[Quantity, Fault]) -> Fault | Refused:
-    """Return one error with all reasons and their remedies; a single reason is returned unchanged."""
+    """Return one error with all reasons and remedies; a single error is returned unchanged."""
     faults: Sequence[Fault] = list(unsolved.values())
     if len(faults) == 1:
         return faults[0]

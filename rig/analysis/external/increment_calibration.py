@@ -23,9 +23,9 @@ PASSES = 3  # iterations: the clock of one determines the increments of the next
 
 @dataclass(frozen=True, slots=True)
 class InIncrements:
-    """The solution, the duration over which attitudes were averaged to fixes, and the increments left out.
+    """The solution, the duration of the windows of fixes, and the increments left out.
 
-    `increments` is their number with nothing left out.
+    `increments`: the number of increments if none were left out.
     """
 
     solution: KnownIncrements
@@ -54,7 +54,7 @@ def _spell_time(time_s: float) -> str:
 
 
 def solve_turning(turning: Turning, window_s: float | None, *, any_mounting: bool) -> InIncrements:
-    """Return the gyroscope's matrix and bias, from windows of a given or an automatically chosen length.
+    """Return the gyroscope's matrix and bias, with windows of a given or an automatically chosen length.
 
     Raise Fault `inverted_attitudes`, and as `gather`, `solve_known_increments`, `check_rests_agree` and `check_axes`
     do.
@@ -70,7 +70,7 @@ def solve_turning(turning: Turning, window_s: float | None, *, any_mounting: boo
 
 
 def _solve(turning: Turning, window_s: float | None) -> InIncrements:
-    """Return the solution. Its clock offset determines which readings are missing, so it is found by iteration."""
+    """Return the solution, by iteration, because its clock offset determines which readings are missing."""
     start = find_start(select_covered(turning)).state
     check_unit(scale_of(start.matrix))
     gathered = gather(turning, window_s, start.clock_s)

@@ -13,10 +13,9 @@ Solved = TypeVar("Solved")
 
 
 def solve_unless_inverted(attitudes: Array, solve: Callable[[Array], Solved], contradicting: Collection[str]) -> Solved:
-    """Return `solve` of attitudes (N, 3, 3).
+    """Return the result of `solve` with attitudes (N, 3, 3).
 
-    Raise its Faults, but `inverted_attitudes` instead of one of `contradicting` if the inverse attitudes agree with the
-    readings.
+    Raise its Faults, but `inverted_attitudes` instead of the names in `contradicting` if the inverse attitudes fit.
     """
     try:
         return solve(attitudes)

@@ -1,4 +1,4 @@
-"""The omissions of external readings, and notes on how they were read."""
+"""The omissions from external readings, and notes on how the files were read."""
 
 from collections.abc import Iterator, Mapping
 
@@ -43,7 +43,7 @@ def notes_on_reading(read: ReadElsewhere, samples: Samples) -> Iterator[str]:
 
 
 def notes_on_speeds(data: ExternalData) -> Iterator[str]:
-    """Yield a note on rates that hardly any gyroscope reads: nothing else shows that both files are in °/s."""
+    """Yield a note on rates that hardly any gyroscope reads: both files may be in °/s."""
     fastest = max((sweep.speed_rad_s for sweep in data.sweeps), default=0.0)
     if RATE.mistaken is not None and fastest > RATE.mistaken.unusual:
         yield (

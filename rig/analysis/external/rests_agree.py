@@ -1,8 +1,8 @@
 """The check of a gyroscope's bias from increments between attitudes against its readings at rest.
 
-A gyroscope at rest reads its bias, and motion of the body that the reference does not show. The reference gives the
-rate of each rest, and its scatter from rest to rest the uncertainty. The reference's errors in motion say little about
-rests, because time-stamp errors may cause them.
+A gyroscope at rest reads its bias, and motion that the reference does not show. The reference gives the rate in each
+rest; the scatter of these rates gives their uncertainty. The reference's errors in motion do not, because time-stamp
+errors may cause them.
 """
 
 import numpy as np
@@ -27,8 +27,8 @@ MOST_RAD_S = 2 * RATE.steady
 def check_rests_agree(turning: Turning, solution: KnownIncrements) -> None:
     """Raise Fault `bias_contradicts_rests` if the bias is not what the gyroscope reads at rest, or `bias_jumped`.
 
-    A rest counts only if both the readings and the attitudes of its rows show one. Rests may differ by their own
-    scatter, by motion that the reference does not show, and by the effect of gravity on a gyroscope.
+    A rest counts only if both the readings and the rows' attitudes show it. Rests may differ by their scatter, by
+    motion that the reference does not show, and by the effect of gravity on a gyroscope.
     """
     at_rest = means_at_rest(turning, solution.clock_s)
     if at_rest is None:
@@ -52,7 +52,7 @@ def check_rests_agree(turning: Turning, solution: KnownIncrements) -> None:
 
 
 def _check_steady(wander_rad_s: Array) -> None:
-    """Raise Fault `bias_jumped` if the readings at rest differ by more than a bias moves, half their range (3,)."""
+    """Raise Fault `bias_jumped` if half the range (3,) of the readings at rest exceeds a plausible bias drift."""
     axis = int(np.argmax(wander_rad_s))
     if wander_rad_s[axis] > MOST_RAD_S:
         raise Fault(
@@ -64,7 +64,7 @@ def _check_steady(wander_rad_s: Array) -> None:
 
 
 def _critical_value(dof: float) -> float:
-    """Return Student's critical value for the worst of three axes, which good recordings exceed with `FALSE_ALARM`."""
+    """Return Student's critical value for the worst of three axes, at the probability `FALSE_ALARM`."""
     from scipy.special import ndtri, stdtrit
 
     tail = false_alarm_of_each(FALSE_ALARM, 2 * len(RATE.axes))
@@ -74,7 +74,7 @@ def _critical_value(dof: float) -> float:
 def _motion_std_rad_s(turned_rad_s: Array) -> float:
     """Return the standard deviation, about any axis, of the body's undetected motion averaged over all rests.
 
-    It is estimated from the scatter of the reference's rates (k, 3) and inflated by Student's t for so few rests.
+    It is estimated from the scatter of the reference's rates (k, 3), and inflated by Student's t for few rests.
     """
     count = len(turned_rad_s)
     scatter = float(np.sqrt(np.var(turned_rad_s, axis=0, ddof=1).mean()))

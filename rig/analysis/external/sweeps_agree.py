@@ -26,10 +26,9 @@ FEWEST_FREEDOM = 3  # with fewer, rounding down to the next integer would alone 
 def check_agree(data: ExternalData) -> None:
     """Check that every sweep agrees with the solution of all others (leave-one-out residuals).
 
-    Too few rows for a solution are left to that.
 
     Raise Refused `bad_sweep` for the sweep that disagrees most, for example half a turn stated as a whole one, or a
-    wrong axis. If an axis has two sweeps, either may be wrong, and both are named.
+    wrong axis; of an axis with only two sweeps both are named. Too few rows for a solution are not checked.
     """
     means, variances, design = _equations(data)
     redundancy = _redundancy_numbers(design)
@@ -63,10 +62,10 @@ def _name_contradiction(worst: int, data: ExternalData) -> str:
 
 @dataclass(frozen=True, slots=True)
 class SweepErrors:
-    """The covariances that errors of the stated motion and a moving bias add to a solution, with `dof`.
+    """The covariances that errors of the stated motion and changes of the bias add to a solution, with `dof`.
 
-    `covariance` (6, 6) of scale and bias; `matrix_covariance` (12, 12) and `angles_covariance_rad2` (6, 6) as in
-    `VectorSolution`, so that twice a standard uncertainty is U.
+    `covariance` (6, 6): of scale and bias; `matrix_covariance` (12, 12) and `angles_covariance_rad2` (6, 6): as in
+    `VectorSolution`, scaled so that twice a standard uncertainty is U.
     """
 
     covariance: Array
@@ -78,7 +77,7 @@ class SweepErrors:
 def sweep_errors(solution: VectorSolution, data: ExternalData) -> SweepErrors | None:
     """Return the effect of the stated motion's errors, and of the bias's changes, on the vector model's `solution`.
 
-    Return None for means corrected to one temperature: the polynomials include the contradictions of repeats.
+    None for means corrected to one temperature: the polynomials include the contradictions of repeats.
     """
     if data.at_reference:
         return None
@@ -117,15 +116,15 @@ def sweep_errors(solution: VectorSolution, data: ExternalData) -> SweepErrors | 
 
 
 def count_redundant_rows(data: ExternalData) -> int:
-    """Return the number of rows beyond those that a solution needs: the degrees of freedom of contradictions.
+    """Return the number of rows in excess of those a solution needs: the degrees of freedom of contradictions.
 
-    A row has three equations but counts once, because its rate or end is wrong in all three.
+    A row has three equations but counts once, because a wrong rate or end affects all three.
     """
     return len(data.sweeps) + len(data.rests) - 4
 
 
 def noise_dof(solution: VectorSolution, data: ExternalData) -> float:
-    """Return the smallest degrees of freedom of the noise, from the weights of the means in the vector model."""
+    """Return the noise's smallest degrees of freedom, by the weights of the means in the vector model."""
     averages = [*(sweep.average for sweep in data.sweeps), *data.rests]
     variances = np.array([average.variance_rad2_s2 for average in averages])
     dof = dof_by_axis(average.dof for average in averages)
@@ -158,7 +157,7 @@ def _derivatives(design: Array, means: Array, variances: Array) -> Array:
 def _contradictions(stated: StatedMotion, sizes: MotionErrors, design: Array) -> Array:
     """Return the contradiction (N, 3) of each sweep with the others, beyond errors of the given sizes.
 
-    One wrong row among many hardly increases the sizes; if only two sweeps are about an axis, only the sizes show it.
+    One wrong row among many hardly increases the sizes; with two sweeps about an axis, only the sizes show it.
     """
     rate_variance, axis_variance = sizes.median_variances
     spread = rate_variance * stated.rate_patterns**2 + axis_variance * np.sum(stated.axis_patterns**2, axis=0)
@@ -175,7 +174,7 @@ def _redundancy_numbers(design: Array) -> Array:
 
 
 def _additional_std(noise_std: Array, expanded: Array, known_dof: float, dof: float) -> Array:
-    """Return the standard uncertainties (q,) to add to the noise (q,), so that k u equals `expanded` (q,)."""
+    """Return the standard uncertainties (q,) to add to the noise (q,) so that k u equals `expanded` (q,)."""
 
     def is_too_small(std: Array) -> Array:
         variances = np.array([noise_std**2, std**2])

@@ -1,1 +1,1 @@
-"""Gyroscopes: from averaged revolutions to a calibration, and its comparison with the board's and a reference's."""
+"""Gyroscopes: their calibration from averaged revolutions, and its comparison with the board and a reference."""

@@ -14,7 +14,7 @@ MIN_INDEPENDENCE = 1e-3  # least over greatest information about a rotation; rev
 
 
 class LinearCalibration(Protocol):
-    """The correction_matrix M (3, 3) and bias_rad_s b (3,) of g = M (m + b)."""
+    """A calibration g = M (m + b): correction_matrix M (3, 3) and bias_rad_s b (3,)."""
 
     @property
     def correction_matrix(self) -> Array: ...
@@ -36,7 +36,7 @@ class MeanRates:
 
 @dataclass(frozen=True, slots=True)
 class RelativeRotation:
-    """The rotation between two sensors, which no errors of scale and bias explain.
+    """The rotation between two sensors, independent of errors of scale and bias.
 
     - `matrix` (3, 3): from a vector in the reference's frame to the sensor's.
     - `std_rad` (3,): of small rotations about the sensor's x, y, z, from the readings' noise alone.
@@ -68,9 +68,9 @@ def collect_mean_rates(observations: Sequence[Observation], calibration: LinearC
 def fit_rotation(sensor: MeanRates, reference: MeanRates, nominal: Array) -> RelativeRotation:
     """Return the rotation R that minimises Σ ‖sensor − R reference‖²; `nominal` (3, 3) is R by the nominal mountings.
 
-    Wahba's problem, solved by SciPy (Kabsch 1976). To first order the sensor reads R r + δθ × R r, so δθ is a linear
-    least-squares estimate with the noise of both sensors. Errors of scale are parallel to the axes of rotation and
-    biases cancel between the two directions, so neither changes R. Raise Fault `rank_deficient`.
+    This is Wahba's problem, solved by SciPy (Kabsch 1976). To first order the sensor reads R r + δθ × R r, so δθ is a
+    linear least-squares estimate with the noise of both sensors. Errors of scale are parallel to the axes of rotation,
+    and biases cancel between both directions. Raise Fault `rank_deficient`.
     """
     from scipy.spatial.transform import Rotation
 

@@ -1,6 +1,6 @@
 """The check that the board's average of each sweep agrees with the computer's. Pure.
 
-It detects a mean of readings that is paired with the wrong mean rate, which no residual shows.
+It detects a mean reading that is paired with a wrong mean rate, which no residual shows.
 """
 
 from collections.abc import Sequence
@@ -14,10 +14,10 @@ LIMIT = 6.0  # standard deviations of the mean: the two averages share its noise
 
 
 def board_averages(sensor: str, recordings: Sequence[ObservedRun]) -> tuple[Check, ...]:
-    """Return a check for each sweep whose averages contradict each other; if none do, one check for all sweeps.
+    """Return a check for each sweep whose averages contradict each other, or else one check for all sweeps.
 
-    Return None if the board averaged nothing. The value is the largest difference of the three axes over the standard
-    deviation of the computer's mean.
+    A check's value is the largest difference of the three axes over the standard deviation of the computer's mean. No
+    checks if the board averaged nothing.
     """
     deviations = compare_board_means(sensor, recordings)
     if not deviations:

@@ -1,4 +1,4 @@
-"""The path from recordings to a gyroscope's calibration, which a run and `rig solve` share. Pure."""
+"""The path from recordings to a gyroscope's calibration, common to runs and `rig solve`. Pure."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -41,19 +41,19 @@ VECTOR, NEWTON, ALGORITHM_1, EARTH_RATE = "vector", "newton", "algorithm_1", "ea
 
 @dataclass(frozen=True, slots=True)
 class SensorResult:
-    """One gyroscope's calibration and its origins.
+    """One gyroscope's calibration, and its intermediate results.
 
     - sensor: the sensor as recorded.
     - solution: the estimate by the chosen estimator.
     - vector_model: the solution of the vector model.
     - explained: the vector model with gravity and bias drift, None without a solution.
-    - uncertainty: the budget, which the estimators "vector" and "newton" have.
+    - uncertainty: the budget; None for other estimators than "vector" and "newton".
     - six_observation: the exact solution of SIX.
     - algorithm_1: the iterative solution of SIX.
     - observations: the averages of the sweeps.
     - rests: the averages of the rests.
     - time_bases: one for each recording.
-    - corrected_by: the correction on the board and in calibration.h.
+    - corrected_by: the correction for the board and calibration.h.
     - earth: the Earth's rate, None if it was not estimated.
     - by_hand: the solution if a hand turned the sensor.
     - faults: the reasons of missing parts, by the estimator's name or EARTH_RATE.
@@ -81,7 +81,7 @@ class SensorResult:
 
     @property
     def scale(self) -> Array:
-        """The scale factors (3,) by the chosen estimator: rate = scale × (reading + bias)."""
+        """The scale factors (3,) of rate = scale × (reading + bias) by the chosen estimator."""
         return self.solution.scale
 
     @property
@@ -101,7 +101,7 @@ class SensorResult:
 
     @property
     def temperature_c(self) -> float | None:
-        """The mean over the samples of all sweeps; None without a thermometer."""
+        """The mean temperature of the samples of all sweeps; None without a thermometer."""
         averages = [observation.average for observation in self.observations]
         if not averages or np.isnan([average.temperature_c for average in averages]).any():
             return None
@@ -111,8 +111,8 @@ class SensorResult:
 def observe_recordings(runs: Sequence[RunData], rotations: Mapping[int, Array] = AS_STATED) -> tuple[ObservedRun, ...]:
     """Return the observations of all recordings of one calibration, without those that have no finished sweep.
 
-    The first recording's thresholds are used; `rotations` as in `observe_runs`. Raise Refused `different_sensors`;
-    Fault `duplicated_observation` and those of `observe_run`.
+    The first recording's thresholds apply to all; `rotations` are the `corrections` of `observe_runs`. Raise Refused
+    `different_sensors`; Fault `duplicated_observation` and those of `observe_run`.
     """
     if any(run.sensors != runs[0].sensors for run in runs):
         raise Refused(
@@ -133,10 +133,9 @@ def solve_observed(
 ) -> dict[str, SensorResult]:
     """Calibrate `sensors` from all recordings, which share the `surroundings`.
 
-    If the estimator is the vector model, sensors in `matrix_corrected` are corrected by the whole matrix. All other
-    corrections assume orthogonal axes. Every estimator needs sweeps that suffice for the six-observation solution, so a
-    plan that lacks a direction is refused. Raise Refused `unknown_estimator`; Fault `duplicated_observation` and as the
-    estimators do.
+    With the vector model, sensors in `matrix_corrected` are corrected by the whole matrix; all other corrections assume
+    orthogonal axes. For every estimator, sweeps must suffice for the six-observation solution. Raise Refused
+    `unknown_estimator`; Fault `duplicated_observation` and as the estimators do.
     """
     chosen = find_estimator(estimator)
     return {
@@ -211,7 +210,7 @@ def _budget_of(
 
 
 def _add_earth_rate(inputs: VectorInputs, earth_rate: EarthRate | None) -> VectorInputs:
-    """Return the inputs with the estimated rate of the Earth; unchanged if none was estimated."""
+    """Return the inputs with the estimated Earth's rate, if any."""
     return inputs if earth_rate is None else replace(inputs, earth_rate_rad_s=earth_rate.rate_rad_s)
 
 
@@ -248,7 +247,7 @@ def solve_vector(
 
 
 def solve_six_observation(observations: Sequence[Observation], estimator: SixObservationEstimator) -> Solution:
-    """Return the six-observation solution, weighted by inverse variance; the paper's algorithm has equal weights."""
+    """Return the six-observation solution, weighted by inverse variance, or equally by the paper's algorithm."""
     accumulated = Accumulator.empty()
     for observation in observations:
         average = observation.average

@@ -1,8 +1,8 @@
 """The comparison of a gyroscope's readings with those of a reference, sample by sample and revolution by revolution.
 
 The reference's readings, corrected by its own calibration, are rotated into the frame of the sensor under test and
-interpolated at that sensor's times. Every sensor has its own time base to the arm's clock, so the delays of their
-filters cancel. The difference is the sensor's error, plus the noise of both.
+interpolated at that sensor's times. Every sensor has its own time base to the arm's clock, which cancels its filter's
+delay. The difference is the sensor's error, plus the noise of both.
 """
 
 from collections.abc import Sequence
@@ -48,7 +48,7 @@ def list_revolutions(sensor: str, recordings: Sequence[ObservedRun]) -> list[Obs
 
 @dataclass(frozen=True, slots=True)
 class Deviation:
-    """Reading less reference over a number of samples: mean, RMS and largest magnitude of each axis, (3,) rad/s."""
+    """Reading minus reference over several samples: mean, RMS and largest magnitude of each axis, (3,) rad/s."""
 
     samples: int
     mean_rad_s: Array
@@ -64,7 +64,7 @@ class Deviation:
 
 @dataclass(frozen=True, slots=True)
 class RevolutionError:
-    """Mean reading less mean reference over one revolution or arc, (3,) rad/s, and its standard deviation.
+    """Mean reading minus mean reference over one revolution or arc.
 
     - `sweep`, `joint_name`, `direction`: the motion; `angle_rad`: the joint's angle, None for a whole revolution.
     - `error_rad_s`, `std_rad_s` (3,): the difference, and its standard deviation by noise.
@@ -113,8 +113,8 @@ def compare(
 ) -> Comparison:
     """Return the comparison of a sensor's recorded readings with the reference's.
 
-    `rotation` (3, 3) takes the latter into the sensor's frame. `gravity_rad_s` (N, 3): the effect of gravity on the
-    readings of each revolution, if given. Raise Fault `no_overlap`, `different_clocks`.
+    `rotation` (3, 3) takes the reference's into the sensor's frame. `gravity_rad_s` (N, 3): the effect of gravity on
+    the readings of each revolution, if given. Raise Fault `no_overlap`, `different_clocks`.
     """
     parts = [_align_recording(recording, sensor, reference, rotation) for recording in recordings]
     return Comparison(
@@ -132,7 +132,7 @@ def compare(
 
 @dataclass(frozen=True, slots=True)
 class _AlignedRecording:
-    """One recording's part of a comparison, with masks (n,): of all sweeps, all rests, and the middle of each rest."""
+    """One recording's part of a comparison, with masks (n,) of all sweeps, all rests, and the middle of each rest."""
 
     time_s: Array
     reading: Array
@@ -184,7 +184,7 @@ def _find_delay(recording: ObservedRun, sensor: str, reference: str) -> Delay | 
 
 
 def _mask_covered(time_s: Array, by_s: Array) -> NDArray[np.bool_]:
-    """Return a mask of the times (n,) that have one of the times `by_s` (m,) shortly before and one shortly after."""
+    """Return a mask of the times (n,) with one of the times `by_s` (m,) shortly before and one shortly after."""
     after = np.searchsorted(by_s, time_s)
     gaps = np.diff(by_s, prepend=-np.inf, append=np.inf)
     close: NDArray[np.bool_] = gaps[after] <= MAX_GAP * np.median(gaps)
@@ -192,7 +192,7 @@ def _mask_covered(time_s: Array, by_s: Array) -> NDArray[np.bool_]:
 
 
 def _interpolate(stream: Stream, reference: Reference, time_s: Array) -> Array:
-    """Return the reference's corrected rate (n, 3) at other times, by a cubic spline, which keeps vibrations."""
+    """Return the reference's corrected rate (n, 3) at times (n,), by a cubic spline, which keeps vibrations."""
     rate = reference.scale * (stream.readings_rad_s + reference.bias_rad_s)
     return CubicSpline(stream.time_s, rate)(time_s)
 

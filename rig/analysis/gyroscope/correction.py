@@ -1,11 +1,10 @@
 """The correction of readings on the board and in `calibration.h`: g = M (m + b), M 3×3. Pure.
 
-`diagonal` is the correction of SIX: M = K, axis by axis. `matrix` also makes the axes orthogonal. With the vector
-model's m = F ω − b, F = K⁻¹ S R: R is the rotation nearest to the three axes (the result's `mounting`), and S,
-symmetric, has their non-orthogonality. M = R F⁻¹ = S⁻¹ K takes a reading to the frame that R rotates the flange's into:
-the polar decomposition. QR would keep the direction of one axis and put the whole error on the others. The chosen R
-prefers no axis, rotates no reading that K would not, and defines the frame in which a verification compares two
-sensors.
+`diagonal` is the correction of SIX: M = K, axis by axis. `matrix` also makes the axes orthogonal. In the vector model m
+= F ω − b, F = K⁻¹ S R by polar decomposition: R is the rotation nearest to the three axes (the result's `mounting`),
+and the symmetric S contains their non-orthogonality. M = R F⁻¹ = S⁻¹ K takes a reading to the frame into which R
+rotates the flange's. QR would keep the direction of one axis and put the whole error on the others; R prefers no axis,
+and defines the frame in which a verification compares two sensors.
 """
 
 from dataclasses import dataclass
@@ -24,7 +23,7 @@ CorrectionKind = Literal["matrix", "diagonal"]
 
 @dataclass(frozen=True, slots=True)
 class Correction:
-    """g = `matrix` (3, 3) · (m + b), of a `kind`."""
+    """The correction g = `matrix` (3, 3) · (m + b), and its `kind`."""
 
     kind: CorrectionKind
     matrix: Array

@@ -1,9 +1,8 @@
 """The comparison of the board's own solution with one in double precision from the same observations. Pure.
 
-Both average the same samples (the board reports which it used) and use the same speeds, so they differ by the board's
-arithmetic only. If a sample was lost on its way to the host, which would have a larger effect, the board's own mean
-replaces the host's. The run's own calibration differs from both: it has weights, removes vibration and uses rests
-(`rig.analysis.gyroscope.calibration`).
+Both average the same samples (the board reports which) and use the same speeds, so only the board's arithmetic differs.
+If a sample was lost on its way to the host, the board's own mean replaces the host's. The run's calibration differs
+from both: it has weights, removes vibration and uses rests (`rig.analysis.gyroscope.calibration`).
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -30,7 +29,7 @@ class Agreement:
     """A sensor's calibration by the board and in double precision; None if either has no solution.
 
     - `solutions`: the board's, by method.
-    - `not_observed`: the sweeps of which the board has no observation, and why.
+    - `not_observed`: the sweeps without an observation by the board, and why.
     - `host_scale`, `host_bias_rad_s` (3,): the host's solution in double precision.
     - `scale_difference` (relative), `bias_difference_rad_s`: the largest of three axes, for the closed form.
     """
@@ -52,7 +51,7 @@ class Agreement:
 
 
 def check_arithmetic(runs: Sequence[RunData], sensor: str) -> Agreement:
-    """Compare board and host for one sensor over all recordings of a run; the last has the board's solutions."""
+    """Compare board and host for one sensor over all recordings of a run; the last one has the board's solutions."""
     solutions = {event.solution.method: event for event in _events(runs[-1], sensor) if isinstance(event, BoardSolved)}
     not_observed = _list_unobserved(runs[-1], sensor)
     host = _solve(_list_observations(runs, sensor))
@@ -72,7 +71,7 @@ def check_arithmetic(runs: Sequence[RunData], sensor: str) -> Agreement:
 
 
 def check_observed(run: RunData, sensors: Iterable[str]) -> None:
-    """Raise Fault `board_missed_sweep` if the board missed a sweep, which a resumed run repeats."""
+    """Raise Fault `board_missed_sweep` if the board missed a sweep; a resumed run repeats it."""
     for sensor in sensors:
         if missed := _list_unobserved(run, sensor):
             raise Fault(
@@ -90,7 +89,7 @@ def _list_unobserved(run: RunData, sensor: str) -> tuple[str, ...]:
 
 @dataclass(frozen=True, slots=True)
 class _BoardObservation:
-    """An observation of the board: mean reading (3,) and speed; `averaged` if the host averaged it too."""
+    """An observation of the board: mean reading (3,), rad/s, and speed; whether the host `averaged` it too."""
 
     mean_rad_s: Array
     speed_rad_s: float
@@ -109,7 +108,7 @@ def _list_observations(runs: Sequence[RunData], sensor: str) -> list[_BoardObser
 
 
 def _recall_observation(earlier: Sequence[RunData], recalled: BoardRecalled) -> _BoardObservation:
-    """Return the observation from the newest recording that has it; NaN if none has."""
+    """Return the observation from the newest recording that contains it, or NaN."""
     for run in reversed(earlier):
         if earlier_observations := find_board_averages([run], recalled.sensor, (recalled.sweep,)):
             return _average_observation(run, earlier_observations[recalled.sweep])
@@ -144,7 +143,7 @@ def _count_missing(sequence: NDArray[np.uint32]) -> int:
 def _solve(observations: Sequence[_BoardObservation]) -> tuple[Array, Array] | None:
     """Return scale and bias by the board's method, with equal weights.
 
-    Return None with too few observations, with other samples than the board reports, or if no mean could be checked.
+    None with too few observations, with other samples than the board reports, or if no mean could be checked.
     """
     accumulated = Accumulator.empty()
     if not any(observation.averaged for observation in observations):

@@ -1,4 +1,4 @@
-"""The table of all segments of a sensor's revolutions and rests, with the rates and gravity that it sensed. Pure."""
+"""The table of all segments of a sensor's revolutions and rests, with the sensed rates and gravity. Pure."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -25,8 +25,7 @@ class Segments:
     - gravity_m_s2 (N, 3): gravity minus the acceleration of the sensor, in that frame.
     - attitudes (N, 3, 3): from the base into that frame.
     - speed_std (N,): relative standard deviation of the mean speed.
-    - times_s (N, 2): start and end on the clock of the first recording; `intervals` are on the clock of their own
-      recording.
+    - times_s (N, 2): start and end on the clock of the first recording; `intervals` are on their own recording's clock.
     - roundings_rad_s (N, 3): standard uncertainty of each mean by rounding.
     - unexplained_rad2_s2 (N, 3): part of the variances that neither arm nor noise explains.
     """
@@ -49,7 +48,7 @@ class Segments:
 def stack_segments(windows: Sequence[SegmentedAverage], explained: Explained, site: Site) -> Segments:
     """Return the segments of a gyroscope's windows, in the order of the means of `explained`.
 
-    The Earth's rate is taken from `explained`: that of the site, or the estimated one.
+    The Earth's rate is that in `explained`, estimated or of the site.
     """
     inputs = explained.inputs
     placed = list(zip(windows, inputs.windows_s[:, 0], inputs.acceleration_m_s2, strict=True))
@@ -85,10 +84,10 @@ def append_transfers(
     windows: Sequence[SegmentedAverage],
     explained: Explained,
 ) -> Segments:
-    """Return the segments with the transfers appended, numbered downwards from below `REST`.
+    """Return the segments with the transfers appended, numbered downwards from `REST` − 1.
 
-    A transfer's noise is its own, or that of the other segments over the same duration if that is larger. The effect of
-    vibration, estimated in the rests before and after, is added. `windows`: the segments' windows.
+    A transfer's noise is its own, or that of other segments over the same duration if larger, plus the effect of
+    vibration, estimated in the rests before and after. `windows`: the segments' windows.
     """
     if not transfers:
         return segments

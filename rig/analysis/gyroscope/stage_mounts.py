@@ -1,6 +1,6 @@
 """The mount of the item in each stage of a run: estimated from the sweeps, then kept fixed.
 
-All sensors are on one item. The first stage defines the frame, so its mount counts as exact: its error is part of the
+All sensors are on one item. The first stage defines the frame: its mount counts as exact, and its error is part of the
 sensors' own mountings, as with an item that is mounted once.
 """
 
@@ -26,8 +26,8 @@ from rig.observation.observed_run import ObservedRun
 class EstimatedMount:
     """The mount of the item in a `stage`, counted from 0, relative to its nominal mount.
 
-    `rotation_rad` (3,) is the rotation vector from the nominal mount, in the item's own axes; `std_rad` (3,) are the
-    standard deviations of its components, which remain those stated if the sweeps do not determine them.
+    `rotation_rad` (3,): rotation vector from the nominal mount, in the item's axes; `std_rad` (3,): its standard
+    deviations, the stated ones if sweeps do not determine it.
     """
 
     stage: int
@@ -45,8 +45,7 @@ def observe_as_mounted(
 ) -> tuple[tuple[ObservedRun, ...], tuple[EstimatedMount, ...]]:
     """Return the observations of one calibration, made with the item's estimated mounts, and these mounts.
 
-    The solution of each sensor estimates the remaining mount errors, which are of second order. Raise as
-    `observe_recordings` does.
+    The solution of each sensor estimates the remaining errors of second order. Raise as `observe_recordings` does.
     """
     recordings = observe_recordings(runs)
     mounts = _estimate_mounts(recordings, settings)
@@ -57,7 +56,7 @@ def observe_as_mounted(
 
 
 def _estimate_mounts(recordings: Sequence[ObservedRun], settings: RunSettings) -> tuple[EstimatedMount, ...]:
-    """Return the mounts of all stages but the first, by the sensor that determines them best, if any does."""
+    """Return the mounts of all stages but the first, by the sensor that determines them best, if any."""
     stages = list(dict.fromkeys(recording.run.settings.stage for recording in recordings))
     if len(stages) < 2:
         return ()

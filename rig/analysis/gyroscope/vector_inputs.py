@@ -29,7 +29,7 @@ WAVE_FRACTION = 0.3
 
 @dataclass(frozen=True, slots=True)
 class RecordingPart:
-    """A sensor's averages in one recording: revolutions and rests; and its clock's offset to the first recording's.
+    """A sensor's revolutions and rests in one recording, and the offset of its clock to the first recording's.
 
     The item was remounted for each `stage`; `mount` (3, 3) transforms the flange's frame into the item's.
     """
@@ -127,8 +127,8 @@ def describe_sensor(
 def lever_arms_m(turns: Sequence[Observation], extension_m: Array, mount: Array | None = None) -> Array:
     """Return the lever arms (M, 3) from the axis of rotation to the sensors, in the item's frame; zero without an arm.
 
-    `extension_m` (3,), from the flange to the sensors, is in the flange's frame. `mount` (3, 3) rotates it into the
-    item's frame; None if both frames agree.
+    `extension_m` (3,): from the flange to the sensors, in the flange's frame. `mount` (3, 3): from there into the
+    item's frame; None if both agree.
     """
     mounted_m = extension_m if mount is None else mount @ extension_m
     lever_arms = [turn.arm_m + mounted_m if turn.arm_m is not None else np.zeros(3) for turn in turns]
@@ -156,8 +156,8 @@ def _return_errors(turns: Sequence[Observation], rests: int, uncertainty: Uncert
 def _encoder_errors(turns: Sequence[Observation], rests: int, uncertainty: Uncertainty) -> Array | None:
     """Return the errors (P, N, 3), as in `VectorInputs`, of a joint's encoder at each angle where arcs begin or end.
 
-    Sweeps in both directions share these angles, so repeats do not average the errors out. Return None if all sweeps
-    are whole revolutions, which end where they began.
+    Sweeps in both directions share these angles, so repeats do not average the errors. None if all sweeps are whole
+    revolutions.
     """
     arcs = [None if turn.arc_rad is None else (turn.joint_name, *turn.arc_rad) for turn in turns]
     marks = list(dict.fromkeys((arc[0], end) for arc in arcs if arc is not None for end in arc[1:]))
@@ -196,7 +196,7 @@ def _group_by_axis(turns: Sequence[Observation]) -> list[list[int]]:
 
 
 def list_given(surroundings: Surroundings, name: str) -> EarthRatePrior:
-    """Return the given values of surroundings and sensor, before the Earth's rate is estimated."""
+    """Return the given values of surroundings and sensor for an estimate of the Earth's rate."""
     site, uncertainty = surroundings.site, surroundings.uncertainty
     return EarthRatePrior(
         up=np.array(site.up),
@@ -210,7 +210,7 @@ def list_given(surroundings: Surroundings, name: str) -> EarthRatePrior:
 def list_uncertainties(
     surroundings: Surroundings, name: str, earth_rate: EarthRate | None, stamp_std_s: float | None = None
 ) -> Unknown:
-    """Return the uncertainties that no recording of sensor `name` shows, and that of the estimated Earth's rate.
+    """Return the uncertainties that no recording of sensor `name` shows, and the uncertainty of the Earth's rate.
 
     `stamp_std_s` is as in `RecordedSensor`.
     """

@@ -1,8 +1,7 @@
 """The verification of calibrated readings by a reference sensor: SIX, Section IV-B, Tables IV and V.
 
-The rotation between the two sensors comes from the calibration's revolutions, so the verification remains a test of
-them. Only this rotation is removed: the non-orthogonality that the board's correction leaves and the cross-axis errors
-of both sensors remain.
+Only the rotation between the two sensors, determined in the calibration's revolutions, is removed: the
+non-orthogonality that the board's correction leaves, and the cross-axis errors of both sensors, remain.
 """
 
 from collections.abc import Sequence
@@ -21,10 +20,10 @@ from rig.observation.observed_run import ObservedRun
 
 @dataclass(frozen=True, slots=True)
 class Verification:
-    """The sensor before its calibration (None if that was not recorded) and with it, by one relative rotation.
+    """The comparison with a reference of the uncalibrated (`before`, None if not recorded) and calibrated readings.
 
-    `reference_error_rad_s` is the reference's own largest error relative to the arm: that of the magnitude of its mean
-    rate, which is 2π/T over a revolution and zero over a rest.
+    `reference_error_rad_s`: the reference's largest error in the norm of its mean rate, 2π/T by the arm over a
+    revolution and zero over a rest.
     """
 
     sensor: str
@@ -46,10 +45,10 @@ def verify(
 ) -> Verification:
     """Compare the readings that the board has calibrated (`after`) with those of the reference.
 
-    - `before`: recordings of raw readings, from which the `calibration` was made; they determine the rotation between
-      the sensors; if there are none, `after` does.
-    - `gravity_rad_s`, two of (N, 3): gravity's effect on the corrected readings of sensor and reference in the
-      revolutions of `after`, if the calibration estimated it.
+    - `before`: the recordings of raw readings of the `calibration`, which determine the rotation between the sensors;
+      without them, `after` does.
+    - `gravity_rad_s`: gravity's effects (N, 3) on the corrected readings of sensor and of reference in the revolutions
+      of `after`, if estimated.
 
     Raise Fault `sensor_missing`, `wrong_mode`, `nothing_to_compare`, `incomplete_verification`, `no_overlap`,
     `different_clocks`, and as `fit_rotation` does.
@@ -109,7 +108,7 @@ def _check_complete(runs: Sequence[RunData]) -> None:
 
 
 def _find_reference_error(recordings: Sequence[ObservedRun], reference: Reference) -> float:
-    """Return the largest difference between the reference's speed and the arm's; speeds do not depend on mountings."""
+    """Return the largest difference, rad/s, between the reference's speed and the arm's, whatever the mountings."""
     turns = list_revolutions(reference.name, recordings)
     rates_rad_s = np.linalg.norm(collect_mean_rates(turns, reference).rate_rad_s, axis=1)
     in_sweeps = rates_rad_s - [turn.speed_rad_s for turn in turns]

@@ -45,7 +45,7 @@ NOT_IDENTIFIABLE = "Set procedure.second_order: false, which makes the bias much
 class HeldOut:
     """The last repeat of the attitudes, which the calibration does not use.
 
-    `error_m_s2` (N,): the size of each calibrated acceleration minus that of gravity.
+    `error_m_s2` (N,): norm of each calibrated acceleration minus gravity.
     """
 
     dwells: tuple[DwellReading, ...]
@@ -62,9 +62,9 @@ class AccelerometerResult:
     """One accelerometer's calibration, a = F (s + φ s²) + b, in the axes of its nominal mounting.
 
     - `movement`: the readings from which the solution is estimated; `sweeps`: the number of sweeps.
-    - `triad`: scale and axes, with the uncertainty of the solution alone; `budget`: the uncertainty of scale and bias
-      by all causes.
-    - `alignment`: rotation to the gyroscope of the same sensor, None if that was not calibrated.
+    - `triad`: scale and axes, with the solution's own uncertainty; `budget`: uncertainty of scale and bias by all
+      causes.
+    - `alignment`: rotation from the gyroscope of the same sensor, None if that was not calibrated.
     - `other_methods`: the solutions from the attitudes alone, by method, or the Fault of a method that fails.
     - `held_out`: the validation, if the attitudes were repeated.
     - `temperature_c`: the mean of all readings.
@@ -87,8 +87,8 @@ class AccelerometerResult:
     def correction_matrix(self) -> Array:
         """The matrix M (3, 3) of s = M (a − b).
 
-        It leads to the orthogonal frame nearest to the gyroscope's axes, so that corrected rates and accelerations
-        share a frame; without an alignment, to the frame nearest to the accelerometer's own axes.
+        M leads to the orthogonal frame nearest to the gyroscope's axes, which corrected rates and accelerations then
+        share; without an alignment, to the frame nearest to the accelerometer's own axes.
         """
         matrix = self.triad.correction_matrix
         return matrix if self.alignment is None else self.alignment.rotation.T @ matrix

@@ -1,4 +1,4 @@
-"""The effect of the arm's errors on readings in attitudes: a few errors that all readings share."""
+"""The effect of the arm's errors, which all readings share, on readings in attitudes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -17,7 +17,7 @@ ERRORS, STEADY = 6, 2
 
 @dataclass(frozen=True, slots=True)
 class Posture:
-    """The arm's angles (6,) in a dwell, or at the start of a sweep, and the wrist that this turns (0 to 2), if any."""
+    """The arm's angles (6,) in a dwell, or at a sweep's start, and the wrist (0 to 2) that the sweep turns, if any."""
 
     q_rad: Array
     wrist: int | None = None
@@ -27,7 +27,7 @@ class Posture:
 class StatedArm:
     """The stated kinematics, the half-width of its angles, and the sensor's nominal mounting (3, 3).
 
-    `estimated_rad` is the standard deviation that the readings show: the arm may be worse than stated.
+    `estimated_rad`: standard deviation of the wrists' errors by the readings, which may exceed the stated one.
     """
 
     arm: DenavitHartenberg
@@ -37,7 +37,7 @@ class StatedArm:
 
 
 def arm_patterns(theta: Array, movement: Movement, postures: Sequence[Posture], stated: StatedArm) -> Array:
-    """Return the change (18, 3 K) of the readings by one standard uncertainty of each of the wrists' errors."""
+    """Return the changes (18, 3 K) of the readings by one standard uncertainty of each of the wrists' errors."""
     by_turns = turned(theta, replace(movement, sweeps=movement.sweeps.alone()))
     stated_rad = np.radians(stated.axis_deg) / np.sqrt(3) * _error_fractions()
     std_rad = np.maximum(stated_rad, stated.estimated_rad)
@@ -52,7 +52,7 @@ def list_arm_rotations(postures: Sequence[Posture], arm: DenavitHartenberg, moun
 
 
 def _error_fractions() -> Array:
-    """Return the fraction (18,) of each wrist error in the arm's error."""
+    """Return each wrist error (18,) as a fraction of the arm's error."""
     return np.tile(np.where(np.arange(ERRORS) < STEADY, 1.0, WAVE_FRACTION), 3)
 
 

@@ -1,4 +1,4 @@
-"""The errors of an accelerometer's readings in one run, from the part's data sheet: for the solution and its budget."""
+"""The errors of an accelerometer's readings in one run, from the part's data sheet, for solution and budget."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -37,7 +37,7 @@ MILLI_G = 1000  # µg
 
 @dataclass(frozen=True, slots=True)
 class Datasheet:
-    """The data sheet of one accelerometer: half-widths, except the minimum of the Allan deviation.
+    """The data sheet of one accelerometer: half-widths, and the bias instability as the Allan deviation's minimum.
 
     `nonlinearity_percent`: nonlinearity relative to `over_g`, in either direction. `temperature_words` as in
     `KnownSensor`.
@@ -110,7 +110,7 @@ def list_windows(name: str, recordings: Sequence[ObservedRun], dwells: Sequence[
 
 
 def mean_temperature_c(windows: Sequence[ReferenceWindow]) -> float:
-    """Return the mean temperature of the readings, to which scale and bias refer."""
+    """Return the mean temperature of the readings, °C, to which scale and bias refer."""
     samples = [window.samples for window in windows]
     return float(np.average([window.temperature_c for window in windows], weights=samples))
 
@@ -118,7 +118,7 @@ def mean_temperature_c(windows: Sequence[ReferenceWindow]) -> float:
 def list_sensor_errors(
     datasheet: Datasheet, windows: Sequence[ReferenceWindow], temperature_step_k: float, *, second_order: bool
 ) -> AccelerometerErrors:
-    """Return the errors of a sensor in these windows; without the even part if `second_order` is estimated.
+    """Return the errors of a sensor in these windows, without the even part if `second_order` is estimated.
 
     `temperature_step_k` is the thermometer's resolution.
     """
@@ -155,9 +155,9 @@ def add_errors(
 def separate_sensor_errors(
     spread: Spread, theta: Array, movement: Movement, datasheet: Datasheet
 ) -> tuple[Spread, list[Contributor]]:
-    """Return the `spread` due to noise and arm, and the contributors of the sensor itself in this `movement`.
+    """Return the `spread` by noise and arm, and the contributors of the sensor itself in this `movement`.
 
-    The spread's response is that of a fit of all parameters, including φ, so a nonlinear sensor has more noise.
+    The spread's response is that of a fit of all parameters including φ, so the noise has a larger effect.
     """
     drift, flicker = (
         spread.response @ shared @ spread.response.T for shared in (wandering(movement), flickering(movement))

@@ -1,7 +1,7 @@
 """The calibration of magnetometers from dwells in known attitudes: TRIAX, Eq. (7), on an arm.
 
-The solution contains iron and currents that turn with the magnetometer, including those of the arm; no residual shows
-them. Runs with the sensor turned over separate them: `rig.analysis.reversal`.
+The solution contains the effect of iron and currents that turn with the magnetometer, also in the arm, which no
+residual shows. Runs with the sensor turned over separate it: `rig.analysis.reversal`.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -36,8 +36,7 @@ class MagnetometerResult:
 
     - `field_t`: the size of the field; `extension_m` (3,): the sensor's position on the flange.
     - `triad`: scale, relative to `field_t`, and axes by the solution alone; `budget`: the uncertainty by all causes.
-    - `uniformity`: the test of the field over the attitudes; `drift`: between tests at home, None if there are fewer
-      than two.
+    - `uniformity`: the test of the field over the attitudes; `drift`: between tests at home, None with fewer than two.
     - `measurements`: the means from which the solution is estimated, in tesla.
     - `other_methods`: the solutions by the other methods, or the Fault of a method that fails.
     """
@@ -58,11 +57,11 @@ class MagnetometerResult:
 def calibrate_magnetometers(
     recordings: Sequence[ObservedRun], settings: RunSettings, accelerometers: Mapping[str, AccelerometerResult]
 ) -> Attempts[str, MagnetometerResult]:
-    """Calibrate every recorded magnetometer; return the results, or the Fault of each that has none.
+    """Calibrate every recorded magnetometer; return the results, and the Faults of those without one.
 
-    The `accelerometers` bound the error of the arm's attitudes. The Fault is `no_attitudes` without dwells,
-    `field_strength_unknown`, `field_drifts`, `field_not_uniform`, a Fault of `field_readings` or of `solve_triaxial`,
-    `swapped_axes`, `mirrored_axis`, `wrong_mounting`.
+    The `accelerometers` bound the error of the arm's attitudes. Faults: `no_attitudes` without dwells,
+    `field_strength_unknown`, `field_drifts`, `field_not_uniform`, `swapped_axes`, `mirrored_axis`, `wrong_mounting`,
+    and those of `field_readings` and `solve_triaxial`.
     """
     magnetometers = recordings[0].run.measuring(FIELD)
     return attempt_each(
@@ -141,7 +140,7 @@ def _drift(name: str, recordings: Sequence[ObservedRun], settings: RunSettings) 
 
 
 def _solve(solve: Callable[..., TriaxialSolution]) -> TriaxialSolution:
-    """Return the solution. Raise Fault `field_not_uniform` for large residuals, as the attitudes are confirmed."""
+    """Return the solution. Raise Fault `field_not_uniform` for large residuals, because attitudes are not the cause."""
     try:
         return solve(method=ESTIMATOR)
     except Fault as fault:

@@ -1,4 +1,4 @@
-"""The contributors to the uncertainty of accelerometers and magnetometers that their readings do not show."""
+"""The contributors to the uncertainty of accelerometers and magnetometers beyond their readings."""
 
 from dataclasses import replace
 from typing import Final
@@ -83,7 +83,7 @@ def magnetometer_budget(
     field_t: float,
     noise_dof: Array,
 ) -> Budget:
-    """Return the budget of a solution of measurements in tesla."""
+    """Return the budget of a magnetometer's solution of measurements in tesla."""
     homogeneity, drift = tested
     spread = _propagate(
         solution,
@@ -131,7 +131,7 @@ def _field(site: Site, field_t: float) -> KnownSize:
 
 
 def lag_pattern(movement: Movement, lag_s: float) -> Array:
-    """Return the pattern (1, 3 K) of the sensor's filter, outside the model: it reduces a sweep's wave by (ω τ)²/2."""
+    """Return the pattern (1, 3 K) of the sensor's filter, which reduces a sweep's wave by (ω τ)²/2."""
     dwells, sweeps = movement.dwells, movement.sweeps
     smaller = sweeps.harmonics_m_s2 * np.square(sweeps.speeds_rad_s * lag_s)[:, None, None] / 2
     smaller[:, 0] = 0.0  # the mean is not reduced

@@ -1,4 +1,4 @@
-"""Three axes in known attitudes to gravity or a field of known size: common to accelerometers and magnetometers."""
+"""Three axes in known attitudes to gravity or a field of known norm, for accelerometers and magnetometers."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ IDENTIFIABLE = 3.0  # least size of the largest second-order term, in its standa
 
 @dataclass(frozen=True, slots=True)
 class Triad:
-    """Three axes from a solution's matrix F and bias, with the uncertainty by its covariance alone.
+    """Three axes from a solution's matrix F and bias, with its own uncertainty.
 
     - `scale` (3,): 1/‖row of F‖; `covariance` (6, 6): of scale and bias.
     - `correction_matrix` M (3, 3): from a reading minus its bias to the orthogonal frame nearest to the axes.
@@ -50,7 +50,7 @@ class Triad:
 
 
 def gravity_reference(site: Site) -> KnownNorm:
-    """Return the reference of an accelerometer at rest: the specific force, which points upwards, against gravity."""
+    """Return the reference of an accelerometer at rest: the specific force, which points upwards."""
     return KnownNorm(site.gravity_m_s2, np.array(site.up))
 
 
@@ -76,12 +76,12 @@ def stack_dwells(dwells: Sequence[DwellReading | StaticReading], mounting: Array
 
 
 def check_mounted(matrix: Array) -> None:
-    """Raise Fault `swapped_axes`, `mirrored_axis`, `wrong_mounting` if F contradicts the nominal mounting."""
+    """Raise Fault `swapped_axes`, `mirrored_axis` or `wrong_mounting` if F contradicts the nominal mounting."""
     check_axes(SensorAxes.from_matrix(matrix).axes, np.eye(3))
 
 
 def check_identifiable(second_order: Array, std: Array, remedy: str) -> None:
-    """Raise Fault `second_order_not_seen` unless one of the terms φ (3,) is significant by its `std` (3,)."""
+    """Raise Fault `second_order_not_seen` unless a term of φ (3,) is significant by its `std` (3,)."""
     largest = float(np.max(np.abs(second_order) / std))
     if largest < IDENTIFIABLE:
         raise Fault(

@@ -40,15 +40,15 @@ class ScaleFreeBias:
 class BiasDrift:
     """The bias of one quantity of a sensor by repeat, rad/s or m/s².
 
-    A gyroscope's bias contains the Earth's rate times the scale error, and the whole Earth's rate if the site does not
-    state it (`earth_rate_known`); both are the same in every repeat.
+    A gyroscope's bias contains the Earth's rate times the scale error, and without a stated Earth's rate
+    (`earth_rate_known`) all of it; either is the same in every repeat.
 
     - `scale_fixed`: with scale, axes and reference of the first repeat (accelerometers), or nominal (gyroscopes).
-    - `common_std` (3,): the further standard deviation common to all biases.
+    - `common_std` (3,): a further standard deviation common to all biases.
     - `scale_free`: the separate solution of every repeat, by its index.
     - `time_s`, `temperature_c` (R,): means over every repeat, times since the first repeat.
     - `dof`, `slope_dof` (3,): degrees of freedom of `scale_fixed.std` and of the slope's standard deviation.
-    - `faults`: by the name SLOPE, why there is no slope.
+    - `faults`: under the name SLOPE, why there is no slope.
     """
 
     scale_fixed: BiasByRepeat
@@ -68,7 +68,7 @@ Drifts = Mapping[str, Mapping[Quantity, BiasDrift]]
 
 @dataclass(frozen=True, slots=True)
 class DwellMean:
-    """A sensor's means (3,) in one dwell, their variances, the attitude base → sensor, time and temperature.
+    """A sensor's means (3,) in one dwell, their variances, the attitude from base to sensor, time and temperature.
 
     `dof` (3,) are the degrees of freedom of the variances.
     """
@@ -84,8 +84,7 @@ class DwellMean:
 def estimate_bias_drifts(recordings: Sequence[ObservedRun], settings: RunSettings) -> Drifts:
     """Return the drift of every sensor to calibrate, over all recordings of a run, by its finished repeats.
 
-    Raise Fault `not_all_attitudes` with fewer than two finished repeats, and as `solve_triaxial` does for the first
-    one.
+    Raise Fault `not_all_attitudes` with fewer than two finished repeats, and as `solve_triaxial` does for the first.
     """
     site = settings.site
     repeats: defaultdict[int, dict[tuple[float, ...], int]] = defaultdict(dict)
@@ -155,7 +154,7 @@ def _rates(recordings: Sequence[ObservedRun], name: str, sensor: RecordedSensor)
 def fit_acceleration_drift(repeats: Sequence[Sequence[DwellMean]], site: Site, *, second_order: bool) -> BiasDrift:
     """Return the drift of an accelerometer, from repeats of the same attitudes in the same order.
 
-    The first determines the fixed parameters. Raise Fault as `solve_triaxial` and `bias_by_repeat` do.
+    The first repeat determines the fixed parameters. Raise Fault as `solve_triaxial` and `bias_by_repeat` do.
     """
     means, variances, attitudes = _stack(repeats)
 

@@ -92,7 +92,7 @@ def correct_files(data: ExternalData, reference_c: float) -> tuple[ExternalData,
 
 
 def add_rate_polynomials(result: SensorResult, polynomials: OverTemperature) -> tuple[SensorResult, OverTemperature]:
-    """Return a gyroscope's calibration and polynomials, with the uncertainty of each added to the other."""
+    """Return a gyroscope's calibration and polynomials, each with the uncertainty of the other."""
     parameters = np.r_[result.scale, result.bias_rad_s]
     if result.uncertainty is None:
         return result, combine_with_reference(polynomials, np.diag(RATE.parameter_signs) @ parameters, ())
@@ -103,7 +103,7 @@ def add_rate_polynomials(result: SensorResult, polynomials: OverTemperature) -> 
 def add_acceleration_polynomials(
     result: AccelerometerResult, polynomials: OverTemperature
 ) -> tuple[AccelerometerResult, OverTemperature]:
-    """Return an accelerometer's calibration and polynomials, with the uncertainty of each added to the other."""
+    """Return an accelerometer's calibration and polynomials, each with the uncertainty of the other."""
     budget, combined = _combine(ACCELERATION, polynomials, np.r_[result.triad.scale, result.bias_m_s2], result.budget)
     return replace(result, budget=budget), combined
 
@@ -111,7 +111,7 @@ def add_acceleration_polynomials(
 def _combine(
     quantity: Quantity, polynomials: OverTemperature, parameters: Array, budget: Budget
 ) -> tuple[Budget, OverTemperature]:
-    """Return the budget (6,) of scale and bias, and polynomials, with the uncertainty of each added to the other."""
+    """Return the budget (6,) of scale and bias, and the polynomials, each with the uncertainty of the other."""
     sign = np.diag(quantity.parameter_signs)
     values = sign @ parameters
     lines = tuple(
@@ -202,7 +202,7 @@ def _correct_turn(turn: Observation, mean_rad_s: Array, reference_c: float) -> O
 
 
 def _correct_wave(turn: Observation, polynomials: OverTemperature) -> Observation:
-    """Return a revolution with the mean and the wave of its accelerometer at the reference temperature."""
+    """Return a revolution with mean and first harmonic of its accelerometer at the reference temperature."""
     if turn.acceleration is None:
         return turn
     wave = turn.acceleration.harmonic

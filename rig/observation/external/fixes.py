@@ -170,10 +170,7 @@ def _find_joined(
 
 
 def _find_unknown_steps(turning: Turning) -> Iterator[tuple[str, NDArray[np.intp], Array]]:
-    """Yield, by reason, the steps between readings in which the motion is unknown, by the first reading's index.
-
-    Each comes with the standard deviation of the rotation that it hides.
-    """
+    """Yield a reason for unknown motion, the readings (k,) before it, and the stds (k,) of the hidden rotation."""
     steps_s = np.diff(turning.time_s)
     readings = turning.readings_rad_s
     angle_rad = np.linalg.norm(readings[:-1] - np.median(readings, axis=0), axis=1) * steps_s
