@@ -1,1 +1,1 @@
-"""A series of parts, one after the other: their states, the questions in between, and the documents."""
+"""A series of parts: their states, the questions between their runs, and the documents."""

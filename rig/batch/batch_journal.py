@@ -1,6 +1,6 @@
-"""The journal of a batch: a line for each entry, on the disk before anything follows.
+"""The journal of a batch: a line for each entry, written to the disk before the next step.
 
-A line that was interrupted was not entered.
+An incomplete line is no entry.
 """
 
 import json
@@ -29,7 +29,7 @@ _NAMES = {kind: name for name, kind in _KINDS.items()}
 
 @dataclass(slots=True)
 class Journal:
-    """The journal in a batch's folder, and the batch that its entries describe."""
+    """The journal in a batch's folder, with the batch that its entries describe."""
 
     folder: Path
     batch: Batch
@@ -47,7 +47,7 @@ class Journal:
 def open_journal(out: Path | None, parent: Path, entry: Begun) -> Journal:
     """Continue or begin the batch in the folder `out`; without `out` begin one in a new folder below `parent`.
 
-    Raise Refused `run_folder`, and as `resume_journal` does; `no_batch` if one is measured and the other simulated.
+    Raise Refused `run_folder`, and as `resume_journal` does; `no_batch` if only the new or the old part is simulated.
     """
     if out is not None and (out / JOURNAL).exists():
         journal = resume_journal(out)

@@ -41,7 +41,7 @@ class Chip:
     who_am_i: tuple[int, ...] = ()
 
     def is_that(self, other: "Chip") -> bool:
-        """Return whether both are the same chip, judged by board and, if both were read, by the sensors' identities."""
+        """Return whether both are the same chip, by their boards and, if both were read, by the sensors' identities."""
         both_read = self.who_am_i and other.who_am_i
         return self.board == other.board and (not both_read or self.who_am_i == other.who_am_i)
 
@@ -101,7 +101,7 @@ class BatchPart:
 
 @dataclass(frozen=True, slots=True)
 class Batch:
-    """All parts so far, in their order; the last may be in work."""
+    """A batch: all parts so far, in order; the last may be in work."""
 
     begun: Begun
     parts: tuple[BatchPart, ...] = ()
@@ -113,12 +113,12 @@ class Batch:
         return self.parts[-1] if self.parts and self.parts[-1].ended is None else None
 
     def count(self, *states: str) -> int:
-        """Return the number of parts in any of `states`."""
+        """Return the number of parts in any of the given states."""
         return sum(part.state in states for part in self.parts)
 
     @property
     def passed(self) -> bool:
-        """Whether every serial number of the batch has a verdict, and the newest one is a pass."""
+        """Whether the newest verdict of every serial number in the batch is a pass."""
         newest = (self.done(serial) for serial in {part.serial for part in self.parts})
         return all(part is not None and part.state == "pass" for part in newest)
 
@@ -174,7 +174,7 @@ class Doubt:
 
 
 def doubt_of(serial: str, batch: Batch, section: StationSection, today: Callable[[str], str | None]) -> Doubt | None:
-    """Return the objection to running this serial number now, or None; `today` describes its run of today, if any."""
+    """Return the objection to running this serial number now, or None; `today` describes its run today, if any."""
     try:
         check_serial_number(serial)
     except ValueError as error:

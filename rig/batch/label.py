@@ -1,7 +1,7 @@
-"""The label of a passed part: lines of text, the same for a label printer (ZPL), the certificate's number as QR.
+"""The label of a passed part: as text, for a label printer (ZPL), and with the certificate's number as QR code.
 
-ZPL II: Zebra, Programming Guide P1099957: `^FH` permits any byte in a field as `_` and two hexadecimal digits, `^BQ`
-prints a QR code. QR: ISO/IEC 18004, by the library segno.
+In ZPL II (Zebra, Programming Guide P1099957), `^FH` permits any byte in a field as `_` and two hexadecimal digits, and
+`^BQ` prints a QR code. The library segno makes QR codes (ISO/IEC 18004).
 """
 
 from collections.abc import Mapping

@@ -14,11 +14,11 @@ from rig.station.questions import COMMAND_WORDS, Kind, Question, Voice, is_agree
 
 @dataclass(frozen=True, slots=True)
 class Operator:
-    """The operator, asked by a `voice`, or a list of `numbers`; an empty number ends the batch.
+    """The operator, asked by a `voice`, or a list of serial `numbers`; an empty number ends the batch.
 
-    Without a voice no questions are asked, so a doubt cannot be overridden. Numbers in a list are used in order. If one
-    is refused, it is entered in the table; a refused typed one is typed again. `asking` is open during a question
-    between two runs, with its subject, such as "to mount the part".
+    Without a voice no questions are asked, so a doubt cannot be overridden. A refused number of a list is entered in
+    the table; a refused typed number is typed again. `asking` is open during a question between two runs, with its
+    subject, such as "to mount the part".
     """
 
     voice: Voice | None
@@ -36,7 +36,7 @@ class Operator:
         return self.numbers is not None
 
     def next_part(self, done: Sequence[BatchPart], why: str = "") -> str | None:
-        """Return the next serial number, from the list or typed; `why` is the reason if the last was refused."""
+        """Return the next serial number, from the list or typed; `why`: why the last was refused, if so."""
         if self.numbers is not None:
             return following(self.numbers, [part.serial for part in done])
         text = f"part {len(done) + 1}, serial number (Enter alone ends):"
@@ -61,11 +61,11 @@ class Operator:
         return self._agrees("again", f"{part.serial}: again? yes, or no to put it aside:", f"{part.serial}: {error}")
 
     def agrees(self, announcement: Sequence[str], to_do: str) -> bool:
-        """Ask whether the announced run may start; an operator who cannot answer has agreed in advance."""
+        """Ask whether the announced run may start; without a voice it may."""
         return self.voice is None or is_agreed(self.voice, question_before(announcement, to_do))
 
     def hears(self, part: BatchPart) -> None:
-        """Print a part's outcome on stdout in a line, and in another how it agrees with a simulated truth."""
+        """Print a part's outcome on stdout in a line, and its agreement with a simulated truth in another."""
         ended = part.ended
         if ended is None:
             return
@@ -80,7 +80,7 @@ class Operator:
         return nullcontext() if self.voice is None else self.asking(what)
 
     def _agrees(self, kind: Kind, text: str, *lines: str) -> bool:
-        """Ask a yes-or-no question; if no operator can be asked, the answer is no."""
+        """Ask a yes-or-no question; without an operator the answer is no."""
         return self.voice is not None and is_agreed(self.voice, Question(kind, text, lines))
 
     def _answer(self, question: Question) -> str | None:
@@ -88,7 +88,7 @@ class Operator:
 
 
 def refuse_without_terminal() -> None:
-    """Raise Refused `not_confirmed` if nobody can be asked."""
+    """Raise Refused `not_confirmed` without a terminal to ask at."""
     if not sys.stdin.isatty():
         raise Refused(
             "not_confirmed",

@@ -1,4 +1,4 @@
-"""A list of parts that are run without questions, and its numbers."""
+"""A list of parts that are run without questions."""
 
 import csv
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ HEADING = "serial_number"
 
 
 def numbers_in(path: Path) -> tuple[str, ...]:
-    """Return the serial numbers in a CSV file's column `serial_number`; in its first column if there is no such column.
+    """Return the serial numbers in a CSV file's column `serial_number`, or else in its first column.
 
     Raise Refused `parts_file`.
     """

@@ -1,4 +1,4 @@
-"""One part after the other: the entries, questions and documents between their runs."""
+"""The sequence of parts: entries, questions and documents between their runs."""
 
 import gc
 from collections.abc import Callable, Sequence
@@ -30,7 +30,7 @@ LABELS = "labels"
 
 
 class Bench(Protocol):
-    """The place where a part is run, with everything that remains between two parts."""
+    """A bench that runs parts, with everything that remains between two parts."""
 
     @property
     def simulated(self) -> bool: ...
@@ -60,7 +60,7 @@ class Desk:
     part: BatchPart
 
     def confirm(self, chip: Chip) -> None:
-        """Raise Refused `same_chip` if the board that has answered belongs to another number, unless confirmed."""
+        """Raise Refused `same_chip` if the board that answered belongs to another serial number, unless confirmed."""
         self.work.refuse_same_chip(self.part, chip)
 
     def agrees(self, announcement: Sequence[str], to_do: str) -> bool:

@@ -42,9 +42,9 @@ class Now:
     - over: whether this is the last state.
     - fraction: the finished fraction of the run (0 to 1), None without a run.
     - turn_deg_s: the present rate of the turner.
-    - sensors: name, number of samples and number of lost samples of each.
+    - sensors: each one's name, number of samples and number of lost samples.
     - verdict: the last part's serial number and state, until the next part begins.
-    - why: the reason of that state.
+    - why: the reason of that part's state.
     - truth: the agreement of its result with a simulated laboratory's truth, empty without a truth.
     """
 
@@ -75,18 +75,18 @@ class Now:
 class Present:
     """The present state of a station: a listener of its runs and of its batch.
 
-    Each of `hears` is called after every change and must not block.
+    The functions `hears` are called after every change and must not block.
     """
 
     now: Now
     hears: Sequence[Callable[[Now], None]] = field(default=())
 
     def event(self, event: RunEvent) -> None:
-        """Handle an event, as a Listener does."""
+        """Update the state after an event of a run."""
         self._becomes(after(self.now, event))
 
     def batch(self, batch: Batch) -> None:
-        """Handle a change of the batch."""
+        """Update the state after a change of the batch."""
         self._becomes(update_by_batch(self.now, batch))
 
     @contextmanager

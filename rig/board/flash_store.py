@@ -35,9 +35,10 @@ class SensorSolution(Protocol):
 def store_calibrations(
     config: RigConfig, results: Mapping[str, SensorSolution]
 ) -> Iterator[tuple[str, StoredCalibration]]:
-    """Store the solution of every sensor on the board that is to be calibrated; yield its name and its record.
+    """Store the solution of every sensor to calibrate on the board; yield its name and its record.
 
-    Raise BoardError if the board refuses, `not_stored` if it reads back another record; Refused as `find_sensor` does.
+    Raise BoardError if the board refuses, or `not_stored` if another record is read back; Refused as `find_sensor`
+    does.
     """
     if not config.on_board:
         return

@@ -1,4 +1,4 @@
-"""Checks that the board and its sensors are the ones that the configuration and this program expect."""
+"""Checks that board and sensors are those of the configuration, and that the firmware is this program's."""
 
 from functools import partial
 from math import isclose

@@ -25,7 +25,7 @@ AxisDirection = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 class ColumnSection(Section):
     """One column of the file.
 
-    Its numbers × `factor`, or ÷ `lsb_per_unit`, are in `unit`. A mirrored axis has a negative factor.
+    The column's numbers × `factor`, or ÷ `lsb_per_unit`, are in `unit`. A mirrored axis has a negative factor.
     """
 
     column: Annotated[str, Field(min_length=1, max_length=200)] = Field(
@@ -47,7 +47,7 @@ class ColumnSection(Section):
     @field_validator("unit")
     @classmethod
     def refuse_unknown_unit(cls, value: str | None) -> str | None:
-        """Refuse a unit that is not in the table, because its conversion is unknown."""
+        """Refuse a unit that is not in the table."""
         if value is not None and value not in ALLOWED:
             raise ValueError(f"this unit is not known; allowed: {', '.join(ALLOWED)}")
         return value
@@ -55,7 +55,7 @@ class ColumnSection(Section):
     @field_validator("factor", "lsb_per_unit")
     @classmethod
     def refuse_zero(cls, value: float | None) -> float | None:
-        """Refuse zero, and numbers that no unit of a sensor can have as its size."""
+        """Refuse zero, and numbers that are impossible as the size of a sensor's unit."""
         if value is not None and not LEAST_FACTOR < abs(value) < 1 / LEAST_FACTOR:
             raise ValueError(f"must be between {LEAST_FACTOR:g} and {1 / LEAST_FACTOR:g}, of either sign")
         return value
@@ -113,15 +113,15 @@ class TableSection(Section):
 
 
 class ColumnMap(Section):
-    """The columns of files: `samples` of the readings; `motion` of sweeps or attitudes, or the log of a `table`.
+    """The columns of files: `samples` of readings; `motion` of sweeps or attitudes, or the log of a `table`.
 
-    The keys of `samples` and `motion` are the rig's own names of columns. A column that already has such a name need
-    not be named; columns that are not named are left out.
+    The keys of `samples` and `motion` are the rig's names of columns. Columns with these names need no key; other
+    columns without a key are left out.
 
     - …_skip_lines: lines before the heading.
     - …_rate_hz: rows per second of a file without a column of time.
     - …_missing: texts that mean a missing value, as an empty cell does.
-    - motion_inverse: the quaternions take table to body coordinates, and are inverted.
+    - motion_inverse: whether the quaternions take table to body coordinates.
     """
 
     samples: dict[str, ColumnSection] = Field(default_factory=dict)

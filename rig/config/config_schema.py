@@ -91,7 +91,7 @@ def _chosen(key: str, sections: Mapping[str, Mapping[str, Any]], text: str) -> d
 
 
 def _file_schema(schema: Any) -> Any:
-    """Return a model's schema for files: all keys are optional, null omits a key, text may be a number."""
+    """Return a model's schema for files, in which all keys are optional, null omits a key, and text may be a number."""
     if isinstance(schema, list):
         return [_file_schema(item) for item in schema]
     if not isinstance(schema, dict):

@@ -38,8 +38,8 @@ sensors:
 class Answers:
     """The turner, the measuring device, and their addresses.
 
-    `sensors` is the section of that name as `rig lines` writes it, if the device's lines were read. `part` is one on
-    the board. `arm_host`, `arm_model` and `payload_kg` are of an arm, `servo_port` and `servo_model` of a servomotor.
+    `sensors` is the section written by `rig lines`, if the device's lines were read; `part` is on the board.
+    `arm_host`, `arm_model` and `payload_kg` belong to an arm, `servo_port` and `servo_model` to a servomotor.
     """
 
     turner: Turner

@@ -44,9 +44,10 @@ PROBLEMS_SHOWN = 25
 class Loaded:
     """A valid configuration.
 
-    `simulated`: the file has a `world:` section, which only the simulated laboratory reads, from `text`. `flash_file`:
-    the file with the simulated board's memory, or None. `text`: the file as used (merged with its base, overrides
-    applied). `rig_text`: the same without the `world:` section, as a recording stores it.
+    - `simulated`: whether the file has a `world:` section, which only the simulated laboratory reads, from `text`.
+    - `flash_file`: the file with the simulated board's memory, or None.
+    - `text`: the file as used, merged with its base and overrides; `rig_text`: without the `world:` section, as
+      recorded.
     """
 
     config: RigConfig
@@ -142,7 +143,7 @@ def parse(
     sections: Sections = STOCK_SECTIONS,
     turners: Turners = None,
 ) -> Loaded:
-    """Validate the configuration in a text as `load` does; the text cannot be based on a file."""
+    """Validate the configuration in a text, which is not based on a file, as `load` does."""
     try:
         layered = merge_layers(text, None, overrides)
     except Unreadable as error:
@@ -179,7 +180,7 @@ def _dump(document: Mapping[str, Any]) -> str:
 def _validate_rig(
     document: Mapping[str, Any], sections: Sections, turners: Turners, layered: Layered
 ) -> tuple[RigConfig | None, list[str]]:
-    """Validate all but the world. The procedure's name and the turner's kind select their models."""
+    """Validate all sections but the world's. The procedure's name and the turner's kind select their models."""
     procedure, problems = _validate_procedure(document.get("procedure", {}), sections, layered)
     turner, turner_problems = _validate_turner(document, turners, layered)
     rest = {**document, "procedure": procedure or ProcedureSection(name=""), "turner": turner or TurnerSection()}
@@ -222,7 +223,7 @@ def _validate_procedure(data: Any, sections: Sections, layered: Layered) -> tupl
 def _validate_turner(
     document: Mapping[str, Any], turners: Turners, layered: Layered
 ) -> tuple[TurnerSection | None, list[str]]:
-    """Validate the turner's section: `arm` or, with its kind, `turner`. A wrong kind gives a single problem."""
+    """Validate the turner's section: `arm`, or `turner` with its kind. A wrong kind is a single problem."""
     if "turner" not in document:
         if "arm" not in document:
             return None, ["arm: missing"]
@@ -265,7 +266,7 @@ SHAPES = {
 
 
 def _explain(model: type[BaseModel], item: Any, prefix: Location, layered: Layered) -> str:
-    """Return one validation error as a line: path, line number, the fault, the allowed values, the nearest spelling."""
+    """Return one validation error as a line: path, line number, fault, allowed values, nearest spelling."""
     location: Location = item["loc"]
     where = _describe_location((*prefix, *location), layered.places)
     kind, value = item["type"], item["input"]

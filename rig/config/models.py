@@ -1,7 +1,7 @@
-"""What a configuration file may say.
+"""The models of a configuration file.
 
-Every quantity carries its unit in its key. Degrees live only here, at the edge; the rig works in SI units. Every key
-says what it means: docs/configuration.md is made of these descriptions.
+Keys carry their units. Degrees occur only here, at the edge; the rig works in SI units. docs/configuration.md is made
+of the keys' descriptions.
 """
 
 from collections.abc import Iterable, Mapping
@@ -203,7 +203,7 @@ class ProcedureSection(Section):
 
 
 class OutputSection(Section):
-    """Where results go."""
+    """The output of results."""
 
     folder: str = Field(
         default="runs", min_length=1, max_length=1000, description="folder that contains a folder for each run"
@@ -211,7 +211,7 @@ class OutputSection(Section):
 
 
 class StatementConfig(Section):
-    """What a laboratory states of itself and of an order."""
+    """A laboratory's statements on itself and on an order."""
 
     site: SiteSection = SiteSection()
     certificate: CertificateSection = CertificateSection()
@@ -238,7 +238,7 @@ class SensorsConfig(Section):
 
     @property
     def ports(self) -> dict[str, str]:
-        """The ports of board and sensors, each by its key in the file."""
+        """The ports of board and sensors, by their keys in the file."""
         ports = {f"sensors.{name}.{s.own_port[0]}": s.own_port[1] for name, s in self.sensors.items() if s.own_port}
         return ports if self.board is None else {"board.port": self.board.port} | ports
 
@@ -317,19 +317,19 @@ class SensorsConfig(Section):
 
     @property
     def to_calibrate(self) -> Mapping[str, SensorSection]:
-        """The sensors a calibration is for, by name."""
+        """The sensors to calibrate, by name."""
         return {name: sensor for name, sensor in self.sensors.items() if sensor.role == "calibrate"}
 
     @property
     def reference(self) -> tuple[str, SensorSection] | None:
-        """The sensor that has a stated calibration, with its name; None if there is none."""
+        """The reference sensor, with a stated calibration, and its name, or None."""
         return next(((name, s) for name, s in self.sensors.items() if s.role == "reference"), None)
 
 
 class RigConfig(SensorsConfig):
-    """Everything the rig reads. It has no knowledge of whether the far end is simulated.
+    """The configuration of the rig, which does not know whether the far end is simulated.
 
-    `turner` is what turns the sensors; a file says it under `turner` with its kind, or an arm under `arm`.
+    `turner` turns the sensors; a file states it under `turner` with its kind, or an arm under `arm`.
     """
 
     turner: TurnerSection
@@ -338,7 +338,7 @@ class RigConfig(SensorsConfig):
 
     @property
     def arm(self) -> ArmSection:
-        """The robot arm that turns the sensors. Raise TypeError if another turner does."""
+        """The robot arm that turns the sensors. Raises TypeError if another turner does."""
         if not isinstance(self.turner, ArmSection):
             raise TypeError(f"no arm turns the sensors: the configuration has a {type(self.turner).__name__}")
         return self.turner

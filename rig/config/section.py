@@ -25,7 +25,7 @@ RATIO: dict[str, Any] = {"unit": "1"}  # a number without a unit, if the key can
 
 
 def no_number_is_true(cls: type[BaseModel], value: Any, info: ValidationInfo) -> Any:
-    """Refuse true and false for numbers: YAML reads yes and on as true, which counts as the number 1."""
+    """Refuse true and false for numbers: YAML reads yes and on as true, which counts as 1."""
     field = cls.model_fields.get(info.field_name or "")
     if isinstance(value, bool) and field is not None:
         kinds = _kinds(field.annotation)
@@ -48,11 +48,10 @@ class Section(BaseModel):
 
 
 def check_host(name: str) -> str:
-    """Return a host's IP address or name unchanged. Raise ValueError if it can be neither.
+    """Return a host's IP address or name unchanged. Raise ValueError for any other text.
 
-    A name has the form of RFC 1123, section 2.1; one with non-ASCII letters must have it after encoding (IDNA, RFC
-    3490). A name whose last part is a number could only be an IPv4 address, so it is refused. So are addresses of many
-    or unspecified hosts.
+    A name has the form of RFC 1123, section 2.1, with non-ASCII letters after encoding (IDNA, RFC 3490). Refused are
+    names whose last part is a number, as in an IPv4 address, and addresses of many or unspecified hosts.
     """
     try:
         address = ipaddress.ip_address(name)
@@ -77,10 +76,9 @@ PORT_NAME = re.compile(r".*[/\\].+|COM\d+", re.IGNORECASE)
 
 
 def check_port(value: str) -> str:
-    """Return a serial port's name or `socket://host:port` unchanged. Raise ValueError if it cannot be one.
+    """Return a serial port's name or `socket://host:port` unchanged. Raise ValueError for any other text.
 
-    A name is a path, or that of a port of Windows. pyserial knows other addresses, and one of them, `spy://`, empties
-    and writes a file that it names.
+    A name is a path, or a port of Windows. Other addresses of pyserial are refused: `spy://` overwrites a file.
     """
     if "://" in value:
         try:

@@ -16,7 +16,7 @@ TIME, ANGLE, RATE, ACCELERATION, FIELD, TEMPERATURE, PRESSURE, NUMBER = (
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """A unit of `quantity`: a number of it × `size` + `zero` is the value in SI, of a temperature in °C."""
+    """A unit of `quantity`: number × `size` + `zero` is the value in SI, for a temperature in °C."""
 
     quantity: str
     size: float

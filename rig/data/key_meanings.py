@@ -1,4 +1,4 @@
-"""The meanings of the keys of `result.json`: the table for its JSON schema and the page of public names."""
+"""The table of meanings of the keys of `result.json`, for its JSON schema and the page of public names."""
 
 import re
 from collections.abc import Mapping
@@ -21,8 +21,8 @@ def meanings() -> Mapping[str, str]:
 def meaning_of(entry: str, key: str) -> str:
     """Return the meaning of a key in an entry, named without its ending `Entry`.
 
-    Raise KeyError if it has none. Standard uncertainties and their degrees of freedom have the meaning that their name
-    states.
+    Names of standard uncertainties and degrees of freedom state their meaning. Raise KeyError for another key without
+    one.
     """
     table = meanings()
     if (meaning := table.get(f"{entry}.{key}", table.get(key))) is not None:

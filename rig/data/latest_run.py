@@ -1,4 +1,4 @@
-"""The run folders that this user ran last, newest at the end: what `latest` means in place of a run folder."""
+"""The run folders that this user ran last, newest at the end, for `latest` in place of a run folder."""
 
 from contextlib import suppress
 from pathlib import Path

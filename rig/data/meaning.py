@@ -13,9 +13,8 @@ JUDGED_PARAMETERS: tuple[Parameter, Parameter] = ("scale", "bias")
 class Meaning:
     """The subject of a check: conformity of a property of the item, or fitness of the measurement for use.
 
-    `quantity` and `parameter` are those of the `sensor` that is judged; None for no single one. `sweep` is the index in
-    the plan of the sweep that contradicts the others and that `rig resume` repeats. `what` names the criterion,
-    `scale_std`: the words of the check are found by it.
+    `quantity` and `parameter` of the judged `sensor` are None for no single one. `sweep` is the plan's index of a sweep
+    that contradicts the others and that `rig resume` repeats. `what` names the criterion, such as `scale_std`.
     """
 
     kind: Kind
@@ -27,7 +26,7 @@ class Meaning:
 
 
 class Judged(Protocol):
-    """A check, as it was made or as a result holds it."""
+    """A check of the verdict, computed or read from a result."""
 
     @property
     def means(self) -> Meaning: ...

@@ -1,7 +1,7 @@
 """Values by which a source marks a field that it does not provide. Pure.
 
-Each source declares a table of `Absent` for its fields, by the definition of its protocol. A marker is no value: a
-temperature that is not provided is unknown, and a sample without a rate is no sample.
+Each source declares a table of `Absent` for its fields, by its protocol. A temperature that is not provided is unknown,
+and a sample without a rate is no sample.
 """
 
 from dataclasses import dataclass
@@ -15,9 +15,9 @@ POSSIBLE_C = (-100.0, 200.0)
 
 @dataclass(frozen=True, slots=True)
 class Absent:
-    """The markers of a field without a value: not finite, one of `numbers`, or not `within` both ends.
+    """The markers of a field without a value: numbers that are not finite, in `numbers`, or not `within` both ends.
 
-    If the message has flags, the field holds a value if all `bits` of them are set.
+    If the message has flags, the field also lacks a value unless all `bits` are set.
     """
 
     numbers: tuple[float, ...] = ()
@@ -25,7 +25,7 @@ class Absent:
     bits: int = 0
 
     def mask_provided(self, values: ArrayLike, flags: ArrayLike = -1) -> NDArray[np.bool_]:
-        """Return which values (n,) or (n, 3) the source provided, by the messages' `flags` (n,) if they have any."""
+        """Return a mask of the values (n,) or (n, 3) that the source provided, by the messages' `flags` (n,) if any."""
         numbers = np.asarray(values, dtype=np.float64)
         low, high = self.within
         valid = np.isfinite(numbers) & ~np.isin(numbers, self.numbers) & (numbers >= low) & (numbers <= high)

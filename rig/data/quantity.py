@@ -1,4 +1,4 @@
-"""The quantities that sensors measure: every name, unit and size that is written or shown of them, in one table.
+"""The quantities that sensors measure: their names and units, in files and on screens, in one table.
 
 A quantity's names in files end with its `suffix`: `bias_m_s2`, `x_m_s2`. A new quantity is a row here, or comes with an
 installed kind of sensor (`rig.data.installed_kinds`).
@@ -25,7 +25,7 @@ class DisplayUnit:
 
 @dataclass(frozen=True, slots=True)
 class Mistaken:
-    """A `unit` in which readings are often given by mistake, the remedy, and a value in SI that no part reaches."""
+    """A `unit` in which readings are often given by mistake, the remedy, and an SI value that no part reaches."""
 
     unit: str
     mend: str
@@ -33,7 +33,7 @@ class Mistaken:
 
     @property
     def unusual(self) -> float:
-        """More than most parts read, in SI."""
+        """A value, in SI, that most parts do not reach."""
         return self.most / 10
 
 
@@ -41,12 +41,12 @@ class Mistaken:
 class Quantity:
     """One quantity that a sensor measures along its axes.
 
-    - sensor: the kind of sensor; unit: that of SI; suffix: the same in names.
+    - sensor: the kind of sensor; unit: the SI unit; suffix: this unit in names.
     - reading: the unit of a reading on a screen; bias: the unit of a bias, and its least number of decimals; drift: the
-      unit of its change over hours; residuals: the units of residuals in a figure, the largest first.
+      unit of a bias' change over hours; residuals: the units of residuals in a figure, the largest first.
     - walk: the name of its white noise; walk_suffix: the SI unit of that noise in names; walk_unit: the displayed unit.
-    - steady: largest difference between the means of two adjacent seconds at rest, beyond noise. No bias moves as fast,
-      but a hand does, and half a degree of tilt exceeds it. The field at one place in a room changes by a tenth of it.
+    - steady: largest difference between the means of two adjacent seconds at rest, beyond noise. No bias changes as
+      fast, but a hand does, as does a tilt by half a degree. The field at one position changes by a tenth of it.
     - d_si: the unit as a digital certificate writes it. towards: the direction to which a sensor at rest is turned.
     - mistaken: the unit in which readings are given by mistake.
     - offset: the ratio of the reading at zero to the bias: −1 if the bias is a correction, m = g/k − b.
@@ -85,7 +85,7 @@ class Quantity:
 
     @property
     def prefix(self) -> str:
-        """Prefix of the names of its checks, limits and columns, such as `acceleration_`; empty for a rate."""
+        """The prefix of the names of its checks, limits and columns, such as `acceleration_`; empty for a rate."""
         return "" if self.name == RATE.name else f"{self.name}_"
 
     def full_label(self, sensor: str) -> str:
@@ -94,7 +94,7 @@ class Quantity:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Columns of its readings in a table, one for each axis."""
+        """The columns of its readings in a table, one for each axis."""
         return tuple(self.file_key(axis) for axis in self.axes)
 
     @property
@@ -109,7 +109,7 @@ class Quantity:
 
     @property
     def parameter_signs(self) -> tuple[float, ...]:
-        """The factors that convert scale factors and biases to a model whose bias is part of the reading."""
+        """The factors of scale factors, then of biases, for a model whose bias is part of the reading."""
         return (1.0,) * len(self.axes) + (float(self.offset),) * len(self.axes)
 
 
@@ -204,6 +204,6 @@ SCALARS: Final = (TEMPERATURE, PRESSURE)
 
 
 def select_displayed(quantities: Iterable[str]) -> list[str]:
-    """Return the names of a sensor's quantities to display: its temperature only if it measures nothing else."""
+    """Return the names of a sensor's displayed quantities: the temperature only if it measures nothing else."""
     names = list(quantities)
     return [name for name in names if name != TEMPERATURE.name] or names

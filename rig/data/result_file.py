@@ -1,4 +1,4 @@
-"""`result.json`: one model that writes it, reads it, and is the source of its JSON schema (docs/result.schema.json).
+"""The model of `result.json`, which writes and reads it and is the source of docs/result.schema.json.
 
 SI units, the unit in every name; vectors and matrices are lists, rows first. Keys are in the order of the fields.
 """
@@ -59,13 +59,13 @@ QuantityName = Annotated[str, AfterValidator(_check_quantity)]
 
 
 class CheckEntry(Entry):
-    """One limit of the verdict; `value` is null if nothing was measured, `limit` if none was set.
+    """One check of the verdict; `value` is null if nothing was measured, `limit` if none was set.
 
-    - If the value has an expanded uncertainty: uncertainty, its coverage_factor, the guard_band by which the
-      decision_rule keeps it below the limit, and the probability that a value beyond the limit is accepted.
+    - uncertainty, coverage_factor: U of the value and its k, if any; guard_band: distance from the limit that the
+      decision rule requires; false_acceptance_probability: that the true value is beyond the limit.
     - kind: conformity of a property of the item, or fitness of the measurement for use; sensor, quantity, parameter:
-      what is judged, if it is a single one; sweep: the sweep that contradicts the others; criterion: the name of the
-      judged quantity, null if the package that made the check does not state it.
+      the subject, if a single one; sweep: a sweep that contradicts the others; criterion: the name of the judged
+      quantity, null if the check's package does not state it.
     """
 
     name: str
@@ -93,8 +93,8 @@ class CheckEntry(Entry):
 class StoredPolynomialsEntry(Entry):
     """Changes of a stored calibration with temperature: rows for (T − `temperature_c`)ⁿ, n from 1 to 3, by axis.
 
-    `scale_change` is added to 1 and multiplies m + b, `bias_change_rad_s` is added to b. Beyond `range_c` it is as at
-    its ends.
+    `scale_change` is added to 1 and multiplies m + b, `bias_change_rad_s` is added to b. Beyond `range_c` the values at
+    its ends apply.
     """
 
     range_c: Vector2
@@ -103,7 +103,7 @@ class StoredPolynomialsEntry(Entry):
 
 
 class StoredCalibrationEntry(Entry):
-    """A calibration the board had stored while it corrected its readings: g = `matrix` (m + b), else K (m + b)."""
+    """A calibration stored on the board, which corrected its readings: g = `matrix` (m + b), else K (m + b)."""
 
     sequence: int
     part: str
@@ -120,7 +120,7 @@ class StoredCalibrationEntry(Entry):
 
 
 class KinematicsEntry(Entry):
-    """The Denavit–Hartenberg parameters of the turner in the calculation, from the ground on; six joints of an arm."""
+    """The Denavit–Hartenberg parameters of the turner, from the ground on, as used in the calculation."""
 
     theta_rad: OfJoints
     a_m: OfJoints
@@ -185,9 +185,9 @@ class EstimateEntry(Entry):
 class VectorEntry(Entry):
     """The vector model's solution: the six parameters, and the directions of the three axes.
 
-    - residuals_std_rad_s: standard deviation that the solution expects of each residual.
+    - residuals_std_rad_s: expected standard deviation of each residual.
     - …_degrees_of_freedom: those of the standard deviations of that name, null if infinite.
-    - Both are left out of a solution without a budget, such as one from the sweeps of a file.
+    - Both are absent without a budget, as for sweeps of a file.
     """
 
     model: str
@@ -227,7 +227,7 @@ class NonlinearityEntry(Entry):
 
 
 class AverageEntry(Entry):
-    """A rest: the mean reading, the standard deviation of that mean, and of one sample."""
+    """A rest: the mean reading, and the standard deviations of the mean and of one sample."""
 
     mean_rad_s: Vector3
     mean_std_rad_s: Vector3
@@ -238,9 +238,9 @@ class AverageEntry(Entry):
 
 
 class ObservationEntry(Entry):
-    """One revolution and the mean reading over it; with its joint if an arm made it.
+    """One revolution, its mean reading, and its joint if an arm made it.
 
-    `angle_rad` is the angle turned: 2π, several of these, or an arc by the encoders; null for a file of speeds.
+    `angle_rad` is the angle turned: a multiple of 2π, or an arc by the encoders; null for a file of speeds.
     """
 
     sweep: int
@@ -284,7 +284,7 @@ class BoardSolutionEntry(Entry):
 
 
 class BoardEntry(Entry):
-    """The board's solutions by method, and the difference of the closed form from its solution in double precision."""
+    """The board's solutions by method, and the difference of the closed form from that in double precision."""
 
     solutions: dict[str, BoardSolutionEntry]
     not_observed: tuple[str, ...]
@@ -297,20 +297,19 @@ class BoardEntry(Entry):
 class GyroscopeEntry(Entry):
     """A sensor's calibration by the chosen estimator, its observations, and the solutions of the other estimators.
 
-    - covariance: of noise and bias random walk; covariance_combined: of all contributors in the budget. Both exist if
-      the vector model was chosen.
+    - covariance: by noise and bias random walk; covariance_combined: by all contributors in the budget, with the vector
+      model.
     - correction_matrix: M of g = M (m + b), by which the board and the C header correct readings.
-    - speeds_rad_s: those of the sweeps. A calibration at one speed, in either direction, is valid at that speed, and
-      has no nonlinearity. axis_rate_ranges_rad_s: the smallest and the largest rate along each of the sensor's own axes
-      in the sweeps that determine its scale factor.
-    - temperature_c: mean over the samples of all sweeps. scale_conditions, bias_conditions: times and temperature of
-      the readings for each: scale factors come from sweeps, biases from rests too.
-    - board: null for a reference: the board solves only for the sensors that are to be calibrated.
-    - earth_rate: only if it was to be estimated, or the reason without it.
-    - detection_limits: faults during the recording, and the size from which on each is detected.
-    - in_attitudes: only if a file gave the attitudes instead of an arm; what is unknown then, as range and temperature,
-      is null. by_angles: only if sweeps of a file were solved by the angle turned. by_hand: only if it was turned by
-      hand.
+    - speeds_rad_s: those of the sweeps. A calibration at one speed, in either direction, is valid at that speed,
+      without nonlinearity. axis_rate_ranges_rad_s: smallest and largest rate along each of the sensor's axes in the
+      sweeps that determine its scale factor.
+    - temperature_c: mean over the samples of all sweeps. scale_conditions, bias_conditions: times and temperatures of
+      the readings: scale factors come from sweeps, biases from rests too.
+    - board: null for a reference sensor, for which the board does not solve.
+    - earth_rate: if requested, or why it is missing.
+    - detection_limits: faults during the recording, and the sizes from which they are detected.
+    - in_attitudes: only if a file gave the attitudes; range and temperature are then null. by_angles: only if a file's
+      sweeps were solved by the angle turned. by_hand: only if it was turned by hand.
     """
 
     part: str
@@ -364,7 +363,7 @@ class RotationEntry(Entry):
 
 
 class DeviationEntry(Entry):
-    """Reading less reference over a number of samples, axis by axis."""
+    """Reading minus reference over several samples, axis by axis."""
 
     samples: int
     mean_rad_s: Vector3
@@ -374,9 +373,9 @@ class DeviationEntry(Entry):
 
 
 class RevolutionErrorEntry(Entry):
-    """Mean reading less mean reference over one revolution; `gravity_rad_s` is gravity's part of it, if known.
+    """Mean reading minus mean reference over one revolution; `gravity_rad_s` is the part due to gravity, if known.
 
-    Over an arc `angle_rad` is the angle turned. Gravity includes the flange's circling, which acts on a sensor like it.
+    Over an arc `angle_rad` is the angle turned. Gravity includes the centripetal acceleration.
     """
 
     sweep: int
@@ -389,7 +388,7 @@ class RevolutionErrorEntry(Entry):
 
 
 class ComparisonEntry(Entry):
-    """A sensor's readings compared with the reference's; `noise_rad_s` is null without rests; a delay per recording."""
+    """A sensor's readings compared with the reference's; `noise_rad_s`: null without rests; one delay per recording."""
 
     movement: DeviationEntry
     sweeps: DeviationEntry
@@ -432,16 +431,16 @@ class ResultDocument(Entry):
     """The result of a run, of schema "rig.result/1".
 
     - gyroscopes: empty for a verification of stored calibrations, and without sweeps; accelerometers, magnetometers:
-      empty if none was calibrated or recorded; one that was recorded and not calibrated has the reason.
+      the calibrations, or the reasons why recorded sensors have none.
     - bias_drift: biases by repeat of a run of that procedure, by sensor, then by "rate" and "acceleration".
-    - over_temperature: calibrations over temperature, keyed in the same way; all other results refer to their reference
-      temperature then.
+    - over_temperature: calibrations over temperature, keyed in the same way; all other results then refer to their
+      reference temperature.
     - unsolved: why a quantity of external readings has no solution, by sensor, then by the quantity's name.
-    - omitted: parts of these readings that were left out; notes: remarks on how they were read.
+    - omitted: parts left out of external readings; notes: remarks on how they were read.
     - others: results of kinds that packages add, by the kind's key, in the package's own format.
     - mounts: of a run of several stages, for each but the first.
 
-    A sensor's name becomes that of files: the rules of a configuration apply here too.
+    Sensors' names follow the rules of a configuration, because they become names of files.
     """
 
     schema_name: Literal["rig.result/1"] = Field(alias="schema")  # as SCHEMA
@@ -479,7 +478,7 @@ def schema_text() -> str:
 
 
 def write_result(document: ResultDocument, folder: Path) -> None:
-    """Write `result.json` into a run folder, completely or not at all: it ends the run."""
+    """Write `result.json`, which ends the run, into a run folder, completely or not at all."""
     write_new(folder / RESULT, document.text() + "\n")
 
 

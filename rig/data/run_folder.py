@@ -1,4 +1,4 @@
-"""The files of a run folder, and the command that resumes one."""
+"""The files of a run folder, and the command that resumes a run."""
 
 import itertools
 import json
@@ -50,7 +50,7 @@ def new_folder(out: Path | None, loaded: "Loaded", script: str, identity: Script
 
 
 def discard(folder: Path) -> None:
-    """Remove a new run folder in which nothing was measured, unless it holds other files."""
+    """Remove a new run folder without measurements, unless it holds other files."""
     begun = [folder / name for name in (CONFIG, SCRIPT, SCRIPT_IDENTITY, WORLD_LATE, TRUTH, LOG, ARM_LOG)]
     with suppress(OSError):
         for path in [*begun, *(file for readings in _BEGINNINGS for file in recordings(folder, readings))]:
@@ -59,7 +59,7 @@ def discard(folder: Path) -> None:
 
 
 def empty_folder(folder: Path, *, or_else: str = "") -> Path:
-    """Make the folder, or return an existing empty one; `or_else` is a further remedy for one that is not empty.
+    """Make the folder, or return it if it is empty; `or_else` is a further remedy for a folder that is not empty.
 
     Raise Refused `run_folder`.
     """
@@ -80,7 +80,7 @@ def refuse_unwritable(folder: Path) -> Iterator[None]:
 
 
 def _write_all(folder: Path, texts: Mapping[str, str]) -> None:
-    """Write all new files or, on a full disk, none, because no run may resume from half a configuration."""
+    """Write all new files or, on a full disk, none: no run may resume from half a configuration."""
     begun: list[Path] = []
     try:
         for name, text in texts.items():
@@ -95,7 +95,7 @@ def _write_all(folder: Path, texts: Mapping[str, str]) -> None:
 
 
 def folder_of_its_own(parent: Path, what: str) -> Path:
-    """Make a new folder whose name has the time and `what` it holds; several may begin in one second."""
+    """Make a new folder named by the time and its content `what`; several may begin in one second."""
     parent.mkdir(parents=True, exist_ok=True)
     name = f"{datetime.now(UTC):%Y-%m-%dT%H-%M-%SZ}-{what}"
     folder, numbers = parent / name, itertools.count(2)
@@ -121,7 +121,7 @@ def script_identity(folder: Path) -> ScriptIdentity:
 
 
 def recordings(folder: Path, readings: str) -> list[Path]:
-    """Return the recordings of "raw" or "calibrated" readings in the order of recording: run.h5, run-2.h5, …"""
+    """Return the recordings of "raw" or "calibrated" readings in order: run.h5, run-2.h5, …"""
     return sorted(folder.glob(f"{_BEGINNINGS[readings]}*.h5"), key=lambda path: (len(path.name), path.name))
 
 
@@ -137,7 +137,7 @@ def resuming(folder: Path) -> str:
 
 
 def refuse_links(*paths: Path) -> None:
-    """Refuse to write through a link, or into a pipe, that may have been put into a folder.
+    """Refuse to write through a link, or into a pipe, that another user may have put into a folder.
 
     Raise Refused `not_written_through` if a path exists and is neither a regular file nor a folder.
     """

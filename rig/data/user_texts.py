@@ -1,6 +1,6 @@
 """Configurations and scripts that the user of this computer has run, recognized by their text in any folder.
 
-An empty file for each, named by its SHA-256, in a folder of the user's own: nothing to parse, nothing to lock.
+Each has an empty file, named by its SHA-256, in the user's own folder: nothing to parse, nothing to lock.
 """
 
 import hashlib

@@ -84,7 +84,7 @@ def parse_json(content: str | bytes, most: int = MOST_RECORDED) -> Any:
 
 
 def refuse_duplicate_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """Return an object of a JSON file. Raise ValueError for a duplicate key, of which readers use either value."""
+    """Return an object of a JSON file. Raise ValueError for a duplicate key."""
     document = dict(pairs)
     if len(document) < len(pairs):
         keys = [key for key, _ in pairs]
@@ -112,7 +112,7 @@ def sanitize(value: Any) -> Any:
 
 
 def _adapter(kind: type[Any]) -> TypeAdapter[Any]:
-    """Return the adapter of a type; cached, since building one takes a while."""
+    """Return the adapter of a type, cached because building one takes long."""
     if kind not in _adapters:
         _adapters[kind] = TypeAdapter(kind)
     return _adapters[kind]

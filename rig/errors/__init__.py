@@ -31,7 +31,7 @@ class Fault(RigError):
 
 
 class Unprinted(RigError):
-    """The loss of output of a finished action (exit status 5)."""
+    """The loss of the output of a finished action (exit status 5)."""
 
     exit_status = 5
 
@@ -46,7 +46,7 @@ def or_fault(solve: Callable[[], Result]) -> Result | Fault:
 
 @contextmanager
 def raise_as(kind: type[RigError]) -> Iterator[None]:
-    """Raise problems of board or recording inside the block as `kind`; Refused stays unchanged."""
+    """Raise problems of board or recording in the block as `kind`; Refused remains unchanged."""
     try:
         yield
     except ProblemError as error:

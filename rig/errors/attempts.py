@@ -1,7 +1,7 @@
-"""Independent attempts of which some succeed: the only form in which a Fault is a value.
+"""Independent attempts, some of which succeed: the only form in which a Fault is a value.
 
-A Fault is raised if nothing can continue. If others can, `attempt_each` and `attempt` store it in `faults`, by the name
-of the attempt, and never in place of a result.
+A Fault is raised if nothing can continue. Otherwise `attempt_each` and `attempt` store it in `faults`, by the name of
+the attempt, never in place of a result.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -52,7 +52,7 @@ def attempt_each(attempts: Mapping[Key, Callable[[], Result]]) -> Attempts[Key, 
 
 
 def attempt(faults: dict[str, Fault], name: str, solve: Callable[[], Result]) -> Result | None:
-    """Return the result of `solve`; on a Fault, store that in `faults` under `name` and return None."""
+    """Return the result of `solve`, or on a Fault store this in `faults` under `name` and return None."""
     try:
         return solve()
     except Fault as fault:

@@ -14,7 +14,7 @@ def load_entry_points(
 ) -> Iterator[tuple[EntryPoint, Any]]:
     """Yield the entry points of a group, those in `stock` first, each with its loaded object.
 
-    Raise the error `not_loaded` (problem, remedy) for one that cannot be imported.
+    Raise the error `not_loaded` (problem, remedy) for an entry point that cannot be imported.
     """
     for entry in (*stock, *_entry_points(tuple(sys.path)).select(group=group)):
         try:
@@ -26,7 +26,7 @@ def load_entry_points(
 
 @cache
 def _entry_points(_: tuple[str, ...]) -> Any:
-    """Return all entry points of the packages on this search path: to look through them takes 10 ms.
+    """Return all entry points of the packages on the search path, cached because looking takes 10 ms.
 
     Python 3.11 and 3.12 have them in different classes; both have `select`.
     """

@@ -24,9 +24,8 @@ UNITS_OF_AGE = ((86_400, "days"), (3600, "h"), (60, "min"), (1, "s"))
 def rigs(stations: Iterable[StationState], more: int = 0) -> dict[str, Any]:
     """Return the rigs' present states in sections "rig 0", "rig 1" …; "rigs" counts them, and how many `more` exist.
 
-    The states have separate sections because only changed ones are sent. A section without a rig is None. A rig is
-    named as in the history; if it has become silent without a last state, it is shown as dead. A state that this
-    version cannot read is `unread`.
+    The states have separate sections because only changed sections are sent. A section without a rig is None. A rig
+    that has become silent without a last state is dead. A state that this version cannot read is `unread`.
     """
     cards = [_card(station) for station in stations]
     sections = {f"rig {i}": cards[i] if i < len(cards) else None for i in range(MOST_RIGS)}

@@ -23,7 +23,7 @@ LOOK_S = 0.5  # a dead rig (3.5 s) must be shown as such within 5 s
 
 @contextmanager
 def looking(address: HistoryAddress) -> Iterator[Sections]:
-    """Keep a feed up to date during the block; the history is only read."""
+    """Keep a feed up to date during the block, from a history that is only read."""
     feed, over = Sections(), threading.Event()
     feed.put(history={"label": address.label, "silent": None})
     thread = threading.Thread(target=_watch_history, args=(address, feed, over), name="floor", daemon=True)
@@ -60,7 +60,7 @@ def _follow(history: History, feed: Sections, over: threading.Event) -> None:
 
 
 def _read_past(history: History, today: date) -> dict[str, Any]:
-    """Return the past calibrations, or only the error if rows cannot be read: the rigs are shown nevertheless."""
+    """Return the past calibrations, or if rows cannot be read only the error; the rigs are shown nevertheless."""
     try:
         pasts = history.calibrations()
         recalls = floor_content.recalls(pasts, today)

@@ -1,1 +1,1 @@
-"""The motion of a turner, of whatever kind: joints, geometry, steps, limits, clearances."""
+"""The motion of turners of all kinds: joints, geometry, steps, limits, clearances."""

@@ -1,4 +1,4 @@
-"""Instructions for a hand with an item on a table: which side comes up, or whole turns on one side. Pure.
+"""Instructions to turn an item on a table by hand: the side that comes up, or whole turns on one side. Pure.
 
 A face is named by the item's axis that points upwards when that side is up: "+x", "-x", "+y", "-y", "+z", "-z".
 """
@@ -15,8 +15,8 @@ Say = Literal["lay", "turn"]
 class Instruction:
     """One action, for the line of text, the drawing and the simulated operator.
 
-    "lay": the side `face` comes up, and the item is released. "turn": with the side `face` up, the item is turned by
-    whole `turns` about the vertical, counterclockwise from above if positive, and released where it was.
+    "lay": put the item down with the side `face` up. "turn": with the side `face` up, turn the item by whole `turns`
+    about the vertical, counterclockwise from above if positive, and release it where it was.
     """
 
     say: Say

@@ -1,4 +1,4 @@
-"""The geometry of a chain of joints in plain numbers: the process of the arm's client starts fast, without NumPy."""
+"""The geometry of a chain of joints in plain numbers, without NumPy, so that the arm client's process starts fast."""
 
 from dataclasses import dataclass
 from math import isfinite
@@ -9,9 +9,9 @@ Pose = tuple[float, ...]  # a controller's pose, (6,): m, rotation vector in rad
 
 @dataclass(frozen=True, slots=True)
 class DenavitHartenberg:
-    """A chain's geometry: zero θ, length a, offset d, twist α of each of n joints, from the ground on.
+    """A chain's geometry: zero θ, length a, offset d and twist α of n joints, from the ground on, rad and m.
 
-    Raise ValueError unless their number is the same, at most `MAX_JOINTS`, and all are finite.
+    Raise ValueError unless all have the same number of values, at most `MAX_JOINTS`, all of them finite.
     """
 
     theta_rad: tuple[float, ...]

@@ -1,4 +1,4 @@
-"""Kinematics of a chain of joints: pose and angular rate of the flange, its end, from joint angles and speeds.
+"""Kinematics of a chain of joints: pose and angular rate of its end, the flange, from joint angles and speeds.
 
 Every function takes arrays whose last axis holds the n joints, the one on the ground first, and broadcasts over the
 others. Shoulder, elbow and forearm refer to an arm like the UR10e, with six joints from base to wrist 3.
@@ -42,8 +42,8 @@ NOMINAL = DenavitHartenberg(  # a UR10e's (maker's article 45257), the arm of re
 def axis_errors(q_rad: ArrayLike, joint: int, arm: DenavitHartenberg = NOMINAL) -> Array:
     """Return the change (…, 13, 3) of a wrist axis' direction in the flange's frame, per radian of `AXIS_ERRORS`.
 
-    The joint angles are `q_rad` (…, n). A rotation of the whole flange is part of a sensor's mounting. If `arm` has
-    another number of joints, its last three count as the wrists; errors of missing joints are zero.
+    The joint angles are `q_rad` (…, n). Rotations of the whole flange are left out, as part of a sensor's mounting. The
+    last three joints of any chain count as wrists; errors of missing joints are zero.
     """
     q = np.asarray(q_rad, dtype=np.float64)
     frames = [frame[..., :3, :3] for frame in _frames(q, arm)]
@@ -63,8 +63,8 @@ def axis_errors(q_rad: ArrayLike, joint: int, arm: DenavitHartenberg = NOMINAL) 
 def flange_errors(q_rad: ArrayLike, arm: DenavitHartenberg = NOMINAL) -> Array:
     """Return the flange's rotations (3, 6, 3) in the base's frame, per radian of each wrist's errors.
 
-    The joint angles are `q_rad` (n,). Errors of a wrist are its twist, its zero, and the `WAVES` of its angle. If `arm`
-    has another number of joints, its last three count as the wrists; errors of missing joints are zero.
+    The joint angles are `q_rad` (n,). Errors of a wrist are its twist, its zero, and the `WAVES` of its angle. The last
+    three joints of any chain count as wrists; errors of missing joints are zero.
     """
     q = np.asarray(q_rad, dtype=np.float64)
     frames = np.array(_frames(q, arm))[:, :3, :3]
@@ -148,7 +148,7 @@ def distance_to_upper_arm(
 ) -> Array:
     """Return distances (…,), m, from a point of the flange's frame to the middle of the upper arm.
 
-    This is the drawing's line from shoulder to elbow, offset by `offset_m` towards wrist 1.
+    The middle is the drawing's line from shoulder to elbow, offset by `offset_m` towards wrist 1.
     """
     frames = _frames(q_rad, arm)
     shoulder, elbow, _ = _find_bends(frames)
@@ -157,7 +157,7 @@ def distance_to_upper_arm(
 
 
 def lengths_m(arm: DenavitHartenberg) -> Array:
-    """Return the lengths (6,), m, named by `LENGTHS`, which can be measured on an arm, however it is parametrised."""
+    """Return the measurable lengths `LENGTHS` (6,), m, of an arm, whatever the parametrisation."""
     frames = _frames(np.zeros(6), arm)
     base, wrist_2, wrist_3, flange = (frames[joint][:3, 3] for joint in (0, 4, 5, 6))
     shoulder, elbow, wrist_1 = _find_bends(frames)
@@ -170,8 +170,8 @@ def lengths_m(arm: DenavitHartenberg) -> Array:
 def _find_bends(frames: list[Array]) -> tuple[Array, Array, Array]:
     """Return shoulder, elbow and wrist 1, (…, 3) m, each in the plane of the previous one.
 
-    The axes of these three are parallel except for the factory's calibration. They therefore intersect hundreds of
-    metres away, and the origins of a calibrated arm's frames may be anywhere along them.
+    The axes of these three are parallel but for the factory's calibration, so they intersect hundreds of metres away,
+    and the origins of a calibrated arm's frames may be anywhere along them.
     """
     shoulder = frames[1][..., :3, 3]
     elbow = _nearest_origin(shoulder, frames[1][..., :3, 2], frames[2])
@@ -179,7 +179,7 @@ def _find_bends(frames: list[Array]) -> tuple[Array, Array, Array]:
 
 
 def _nearest_origin(point: Array, axis: Array, frame: Array) -> Array:
-    """Return the point (…, 3), m, of a frame's axis in the plane through `point` at right angles to `axis`."""
+    """Return the point (…, 3), m, where a frame's axis meets the plane through `point` at right angles to `axis`."""
     other = frame[..., :3, 2]
     distance = _dot(point - frame[..., :3, 3], axis) / _dot(other, axis)
     origin: Array = frame[..., :3, 3] + distance[..., None] * other
@@ -221,7 +221,8 @@ def flange_axes(q_rad: ArrayLike, arm: DenavitHartenberg = NOMINAL) -> Array:
 def flange_arm(q_rad: ArrayLike, joint: int, arm: DenavitHartenberg = NOMINAL) -> Array:
     """Return the lever arm (…, 3), m, from a joint's axis to the flange's origin, in the flange's frame.
 
-    It begins at the joint's origin, for joint angles `q_rad` (…, n); its part along the axis is arbitrary.
+    The joint angles are `q_rad` (…, n). The lever arm begins at the joint's origin, so its part along the axis is
+    arbitrary.
     """
     frames = _frames(q_rad, arm)
     to_flange = np.swapaxes(frames[-1][..., :3, :3], -1, -2)
@@ -232,7 +233,7 @@ def flange_arm(q_rad: ArrayLike, joint: int, arm: DenavitHartenberg = NOMINAL) -
 def flange_rate(q_rad: ArrayLike, qd_rad_s: ArrayLike, arm: DenavitHartenberg = NOMINAL) -> Array:
     """Return angular velocities (…, 3) of the flange in its own frame, rad/s, from joint angles and speeds (…, n).
 
-    The rate is propagated from link to link, each in its own frame, which is fast for the many states of a recording.
+    The rate is propagated from link to link in the links' own frames, which is fast for many states.
     """
     angles = np.moveaxis(np.asarray(q_rad, dtype=np.float64) + arm.theta_rad, -1, 0)
     speeds = np.moveaxis(np.asarray(qd_rad_s, dtype=np.float64), -1, 0)

@@ -1,4 +1,4 @@
-"""The distance of the load from the arm itself during a plan. Pure."""
+"""The distance between the load and the arm itself during a plan. Pure."""
 
 from collections.abc import Iterator, Sequence
 from math import radians
@@ -29,7 +29,7 @@ OTHER_ELBOW = "Bring wrist 2 in arm.home_deg, or in procedure.attitudes, farther
 
 
 class _Path(NamedTuple):
-    """The poses (N, 6) of a step, the clearance that they keep from the forearm, and the remedy."""
+    """The poses (N, 6) of a step, the clearance required from the forearm, and the remedy."""
 
     name: str
     q_rad: Array
@@ -42,9 +42,8 @@ def find_clearance_problems(
 ) -> list[Problem]:
     """Return the problems of steps that bring flange, payload's centre or extension too near to forearm or upper arm.
 
-    Lengths are taken from `arm` if given, otherwise from the model's drawing. A motion from or to an attitude keeps
-    `dwell_room_m` from the forearm, all others `sweep_room_m`. The motion from the arm's pose is checked if the plan
-    begins there.
+    Lengths are those of `arm` if given, otherwise of the model's drawing. A motion from or to an attitude must keep
+    `dwell_room_m` from the forearm, all others `sweep_room_m`.
     """
     problems = []
     for path in _list_paths(plan, model):
@@ -75,7 +74,7 @@ def find_clearance_problems(
 def keeps_clear(start_q_rad: Joints, target_q_rad: Joints, carried: FlangeLoad, model: TurnerModel) -> bool:
     """Return whether a straight path in joint space is clear enough of the arm for sweeps and motions between them.
 
-    Lengths are taken from the model's drawing, because plans are made before an arm is connected. Paths beyond the
+    Lengths are those of the model's drawing, because plans are made before an arm is connected. Paths beyond the
     joints' limits count as clear; other checks refuse them.
     """
     if not _is_within(model.limits, start_q_rad, target_q_rad):
@@ -94,7 +93,7 @@ def _clearance_m(radius_m: float, room_m: float) -> float:
 def _measure_to_forearm(
     q_rad: Array, carried: FlangeLoad, model: TurnerModel, arm: DenavitHartenberg | None = None
 ) -> tuple[str, float]:
-    """Return the smallest distance, m, of the load from the forearm in the poses (N, 6), and the part that has it."""
+    """Return the nearest part of the load to the forearm in the poses (N, 6), and its distance, m."""
     names, points = _list_load_points(carried)
     offset_m, lengths = model.forearm.offset_m, arm or model.drawing
     return _find_nearest(names, distance_to_forearm(q_rad, points, lengths, offset_m=offset_m))
@@ -103,14 +102,14 @@ def _measure_to_forearm(
 def _measure_to_upper_arm(
     q_rad: Array, carried: FlangeLoad, model: TurnerModel, arm: DenavitHartenberg | None = None
 ) -> tuple[str, float]:
-    """Return the smallest distance, m, of the load from the upper arm in the poses (N, 6), and the part."""
+    """Return the nearest part of the load to the upper arm in the poses (N, 6), and its distance, m."""
     names, points = _list_load_points(carried)
     offset_m, lengths = model.upper_arm.offset_m, arm or model.drawing
     return _find_nearest(names, distance_to_upper_arm(q_rad, points, lengths, offset_m=offset_m))
 
 
 def _find_nearest(names: Sequence[str], distances_m: Array) -> tuple[str, float]:
-    """Return the smallest of the distances (k, N), m, and the name of the part that has it, of k `names`."""
+    """Return the smallest of the distances (k, N), m, and its part's name among k `names`."""
     least_m = distances_m.min(axis=1)
     return names[int(least_m.argmin())], float(least_m.min())
 

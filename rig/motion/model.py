@@ -1,4 +1,4 @@
-"""The properties of a turner, as data: each model of arm has a file in `models/`, with the sources of its figures."""
+"""The properties of turners as data: each model of arm has a file in `models/`, with the sources of its figures."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ CLIENT_SPEED_RAD_S = 3.14  # the highest speed that `ur_rtde` accepts, slightly 
 
 @dataclass(frozen=True, slots=True)
 class Tube:
-    """A link of `radius_m`, whose middle is offset from its line in the drawing, on the side of wrist 1."""
+    """A link of `radius_m`, whose middle is `offset_m` from its line in the drawing, towards wrist 1."""
 
     offset_m: float
     radius_m: float
@@ -55,7 +55,7 @@ class TurnerModel:
 
 @lru_cache
 def load_turner_model(key: ModelName) -> TurnerModel:
-    """Return the model called `key` in a configuration. Raise FileNotFoundError if there is none."""
+    """Return the model called `key` in a configuration. Raise FileNotFoundError for an unknown one."""
     import yaml  # imported here: the process of the arm's client must start fast and needs no model
 
     text = files("rig.motion").joinpath("models", f"{key}.yaml").read_text(encoding="utf-8")

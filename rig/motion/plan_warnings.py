@@ -1,4 +1,4 @@
-"""Plans that are possible but probably unintended. Pure: shown before the operator agrees, never refused."""
+"""Plans that are possible but probably unintended: shown before the operator agrees, never refused. Pure."""
 
 import math
 
@@ -9,7 +9,7 @@ SLOW_DEG_S = math.pi
 
 
 def doubts(plan: Plan) -> list[str]:
-    """Return a sentence for each key of the configuration whose speed is below `SLOW_DEG_S`."""
+    """Return a sentence for each key of the configuration with a speed below `SLOW_DEG_S`."""
     transfers = [step for step in plan.steps if isinstance(step, Transfer)]  # the first one is slow on purpose
     speeds_rad_s = {
         "procedure.speed_deg_s": min((sweep.speed_rad_s for sweep in plan.sweeps), default=math.inf),

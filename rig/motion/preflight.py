@@ -1,4 +1,4 @@
-"""Pre-flight of a plan: its problems for any turner. Pure functions: a plan in, problems out."""
+"""The pre-flight check of a plan for any turner: its problems. Pure."""
 
 import math
 

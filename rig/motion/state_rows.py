@@ -13,7 +13,7 @@ Scalar = Literal["f4", "f8", "i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8"]  # 
 
 @dataclass(frozen=True, slots=True)
 class StateField:
-    """A field of a turner's states besides times and joints: name, which carries the unit, and type."""
+    """A field of a turner's states besides times and joints: its name, which contains the unit, and type."""
 
     name: str
     type: Scalar
@@ -22,7 +22,7 @@ class StateField:
 def state_dtype(joints: int, more: Sequence[StateField] = ()) -> np.dtype[Any]:
     """Return the type of the rows of states, for a number of joints and `more` fields.
 
-    Without joints it has no columns for them, because HDF5 has no arrays of length 0.
+    Without joints there are no columns for them, because HDF5 has no arrays of length 0.
     """
     angles = [(name, "<f8", (joints,)) for name in ("q_rad", "qd_rad_s")] if joints else []
     others = [(field.name, f"<{field.type}" if field.type[1] != "1" else field.type) for field in more]

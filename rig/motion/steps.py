@@ -35,9 +35,9 @@ class Motion(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Sweep:
-    """One wrist through one revolution, or an arc, at constant speed, with ramps and margins outside of it.
+    """A revolution, or an arc, of one wrist at constant speed, with ramps and margins outside of it.
 
-    - `index`: the number among the procedure's sweeps and dwells, from 0.
+    - `index`: number among the procedure's sweeps and dwells, from 0.
     - `joint`: 0 (base) to 5 (wrist 3); `direction`: "ccw" for an increasing joint angle, "cw" for a decreasing one.
     - `axis_flange`: unit vector of the nominal arm's angular velocity in the flange frame, sign included.
     - `revolution_rad`: (low, high) joint angle of the revolution or arc, centred on the home pose.
@@ -86,8 +86,8 @@ class Sweep:
 class Transfer:
     """A motion between sweeps or attitudes, without measurement.
 
-    One that `tries` the mounting is a small turn of one joint. The sensors must sense it about the axis and with the
-    sign of the stage's mounting, or the run ends.
+    A transfer that `tries` the mounting is a small turn of one joint. The sensors must sense it about the axis, and
+    with the sign, of the stage's mounting, or the run ends.
     """
 
     name: str
@@ -103,7 +103,7 @@ class Transfer:
 class Rest:
     """A rest of the arm, in the controller's time.
 
-    One `for_temperature` lasts until the sensors have the next temperature; its duration is an estimate.
+    A rest `for_temperature` lasts until the sensors have the next temperature; its duration is an estimate.
     """
 
     name: str
@@ -115,8 +115,8 @@ class Rest:
 class Dwell:
     """A measured rest in the attitude `q_rad` for `duration_s` in the controller's time.
 
-    It begins when the sensors have settled, at the latest `settle_s` after the arm's arrival; `duration_s` does not
-    include that wait. `index` is the number among the procedure's sweeps and dwells, from 0.
+    It begins when the sensors have settled, at most `settle_s` after the arm's arrival, which `duration_s` does not
+    include. `index` is the number among the procedure's sweeps and dwells, from 0.
     """
 
     index: int
@@ -137,8 +137,8 @@ Step = Sweep | Transfer | Rest | Dwell
 class Stage:
     """A part of a plan with its own recording, before which the operator mounts the item by the `instruction`.
 
-    `mount` (3 rows of 3) is the nominal rotation from the flange's frame to the item's, to which the sensors' mountings
-    refer. `indices` are the indices of its sweeps in the whole procedure; `begins`: the number of earlier steps.
+    `mount` (3 rows of 3): nominal rotation from the flange's frame to the item's, to which sensors' mountings refer.
+    `indices`: those of its sweeps in the whole procedure; `begins`: the number of earlier steps.
     """
 
     mount: tuple[Vector3, Vector3, Vector3]
@@ -149,7 +149,7 @@ class Stage:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """Every step in order. `home_q_rad`: the pose at the plan's end; `start_q_rad`: the expected pose at its start.
+    """All steps in order. `home_q_rad`: the pose at the plan's end; `start_q_rad`: the expected pose at its start.
 
     Without `stages` the item's mounting does not change; otherwise it is remounted for each stage, with the arm at
     home.
@@ -202,7 +202,7 @@ def turn_words(angle_rad: float) -> str:
 
 
 def trapezoid_duration(distance_rad: float, speed_rad_s: float, acceleration_rad_s2: float) -> float:
-    """Return the duration, s, of a distance with equal ramps, which may be too short to reach the speed."""
+    """Return the duration, s, of a motion with equal ramps, also over a distance too short to reach the speed."""
     if distance_rad < speed_rad_s**2 / acceleration_rad_s2:
         return 2 * math.sqrt(distance_rad / acceleration_rad_s2)
     return distance_rad / speed_rad_s + speed_rad_s / acceleration_rad_s2

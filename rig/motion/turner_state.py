@@ -1,6 +1,6 @@
 """The state of a turner with any number of joints, and the report on a turner.
 
-The states of Universal Robots' arms are defined here too, because the page shows their modes.
+The state of Universal Robots' arms is also here, because the page shows its modes.
 """
 
 from collections.abc import Callable
@@ -24,8 +24,8 @@ REST_SPEED_RAD_S = 5e-3
 class State(Protocol):
     """The state of a turner at one moment.
 
-    `time_s` is its own time (the reference clock of a recording), `host_time_s` `time.monotonic()` at its reading;
-    `q_rad` (n,) and `qd_rad_s` (n,) are the measured angles (rad) and speeds (rad/s) of its joints.
+    `time_s` is the turner's own time, the reference clock of a recording; `host_time_s` is `time.monotonic()` at the
+    reading; `q_rad` (n,) and `qd_rad_s` (n,) are the joints' measured angles and speeds.
     """
 
     @property
@@ -145,10 +145,10 @@ class JointLimits:
 
 @dataclass(frozen=True, slots=True)
 class TurnerIdentity:
-    """The maker and model (None if unknown) of a turner, and the geometry with which results are computed.
+    """A turner's maker and model (None if unknown), and the geometry with which results are computed.
 
     `tcp_offset`: an arm's tool centre point in the flange's frame, for information. `reading_std_rad`: the noise of one
-    reading of an angle, if that is too large for single readings; a revolution then ends at the same reading.
+    reading of an angle, if too large for single readings; a revolution then ends where a reading recurs.
     """
 
     maker: str
@@ -159,10 +159,10 @@ class TurnerIdentity:
 
 
 class Report(Protocol):
-    """The report on a turner.
+    """A turner's report about itself.
 
-    `host`: its address or port; `software`: the version of its controller; `model`: None if unknown; `kinematics`: its
-    geometry if it reports one; `joints`: their names, beginning on the ground; `words`: its name in a sentence.
+    `host`: its address or port; `software`: its controller's version; `model`: None if unknown; `kinematics`: its
+    reported geometry, or None; `joints`: their names, from the ground on; `words`: its name in a sentence.
     """
 
     @property

@@ -1,4 +1,4 @@
-"""The winding of the cable at the flange by a plan: each joint's travel to both sides of its present angle. Pure."""
+"""The winding of the flange's cable by a plan: each joint's travel to both sides of its present angle. Pure."""
 
 from collections.abc import Sequence
 from math import degrees, pi
@@ -11,7 +11,7 @@ OTHER_TURN_RAD = pi  # angle from home, beyond which a joint is in another revol
 
 
 def windings_rad(plan: Plan, q_rad: Joints) -> list[tuple[float, float]]:
-    """Return each joint's travel below and above its present angle, ≤ 0 and ≥ 0, in all motions of a plan, (k, 2)."""
+    """Return each joint's travel (k, 2), rad, below (≤ 0) and above (≥ 0) its present angle in a plan's motions."""
     poses = [q_rad, plan.home_q_rad, *(q for step in plan.motions for q in (step.start_q_rad, step.target_q_rad))]
     travels = ([angle - now for angle in angles] for now, angles in zip(q_rad, zip(*poses, strict=True), strict=True))
     return [(min(angles), max(angles)) for angles in travels]

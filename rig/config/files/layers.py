@@ -1,4 +1,4 @@
-"""Configurations that build on one another: `base: demo.yaml`, and `--set path=value` on top of them all."""
+"""Configurations based on one another by `base: demo.yaml`, and overrides `--set path=value` on top."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -17,10 +17,10 @@ Places = Mapping[Location, str]  # position of each key, in words: "line 3", "de
 
 @dataclass(frozen=True, slots=True)
 class Layered:
-    """All that is said: the `document`, the `places` of its keys, and the `problems` found while putting it together.
+    """The merged layers: the `document`, the `places` of its keys in files, and the `problems` of merging.
 
-    `written` is the text of every value that YAML reads as something other than text. `text` is the file's text if
-    there is a single file; None if the document is merged from several.
+    `written` is the text of every value that YAML reads as something other than text. `text` is that of a single file;
+    None if several are merged.
     """
 
     document: dict[str, Any]
@@ -41,12 +41,12 @@ class _Layer:
 
 
 def read_layers(path: Path, overrides: Sequence[str] = ()) -> Layered:
-    """Read a file, the files it builds on, and the overrides. Raise `Unreadable`."""
+    """Merge a file with the files that it is based on, and the overrides. Raise `Unreadable`."""
     return merge_layers(read_file(path), path, overrides)
 
 
 def merge_layers(text: str, path: Path | None, overrides: Sequence[str] = ()) -> Layered:
-    """Merge a text with the files it is based on, relative to its `path` if it has one. Raise `Unreadable`."""
+    """Merge a text with the files that it is based on, relative to its `path`, if any. Raise `Unreadable`."""
     layers = list(_layers(text, path))
     document: dict[str, Any] = {}
     places: dict[Location, str] = {}

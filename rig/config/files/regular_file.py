@@ -1,4 +1,4 @@
-"""Opens files that anybody may have named: regular ones of a sensible size. A pipe or a device may never end."""
+"""Opens files named by users, if they are regular and of a sensible size. A pipe or a device may never end."""
 
 import os
 import stat
@@ -13,7 +13,7 @@ _shut: list[Callable[[], Iterable[FileIdentity]]] = []
 
 
 class UnfitFile(Exception):
-    """Why a file is not read, as the end of the sentence that names it: "it is no regular file"."""
+    """The reason why a file is not read, as the end of a sentence: "it is no regular file"."""
 
 
 def file_identity(path: Path) -> FileIdentity | None:
@@ -42,8 +42,7 @@ def shut_files(identities: Callable[[], Iterable[FileIdentity]]) -> Iterator[Non
 def open_regular_file(path: Path, max_bytes: int, *, follow_links: bool = True) -> Iterator[BinaryIO]:
     """Open a regular file of at most `max_bytes` for reading.
 
-    Raise `UnfitFile`, and OSError as `open` does. In another user's folder a link is not followed, because it leads out
-    of the folder.
+    Raise `UnfitFile`, and OSError as `open` does. Links in another user's folder must not be followed.
     """
     # Checked before opening: to open a device may have effects.
     _check(path.stat() if follow_links else path.lstat(), max_bytes)

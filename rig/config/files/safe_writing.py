@@ -1,4 +1,4 @@
-"""Writes files into folders in which another user may have put something: never through a link or into a pipe."""
+"""Writes files into folders of any user, never through a link or into a pipe."""
 
 import os
 import stat
@@ -38,9 +38,8 @@ def replace_together() -> Iterator[None]:
 def new_file(path: Path) -> Iterator[BinaryIO]:
     """Open a file to be written in this block, which then replaces `path` completely or not at all.
 
-    Within `replace_together` this happens at the end of that block. If `path` is a link, the link is replaced and its
-    target remains. Raise OSError as writing does, also if another process creates a file of that name at the same
-    moment.
+    Within `replace_together` this happens at the end of that block. If `path` is a link, the link is replaced, not its
+    target. Raise OSError as writing does, also if another process creates a file of that name meanwhile.
     """
     part = path.with_name(path.name + PART)
     part.unlink(missing_ok=True)

@@ -1,4 +1,4 @@
-"""Finds the configurations and examples that come with the program: in its wheel, or in the checkout it runs from."""
+"""Finds the configurations and examples that come with the program, in its wheel or its checkout."""
 
 from pathlib import Path
 

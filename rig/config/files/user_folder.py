@@ -1,4 +1,4 @@
-"""The user's own folder, in which the rig stores texts that it recognises later, a history, and old parameters."""
+"""The user's folder of the rig, for texts to recognise later, a history, and old parameters."""
 
 from pathlib import Path
 
@@ -6,7 +6,7 @@ from rig.errors import Refused
 
 
 def rig_folder() -> Path:
-    """Return this user's folder of the rig, which may not exist yet. Raise Refused `no_home` without a home folder."""
+    """Return the user's folder of the rig, which may not exist yet. Raise Refused `no_home` without a home folder."""
     from platformdirs import user_data_path
 
     try:

@@ -1,4 +1,4 @@
-"""A key that expects text gets the text as written, such as `0017`, even if YAML reads it as a number."""
+"""Texts as written, such as `0017`, for keys that expect text, even if YAML reads a number."""
 
 import types
 import typing
@@ -22,7 +22,7 @@ def take_text_as_written(model: type[BaseModel], data: Any, prefix: Location, wr
 
 
 def _restore_text(annotation: Any, value: Any, location: Location, written: Mapping[Location, str]) -> Any:
-    """Return the `value` of a key of type `annotation`, with its texts as the file has them."""
+    """Return the `value` of a key of type `annotation`, with its texts as written."""
     kinds = _kinds(annotation)
     if str in kinds and not isinstance(value, (str, dict, list)) and location in written:
         return written[location]

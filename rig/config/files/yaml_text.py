@@ -1,7 +1,6 @@
-"""Reads YAML that anybody may have written: plain data and the line of every key, or one sentence why not.
+"""Reads YAML from any source: plain data and the line of every key, or a sentence that explains a refusal.
 
-No text makes reading slow, large or deep: a configuration is a page, so anything far beyond that is refused instead of
-read.
+No text makes reading slow, large or deep: a configuration is a page, and anything far beyond is refused.
 """
 
 import unicodedata
@@ -36,7 +35,7 @@ UNSEEN = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})
 
 
 class Unreadable(Exception):
-    """Why something cannot be read as a configuration, in one line."""
+    """The reason why a text cannot be read as a configuration, in one line."""
 
     def __init__(self, why: str, line: int | None = None) -> None:
         super().__init__(f"line {line}: {why}" if line else why)
@@ -101,7 +100,7 @@ def read_yaml(text: str) -> Document:
 def _compose(text: str) -> "tuple[_Loader, yaml.Node | None]":
     """Return the loader of a text and its node.
 
-    libyaml parses five times as fast, and PyYAML says more of what is wrong.
+    libyaml parses five times as fast; PyYAML describes errors better.
     """
     try:
         loader = _Loader(text, yaml.CSafeLoader(text))
@@ -112,7 +111,7 @@ def _compose(text: str) -> "tuple[_Loader, yaml.Node | None]":
 
 
 class _Loader(yaml.SafeLoader):
-    """Composes no more than a configuration can need; makes plain data only. `parser`: another one of the same text."""
+    """A loader of limited documents of plain data; `parser`: another parser of the same text."""
 
     def __init__(self, text: str, parser: yaml.CSafeLoader | None = None) -> None:
         super().__init__(text)

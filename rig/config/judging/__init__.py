@@ -1,1 +1,1 @@
-"""Sections about judging a result and keeping it: limits, site, certificate, history, series of parts."""
+"""Sections about judging and storing a result: limits, site, certificate, history, series of parts."""

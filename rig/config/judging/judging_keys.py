@@ -1,6 +1,6 @@
-"""The keys by which a recording is judged, apart from limits, one in a row: its range, its default, and its meaning.
+"""The keys by which a recording is judged, apart from limits: each with its range, default and meaning.
 
-One table for the section of a configuration and for the settings that are recorded, which have every key.
+The sections of a configuration and the recorded settings share this table; recorded settings have every key.
 """
 
 from typing import Annotated, Any, Generic, Literal, TypeVar, get_args
@@ -32,7 +32,7 @@ OfSensors = TypeVar("OfSensors")
 
 
 def _part_default_key(what: str, unit: str | None = None) -> Any:
-    """Return the field of a key that, if left out, has the catalogue's value for the sensor's part."""
+    """Return the field of a key whose default is the catalogue's value for the sensor's part."""
     extra: dict[str, Any] | None = None if unit is None else {"unit": unit}
     return Field(default=None, description=f"{what}; if left out, the part's value", json_schema_extra=extra)
 

@@ -1,4 +1,4 @@
-"""The section of a series of parts: what a serial number may be, and which parts there are."""
+"""The section of a series of parts: permitted serial numbers, and the parts' sensors."""
 
 import re
 

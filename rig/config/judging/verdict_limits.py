@@ -1,7 +1,6 @@
-"""The verdict's limits, a row each: its key, what it holds, in what unit, what its words are, and what needs it.
+"""The verdict's limits, a row each: key, quantity, unit, name of the check, and what needs the limit.
 
-One table for the section of a configuration, the settings that are recorded, the checks of the verdict, and all that is
-made of them.
+The sections of a configuration, the recorded settings, and the checks of the verdict share this table.
 """
 
 from collections.abc import Mapping
@@ -22,8 +21,8 @@ class Limit:
     """A limit for a sensor's `quantity`: `what` names its check, `unit` is that of the value and the limit.
 
     A "conformity" limit judges a property of the item, a "fitness" limit the measurement's fitness for use. `parameter`
-    is the judged parameter of the calibration, None if it is no parameter. `needed_by` is what cannot pass without the
-    limit; None if every configuration states the limit.
+    is the judged parameter of the calibration, None if it is no parameter. `needed_by` cannot pass without the limit;
+    None if every configuration states the limit.
     """
 
     quantity: str
@@ -35,7 +34,7 @@ class Limit:
 
 
 class Limits(BaseModel):
-    """The verdict's limits; None for a limit that nothing requested needs."""
+    """The verdict's limits, None for those not needed."""
 
     # Limits that a later version adds are ignored when a recording is read.
     model_config = ConfigDict(frozen=True, allow_inf_nan=False, defer_build=True)

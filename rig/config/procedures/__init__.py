@@ -1,1 +1,1 @@
-"""Sections of the stock procedures, their stages, and the turners that have none of an arm's joints."""
+"""Sections of the stock procedures, their stages, and of turners without an arm's joints."""

@@ -1,8 +1,8 @@
 """Attitudes by name: angles of the wrists 1, 2, 3 in degrees, with base, shoulder and elbow at home.
 
-Possible on every arm that is known but a UR3e, whose forearm is too short for them. Wrist 2 remains at -90°: there the
-flange keeps its distance from the forearm, and turns of wrist 1 and wrist 3 reach every attitude. Their goodness is
-reckoned by `rig.estimation.design.attitude_design`.
+They are possible on every known arm but a UR3e, whose forearm is too short. Wrist 2 remains at -90°, where the flange
+keeps its distance from the forearm, and wrists 1 and 3 reach every attitude. `rig.estimation.design.attitude_design`
+computes their efficiency.
 """
 
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""The sections of a calibration by hand: the procedure, and the turner that has no joints."""
+"""The sections of a calibration by hand: the procedure, and the turner without joints."""
 
 from collections.abc import Iterator
 
@@ -58,7 +58,7 @@ class ByHandSection(ProcedureSection):
     )
 
     def problems(self, config: RigConfig) -> Iterator[str]:
-        """Yield the problems of sensors: an unknown clock, or a data rate too low to follow a hand."""
+        """Yield the problems of sensors: an unknown clock, or a data rate too low for a hand's motion."""
         others = [name for name, sensor in config.sensors.items() if not sensor.on_board]
         if others and "crystal_ppm" not in config.uncertainty.model_fields_set:
             yield (

@@ -1,4 +1,4 @@
-"""The `procedure:` section of each stock procedure. A procedure of one's own brings a section like these."""
+"""The `procedure:` section of each stock procedure. Other procedures bring a section like these."""
 
 from collections.abc import Iterator, Mapping
 from types import MappingProxyType
@@ -444,7 +444,7 @@ class ThermalSection(SixSweepsSection, AttitudesSection):
 
     @model_validator(mode="after")
     def check_temperature_range(self) -> Self:
-        """Refuse a range with too few sets for polynomials of the highest order, which is chosen after the run."""
+        """Refuse a range with too few sets for polynomials of the highest order; the order is chosen after the run."""
         gaps, other = (2, "") if self.both_directions else (3, " with both_directions: false")
         if self.to_c - self.from_c < gaps * self.max_step_k:
             raise ValueError(

@@ -86,7 +86,7 @@ class ServoSixObservationSection(ProcedureSection):
 
     @model_validator(mode="after")
     def require_six_directions(self) -> Self:
-        """Refuse turns in fewer than six independent directions, which six parameters need: both about three axes."""
+        """Refuse turns in fewer directions than six parameters need: both directions about three axes."""
         if set(self.directions) != {"cw", "ccw"}:
             raise ValueError("directions must name both cw and ccw")
         shaft_axes = np.array([mount_matrix(stage.mount)[:, 2] for stage in self.stages])

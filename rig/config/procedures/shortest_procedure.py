@@ -1,4 +1,4 @@
-"""`procedure: {name: shortest, target_uncertainty: …}`: six observations, repeated until it is reached."""
+"""`procedure: {name: shortest, target_uncertainty: …}`: six observations, repeated until U reaches a target."""
 
 from collections.abc import Mapping
 from typing import Any, Literal, Self
@@ -52,7 +52,7 @@ class ShortestSection(Section):
 
 
 def alternative_procedure(document: Mapping[str, Any]) -> str | None:
-    """Return what to use instead if the turner is not an arm and cannot carry out this procedure; None for an arm."""
+    """Return the procedure to use instead with a turner that is not an arm; None for an arm."""
     turner = document.get("turner")
     kind = str(turner.get("kind")) if isinstance(turner, dict) else ""
     if kind not in OTHERS:

@@ -1,4 +1,4 @@
-"""The section of one stage of a procedure: how the item is mounted then, and what is turned."""
+"""The section of one stage of a procedure: the item's mounting, and the sweeps."""
 
 from typing import Annotated, Literal
 
@@ -46,8 +46,8 @@ class StageSection(Section):
 def mount_matrix(mount: StageMountSection) -> np.ndarray:
     """Return the rotation (3, 3) from the flange's frame to the item's: row i is the item's axis i.
 
-    The stated axes place the item, then the rotation vector rotates it. A vector's components therefore transform by
-    the inverse of that rotation.
+    The stated axes place the item, then the rotation vector rotates it, so a vector's components transform by the
+    inverse rotation.
     """
     matrix: np.ndarray = rotation_by(np.radians(mount.rotation_deg)).T @ mounting_matrix(mount)
     return matrix

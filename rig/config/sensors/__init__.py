@@ -1,1 +1,1 @@
-"""Sections about a sensor: its part, its source, its mounting, what the link carries."""
+"""Sections about a sensor: its part, its source, its mounting, and the link's load."""

@@ -39,7 +39,7 @@ Decimals = Annotated[
 
 
 def _refuse_gap(value: str) -> str:
-    """Return the value. Raise ValueError for `?`, which `rig lines` writes if the readings do not determine a value."""
+    """Return the value. Raise ValueError for `?`, which `rig lines` writes if readings do not determine a value."""
     if value == GAP:
         raise ValueError("the readings did not determine it: look it up in the device's program, and write it here")
     return value

@@ -1,4 +1,4 @@
-"""Whether the serial link carries what the sensors deliver: bytes a second, by the protocol's own table. Pure."""
+"""The sensors' load on a serial link, in bytes per second, by the protocol's own table. Pure."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,9 +12,9 @@ MARGIN = 0.1  # fraction of the link that remains free: for replies, and for a c
 
 @dataclass(frozen=True, slots=True)
 class LinkLoad:
-    """What one sensor sends: samples a second, raw or `calibrated` or both in turn, raw ones with its accelerations.
+    """The stream of one sensor: samples per second, raw or `calibrated` or both in turn, raw with accelerations.
 
-    For a magnetometer, of its `field`.
+    `field`: whether they are a magnetometer's.
     """
 
     rate_hz: float

@@ -1,4 +1,4 @@
-"""The section of a sensor that is an autopilot's IMU: where the autopilot answers, and which of its IMUs it is."""
+"""The section of a sensor that is an autopilot's IMU: the autopilot's port, and the IMU's number."""
 
 from collections.abc import Mapping
 from typing import Literal
@@ -69,7 +69,7 @@ class MavlinkSection(Section):
 
     @property
     def wired(self) -> bool:
-        """Whether transfer takes time, as over a serial port."""
+        """Whether the port is a serial one, over which transfer takes time."""
         return not self.port.startswith(("udp:", "tcp:", "socket://"))
 
 

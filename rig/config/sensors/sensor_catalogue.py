@@ -13,7 +13,7 @@ RATE_TOLERANCE = 2e-4  # relative: 333.33 stands for 1000/3, and the closest two
 class Delivered:
     """The errors of a part as it is delivered: half-widths, None if its data sheet has no figure.
 
-    `rate_percent` is of its own data rate, with all temperatures.
+    `rate_percent` is that of the part's own data rate, over all temperatures.
     """
 
     bias_deg_s: float | None = None
@@ -32,7 +32,7 @@ class PartSpec:
     - default_rate_hz, default_range_deg_s: those without a setting.
     - g_sensitivity_deg_s_g: change of a reading by 1 g.
     - nonlinearity_percent: deviation from the best straight line, of full scale.
-    - asymmetry_percent: the even part of that curve.
+    - asymmetry_percent: the even part of the nonlinearity.
     - bias_deg_s_k, scale_ppm_k: change of bias and scale with temperature.
     - angle_random_walk_deg_sqrt_h: white noise, typical.
     - bias_instability_deg_h: the least Allan deviation of the bias.
@@ -41,10 +41,10 @@ class PartSpec:
     - acceleration_noise_ug_sqrt_hz: noise density, one-sided, as data sheets state it.
     - acceleration_nonlinearity_percent: of the range that acceleration_nonlinear_over_g states.
     - acceleration_bias_mg_k, acceleration_scale_ppm_k, acceleration_bias_instability_ug: as the gyroscope's.
-    - acceleration_nonlinear_over_g: that range, in either direction; 0 means the range that is set.
+    - acceleration_nonlinear_over_g: that range, in either direction; 0 for the configured range.
     - delivered: the quantities that its calibration estimates.
-    - own_port: whether it has a port and a clock of its own, apart from the board.
-    - any_rate: whether it may be any sensor: its section states rates and ranges, the limits are a consumer part's.
+    - own_port: whether it has a port and a clock of its own.
+    - any_rate: whether it stands for any sensor, whose section states rates and ranges, with limits of a consumer part.
     """
 
     rates_hz: tuple[float, ...]
@@ -94,7 +94,7 @@ class PartSpec:
 
 @dataclass(frozen=True, slots=True)
 class MagnetometerPart:
-    """One kind of magnetometer: its data rates that dwells of seconds can use, its ranges, the usual one first."""
+    """One kind of magnetometer: data rates that suit dwells of seconds, and ranges, the usual one first."""
 
     rates_hz: tuple[float, ...]
     ranges_gauss: tuple[float, ...]

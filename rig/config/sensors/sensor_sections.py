@@ -1,4 +1,4 @@
-"""The sections of a sensor: its part and rate, its mounting, its own port, and what is known of it before the run."""
+"""The sections of a sensor: its part and rate, its mounting, its own port, and its earlier calibration."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Protocol, Self
@@ -133,7 +133,7 @@ def check_serial_number(value: str) -> str:
 
 
 def the_part_has_it(value: float, info: ValidationInfo) -> float:
-    """Raise ValueError for a rate or range that the part does not have; no other one is used silently."""
+    """Raise ValueError for a rate or range that the part does not have."""
     part = CATALOGUE.get(info.data.get("part", ""))
     if part is None:
         return value
@@ -187,7 +187,7 @@ class SensorSection(Section):
 
     @property
     def on_board(self) -> bool:
-        """Whether the board reads it."""
+        """Whether the board reads the sensor."""
         return self.own_port is None
 
     @property

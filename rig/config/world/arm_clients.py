@@ -1,4 +1,4 @@
-"""Sections of what else is connected to the simulated controller: a fieldbus adapter, a logger of its poses."""
+"""Sections of other devices at the simulated controller: a fieldbus adapter, a logger of its poses."""
 
 from pathlib import Path
 from typing import Any, Literal

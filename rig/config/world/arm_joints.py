@@ -1,6 +1,6 @@
-"""How the joints of the simulated arm follow their targets and are read: as measured on real arms, roughly, or ideally.
+"""Sections of the simulated arm's joints: their motion and encoders, as measured on real arms, rough, or ideal.
 
-docs/simulated-arm.md says where each figure comes from.
+docs/simulated-arm.md names the source of each figure.
 """
 
 from collections.abc import Mapping

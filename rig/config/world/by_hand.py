@@ -1,4 +1,4 @@
-"""The section `world: hand:`: how the simulated operator handles an item, and by which mistakes."""
+"""The section `world: hand:`: the simulated operator's handling of an item, and mistakes."""
 
 from typing import Annotated, Literal, get_args
 

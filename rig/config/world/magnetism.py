@@ -1,4 +1,4 @@
-"""Sections of `world:` about magnetism: the arm's iron, and what is wrong with a simulated magnetometer."""
+"""Sections of `world:` about magnetism: the arm's iron, and the errors of a simulated magnetometer."""
 
 from typing import Literal
 

@@ -1,4 +1,4 @@
-"""The `world.servo:` section: what the simulated servo is in truth."""
+"""The `world.servo:` section: the simulated servo's true properties."""
 
 from typing import Annotated, Any
 

@@ -31,8 +31,8 @@ class AccelerationSolutionEntry(Entry):
 class DwellEntry(Entry):
     """A dwell: the mean reading in an attitude, its standard deviation, and its residual from the model.
 
-    `residual_std_m_s2` is the standard deviation that the solution expects of the residual. `attitude` takes a vector
-    of the arm's base frame into the flange's.
+    `residual_std_m_s2` is the residual's expected standard deviation. `attitude` takes a vector of the arm's base frame
+    into the flange's.
     """
 
     index: int
@@ -49,7 +49,7 @@ class DwellEntry(Entry):
 
 
 class ValidationEntry(Entry):
-    """The last repeat of the attitudes, which the calibration does not use: size of acceleration minus gravity."""
+    """The last repeat of the attitudes, unused by the calibration: norm of the acceleration minus gravity."""
 
     dwells: int
     rms_m_s2: float
@@ -66,20 +66,20 @@ class AlignmentEntry(Entry):
 class AccelerometerEntry(Entry):
     """A calibration a = F (s + φ s²) + b of the specific force s in the flange's frame.
 
-    - covariance: of scale and bias by the solution alone; covariance_combined: all of it, itemized in budget.
-    - gravity_m_s2: the size of gravity to which the scale is relative.
-    - With its nonlinearity in the budget, scale is that of the readings at 1 g up and 1 g down, bias_m_s2 the reading
-      at 0 g, whatever curve the sensor has between.
+    - covariance: of scale and bias by the solution alone; covariance_combined: by all contributors in budget.
+    - gravity_m_s2: the gravity to which the scale is relative.
+    - scale, bias_m_s2: if the budget contains the nonlinearity, by the readings at 1 g up and 1 g down, and the reading
+      at 0 g.
     - reference_m_s2: specific force at rest in the arm's base frame; attitude_error_rad: error of the arm's attitudes
       about each axis, estimated from the readings.
     - lever_arm_m, from the sweeps' axes to the sensor in the flange's frame, and delay_s, its lag behind the gyroscope:
       only with sweeps.
-    - detection_limits: faults during the recording, and the size from which on each is detected.
-    - conditions: times and temperature of the readings for scale and bias; temperature_c is that temperature.
+    - detection_limits: faults during the recording, and the sizes from which they are detected.
+    - conditions: times and temperature (temperature_c) of the readings for scale and bias.
     - …_degrees_of_freedom: degrees of freedom of the standard deviations of that name, null if infinite.
-    - placement: only if a file gave the attitudes instead of an arm; range and temperature are unknown then.
-    - correction_matrix: M of s = M (a − b), first order: in the frame of the gyroscope's corrected rates (whole matrix)
-      with an alignment, else in the right-angled frame nearest to the accelerometer's own axes.
+    - placement: only if a file gave the attitudes; range and temperature are then unknown.
+    - correction_matrix: M of s = M (a − b), first order: with an alignment in the frame of the gyroscope's corrected
+      rates (whole matrix), else in the right-angled frame nearest to the accelerometer's own axes.
     """
 
     part: str

@@ -22,7 +22,7 @@ class BiasStepEntry(Entry):
 class RepeatEntry(Entry):
     """One repeat of all attitudes: its bias with scale, axes and reference fixed, and with all of them estimated.
 
-    `time_s` is the time of its middle, from the middle of the first repeat.
+    `time_s` is from the middle of the first repeat to that of this one.
     """
 
     time_s: float
@@ -32,7 +32,7 @@ class RepeatEntry(Entry):
 
 
 class SlopeEntry(Entry):
-    """Slope of the bias over temperature, per °C, valid only in the range that was recorded."""
+    """Slope of the bias over temperature, per °C, valid only in the recorded range."""
 
     slope: Vector3
     std: Vector3
@@ -44,18 +44,18 @@ class SlopeEntry(Entry):
 class DriftEntry(Entry):
     """One quantity's bias by repeat.
 
-    - unit: of all values without another one.
+    - unit: of all values without one of their own.
     - repeats: bias and temperature of each repeat.
     - common_std: standard deviation that all biases share.
     - scatter_ratio: scatter of the readings from repeat to repeat over that within a dwell.
     - steps: jumps of the bias.
     - false_alarm_probability: probability that a steady bias shows steps.
     - largest_change: between any two repeats.
-    - temperature_slope: slope of the bias over temperature, or the error.
+    - temperature_slope: of the bias, or the error.
     - earth_rate_known: whether the Earth's rate was subtracted.
     - degrees_of_freedom: those of the standard deviations with the scale fixed, null if infinite.
     - part, serial_number, full_scale: properties of the sensor.
-    - temperature_stated: whether the temperatures are stated because the sensor has no thermometer.
+    - temperature_stated: whether the temperatures are stated, not measured.
     """
 
     unit: str

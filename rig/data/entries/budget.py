@@ -16,10 +16,10 @@ Freedom6 = Annotated[tuple[float | None, ...], Field(min_length=6, max_length=6)
 
 
 class ContributorEntry(Entry):
-    """One line of the budget; `half_width` in `unit` is null if it was measured.
+    """One line of the budget; `half_width`, in `unit`, is null for a contributor estimated from readings.
 
-    Of a normal distribution it is the stated expanded uncertainty (k = 2). `std` and `variance_fraction` (of the
-    variance) are those of kx ky kz bx by bz; units 1 and that of the biases.
+    For a normal distribution it is the stated expanded uncertainty (k = 2). `std` and `variance_fraction` (of the
+    variance) are for kx ky kz bx by bz, in units of 1 and of the bias.
     """
 
     name: str
@@ -36,8 +36,8 @@ class ContributorEntry(Entry):
 class BudgetEntry(Entry):
     """The contributors to `covariance_combined`; `expanded` is `coverage_factors` × `std`.
 
-    These are Student's t of the effective `degrees_of_freedom`, so that each interval holds the true value with its
-    part of `coverage_probabilities`. `coverage_factor` is the largest of them.
+    The factors are Student's t for the effective `degrees_of_freedom`, with the `coverage_probabilities` of the
+    intervals. `coverage_factor` is the largest factor.
     """
 
     contributors: tuple[ContributorEntry, ...]
@@ -62,7 +62,7 @@ def expanded_uncertainties(budget: BudgetEntry | None, covariance: Sequence[Sequ
 
 
 class BiasProcessEntry(Entry):
-    """The random walk of the bias: a mean over `averaging_time_s`; an hour changes it by `hour_std_rad_s` (1σ)."""
+    """The random walk of the bias, from means over `averaging_time_s`; `hour_std_rad_s`: its change (1σ) in an hour."""
 
     random_walk_rad_s_sqrt_s: float
     scatter_rad_s: float
@@ -80,7 +80,7 @@ class ClockComparisonEntry(Entry):
 
 
 class ClockEntry(Entry):
-    """The rate error of the controller's clock, a fraction, and the comparisons that show it; speeds are corrected."""
+    """The relative rate error of the controller's clock, for which speeds are corrected, and its comparisons."""
 
     error: float
     std: float

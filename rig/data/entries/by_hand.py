@@ -6,9 +6,9 @@ from rig.data.entries.result_types import Entry
 
 
 class RestByHandEntry(Entry):
-    """A rest: the body's axis that pointed upwards, null on no face, and its agreement with the others.
+    """A rest: the body's axis that pointed upwards, null on no face, and the agreement with other rests.
 
-    `normalised_residual` is its largest residual over the standard deviation of such residuals.
+    `normalised_residual` is the rest's largest residual over its standard deviation.
     """
 
     face: str | None
@@ -16,7 +16,7 @@ class RestByHandEntry(Entry):
 
 
 class MoveByHandEntry(Entry):
-    """A move from a rest to the next: a flip to another face, or whole `turns` on a face, by `angle_rad` in all.
+    """A move from one rest to the next, by `angle_rad`: a flip to another face, or whole `turns` on a face.
 
     `closure_error_rad` is a turn's end minus its beginning, null for flips and without a stated edge.
     """
@@ -40,9 +40,8 @@ class HandErrorEntry(Entry):
 class ByHandEntry(Entry):
     """A session by hand: its rests and moves, and the errors of the hand.
 
-    `chi_square`, with `degrees_of_freedom`, is χ² of the residuals of all rests and moves. `session_std` (3,) of the
-    scale is by this session and its clock alone; the budget adds the disagreement seen between recordings of real
-    hands.
+    `chi_square`, with `degrees_of_freedom`, is χ² of the residuals of all rests and moves. `session_std` (3,) is the
+    scale's by this session and its clock alone; the budget adds the disagreement among recordings of real hands.
     """
 
     rests: tuple[RestByHandEntry, ...]

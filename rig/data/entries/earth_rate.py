@@ -6,11 +6,11 @@ from rig.data.entries.result_types import Entry, Freedom, Matrix3, Vector3
 class EarthRateEntry(Entry):
     """The Earth's rate in the frame of the arm's base, by the sweeps and rests of a sensor.
 
-    - `latitude_rad`, `heading_rad`: the latitude by its angle to `up`, north positive, and the direction of the base's
-      x axis, from north over east; null if that axis points up or down.
-    - `vertical_fixed`: its vertical part was not estimated but fixed by a given latitude, for the sake of the
-      g-sensitivity; then `latitude_rad` shows the agreement of the level part with that latitude.
-    - `birge_ratio`: ratio of the residuals to their expectation; above 1 it has inflated `covariance_rad2_s2`.
+    - `latitude_rad`: by the rate's angle to `up`, north positive.
+    - `heading_rad`: direction of the base's x axis, from north over east; null if that axis is vertical.
+    - `vertical_fixed`: whether a given latitude fixed the vertical part, to identify the g-sensitivity; `latitude_rad`
+      is then that of the level part.
+    - `birge_ratio`: of the residuals; above 1 it has inflated `covariance_rad2_s2`.
     - `degrees_of_freedom`: those of the standard deviations; null if infinite.
     """
 

@@ -4,7 +4,7 @@ from rig.data.entries.result_types import Covariance, Entry, ErrorEntry, Positiv
 
 
 class OmittedIncrementsEntry(Entry):
-    """Increments that could not be made: the `error`, their number, and when the first of them began."""
+    """Increments that could not be made: the `error`, their number, and the start of the first one."""
 
     error: str
     count: int
@@ -23,11 +23,11 @@ class RateSolutionEntry(Entry):
 class IncrementsEntry(Entry):
     """Estimates in addition to scale and bias, of a gyroscope integrated from attitude to attitude.
 
-    - window_s: length of the windows over which attitudes were averaged; attitude_std_rad: their error about each axis;
-      clock_offset_s: offset of their clock from the readings', which is corrected.
+    - window_s: length of the windows over which attitudes were averaged; attitude_std_rad: error of a mean about each
+      axis; clock_offset_s: corrected offset of the attitudes' clock from the readings'.
     - angle_random_walk_rad_sqrt_s: the gyroscope's own; matrix_scatter, bias_scatter_rad_s: scatter of F and b between
       intervals of the recording.
-    - omitted: increments that could not be made; rejected: number of those that contradicted all others.
+    - omitted: increments that could not be made; rejected: number of increments that contradicted all others.
     """
 
     increments: int
@@ -46,8 +46,8 @@ class IncrementsEntry(Entry):
 class AnglesEntry(Entry):
     """Sweeps of a file that were solved by the angle turned from rest to rest: the numbers of their `rows`.
 
-    `angle_std_rad`, `axis_std_rad`: standard deviations of a turn's end and of its axis, the largest of all, multiplied
-    by `uncertainty_inflation` because the turns contradict each other.
+    `angle_std_rad`, `axis_std_rad`: largest standard deviations of a turn's end and axis, multiplied by
+    `uncertainty_inflation` because the turns contradict each other.
     """
 
     rows: tuple[int, ...]
@@ -59,10 +59,10 @@ class AnglesEntry(Entry):
 class AttitudesEntry(Entry):
     """Results from attitudes in addition to a gyroscope's scale and bias.
 
-    `earth_rate_rad_s` is the Earth's rate in the axes of the table, with its standard deviations, or `earth_rate_error`
-    the reason without it. `by_increments` holds the results from increments of angle between attitudes, null if the
-    rates were exact. `other_methods` are the solutions of the other methods. `covariance` is that of F row by row, the
-    Earth's rate and c of m = F ω + c.
+    - `earth_rate_rad_s`: in the axes of the table, with standard deviations, or `earth_rate_error`: why it is missing.
+    - `by_increments`: results from increments of angle between attitudes, null if the rates were exact.
+    - `other_methods`: the solutions of the other methods.
+    - `covariance`: of F row by row, the Earth's rate and c of m = F ω + c.
     """
 
     earth_rate_rad_s: Vector3 | None

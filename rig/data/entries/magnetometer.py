@@ -40,8 +40,8 @@ class FieldSolutionEntry(Entry):
 class FieldDwellEntry(Entry):
     """A dwell: the mean reading in an attitude, its standard deviation, and its residual from the model.
 
-    `residual_std_t` is the standard deviation that the solution expects of the residual. `attitude` takes a vector of
-    the arm's base frame into the flange's.
+    `residual_std_t` is the residual's expected standard deviation. `attitude` takes a vector of the arm's base frame
+    into the flange's.
     """
 
     index: int
@@ -57,7 +57,7 @@ class FieldDwellEntry(Entry):
 
 
 class UniformityEntry(Entry):
-    """A test that the field is the same in all attitudes: χ² of the residuals, with a limit that noise rarely exceeds.
+    """A test that the field is the same in all attitudes: χ² of the residuals, with its critical value.
 
     `attitude_error_rad` is the assumed error of the attitudes about each axis, by the accelerometer.
     """
@@ -69,7 +69,7 @@ class UniformityEntry(Entry):
 
 
 class FieldDriftEntry(Entry):
-    """The largest change of the readings between two tests in one attitude, its σ, its χ² and the limit of that."""
+    """The largest change of the readings between two tests in one attitude, its σ, its χ² and the critical value."""
 
     change_t: Vector3
     std_t: Vector3
@@ -80,19 +80,18 @@ class FieldDriftEntry(Entry):
 class MagnetometerEntry(Entry):
     """A calibration m = F B + b of the magnetic field B in the axes of the nominal mounting.
 
-    - It refers to the magnetometer as it is mounted: iron and currents that turn with it are part of F and b, and
-      hard_iron_t is F⁻¹ b. No limit of the verdict judges it.
-    - arm_field_in_bias: the arm's own field, as far as it turns with the flange, is in the bias, and no residual shows
-      it. Runs with the sensor turned over separate them (`rig reversal`).
+    - Iron and currents that turn with the magnetometer are part of F and b; hard_iron_t is F⁻¹ b. There are no limits.
+    - arm_field_in_bias: whether the bias contains the arm's own field that turns with the flange, which no residual
+      shows; runs with the sensor turned over separate it (`rig reversal`).
     - extension_m: its position on the flange; uniformity: test that the field was the same in all attitudes; drift:
-      test that it stayed the same, null without tests.
-    - covariance: of scale and bias by the solution alone; covariance_combined: all of it, itemized in budget. field_t:
-      the size of the field to which the scale is relative.
+      test that it remained the same, null without tests.
+    - covariance: of scale and bias by the solution alone; covariance_combined: by all contributors in budget. field_t:
+      the norm of the field to which the scale is relative.
     - field_base_t: the field in the arm's base frame; attitude_error_rad: error of the arm's attitudes about each axis,
       estimated from the readings.
-    - detection_limits: faults during the recording, and the size from which on each is detected.
+    - detection_limits: faults during the recording, and the sizes from which they are detected.
     - conditions: times of the readings; non_orthogonality_degrees_of_freedom: null if infinite.
-    - placement: only if a file gave the attitudes instead of an arm; the range is unknown then.
+    - placement: only if a file gave the attitudes; the range is then unknown.
     - correction_matrix: M of B = M (m − b), in the right-angled frame nearest to the magnetometer's own axes.
     """
 
@@ -133,7 +132,7 @@ class MagnetometerEntry(Entry):
 
 
 class AsMountedEntry(Entry):
-    """One run of a reversal: the sensor's mounting, and the bias in it, the arm's field included."""
+    """One run of a reversal: the sensor's mounting, and its bias, which includes the arm's field."""
 
     run: str
     started_utc: Utc
@@ -146,8 +145,7 @@ class AsMountedEntry(Entry):
 class ReversalEntry(Entry):
     """A magnetometer's bias and the arm's field, separated by turning the sensor over.
 
-    - bias_t: the sensor's own bias. On an axis that was never turned over arm_field_in_bias is true, and bias_t is the
-      bias as mounted.
+    - bias_t: the sensor's own bias; on an axis that was never turned over (arm_field_in_bias) the bias as mounted.
     - arm_field_t: the arm's field in the sensor's axes as it was mounted in the first run; 0 on such an axis.
     - covariance: of bias and arm's field; chi_square: agreement of the runs on their common parameters.
     - scale, correction_matrix: means over the runs. …_degrees_of_freedom: those of the standard deviations of that

@@ -47,8 +47,8 @@ class Entry(BaseModel):
 class ConditionsEntry(Entry):
     """The time of readings, from start to end (UTC, by the arm controller's clock since the recording's start).
 
-    `mean_utc` is the middle of the readings, `temperature_c` their mean by the sensor's own thermometer, which stayed
-    between the two of `temperature_range_c`; null without one. A temperature without range was stated, not read.
+    `mean_utc` is the mean time. `temperature_c` and `temperature_range_c` are mean and range by the sensor's own
+    thermometer, null without one; a temperature without range was stated.
     """
 
     from_utc: Utc
@@ -66,9 +66,10 @@ class ConditionsEntry(Entry):
 class PlacementEntry(Entry):
     """The placements of a body in attitudes that a file gives, in the unit of the readings.
 
-    `placement_std` is the standard deviation of a reading from one placement to another besides its attitude, null if
-    the method does not estimate it, with `rests_without_attitude` further rests. `rows_omitted` rows of the file were
-    left out because the body moved. `covariance` is the covariance of all estimates, in its own order.
+    - `placement_std`: standard deviation of a reading from placement to placement besides attitude, by
+      `rests_without_attitude` further rests; null if the method does not estimate it.
+    - `rows_omitted`: number of rows left out because the body moved.
+    - `covariance`: of all estimates, in `covariance_order`.
     """
 
     placement_std: float | None
@@ -82,9 +83,9 @@ class PlacementEntry(Entry):
 class DetectionLimitEntry(Entry):
     """The smallest `size` of a `fault` that the `check` detects in 95 of 100 recordings; null if it detects none.
 
-    This is the minimal detectable bias (Baarda 1968). For a change half-way it is the complete change.
-    `error_over_expanded` is the largest error of a scale factor or bias just below that size, in multiples of its
-    expanded uncertainty; null if it was not computed.
+    This is the minimal detectable bias (Baarda 1968); of a change half-way, the complete change. `error_over_expanded`
+    is the largest error of scale factor or bias just below that size, in multiples of its expanded uncertainty; null if
+    not computed.
     """
 
     fault: str
@@ -97,8 +98,7 @@ class DetectionLimitEntry(Entry):
 class OmittedEntry(Entry):
     """Parts left out of a recording: `count` of `total` `what` (rows, increments, readings), and where the `first` is.
 
-    The `reason` begins with the name of an error, if there is one. `quantity` is the quantity from which they are
-    missing; null if they are missing from all.
+    The `reason` may begin with an error's name. `quantity` is the quantity that lacks them, null for all quantities.
     """
 
     quantity: str | None

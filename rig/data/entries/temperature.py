@@ -36,10 +36,10 @@ class OverTemperatureEntry(Entry):
     - The bias has the sign that it has in the calibration, and its unit.
     - range_c: the range in which both are valid, by the part's own thermometer; table: values from one end to the
       other.
-    - orders: those that the readings require, of scale and bias.
+    - orders: of the polynomials of scale and bias, as the readings require.
     - covariance (24, 24): in the order scale n = 0 x y z, n = 1 x y z, …, then the bias.
-    - hysteresis: largest difference of a warming sensor from the mean of warming and cooling. It is null unless both
-      were measured; then the uncertainty does not include it.
+    - hysteresis: largest difference of a warming sensor from the mean of warming and cooling; null, and not in the
+      uncertainty, unless both were measured.
     - lag_s: lag of the thermometer.
     """
 

@@ -1,1 +1,1 @@
-"""Files of others read in a process of its own, and the signals that end processes."""
+"""Foreign files, read in a process of its own, and the signals that end processes."""

@@ -1,4 +1,4 @@
-"""The signals that end or suspend a program from outside, and the interrupt that they become."""
+"""The signals that end or suspend a program from outside, and their conversion to an interrupt."""
 
 import _thread
 import signal
@@ -38,10 +38,11 @@ _LOCK_METHODS = ("__enter__", "__exit__", "_acquire_restore", "_release_save")
 
 
 class Interrupts:
-    """The handler that raises KeyboardInterrupt in the main thread for a signal, without leaving a lock half taken.
+    """The handler that raises KeyboardInterrupt in the main thread for a signal, but never while it takes a lock.
 
-    An exception while `threading` takes or leaves a lock would leave it taken, and stopping the arm needs the same
-    locks. The end of a wait takes its lock again: a second exception must not come before that.
+    An exception while `threading` takes or releases a lock would leave it taken, and stopping the arm needs the same
+    locks. After the exception, an interrupted wait takes its lock again, so a second exception must not follow too
+    soon.
     """
 
     def __init__(self) -> None:
@@ -55,7 +56,7 @@ class Interrupts:
     def hear(self, number: int, frame: FrameType | None, text: str = "") -> None:
         """Raise an exception for a signal, except within a burst of signals.
 
-        While a thread takes a lock, wait a moment, at most as long as a burst lasts.
+        While a thread takes a lock, the exception is delayed, at most by the duration of a burst.
         """
         now_s = time.monotonic()
         if now_s - self._raised_s < BURST_S:
@@ -79,7 +80,7 @@ def _takes_a_lock(frame: FrameType | None) -> bool:
 
 
 def _send_later(thread: int, number: int) -> None:
-    """Send a thread a signal in a moment. It does not use the module `threading`, whose locks may be in use."""
+    """Send a thread a signal after a moment, without the module `threading`, whose locks may be in use."""
     time.sleep(LATER_S)
     if hasattr(signal, "pthread_kill"):
         signal.pthread_kill(thread, number)

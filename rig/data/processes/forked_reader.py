@@ -1,6 +1,6 @@
-"""A reading process forked from this one, which has already loaded most modules: that saves a tenth of a second.
+"""A reading process forked from this one, which saves the tenth of a second to load modules.
 
-Only a process of one thread is forked, as a lock that another thread holds would stay locked in the child for ever.
+Only a process of one thread is forked: another thread's lock would stay locked in the child for ever.
 """
 
 import os
@@ -21,7 +21,7 @@ HDF5_PLUGINS = {"HDF5_PLUGIN_PRELOAD": "::"}  # no plugins: a foreign file must 
 def can_fork() -> bool:
     """Return whether a reading process may be forked from this one.
 
-    HDF5 looks for its plugins when it is loaded, so it must not be loaded here yet, unless by `load_hdf5`.
+    HDF5 looks for plugins when it is loaded, so only `load_hdf5` may have loaded it here.
     """
     if sys.platform != "linux" or not hasattr(os, "pidfd_open") or ("h5py" in sys.modules and not load_hdf5()):
         return False
@@ -47,7 +47,7 @@ def measure_address_space() -> int:
 
 
 class ForkedReader:
-    """A forked process that calls `read` and ends; it has those attributes of `subprocess.Popen` that its owner needs.
+    """A forked process that calls `read` and ends, with the attributes of `subprocess.Popen` that its owner needs.
 
     Its output goes to the files `out` and `stderr`; no other file of this process remains open in it.
     """

@@ -1,4 +1,4 @@
-"""The silence of another process, counted so that a busy machine does not look like a process that hangs."""
+"""The silence of another process, counted so that a busy machine does not look like a hanging process."""
 
 import time
 from pathlib import Path
@@ -16,11 +16,10 @@ _Times = dict[str, tuple[float, float]]  # by thread: seconds on a processor, se
 class Silence:
     """A counter of the ticks without a sign of life from the process `pid`.
 
-    It counts ticks and not seconds, because the counting process may itself be delayed. It omits ticks in which the
-    thread that is expected to answer (`thread`, any if None) spent most of the time waiting for a processor. If the
-    system does not show that (proc(5) of Linux does) all ticks count. Every tick counts of a process that was stopped.
-    However busy the machine, a silence lasts at most `spared` times CROWDED times its limit: the arm must not be left
-    alone.
+    Ticks are counted, not seconds, because the counting process may itself be delayed. A tick does not count if the
+    thread that is expected to answer (`thread`, any if None) mostly waited for a processor; all ticks count if the
+    system does not show this (proc(5) of Linux does) or the process was stopped. However busy the machine, a silence
+    lasts at most `spared` times CROWDED times its limit: the arm must not be left alone.
     """
 
     def __init__(self, pid: int, *, spared: int, thread: int | None = None) -> None:
@@ -40,8 +39,8 @@ class Silence:
     def tick(self, unheard: bool = False) -> None:
         """Count one more interval without a sign of life.
 
-        Call it at even intervals. `unheard`: an answer has arrived and not been read yet, so the process was not
-        silent.
+        Call this at even intervals. `unheard`: whether an answer has arrived that was not read yet, so the process was
+        not silent.
         """
         self._all_ticks += 1
         # The first tick of a silence means nothing yet; from the second on the process' threads are examined.
@@ -49,9 +48,9 @@ class Silence:
         self.ticks += not (starved or unheard)
 
     def lasts_over(self, limit: float) -> bool:
-        """Return whether more than `limit` ticks were silent, or more than `spared` times as many have passed.
+        """Return whether more than `limit` silent ticks count, or more than `spared` × `limit` ticks have passed.
 
-        The limit applies to a machine with a processor for every program; the machine's `crowding` extends it.
+        The `limit` is for a machine with a processor for every program; the machine's crowding extends it.
         """
         if max(self.ticks, self._all_ticks / self._spared) <= limit:
             return False
@@ -59,14 +58,14 @@ class Silence:
         return self.ticks > stretched or self._all_ticks > self._spared * stretched
 
     def _is_stopped(self) -> bool:
-        """Return whether a signal has stopped the process, so that the machine is not the cause of its silence."""
+        """Return whether a signal has stopped the process, so its silence is not due to the machine."""
         return _state(self._tasks / self._main) == "T"
 
     def _is_starved(self, has_previous: bool) -> bool:
         """Return whether the process waited for a processor since the last call; False at the first call.
 
-        The system's count of waiting time excludes a thread that is still waiting, so a thread that is ready and has
-        not run counts too.
+        The system's waiting time excludes a thread that is still waiting, so a ready thread that has not run counts
+        too.
         """
         now_s = time.monotonic()
         elapsed_s, before = now_s - self._looked_s, self._times

@@ -1,7 +1,5 @@
 """The process that reads one file: `python -m rig.data.processes.reading_child`, or a forked one.
 
-The former takes its request as JSON from stdin.
-
 Writes the parts that the reader yields to stdout, for `rig.data.processes.reading_process`: a line of JSON for a dict,
 an array in NumPy's format. A failure ends in one line on stderr and a `Status`.
 """
@@ -74,7 +72,7 @@ def _encode(part: Part) -> bytes:
 
 
 def _end_with_parent() -> None:
-    """Make the system kill this process when its parent ends; leave Ctrl-C to the parent."""
+    """Make the system kill this process when its parent ends, and ignore Ctrl-C."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if sys.platform == "linux":
         import ctypes
@@ -83,7 +81,7 @@ def _end_with_parent() -> None:
 
 
 def _limit(limits: Mapping[str, Any]) -> int | None:
-    """Limit the resources of this process; return the largest length of a file that it may write."""
+    """Limit the resources of this process; return the largest length of a file that it may write, bytes."""
     try:
         import resource
     except ModuleNotFoundError:  # Windows
@@ -96,7 +94,7 @@ def _limit(limits: Mapping[str, Any]) -> int | None:
 
 
 def _lower(what: int, limit: int) -> int:
-    """Lower a limit of this process, if it is not lower already; return the resulting limit."""
+    """Lower a limit of this process to `limit` at most; return the resulting limit."""
     import resource
 
     soft, hard = resource.getrlimit(what)

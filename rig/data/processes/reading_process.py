@@ -1,9 +1,8 @@
 """Reading of a foreign file in a process of its own, within limits of memory, time and disk space.
 
-A library may never return from a damaged file, a few bytes may unpack to gigabytes, and nothing inside a process can
-end that, not even a signal. So a file is read in a process that can be ended from outside
-(`rig.data.processes.reading_child`), and only complete results reach the rig. All foreign files are read so:
-recordings, bags, logs, tables.
+A library may never return from a damaged file, or unpack a few bytes to gigabytes, and nothing inside the process can
+end that. So foreign files (recordings, bags, logs, tables) are read in a process that can be ended from outside
+(`rig.data.processes.reading_child`), and only complete results reach the rig.
 """
 
 import json
@@ -54,8 +53,9 @@ OUT_OF_TIME = getattr(signal, "SIGXCPU", None)
 class ReadingLimits:
     """The resources of a process that reads a file.
 
-    `memory_bytes` of address space; `processor_s` on a processor, and `idle_s` altogether; `written_bytes` for each
-    file that it writes, for its results and for unpacking.
+    - `memory_bytes`: address space.
+    - `processor_s`: time on a processor; `idle_s`: all time but waits for a processor or the disk.
+    - `written_bytes`: of each file that it writes, for its results and for unpacking.
     """
 
     memory_bytes: int
@@ -86,7 +86,7 @@ def limits_for(stored_bytes: int) -> ReadingLimits:
 def stored_bytes(path: Path) -> int:
     """Return the size on the disk of a regular file, or of the files side by side in a folder.
 
-    Raise `UnfitFile` for a pipe, a device, a socket, a file that is mostly a hole, and a folder of too many files;
+    Raise `UnfitFile` for a pipe, a device, a socket, a file that is mostly holes, and a folder of too many files;
     OSError as `open` does.
     """
     if not path.is_dir():
@@ -129,8 +129,8 @@ def size_without_holes(file: BinaryIO) -> int:
 class ReadingTask:
     """A file that another process reads by a `reader` ("module:function"), called with its path and `arguments`.
 
-    The arguments are values of JSON. The process runs from the beginning, so the caller may import modules during it;
-    leaving the context ends it. Raise Refused `temporary_folder_full`.
+    The arguments are JSON values. The process starts at once, so the caller may import modules meanwhile; leaving the
+    context ends it. Raise Refused `temporary_folder_full`.
     """
 
     def __init__(self, reader: str, path: Path, arguments: Mapping[str, Any], limits: ReadingLimits) -> None:
@@ -201,7 +201,7 @@ def _fork(
 
 
 def read_apart(reader: str, path: Path, arguments: Mapping[str, Any], limits: ReadingLimits) -> list[Part]:
-    """Return the parts that a `reader` yields of a file: see `ReadingTask`. Raise as `ReadingTask.parts` does."""
+    """Return the parts of a file that a `reader` yields: see `ReadingTask`. Raise as `ReadingTask.parts` does."""
     with ReadingTask(reader, path, arguments, limits) as reading:
         return reading.parts()
 
@@ -209,8 +209,8 @@ def read_apart(reader: str, path: Path, arguments: Mapping[str, Any], limits: Re
 def _wait_for(reading: "subprocess.Popen[bytes] | ForkedReader", idle_s: float) -> bytes:
     """Return the process' output on stderr, once it has ended.
 
-    Raise TimeoutError. A hanging library may sleep, which uses no processor time, so sleep also counts; waiting for a
-    processor or for the disk does not.
+    Raise TimeoutError after `idle_s`, without waits for a processor or the disk: a hanging library may sleep, which
+    uses no processor time.
     """
     silent = Silence(reading.pid, spared=SPARED)
     while not silent.lasts_over(idle_s / TICK_S):
@@ -222,7 +222,7 @@ def _wait_for(reading: "subprocess.Popen[bytes] | ForkedReader", idle_s: float) 
 
 
 def _kill(reading: "subprocess.Popen[bytes] | ForkedReader") -> None:
-    """Kill the process, and wait a limited time for its end, because a dead disk may delay that."""
+    """Kill the process, and wait a limited time for its end, which a dead disk may delay."""
     reading.kill()
     with suppress(subprocess.TimeoutExpired):
         reading.wait(GONE_S)

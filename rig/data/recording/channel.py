@@ -27,11 +27,10 @@ class Channel:
     """One quantity of a sensor: reading = number in the `column` × `unit_per_count` + `offset`, in the quantity's unit.
 
     - quantity: a name in `measured()`; type: NumPy's of a number.
-    - full_scale_counts: numbers from which on it is saturated, None if unknown; range: the nominal end of scale in the
-      unit, None if unknown.
-    - step: largest distance of neighbouring readings, in the unit, if it is more than a count. Numbers that were
-      truncated toward zero have it there, and half of it elsewhere.
-    - stated: whether the value was stated and not read: all numbers are equal, and a count is its possible change.
+    - full_scale_counts: number at which it saturates; range: the nominal end of scale, in the unit; None if unknown.
+    - step: largest distance of neighbouring readings, in the unit, if it is more than a count. Numbers truncated toward
+      zero have this step at zero, and half of it elsewhere.
+    - stated: whether the value was stated, not read: all numbers are equal, and a count is the possible change.
     """
 
     quantity: str
@@ -57,7 +56,8 @@ class Channel:
     def steps(self, readings: Array, *, trusts_counts: bool = False) -> Steps:
         """Return the resolution steps of readings (n, 3): as stated, or larger if the readings show larger steps.
 
-        `trusts_counts`: the recorded numbers are the converter's own counts, so the readings are not searched.
+        `trusts_counts`: whether the recorded numbers are the converter's own counts, so readings are not searched for
+        steps.
         """
         if self.step is not None:
             return cut_steps(readings, self.step / 2)
@@ -90,7 +90,7 @@ class Channel:
         return tuple(self.convert(self.counts(samples).mean(axis=0)).reshape(-1).tolist())
 
     def is_saturated(self, samples: NDArray[Any]) -> NDArray[np.bool_]:
-        """Return which of the samples (n,) are at the end of the scale."""
+        """Return a mask of the samples (n,) at the end of the scale."""
         if self.full_scale_counts is None:
             return np.zeros(len(samples), dtype=np.bool_)
         counts = self.counts(samples)
@@ -102,7 +102,7 @@ class Channel:
 def triad_channel(
     quantity: Quantity, unit_per_count: float, full_scale_counts: int, end_of_scale: float | None
 ) -> Channel:
-    """Return the channel of three axes in counts, the form that the board and the KVH 1775 deliver."""
+    """Return the channel of three axes in counts, as delivered by the board and the KVH 1775."""
     column = f"{quantity.prefix}counts"
     return Channel(quantity.name, column, "<i4", unit_per_count, 0.0, full_scale_counts, end_of_scale)
 
@@ -125,7 +125,7 @@ def sample_dtype(channels: Sequence[Channel]) -> np.dtype[Any]:
 def stamp_samples(
     dtype: np.dtype[Any], numbers: NDArray[Any], times_us: NDArray[Any], host_time_s: float
 ) -> NDArray[Any]:
-    """Return samples (n,) with numbers and times (n,) on their own clock, received together; other columns are zero."""
+    """Return samples (n,) received together, with numbers and times (n,) on their own clock; other columns are zero."""
     samples = np.zeros(len(numbers), dtype)
     samples["sequence"], samples["board_time_us"], samples["host_time_s"] = numbers, times_us, host_time_s
     return samples

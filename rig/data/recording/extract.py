@@ -1,8 +1,8 @@
 """Extraction of a run file, in a process of its own (`rig.data.processes.reading_process`).
 
 Yields a header (schema, texts, descriptions of the sensors), then the arrays: each sensor's samples, the turner's
-states, events, and the tables of external readings. Rows hold plain numbers; the reader judges whether they agree with
-the texts, because only the imports of this module are loaded here.
+states, events, and the tables of external readings. Rows hold plain numbers; the caller checks whether they agree with
+the texts, because few modules are loaded here.
 """
 
 import re
@@ -69,7 +69,7 @@ def extract(path: Path) -> Iterator[dict[str, Any] | NDArray[Any]]:
 
 
 def reason(error: Exception) -> str:
-    """Return the reason why a file cannot be read, in one line, without HDF5's wrapping of the system's message."""
+    """Return the reason why a file cannot be read, in one line, without HDF5's words around the system's message."""
     if isinstance(error, OSError) and error.filename is not None:
         error = OSError(error.strerror)  # the caller names the file
     text = " ".join(str(error).split())
@@ -122,7 +122,7 @@ def _check(dataset: Any, name: str) -> None:
 
 
 def _refuse_endless(path: Path, unpacked: int) -> None:
-    """Raise ValueError if compression or holes let a small file expand to more than the memory holds."""
+    """Raise ValueError if compression or holes let a small file expand beyond the memory."""
     with path.open("rb") as file:
         stored = size_without_holes(file)
     for what, size in (("its rows unpack", unpacked), ("it swells", path.stat().st_size)):
@@ -149,7 +149,7 @@ def _text(file: Any, name: str) -> str:
 def _convert(value: Any) -> Any:
     """Return an attribute in Python's own types.
 
-    Raise ValueError for one that no run file has. `_encode` raises TypeError for types that JSON does not have.
+    Raise ValueError for a type that no run file has. `_encode` raises TypeError for types that JSON does not have.
     """
     size = getattr(value, "size", 1) or 0  # an empty attribute has None
     if size > LONGEST_ATTRIBUTE or (isinstance(value, str | bytes) and len(value) > LONGEST_TEXT):

@@ -1,4 +1,4 @@
-"""The events of a calibration by hand as its recording stores them. Times are the board's, in microseconds."""
+"""The events of a calibration by hand in its recording. Times are the board's, in microseconds."""
 
 from dataclasses import dataclass
 from typing import Annotated, Literal
@@ -13,7 +13,7 @@ Reason = Annotated[str, Field(pattern=r"^[a-z_0-9]+$", max_length=40)]
 
 @dataclass(frozen=True, slots=True)
 class HandAsked:
-    """A request to the operator; `again` names the error of the last move, `why` gives it in words."""
+    """A request to the operator; `again` names the error of the last move, `why` describes it."""
 
     instruction: Instruction
     again: Reason | None = None
@@ -31,7 +31,7 @@ class HandRested:
 
 @dataclass(frozen=True, slots=True)
 class HandMoveAccepted:
-    """A move between two rests counts: a flip, or whole turns on a face."""
+    """A move between two rests that counts: a flip, or whole turns on a face."""
 
     begin_us: Microseconds
     end_us: Microseconds
@@ -43,7 +43,7 @@ class HandMoveAccepted:
 
 @dataclass(frozen=True, slots=True)
 class HandMoveRefused:
-    """A move between two rests does not count, by the error's name `again`; both rests do."""
+    """A move between two rests that does not count, by the error's name `again`; both rests count."""
 
     begin_us: Microseconds
     end_us: Microseconds
@@ -63,7 +63,7 @@ class HandRestRefused:
 class HandBegunAnew:
     """A restart of the session: nothing before `begin_us` counts.
 
-    `again` is the error's name: the table, or the sensor, is another.
+    `again` is the error's name: for another table, or another sensor.
     """
 
     begin_us: Microseconds

@@ -1,9 +1,9 @@
 """The layout of a run in HDF5 (schema "rig.run/1").
 
-`/samples/<sensor>` (its stamps and a column for each of its channels; the sensor's description as attributes, with the
-`channels` in JSON), `/states` (of the turner, of the type that `turner` describes:
-`rig.data.recording.recorded_turner`), `/events` (bytes: SWMR forbids data of variable length, so an event is a line of
-JSON); `schema`, `config` (YAML), `settings`, `provenance` and `turner` (JSON) as attributes of the file.
+- `/samples/<sensor>`: its stamps and a column for each channel; attributes describe the sensor (`channels` in JSON).
+- `/states`: those of the turner, of the type that `turner` describes (`rig.data.recording.recorded_turner`).
+- `/events`: bytes, a line of JSON for each event, because SWMR forbids data of variable length.
+- attributes of the file: `schema`, `config` (YAML), and in JSON `settings`, `provenance` and `turner`.
 
 External readings (schema "rig.files/1") have no `/samples` and no rows in `/states`, but the tables `/readings` and
 `/motion` (a float column each, by name; `rig.data.recording.motion_file`) and `elsewhere` (JSON: the item, and the kind
@@ -34,9 +34,9 @@ CHUNK_BYTES = 65536
 class Contents:
     """The contents of a run file, not yet validated.
 
-    `texts` are the attributes named in `TEXTS`, `described` the attributes of each sensor; `samples` (n,) by sensor, of
-    its type, `states` (n,) of the turner, of theirs, `events` (n,) bytes; `tables` (n,) by the names of `TABLES`, of
-    external readings alone.
+    - `texts`: the attributes named in `TEXTS`; `described`: the attributes of each sensor.
+    - `samples` (n,) by sensor, `states` (n,) of the turner, `events` (n,) in bytes.
+    - `tables` (n,): of external readings, by the names in `TABLES`.
     """
 
     schema: str
@@ -106,9 +106,9 @@ def table_dtype(names: Sequence[str]) -> np.dtype[Any]:
 
 
 def lay_out(path: Path, contents: Contents, *, swmr: bool) -> None:
-    """Write a run file under a temporary name and rename it, so a kill or a full disk leaves a complete file or none.
+    """Write a run file under a temporary name and rename it: a kill or a full disk leaves a complete file or none.
 
-    With `swmr` it can be opened for appending in that mode; without, any HDF5 tool opens it. Raise OSError.
+    With `swmr` the file can be opened for appending in that mode; otherwise any HDF5 tool opens it. Raise OSError.
     """
     write_new(path, _image(contents, "latest" if swmr else None))
 

@@ -1,6 +1,6 @@
-"""The names and types in a run file that determine how to read the rest of it: see `rig.data.recording.layout`.
+"""The names and types in a run file that determine how to read its contents: see `rig.data.recording.layout`.
 
-The process that extracts a file imports nothing else of the rig, because it lives only for a moment.
+The short-lived process that extracts a file imports nothing else of the rig.
 """
 
 from typing import Final

@@ -1,4 +1,4 @@
-"""External readings, and their motion by a file of the turner's."""
+"""External readings, and their motion from the turner's file."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
@@ -30,7 +30,7 @@ QUATERNION = ("qw", "qx", "qy", "qz")
 class Header:
     """The columns of a file: those `needed`, `one_of` several, and groups of optional ones.
 
-    `between`: the number that a column must exceed, and the largest allowed number, for a file of `one_row`.
+    `between`: for a file of `one_row`, the number that a column must exceed, and the largest allowed number.
     """
 
     needed: tuple[str, ...]
@@ -100,7 +100,7 @@ MOTIONS: Final[Mapping[MotionKind, Header]] = MappingProxyType(
 
 @dataclass(frozen=True, slots=True)
 class Item:
-    """The sensor that was read, as far as the user declared it."""
+    """The sensor that was read, as declared by the user."""
 
     name: SensorName
     part: ItemWord = NOT_STATED
@@ -108,12 +108,12 @@ class Item:
 
     @property
     def range_rad_s(self) -> None:
-        """Range of the sensor, which the files do not state."""
+        """The range of the sensor, rad/s, which the files do not state."""
         return
 
     @property
     def mounting(self) -> NDArray[np.float64]:
-        """Mounting (3, 3) on the moving body: the identity, because the file's axes count as the sensor's own."""
+        """The mounting (3, 3) on the moving body: the identity, because the file's axes count as the sensor's own."""
         return np.eye(3)
 
 
@@ -121,9 +121,9 @@ class Item:
 class ReadElsewhere:
     """The `readings` (n,) of an item, and the rows (N,) of sweeps or of attitudes of its `motion`, by column.
 
-    For "turns" by hand the readings show the motion: then there is one row, of what the user declared. Times count from
-    `origin_s` of the files' clock. `other_rows` of the readings' file hold readings of other sensors alone. `note`
-    states what the file's format does not specify about its readings, "" if it specifies everything.
+    For "turns" by hand the readings show the motion, and one row has the user's declarations. Times count from
+    `origin_s` of the files' clock. `other_rows` is the number of rows with readings of other sensors only. `note`
+    states what the file's format does not specify about its readings, "" if nothing.
     """
 
     item: Item
@@ -136,7 +136,7 @@ class ReadElsewhere:
 
     @property
     def sensor(self) -> RecordedSensor:
-        """The item as a recorded sensor, whose samples hold readings and no counts, on a clock of their own."""
+        """The item as a recorded sensor, whose samples hold readings instead of counts, on a clock of their own."""
         present = [channel for channel in channel_contents().values() if channel.columns[0] in self.readings]
         time_s = self.readings[TIME]
         span_s = float(np.ptp(time_s)) if len(time_s) else 0.0
@@ -165,7 +165,7 @@ class ReadElsewhere:
 
 @dataclass(frozen=True, slots=True)
 class ExternalHeader:
-    """The description of external readings in a run file, apart from their tables: see `ReadElsewhere`."""
+    """The description of external readings in a run file, without their tables: see `ReadElsewhere`."""
 
     item: Item
     tells: MotionKind

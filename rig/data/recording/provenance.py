@@ -32,15 +32,15 @@ PACKAGES = ("ur-rtde", "numpy", "h5py", "pyserial")
 
 @dataclass(frozen=True, slots=True)
 class Provenance:
-    """The origin of a recording; "arm" means any turner, `NO_BOARD` replaces what a recording without a board lacks.
+    """The origin of a recording; "arm" means any turner, `NO_BOARD` replaces values that only a board provides.
 
     - started_utc: the time of its start.
     - rig_version, python_version, package_versions, firmware_version: the software.
     - configuration_sha256: the hash of the configuration.
     - arm_serial_number, arm_software, board_unique_id: the devices.
     - sensor_serial_numbers: by sensor name.
-    - stored_calibrations: those by which the board corrected its stream, by sensor name.
-    - script, script_sha256, script_installed: the procedure's script, its hash, whether it came with a package.
+    - stored_calibrations: by which the board corrected its stream, by sensor name.
+    - script, script_sha256, script_installed: the procedure's script, its hash, and whether a package provided it.
     - arm_kinematics: the turner's geometry, None without one.
     - tcp_offset: the controller's tool centre point in the flange's frame, unused; None if unknown.
     - arm_maker, arm_model: of the connected turner.
@@ -88,7 +88,7 @@ class Provenance:
 
 
 def calls_itself_simulated(software: str) -> bool:
-    """Return whether a controller of this version drives no arm; its seconds may then have any length."""
+    """Return whether a controller of this version is simulated; its seconds may then have any length."""
     return software.endswith(SIMULATED)
 
 

@@ -1,4 +1,4 @@
-"""The events of a run as its recording stores them: one type for each kind, written and read only by this module.
+"""The events of a run in its recording: one type for each kind, written and read only by this module.
 
 In the file an event is a line of JSON: its kind's name, its times, and the fields of its type.
 """
@@ -49,7 +49,7 @@ class RestStarted:
 
 @dataclass(frozen=True, slots=True)
 class RestFinished:
-    """The arm has stood still until now."""
+    """The arm was at rest until this time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +78,7 @@ class BoardObserved:
 
 @dataclass(frozen=True, slots=True)
 class BoardNotObserved:
-    """The board has no average of the sweep, for `reason`."""
+    """The reason why the board has no average of the sweep."""
 
     sensor: str
     sweep: int
@@ -87,7 +87,7 @@ class BoardNotObserved:
 
 @dataclass(frozen=True, slots=True)
 class BoardRecalled:
-    """The board was given its average of the sweep from before the run was interrupted."""
+    """The return to the board of its average of the sweep, after the run was interrupted."""
 
     sensor: str
     sweep: int
@@ -130,7 +130,7 @@ _NAMES = {kind: name for name, kind in _KINDS.items()}
 
 @dataclass(frozen=True, slots=True)
 class TimedEvent:
-    """An event and its time: on the host's monotonic clock, and on the controller's if that was received by then."""
+    """An event and its time on the host's monotonic clock, and on the controller's if known by then."""
 
     event: Event
     host_time_s: float
@@ -138,7 +138,7 @@ class TimedEvent:
 
 
 def encode_event(recorded: TimedEvent) -> bytes:
-    """Return a line of a run file's events, with its end."""
+    """Return an event as a line of a run file, with the line's end."""
     document = {
         "name": _NAMES[type(recorded.event)],
         "host_time_s": recorded.host_time_s,
@@ -149,7 +149,7 @@ def encode_event(recorded: TimedEvent) -> bytes:
 
 
 def decode_events(stream: bytes) -> Iterator[TimedEvent]:
-    """Yield the events of a run file; a last line without an end, cut off by a kill, is left out.
+    """Yield the events of a run file, without a last line that a kill cut off.
 
     Raise ValueError naming the first line that is not an event, or that does not have the form of its kind.
     """
@@ -179,7 +179,7 @@ def _decode_document(document: Any) -> TimedEvent:
 
 
 def _nest_answer(name: str, detail: dict[str, Any]) -> dict[str, Any]:
-    """Return the details with the board's answer nested. In schema "rig.run/1", its fields were not nested."""
+    """Return the details with the board's answer nested; in schema "rig.run/1" its fields were not nested."""
     answer = {"board_observed": "observation", "board_solved": "solution"}.get(name)
     return {**detail, answer: detail} if answer is not None and answer not in detail else detail
 
@@ -191,7 +191,7 @@ class _Times:
 
 
 def _check_sweep(sweep: Sweep) -> None:
-    """Raise ValueError for a sweep that no plan contains, because readers rely on its numbers."""
+    """Raise ValueError for a sweep that no plan contains."""
     low, high = sweep.revolution_rad
     rates = sweep.speed_rad_s, sweep.acceleration_rad_s2, sweep.duration_s
     numbers = (*sweep.axis_flange, *sweep.start_q_rad, *sweep.end_q_rad, low, high, *rates)

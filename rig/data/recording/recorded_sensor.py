@@ -31,10 +31,11 @@ AS_THE_FLANGE: Mounting = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 class RecordedSensor:
     """A sensor and its `channels`, in the order of their columns in its samples.
 
-    `mounting` (3 rows of 3) is the nominal rotation from the flange frame to the sensor's; a sensor without axes has
-    the default. `mode` is "calibrated" if the rates were corrected before they were recorded. `clock` names the sensor
-    whose clock stamps the samples: itself, or its device; None for the board's. `stamp_std_s` is the standard
-    uncertainty of a time stamp, None if it is negligible against the interval between samples.
+    - `mounting` (3 rows of 3): nominal rotation from the flange frame to the sensor's, by default for a sensor without
+      axes.
+    - `mode`: "calibrated" if the rates were corrected before they were recorded.
+    - `clock`: the sensor whose clock stamps the samples, itself or its device; None for the board.
+    - `stamp_std_s`: standard uncertainty of a time stamp, None if negligible.
     """
 
     part: str
@@ -48,7 +49,7 @@ class RecordedSensor:
 
     @property
     def on_board(self) -> bool:
-        """Whether the board reads it, and stamps its samples by the board's clock."""
+        """Whether the board reads it, and stamps its samples."""
         return self.clock is None
 
     @property
@@ -63,7 +64,7 @@ class RecordedSensor:
 
     @property
     def unseen_change_k(self) -> float:
-        """The change of its temperature, K, that remains unrecorded because it is below the thermometer's step."""
+        """The possible unrecorded change of its temperature, K, below the thermometer's step."""
         return self.channel(TEMPERATURE).resolution if self.measures(TEMPERATURE) else UNKNOWN_CHANGE_K
 
     @property
@@ -80,7 +81,7 @@ class RecordedSensor:
 
     @property
     def range_rad_s(self) -> float:
-        """Nominal end of scale of its rates, which every gyroscope states."""
+        """The nominal end of scale of its rates, which every gyroscope states, rad/s."""
         range_rad_s = self.channel(RATE).range
         assert range_rad_s is not None, "a gyroscope that does not state it is not read"
         return range_rad_s
@@ -116,14 +117,14 @@ def build_sensor(
     rate_hz: float | None = None,
     clock: str | None = None,
 ) -> RecordedSensor:
-    """Return the recorded sensor of a section, with these channels; part and rate are the section's by default."""
+    """Return the recorded sensor of a section, with these channels; part and rate are by default the section's."""
     mounting = tuple(tuple(row) for row in mounting_matrix(section.mounting).tolist())
     rate_hz = section.rate_hz if rate_hz is None else rate_hz
     return RecordedSensor(part or section.part, section.serial_number, rate_hz, channels, mounting, clock=clock)
 
 
 def range_m_s2(section: AccelerationSection) -> float:
-    """Return the full scale of an accelerometer."""
+    """Return the full scale of an accelerometer, m/s²."""
     return section.range_g * STANDARD_GRAVITY_M_S2
 
 

@@ -1,4 +1,4 @@
-"""The turner of a recording, as its run file describes it, and the rows of its states."""
+"""The description of the turner in a run file, and the rows of its states."""
 
 import json
 from collections.abc import Iterable, Sequence
@@ -27,9 +27,8 @@ JointName = Annotated[str, Field(pattern=r"^\w[\w -]*$", max_length=40)]  # beco
 class RecordedTurner:
     """A turner: its `kind`, by which it is registered, its maker and its model (None if unknown).
 
-    `joints` are the names of its n joints, 0 to `MAX_JOINTS`, beginning on the ground; `geometry` converts their
-    angles; `fields` are the fields of its states in addition to times and joints; `reading_std_rad` as in
-    `TurnerIdentity`.
+    `joints`: the names of its n joints, 0 to `MAX_JOINTS`, from the ground on; `geometry`: that of the chain of joints;
+    `fields`: those of its states besides times and joints; `reading_std_rad`: as in `TurnerIdentity`.
     """
 
     kind: Kind

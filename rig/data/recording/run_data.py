@@ -1,4 +1,4 @@
-"""A recording in memory. It does not import the descriptions of its contents, because a plan needs only its type."""
+"""A recording in memory. The module does not import the contents' descriptions, because a plan needs only the type."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 class RunData:
     """A run file in memory: `samples` (n,) by name of a sensor, `states` (n,) of its turner, events in order.
 
-    `settings` are those for the judgement; `config` is the configuration's text, for people. External readings
-    (`elsewhere`) have no turner (None); their samples are those of a sensor on a clock of its own.
+    `settings` are those for solving and judging; `config` is the configuration's text, for people. External readings
+    have no turner (None); their samples are those of a sensor on a clock of its own.
     """
 
     config: str

@@ -46,8 +46,7 @@ class RunRecorder:
 
     `config` is the configuration's text without its `world:` section. The folder of `path` must exist and the file must
     not. Raise Fault `recording_failed` from the constructor, `check` and `close`. The adding calls never wait for the
-    disk and do not report its failures, so that a full disk stalls neither the board's link nor the turner's: watch
-    `check`.
+    disk and do not report its failures, so a full disk stalls neither the board's link nor the turner's: call `check`.
     """
 
     def __init__(
@@ -104,7 +103,7 @@ class RunRecorder:
             self._pending.states.append(state)
 
     def add(self, event: Event, *, controller_time_s: float | None = None) -> None:
-        """Append an event at this time; its controller time is by default the time of the newest state."""
+        """Append an event at the present time; its controller time is by default that of the newest state."""
         with self._lock:
             time_s = self._controller_time_s if controller_time_s is None else controller_time_s
             self._pending.events.append(encode_event(TimedEvent(event, time.monotonic(), time_s)))
@@ -115,7 +114,7 @@ class RunRecorder:
             raise self._fault(self._failure)
 
     def close(self) -> None:
-        """Write pending data and close the file; any HDF5 reader then opens it. Closing twice is allowed."""
+        """Write pending data and close the file, which any HDF5 reader then opens. Closing twice is allowed."""
         self._closing.set()
         self._thread.join()
         self.check()
@@ -168,8 +167,8 @@ class RunRecorder:
 def read_run(path: Path, timeout_s: float | None = None, *, begun: ReadingTask | None = None) -> RunData:
     """Read a run file: finished, still being written, or left behind by a killed process.
 
-    `begun` is the result of `begin_reading`, if that was called before. Rows that a kill left unwritten or incomplete
-    are dropped. Raise Refused: `no_run_file` without a file; `not_a_run_file` if it is damaged, of another kind or
+    `begun` is the result of `begin_reading`, if that was called before. Rows left unwritten or incomplete by a kill are
+    dropped. Raise Refused: `no_run_file` without a file; `not_a_run_file` if the file is damaged, of another kind or
     schema, or takes longer than `timeout_s` (None: by its size) on a machine that is not overloaded;
     `temporary_folder_full`.
     """
@@ -222,8 +221,7 @@ def write_elsewhere(path: Path, run: RunData) -> None:
 def make_plain(path: Path) -> None:
     """Rewrite a killed run's file, which only SWMR readers can open, so that any HDF5 tool can open it.
 
-    The content remains the same. No process may be writing the file at that time. Raise Refused as `read_run` does;
-    OSError.
+    No process may be writing the file. Raise Refused as `read_run` does; OSError.
     """
     contents = _contents(path, None)
     samples = {name: _whole_rows(rows) for name, rows in contents.samples.items()}
@@ -303,7 +301,7 @@ def _whole_rows(rows: NDArray[Any]) -> NDArray[Any]:
 def _check_numbers(name: str, rows: NDArray[Any], most: float) -> None:
     """Raise ValueError for numbers that overflow in calculations, and for a host time that is not finite.
 
-    Other numbers that are not finite are reported when they are used, because some never are.
+    Other numbers that are not finite raise only when they are used.
     """
     if not np.isfinite(rows["host_time_s"]).all():
         raise ValueError(f"a host time of {name} is not a number")
@@ -315,7 +313,7 @@ def _check_numbers(name: str, rows: NDArray[Any], most: float) -> None:
 
 @dataclass(frozen=True, slots=True)
 class _Named:
-    """The names of the sensors: they become names of files, so the rules of a configuration apply."""
+    """The names of the sensors, under the rules of a configuration, because they become names of files."""
 
     sensors: tuple[SensorName, ...]
 

@@ -1,7 +1,7 @@
-"""The settings by which a recording is judged: recorded with it, typed, and with a version of their own.
+"""The settings by which a recording is judged, stored in it, typed, and with a version of their own.
 
-The configuration of a run is stored as text, for people. Its keys may change from one version of the rig to the next,
-but these settings do not, so that a recording is judged as in the run, or by the options of `rig solve --set`.
+The configuration of a run is stored as text, for people, and its keys may change with the version of the rig. By these
+settings, a recording is judged as in its run, or by the options of `rig solve --set`.
 """
 
 import json
@@ -44,8 +44,9 @@ Vector3 = tuple[Finite, Finite, Finite]
 class ObservationThresholds(ObservationKeys):
     """Conditions on an averaged revolution.
 
-    Of its samples `max_lost_fraction` may be missing; the joint's rate, smoothed, may stray from its mean by the
-    fraction `max_speed_deviation`; the reading may point `max_axis_deviation_deg` away from the turn.
+    - `max_lost_fraction`: of the samples may be missing.
+    - `max_speed_deviation`: largest deviation of the joint's smoothed rate from its mean, as a fraction.
+    - `max_axis_deviation_deg`: largest angle between the reading and the axis of rotation.
     """
 
     @model_validator(mode="before")
@@ -66,10 +67,10 @@ class KnownReference:
 
 @dataclass(frozen=True, slots=True)
 class Site:
-    """The site of the arm, in its base frame: `up` (unit vector), gravity, and the Earth's rate if it is known.
+    """The site of the arm, in its base frame: `up` (unit vector), gravity, and the Earth's rate, if known.
 
-    Of the magnetic field at most the size is known, and whether it points upwards. The latitude may be known without
-    the Earth's rate, for want of a heading. `…_expanded_…` are expanded uncertainties (k = 2), None if none was stated.
+    Of the magnetic field at most the norm is known, and whether it points upwards. Without a heading, the latitude may
+    be known without the Earth's rate. `…_expanded_…` are expanded uncertainties (k = 2), None if not stated.
     """
 
     up: Vector3
@@ -88,11 +89,11 @@ class Site:
 
 
 class Uncertainty(UncertaintyKeys[dict[str, NonNegative]]):
-    """Half-widths of quantities that no recording shows: all values within are equally likely.
+    """Half-widths of errors that no recording shows: all values within are equally likely.
 
-    An exception is `angle_std_deg`, the standard deviation of a joint's angle from its encoder's, None if it was not
-    stated. Those of sensors are keyed by name. `decision_rule` compares a limit with the value alone ("simple") or with
-    the value and its expanded uncertainty ("guard_band").
+    `angle_std_deg` is the standard deviation of a joint's angle by its encoder, None if not stated. Those of sensors
+    are keyed by name. `decision_rule` compares a limit with the value alone ("simple") or with the value and its
+    expanded uncertainty ("guard_band").
     """
 
     @model_validator(mode="before")
@@ -103,35 +104,35 @@ class Uncertainty(UncertaintyKeys[dict[str, NonNegative]]):
 
     @property
     def angle_std_rad(self) -> float:
-        """Standard deviation of a joint's angle by its encoder. Raises Refused `angle_std_not_stated`."""
+        """The standard deviation of a joint's angle by its encoder. Raises Refused `angle_std_not_stated`."""
         if self.angle_std_deg is None:
             raise _angle_std_not_stated()
         return float(np.radians(self.angle_std_deg))
 
     @property
     def repeatability_std_rad(self) -> float:
-        """The standard deviation with which the arm returns to an angle."""
+        """The standard deviation of the arm's return to an angle, rad."""
         return float(np.radians(self.repeatability_deg) / np.sqrt(3))
 
     def knows(self, name: str) -> bool:
-        """Return whether sizes are stated for the sensor `name`."""
+        """Return whether error sizes are stated for the sensor `name`."""
         return all(name in getattr(self, what) for what in OF_SENSORS)
 
     def stated_size(self, what: OfSensor, name: str) -> float:
-        """Return the size that is stated for the sensor `name`."""
+        """Return the stated size of the error `what` of the sensor `name`."""
         sizes: dict[str, float] = getattr(self, what)
         return sizes[name]
 
 
 @dataclass(frozen=True, slots=True)
 class Elsewhere:
-    """The settings of a solution of external readings, with a file of their motion (`motion_file`).
+    """The settings for solving external readings with their motion (`motion_file`).
 
-    - `any_mounting`: the sensor's axes need not lie along those of the body whose attitudes are given.
-    - `find_clock`: the attitudes are on a clock of their own; `exact_rates`: their rates are exact, as those of a rate
-      table are; `window_s`: for averages of attitudes in a gyroscope's increments, None for a suitable one.
-    - `estimator`: the requested one, None for the one that suits each quantity.
-    - `only`: the sensors to calibrate, by the kind of sensor; all recorded ones if it is empty.
+    - `any_mounting`: whether the sensor may have any mounting on the body.
+    - `find_clock`: whether the attitudes have a clock of their own; `exact_rates`: whether their rates are exact, as of
+      a rate table; `window_s`: for averages of attitudes in a gyroscope's increments, None for a suitable one.
+    - `estimator`: None for the one that suits each quantity.
+    - `only`: the kinds of sensors to calibrate; empty for all that are recorded.
     """
 
     any_mounting: bool = False
@@ -146,8 +147,8 @@ class Elsewhere:
 class HandSettings:
     """The settings of a session by hand, and its planned numbers of `flips` and whole `turns`.
 
-    The next move is asked for `rest_s` after the item came to rest. `box_rad` and `closure_rad` are standard
-    deviations: of the item's faces from right angles, and of a whole turn's end from its beginning.
+    The next move is requested `rest_s` after the item came to rest. `box_rad` and `closure_rad` are standard deviations
+    of the item's faces from right angles, and of a whole turn's end from its beginning.
     """
 
     flips: Annotated[int, Field(ge=0)]
@@ -180,7 +181,7 @@ class PlannedDwell:
 
 @dataclass(frozen=True, slots=True)
 class RunSettings:
-    """The task of a run, and how it is solved and judged.
+    """The task of a run, and the settings to solve and judge it.
 
     - procedure: the procedure's name.
     - then_verify: whether a verification was to follow the calibration.
@@ -188,16 +189,16 @@ class RunSettings:
     - to_calibrate: names of the sensors to calibrate.
     - reference: the sensor with a given calibration.
     - home_q_rad: angles of the turner's joints, of which there may be none.
-    - planned_sweeps, planned_dwells: of the complete procedure, however often the run was interrupted.
+    - planned_sweeps, planned_dwells: of the complete procedure, even if the run was interrupted.
     - site: location of the arm.
     - matrix_corrected: names of the sensors whose readings the complete matrix corrects.
     - second_order: whether the accelerometers' model has terms of second order.
-    - finds_earth_rate: whether the gyroscopes' readings give the Earth's rate, instead of the site.
+    - finds_earth_rate: whether the Earth's rate is estimated from the gyroscopes' readings.
     - extension_m: end of the extension that carries the sensors, in the flange's frame.
-    - elsewhere: how an external recording is solved.
+    - elsewhere: for an external recording.
     - mounts: nominal rotations from the flange's to the item's frame by stage, empty for an item that is mounted once.
     - stage: number of this recording's stage, from 0.
-    - by_hand: how a session by hand is solved.
+    - by_hand: for a session by hand.
     - reference_c: temperature at which a calibration over temperature is stated, None for other calibrations.
     """
 
@@ -229,7 +230,7 @@ class RunSettings:
 
     @property
     def stated_uncertainty(self) -> Uncertainty:
-        """The uncertainty that a run states. Raise ValueError for external readings, which do not."""
+        """The uncertainty that a run states. Raises ValueError for external readings, which state none."""
         if self.uncertainty is None:
             raise ValueError("its settings state no uncertainty, but those of a run do")
         return self.uncertainty
@@ -248,11 +249,10 @@ class RunSettings:
         return self.procedure, self.then_verify, self.home_q_rad, *steps, self.mounts, self.by_hand
 
     def apply_overrides(self, overrides: Sequence[str]) -> "RunSettings":
-        """Return the settings with other thresholds or limits:
+        """Return the settings with other thresholds or limits.
 
-        `limits.scale_std=0.001`. If the run has arcs, the encoders' uncertainty can also be changed:
-        `uncertainty.angle_std_deg=0.02`. Raise Refused `unknown_setting` or `wrong_setting`, which list the possible
-        settings.
+        An override is `limits.scale_std=0.001`, or if the run has arcs `uncertainty.angle_std_deg=0.02`. Raise Refused
+        `unknown_setting` or `wrong_setting`, which list the possible settings.
         """
         changed = self
         for item in overrides:
@@ -329,7 +329,7 @@ def settings_of(config: "RigConfig", plan: "Plan") -> RunSettings:
 
 
 def _limits(config: "RigConfig") -> Limits:
-    """Return the limits in the file, including the targets at which its procedure ends."""
+    """Return the limits in the file, with the targets at which its procedure ends."""
     from rig.config.procedures.procedure_sections import SixObservationSection
 
     limits, section = config.limits.model_dump(), config.procedure

@@ -1,4 +1,4 @@
-"""The events of a calibration over temperature, in addition to its sweeps and dwells, as its recording stores them."""
+"""The events of a calibration over temperature in its recording, besides its sweeps and dwells."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -13,9 +13,9 @@ Celsius = dict[str, Finite]
 
 @dataclass(frozen=True, slots=True)
 class TemperatureWanted:
-    """A request to warm or cool the sensors until the first of them is at `next_c`.
+    """A request to warm or cool the sensors, now at `now_c`, until the first of them is at `next_c`.
 
-    They are `now_c`. The operator does it, or the board's heater, if `heated`.
+    The operator does so, or the board's heater if `heated`.
     """
 
     warming: bool
