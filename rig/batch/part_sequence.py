@@ -79,7 +79,7 @@ class Work:
     notify: Callable[[Batch], None] = lambda batch: None
 
     def all_parts(self) -> None:
-        """Run one part after the other, until operator or list ends. Raise Fault if a question gets no answer."""
+        """Run part after part, until the operator or the list ends. Raise Fault if a question gets no answer."""
         self._write_table()
         self.notify(self.journal.batch)
         while True:

@@ -12,11 +12,11 @@ EntryT = TypeVar("EntryT", bound=BaseModel)
 
 
 def entry(kind: type[EntryT], /, *sources: object, **more: Any) -> EntryT:
-    """Return an entry of `kind`: each field from `more`, or from the first source that has it according to the table.
+    """Return an entry of `kind`, with each field from `more`, or from the first source that fills it by the table.
 
-    Arrays become tuples. Raise ValueError if a field has no source or its value does not fit. Raise TypeError if `more`
-    has a name that is no field of the entry, or if the table does not list a source: a reader ignores unknown keys, a
-    writer must not. Raise AttributeError if a source lacks an attribute of the table.
+    Arrays become tuples. Raise ValueError for a field without a source or with a value that does not fit; TypeError if
+    `more` has a name that is no field, or for a source that the table does not list; AttributeError if a source lacks
+    an attribute of the table.
     """
     if unknown := more.keys() - kind.model_fields.keys():
         raise TypeError(f"{kind.__name__} has no {', '.join(sorted(unknown))}")

@@ -1,9 +1,8 @@
-"""The table of what each entry of `result.json` takes from the results of the analysis.
+"""The table of the attributes of analysis results that fill the entries of `result.json`.
 
-A row names the classes that it reads and, for each field of the entry, the attribute that fills it. A class is given by
-its name, so that writing one entry does not import the analysis of all others. A field without a row is set by the
-function that builds the entry, or is left out. So an attribute may be renamed, or may get the name of a field, without
-a change of the file.
+A row names the classes that it reads and, for each field of the entry, the attribute that fills it. Classes are given
+by name, so that writing one entry does not import the analysis of all others. The function that builds the entry sets
+fields without a row. So an attribute may be renamed without a change of the file.
 """
 
 from collections.abc import Mapping

@@ -18,7 +18,7 @@ NOTHING: Mapping[str, Array] = MappingProxyType({})
 
 
 def write_header(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
-    """Write `calibration.h`, unless the calibration failed its limits, so that it must not be used."""
+    """Write `calibration.h`, unless the calibration failed its limits and must not be used."""
     by_sensor = {name: g_sensitivity(result) for name, result in outcome.results.items()}
     sensitivities = {name: matrix for name, matrix in by_sensor.items() if matrix is not None}
     if not outcome.passed or not any(_calibrations(document, sensitivities)):
@@ -44,10 +44,10 @@ def g_sensitivity(result: SensorResult) -> Array | None:
 def calibration_header(document: ResultDocument, g_sensitivity: Mapping[str, Array] = NOTHING) -> str:
     """Return C source text for the sensors of a result.
 
-    A calibrated gyroscope gets its scale factors (1), its biases (rad/s), the matrix M of g = M (m + b) by which the
-    board corrects it, and a function that does the same. If its `g_sensitivity` (3, 3), rad/s per m/s², is known, it
-    gets that and a function that subtracts its effect first. An accelerometer and a magnetometer get bias, matrix and
-    function. C names are the sensors' names with `_` for every character that C does not allow.
+    A calibrated gyroscope gets its scale factors, its biases (rad/s), the matrix M of the board's correction g = M (m +
+    b), and a function for it; with a known `g_sensitivity` (3, 3), rad/s per m/s², also this and a function that
+    subtracts its effect first. An accelerometer and a magnetometer get bias, matrix and function. C names are the
+    sensors' names with `_` for every character that C does not allow.
     """
     lines = [
         "/* Calibrations. Of gyroscopes g = M (m + b): rate_rad_s = matrix * (reading_rad_s + bias_rad_s), where",

@@ -1,6 +1,6 @@
 """The truth of a simulated laboratory next to the result: (result − truth)/U.
 
-It is for people only: nothing that estimates imports this module.
+It is for people only: no estimator imports this module.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -55,7 +55,7 @@ class TrueValues:
 
     @property
     def deviations(self) -> list[float]:
-        """(result − truth)/U of each axis."""
+        """The deviations (result − truth)/U of each axis."""
         rows = zip(self.result.values, self.truth, self.result.expanded, strict=True)
         return [(value - true) / u if u else float("nan") for value, true, u in rows]
 
@@ -67,7 +67,7 @@ class TrueValues:
 
 @dataclass(frozen=True, slots=True)
 class TruthRow:
-    """A row of the result with its truth; `scale` is None if no true scale factor is defined."""
+    """A row of the result with the truth; `scale` is None if no true scale factor is defined."""
 
     row: DisplayRow
     scale: TrueValues | None

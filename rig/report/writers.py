@@ -25,16 +25,16 @@ class Writer(Protocol):
     """A function that writes files of its own into the run folder, by `rig.config.files.safe_writing`.
 
     `outcome` has everything that the analysis computed, curves too; `document` is the content of `result.json`. The
-    events that it returns are passed on to the operator.
+    returned events are passed on to the operator.
     """
 
     def __call__(self, outcome: Outcome, document: ResultDocument, folder: Path, /) -> Iterable[RunEvent]: ...
 
 
 def write_outcome(folder: Path, outcome: Outcome) -> Iterator[RunEvent]:
-    """Write all documents and then `result.json`, which ends the run; yield their events once all are in place.
+    """Write all documents, then `result.json`, which ends the run; yield the events once all are in place.
 
-    No document appears without the result: on a full disk none is put in place, and the run can be resumed.
+    On a full disk no document is put in place, and the run can be resumed.
     """
     document = document_of(outcome)
     pictures = dict.fromkeys(kind.figures for kind in kinds() if not isinstance(kind.figures, NoOutlet))

@@ -82,7 +82,7 @@ class PartSpec:
         return self.acceleration_noise_ug_sqrt_hz / sqrt(2)
 
     def accept_rate(self, rate_hz: float) -> float:
-        """Return the part's exact rate for a nominal `rate_hz`. Raise ValueError, with the nearest, if it has none."""
+        """Return the part's exact rate for a nominal `rate_hz`. Raise ValueError, with the nearest, if none fits."""
         if self.any_rate:
             return positive(rate_hz)
         return nearest_rate(rate_hz, self.rates_hz, self.rates_rule)
@@ -101,7 +101,7 @@ class MagnetometerPart:
     default_rate_hz: float
 
     def accept_rate(self, rate_hz: float) -> float:
-        """Return the part's exact rate for a nominal `rate_hz`. Raise ValueError, with the nearest, if it has none."""
+        """Return the part's exact rate for a nominal `rate_hz`. Raise ValueError, with the nearest, if none fits."""
         return nearest_rate(rate_hz, self.rates_hz, list_numbers(self.rates_hz))
 
     def accept_range(self, range_gauss: float) -> float:

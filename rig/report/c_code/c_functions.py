@@ -96,7 +96,7 @@ def _gravity_correction(prefix: str, sensitivity: Array) -> Iterator[str]:
 def _subtraction_lines(
     finding: Finding[Any], bias: Sequence[float], matrix: Sequence[Sequence[float]], true: str, about: Sequence[str]
 ) -> Iterator[str]:
-    """Yield bias, matrix and function of a sensor whose bias is subtracted from its reading.
+    """Yield bias, matrix and correction function of a sensor whose bias is subtracted from its reading.
 
     `true` is the C name of the corrected value.
     """

@@ -1,4 +1,4 @@
-"""The content of a certificate, from a result and the laboratory's statements: texts and numbers, no layout."""
+"""The content of a certificate, without layout, from a result and the laboratory's statements."""
 
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
@@ -37,7 +37,7 @@ from rig.turners.turner_registry import words_of
 
 @dataclass(frozen=True, slots=True)
 class CertifiedGyroscope:
-    """One calibrated gyroscope: its result, and its verification if there is one."""
+    """One calibrated gyroscope: its result, and its verification, if any."""
 
     name: str
     sensor: GyroscopeEntry
@@ -48,7 +48,7 @@ class CertifiedGyroscope:
 class HeldStill:
     """The sensors of one `kind` that were calibrated at rest, and the standard of their scale factors.
 
-    `value` is the stated value of the standard, `origin` the laboratory's statement of its source.
+    `value` is the standard's stated value, `origin` its source by the laboratory's statement.
     """
 
     kind: str
@@ -221,14 +221,14 @@ class Certificate:
 
     @property
     def guarded(self) -> bool:
-        """Whether a guard band of U was applied to the limits."""
+        """Whether a limit of conformity has a guard band of U."""
         return any(check.guard_band > 0 for check in self.conformity)
 
 
 def certificate_of(
     result: ResultDocument, stated: StatedFacts, reversals: Mapping[str, ReversalEntry] = MappingProxyType({})
 ) -> Certificate:
-    """Return the certificate of a result; its number too depends on the arguments alone.
+    """Return the certificate of a result; everything in it, the number too, depends on the arguments alone.
 
     Raise Refused `another_sensor` if reversals are of other magnetometers, or of other runs, than the result's.
     """
@@ -271,7 +271,7 @@ def is_simulated(result: ResultDocument, stated: StatedFacts) -> bool:
 
 
 def _number(result: ResultDocument, stated: StatedFacts, reversals: Mapping[str, ReversalEntry]) -> str:
-    """Return the day and a part of the SHA-256 of the content, so that the number changes with the content."""
+    """Return the certificate's number, which changes with its content: the day and a part of the content's SHA-256."""
     content = f"{result.text()}\n{stated.site!r}\n{stated.certificate!r}\n{stated.simulated}"
     content += "".join(f"\n{name}: {reversal.model_dump_json()}" for name, reversal in reversals.items())
     day = datetime.fromisoformat(result.provenance.started_utc)
@@ -327,7 +327,7 @@ def _angles_rad(result: ResultDocument) -> Iterator[float]:
 
 
 def _traceable(result: ResultDocument, stated: StatedFacts) -> bool:
-    """Return whether time, the only standard of a gyroscope's scale, is traceable to a named reference.
+    """Return whether time, the only standard of a gyroscope's scale, is traceable to a stated reference.
 
     Arcs are not traceable, because encoders measure their angles.
     """
@@ -355,7 +355,7 @@ def _find_held_still(result: ResultDocument, stated: StatedFacts) -> Iterator[He
 
 
 def _size_stated(budget: BudgetEntry) -> bool:
-    """Return whether the standard's uncertainty is stated (normal), and not assumed (a half-width)."""
+    """Return whether the standard's uncertainty is stated (normal), not assumed (a half-width)."""
     return any(line.kind == "B" and line.distribution == "normal" for line in budget.contributors)
 
 
@@ -382,7 +382,7 @@ def _deviations(result: ResultDocument) -> Iterator[str]:
 
 
 def _references(result: ResultDocument) -> Iterator[str]:
-    """Yield the references' calibrations, which are the results of other laboratories."""
+    """Yield the calibrations of reference sensors, which are results of other laboratories."""
     for entry in {entry.reference: entry for entry in result.verification.values()}.values():
         serial = result.provenance.sensor_serial_numbers.get(entry.reference, "not stated")
         scale = ", ".join(f"{k:g}" for k in entry.reference_scale)

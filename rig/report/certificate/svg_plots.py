@@ -40,7 +40,7 @@ class PlotPoint:
 class Residuals:
     """Three values of each sweep, attitude or repeat; `ticks` are heights with their labels, rests begin at `split`.
 
-    `shown` describes the points, `expectation` the bars, which are two standard deviations.
+    `shown` describes the points; `expectation` describes the bars of two standard deviations.
     """
 
     points: tuple[PlotPoint, ...]
@@ -57,7 +57,7 @@ class Residuals:
 class Contributions:
     """Contributions to the combined uncertainty on a logarithmic axis: (name, y, x of k, x of b).
 
-    They are of the values of the printed budget, on their `axes`.
+    The values are those of the printed budget, on their `axes`.
     """
 
     axes: tuple[str, str]
@@ -106,7 +106,7 @@ def _draw(unexplained: Unexplained) -> Residuals:
 
 
 def reach_in(largest: float, units: Sequence[DisplayUnit]) -> tuple[float, DisplayUnit]:
-    """Return a round limit above `largest`, and its unit: the first one in which `largest` exceeds 1."""
+    """Return a round limit above `largest`, and its unit: the first unit in which `largest` exceeds 1."""
     unit = next((unit for unit in units if largest >= unit.size), units[-1])
     shown = largest / unit.size
     decade = 10 ** np.floor(np.log10(max(shown, 1e-9)))

@@ -1,4 +1,4 @@
-"""Errors that a certificate's uncertainties do not include, quantity by quantity, so that readers know it."""
+"""Errors that a certificate's uncertainties do not include, quantity by quantity, for its readers."""
 
 from rig.data.entries.accelerometer import AccelerometerEntry
 from rig.data.entries.budget import BudgetEntry
@@ -36,5 +36,5 @@ def list_omitted_accelerations(entry: AccelerometerEntry) -> str:
 
 
 def list_omitted_fields() -> str:
-    """Return the errors that a magnetometer's U omits; not the arm's field, which is stated with the bias."""
+    """Return the errors that a magnetometer's U omits, without the arm's field, which is stated with the bias."""
     return ", ".join(("nonlinearity", "iron magnetised since", *ALWAYS))

@@ -37,7 +37,7 @@ def unsolved_entries(outcome: "Outcome") -> dict[str, dict[str, ErrorEntry]]:
 
 
 def notes(outcome: "Outcome") -> dict[str, tuple[str, ...]]:
-    """Return remarks on how recordings were read and solved, by sensor, where this was unusual."""
+    """Return remarks on unusual ways in which recordings were read and solved, by sensor."""
     return {name: sensor.notes for name, sensor in outcome.external.items() if sensor.notes}
 
 

@@ -2,7 +2,7 @@
 
 PX4 (src/lib/sensor_calibration): gyroscopes data − offset, accelerometers (data − offset) scale, magnetometers S (data
 − offset), S symmetric, in gauss. ArduPilot (AP_InertialSensor_Backend, AP_Compass): the same, except that offsets of a
-compass are added and in milligauss. It replaces offsets of gyroscopes, INS_GYROFFS_X, …, at each boot unless
+compass are added and in milligauss. ArduPilot replaces offsets of gyroscopes, INS_GYROFFS_X, …, at each boot unless
 INS_GYR_CAL is 0. Neither has a scale factor of a gyroscope.
 """
 
@@ -43,7 +43,7 @@ Autopilot = Mapping[Quantity, Callable[[int, Corrected], Parameters]]
 
 
 def px4_files(calibrations: ExportedCalibrations) -> Mapping[str, str]:
-    """Return `px4.params` as QGroundControl loads it: vehicle, component, name, value, type, separated by tabs."""
+    """Return `px4.params` for QGroundControl: vehicle, component, name, value, type, separated by tabs."""
     lines = [
         *HEADING,
         "# Lost too: CAL_GYROn_ID, CAL_ACCn_ID, CAL_MAGn_ID, which only the vehicle has; PX4 uses parameters",
@@ -103,7 +103,7 @@ def _number_imus(calibrations: ExportedCalibrations) -> dict[str, int]:
 
 
 def symmetric(matrix: Array) -> Array:
-    """Return symmetric P (3, 3) of matrix = R P with a rotation R. P and `matrix` change a vector's length alike."""
+    """Return the symmetric P (3, 3) of matrix = R P, R a rotation: both change a vector's length alike."""
     squared, vectors = np.linalg.eigh(matrix.T @ matrix)
     root: Array = vectors @ np.diag(np.sqrt(squared)) @ vectors.T
     return root

@@ -1,4 +1,4 @@
-"""Tables of columns, as exports write them."""
+"""Tables of columns for exports."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from rig.estimation.arrays import Array
 
 @dataclass(frozen=True, slots=True)
 class ExportTable:
-    """Columns (n,) by name, which carries the unit, and their `meaning`."""
+    """Columns (n,) by name, which contains the unit, and their `meaning`."""
 
     name: str
     columns: Mapping[str, Array]

@@ -1,4 +1,4 @@
-"""A run's calibrations for exports: the corrections of all kinds, and IMUs of gyroscope and accelerometer."""
+"""A run's calibrations for exports: corrections of all kinds, and IMUs of gyroscope and accelerometer."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ class Imu:
 
     @property
     def g_sensitivity(self) -> Array:
-        """The gyroscope's g-sensitivity (3, 3), rad/s per m/s²; zero if unknown."""
+        """The gyroscope's g-sensitivity (3, 3), rad/s per m/s², zero if unknown."""
         matrix = self.gyroscope.g_sensitivity
         return np.zeros((3, 3)) if matrix is None else matrix
 
@@ -60,7 +60,7 @@ class ExportedCalibrations:
 
     @property
     def further_terms(self) -> tuple[str, ...]:
-        """Results other than scale and bias, which no format supports."""
+        """Results other than scale and bias, for which no format has a place."""
         terms = (term for term in terms_of(self.result, "exports") if not term.finding.is_reference)
         return tuple(printable(f"{term.whose}, {term.name}") for term in terms)
 

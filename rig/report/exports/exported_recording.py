@@ -1,7 +1,7 @@
 """Recordings for exports: of a turner with joints, of a hand, or of external files.
 
-Only a turner with joints has a recorded motion and a common clock. Other recordings export what they have: readings on
-the clock that stamped them, and the motion that a file states.
+Only a turner with joints has a recorded motion and a common clock. Other recordings have readings on the clock that
+stamped them, and the motion that a file states.
 """
 
 from collections.abc import Iterator, Mapping, Sequence

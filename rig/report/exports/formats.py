@@ -1,4 +1,4 @@
-"""The formats and their writers. A new one is a file with its writer, and its line here."""
+"""The formats and their writers. A new format is a file with its writer, and a line here."""
 
 import importlib
 from collections.abc import Callable, Mapping

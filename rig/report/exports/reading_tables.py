@@ -17,7 +17,7 @@ from rig.report.exports.names import plain_names
 
 
 def tables_of(recordings: Sequence[Exported]) -> Iterator[ExportTable]:
-    """Yield the tables of each recording; from the second recording on, their names contain its number."""
+    """Yield the tables of each recording; from the second recording on, names contain the recording's number."""
     for number, recording in enumerate(recordings, start=1):
         for table in recording.tables():
             yield table if number == 1 else replace(table, name=f"{table.name}-{number}")

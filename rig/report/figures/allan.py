@@ -1,4 +1,4 @@
-"""Allan deviations, for people and for machines, and their plots."""
+"""Allan deviations and their plots, for people and for machines."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -131,7 +131,7 @@ def _read(figure: AllanReading | Fault) -> dict[str, Any]:
 
 
 def _draw(axes: "Axes", quantity: Quantity, result: AtRest) -> None:
-    """Draw the curves with their bands, and mark the values that were read from them."""
+    """Draw the curves with their bands, and mark the values read from them."""
     size = quantity.drift.size
     curve = result.curve
     for i, (axis, figures) in enumerate(zip("xyz", result.axes, strict=True)):

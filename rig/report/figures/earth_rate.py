@@ -51,7 +51,7 @@ def _draw(figure: "Figure", recording: ObservedRun, sensor: str, fit: Explained,
 def errors(recording: ObservedRun, sensor: str, fit: Explained, earth: EarthRate) -> tuple[Array, Array, Array]:
     """Return times (n,), the flange's rates (n, 3), and corrected readings minus the rates of flange and Earth (n, 3).
 
-    They are in rad/s, averaged over 1 / `RATE_HZ`, in the flange's frame, at times with states of the arm.
+    Rates are in rad/s, averaged over 1 / `RATE_HZ`, in the flange's frame, at times with states of the arm.
     """
     stream, motion, solution = recording.stream(sensor), recording.motion, fit.solution
     samples = max(1, round(stream.sensor.rate_hz / RATE_HZ))

@@ -27,7 +27,7 @@ MARGINS = {"left": 0.06, "right": 0.985, "bottom": 0.065, "top": 0.915, "wspace"
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """A figure for a run folder: its file's name, its heading, its width and height in inches, its drawing function."""
+    """A figure for a run folder: name of its file, heading, width and height in inches, and drawing function."""
 
     name: str
     title: str
@@ -37,7 +37,7 @@ class Picture:
 
 
 def write_pictures(pictures: Sequence[Picture], folder: Path) -> tuple[RunEvent, ...]:
-    """Draw each picture as PNG and SVG into `folder`; return the event. Draw nothing without matplotlib (an extra)."""
+    """Draw each picture as PNG and SVG into `folder`; return the event. Draw nothing without matplotlib."""
     if not pictures:
         return ()
     try:
@@ -61,7 +61,7 @@ def write_figures(outcome: Outcome, document: ResultDocument, folder: Path) -> t
 
 
 def draw_verifications(verifications: Iterable[Verification], folder: Path) -> tuple[RunEvent, ...]:
-    """Draw these verifications, each as PNG and SVG, into `folder`."""
+    """Draw each verification, as PNG and SVG, into `folder`."""
     pictures = [
         Picture(
             f"verification_{verification.sensor}_{when}",

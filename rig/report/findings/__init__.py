@@ -1,1 +1,1 @@
-"""Interfaces of kinds of results to every outlet, and the characteristics that entries state."""
+"""The interface of kinds of results to all outlets, and the characteristics in entries."""

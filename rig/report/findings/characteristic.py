@@ -17,7 +17,7 @@ OUTLETS: Final[tuple[Outlet, ...]] = get_args(Outlet)
 
 @dataclass(frozen=True, slots=True)
 class UncertainNumbers:
-    """Numbers of an entry in SI units, their standard uncertainties, and the degrees of freedom of these, if stated."""
+    """Numbers of an entry in SI units, their standard uncertainties, and the degrees of freedom of each, if stated."""
 
     values: Sequence[float]
     stds: Sequence[float]
@@ -26,7 +26,7 @@ class UncertainNumbers:
 
 @dataclass(frozen=True, slots=True)
 class Units:
-    """The unit of such numbers: of the SI in print and in D-SI notation, and the one in which they are `shown`."""
+    """The units of a characteristic's numbers: SI in print and in D-SI notation, and that in which they are `shown`."""
 
     si: str
     d_si: str
@@ -35,7 +35,7 @@ class Units:
 
 @dataclass(frozen=True, slots=True)
 class Series:
-    """Names of such numbers in a history: `prefix` and label, with `words` that are formatted by the label's letters.
+    """A characteristic's names in a history: `prefix` and label, with `words` that contain the label's letters.
 
     `drawn` series are among the pictures; `opposite` ones are stored with the opposite sign of the certificates.
     """
@@ -51,9 +51,9 @@ class Characteristic:
     """A quantity of a sensor other than scale factor and bias, which an entry states for each of `labels`.
 
     - `units`: the units, by the quantity that the sensor measures.
-    - `read`: reads the numbers from an entry; None if it has none.
-    - `series`: the names in a history; None if it stores none, which `exempt` explains.
-    - `exempt`: the outlets that do not take it from here, each with the reason in a line.
+    - `read`: returns the numbers in an entry, or None.
+    - `series`: the names in a history; None if a history does not store it, which `exempt` explains.
+    - `exempt`: the outlets that do not use it, each with a reason.
     - `remark`: the digital certificate's remark before ± U, by the entry.
     """
 

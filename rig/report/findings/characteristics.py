@@ -1,7 +1,7 @@
-"""All characteristics of the rig's own kinds of results: a new one is a row here, and every outlet reads it.
+"""All characteristics of the rig's own kinds of results. A new characteristic is a row here, for all outlets.
 
-A row has its name, its units, a reader of its numbers, its names in a history, and the outlets that do not take it from
-here, with the reason. Terminal, page, notebook, both certificates and exports take all others.
+A row has a name, units, a reader of the numbers, names in a history, and the outlets that do not use it, with reasons.
+All others use it: terminal, page, notebook, both certificates and exports.
 """
 
 from collections.abc import Callable, Mapping

@@ -19,5 +19,5 @@ class Finding(Generic[EntryT]):
 
     @property
     def is_reference(self) -> bool:
-        """Whether the sensor is a reference: its calibration was given, not measured here."""
+        """Whether the sensor is a reference, whose calibration was given."""
         return getattr(self.entry, "role", "calibrate") == "reference"

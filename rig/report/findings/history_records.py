@@ -26,8 +26,8 @@ SCALES, BIASES = ("k", "kx", "ky", "kz"), ("bx", "by", "bz")
 class Parameter:
     """One number of a calibration.
 
-    `std_combined` is None if only the noise is known of its uncertainty. `max_deviation` from the nominal value is the
-    run's limit, None without one. `coverage_factor` is the factor of U for its degrees of freedom.
+    `std_combined` is None if only the uncertainty due to noise is known. `max_deviation`: the run's limit of the
+    deviation from nominal, or None. `coverage_factor`: that of U for its degrees of freedom.
     """
 
     name: str
@@ -96,7 +96,7 @@ def nominal(name: str) -> float:
 
 
 def is_scale(name: str) -> bool:
-    """Return whether a parameter of this name is a scale factor, whose changes are fractions."""
+    """Return whether a parameter of this name is a scale factor, whose changes are stated as fractions."""
     return name in SCALES
 
 

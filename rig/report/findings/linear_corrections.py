@@ -1,6 +1,6 @@
 """Corrections of a sensor's readings in the form of other programs: matrix, offset, noise. Pure.
 
-All are in SI units and in the right-angled frame nearest to a gyroscope's axes, whose rotation is the vector model's
+All are in SI units, in the right-angled frame nearest to a gyroscope's axes, whose rotation is the vector model's
 `mounting`:
 
     gyroscope        m = F ω + G a + c,    c = −b, a the specific force, which at rest points upwards
@@ -30,7 +30,7 @@ class Averaged(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class ReadingNoise:
-    """Sample rate and `density` of white noise, unit/√Hz. None if the result does not contain it."""
+    """Sample rate and `density` of white noise, unit/√Hz; None if the result does not contain them."""
 
     rate_hz: float | None
     density: float | None
@@ -43,7 +43,7 @@ class Corrected:
     - `full_scale` is None if it was not stated.
     - `scale` (3,) is the factor along each axis, for programs that take no matrix.
     - `g_sensitivity` (3, 3): of a gyroscope, rad/s per m/s².
-    - `second_order` is true if an accelerometer has quadratic terms, which no other program supports.
+    - `second_order`: whether an accelerometer has quadratic terms, which no other program supports.
     """
 
     sensor: str
@@ -61,7 +61,7 @@ class Corrected:
 
     @property
     def name(self) -> str:
-        """The sensor's name with its quantity, which distinguishes it from others of this name."""
+        """The sensor's name with its quantity."""
         return self.quantity.label(self.sensor)
 
     @property

@@ -26,7 +26,7 @@ OWN_TEMPLATES = Path(__file__).parents[1] / "certificate" / "templates"
 
 @dataclass(frozen=True, slots=True)
 class NoOutlet:
-    """The reason why a kind of result has no such outlet."""
+    """The reason why a kind of result does not have an outlet."""
 
     why: str
 
@@ -71,8 +71,8 @@ class DisplayRow:
 class CertifiedItem:
     """The digital certificate's content for one item: named results, and the temperatures of their readings.
 
-    The item is the `sensor` of that name of one kind (`item`: gyroscope), with part and serial number if the result
-    states them.
+    The item is one kind of sensor (`item`: gyroscope) in the `sensor` of that name, with part and serial number if the
+    result states them.
     """
 
     item: str
@@ -106,22 +106,22 @@ class ResultKind(Generic[EntryT]):
 
     - name: its name for people.
     - key: its key in result.json.
-    - entries: builds the entries there, none if the run has none.
+    - entries: builds the entries there, if the run has any.
     - find: finds them in a document.
     - printed: yields tables and lines for the terminal.
     - shown: builds the row of page and notebook.
     - followed: builds the record of a history.
     - header: yields the lines of calibration.h, by the g-sensitivities (3, 3) of the gyroscopes.
     - figures: the writer of its pictures in a run folder ("module:function").
-    - block: the macro of the certificate's page that prints one ("template:macro").
+    - block: the macro of the certificate's page that prints a finding ("template:macro").
     - measured: builds the content of the digital certificate, with reversals by sensor.
     - standard: the statement of traceability in both certificates.
     - corrected: builds the correction of readings for exports; None for a reference.
-    - unexplained: builds the residuals of its means for pictures; None if it has none.
+    - unexplained: builds the residuals of its means for pictures, or None.
     - templates: the folder of the block's template.
     - unsolved: yields the reasons why sensors have no solution.
     - in_short: yields lines for the end of a run, if the kind has no row.
-    - characteristics: quantities other than scale and bias, which all outlets walk after the kind's own output.
+    - characteristics: quantities other than scale and bias, for all outlets.
     """
 
     name: str
@@ -154,5 +154,5 @@ def row_of(term: Term, whose: str | None = None, noun: str | None = None) -> Dis
 
 
 def outlet_items(outlet: Callable[..., Iterable[ItemT]] | NoOutlet, *about: object) -> Iterable[ItemT]:
-    """Return the items that an outlet yields for `arguments`; empty if the kind does not have the outlet."""
+    """Return the items that an outlet yields for `arguments`; empty if the kind lacks the outlet."""
     return () if isinstance(outlet, NoOutlet) else outlet(*about)

@@ -30,7 +30,7 @@ from rig.report.words.validity_words import load_words, speed_words, warmth, whe
 
 
 def _entries(outcome: Outcome) -> dict[str, GyroscopeEntry]:
-    """Return the entries of all gyroscopes. Every result has their key, even without sweeps."""
+    """Return the entries of all gyroscopes, if any."""
     from rig.analysis.measurement_conditions import gyroscope_conditions
     from rig.report.entries.conditions_entry import when_entry
     from rig.report.entries.gyroscope import sensor_entry
@@ -155,7 +155,7 @@ def _lines(finding: Finding[GyroscopeEntry]) -> Iterator[str]:
 
 
 def _describe_difference(sensor: GyroscopeEntry, other: EstimateEntry | VectorEntry) -> Iterator[str]:
-    """Yield a sentence that says which of two estimators to prefer, if they differ by more than U."""
+    """Yield a sentence on the preferable one of two estimators that differ by more than U."""
     expanded = expanded_uncertainties(sensor.budget, sensor.covariance)
     values, others = ((*solution.scale, *solution.bias_rad_s) for solution in (sensor, other))
     differences = divide_or_infinity(np.abs(np.subtract(others, values)), expanded)
@@ -223,7 +223,7 @@ def _attitude_lines(attitudes: AttitudesEntry | None, clocks: Iterable[TimeBaseE
 
 
 def _speeds(sensor: GyroscopeEntry) -> Iterator[str]:
-    """Yield the speeds for which the calibration is valid, as one speed does not show nonlinearity."""
+    """Yield the speeds for which the calibration is valid; one speed does not show nonlinearity."""
     speeds, loads, nonlinearity = speed_words(sensor), load_words(sensor), sensor.nonlinearity
     if loads is not None:
         yield f"rates along its own axes: {loads} °/s"

@@ -1,4 +1,4 @@
-"""All kinds of results, in the order in which they are shown; a new kind is a file and a line here."""
+"""All kinds of results, in displayed order. A new kind is a file and a line here."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -48,13 +48,13 @@ def terms_of(document: ResultDocument, outlet: Outlet | None = None) -> Iterator
 
 
 def shown(document: ResultDocument) -> Iterator[DisplayRow]:
-    """Yield the rows that page and notebook show: those of all kinds of results, then those of characteristics."""
+    """Yield the rows of page and notebook: those of all kinds of results, then those of characteristics."""
     yield from (show(finding) for _, show, finding in outlets(document, lambda kind: kind.shown))
     yield from map(row_of, terms_of(document, "page"))
 
 
 def history_records(document: ResultDocument) -> tuple[HistoryRecord, ...]:
-    """Return the records of a result that a history follows, of all sensors including references."""
+    """Return a result's records for a history, of all sensors including references."""
     return tuple(_records(document))
 
 

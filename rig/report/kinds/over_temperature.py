@@ -69,7 +69,7 @@ def _build_row(finding: Finding[OverTemperatureEntry]) -> DisplayRow:
 
 
 def _build_record(finding: Finding[OverTemperatureEntry], _: ResultDocument) -> HistoryRecord | None:
-    """Return the slopes at the reference temperature; the sensor's calibration has the scale and bias at it."""
+    """Return the record of the slopes at the reference temperature, at which the calibration states scale and bias."""
     entry = finding.entry
     return HistoryRecord(
         finding.sensor,

@@ -29,10 +29,10 @@ from rig.report.tables.budget import budget_table, heading_for
 
 @dataclass(frozen=True, slots=True)
 class Words:
-    """The texts of one such kind of sensor, by its entry.
+    """The texts of a kind of three-axis sensor, by its entry.
 
-    Of the terminal: behind the sensor's name, its model, lines below the table. Of the digital certificate: scale and
-    bias with a reversal, and the temperatures.
+    For the terminal, the words behind the sensor's name, its model, and lines below the table; for the digital
+    certificate, scale and bias with a reversal, and the temperatures.
     """
 
     title: str
@@ -88,7 +88,7 @@ def item_words(entry: Any) -> str:
 
 
 def attitude_lines(finding: Finding[Any]) -> Iterator[str]:
-    """Yield the non-orthogonality, the attitude error and, for attitudes of a file, the placement error."""
+    """Yield lines on non-orthogonality, attitude error and, for attitudes of a file, placement error."""
     entry, quantity = finding.entry, finding.quantity
     yield line_of(NON_ORTHOGONALITY.term_of(finding), "non-orthogonality yz zx xy", "+.4f")
     if entry.attitude_error_rad is not None:

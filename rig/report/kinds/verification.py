@@ -64,7 +64,7 @@ def _render(finding: Finding[VerificationEntry]) -> Iterator[Table | str]:
 
 
 def verification_table(name: str, entry: VerificationEntry) -> Table:
-    """Return a table of the errors of each axis before and after; a dash if there are no readings from before."""
+    """Return a table of the errors of each axis before and after; a dash without readings from before."""
     table = Table(
         title=plain(f"{name} against {entry.reference}, sweeps and rests", "table.title"), title_justify="left"
     )

@@ -1,4 +1,4 @@
-"""Content of a signature's container (CMS, RFC 5652) that the signature does not cover: none is allowed."""
+"""Content of a signature's container (CMS, RFC 5652) that the signature does not cover, which is not allowed."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -19,9 +19,8 @@ def find_uncovered_in_container(der: bytes) -> Iterator[str]:
     """Yield the parts of a signature's container that the signature does not cover.
 
     `der` is the ContentInfo of a document's signature, which covers its signed attributes only. So the container must
-    equal, byte by byte, one that is rebuilt from them, from the signature's value, the certificates of the signer's
-    chain, and at most one time stamp, to which the same applies. This does not test whether the certificates are
-    genuine.
+    equal, byte by byte, one rebuilt from these, the signature's value, the certificates of the signer's chain, and at
+    most one time stamp of the same kind. Whether the certificates are genuine is not tested.
     """
     content = cms.ContentInfo.load(der, strict=True)
     (info,) = content["content"]["signer_infos"]

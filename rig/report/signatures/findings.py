@@ -1,4 +1,4 @@
-"""Results of the inspection of a signed file: its signatures, and its problems by name."""
+"""Results of the inspection of a signed file: its signatures and its problems."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -13,8 +13,9 @@ from rig.report.signatures.reason import Reason
 class SignatureReport:
     """One signature: `signer` is the name in its certificate, `certificate_sha256` the certificate's fingerprint.
 
-    `when` is by the clock of `time_server`, or the signer's own if that is None. `trusted` is None if no trusted
-    certificate was given. `long_term`: the certificate was not revoked then, by the revocation lists in the file.
+    `when` is the time by the clock of `time_server`, or without one the signer's. `trusted` is None if no trusted
+    certificate was given. `long_term`: whether revocation lists in the file show that the certificate was not revoked
+    then.
     """
 
     signer: str
@@ -69,7 +70,7 @@ def not_as_signed(name: str, why: str) -> Refused:
 
 
 def signer_not_trusted(name: str, signer: str, why: str) -> Refused:
-    """Return the problem of an unaltered file whose signer is not the expected one."""
+    """Return the problem of an unaltered file with an unexpected signer."""
     return Refused(
         "signer_not_trusted",
         f"{name} is signed by {signer}, who is not trusted: {why}",

@@ -15,7 +15,7 @@ HEAD_BYTES = 200  # enough to detect the type of a file
 
 
 def inspect_file(name: str, content: bytes, trust: Trust) -> FileInspection:
-    """Inspect a file by its content: PDF, XML, or another form without a signature. Raise Refused `missing_extra`."""
+    """Inspect a file by its content: PDF, XML, or without a signature. Raise Refused `missing_extra`."""
     with requiring(EXTRA):
         from rig.report.signatures.pdf_signatures import inspect_pdf
         from rig.report.signatures.xml_signature import inspect_xml

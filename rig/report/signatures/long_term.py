@@ -25,7 +25,7 @@ class Authorities:
     lists: tuple[bytes, ...]
 
     def context(self, by: Signatory) -> "ValidationContext":
-        """Return the context of a check that trusts only these authorities and requires all revocation lists."""
+        """Return the context of a validation that trusts only these authorities and requires all revocation lists."""
         from asn1crypto.crl import CertificateList
         from asn1crypto.x509 import Certificate
         from cryptography.hazmat.primitives.serialization import Encoding

@@ -1,4 +1,4 @@
-"""The signatures of a PDF: every byte of it must be signed, except the signature itself."""
+"""The signatures of a PDF, which must cover every byte except the signature itself."""
 
 import io
 import logging
@@ -52,7 +52,7 @@ def inspect_pdf(name: str, content: bytes, trust: Trust) -> FileInspection:
 
 
 def _status(signature: Any, trust: Trust) -> Any:
-    """Return pyHanko's status. It trusts no signers here, but the time servers of `trust`."""
+    """Return pyHanko's status of a signature, trusting no signers but the time servers of `trust`."""
     no_signers = ValidationContext(trust_roots=[], allow_fetching=False)
     roots = list(map(Certificate.load, trust.certificates))
     servers = ValidationContext(trust_roots=roots, allow_fetching=False)
@@ -60,7 +60,7 @@ def _status(signature: Any, trust: Trust) -> Any:
 
 
 def _alterations(signature: Any, status: Any, content: bytes, attached: Sequence[tuple[str, bytes]]) -> Iterator[str]:
-    """Yield how the file differs from the signed one: the signature must cover every byte except itself."""
+    """Yield the file's alterations since it was signed: the signature must cover every byte except itself."""
     if not status.intact:
         yield "signed bytes have changed"
     elif not status.valid:
@@ -115,7 +115,7 @@ def _inspect_signature(
 
 
 def _check_authorities(name: str, signature: Any, trust: Trust) -> Iterator[Refused]:
-    """Yield problems of the authorities' certificates in the signature's container, which it does not cover."""
+    """Yield problems of the authorities' certificates in the container, which the signature does not cover."""
     for certificates in certificates_with(signature.pkcs7_content) if trust.certificates else ():
         for authority in find_unvouched(certificates, trust):
             yield authority_not_trusted(name, authority.subject.rfc4514_string())

@@ -1,4 +1,4 @@
-"""The reason in a certificate's signatures; it includes the marks of a certificate that is not valid. Pure."""
+"""The reason in a certificate's signatures, with the marks of a certificate that is not valid. Pure."""
 
 import re
 from dataclasses import dataclass
@@ -12,13 +12,13 @@ _ANCHOR = re.compile(r"journal entry (\d+), SHA-256 ([0-9a-f]{64})$")
 
 @dataclass(frozen=True, slots=True)
 class Reason:
-    """The reason in a signature; `anchor` is the last entry of the history's journal then, number and SHA-256."""
+    """The reason in a signature. It may contain the journal's last entry in the history (`anchor`)."""
 
     text: str
 
     @property
     def anchor(self) -> tuple[int, str] | None:
-        """The journal entry that the text names; None if there was no history."""
+        """The number and SHA-256 of the journal's last entry in the history; None without a history."""
         match = _ANCHOR.search(self.text)
         return None if match is None else (int(match[1]), match[2])
 

@@ -27,7 +27,7 @@ REMEDY = f"Give a PKCS#12 or PEM file with an RSA or EC key and its certificate;
 
 @dataclass(frozen=True, slots=True)
 class Signatory:
-    """The `signer` of pyHanko, and its `certificates`: the key's own first, then those that lead to its root."""
+    """The `signer` of pyHanko, and its `certificates`: the key's own first, then its issuers' up to the root."""
 
     signer: Any
     certificates: "tuple[Certificate, ...]"
@@ -140,7 +140,7 @@ def _open_token(key: TokenKey) -> Iterator[Signatory]:
 
 
 def _check(signatory: Signatory, where: str) -> None:
-    """Raise Refused `signing_key` if the certificate is not valid now, or if verifiers would reject its key."""
+    """Raise Refused `signing_key` if the certificate is not valid now, or verifiers would reject its key."""
     certificate = signatory.certificates[0]
     for why in unfit_for_documents(certificate):
         raise _unfit(where, why)

@@ -18,8 +18,8 @@ def sign_as_pades(
 ) -> bytes:
     """Return the PDF with a certification signature that permits no changes: B-B, or B-T with a time server's URL.
 
-    With `authorities` it is B-LT: their lists are in the same revision, and the signature covers them. Raise Refused
-    `time_server` if that server gives no time stamp, `revocation_list` if the lists do not cover every certificate.
+    With `authorities` it is B-LT, and the signature covers their revocation lists. Raise Refused `time_server` without
+    a time stamp by the server, `revocation_list` if the lists do not cover every certificate.
     """
     from pyhanko.pdf_utils.incremental_writer import IncrementalPdfFileWriter
     from pyhanko.sign.fields import MDPPerm, SigSeedSubFilter
@@ -81,7 +81,7 @@ def sign_as_xades(xml: bytes, by: Signatory, reason: Reason) -> bytes:
 
 @dataclass(frozen=True, slots=True)
 class _Key:
-    """A private key in the form that signxml uses; it may be in a token, without access to its value."""
+    """A private key for signxml, possibly in a token, without access to its value."""
 
     by: Signatory
     key_size: int

@@ -16,7 +16,7 @@ _PIN = re.compile(r"pin[\W_]*(value|source)|(^|[\W_])pin[\W_]*=")
 
 @dataclass(frozen=True, slots=True)
 class TokenKey:
-    """The key labelled `name` in the `token` (None: the only one), accessible by the module at `module_path`."""
+    """The key labelled `name` in the `token` (None: the only one), read by the PKCS#11 module at `module_path`."""
 
     token: str | None
     name: str
@@ -29,7 +29,7 @@ class TokenKey:
 
 
 def is_token_address(text: str) -> bool:
-    """Return whether the text is meant as the address of a key in a token, and not as a file's name."""
+    """Return whether the text is meant as the address of a key in a token, not as a file's name."""
     return _decode(text).strip().startswith(SCHEME)
 
 

@@ -31,10 +31,10 @@ class Trust:
 def why_untrusted(
     chain: Sequence[bytes], trust: Trust, moment: datetime, lists: "Sequence[CertificateList]" = ()
 ) -> str:
-    """Return why the signer whose certificate begins this `chain` (DER) is not trusted; empty if it is.
+    """Return why the signer, whose certificate begins this `chain` (DER), is not trusted; empty if trusted.
 
-    The certificate must be valid at the `moment`, have a chain to a trusted one, be intended for signing documents and
-    have the expected name. Revocation `lists`, if given, must cover the whole chain.
+    The certificate must be valid at the `moment`, have a chain to a trusted certificate, be intended for signing
+    documents, and have the expected name. Revocation `lists`, if given, must cover the whole chain.
     """
     from cryptography.x509 import load_der_x509_certificate
 
@@ -69,7 +69,7 @@ def _no_path(chain: Sequence[bytes], trust: Trust, moment: datetime, lists: "Seq
 
 
 def unfit_for_documents(certificate: "Certificate") -> Iterator[str]:
-    """Yield why a key with this certificate may not sign documents: its key usage, its purposes, its length.
+    """Yield reasons why a key with this certificate may not sign documents: its key usage, purposes or length.
 
     A certificate without key usage is not accepted, although RFC 5280 (4.2.1.3) permits it all usages: certificates of
     web servers from small authorities often have none.
@@ -112,8 +112,8 @@ def _other_name(certificate: "Certificate", expected: str | None) -> str:
 def find_unvouched(chain: "Sequence[Certificate]", trust: Trust) -> list["Certificate"]:
     """Return the certificates in a signer's `chain`, besides the first, whose content nothing verifies.
 
-    The signature itself identifies the first. The others must be trusted, or issued by one of the chain or a trusted
-    one.
+    The signature itself identifies the first. The others must be trusted, or issued by a trusted certificate or one of
+    the chain.
     """
     from cryptography.hazmat.primitives.serialization import Encoding
     from cryptography.x509 import load_der_x509_certificate

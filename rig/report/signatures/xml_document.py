@@ -1,4 +1,4 @@
-"""A signed digital certificate as text and tree: how it is read, and its form if all of it is signed."""
+"""Reading of a signed digital certificate, and its form if everything in it is signed."""
 
 import re
 from base64 import b64decode, b64encode
@@ -29,7 +29,7 @@ _DECLARATION = re.compile(
 def read_xml(content: bytes) -> Any:
     """Return the root of a document in UTF-8 or UTF-16, with or without a declaration.
 
-    The bytes decide on the encoding, so that all readers see the same text. Raise ValueError for another encoding, a
+    The bytes determine the encoding, so that all readers see the same text. Raise ValueError for another encoding, a
     declaration that contradicts the bytes or a document type, and the errors of lxml.
     """
     codec, names = _ENCODINGS.get(content[:2], _UTF_8)
@@ -50,7 +50,7 @@ def read_xml(content: bytes) -> Any:
 
 
 def canonical(root: Any) -> bytes:
-    """Return all content of the document that a reader can see: its canonical form (C14N) with comments."""
+    """Return the document's visible content: its canonical form (C14N) with comments."""
     text: bytes = etree.tostring(root.getroottree(), method="c14n", with_comments=True)
     return text
 
@@ -59,8 +59,8 @@ def rebuild_document(verified: tuple[bytes, bytes, bytes], method: str, value: s
     """Return the root of the only document that this signature validates, built from verified content alone.
 
     `verified` are the signed canonical forms: of the document without its signature, of the signed properties (XAdES)
-    and of the key's certificates. `method` is the signature's method and `value` its value in base64. All else follows
-    from these: the names from the signed properties, the rest from the form of the rig's signatures.
+    and of the key's certificates. `method` is the signature's method and `value` its value in base64. Names follow from
+    the signed properties, everything else from the form of the rig's signatures.
     """
     document, properties, key_info = verified
     root, signed_properties, certificates = map(etree.fromstring, verified)

@@ -67,7 +67,7 @@ def line_of(term: Term, lead: str, form: str, width: str = ".2g") -> str:
 def matrix_lines(matrix: Array, covariance: Array, factor: float) -> Iterator[str]:
     """Yield F row by row and the angles between its axes, ± U; `covariance` (9, 9) is the covariance of F, row by row.
 
-    `factor` is the coverage factor: the largest one among those of the scale factors.
+    `factor` is the largest coverage factor of the scale factors.
     """
     widths = factor * np.sqrt(np.diag(covariance)).reshape(3, 3)
     for axis, row, row_widths in zip("xyz", matrix.tolist(), widths.tolist(), strict=True):

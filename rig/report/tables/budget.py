@@ -50,7 +50,7 @@ def budget_table(budget: BudgetEntry, scale: Sequence[float], bias: DisplayUnit)
 
 
 def _label(line: Line) -> str:
-    """Return a contributor's name, with its half-width if assumed. The table lists negligible contributors below."""
+    """Return a contributor's name, with its half-width if assumed."""
     if not line.kind:
         return line.name.partition(":")[0]
     assumed = " ".join(line.assumed.split())  # a terminal shows no-break spaces as codes

@@ -28,7 +28,7 @@ class Pair:
 
 @dataclass(frozen=True, slots=True)
 class AxisRow:
-    """One axis: scale factor and bias, the bias in a second unit if there is one."""
+    """One axis: scale factor and bias, the bias also in a second unit, if any."""
 
     axis: str
     scale: Pair

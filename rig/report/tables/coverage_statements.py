@@ -12,7 +12,7 @@ QUANTITIES = ("scale factors", "biases")
 
 
 def factor_note(budget: BudgetEntry) -> str:
-    """Return the note on U: k, if it is the same for all printed values."""
+    """Return the note on U with k, if k is the same for all printed values."""
     printed = {f"{factor:.2f}" for factor in budget.coverage_factors}
     return f"k\u00a0=\u00a0{_short(printed.pop())}" if len(printed) == 1 else "k as stated below"
 
@@ -23,7 +23,7 @@ def joint_factor(budget: BudgetEntry) -> float:
 
 
 def coverage_sentence(budget: BudgetEntry) -> str:
-    """Return the statement on k: the sentence of EA-4/02 M:2022, 6.4, or of its annex E for few degrees of freedom."""
+    """Return the statement on k of EA-4/02 M:2022, 6.4, or for few degrees of freedom of its annex E."""
     begins = (
         "The reported expanded uncertainty of measurement is the standard uncertainty of measurement multiplied by the "
         "coverage factor k"

@@ -141,7 +141,7 @@ def verification(entry: VerificationEntry) -> Iterator[Element]:
 
 
 def earth_rate(entry: EarthRateEntry) -> Iterator[Element]:
-    """Yield the Earth's rate with its covariance, and the site that follows from it."""
+    """Yield the Earth's rate with its covariance, and the resulting latitude and heading."""
     statement = "In the frame of the arm's base. The ellipsoid holds all three values with a probability of 95 %."
     factor = _ellipsoid_factor(entry.dofs(len(AXES)))
     rate = real_list(AXES, entry.rate_rad_s, [RATE.d_si], region=(entry.covariance_rad2_s2, factor))
@@ -181,7 +181,7 @@ def _full_uncertainty(entry: GyroscopeEntry) -> tuple[BudgetEntry, Matrix6]:
 
 
 def _conditions(when: ConditionsEntry | None) -> str:
-    """Return time and temperature of the readings as a sentence; none for files, which do not state them."""
+    """Return time and temperature of the readings as a sentence; None for files, which do not state them."""
     words = "" if when is None else f"{when_words(when)}. "
     return words[:1].upper() + words[1:]
 
@@ -215,7 +215,7 @@ def _joint(
 
 
 def _ellipsoid_factor(counted: Sequence[Freedom]) -> float:
-    """Return the factor of the ellipsoid of as many values as degrees of freedom, of which None is infinite."""
+    """Return the factor of the joint ellipsoid of values with these degrees of freedom, None for infinite."""
     return find_ellipsoid_factor(len(counted), [math.inf if dof is None else dof for dof in counted])
 
 

@@ -1,4 +1,4 @@
-"""Building blocks of PTB's digital certificate: elements of DCC 3.2.1 and of D-SI 2.1, nothing about this rig."""
+"""Building blocks of PTB's digital certificate: elements of DCC 3.2.1 and of D-SI 2.1."""
 
 from collections.abc import Iterable, Sequence
 from datetime import date
@@ -48,7 +48,7 @@ def text(name: str, statement: str | None) -> Element:
 
 
 def _printable(statement: str | date | None) -> str:
-    """Return printable text, since XML allows no control characters, with one space for any white space."""
+    """Return text without control characters, which XML does not allow, and one space for any white space."""
     return UNSAID if statement is None else printable(" ".join(str(statement).split())) or UNSAID
 
 

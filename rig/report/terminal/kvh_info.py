@@ -16,12 +16,12 @@ class KvhInfo:
     - sensor: its name.
     - port, baud: its line.
     - serial_number: the instrument's.
-    - settings: those in its memory.
+    - settings: in its memory.
     - built_in_test: the result, None without one.
     - messages, lost: numbers of received and lost messages.
     - rotation, acceleration_g (3,): means over the messages, in the instrument's units.
-    - status: of the messages, None without one.
-    - problem: what prevented the reception of a stream.
+    - status: that of the messages, None without messages.
+    - problem: why no stream was received, or None.
     """
 
     sensor: str

@@ -1,4 +1,4 @@
-"""The contents of a file of another program, and the solutions it allows, as lines for a terminal of 80 columns."""
+"""The contents of another program's file, and its possible solutions, as lines for a terminal of 80 columns."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -82,9 +82,12 @@ def describe_convention(convention: Convention | None) -> Iterator[str]:
 
 @dataclass(frozen=True, slots=True)
 class TriedSolutions:
-    """The files and what was tried: the map's file, why it is no log at rest, the axis upwards, whether clocks differ.
+    """The solutions that were tried for a log.
 
-    `turns`, `attitudes`: the solutions that were tried, None if none was.
+    - `columns`: the file of its column map, if any.
+    - `at_rest`: why it is no log at rest, or None.
+    - `up`: the axis that points upwards; `finds_clock`: whether the reference has a clock of its own.
+    - `turns`, `attitudes`: the trials, None if none was made.
     """
 
     columns: Path | None

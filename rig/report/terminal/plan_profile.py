@@ -13,7 +13,7 @@ SAME = 1e-6  # tolerance of directions, which are rounded
 
 @dataclass(frozen=True, slots=True)
 class ProfilePoint:
-    """A corner of a profile: the item's axis, the time, the angle, the rate, and what begins."""
+    """A corner of a profile: the item's axis, time, angle, rate, and the name of the part that begins."""
 
     axis: str
     at_s: float
@@ -57,7 +57,7 @@ def _corners(axis: str, sweeps: list[tuple[Sweep, float]]) -> Iterator[ProfilePo
 
 
 def _name_axis(axis: Vector3) -> str:
-    """Return the name of an axis for both directions: `x`, `y`, `z`, or a direction in the frame of the flange."""
+    """Return the name of an axis, the same for both directions: `x`, `y`, `z`, or a vector in the flange's frame."""
     leading = _leading_component(axis)
     upright = [component / math.copysign(1.0, leading) for component in axis]
     if abs(leading) > 1 - SAME:

@@ -1,4 +1,4 @@
-"""The dry run: every motion of the plan, with its time and limits."""
+"""The dry run: all motions of the plan, with times and limits."""
 
 import json
 import math
@@ -28,9 +28,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class DryRun:
-    """A plan with its configuration, `repeated` if a verification follows; its predictions are computed on demand.
+    """A plan with its configuration, `repeated` if a verification follows, and predictions computed on demand.
 
-    `model` is the name of the turner, None if its section does not state it.
+    `model`: the turner's model, None if its section does not state it.
     """
 
     model: str | None
@@ -168,7 +168,7 @@ def _print_predictions(planned: DryRun, console: Console) -> None:
 
 
 def _counts(plan: Plan) -> str:
-    """Return the numbers of sweeps and dwells in words, with which a line begins."""
+    """Return the numbers of sweeps and dwells in words, for the beginning of a line."""
     sweeps = f"{len(plan.sweeps)} sweeps, " if plan.sweeps or not plan.dwells else ""
     return sweeps + (f"{len(plan.dwells)} dwells, " if plan.dwells else "")
 

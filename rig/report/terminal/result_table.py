@@ -28,7 +28,7 @@ ALL_OF_IT = "the same command with --all"
 def print_outcome(document: ResultDocument, *, as_json: bool, whole: bool = False, folder: Path | None = None) -> None:
     """Print a result that is not stored: as JSON for machines; for people its ending or, if `whole`, all tables.
 
-    `folder` is the folder of its run, which remedies name.
+    `folder` is that of its run, for remedies.
     """
     console = Console(highlight=False)
     if as_json:
@@ -128,5 +128,5 @@ def _checks(sensor: str | None, checks: Sequence[CheckEntry]) -> Table:
 
 
 def _number(value: float, limit: float | None) -> str:
-    """Return the printed value. One smaller than the limit's last digit is rounding error and reads 0."""
+    """Return the printed value; a value smaller than the limit's last digit reads 0."""
     return "0" if limit is not None and abs(value) < ROUNDING * limit else f"{value:.4g}"

@@ -1,4 +1,4 @@
-"""The end of a run in few lines: each sensor's values ± U, failed and nearly failed checks, further files. Pure."""
+"""The end of a run in a few lines: each sensor's values ± U, failed and nearly failed checks, further files. Pure."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -43,8 +43,8 @@ def ending(
 ) -> Iterator[str]:
     """Yield the lines at the end of a run, the verdict last, at most `width` long except paths and commands.
 
-    `since` is the comparison with the last calibrations; `folder` is the run's folder, if there is one, for use in
-    remedies; `everything` is the command that prints all details.
+    `since` is the comparison with the last calibrations; `folder` is the run's, for remedies, or None; `everything` is
+    the command that prints all details.
     """
     items = [*_items(result)]
     summary = "; ".join([*_describe_values(items), _count_passed(result)])
@@ -180,7 +180,7 @@ def _count_passed(result: ResultDocument) -> str:
 def _explain_failures(result: ResultDocument, folder: Path | None) -> list[tuple[str, str]]:
     """Return failed checks with their meaning and remedy: causes first, then the largest excess over the limit.
 
-    Checks without a value come last: most have none because another check failed.
+    Checks without a value come last: most lack it because another check failed.
     """
     failed = sorted((check for check in result.checks if not check.passed), key=_ratio_to_limit, reverse=True)
     failed.sort(key=lambda check: (check.value is None, check.means.what not in CAUSES))

@@ -1,4 +1,4 @@
-"""The shortest run in words: its duration, its uncertainties, their main contributors, and what no run reaches."""
+"""The shortest run in words: its duration, uncertainties and their main contributors, and the limits of all runs."""
 
 import json
 from collections.abc import Iterator

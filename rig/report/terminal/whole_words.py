@@ -1,4 +1,4 @@
-"""Fits a table into a terminal without cutting a word: columns shrink to their longest word, then the frame goes."""
+"""Fits a table into a terminal without cutting words: columns shrink to their longest word, then the frame ends."""
 
 from rich import box
 from rich.cells import cell_len

@@ -28,7 +28,7 @@ class CheckWords:
 
 @cache
 def check_words() -> Mapping[str, CheckWords]:
-    """Return the table's rows by the check's name. Raise ValueError for a line unlike `name | means | what to do`."""
+    """Return the table's rows by check name. Raise ValueError for lines unlike `name | means | what to do`."""
     return {cells[0]: CheckWords(*cells) for cells in read_rows(TABLE, "name | what it means | what to do")}
 
 
@@ -40,7 +40,7 @@ def words_of(check: CheckEntry) -> CheckWords | None:
 def words_of_name(name: str) -> CheckWords | None:
     """Return the words of a check by its name, with or without sensor, quantity and sweep.
 
-    A sensor may have the name of a check, so the last part that is a check counts.
+    A sensor may have the name of a check, so the last part that names a check counts.
     """
     prefixes = ["", *(f"{quantity}_" for quantity in _quantities())]
     candidates = (part.removeprefix(prefix) for part in reversed(name.split(".")) for prefix in prefixes)

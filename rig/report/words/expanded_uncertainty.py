@@ -1,4 +1,4 @@
-"""U of values without a budget, by standard deviations and degrees of freedom, and its coverage factor in words."""
+"""U of values without a budget, from standard deviations and degrees of freedom, and coverage factors in words."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from rig.estimation.statistics.coverage import COVERAGE_FACTOR, coverage_factors
 
 @dataclass(frozen=True, slots=True)
 class Expanded:
-    """Expanded uncertainties U with coverage factors and probabilities, separate for each U or common to all."""
+    """Expanded uncertainties U with coverage factors and probabilities, one for each U or one for all."""
 
     widths: Sequence[float]
     factors: Sequence[float]

@@ -25,7 +25,7 @@ class Word:
 
     @property
     def synonyms(self) -> tuple[str, ...]:
-        """The names one by one: `coverage factor, k = 2` gives also `k`."""
+        """The separate names: `coverage factor, k = 2` also gives `k`."""
         return tuple(name.partition(" = ")[0] for name in self.names.split(", "))
 
     def plain_meaning(self, *, with_pages: bool) -> str:
@@ -35,7 +35,7 @@ class Word:
 
 @cache
 def glossary() -> tuple[Word, ...]:
-    """Return every word. Raise ValueError for a line of another form than `owner | names | meaning`."""
+    """Return all words. Raise ValueError for a line of another form than `owner | names | meaning`."""
     words = (Word(*cells) for cells in read_rows(TABLE, "owner | names | meaning", 0, OWNERS))
     house = tomllib.loads(OWN_WORDS.read_text(encoding="utf-8"))["house"]
     return (*words, *(Word("project", names, meaning) for names, meaning in house.items()))

@@ -1,6 +1,6 @@
 """The measured mounting of the item in each stage of a run, in words. Pure.
 
-If each stage turns the item about one axis only, its mounting is not measured, and there are no words.
+If each stage turns the item about only one axis, its mounting is not measured, and there are no lines.
 """
 
 from collections.abc import Iterator

@@ -1,6 +1,6 @@
-"""The uncertainty budget in print: for one axis, with lines that add up to the U of its value.
+"""The uncertainty budget in print, for one axis, with lines that add up to U.
 
-It is the same at the terminal and on the certificate; all six budgets are in `result.json`.
+Terminal and certificate print the same budget; all six are in `result.json`.
 """
 
 import math
@@ -20,7 +20,7 @@ DIGITS = 3  # digits of a combined standard uncertainty: its parts are printed t
 
 @dataclass(frozen=True, slots=True)
 class BudgetColumn:
-    """The uncertainty of one value: its `index` among kx ky kz bx by bz, and the `unit` of all numbers."""
+    """The uncertainty of one value, whose `index` is among kx ky kz bx by bz, with numbers in `unit`."""
 
     index: int
     unit: str
@@ -82,7 +82,7 @@ def printed_indices(budget: BudgetEntry, scale: Sequence[float]) -> tuple[int, i
 
 @dataclass(frozen=True, slots=True)
 class _Size:
-    """The unit in which a column's numbers are printed and can be added up: multiplied by `factor`, with `decimals`."""
+    """The unit of a column's printed numbers, which add up: multiplied by `factor`, with `decimals`."""
 
     unit: str
     factor: float
@@ -129,7 +129,7 @@ def _line(line: ContributorEntry, indices: tuple[int, int], sizes: Sequence[_Siz
 
 
 def _explain_missing_dof(line: ContributorEntry) -> str:
-    """Return the words for degrees of freedom without a number: infinite, included in u, or unknown."""
+    """Return the words for degrees of freedom that have no number: infinite, included in u, or unknown."""
     if line.kind == "B":
         return "∞"
     return "in u" if line.source.endswith(IN_U) else "–"

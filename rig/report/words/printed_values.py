@@ -29,7 +29,7 @@ class Rounded:
 def round_to_u(value: float, uncertainty: float) -> Rounded:
     """Return U to two significant digits, and the value to the same decimal.
 
-    Halves are rounded up, so U never falls by more than 4.8 %; EA-4/02 requires rounding up only from 5 %. Raise
+    Halves are rounded up, so U never decreases by more than 4.8 %; EA-4/02 requires rounding up only from 5 %. Raise
     ValueError if the value is not finite or the uncertainty is not a positive number.
     """
     exact, wide = Decimal(repr(value)), Decimal(repr(uncertainty))
@@ -47,7 +47,7 @@ def format_signed(value: float, decimals: int) -> str:
 
 
 def format_with_u(value: float, uncertainty: float) -> tuple[str, str]:
-    """Return the texts of a value and its U; without a positive U, six digits and a dash."""
+    """Return a value and its U as texts; without a positive U, six digits and a dash."""
     try:
         printed = round_to_u(float(value), float(uncertainty))
     except ValueError:

@@ -30,7 +30,7 @@ def when_words(when: ConditionsEntry) -> str:
 
 
 def warmth_words(when: ConditionsEntry | None) -> str:
-    """Return the source of a temperature in words."""
+    """Return a temperature's source in words."""
     if when is not None and when.temperature_c is None:
         return "temperature neither measured by the item nor stated"
     if when is not None and when.temperature_stated:
