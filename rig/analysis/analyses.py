@@ -46,7 +46,7 @@ def estimate_bias_drift(runs: "Sequence[RunData]", estimator: str = DEFAULT_ESTI
 def calibrate_by_hand(runs: "Sequence[RunData]") -> Outcome:
     """Solve and judge the recordings of a session by hand, at least one.
 
-    Raise Fault as `rig.estimation.by_hand.solve_by_hand` does, and `no_crystal` if no crystal drives the board's clock.
+    Raise Fault and Refused as `rig.estimation.by_hand.solution.solve_by_hand` and `collect_inputs` do.
     """
     from rig.analysis.by_hand import hand_outcome as hand_judging
 

@@ -1,4 +1,4 @@
-"""Signals that end a command from outside, all made to stop the arm first."""
+"""Signals that end a command from outside, but first stop the arm."""
 
 import signal
 from collections.abc import Iterator
@@ -32,14 +32,14 @@ def end_by_interrupt() -> None:
 
 
 def ignore_endings() -> None:
-    """Ignore every signal that ends a process, except a kill, from now on."""
+    """From now on, ignore every signal that ends a process, except a kill."""
     for number in ENDING_SIGNALS:
         signal.signal(number, signal.SIG_IGN)
 
 
 @contextmanager
 def ending_by_interrupt() -> Iterator[None]:
-    """Make every ending signal raise KeyboardInterrupt within the block, and restore its handlers afterwards."""
+    """Make every ending signal raise KeyboardInterrupt in the block, and restore the handlers afterwards."""
     changed = ENDING_SIGNALS if _PRINTING_BEHIND is None else (*ENDING_SIGNALS, _PRINTING_BEHIND)
     before = {number: signal.getsignal(number) for number in changed}
     end_by_interrupt()

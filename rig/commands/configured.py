@@ -1,4 +1,4 @@
-"""The configuration of a command and its procedure: the one named in the configuration, or one in a script."""
+"""The configuration of a command and its procedure, which the configuration names or a script contains."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
@@ -56,7 +56,7 @@ def change_configured(configured: Configured, overrides: Sequence[str]) -> Confi
 def open_configured(
     config_path: Path, overrides: Sequence[str] = (), script: ScriptFile | Path | None = None
 ) -> Iterator[Configured]:
-    """Load as `load_configured` does; in the block a simulated laboratory has an address of its own."""
+    """Load as `load_configured` does; a simulated laboratory has an address of its own during the block."""
     configured = load_configured(config_path, overrides, script)
     with find_own_address(configured.loaded.config, configured.loaded.laboratory) as moved:
         yield load_configured(config_path, [*overrides, *moved], script and configured.script) if moved else configured

@@ -1,4 +1,4 @@
-"""The operator's page on the command line: whether it is wanted, its address, and whether it may answer questions."""
+"""The arguments of the operator's page: its request, its address, and its permission to answer questions."""
 
 import argparse
 import os
@@ -29,7 +29,7 @@ LONGEST_TOKEN = 1000  # bytes of the file that contains the token
 
 @dataclass(frozen=True, slots=True)
 class PageWish:
-    """The wish for a page: its `host_and_port` and token, and whether it may answer for the operator."""
+    """A requested page: its `host_and_port` and token, and whether it may answer for the operator."""
 
     host_and_port: str | None = None
     token: str | None = None
@@ -49,7 +49,7 @@ class PageWish:
 
 @dataclass(frozen=True, slots=True)
 class OperatorsPage:
-    """The page as a run uses it: its listeners, its questions instead of the terminal's, and how to wait at the end."""
+    """The page of a run: its listeners, its questions instead of the terminal's, and its wait at the end."""
 
     listeners: "tuple[Listener, ...]" = ()
     answer: Answer | None = None
@@ -150,7 +150,7 @@ def serve_operators_page(
 
 
 class _Address:
-    """A listener that prints the page's address after the pre-flight, because most refusals come before that."""
+    """A listener that prints the page's address after the pre-flight, because most refusals come before."""
 
     def __init__(self, url: str) -> None:
         self._url: str | None = url
@@ -165,7 +165,7 @@ class _Address:
 
 
 def stay_for_the_operator() -> None:
-    """Keep the page with its verdict until Ctrl-C if there is a terminal; otherwise return at once."""
+    """Keep the page with its verdict until Ctrl-C; without a terminal return at once."""
     if sys.stdin is not None and sys.stdin.isatty():
         say("The page stays until Ctrl-C.", sys.stderr)
         wait_for_interrupt()

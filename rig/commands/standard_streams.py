@@ -1,4 +1,4 @@
-"""Standard streams that cannot end a run: if the reader of the output goes away, the work continues."""
+"""Standard streams that cannot end a run: without a reader of the output the work continues."""
 
 import os
 import sys
@@ -7,9 +7,9 @@ from typing import Any, TextIO
 
 
 class _Unbroken:
-    """A text stream whose loss ends nothing: output that it refuses is discarded, and all later output.
+    """A text stream whose loss ends nothing: output that it refuses, and all later output, is discarded.
 
-    `lost` is the error, None if the reader has gone away, because it has read as much as it wanted.
+    `lost` is the error, None if the reader has gone away, having read enough.
     """
 
     def __init__(self, stream: TextIO) -> None:
@@ -42,7 +42,7 @@ class _Unbroken:
 
 
 def output_lost() -> OSError | None:
-    """Return why stdout has lost output since the last call; None if no output was lost."""
+    """Return why stdout has lost output since the last call, or None."""
     stream = sys.stdout
     if not isinstance(stream, _Unbroken):
         return None
@@ -63,8 +63,8 @@ def say_where_the_result_is(result: Path) -> None:
 def keep_streams_usable() -> None:
     """Make stdin, stdout and stderr usable in any state: closed, a pipe without a reader, a closed terminal.
 
-    Neither a lost stdout nor a lost stderr ends the work. A lost stderr carries only progress. A full disk under stdout
-    loses results: see `output_lost`. A reader that has gone away (`rig plan … | head`) has read all that it needs.
+    Neither a lost stdout nor a lost stderr, which has only progress, ends the work. A full disk under stdout loses
+    results: see `output_lost`. A reader that has gone away (`rig plan … | head`) has read enough.
     """
     # A closed descriptor would go to the next file opened, and stray output into that file.
     for descriptor, name in enumerate(("stdin", "stdout", "stderr")):

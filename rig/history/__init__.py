@@ -1,1 +1,1 @@
-"""The laboratory's memory: all finished runs, each sensor over time, and the rig itself."""
+"""The history of a laboratory: all finished runs, each sensor over time, and the rig itself."""

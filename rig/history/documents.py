@@ -164,7 +164,7 @@ def rigs_document(states: Sequence[RigState], effects: Mapping[str, Sequence[Rig
 
 
 def chart_entry(chart: Chart) -> dict[str, Any]:
-    """Return a control chart; null for the first results, which nothing precedes."""
+    """Return a control chart; null for the first results."""
     return {
         "out_of_control": bool(chart.out_of_control) if chart.alarm.size else False,
         "deviation": _numbers(chart.deviation),
@@ -186,7 +186,7 @@ def _parameter(parameter: Parameter) -> dict[str, Any]:
 
 
 def cell(value: object) -> object:
-    """Return a value such that a spreadsheet reads it as a text or a number: one line, and no formula."""
+    """Return a value that a spreadsheet reads as a text of one line or a number, not as a formula."""
     if not isinstance(value, str):
         return value
     line = " ".join(value.splitlines())

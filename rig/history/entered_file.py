@@ -1,4 +1,4 @@
-"""The entries of a file in a history: which certificate or result it is, and whether they are unchanged."""
+"""The entries in a history for a file that is a certificate or a result, and whether they are unchanged."""
 
 import hashlib
 import json
@@ -25,9 +25,9 @@ class FileEntries:
 def find_file_entries(history: History, name: str, content: bytes, anchor: tuple[int, str] | None) -> FileEntries:
     """Return the entries of a file in the history, by its bytes or by the values of a result.json.
 
-    `anchor` is the journal entry that its signature names. Problems are `unknown_to_history` if the history does not
-    have the file, `not_as_entered` if its rows have changed since, `journal_rewritten` if the journal is not the one at
-    the time of the signature.
+    `anchor` is the journal entry that the file's signature names. Problems are `unknown_to_history` if the history does
+    not have the file, `not_as_entered` if its rows have changed since, `journal_rewritten` if the journal is not the
+    one at the time of the signature.
     """
     with history.engine.connect() as connection:
         rows = list(_entries(connection, content))
@@ -71,7 +71,7 @@ def _list_voided(connection: Connection, run_id: int) -> list[str]:
 
 
 def _runs_of(connection: Connection, content: bytes) -> list[int]:
-    """Return the runs entered with the same result.json: equal values in equal order."""
+    """Return the numbers of the runs entered with the same values of result.json, in the same order."""
     runs = schema.run.c
     try:
         text = content.decode()

@@ -26,7 +26,7 @@ MOST_TOLD = 3  # contradictions of a run that are reported, at most
 
 @dataclass(frozen=True, slots=True)
 class EntryState:
-    """The state of one thing: `what` is the path of a file, or the number of an entry."""
+    """The state of `what`: the path of a file, or the number of an entry."""
 
     what: str
     state: State
@@ -36,8 +36,8 @@ class EntryState:
 def examine_history(history: History) -> Iterator[EntryState]:
     """Yield the state of triggers, numbers and rows, of each run by its result, and of files by their hashes.
 
-    Files are read at their last known location. Those entered on another computer and not accessible here are
-    `elsewhere`; a file of a run that was not entered with any run is `unknown`.
+    Files are read at their last known location. A file of another computer that is not accessible here is `elsewhere`;
+    a file in a run's folder that was not entered is `unknown`.
     """
     computer = platform.node()
     for entry in history.broken():
@@ -86,7 +86,7 @@ def _record(past: Past) -> HistoryRecord:
 
 
 def _files_by_folder(history: History) -> Mapping[str, set[tuple[str, str]]]:
-    """Return the entered files by folder; a resumed run has been entered again from the same folder."""
+    """Return the entered files by folder; a resumed run was entered repeatedly from the same folder."""
     by_folder: dict[str, set[tuple[str, str]]] = {}
     for path, name, sha256 in history.files():
         by_folder.setdefault(path, set()).add((name, sha256))
@@ -143,7 +143,7 @@ def _unknown(folder: Path, entered: Mapping[str, set[tuple[str, str]]]) -> Itera
 
 
 def _names(run: Kept, folder: Path) -> set[str]:
-    """Return the names of the entered files; if they may be on another computer, only of those present here."""
+    """Return the names of the entered files; of those that may be on another computer, only the present ones."""
     possible = {RESULT, *(name for certificate in run.certificates for name, _ in certificate.files)}
     return {name for name, _ in run.documents} | {name for name in possible if (folder / name).exists()}
 

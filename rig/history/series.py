@@ -32,10 +32,10 @@ Subject = tuple[str, str, str, float, bool]
 
 @dataclass(frozen=True)
 class Trend:
-    """One parameter of one sensor over time: `times` of the calibrations, and the parameter in each of them.
+    """One parameter of one sensor over time: the times of the calibrations, and the parameter in each.
 
-    Lines, bands and charts use the statistical uncertainty of each result and the additional scatter between runs;
-    errors common to all results of a rig do not affect them. They are None below five results.
+    Lines, bands and charts use each result's statistical uncertainty and the additional scatter between runs, not
+    errors common to all results of a rig. They are None for fewer than five results.
     """
 
     name: str
@@ -60,17 +60,17 @@ class Trend:
 
     @property
     def days(self) -> Array:
-        """Times (n,) in days since the first result."""
+        """The times (n,) in days since the first result."""
         return np.array([(time - self.times[0]).total_seconds() / DAY_S for time in self.times])
 
     @property
     def values(self) -> Array:
-        """Values (n,) of the parameter."""
+        """The values (n,) of the parameter."""
         return np.array([parameter.value for parameter in self.parameters])
 
     @property
     def std(self) -> Array:
-        """Standard deviations (n,) of the random part between runs."""
+        """The standard deviations (n,) of the random part between runs."""
         return np.array([parameter.std_statistical for parameter in self.parameters])
 
     @cached_property
@@ -116,7 +116,7 @@ class RigState:
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """A parameter in this and the previous calibration; `compared` is the number of values compared at once."""
+    """A parameter in this and the previous calibration; `compared` is the number of values in the comparison."""
 
     name: str
     unit: str
@@ -133,8 +133,8 @@ class Change:
     def limit(self) -> float:
         """The limit of E_n: with the probability `UNCHANGED`, all unchanged values of a comparison are below it.
 
-        It uses Student's t for the effective degrees of freedom of the difference, and Bonferroni's inequality, because
-        a history does not store the correlations between parameters of one calibration.
+        By Student's t for the effective degrees of freedom of the difference, and Bonferroni's inequality, because a
+        history does not store correlations between parameters.
         """
         both = (self.before, self.now)
         dof = effective_dof([parameter.std**2 for parameter in both], [parameter.dof for parameter in both])
@@ -148,7 +148,7 @@ class Change:
 
 
 def subjects(pasts: Iterable[Past]) -> dict[Subject, list[Past]]:
-    """Return valid calibrations by subject: without voided ones, and without those unfit by their own checks."""
+    """Return the valid calibrations by subject, without voided ones and those that failed their checks of fitness."""
     by_subject: dict[Subject, list[Past]] = {}
     for past in pasts:
         if past.fit and past.voided is None:
@@ -172,7 +172,7 @@ Parameters = Mapping[str, Parameter]
 def changes_in(pairs: Sequence[tuple[Parameters, Parameters]]) -> tuple[tuple[Change, ...], ...]:
     """Return the changes of the parameters common to each pair of calibrations, before and now.
 
-    All pairs, for example all sensors of a run, form one comparison: the number of all values counts.
+    All pairs, for example all sensors of a run, form one comparison.
     """
     shared = [[name for name in now if name in before] for before, now in pairs]
     compared = sum(map(len, shared))
@@ -194,7 +194,7 @@ def changes_between(before: Sequence[Past], now: Sequence[Past]) -> dict[Subject
 
 
 def rig_states(pasts: Sequence[Past]) -> list[RigState]:
-    """Return the state of every rig with check standards: sensors that were ever declared as such."""
+    """Return the state of every rig with check standards, that is sensors that were ever declared as such."""
     # Drifts and curves are not standards, and external readings have no rig.
     by_subject = subjects([past for past in pasts if past.quantity in quantities() and past.rig != NO_ARM])
     standards = {key: series for key, series in by_subject.items() if any(past.check_standard for past in series)}
@@ -218,7 +218,7 @@ def rig_states(pasts: Sequence[Past]) -> list[RigState]:
 
 
 def effects(pasts: Sequence[Past]) -> dict[str, tuple[RigEffect, ...]]:
-    """Return the differences between rigs that share gyroscopes, by parameter; of scale factors as fractions."""
+    """Return the differences between rigs that share gyroscopes, by parameter, as fractions for scale factors."""
     by_rigs = subjects(past for past in pasts if past.rig != NO_ARM)
     series = [
         (name, past) for pasts_of_subject in by_rigs.values() for past in pasts_of_subject for name in past.parameters

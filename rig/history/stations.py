@@ -1,6 +1,6 @@
 """The present state of each station in a shared history: one row for each rig, replaced every second.
 
-It is not an entry of the history: no result depends on it, and no journal contains it. Ages are by the database's clock
+It is no entry of the history: no result depends on it, and no journal contains it. Ages are by the database's clock
 alone, so the computers' clocks need not agree.
 """
 
@@ -88,7 +88,7 @@ def tell(engine: Engine, rig: str, computer: str, state: str) -> None:
 def heard(engine: Engine) -> tuple[list[StationState], int]:
     """Return the last states of stations, sorted by rig, and the number of further stations.
 
-    Of more than `MOST` stations, the latest are returned.
+    At most `MOST` stations, the latest, are returned.
     """
     if not inspect(engine).has_table(station.name):
         return [], 0
@@ -109,7 +109,7 @@ _LENGTHS = ((station.c.rig, NAME), (station.c.computer, NAME), (station.c.told, 
 
 
 def _text(connection: Connection, column: ColumnElement[str], most: int) -> ColumnElement[Any]:
-    """Return the beginning of a text; from SQLite as bytes, because its columns hold any bytes, also invalid UTF-8."""
+    """Return the beginning of a text; from SQLite as bytes, because its columns may hold invalid UTF-8."""
     start = func.substr(column, 1, most)
     return cast(start, LargeBinary) if connection.dialect.name == "sqlite" else start
 

@@ -1,4 +1,4 @@
-"""A history: runs are entered, and read again.
+"""A history: runs are entered and read.
 
 with open_history() as history:                    # or open_history("postgresql://rig@lab-server/history")
     for past in history.calibrations(Selection(serial_number="LSM9DS1-001")):
@@ -44,7 +44,7 @@ class Selection:
 class Past:
     """A calibration of the history. `id` is its number, `run_id` the number of its run.
 
-    `voided` is the reason why it does not count, None if it does.
+    `voided` is the reason why it does not count, or None.
     """
 
     id: int
@@ -91,8 +91,8 @@ class Entered:
 class Kept:
     """A run as it was entered: its result, its recordings, and its folder's locations, the newest first.
 
-    `certificates` are in the order of entry; `documents` are the other files of its folder, name and SHA-256; `row` is
-    the run's row with all other columns.
+    `certificates`: in the order of entry; `documents`: name and SHA-256 of its folder's other files; `row`: all other
+    columns of the run's row.
     """
 
     run_id: int
@@ -128,7 +128,7 @@ def open_history(where: str | HistoryAddress | None = None) -> Iterator["History
 
 @dataclass(frozen=True, slots=True)
 class History:
-    """An open history. Each entry is read back by another connection before a method returns, or `entry_not_kept`."""
+    """An open history. Another connection reads each entry back before a method returns; else `entry_not_kept`."""
 
     address: HistoryAddress
     engine: Engine
@@ -136,7 +136,7 @@ class History:
     def enter(self, finished: FinishedRun) -> Entered:
         """Add a run; if the history already has it, add only a new location of its folder.
 
-        The result is not compared with its recordings: `rig history import` does that. Raise Refused `entry_not_kept`.
+        The result is not compared with its recordings, as by `rig history import`. Raise Refused `entry_not_kept`.
         """
         content = finished.content_sha256
         try:

@@ -1,4 +1,4 @@
-"""One sensor's calibration: its numbers ± U, and the correction of one's own readings."""
+"""One sensor's calibration: its numbers ± U, and the correction of the user's readings."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -24,7 +24,7 @@ NOISE_TEXT = "± U: two standard deviations of the noise only"
 
 @dataclass(frozen=True, eq=False)
 class CharacteristicValue:
-    """Numbers other than scale factors and biases, by `labels`: `values` and `expanded`, U, in an SI `unit`."""
+    """Numbers other than scale factors and biases, by `labels`: `values` and their U (`expanded`) in an SI `unit`."""
 
     labels: tuple[str, ...]
     values: Array
@@ -36,8 +36,8 @@ class CharacteristicValue:
 class Calibration:
     """Scale factors and biases of one sensor, with their uncertainties, and its `characteristics` by name.
 
-    A gyroscope's reading m is corrected as g = K (m + b), an accelerometer's or a magnetometer's as M (m − b); `apply`
-    does it. Arrays are in SI units: a bias in rad/s, m/s² or T. `entry` has everything in `result.json`.
+    `apply` corrects a gyroscope's reading m to g = K (m + b), an accelerometer's or a magnetometer's to M (m − b).
+    Arrays are in SI units: a bias in rad/s, m/s² or T. `entry` is the entry in `result.json`.
     """
 
     name: str
@@ -57,32 +57,32 @@ class Calibration:
 
     @property
     def scale(self) -> Array:
-        """Scale factors (3,)."""
+        """The scale factors (3,)."""
         return np.array(self.entry.scale)
 
     @property
     def bias(self) -> Array:
-        """Bias (3,) in the SI unit of the quantity."""
+        """The bias (3,) in the SI unit of the quantity."""
         return np.array(bias_of(self.quantity, self.entry))
 
     @property
     def bias_rad_s(self) -> Array:
-        """Biases (3,) of a gyroscope."""
+        """The biases (3,) of a gyroscope, rad/s."""
         return np.array(self.entry.bias_rad_s)
 
     @property
     def scale_expanded(self) -> Array:
-        """Expanded uncertainties U (3,) of the scale factors, as on terminal and certificate."""
+        """The expanded uncertainties U (3,) of the scale factors, as on terminal and certificate."""
         return self._expanded[: len(self.entry.scale)]
 
     @property
     def bias_expanded(self) -> Array:
-        """Expanded uncertainties U (3,) of the biases, in the unit of `bias`."""
+        """The expanded uncertainties U (3,) of the biases, in the unit of `bias`."""
         return self._expanded[len(self.entry.scale) :]
 
     @property
     def coverage_factors(self) -> Array:
-        """Coverage factors k (6,) of U in the order kx ky kz bx by bz: U = k u."""
+        """The coverage factors k (6,) of U in the order kx ky kz bx by bz: U = k u."""
         budget = self.entry.budget
         return (
             np.array(budget.coverage_factors) if budget is not None else np.full(len(self._expanded), COVERAGE_FACTOR)
@@ -95,12 +95,12 @@ class Calibration:
 
     @property
     def std(self) -> Array:
-        """Standard deviations (6,) of that covariance, which includes only noise, unlike U."""
+        """The standard deviations (6,) of `covariance`, which unlike U includes only noise."""
         return np.asarray(np.sqrt(np.diag(self.covariance)), dtype=np.float64)
 
     @property
     def correction_matrix(self) -> Array:
-        """Matrix M (3, 3) of `apply` and `calibration.h`; diag(K) if the axes are not corrected."""
+        """The matrix M (3, 3) of `apply` and `calibration.h`; diag(K) if the axes are not corrected."""
         matrix = getattr(self.entry, "correction_matrix", None)
         return np.diag(self.scale) if matrix is None else np.array(matrix)
 
@@ -108,9 +108,9 @@ class Calibration:
         """Return the corrected readings (n, 3) of this sensor, from readings (n, 3) in the SI unit of its quantity.
 
         A gyroscope's are g = M (m + b), with M = K if only scale factors are corrected; an accelerometer's and a
-        magnetometer's M (m − b). They are in the frame of `correction_matrix` in `result.json`, as by the functions of
+        magnetometer's M (m − b). They are in the frame of `correction_matrix` in `result.json`, like those of
         `calibration.h`. A row with a NaN becomes NaN. Raise Refused `not_readings` for counts and other shapes,
-        `wrong_unit` for numbers that this sensor cannot read in its SI unit, such as °/s, g or µT.
+        `wrong_unit` for numbers that are impossible in SI units, such as °/s, g or µT.
         """
         limit = getattr(self.entry, self.quantity.file_key("range"), None)
         valid = own_readings(readings, self.quantity, limit, f"the {self.quantity.sensor} {self.name}")

@@ -35,7 +35,7 @@ class SensorComparison:
 
     @property
     def shown(self) -> Comparison:
-        """The plotted comparison: of calibrated readings, if recorded."""
+        """The plotted comparison: that of calibrated readings, if recorded."""
         return next(part for part in (self.after, self.before) if part is not None)
 
     def plot(self) -> "Plot":
@@ -93,7 +93,7 @@ def compare(run: Run, sensor: str, reference: str) -> SensorComparison:
 
 
 def _correction_of(run: Run, name: str, recordings: Sequence[ObservedRun]) -> Reference:
-    """Return the correction of a sensor's readings in these recordings; None if the board has corrected them."""
+    """Return the correction of a sensor's readings in these recordings: none if the board has corrected them."""
     if recordings[0].run.sensors[name].mode == "calibrated":
         return Reference(name, np.ones(3), np.zeros(3))
     turntable = run.settings.reference

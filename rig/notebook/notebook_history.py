@@ -1,4 +1,4 @@
-"""The laboratory's memory in a notebook: all calibrations of a sensor, and changes between runs."""
+"""The history in a notebook: all calibrations of a sensor, and changes between runs."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass

@@ -85,13 +85,13 @@ class Readings:
 
     @property
     def quantities(self) -> tuple[str, ...]:
-        """The names of the measured quantities; `on_arm_clock` and `plot` use the first."""
+        """The names of the measured quantities; `on_arm_clock` and `plot` use the first one."""
         names = [channel.quantity for channel in self.sensor.channels]
         return tuple(sorted(names, key=lambda name: name != RATE.name))
 
     @property
     def rate(self) -> Signal:
-        """The rates of a gyroscope in rad/s."""
+        """The rates of a gyroscope, rad/s."""
         return self.signal(RATE.name)
 
     @property
@@ -131,7 +131,7 @@ class Readings:
 
     @property
     def samples(self) -> NDArray[Any]:
-        """Samples (n,), SAMPLE_DTYPE: counts, board times and sequence numbers as the board sent them."""
+        """The samples (n,), SAMPLE_DTYPE: counts, board times and sequence numbers as sent by the board."""
         return np.concatenate([run.samples[self.name] for run in self.recordings])
 
     def to_frame(self, sweep: int | None = None) -> "DataFrame":
@@ -166,7 +166,7 @@ class Readings:
 
     @cached_property
     def _time_s(self) -> Array:
-        """Times (n,) of all samples, computed once. For readings from files, the times in the file."""
+        """The times (n,), s, of all samples, computed once; for readings from files, the times in the file."""
         if any(run.external is not None for run in self.recordings):
             times_of_file: Array = self.samples["host_time_s"]
             return times_of_file

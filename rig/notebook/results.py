@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Result(Mapping[str, Calibration]):
-    """A run's result.
+    """A run's result, by calibration.
 
     `result["gyro"]` is a sensor's calibration, `result["gyro, accelerometer"]` that of another quantity. If a sensor
     has only one quantity, its name is enough. `document` is the complete `result.json`.
@@ -126,7 +126,7 @@ class Result(Mapping[str, Calibration]):
 
 
 def solve(run: Run, estimator: str | None = None, **changes: float) -> Result:
-    """Solve and judge a run, as `rig solve` does, by the estimator of its procedure unless another is named.
+    """Solve and judge a run, as `rig solve` does, by `estimator` or that of its procedure.
 
     `changes` are thresholds or limits to use instead of the recorded ones: `max_lost_fraction=0.01`. Raise Fault and
     Refused as `rig solve` does; `unknown_setting` lists the possible changes.

@@ -103,8 +103,8 @@ def load(path: str | Path, script: str | Path | None = None) -> Run:
 def read_log(path: str | Path, columns: str | Path | None = None) -> Readings:
     """Read a log of another program as `rig solve` does:
 
-    CSV, a bag, `.ulg`, `.mat`. Values are in SI units. `columns` names the file of `--columns`, if the log has names
-    and units of its own. Raise Refused as `rig solve` does.
+    CSV, a bag, `.ulg` or `.mat`. Values are in SI units. `columns` is the file of `--columns` for a log with other
+    names and units. Raise Refused as `rig solve` does.
     """
     column_map = AS_NAMED if columns is None else load_as(ColumnMap, Path(columns))
     recording = read_external_log(Path(path), column_map)

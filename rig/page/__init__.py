@@ -1,1 +1,1 @@
-"""The operator's page: a run in a browser, live or replayed. It listens; it moves nothing."""
+"""The operator's page: a run in a browser, live or replayed. It moves nothing."""

@@ -8,10 +8,11 @@ from typing import Any
 class About:
     """Facts about a run before its first event.
 
-    - `folder`, `procedure`: of the run. `replayed`: whether it is a recording. `simulated`: whether the laboratory is.
+    - `folder`, `procedure`: those of the run. `replayed`: whether it is a recording. `simulated`: whether the
+      laboratory is simulated.
     - `may_answer`: whether the page may answer the operator's questions.
     - `parts`: each sensor's part and serial number.
-    - `storing`: the command that stores a calibration on the board, if it can.
+    - `storing`: the command that stores a calibration on the board, if possible.
     - `arm`: the arm's geometry; for a recording also its names.
     """
 

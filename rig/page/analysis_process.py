@@ -1,4 +1,4 @@
-"""Analysis of the recording after each step that measures, by a process of its own (`rig.page.live_analysis`)."""
+"""Analysis of the recording after each measuring step, in a process of its own (`rig.page.live_analysis`)."""
 
 import json
 import subprocess
@@ -30,7 +30,7 @@ class Lookout:
         self._raw = True
 
     def event(self, event: RunEvent) -> None:
-        """Handle an event, as a Listener does: a finished step requests an analysis."""
+        """Request an analysis after a finished step."""
         match event:
             case PhaseStarted(_, _, sensors):
                 self._raw = "calibrated" not in sensors.values()
@@ -42,7 +42,7 @@ class Lookout:
 def looking_out(folder: Path, feed: Feed) -> Iterator[Lookout]:
     """Run the analysis during the block, and show its results by `feed`.
 
-    If its process fails, it prints this on stderr: the page lacks its results, and the run continues.
+    If its process fails, a message on stderr says so: the page lacks its results, and the run continues.
     """
     lookout = Lookout()
     command = [sys.executable, "-P", "-m", "rig.page.live_analysis", str(folder)]

@@ -10,7 +10,7 @@ from rig.page.recent_readings import round_digits
 
 
 def built(chain: DenavitHartenberg) -> dict[str, Any]:
-    """Return a turner's geometry, and the total length of its links, m, from joint to joint across the axes."""
+    """Return a turner's geometry, and the total length of its links, m."""
     return {"geometry": asdict(chain), "long_m": sum(map(abs, chain.a_m))}
 
 
@@ -32,7 +32,7 @@ def turner_section(report: Report) -> dict[str, Any]:
 
 
 def stance(state: State) -> dict[str, Any]:
-    """Return a turner's last state; it is `let_go` if it is at rest and no program runs."""
+    """Return a turner's last state; a turner at rest without a program is `let_go`."""
     joints = {"q_rad": round_digits(state.q_rad), "qd_rad_s": round_digits(state.qd_rad_s)}
     if not isinstance(state, ArmState):
         return {**joints, "let_go": False}

@@ -23,7 +23,7 @@ Row = dict[str, Any]
 def outcome_rows(result: ResultDocument, parts: Mapping[str, str], true_rows: Sequence[TruthRow] = ()) -> list[Row]:
     """Return a row for each result: its numbers ± U as on the certificate, and its limits.
 
-    `parts` are the sensors' parts and serial numbers; `true_rows` the true values of a simulated laboratory.
+    `parts`: the sensors' parts and serial numbers; `true_rows`: the true values of a simulated laboratory.
     """
     rows = []
     true_by_name = {true.row.name: true for true in true_rows}
@@ -47,7 +47,7 @@ def outcome_rows(result: ResultDocument, parts: Mapping[str, str], true_rows: Se
 
 
 def since_rows(since: Iterable[Since]) -> dict[str, Row]:
-    """Return the previous results, by the names of the rows with which they are shown, in the rows' units."""
+    """Return the previous results, by the names of the displayed rows and in their units."""
     rows = {}
     for since_result in since:
         quantity = quantities().get(since_result.quantity)

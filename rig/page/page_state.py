@@ -1,4 +1,4 @@
-"""The state of the page, built from a run's events. No thread, no clock, and no file but the reported ones."""
+"""The state of the page, built from a run's events, without threads, clocks, and files except reported ones."""
 
 from collections.abc import Iterator
 from dataclasses import asdict
@@ -180,7 +180,7 @@ class PageState:
             self.put("parameters", look.parameters)
 
     def _take_once(self, event: RunEvent) -> None:
-        """Update the sections by one of the events that are not repeated many times a second."""
+        """Update the sections by an event that is not repeated many times a second."""
         sections = self.sections
         match event:
             case ArmConnected(report):

@@ -1,4 +1,4 @@
-"""A recorded run as the events that it was, in the controller's time."""
+"""A recorded run as its events, in the controller's time."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -58,7 +58,7 @@ class _Done:
 
 
 def moments(run: RunData) -> Iterator[Moment]:
-    """Yield the events of a recording with their times, in order; none without a state of the turner."""
+    """Yield the events of a recording with their times, in order; nothing without a state of the turner."""
     if len(run.states) == 0:
         return
     times_s = run.states["time_s"]
@@ -100,7 +100,7 @@ def end_events(result: ResultDocument) -> Iterator[RunEvent]:
 
 
 def _list_steps(run: RunData, end_s: float) -> list[_Done]:
-    """Return the sweeps, rests and dwells of a recording; those without an end were interrupted."""
+    """Return the sweeps, rests and dwells of a recording, including interrupted ones."""
     done: list[_Done] = []
     for recorded in run.events:
         event, time_s = recorded.event, recorded.controller_time_s
@@ -139,7 +139,7 @@ _OF_STEPS = (SweepStarted, SweepFinished, RestStarted, RestFinished, DwellStarte
 
 
 def _cut_at(run: RunData, time_s: float) -> RunData:
-    """Return the recording with the events up to `time_s`, and no later ones."""
+    """Return the recording with the events up to `time_s`."""
     return replace(run, events=tuple(e for e in run.events if (e.controller_time_s or 0.0) <= time_s))
 
 

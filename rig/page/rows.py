@@ -31,7 +31,7 @@ class Look:
 
 
 def observation_row(sensor: str, observation: Observation) -> Row:
-    """Return a revolution averaged by the host: the reading of one axis, and 2π/T's component along it."""
+    """Return the row of a revolution averaged by the host: one axis' reading, and the component of 2π/T along it."""
     average = observation.average
     return {
         "sensor": sensor,
@@ -86,7 +86,7 @@ def look_of(partial: SoFar) -> Look:
 
 
 def parameter_rows(result: ResultDocument) -> list[Row]:
-    """Return the rows of a run's result, kind by kind, with U, or twice the noise without a budget."""
+    """Return the rows of a run's result, kind by kind, with U, or without a budget twice the noise."""
     return [_row(row) for row in shown(result)]
 
 

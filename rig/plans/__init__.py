@@ -1,1 +1,1 @@
-"""Procedure → steps: the motions of the arm, before it moves; pure."""
+"""From a procedure to steps: the motions of the arm, before it moves. Pure."""

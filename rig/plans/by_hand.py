@@ -1,7 +1,8 @@
-"""The list of moves in a calibration by hand, and the next one to ask for. Pure.
+"""The list of moves in a calibration by hand, and the next move to request. Pure.
 
-Twelve flips over all six faces determine scale factors and right angles best in a given time; whole turns are a check
-that needs no flat table. Any order will do: the next request follows from the item's position and its past moves.
+Twelve flips over all six faces determine scale factors and angles between axes best in a given time; whole turns are a
+check that needs no flat table. The order does not matter: the next request follows from the item's face and its past
+moves.
 """
 
 from collections.abc import Collection, Iterator, Sequence
@@ -29,20 +30,20 @@ def plan_by_hand(
 
 @dataclass(frozen=True, slots=True)
 class WantedMoves:
-    """The list of a session: its numbers of flips between faces and of whole turns."""
+    """The list of a session: the numbers of flips between faces and of whole turns."""
 
     flips: int
     turns: int
 
     @property
     def pairs(self) -> tuple[Pair, ...]:
-        """Flips in the order of the requests, if the operator makes no other move between them."""
+        """The flips in the order of the requests, if the operator makes no other move between them."""
         count = len(ROUND)
         return tuple((ROUND[index % count], ROUND[(index + 1) % count]) for index in range(self.flips))
 
     @property
     def about(self) -> tuple[tuple[str, int], ...]:
-        """Whole turns: axis and direction, +1 or -1; a second turn about an axis has the opposite direction."""
+        """The whole turns: axis and direction, +1 or -1; a second turn about an axis has the opposite direction."""
         return tuple((AXES[index % 3], -1 if index // 3 % 2 else 1) for index in range(self.turns))
 
 

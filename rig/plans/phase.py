@@ -1,4 +1,4 @@
-"""The phases of a run: each a movement that is recorded into files of its own and judged."""
+"""The phases of a run: movements with their own recordings and verdicts."""
 
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -22,8 +22,8 @@ class PhasePlanner(Protocol):
 class Phase:
     """One movement of a run.
 
-    `procedure` determines what is streamed, done and judged; `plan` makes the steps. `agreed`: whether the operator has
-    agreed to it together with the previous phase; `follows`: the next phase if it passes.
+    `procedure` determines readings, steps and verdict; `plan` makes the steps. `agreed`: whether the operator agreed to
+    it with the previous phase; `follows`: the next phase, if this one passes.
     """
 
     procedure: AnyProcedure
@@ -36,8 +36,8 @@ def first_phase(procedure: AnyProcedure, config: RigConfig, procedures: Procedur
     """Return the phase with which a run of `procedure` begins; the next phase repeats its movement.
 
     Raise Refused `no_such_procedure`. The phase's `plan` raises Refused as the procedure's does; also `script_failed`;
-    `rank_deficient`, `ill_conditioned` if the whole plan's attitudes do not determine the requested parameters; and
-    `other_turner` if the procedure plans for another kind than is configured.
+    `rank_deficient`, `ill_conditioned` if the whole plan's attitudes do not determine the requested parameters;
+    `other_turner` if the procedure needs another kind of turner.
     """
 
     def plan(start_q_rad: Joints | None = None, done: Collection[int] = ()) -> Plan:

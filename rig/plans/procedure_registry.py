@@ -1,7 +1,7 @@
 """The procedures by name: the stock ones, and those that packages add through the entry-point group `rig.procedures`.
 
 The stock procedures are those in `STOCK_SECTIONS`; each has its script in the module of its name in `procedures/`. The
-rig knows a procedure only through its `Procedure`; one that is not installed comes from a file of its own
+rig knows a procedure only through its `Procedure`; a procedure that is not installed comes from a file
 (`rig.plans.script_file`).
 """
 
@@ -60,10 +60,10 @@ def calibration(runs: Sequence[RunData], before: Outcome | None, estimator: str)
 class Procedure(Generic[SectionT]):
     """A procedure: its name, its section in the configuration, its planner, its script and its analysis.
 
-    - readings: what the sensors to calibrate stream: raw counts, which the board averages as well, or readings that the
-      board has corrected by its stored calibration.
+    - readings: of the sensors to calibrate: raw counts, which the board also averages, or readings corrected by the
+      board.
     - then: the procedure that follows with the same movement if the section has `then_verify`.
-    - turner: the section of the kind of turner that it plans for.
+    - turner: the section type of the turner that it needs.
     - estimator: the estimator of the result, unless another is requested.
     """
 
@@ -84,7 +84,7 @@ class Procedure(Generic[SectionT]):
 
     @property
     def calibrates_along(self) -> bool:
-        """Whether the board averages and solves during the recording, which requires raw readings."""
+        """Whether the board averages and solves during the recording, for which it needs raw readings."""
         return self.readings == "raw"
 
     def following(self, procedures: "Procedures") -> "AnyProcedure | None":

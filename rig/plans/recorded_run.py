@@ -81,10 +81,10 @@ def open_run(
 
 
 def judge_phases(run: RecordedRun, estimator: str | None = None) -> Outcome:
-    """Return the outcome of a run, phase by phase; a planned phase that is missing counts as failed.
+    """Return the outcome of a run, phase by phase; a missing planned phase counts as failed.
 
-    The estimator is the procedure's own unless another is requested; a single recording has its own outcome. Raise
-    Fault and Refused as the procedure's analysis does.
+    The estimator is by default the procedure's own; a single recording has its own outcome. Raise Fault and Refused as
+    the procedure's analysis does.
     """
     procedure = _procedure_of(run, run.movement[0])
     estimator = estimator or procedure.estimator
@@ -98,7 +98,7 @@ def judge_phases(run: RecordedRun, estimator: str | None = None) -> Outcome:
 
 
 def describe_omission(run: RecordedRun) -> str | None:
-    """Return a sentence if the solution lacks the analysis of a script, which is not executed here."""
+    """Return a sentence if the solution lacks the analysis of a script that is not executed, or None."""
     for recording in (*run.raw, *run.corrected):
         if recording.external is None and _script_of(run, recording) is None and not _is_by_installed(recording):
             return (
@@ -116,7 +116,7 @@ def _is_corrected(run: RunData) -> bool:
 def _procedure_of(run: RecordedRun, recording: RunData) -> AnyProcedure:
     """Return the procedure of a recording: installed, or defined by the user's own script.
 
-    If neither is available, return an installed one for the same kind of readings, because a solution needs no script.
+    If neither is available, return an installed procedure for the same kind of readings: a solution needs no script.
     Raise Refused `another_script` if the script is not that of the recording, and as `kept_script` does.
     """
     if _is_by_installed(recording):
@@ -131,7 +131,7 @@ def _is_by_installed(recording: RunData) -> bool:
 
 
 def _script_of(run: RecordedRun, recording: RunData) -> ScriptFile | None:
-    """Return the script of a recording if it may be executed, because the user has named it or executed it before."""
+    """Return the script of a recording if the user has named it, or executed it before."""
     folder = run.path if run.path.is_dir() else run.path.parent
     if _is_by_installed(recording) or (run.script is None and not (folder / SCRIPT).exists()):
         return None

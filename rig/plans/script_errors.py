@@ -1,4 +1,4 @@
-"""Errors in the code of a user's own procedure, by name: they are not defects of the rig."""
+"""Errors in the code of a user's own procedure, which are not defects of the rig."""
 
 import traceback
 from collections.abc import Iterator
@@ -12,9 +12,9 @@ ENDING = 'Let it end nothing by itself: `if __name__ == "__main__":` belongs bef
 
 @contextmanager
 def script_errors(what: str, remedy: str = "Correct the script") -> Iterator[None]:
-    """Raise Refused `script_failed`, `what` with the reason and its position; named errors stay unchanged.
+    """Raise Refused `script_failed`, `what` with the reason and its position; named errors remain unchanged.
 
-    A script that ends the program is refused as well, because its exit status would be taken for a verdict.
+    A script that ends the program is refused as well: its exit status would be taken for a verdict.
     """
     try:
         yield

@@ -69,8 +69,8 @@ def load_script(path: Path) -> ScriptFile:
 def kept_script(folder: Path, kept: ScriptIdentity, named: ScriptFile | None = None) -> ScriptFile:
     """Return the script `kept` in a run folder; the text in the folder is executed only if it is the user's own.
 
-    An installed script is taken from its package. If the user has `named` the same script, that is the user's consent.
-    The text in the folder is the user's own if the user has begun a run with it before. Raise Refused `another_script`,
+    An installed script is taken from its package. A user who has `named` the same script consents. The text in the
+    folder is the user's own if the user has begun a run with it before. Raise Refused `another_script`,
     `foreign_script`, and as `load_script` does.
     """
     if named is not None:

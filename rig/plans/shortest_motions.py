@@ -1,4 +1,4 @@
-"""Motions that the search for the shortest run tries: sweeps, attitudes, turns of a servo. Pure."""
+"""Candidate motions of the search for the shortest run: sweeps, attitudes, turns of a servo. Pure."""
 
 from collections.abc import Iterator, Mapping
 from itertools import product
@@ -46,7 +46,7 @@ def vary_attitudes(config: RigConfig) -> Iterator[Motion]:
 
 
 def vary_imu(config: RigConfig) -> Iterator[Motion]:
-    """Yield sweeps with attitudes; sweeps are single turns at one speed: one period of the accelerometer's wave."""
+    """Yield sweeps with attitudes; sweeps are single turns at one speed, one period of an accelerometer's wave."""
     turns = [motion for motion in vary_arm(config) if motion[1] == TURNS_DEG[0] and not motion[2].get("speeds_deg_s")]
     for (family, turned, keys), (attitudes, _, stood) in product(turns, vary_attitudes(config)):
         yield (*family, *attitudes), turned, {**keys, **stood}

@@ -1,7 +1,7 @@
 """The search for the shortest run of a configuration that reaches a target uncertainty. Pure.
 
-The file's order, directions, stages, several speeds and six axes remain, as do the attitudes if magnetometers need
-them.
+The file's order, directions, stages, several speeds and six axes are kept, and the attitudes if there are
+magnetometers.
 """
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -58,10 +58,10 @@ REST_STEP_S = 0.1  # step of the last, fine search
 
 
 class Tried(Protocol):
-    """The runs of a procedure among which the search chooses, with the prediction of each.
+    """The candidate runs of a procedure, with their predictions.
 
     - `predict`: returns the budgets, None for a run that is not possible.
-    - `anew`: the budget lines whose error is new in each repeat; a run repeated without end has none of them.
+    - `anew`: the contributors with a new error in each repeat, which a run repeated without end lacks.
     - `ending`: the keys that end a run before its last repeat, when the target is reached.
     """
 
@@ -216,7 +216,7 @@ class _Swept:
         return candidates
 
     def select_endless(self, candidates: Sequence[Candidate]) -> Sequence[Candidate]:
-        """Return each family's candidates with the largest angle and dwell, extreme rests, and at most two repeats."""
+        """Return each family's candidates with the largest angle and dwell, extreme rests, and up to two repeats."""
         selected = {
             (candidate.family, candidate.rests_s): candidate
             for candidate in sorted(candidates, key=lambda candidate: candidate.sizes)
@@ -266,7 +266,7 @@ class _Swept:
 
 
 def _longer_s(counts: Mapping[str, int], waits_s: Mapping[str, float], others_s: Mapping[str, float]) -> float:
-    """Return the extra duration, s, with waits of `others_s` instead of `waits_s`."""
+    """Return the extra duration, s, by waits of `others_s` instead of `waits_s`."""
     return sum(count * (others_s[key] - waits_s[key]) for key, count in counts.items())
 
 
@@ -287,7 +287,7 @@ class _ByHand:
         return [self._candidate(*numbers) for numbers in product(FLIPS, TURNS_BY_HAND, RESTS_S[:4])]
 
     def select_endless(self, candidates: Sequence[Candidate]) -> Sequence[Candidate]:
-        """Return the candidate with the most flips and fewest rests, which would be the best without noise."""
+        """Return the candidate with the most flips, fewest turns and shortest rests, the best one without noise."""
         return [max(candidates, key=lambda candidate: (candidate.sizes[0], -candidate.sizes[1], -candidate.sizes[2]))]
 
     def finer(self, best: Candidate) -> Sequence[Candidate]:

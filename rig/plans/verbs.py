@@ -1,4 +1,4 @@
-"""The verbs of a procedure's script. `rig.runner.procedure_runner.Rig` carries them out."""
+"""The verbs of a procedure's script, carried out by `rig.runner.procedure_runner.Rig`."""
 
 from collections.abc import Callable
 from typing import Protocol
@@ -7,11 +7,11 @@ from rig.motion.steps import Dwell, Plan, Rest, Sweep, Transfer
 
 
 class Verbs(Protocol):
-    """An arm and a board, connected and recorded. Whatever ends a verb early stops the arm first."""
+    """A connected and recorded arm and board. Anything that ends a verb early first stops the arm."""
 
     @property
     def plan(self) -> Plan:
-        """The steps to be done, fewer than in the complete plan if an interrupted run is resumed."""
+        """The steps to carry out, fewer than in the complete plan if an interrupted run is resumed."""
         ...
 
     def preflight(self) -> None:
@@ -23,7 +23,7 @@ class Verbs(Protocol):
         ...
 
     def move(self, transfer: Transfer) -> None:
-        """Move the arm without measuring. The motion must be the next one of the plan, as for `sweep`."""
+        """Move the arm without measuring; as for `sweep`, the motion must be the plan's next."""
         ...
 
     def sweep(self, sweep: Sweep) -> None:

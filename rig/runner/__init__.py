@@ -1,1 +1,1 @@
-"""A run while it happens: the only impure middle."""
+"""A run in progress: the only impure code between pure functions and devices."""

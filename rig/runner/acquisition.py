@@ -1,4 +1,4 @@
-"""The samples and states that arrive: passed on to the recording, counted, and kept for the next computations."""
+"""Arriving samples and states: passed on to the recording, counted, and kept for the next computations."""
 
 import threading
 from collections import defaultdict, deque
@@ -29,9 +29,9 @@ STANDING_S = 0.25
 class SensorCount:
     """The number of samples that one sensor has delivered so far.
 
-    - `lost`: the gaps in its sequence numbers.
+    - `lost`: the number missing in its sequence numbers.
     - `latest`: the mean readings of the newest samples, by quantity.
-    - `read_s`: the time at which these were read, by the clock that stamps them.
+    - `read_s`: the time of the latest readings, by the clock that stamps them.
     """
 
     name: str
@@ -76,7 +76,7 @@ class _Thinning:
     def keeps(self, time_s: float) -> bool:
         """Return whether to record the state at `time_s`: every state for `WHOLE_S`, then one in each `STANDING_S`.
 
-        Call it for each state in order.
+        Call this for each state in order.
         """
         if self.began_s is None:
             self.began_s = time_s
@@ -91,7 +91,7 @@ class Acquisition:
     """The data from the reader threads of the sources and the arm, read by the script's thread.
 
     `counts` is by sensor name. Data that arrive before there is a `recorder` are not recorded. From the first `keep`
-    on, the data since its last `KEPT_PARTS` calls are also in memory.
+    on, data since its last `KEPT_PARTS` calls are also in memory.
     """
 
     counts: dict[str, SensorCount] = field(default_factory=dict)
@@ -103,7 +103,7 @@ class Acquisition:
     _heard: "SimpleQueue[tuple[str, NDArray[Any]]] | None" = None
 
     def expect(self, name: str, sensor: RecordedSensor) -> None:
-        """Count the samples of a sensor from now on; if it has rates, watch its settling."""
+        """Count the samples of a sensor from now on, and watch its settling if it has rates."""
         self.counts[name] = SensorCount(name, sensor)
         if sensor.measures(RATE):
             self.settling.expect(name, sensor)
@@ -131,9 +131,9 @@ class Acquisition:
 
     @contextmanager
     def thin_states(self) -> Iterator[None]:
-        """Record few of the arm's states inside the block, after its first seconds, during which the arm is at rest.
+        """Record few of the arm's states in the block, during which it is at rest, after the first seconds.
 
-        Page and supervision still receive all of them.
+        Page and supervision still receive all states.
         """
         self._thinning = _Thinning()
         try:
@@ -154,8 +154,8 @@ class Acquisition:
     def collect_kept(self, sensor: str) -> tuple[np.ndarray, list[State], int]:
         """Return the kept samples (n,) of one sensor, the kept states of the arm, and the number of new states.
 
-        States since the latest `keep` are new. Older states reach at most `REACHES_BACK_S` before it, however long the
-        run has waited.
+        States since the latest `keep` are new. Older states are from at most `REACHES_BACK_S` before it, however long
+        the run has waited.
         """
         with self._lock:
             batches = [batch for part in self._kept for batch in part.batches[sensor]]

@@ -16,7 +16,7 @@ NOBODY = "Nobody and nothing may be within its reach."
 
 
 def mounting(plan: Plan, number: int, words: Wording) -> Prompt:
-    """Return the question that asks if the item is mounted for stage `number` (from 0); `words` names the turner."""
+    """Return the question whether the item is mounted for stage `number` (from 0); `words` names the turner."""
     stages, stage = plan.stages, plan.stages[number]
     far = _farthest(plan)
     lines = (
@@ -74,7 +74,7 @@ def announcement(
 
 
 def _joint_names(plan: Plan) -> list[str]:
-    """Return a name for each joint: that of its sweeps, or its number if it has none."""
+    """Return a name for each joint: that of its sweeps, or else its number."""
     names = {sweep.joint: sweep.joint_name for sweep in plan.sweeps}
     return [names.get(joint, f"joint {joint + 1}") for joint in range(len(plan.home_q_rad))]
 

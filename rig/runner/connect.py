@@ -1,4 +1,4 @@
-"""Connects the sources of samples and the turner, starts the recording, and gives a script all of it as one `Rig`."""
+"""Connects the sources of samples and the turner, starts the recording, and combines all of it in a `Rig`."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
@@ -51,9 +51,9 @@ from rig.turners.turner_registry import kind_of
 class Connector:
     """The connections of one phase of a run.
 
-    - `results`: the calibrations of the phase before, by sensor name.
+    - `results`: the calibrations of the previous phase, by sensor name.
     - `memory`: the sensors' earlier calibrations.
-    - `connecting`: connects the turner; None: as its kind does.
+    - `connecting`: connects the turner, or None for its kind's own function.
     """
 
     phase: Phase
@@ -68,7 +68,7 @@ class Connector:
     connecting: Connecting | None = None
 
     def _find_omitted(self, whole_plan: Plan) -> frozenset[int]:
-        """Return the indices of sweeps and dwells to omit now: finished ones, and those of other stages."""
+        """Return the indices of sweeps and dwells to omit now: those finished, and those of other stages."""
         others = (stage.indices for index, stage in enumerate(whole_plan.stages) if index != self.settings.stage)
         return self.resumed.done.union(*others)
 
@@ -76,9 +76,8 @@ class Connector:
     def open(self) -> Iterator[Rig]:
         """Connect everything and start recording; at the end stop the turner and close the file.
 
-        Nothing moves while connecting. Raise `Refused` by name if the turner, the board or a sensor differs from the
-        configuration or from the recording so far, or if a sensor has no calibration by which its readings could be
-        corrected.
+        Nothing moves. Raise `Refused` by name if the turner, the board or a sensor differs from the configuration or
+        from the recording so far, or if a sensor lacks the calibration for its corrected readings.
         """
         whole_plan = self.phase.plan()
         if self.resumed.earlier and not self.phase.agreed:  # a later stage resumes nothing
@@ -176,7 +175,7 @@ class Connector:
         return turner, report, kind.describe_connected(section, report)
 
     def _report_last_state(self, turner: Turner) -> None:
-        """Report the turner's last state once more; otherwise the page shows a moving turner."""
+        """Report the turner's last state again; otherwise the page shows a moving turner."""
         self.station.event(ArmSeen(turner.latest, turner.missed_states))
 
     def _build_provenance(
@@ -267,7 +266,7 @@ class Connector:
     ) -> BoardCalibration | None:
         """Return the board's own calibration from raw readings, with its observations from before an interruption.
 
-        Return None if the readings are not raw, or no sensor on the board is to be calibrated.
+        None if the readings are not raw, or no sensor on the board is to be calibrated.
         """
         to_calibrate = {
             name: (sensor.index, sensor.described)

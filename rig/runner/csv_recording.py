@@ -51,9 +51,9 @@ class RecordedFile:
 
 
 class ReadingsFile:
-    """A CSV file of a sensor's readings in SI units, a row each, by the clock that stamped them.
+    """A CSV file of a sensor's readings in SI units, one per row, on the clock that stamped them.
 
-    A board's clock that `follows_crystal` counts too few microseconds by NOMINAL_DRIFT: its times are the crystal's.
+    A board's clock that `follows_crystal` counts too few microseconds, by NOMINAL_DRIFT, which is corrected.
     """
 
     def __init__(self, path: Path, name: str, sensor: RecordedSensor, follows_crystal: bool | None = None) -> None:
@@ -95,7 +95,7 @@ class ReadingsFile:
         self._write("".join(f"{self._format % tuple(row)}\n" for row in rows))
 
     def _write(self, lines: str) -> None:
-        """Write complete lines or none, because half a number is another number. Raise OSError with the file's name."""
+        """Write complete lines or none: half a number is another number. Raise OSError with the file's name."""
         whole_bytes = self._file.tell()
         rest = memoryview(lines.encode())
         try:
@@ -107,7 +107,7 @@ class ReadingsFile:
 
 
 def record_readings(config: SensorsConfig, folder: Path, duration_s: float) -> Mapping[Path, RecordedFile]:
-    """Record every sensor for `duration_s` by its own clock; return the summary of each file `folder`/<sensor>.csv.
+    """Record each sensor for `duration_s` by its own clock; return the summaries of the files `folder`/<sensor>.csv.
 
     Nothing moves. If recording ends early, the files contain the readings until then. Raise Refused `run_folder`, and
     as `connect_sensors` does; Fault `no_samples`, and the faults of a source.

@@ -1,6 +1,6 @@
-"""A turner that is connected before the run that uses it, while the operator mounts the part. Nothing moves.
+"""The connection of a turner before the run that uses it, while the operator mounts the part. Nothing moves.
 
-A run ends with its turner stopped for good, so each run needs its own connection, which takes seconds.
+A run stops its turner for good, so each run needs its own connection, which takes seconds.
 """
 
 import threading
@@ -17,9 +17,9 @@ Connecting = Callable[[OnState, Path], AbstractContextManager[Turner]]
 
 
 class Ahead:
-    """A connection by `connect`, logged in `log`, that is made before the run; the next run takes it over.
+    """A connection by `connect`, logged in `log`, made before the run that takes it over.
 
-    If it fails or is lost before the run, the run connects by itself and reports the error.
+    If it fails or is lost, the run connects by itself and reports the error.
     """
 
     def __init__(self, connect: Connecting, log: Path) -> None:
@@ -47,7 +47,7 @@ class Ahead:
 
 
 class _Connection:
-    """One turner, from the thread that connects it to the run that takes it."""
+    """A connected turner, from the thread that connects it to the run that uses it."""
 
     def __init__(self, connect: Connecting, log: Path) -> None:
         self._on_state: OnState = _forget
@@ -66,7 +66,7 @@ class _Connection:
         self._on_state(state)
 
     def hand_over(self, stack: ExitStack, on_state: OnState) -> Turner | None:
-        """Return the turner if it is connected without fault, else None; `stack` will close it."""
+        """Return the turner if it is connected without fault, else None; `stack` closes it."""
         self._thread.join()
         if self._turner is None:
             return None
@@ -85,7 +85,7 @@ class _Connection:
         return self._turner
 
     def _let_go(self) -> None:
-        """Drop the references to the run, because they would keep all of its readings in memory."""
+        """Drop the references to the run, which would keep all of its readings in memory."""
         self._on_state, self._turner = _forget, None
 
     def close(self) -> None:

@@ -1,7 +1,7 @@
 """The end of a run before its last repeat, as soon as the target uncertainty is reached.
 
-The arm only makes motions that pre-flight has judged: after the end, the plan's motion that leads home from the present
-pose. If the plan has none, the run continues with the next repeat.
+The arm makes only motions that pre-flight has judged: at the end, the plan's motion home from the present pose. If the
+plan has none, the run continues with the next repeat.
 """
 
 import time
@@ -33,7 +33,7 @@ class EndingEarly:
     - `plan`: the remaining motions of the run.
     - `sweeps`, `repeats`: numbers of sweeps and repeats in the complete run.
     - `path`: the file of this recording.
-    - `earlier`: the previous recordings; if these are complete repeats, the run may end before anything moves.
+    - `earlier`: the previous recordings; after complete repeats, the run may end before anything moves.
     """
 
     wanted: TargetUncertainty
@@ -61,7 +61,7 @@ class EndingEarly:
             self._stands_at(self.plan.start_q_rad, len(remaining))
 
     def note_sweep(self, sweep: Sweep) -> None:
-        """Note a recorded sweep, and whether it completes a repeat."""
+        """Note a recorded sweep; mark an assessment as due if it completes a repeat."""
         self._recorded = True
         remaining = [motion.index for motion in self.plan.motions[self._motions :] if isinstance(motion, Sweep)]
         self._due = False
@@ -82,7 +82,7 @@ class EndingEarly:
             pool.shutdown(wait=False, cancel_futures=True)
 
     def conclude(self, looked: "Future[ReachedUncertainty | None]") -> UncertaintySoFar | None:
-        """Return the uncertainty if it was computed in time; end the run if it meets the target."""
+        """Return the uncertainty if it was computed in time; end the run if the target is met."""
         self._due = False
         reached = looked.result() if looked.done() else None
         if reached is None:
@@ -93,7 +93,7 @@ class EndingEarly:
     def skips(self, motion: Motion) -> bool:
         """Return whether to skip the next motion of the plan.
 
-        At an early end all motions are skipped except the one home.
+        At an early end all motions but that home are skipped.
         """
         index, self._motions = self._motions, self._motions + 1
         return self.ended and index != self._home

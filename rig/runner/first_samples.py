@@ -11,11 +11,11 @@ TIMEOUT_S = 2.0
 
 @dataclass(slots=True)
 class FirstSamples:
-    """A wait that is counted in looks, `look_s` apart, and by the turner's clock if there is one.
+    """A wait counted in polls, `look_s` apart, and by the turner's clock, if any.
 
-    Elapsed time does not suffice: the thread that checks may be delayed, and with it the thread that reads samples. The
-    limit grows with the load of this computer, as the simulated laboratory may run on it. The turner's clock may be
-    simulated; then it stops while the simulation is delayed.
+    Elapsed time does not suffice: the threads that poll and read samples may be delayed. The limit grows with the load
+    of this computer, on which the simulated laboratory may run. A simulated turner's clock stops while the simulation
+    is delayed.
     """
 
     look_s: float

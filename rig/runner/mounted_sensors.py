@@ -11,7 +11,7 @@ from rig.station.operator_station import Station
 
 @dataclass(frozen=True, slots=True)
 class CalibratedBefore:
-    """A calibration in the history that counts: its `number` there, its day, its verdict.
+    """A valid calibration in the history: its `number` there, its day, its verdict.
 
     `board_unique_id` is None if the sensor was on no board.
     """
@@ -34,8 +34,8 @@ class CalibratedBefore:
 class Memory:
     """The earlier calibrations of the sensors' serial numbers, the newest first.
 
-    `silent` is why no calibration can be read, None if the history answered. `moved` are the serial numbers of sensors
-    that the operator has declared to be on another board than before.
+    `silent`: why no calibration can be read, None if the history answered. `moved`: the serial numbers of sensors that
+    the operator declared to be on another board than before.
     """
 
     calibrations: Sequence[CalibratedBefore] = ()
@@ -45,7 +45,7 @@ class Memory:
 
 @dataclass(frozen=True, slots=True)
 class MountedSensor:
-    """A sensor of this run: its name, its part, the board it is on (None: a port of its own).
+    """A sensor of this run: its name, its part, and its board (None: a port of its own).
 
     `last` is the last calibration of its serial number, `other_board` the last one on a board if that was another.
     """
@@ -72,7 +72,7 @@ class Mounted:
         return tuple(sensor for sensor in self.sensors if sensor.other_board and sensor.serial_number not in moved)
 
     def lines(self) -> Iterator[str]:
-        """Return a line for each board and sensor, with the sensor's last calibration."""
+        """Yield a line for each board and sensor, with the sensor's last calibration."""
         for board in dict.fromkeys(sensor.board for sensor in self.sensors if sensor.board is not None):
             yield f"The board is {board}."
         for sensor in self.sensors:
@@ -90,7 +90,7 @@ def find_mounted(
 ) -> Mounted:
     """Return the sensors of a run that can be calibrated, on the board with the identifier `board`.
 
-    `sensors` are the sensors by name. A simulated sensor and a real one are never the same.
+    `sensors` are by name. Simulated and real sensors are never the same.
     """
     turned = []
     for name, sensor in sensors.items():

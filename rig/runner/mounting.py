@@ -1,7 +1,7 @@
-"""Tests of the item's mounting against its stage by the item's own sensors, before a sweep turns it. Pure.
+"""Tests of the item's mounting in a stage by its own sensors, before a sweep turns it. Pure.
 
-A hand that still holds the item, a board mounted in reverse, an instruction not followed: each is detected at rest, or
-by a turn too small to pull at a cable.
+A hand that still holds the item, a reversed board, or a disregarded instruction shows at rest, or in a turn too small
+to pull at a cable.
 """
 
 from dataclasses import dataclass
@@ -63,9 +63,9 @@ def refuse_unsteady(readings: GyroscopeReadings, turner: str) -> None:
 
 
 def refuse_hanging_otherwise(readings: GyroscopeReadings, stage: Stage, up_flange: Array) -> None:
-    """Raise Refused `mounted_otherwise` if an accelerometer contradicts the vertical (3,) in the flange's frame.
+    """Raise Refused `mounted_otherwise` if an accelerometer contradicts the vertical `up_flange` (3,).
 
-    A sensor without accelerations is not tested.
+    The vertical is in the flange's frame. A sensor without accelerations is not tested.
     """
     if not readings.sensor.measures(ACCELERATION):
         return
@@ -86,7 +86,7 @@ def refuse_turning_otherwise(
 ) -> None:
     """Raise Fault `mounted_otherwise` if a gyroscope contradicts a small rotation (3,), rad, in the flange's frame.
 
-    `resting_rad_s` (3,) is its reading at rest. Its readings cover the whole rotation.
+    `resting_rad_s` (3,): reading at rest, by sensor name. The readings cover the whole rotation.
     """
     turned = (readings.rates_rad_s - resting_rad_s).sum(axis=0) / readings.sensor.rate_hz
     stated = np.array(stage.mount) @ turn_flange_rad

@@ -1,7 +1,7 @@
-"""One run in its folder: records a phase and judges it; if it passed, stores the results and goes on to the next phase.
+"""One run in its folder: records and judges a phase; if it passed, stores the results and continues with the next.
 
-Each phase has recordings of its own. Whatever ends a phase, the run's log contains the reason and, if data were kept,
-the command to continue with.
+Each phase has its own recordings. The run's log contains the reason of an early end and, if data were kept, the command
+to continue.
 """
 
 import traceback
@@ -53,11 +53,11 @@ from rig.turners.turner_registry import kind_of
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """A run; its laboratory, if simulated, runs already.
+    """A run; its laboratory, if simulated, is already running.
 
     - `script`: the script of the first phase.
     - `memory`: the sensors' earlier calibrations.
-    - `connecting`: connects the turner; None: as its kind does.
+    - `connecting`: connects the turner, or None for its kind's own function.
     - `again`: the command that continues the run, if it is not `rig resume`.
     """
 
@@ -84,7 +84,7 @@ class Run:
         return self._write(outcome)
 
     def has_refused_sweeps(self, phase: Phase) -> bool:
-        """Return whether a phase has sweeps or dwells that do not count, so that another run repeats them."""
+        """Return whether a phase has sweeps or dwells that do not count, which another run repeats."""
         if phase.procedure.reads_corrected:
             return False
         plan = phase.plan()
@@ -104,7 +104,7 @@ class Run:
     ) -> tuple[RunData, ...]:
         """Carry out the phase's script, with `results` of the previous calibration; return all recordings of the phase.
 
-        While the item is mounted for a stage, nothing is connected, because cables may have to be unplugged.
+        During the mounting for a stage nothing is connected, because cables may have to be unplugged.
         """
         readings = phase.procedure.readings
         with self.report_end(self._advice, moved=moved):
@@ -214,7 +214,7 @@ class Run:
     def report_end(self, advice: Advice | None = None, *, moved: bool = False) -> Iterator[None]:
         """Report the early end of a run, also in its log; after a fault, `advice` follows.
 
-        A refusal means that nothing has moved; if the run has `moved`, it becomes a fault.
+        A refusal means that nothing has moved; if the run has `moved`, the refusal becomes a fault.
         """
         try:
             yield
@@ -247,7 +247,7 @@ class Run:
             raise
 
     def _report_failure(self, fault: Fault, advice: Advice | None = None) -> None:
-        """Report a fault, then `advice`, which becomes a note of the fault: the command prints it after the error."""
+        """Report a fault, then `advice`, which becomes a note that the command prints after the error."""
         self.station.event(Failed(fault))
         if advice is not None and self.folder.exists():
             self.station.event(advice)
@@ -255,7 +255,7 @@ class Run:
 
 
 def _add_notes(what: str, error: BaseException) -> str:
-    """Return the message `what` followed by the notes of the error, such as the one on how the arm stopped."""
+    """Return the message `what` followed by the notes of the error, such as that on how the arm stopped."""
     return "; ".join([what, *dict.fromkeys(_notes(error))])
 
 

@@ -1,7 +1,7 @@
-"""Carries out the verbs of a script (`rig.plans.verbs`).
+"""The implementation of the verbs of a script (`rig.plans.verbs`).
 
-Every verb is supervised: while the arm moves or rests, the board and the recording are watched. Whatever ends a verb
-early (an error, Ctrl-C, a lost link) first stops the arm and is then reported.
+During every verb the board and the recording are supervised. An early end (an error, Ctrl-C, a lost link) first stops
+the arm and is then reported.
 """
 
 import time
@@ -123,11 +123,11 @@ class Rig:
 
     - `plan`: the motions of this recording; `whole_plan`: also those done before an interruption or in other stages.
     - `stage`: the number of this stage, from 0; `last`: whether no stage follows.
-    - `onboard`: the calibration by the board itself, if it makes one.
-    - `hand`: the session, if an operator turns the item.
+    - `onboard`: the board's own calibration, if any.
+    - `hand`: the session by hand, if any.
     - `up`: the vertical in the frame of the arm's base.
-    - `early`: the condition to end early, if there is one; when it is met, all motions except one home are skipped.
-    - `warming`: the supervision of the temperature, if the procedure changes it.
+    - `early`: the condition to end early, if any.
+    - `warming`: the supervision of the temperature, if any.
     """
 
     devices: Devices
@@ -153,7 +153,7 @@ class Rig:
         """Check every condition of a movement, ask the operator, and take control of the arm.
 
         A movement with agreement in advance begins without a question, unless the arm has moved since. Raise `Refused`
-        with every problem; nothing has moved then.
+        with all problems before anything moves.
         """
         report, kind, section = self.devices.report, self.devices.kind, self.devices.section
         refuse(kind.problems([self.whole_plan, self.plan], section, report))
@@ -182,7 +182,7 @@ class Rig:
             raise Refused("not_confirmed", "nobody agreed to the movement", NOT_AGREED)
 
     def _refuse_moved(self) -> None:
-        """Raise Refused `arm_moved` if the arm was moved since the announcement, because its path has changed."""
+        """Raise Refused `arm_moved` if the arm was moved since the announcement, which changes its path."""
         moved_rad = max(map(abs, travel(self.plan.start_q_rad, self.devices.turner.latest.q_rad)), default=0.0)
         if moved_rad > SAME_POSE_RAD:
             raise Refused(
@@ -276,7 +276,7 @@ class Rig:
         self._done.add(sweep.index)
 
     def _refuse_unplanned(self, motion: Motion) -> None:
-        """Raise `unplanned_motion` unless the motion is the plan's next, the only one that pre-flight has judged."""
+        """Raise `unplanned_motion` unless the motion is the plan's next, as judged by pre-flight."""
         what = f"the script orders {motion.name}"
         remedy = "Let the script make the motions of `plan.steps`, each once, in their order, after `preflight()`"
         if self._motions is None:
@@ -303,7 +303,7 @@ class Rig:
         return self.early.skips(motion)
 
     def _observe(self, sweep: Sweep) -> None:
-        """Let the board average the sweep. Finding its window takes seconds, in which a heater is still controlled."""
+        """Let the board average the sweep; while its window is computed, for seconds, a heater is still controlled."""
         if self.onboard is None:
             return
         if self.warming is None:
@@ -404,15 +404,14 @@ class Rig:
         self.hand.carry_out(self._check_along)
 
     def _check_along(self) -> None:
-        """Check the sources and the recording during a step, and report the number of samples."""
+        """Check the sources and the recording, and report the number of samples."""
         self._check()
         self.recording.station.event(SamplesTaken(self.devices.acquisition.samples()))
 
     def solve_on_board(self) -> None:
         """Let the board compute its own calibration from its averages, for comparison with the host's.
 
-        It does so only after the last stage, from the sweeps of all stages: it uses speeds alone, for any axis of
-        rotation.
+        It does so only after the last stage, from the sweeps of all stages, by their speeds alone.
         """
         if self.onboard is not None and self.last:
             self.onboard.solve()
@@ -427,7 +426,7 @@ class Rig:
 
     @contextmanager
     def _step(self, step: Step, then: Callable[[], None] = lambda: None) -> Iterator[None]:
-        """Report the start and end of a step. `then` is done within the step, but after its recorded time."""
+        """Report the start and end of a step; call `then` within the step, but after its recorded time."""
         self._number += 1
         position = self._number, len(self.plan.steps), step
         turner = self.devices.turner
@@ -440,7 +439,7 @@ class Rig:
         self.recording.station.event(StepFinished(*position, took_s))
 
     def _check(self) -> None:
-        """Raise the error of a source, the recording or the temperature, if there is one."""
+        """Raise the error of a source, the recording or the temperature, if any."""
         for source in self.devices.sources:
             source.check(self.devices.turner.latest.time_s)
         self.recording.check()

@@ -1,4 +1,4 @@
-"""The finished part of an interrupted run, and the check that the rest belongs to the same run."""
+"""The finished part of an interrupted run, and the check that its continuation belongs to the same run."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ class Resumption:
     def refuse_other_instruments(self, provenance: Provenance, sensors: Mapping[str, RecordedSensor]) -> None:
         """Raise Refused `another_board`, `another_arm`, `another_sensor` if the devices differ.
 
-        Readings of two boards, or with two settings, cannot be used for one calibration.
+        Readings of different devices or settings do not belong in one calibration.
         """
         for run in self.earlier:
             begun = run.provenance
@@ -51,8 +51,8 @@ class Resumption:
 def resumption(earlier: Sequence[RunData], settings: RunSettings, script: ScriptFile) -> Resumption:
     """Return the valid steps of an interrupted run: dwells, and sweeps that the board has also averaged.
 
-    A sweep that contradicts the others is not valid. Steps are identified by their index in the procedure, so script
-    and movement must be the same. Raise Refused `another_script`, `another_procedure`.
+    A sweep that contradicts the others is not valid. Steps are identified by index, so script and movement must be the
+    same. Raise Refused `another_script`, `another_procedure`.
     """
     for run in earlier:
         if run.provenance.script_sha256 != script.sha256:

@@ -1,4 +1,4 @@
-"""The test whether the sensors have settled after a motion: their readings scatter hardly more than at the start.
+"""The test whether the sensors have settled after a motion: their readings scatter hardly more than in the first rest.
 
 The arm's controller reports standstill while the carried parts still oscillate, so the sensors decide.
 """
@@ -46,7 +46,7 @@ class _Watched:
         return float(np.sqrt(np.var(span, axis=0).mean()))
 
     def over_rest(self) -> float | None:
-        """Return the ratio of the newest scatter to that at rest; None if there are too few readings."""
+        """Return the ratio of the newest scatter to that at rest, or None with too few readings."""
         scatter = self.scatter_counts()
         if scatter is None or not self.at_rest_counts:
             return None
@@ -54,7 +54,7 @@ class _Watched:
 
     @property
     def settled(self) -> bool:
-        """Whether the readings scatter as at rest, or slightly more with a scatter that no longer decreases."""
+        """Whether the readings scatter as at rest, or slightly more if their scatter no longer decreases."""
         ratio, scatter, earlier = self.over_rest(), self.scatter_counts(), self.scatter_counts(before=1)
         if ratio is None or scatter is None:
             return False
@@ -64,7 +64,7 @@ class _Watched:
 
 @dataclass(slots=True)
 class Settling:
-    """The test of all sensors, fed by the threads of the sources, read by the script's."""
+    """The settling of all sensors, fed by the threads of the sources and read by the script's thread."""
 
     _watched: dict[str, _Watched] = field(default_factory=dict)
     _lock: threading.Lock = field(default_factory=threading.Lock)
@@ -83,7 +83,7 @@ class Settling:
                 watched.recent.extend(samples[watched.column].astype(np.float64))
 
     def begin(self) -> None:
-        """Drop the readings so far, because the arm is at rest from now on."""
+        """Drop the readings so far; the arm is at rest from now on."""
         with self._lock:
             for watched in self._watched.values():
                 watched.recent.clear()

@@ -35,8 +35,8 @@ class Warming:
     """The supervision of a calibration over temperature.
 
     - `names`: the sensors whose thermometers count.
-    - `heater`: the board that has it; None if the operator changes the temperature.
-    - `set_s`: the duration of a set, the planned one or the longest so far.
+    - `heater`: the board with the heater, None if the operator changes the temperature.
+    - `set_s`: the duration of a set, planned or the longest so far.
     """
 
     section: ThermalSection
@@ -153,7 +153,7 @@ class Warming:
             self.heater.keep_heating(0.0)
 
     def _nearest(self, now_c: Mapping[str, float]) -> float:
-        """Return the temperature of the sensor that has the largest part of the range ahead."""
+        """Return the temperature of the sensor with the largest part of the range ahead."""
         return max(now_c.values()) if self.course.warming is False else min(now_c.values())
 
     def _refuse_hot(self, now_c: Mapping[str, float]) -> None:
@@ -168,7 +168,7 @@ class Warming:
             )
 
     def _refuse_fast(self, name: str, read_s: float, temperature_c: float) -> None:
-        """Raise `too_fast`, computed with the board's times, since readings may arrive late on a busy computer."""
+        """Raise Fault `too_fast`, by the board's times: readings may arrive late on a busy computer."""
         history = self._history.setdefault(name, deque())
         if history and read_s <= history[-1][0]:
             return
@@ -198,7 +198,7 @@ class Warming:
 
 
 def range_not_reached(missing: str, why: str) -> Fault:
-    """Return the fault of a run that ends without having covered the range."""
+    """Return the fault of a run that ends before it has covered the range."""
     return Fault(
         "range_not_reached",
         f"{missing}; {why}",

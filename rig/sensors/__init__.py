@@ -1,1 +1,1 @@
-"""Sensors with a port of their own (not the board's), one package for each maker's protocol."""
+"""Sensors with a port of their own, one package for each maker's protocol."""

@@ -24,7 +24,7 @@ class DevicePort(Protocol):
 class PortFaults:
     """The errors of a device if its port has closed, if it is silent, or if a consumer of its data has failed.
 
-    Each lacks only the end of its message: the reason, or the duration.
+    Each message is completed by a reason, or a duration.
     """
 
     closed: SensorError
@@ -41,7 +41,7 @@ class PortFaults:
 
 
 class OwnPort:
-    """An open port and the thread that reads it until `close`; `take` gets the data of each read and its time.
+    """An open port and the thread that reads it until `close`; `take` gets the data and the time of each read.
 
     `news` is locked during `take`, and notified after it. The first error that ends the reading becomes the `fault`:
     the port's OSError, a SensorError, or an error of a consumer.
@@ -77,7 +77,7 @@ class OwnPort:
         return self._most_silent_s is not None
 
     def stream(self, more_s: float = 0.0) -> None:
-        """Treat a silence longer than `Patience.silent_s` plus `more_s` as a fault from now on."""
+        """From now on, treat a silence longer than `Patience.silent_s` plus `more_s` as a fault."""
         with self.news:
             self._most_silent_s, self.silence = self._patience.silent_s + more_s, PortSilence()
 
@@ -94,7 +94,7 @@ class OwnPort:
             raise _complete_error(self._faults.silent, f" for {silent_s:.1f} s")
 
     def wait(self, until: Callable[[], bool], timeout_s: float) -> bool:
-        """Wait until a condition is true; return whether that was in time. Raise a fault that occurs meanwhile."""
+        """Wait until a condition is true; return whether it was in time. Raise a fault that occurs meanwhile."""
         with self.news:
             done = self.news.wait_for(lambda: until() or self.fault is not None, timeout_s)
             if self.fault is not None:

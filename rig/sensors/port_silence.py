@@ -23,9 +23,9 @@ USUAL = Patience()
 
 
 class PortSilence:
-    """The duration without data, s, during reading only, so that a device does not seem silent to a delayed reader.
+    """The time spent reading without data, s, so that a device does not seem silent to a delayed reader.
 
-    Time in which another instrument's clock stops, as a simulated one may, does not count either.
+    Time in which another instrument's clock stops, as in a simulation, does not count either.
     """
 
     def __init__(self) -> None:
@@ -46,10 +46,7 @@ class PortSilence:
 
     @property
     def lasts_s(self) -> float:
-        """The time spent reading, s, without receiving data: a delayed reader does not make a device appear silent.
-
-        Time in which another instrument's clock stops, as in a simulation, does not count either.
-        """
+        """The time spent reading without data, s."""
         silent_s = self._idle_reads * READ_TIMEOUT_S
         if self._clock_s is None:
             return silent_s

@@ -24,5 +24,5 @@ class SampleSource(Protocol):
         ...
 
     def check(self, clock_s: float | None = None) -> None:
-        """Raise errors since the last call; a silence counts only if a clock that now shows `clock_s` confirms it."""
+        """Raise errors since the last call; a silence counts only if another clock, now at `clock_s`, confirms it."""
         ...

@@ -1,4 +1,4 @@
-"""Scales of readings that are sent as fractions: samples hold integers, far finer than those fractions. Pure."""
+"""Scales of readings that are sent as fractions; samples hold far finer integers. Pure."""
 
 from rig.config.sensors.stated_temperature import StatedTemperatureSection
 from rig.data.quantity import Quantity

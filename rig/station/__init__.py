@@ -1,1 +1,1 @@
-"""The operator's side of a run: events, views, questions."""
+"""The operator's side of a run: events, views and questions."""

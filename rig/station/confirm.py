@@ -14,7 +14,7 @@ NOT_AGREED = "Run again and agree, or agree in advance: --yes, in Python yes=Tru
 def ask_operator(announcement: Sequence[str], to_do: str = "start") -> bool:
     """Show what will be done and ask until the operator agrees or not; return False without a terminal.
 
-    Input typed before the question does not count.
+    Input typed before the question is ignored.
     """
     if sys.stdin.isatty():
         return is_agreed(Terminal(), question_before(announcement, to_do))

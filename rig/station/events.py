@@ -1,4 +1,4 @@
-"""The events of a run, typed. Views make words of them; no program parses sentences.
+"""The typed events of a run. Views convert them to words; no program parses sentences.
 
 All events of a run come in order, from the thread that runs the procedure.
 """
@@ -80,9 +80,9 @@ class PreflightPassed:
 class Prompt:
     """A question to the operator.
 
-    It has an `announcement`, and the agreement `to_do` it, which a page shows with a box `to_tick`. A question
-    `for_a_person` cannot be agreed to in advance. Before a stage with a new mounting, `mounts` is the number of the
-    stage, from 0.
+    After the `announcement` it asks for agreement `to_do` so; a page also shows a box `to_tick`. A question
+    `for_a_person` cannot be agreed to in advance. Before a stage with a new mounting, `mounts` is the stage's number,
+    from 0.
     """
 
     announcement: tuple[str, ...]
@@ -115,7 +115,7 @@ class StepStarted:
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """The progress of the run, many times in each step: the `fraction` of the step (0 to 1), times of the plan."""
+    """The progress of the run, many times in each step: the `fraction` of the step (0 to 1), and times by the plan."""
 
     number: int
     count: int
@@ -128,7 +128,7 @@ class Progress:
 
 @dataclass(frozen=True, slots=True)
 class SensorSamples:
-    """The samples of one sensor so far: their number, gaps in their numbering, the newest mean readings by quantity.
+    """The samples of one sensor so far: their number, lost ones by their numbering, newest mean readings by quantity.
 
     A reading is a number for each axis, or a single one, in the quantity's unit (`rig.data.installed_kinds.measured`).
     """
@@ -206,7 +206,7 @@ class HandSeen:
 
 @dataclass(frozen=True, slots=True)
 class ObservationMade:
-    """The host has averaged a revolution of `sensor`; after a phase is judged, all those of its calibration."""
+    """The host has averaged a revolution of `sensor`, or after the verdict all revolutions of its calibration."""
 
     sensor: str
     observation: Observation
@@ -214,7 +214,7 @@ class ObservationMade:
 
 @dataclass(frozen=True, slots=True)
 class AttitudeRead:
-    """The host has averaged a dwell of a sensor; after a phase is judged, all of them."""
+    """The host has averaged a dwell of a sensor, or after the verdict all dwells."""
 
     read: ReadAtRest
 
@@ -238,7 +238,7 @@ class PhaseSkipped:
 
 @dataclass(frozen=True, slots=True)
 class UncertaintySoFar:
-    """The expanded uncertainties after a repeat. If they are `as_wanted`, the other repeats are skipped.
+    """The expanded uncertainties after a repeat. If these are `as_wanted`, the other repeats are skipped.
 
     `scale_u` and `bias_u_rad_s` are the largest of all axes and sensors.
     """
@@ -284,7 +284,7 @@ class VerdictReached:
 
 @dataclass(frozen=True, slots=True)
 class ListenerDropped:
-    """A listener raised `error` on an event; it gets no further ones."""
+    """A listener raised `error` on an event, and gets no further events."""
 
     listener: str
     error: str
@@ -316,9 +316,9 @@ class Since:
 
 @dataclass(frozen=True, slots=True)
 class Remembered:
-    """The run was entered in `history` as the calibrations of these `numbers`, by which `rig history` finds them.
+    """The run was entered in `history` as the calibrations with these `numbers`, for `rig history`.
 
-    `usual` is whether that is the command's default history. `since` are the previous calibrations of the sensors.
+    `usual`: whether this is the command's default history; `since`: the previous calibrations of the sensors.
     """
 
     history: str
@@ -329,7 +329,7 @@ class Remembered:
 
 @dataclass(frozen=True, slots=True)
 class NotRemembered:
-    """The run in `folder` could not be entered in the history, and why. The run itself is not affected."""
+    """The reason why the run in `folder` could not be entered in the history. The run itself is not affected."""
 
     folder: Path
     why: str
@@ -337,7 +337,7 @@ class NotRemembered:
 
 @dataclass(frozen=True, slots=True)
 class Advice:
-    """The next step after a failure: the data are in `folder`; `command` continues, or `repeats` refused sweeps."""
+    """The next step after a failure, with data in `folder`: `command` continues, or `repeats` refused sweeps."""
 
     folder: Path
     command: str

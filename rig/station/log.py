@@ -1,4 +1,4 @@
-"""The run's log: a line with the time for every event."""
+"""The run's log: a line with its time for every event."""
 
 import os
 from collections.abc import Iterator
@@ -15,7 +15,7 @@ from rig.station.words import line, reason
 
 
 class Log:
-    """The writer of an open log file. If it cannot be written, that is no error here: the recording reports it."""
+    """The writer of an open log file. Errors of writing are ignored: the recording reports them."""
 
     def __init__(self, file: TextIO) -> None:
         self._file = file
@@ -34,7 +34,8 @@ class Log:
 def log(path: Path) -> Iterator[Log]:
     """Open the log at `path` for the block; existing lines remain.
 
-    Raise Refused `run_folder` if it cannot be written, because the recording in this folder could not be either.
+    Raise Refused `run_folder` if the log cannot be written, because the recording in the same folder could not be
+    either.
     """
     try:
         file = os.fdopen(open_to_append(path), "a", encoding="utf-8")

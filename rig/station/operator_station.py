@@ -8,7 +8,7 @@ from rig.station.events import Answered, ListenerDropped, Prompt, RunEvent
 
 
 class Listener(Protocol):
-    """A receiver of all events, which must not block. If it raises, it gets no more: a run does not depend on it."""
+    """A receiver of all events, which must not block. If it raises, it gets no more events."""
 
     def event(self, event: RunEvent) -> None: ...
 
@@ -27,10 +27,10 @@ class Station(Protocol):
 
 @dataclass(slots=True)
 class Stations:
-    """Several listeners and one answer; if not `attended`, everything was agreed to in advance.
+    """A station of several listeners and one answer; if not `attended`, everything is agreed to in advance.
 
-    `mount` mounts the item for a stage after agreement: the operator of a simulated laboratory does. `confirm` confirms
-    the part of a batch.
+    `mount` mounts the item for a stage after agreement, in a simulated laboratory. `confirm` confirms the part of a
+    batch.
     """
 
     listeners: Sequence[Listener]
@@ -53,7 +53,7 @@ class Stations:
             self.event(ListenerDropped(type(dropped).__name__, f"{type(why).__name__}: {why}"))
 
     def confirm_part(self) -> None:
-        """Confirm the part as in the protocol; a single run has nothing to compare with."""
+        """Confirm the part as in the protocol; a single run has nothing to compare it with."""
         if self.confirm is not None:
             self.confirm()
 
@@ -70,5 +70,5 @@ class Stations:
 
 
 def always_yes(announcement: Sequence[str], to_do: str) -> bool:
-    """Return True, for a run in which there is no operator."""
+    """Return True, for a run without an operator."""
     return True

@@ -31,7 +31,7 @@ def say_on_terminal(doing: str) -> None:
 
 
 def format_for_file(text: str, file: TextIO) -> str:
-    """Return a message for a file such as stderr: broken between words for a terminal, unchanged otherwise."""
+    """Return a message for a file such as stderr, broken between words if that is a terminal."""
     if not file.isatty():
         return text
     width = _columns(file)

@@ -1,4 +1,4 @@
-"""The questions before something moves or changes: the answers that each takes, and how it is asked at a terminal."""
+"""The questions before something moves or changes, their answers, and the terminal that asks them."""
 
 import sys
 from collections.abc import Mapping, Sequence
@@ -35,7 +35,7 @@ COMMAND_WORDS = frozenset(word for choices in CHOICES.values() for choice in cho
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """A question of a `kind`: the `lines` before it, its `text`, and a `hint` if the last input was no answer."""
+    """A question of a `kind`: the `lines` before it, its `text`, and a `hint` after an input that was no answer."""
 
     kind: Kind
     text: str
@@ -53,24 +53,24 @@ class Question:
         return next((choice.yes for choice in self.choices if typed in choice.words), None)
 
     def after_no_answer(self, answer: str) -> "Question":
-        """Return the question to ask again after something that did not answer it."""
+        """Return the question with a hint that `answer` does not answer it."""
         expected = " or ".join(choice.words[0] or "Enter" for choice in self.choices) or "a serial number"
         return replace(self, hint=f'"{answer}" does not answer this question: {expected}')
 
 
 class Voice(Protocol):
-    """The interface to an operator; an answer has no white space around it. It is None if the operator has left."""
+    """The interface to an operator; an answer has no white space around it, and is None if the operator has left."""
 
     def answer(self, question: Question) -> str | None: ...
 
 
 class Terminal:
-    """The keyboard of the terminal. A scanner is a keyboard that ends each number with Enter."""
+    """The keyboard of the terminal, or a scanner that ends each number with Enter."""
 
     def answer(self, question: Question) -> str | None:
-        """Return the text typed after the question: earlier input does not answer it.
+        """Return the text typed after the question; earlier input is ignored.
 
-        Return None if the terminal is closed.
+        None if the terminal is closed.
         """
         _forget_what_was_typed()
         for line in (question.hint,) if question.hint else question.lines:
@@ -81,7 +81,7 @@ class Terminal:
 
 
 def question_before(announcement: Sequence[str], to_do: str) -> Question:
-    """Return the question before an announced action: the answer `go` permits motion, `yes` anything else."""
+    """Return the question before an announced action: the answer `go` permits motion, `yes` any other action."""
     from rig.station.events import Prompt
 
     if to_do == Prompt(()).to_do:
@@ -99,7 +99,7 @@ def is_agreed(voice: Voice, question: Question) -> bool:
 
 
 def _forget_what_was_typed() -> None:
-    """Discard lines that wait at the terminal: they do not answer a question that was not shown yet."""
+    """Discard lines typed at the terminal before the question."""
     with suppress(ImportError):  # a system with other terminals
         import termios
 

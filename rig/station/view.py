@@ -43,7 +43,7 @@ class LiveView:
         self._instruction: HandAsked | None = None
 
     def event(self, event: RunEvent) -> None:
-        """Show an event: as a line, or in the panel."""
+        """Show an event as a line, or in the panel."""
         match event:
             case SamplesTaken():
                 self._samples = event
@@ -89,7 +89,7 @@ def _panel(progress: Progress, samples: SamplesTaken) -> Table:
 
 
 def _bar(fraction: float) -> ProgressBar:
-    """Return a progress bar that is always green; the library's own bar changes from red to green."""
+    """Return a progress bar that is always green, unlike the library's own."""
     return ProgressBar(total=1.0, completed=fraction, width=40, complete_style="green", finished_style="green")
 
 

@@ -1,4 +1,4 @@
-"""The line for an event, at a terminal and in the log."""
+"""The lines for events, at a terminal and in the log."""
 
 import shlex
 from collections.abc import Sequence
@@ -87,7 +87,7 @@ def _temperature_line(event: RunEvent) -> str | None:
 
 
 def _outcome_line(event: RunEvent) -> str | None:
-    """Return an event in words if it is one that comes after the last motion, else None."""
+    """Return an event after the last motion in words, else None."""
     text: str | None
     match event:
         case CalibrationStored(sensor, part, serial_number, record):
@@ -140,7 +140,7 @@ def _entry_words(history: str, numbers: Sequence[int], *, usual: bool) -> str:
 
 
 def reason(event: RunEvent) -> str | None:
-    """Return why a run ended early. The log keeps this; on a terminal the command prints it last."""
+    """Return why a run ended early, for the log; on a terminal the command prints it last."""
     match event:
         case Failed(error) if error.name == "script_failed" and error.__cause__ is not None:
             return f"{error}\n{''.join(format_exception(error.__cause__)).rstrip()}"

@@ -1,8 +1,8 @@
 """SIX, Eq. (8): squaring every sample before averaging, against averaging the revolution before squaring.
 
-Taken literally, Eq. (8) averages m². The mean of the squares contains the square of the mean, the variance of the noise
-on all three axes, and that of the vibration along the turn (a fraction ε = 0.05 of the speed). The estimated scale
-factors therefore shrink by about 3 k² σ² / (2 ω²) + ε²/2.
+Taken literally, Eq. (8) averages m². The mean of squares contains the variance of the noise on all three axes, and of
+the vibration along the turn (a fraction ε = 0.05 of the speed). The estimated scale factors therefore shrink by about 3
+k² σ² / (2 ω²) + ε²/2.
 """
 
 from functools import partial
@@ -63,7 +63,7 @@ def _simulate_gyroscope(runs: int, rng: np.random.Generator, _: int) -> Array:
 
 
 def _solve_closed_form(x: Array, speed_rad_s: float) -> tuple[Array, Array]:
-    """Return scale factors and biases (runs, 3) for designs (runs, 6, 6) of either order of averaging."""
+    """Return scale factors and biases (runs, 3) for designs (runs, 6, 6) with either order of averaging."""
     q = np.linalg.solve(x, np.ones((*x.shape[:-1], 1)))[..., 0]
     total = np.sum(q[:, 3:] ** 2 / (4 * q[:, :3]), axis=1, keepdims=True)
     beta = speed_rad_s**2 / (1 + total) * q

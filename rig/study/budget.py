@@ -1,4 +1,4 @@
-"""Coverage of the stated uncertainty: sessions with every effect that the budget names, drawn from its distribution.
+"""Coverage of the stated uncertainty: sessions with all effects in the budget, drawn from their distributions.
 
 JCGM 101: a draw is a session with its own gyroscope, arm and controller. Its mean readings are computed from the true
 motion; the solver gets the controller's values. The interval ± 2 u of the budget must then cover the truth in 95 of 100
@@ -42,12 +42,13 @@ WARM_UP_S, STEP_K = 300.0, 1 / 16  # warm-up, and the resolution of the thermome
 class Effects:
     """Magnitudes of the effects: standard deviations, but half-widths of clock, offset, nonlinearity and warming.
 
-    - `g_sensitivity_rad_s_g` of every element; `axis_rad`, twist of each wrist's axis; `jitter_s` of states' times;
-    - `clock`, `clock_known`: error of the controller's clock, and standard uncertainty of its correction;
-    - `walk_rad_s_sqrt_s`, bias random walk; `offset_m`, the sensor's offset from the flange's centre, by axis;
-    - `nonlinearity` as a fraction of full scale; `warming_k`, with its effect on bias and scale.
+    - `g_sensitivity_rad_s_g`: of every element; `axis_rad`: twist of each wrist's axis; `jitter_s`: of states' times.
+    - `clock`, `clock_known`: error of the controller's clock, and standard uncertainty of its correction.
+    - `walk_rad_s_sqrt_s`: bias random walk; `offset_m`: the sensor's offset from the flange's centre, by axis.
+    - `nonlinearity`: as a fraction of full scale; `warming_k`: change of temperature, which affects bias and scale.
 
-    The noise is a LSM9DS1's by its data sheet, 0.01 °/s/√Hz, the nonlinearity a MPU-9250's (PS-MPU-9250A-01, table 1).
+    The noise is an LSM9DS1's by its data sheet, 0.01 °/s/√Hz, the nonlinearity an MPU-9250's (PS-MPU-9250A-01, table
+    1).
     """
 
     speed_rad_s: float = np.pi / 3

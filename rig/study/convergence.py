@@ -1,9 +1,9 @@
 """SIX, Table I: passes of Algorithm 1, and the bias at which it stops converging.
 
-Without noise the first pass omits β0: k₁² = k² / (1 − β0/ω²), and b₁ = b already. So the first line of each of Table
-I's examples implies the speed that was used, which SIX does not state. Each further pass shrinks the error by Γ = β0 /
-(ω² − β0), alternating: k_n ≈ k (1 ± Γⁿ/2). So Algorithm 1 needs β0 < ω²/2 (at 1 rad/s this is SIX's "β0 < 0.5"). Table
-I counts passes until its four decimals stop changing, long before Σ|Δβ| ≤ 1e-6.
+Without noise the first pass omits β0: k₁² = k² / (1 − β0/ω²), and b₁ = b already. So the first lines of Table I's
+examples imply the speed, which SIX does not state. Each further pass shrinks the error by Γ = β0 / (ω² − β0),
+alternating: k_n ≈ k (1 ± Γⁿ/2). So Algorithm 1 needs β0 < ω²/2 (at 1 rad/s this is SIX's "β0 < 0.5"). Table I counts
+passes until its four decimals stop changing, long before Σ|Δβ| ≤ 1e-6.
 """
 
 from dataclasses import dataclass
@@ -104,7 +104,7 @@ def _build_rows(example: str, scale: Array, bias_rad_s: Array, speed_rad_s: floa
 
 
 def _count_passes(scale: float, ratio: float) -> int | None:
-    """Return the number of passes until four decimals of k (1 ± Γⁿ/2) are final; None if they never are."""
+    """Return the number of passes until four decimals of k (1 ± Γⁿ/2) are final, or None."""
     factor = ratio / (1 - ratio) if ratio < 0.5 else 1.0
     return None if factor == 1 else int(np.ceil(np.log(2 * FOUR_DECIMALS / scale) / np.log(factor)))
 

@@ -1,7 +1,7 @@
-"""Every estimator's mean squared error over its own Cramér–Rao bound, for the gyroscope from the same runs.
+"""The mean squared error of every estimator over its own Cramér–Rao bound.
 
-The six-observation estimators and the vector model have different bounds: the latter knows the direction of each turn
-and uses the rests too. The tri-axial estimators use the rate table's data.
+The gyroscope's estimators use the same runs. The six-observation estimators and the vector model have different bounds:
+the latter knows the directions of the turns and uses the rests too. The tri-axial estimators use the rate table's data.
 """
 
 from collections.abc import Iterator
@@ -87,7 +87,7 @@ def _gyroscope_rows(ratios: Array) -> Iterator[dict[str, Any]]:
 
 
 def _simulate_rate_table(runs: int, rng: np.random.Generator, _: int) -> dict[str, Array]:
-    """Return each parameter's mean squared error, divided by its bound, and absolute, (2, 15 or 18), by estimator."""
+    """Return by estimator each parameter's mean squared error, divided by its bound and absolute, (2, 15 or 18)."""
     attitudes = rt.draw_attitudes(TABLE_POSES)
     ratios = {}
     rates = 0.5 * np.random.default_rng(TABLE_POSES).normal(size=(TABLE_POSES, 3))  # rad/s, the same in every run

@@ -1,4 +1,4 @@
-"""TRIAX, section III-B: accelerometers in attitudes at rest, with second-order terms, and their bias by repeat."""
+"""TRIAX, section III-B: an accelerometer in attitudes at rest, with second-order terms, and its bias by repeat."""
 
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -68,8 +68,8 @@ def study(settings: Settings) -> StudyReport:
 def _calibrate(rng: np.random.Generator, _: int) -> tuple[Array, Array, Array]:
     """Return θ (18,), its standard deviations (18,), and residuals (3,) in m/s².
 
-    The residuals are the largest standard deviation of corrected samples, and the largest mean in any attitude, with
-    and without second-order terms.
+    The residuals: largest standard deviation of corrected samples, and largest mean in any attitude, with and without
+    second-order terms.
     """
     attitudes = rt.draw_attitudes(STILL)
     force = rt.project(attitudes, rt.ACCELEROMETER_REFERENCE_M_S2)
@@ -95,7 +95,7 @@ def _solve(means: Array, attitudes: Array, *, second_order: bool) -> TriaxialSol
 
 
 def _simulate_drift(seed: int) -> list[dict[str, Any]]:
-    """Return the repeats of TRIAX, Fig. 6: a jump after the first repeat, then almost no change."""
+    """Return repeats as in TRIAX, Fig. 6: a jump after the first repeat, then almost no change."""
     sensor = rt.DriftingSensor(
         rt.ACCELEROMETER_MATRIX,
         rt.ACCELEROMETER_REFERENCE_M_S2,

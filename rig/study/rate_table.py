@@ -48,7 +48,7 @@ def draw_attitudes(count: int) -> Array:
 def simulate_oscillation(duration_s: float) -> tuple[Array, Array]:
     """Return attitudes (N, 3, 3) and body rates (N, 3), rad/s, of oscillations by ±60° about all three axes.
 
-    TRIAX shows its motion only as a figure; the essential is that every axis turns and tilts.
+    TRIAX shows its motion only in a figure; essential is that every axis turns and tilts.
     """
     from scipy.spatial.transform import Rotation
 
@@ -92,8 +92,8 @@ class DriftingSensor:
     def simulate_repeats(self, rng: np.random.Generator, unit: float, unit_name: str) -> list[dict[str, Any]]:
         """Return one row per repeat, with the bias in `unit`, as in TRIAX, Figs. 4 and 6.
 
-        `held`: whether F and the reference are given by an earlier calibration, and only the bias is estimated. `free`:
-        all parameters are estimated from the ten attitudes, with the reference's norm given.
+        Columns `held_…` have the bias estimated with F and the reference of an earlier calibration; for `free_…` all
+        parameters are estimated from the ten attitudes, with the reference's norm given.
         """
         attitudes = draw_attitudes(ATTITUDES)
         force = project(attitudes, self.reference)

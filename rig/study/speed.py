@@ -1,8 +1,8 @@
 """SIX, Fig. 4: mean squared error of the parameters against the speed of the sweeps.
 
-In SIX the biases' error is the same at every speed. That needs the same number of samples in every sweep, whereas a
-slower revolution lasts longer and averages more of them. Both are shown: `whole_turn` samples one revolution at 200 Hz,
-`fixed_samples` takes as many samples as a revolution at 3 rad/s has.
+In SIX the biases' error is the same at every speed. This needs the same number of samples in every sweep, whereas a
+slower revolution has more. Both are shown: `whole_turn` samples one revolution at 200 Hz, `fixed_samples` takes as many
+samples as a revolution at 3 rad/s has.
 """
 
 from collections.abc import Callable

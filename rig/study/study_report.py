@@ -13,7 +13,7 @@ Columns = Mapping[str, Sequence[Any] | NDArray[Any]]
 
 
 class StudyProgress(Protocol):
-    """A function that passes on the results of a study's tasks, and may show their number out of `total`."""
+    """A function that passes on the results of a study's tasks, and may show the progress out of `total`."""
 
     def __call__(self, results: Iterable[Any], total: int) -> Iterable[Any]: ...
 
@@ -25,7 +25,7 @@ def pass_on(results: Iterable[Any], total: int) -> Iterable[Any]:
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """The seed, the `runs` per parameter set (None: the paper's or the study's own), and the distribution of work.
+    """A study's settings: seed, `runs` per parameter set (None: the paper's or the study's own), distribution of work.
 
     `jobs` is joblib's `n_jobs`; None leaves it to the surrounding `joblib.parallel_config`, one process without any.
     """
@@ -38,7 +38,7 @@ class Settings:
 
 @dataclass(frozen=True, slots=True)
 class StudyFinding:
-    """One number of a study and, if there is one, the published value, both in `unit`."""
+    """One number of a study, and the published value, if any, both in `unit`."""
 
     quantity: str
     value: float

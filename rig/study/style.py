@@ -8,8 +8,8 @@ from contextlib import contextmanager
 def use_style() -> Iterator[None]:
     """Draw in one style within this block, with the same bytes of SVG each time.
 
-    By default matplotlib reads settings from a file in the working folder, which may be another user's run folder and
-    make LaTeX set the text. So its own defaults are restored.
+    The library's defaults are restored, because matplotlib reads settings from a file in the working folder, which may
+    be another user's run folder and start LaTeX.
     """
     import matplotlib as mpl
 

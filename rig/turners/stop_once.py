@@ -1,4 +1,4 @@
-"""A stop that runs once, in a thread of its own: the part that the stops of all turners share."""
+"""A stop that runs once, in a thread of its own: the common part of the stops of all turners."""
 
 import threading
 from collections.abc import Callable, Iterator
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class StopOutcome:
-    """The end of a stop: whether a state confirmed rest, in words; `remedy` is empty if nothing remains to be done."""
+    """The end of a stop: whether a state confirmed rest, a description, and a `remedy`, empty if none is needed."""
 
     at_rest: bool
     what: str
@@ -18,8 +18,8 @@ class StopOutcome:
 class StopOnce:
     """A stop that starts at the first call of `begin`; later calls change nothing.
 
-    `stopped` stops the turner and returns the outcome in less than 1 s, in a thread called `name`. An interrupt of the
-    caller does not abort it. `not_ended` is the outcome if `stopped` itself fails.
+    `stopped` stops the turner and returns the outcome in less than 1 s, in a thread called `name`, which an interrupt
+    of the caller does not abort. `not_ended` is the outcome if `stopped` itself fails.
     """
 
     def __init__(self, name: str, stopped: Callable[[], StopOutcome], not_ended: StopOutcome) -> None:
@@ -43,8 +43,8 @@ class StopOnce:
     def outcome(self) -> StopOutcome:
         """Stop, unless the stop has begun; wait for the outcome, which takes less than 1 s.
 
-        An interrupt during the stop is raised once the outcome is known. (It waits for an event, because in Python 3.11
-        an interrupted `join` takes the thread for ended.)
+        An interrupt during the stop is raised once the outcome is known. (In Python 3.11 an interrupted `join` takes
+        the thread for ended, so an event is awaited.)
         """
         self.begin()
         interrupt = None
@@ -66,7 +66,7 @@ class StopOnce:
 
 @contextmanager
 def stopping_on_error(stop: Callable[[], StopOutcome]) -> Iterator[None]:
-    """Stop the turner if the block raises an exception, before the caller receives it."""
+    """Stop the turner if the block raises an exception, before passing it on."""
     try:
         yield
     except BaseException:

@@ -1,4 +1,4 @@
-"""The protocol of a turner as a run uses it; each kind (`rig.turners.turner_kind`) has a driver in its own package."""
+"""The protocol of a turner in a run; each kind (`rig.turners.turner_kind`) has a driver in its own package."""
 
 from collections.abc import Callable
 from typing import Protocol
@@ -11,9 +11,9 @@ from rig.motion.turner_state import Report, State
 class Turner(Protocol):
     """A connected turner, at rest until `take_control`, and stopped again at the end of its `with` block.
 
-    The time of its states is the reference of a recording, which gets every state in order. A failure stops the turner
-    first; then every method raises `Fault` by name, or `Refused` while nothing has moved. `move` and `rest` call
-    `watch` at least every 20 ms; an exception of it stops the turner and goes on to the caller.
+    The time of its states is the reference of a recording, which gets every state in order. A failure first stops the
+    turner; then every method raises `Fault` by name, or `Refused` while nothing has moved. `move` and `rest` call
+    `watch` at least every 20 ms; its exception stops the turner and is passed to the caller.
     """
 
     @property
@@ -31,7 +31,7 @@ class Turner(Protocol):
         ...
 
     def check(self) -> None:
-        """Raise the problem that has occurred since the last call, if there is one."""
+        """Raise the problem that has occurred since the last call, if any."""
         ...
 
     def take_control(self, carried: FlangeLoad) -> None:
@@ -39,7 +39,7 @@ class Turner(Protocol):
         ...
 
     def move(self, motion: Motion, watch: Callable[[], None] = ...) -> None:
-        """Make one movement, and return when the turner is at rest at its end; stop a movement that takes too long."""
+        """Make one movement, and return when the turner is at rest at the end; stop a movement that takes too long."""
         ...
 
     def rest(self, duration_s: float, watch: Callable[[], None] = ...) -> None:

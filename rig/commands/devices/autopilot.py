@@ -119,7 +119,7 @@ def _announce(planned: "ParameterChange", which: str) -> Iterator[str]:
 def _read_values(
     firmware: int, result: "ResultDocument", path: Path, sections: Mapping[str, "SensorSection"]
 ) -> dict[str, float]:
-    """Return the parameters that store a run's calibrations of the sensors.
+    """Return the values of the parameters that store a run's calibrations of the sensors.
 
     Raise Refused `not_in_result`, and as `refuse_other_sensor` does.
     """
@@ -163,7 +163,7 @@ def _backup_path(options: Namespace) -> Path:
 
 @contextmanager
 def _connect(options: Namespace) -> Iterator[tuple["AutopilotLink", Mapping[str, "SensorSection"]]]:
-    """Connect to the only autopilot of a configuration, with its IMUs; start its simulated laboratory if it has one."""
+    """Connect to the only autopilot of a configuration, with its IMUs; start the simulated laboratory, if any."""
     from rig.commands.laboratory.claims import claim_sensor
     from rig.commands.laboratory.laboratory_process import run_simulated_laboratory
     from rig.commands.laboratory.own_address import load_at_own_address

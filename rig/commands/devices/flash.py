@@ -1,4 +1,4 @@
-"""`rig board flash`: put the firmware that comes with this program onto the board."""
+"""`rig board flash`: write this program's firmware onto the board."""
 
 from argparse import Namespace
 from collections.abc import Callable

@@ -1,6 +1,6 @@
 """`rig board hand`: the board calibrates a gyroscope that is turned by hand; its result is checked.
 
-With `--fetch` the session was started by the board's button: its result is used as it is.
+With `--fetch` the board's button started the session, and its result is used unchecked.
 """
 
 import json
@@ -47,7 +47,7 @@ def hand(options: Namespace) -> int:
     """Let the board calibrate, or read its last result; print it with its difference from double precision.
 
     Raise Refused `bad_option`, `no_such_sensor`, `not_confirmed`, `another_sensor`, `another_range`, and as
-    `calibrate_by_board` and `read_kept_solution` do; Fault as the first of them does.
+    `calibrate_by_board` and `read_kept_solution` do; Fault as `calibrate_by_board` does.
     """
     if options.moves not in MOVES or not 0 < options.scale_std < 1:
         raise Refused(

@@ -69,7 +69,7 @@ def run(options: Namespace) -> int:
 
 
 def ask_stated(options: Namespace, *, by_hand: bool) -> "StatedProperties":
-    """Ask for values that no option states; without a terminal they remain open. Raise Refused `bad_option`."""
+    """Ask for values that no option states; without a terminal they remain unknown. Raise Refused `bad_option`."""
     from rig.commands.devices.terminal_questions import ask
     from rig.config.sensors.sensor_sections import check_serial_number
     from rig.sensors.lines.guessed_section import StatedProperties
@@ -104,7 +104,7 @@ def look_at_device(
 ) -> str:
     """Read a device's lines for ten seconds and return its section as YAML; print the properties of the lines.
 
-    Raise Refused as `listen` does; `lines_no_pattern` if its lines have nothing in common; for a configuration by hand,
+    Raise Refused as `listen` does; `lines_no_pattern` for lines without a common pattern; for a configuration by hand,
     `lines_not_turned` if no columns look like a gyroscope's.
     """
     from rig.commands.laboratory.claims import claim_sensor

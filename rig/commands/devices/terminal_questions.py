@@ -1,4 +1,4 @@
-"""Questions at the terminal for values that the command line does not give; without a terminal the option is named."""
+"""Questions at the terminal for values that the command line lacks; without a terminal an error names the option."""
 
 import sys
 from collections.abc import Callable, Mapping

@@ -85,7 +85,7 @@ def export_files(options: Namespace) -> list[Path]:
 def _read_recordings(run: Path, columns: Path | None) -> "Sequence[RunData]":
     """Return the recordings of a run, or of a log of another program.
 
-    Raise Refused `bad_option`, and the errors of both readers. A folder of `rig record` counts as logs, not as a run.
+    A folder of `rig record` counts as logs, not as a run. Raise Refused `bad_option`, and as both readers do.
     """
     from rig.observation.external.from_files import read_log
     from rig.observation.formats.sample_files import is_in_format

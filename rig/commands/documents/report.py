@@ -1,4 +1,4 @@
-"""`rig report`: the documents of a finished run again, in other forms or with the customer's name in them."""
+"""`rig report`: the documents of a finished run again, in other forms or with the customer's name."""
 
 import sys
 from argparse import ArgumentParser, Namespace
@@ -69,9 +69,9 @@ def write_documents(options: Namespace) -> tuple[list[Path], list[Refused]]:
     """Write the certificate of a run folder or its result.json into `--out`: HTML, with `--dcc` and `--pdf` also these.
 
     `--sign` is the key that signs these two, `--time-server` the server that dates the signature. `--reversal` is the
-    file that `rig reversal` wrote for its magnetometers. `--history` is the history in which the certificate is
-    entered: by default the user's own, never one that the folder names. Return the files, and why requested forms could
-    not be made. Raise Refused `report_folder`, `bad_option`, and as `read_result`, `read_reversal`, `refuse_links`,
+    file by `rig reversal` for its magnetometers. `--history` is the history in which the certificate is entered, by
+    default the user's own, never one that the folder names. Return the files, and why requested forms could not be
+    made. Raise Refused `report_folder`, `bad_option`, and as `read_result`, `read_reversal`, `refuse_links`,
     `certificate_of`, `folder_statements` and `signatory`.
     """
     if options.sign is None and options.time_server is not None:

@@ -135,8 +135,7 @@ def _judge(
 ) -> VerifiedFile:
     """Judge one file by its signature; without a signature, by a signed file that contains it, or by the history.
 
-    `looks` are the inspections of all files. If the history confirms an unsigned file, it does not matter whether a
-    signer is trusted.
+    `looks` are the inspections of all files. If the history confirms an unsigned file, a signer need not be trusted.
     """
     look, attached_to = looks[file], None
     problems = look.problems
@@ -159,7 +158,7 @@ def find_signed_holder(
 ) -> tuple[str | None, tuple[Refused, ...]]:
     """Return the signed file that contains an unsigned file, or None, and the problems of its signer.
 
-    It contains it under its name, or under another one if no file of this name is attached.
+    It is attached under its name, or else under another name.
     """
     from rig.report.signatures.findings import not_as_signed, not_attached
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 @contextmanager
 def connect_client(address: str) -> Iterator["Client"]:
-    """Connect to the scheduler at `address` for the block. Raise Refused `missing_extra`, `no_cluster`."""
+    """Connect to the scheduler at `address` during the block. Raise Refused `missing_extra`, `no_cluster`."""
     from rig.errors.extras import requiring
 
     with requiring("dask"):

@@ -1,4 +1,4 @@
-"""The answer of a history to a run, which waits for it a few seconds only."""
+"""The answer of a history to a run, which waits for a few seconds only."""
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -31,7 +31,7 @@ TO_CONNECT = {
 def ask_history(address: "HistoryAddress", work: Callable[[], T], modules: Sequence[str] = ()) -> T:
     """Return the result of `work` on the history at `address`; raise its errors, or TimeoutError if it takes too long.
 
-    The needed modules, and `modules`, are imported before the time limit starts to run.
+    The history's modules, and `modules`, are imported before the time limit begins.
     """
     is_file = isinstance(address.where, Path)
     for name in (*TO_ASK, *modules):

@@ -208,8 +208,8 @@ def void(options: Namespace) -> int:
 def open_named_history(options: Namespace) -> AbstractContextManager[History]:
     """Open the named history.
 
-    Raise Refused `no_history` if there is none, for opening it would make an empty one; as `open_history` does, and as
-    `load` does if a configuration names it.
+    Raise Refused `no_history` if there is none, because opening would make an empty one; as `open_history` does, and as
+    `load` does if a configuration names the history.
     """
     return _open_existing(_read_address(options))
 
@@ -242,7 +242,7 @@ def _select_pasts(history: History, selection: Selection) -> list[Past]:
 
 
 def _find_run_folders(folders: list[Path], *, unsolved: bool) -> Iterator[Path]:
-    """Yield the run folders among and within `folders`, and any folder without one, so that it is refused by name."""
+    """Yield the run folders among and within `folders`, and any folder without a run, which is then refused by name."""
     for folder in folders:
         inner = {file.parent for file in folder.rglob(RESULT)}
         if unsolved:
@@ -251,7 +251,7 @@ def _find_run_folders(folders: list[Path], *, unsolved: bool) -> Iterator[Path]:
 
 
 def _recompute_finished(folder: Path, history: History, *, solve: bool) -> FinishedRun:
-    """Return the run with results recomputed from its recordings, unless the history has it.
+    """Return the run with its result recomputed from its recordings, unless the history already has it.
 
     A result.json alone proves nothing. Raise Refused `no_recording`, `result_not_of_recording`, and as the recordings'
     solution does.

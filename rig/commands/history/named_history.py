@@ -1,4 +1,4 @@
-"""The history that a command names: itself, or by a configuration file that names one."""
+"""The history that a command names, itself or by a configuration file."""
 
 import argparse
 from pathlib import Path

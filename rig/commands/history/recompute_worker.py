@@ -1,4 +1,4 @@
-"""The work of one worker, on this computer or another, when a history is recomputed: one recording, and its answer."""
+"""The work of one worker, on any computer, in the recomputation of a history: one recording, and its answer."""
 
 import platform
 from dataclasses import dataclass
@@ -25,10 +25,10 @@ NOT_HERE = (
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """Recordings to be solved again, with the program's version, estimator (None: the procedure's own) and settings.
+    """Recordings to solve again, with the program's version, estimator (None: the procedure's own) and settings.
 
-    `key` names the result with which they are compared; `places` are pairs of computer and folder; `recordings` are
-    those in the history.
+    `key` names the result to compare with; `places` are pairs of computer and folder; `recordings` are those in the
+    history.
     """
 
     key: str
@@ -48,7 +48,7 @@ def solve_task(task: Task) -> Answer:
 
 
 def _find_folder(task: Task) -> Path | Unsolved:
-    """Return the newest folder in which every recording is as it was entered, or why there is none."""
+    """Return the newest folder in which all recordings are as entered, or why there is none."""
     if not task.recordings:
         return Unsolved("missing", "the history has no recording of it")
     damaged = None

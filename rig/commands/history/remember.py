@@ -1,4 +1,4 @@
-"""Entering a finished run in the history, and comparing it with the last calibration of the same sensors.
+"""The entry of a finished run in the history, and its comparison with the last calibration of the same sensors.
 
 A run never fails because of the history: it reports the problem and continues.
 """
@@ -76,8 +76,8 @@ def _is_usual(address: "HistoryAddress") -> bool:
 def remember_certificate(folder: Path, result: str, certificate: "Issued", history: str | None = None) -> str | None:
     """Enter the certificate of the run in `folder`, whose result.json is `result`; return why it is not entered.
 
-    The history is `history`; if that is None, the user's own. It never connects to the one that the folder's
-    configuration names, as the folder may come from anywhere.
+    The history is `history`, or if None the user's own, never one that the folder's configuration names, because the
+    folder may come from anywhere.
     """
     try:
         from rig.history.entered.finished_run import content_sha256
@@ -98,7 +98,7 @@ def remember_certificate(folder: Path, result: str, certificate: "Issued", histo
 def _find_own(folder: Path, history: str | None) -> "tuple[Loaded | None, HistoryAddress | None]":
     """Return the configuration of the run in `folder`, and the address of `history`, or of the user's own.
 
-    The address is None if there is no history, or if that configuration switches it off and none is named.
+    The address is None if there is no history, or if the configuration switches it off and none is named.
     """
     from rig.history.entered.finished_run import read_configuration
     from rig.history.storage.address import default_history_address
@@ -111,7 +111,7 @@ def _find_own(folder: Path, history: str | None) -> "tuple[Loaded | None, Histor
 def find_journal_end(folder: Path, history: str | None = None) -> tuple[int, str] | None:
     """Return number and SHA-256 of the last entry in the journal of the history that `remember_certificate` would use.
 
-    Return None if there is no history, if it does not answer, or if it is empty.
+    None if there is no history, if it does not answer, or if it is empty.
     """
     try:
         _, address = _find_own(folder, history)

@@ -1,4 +1,4 @@
-"""The serial numbers of a run's sensors as the history has them, read when the run begins."""
+"""The history's calibrations of a run's serial numbers, read when the run begins."""
 
 from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
@@ -36,8 +36,8 @@ def find_other_board(
 ) -> str | None:
     """Return the serial number, in words, under which the history contains a sensor on this board.
 
-    The newest calibration of one of the `parts` decides. Return None if its serial number is one of
-    `own_serial_numbers`, or if the history does not answer.
+    The newest calibration of one of the `parts` decides. None if its serial number is one of `own_serial_numbers`, or
+    if the history does not answer.
     """
     from rig.history.storage.address import choose_history_address
 

@@ -1,4 +1,4 @@
-"""Waiting for an answer that may never come, such as that of a frozen database."""
+"""The wait for an answer that may never come, such as that of a frozen database."""
 
 from collections.abc import Callable
 from threading import Thread
@@ -10,9 +10,8 @@ T = TypeVar("T")
 def await_answer(work: Callable[[], T], within_s: float | None = None) -> T:
     """Return the result of `work`, from a thread of its own; pass on its exception.
 
-    Raise TimeoutError if it takes longer. Ctrl-C therefore takes effect immediately, whatever the thread waits for. A
-    late thread is abandoned and ends with the process, because a library that waits for its server cannot be
-    interrupted.
+    Raise TimeoutError if it takes longer. Ctrl-C takes effect immediately. A late thread is abandoned and ends with the
+    process, because a library that waits for its server cannot be interrupted.
     """
     from concurrent.futures import Future  # here, as `rig --help` does not need it
 

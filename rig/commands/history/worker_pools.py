@@ -1,6 +1,6 @@
 """The places where recordings are solved: this process, processes of this computer, or workers of a Dask scheduler.
 
-In all of them a worker that dies costs only the recording that it was solving.
+If a worker dies, only the recording that it was solving is lost.
 """
 
 import signal
@@ -46,7 +46,7 @@ class Workers(Protocol):
         ...
 
     def answers(self) -> Iterator[SolvedTask]:
-        """Yield the answers that have arrived, after a short wait if there is none. Raise Fault `cluster_lost`."""
+        """Yield the answers that have arrived, after a short wait if there are none. Raise Fault `cluster_lost`."""
         ...
 
 
@@ -62,7 +62,7 @@ def solve_one_by_one(tasks: Iterable[Task], solve: Solve) -> Iterator[SolvedTask
 def distribute(tasks: Iterable[Task], solve: Solve, workers: Workers) -> Iterator[SolvedTask]:
     """Solve the tasks by `workers`, and yield the answers as they arrive.
 
-    Raise Fault `cluster_lost`. No more tasks are given out than the workers can take.
+    The workers get no more tasks than they can take. Raise Fault `cluster_lost`.
     """
     waiting = deque(tasks)
     while waiting or workers.busy:
@@ -72,7 +72,7 @@ def distribute(tasks: Iterable[Task], solve: Solve, workers: Workers) -> Iterato
 
 
 class Processes(AbstractContextManager["Processes"]):
-    """A number of processes of this computer, each a pool of its own, so that a crash affects no other one."""
+    """Processes of this computer, each a pool of its own, so that a crash affects no other."""
 
     def __init__(self, count: int) -> None:
         self._idle = [_new_process() for _ in range(count)]

@@ -1,1 +1,1 @@
-"""The rig that a command uses: its claims, its address, and the simulated laboratory."""
+"""The rig of a command: its claims, its address, and the simulated laboratory."""

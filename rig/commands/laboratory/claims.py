@@ -1,10 +1,10 @@
-"""Claims: a command reserves the arm, board or instrument that it works with, so that only one rig at a time uses it.
+"""Claims: a command reserves its arm, board or instrument, so that only one rig at a time uses it.
 
-A claim is a socket that listens under an abstract name of the kernel (unix(7)), for which there is no file. It ends
-with the process that holds it, however that ends, so no stale claim remains. Every user of the computer sees it, and
-the kernel names the holder. Only Linux has such names: other systems claim nothing.
+A claim is a socket that listens under an abstract name of the kernel (unix(7)), without a file. It ends with the
+process that holds it, however that ends. Every user of the computer sees it, and the kernel names the holder. Only
+Linux has such names: on other systems nothing is claimed.
 
-A claim from another computer is reported by the arm itself: `program_running`, `registers_in_use`.
+The arm itself reports the use by another computer: `program_running`, `registers_in_use`.
 """
 
 import os

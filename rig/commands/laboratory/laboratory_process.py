@@ -19,13 +19,13 @@ CONTROL_TIMEOUT_S = 30.0
 
 @contextmanager
 def run_simulated_laboratory(config_text: str, late: Path | None = None, truth: Path | None = None) -> Iterator[str]:
-    """Run the world of a configuration text for the length of the block; yield the address of its control channel.
+    """Run the world of a configuration text during the block; yield the address of its control channel.
 
-    If its steps come late, it writes the causes to the file `late`, or to stderr if that is None. It may be asked to
-    write the truth to the file `truth`.
+    The world writes the causes of late steps to the file `late`, or if None to stderr, and the truth on request to the
+    file `truth`.
 
-    The world ends when its standard input closes, so it cannot outlive this process, however this process ends. Raise
-    Refused: `only_on_linux`, the world's own refusal, or `world_not_ready` if it ends without one.
+    The world ends when its standard input closes, so it cannot outlive this process. Raise Refused: `only_on_linux`,
+    the world's own refusal, or `world_not_ready` if it ends without one.
     """
     refuse_unless_linux("the simulated laboratory")
     files = {"--late": late, "--truth": truth}
@@ -59,7 +59,7 @@ def run_simulated_laboratory(config_text: str, late: Path | None = None, truth: 
 
 
 def make_mounter(control: str) -> Callable[[int], None]:
-    """Return the function that mounts the item for a stage, counted from 0: the simulated operator does it.
+    """Return the function with which the simulated operator mounts the item for a stage, counted from 0.
 
     `control` is the laboratory's control channel. The function raises OSError or ValueError if the laboratory has
     ended.
@@ -72,7 +72,7 @@ def make_mounter(control: str) -> Callable[[int], None]:
 
 
 def make_fitter(control: str) -> Callable[[str], None]:
-    """Return the function by which the simulated operator mounts the part with a given serial number.
+    """Return the function with which the simulated operator mounts the part with a given serial number.
 
     `control` and errors as in `make_mounter`.
     """

@@ -1,4 +1,4 @@
-"""Refusal on other systems of what needs Linux: an arm, a servomotor, the simulated laboratory."""
+"""Refusal on other systems of everything that needs Linux: an arm, a servomotor, the simulated laboratory."""
 
 import sys
 from importlib.util import find_spec
@@ -10,7 +10,7 @@ MODULES = ("fcntl", "termios")  # without them pyserial opens no port, not even 
 
 
 def refuse_unless_linux(what: str, system: str = sys.platform) -> None:
-    """Raise Refused `only_on_linux` unless the system is Linux with its modules.
+    """Raise Refused `only_on_linux`, about `what`, unless the system is Linux.
 
     Others lack prompt stops by signals, loopback addresses or pseudo-terminals.
     """

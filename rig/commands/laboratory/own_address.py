@@ -23,8 +23,7 @@ def find_own_address(config: SensorsConfig, laboratory: str | None) -> Iterator[
     """Yield the overrides that give a configuration's laboratory an address of its own during the block.
 
     `laboratory` is the file with all defaults if it simulates a laboratory, else None. There are no overrides if the
-    address is free, or if the laboratory is real. There are no changes either if no candidate is free; then the device
-    that needs the address reports this.
+    address is free, the laboratory is real, or no candidate is free, which the device at the address then reports.
     """
     if laboratory is None or not isinstance(config, RigConfig):
         yield []

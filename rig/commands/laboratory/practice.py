@@ -1,4 +1,4 @@
-"""Faults to practise in a running laboratory, and their remedies, which a person causes by typing words."""
+"""Faults to practise in a running laboratory, and their remedies, which typed words cause."""
 
 import re
 from collections.abc import Mapping
@@ -15,7 +15,7 @@ Request = Mapping[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class Incident:
-    """Something that happens in the laboratory: the request to the control channel, and what a person sees of it."""
+    """An incident in the laboratory: the request to the control channel, and a description of its effect."""
 
     request: Request
     text: str
@@ -63,7 +63,7 @@ def find_incident(words: str) -> Incident | None:
 
 
 def practise(control: str, words: str) -> str:
-    """Cause the incident that `words` name in the laboratory, and return what a person there would see.
+    """Cause the incident that `words` name in the laboratory, and return the description of its effect.
 
     Raise Fault `world_ended` if the laboratory has ended.
     """

@@ -1,4 +1,4 @@
-"""The simulated operator, who receives the instructions of a run by hand."""
+"""The simulated operator, who receives the instructions of a session by hand."""
 
 from rig.commands.laboratory.laboratory_process import send_request
 from rig.data.recording.hand_events import HandAsked
@@ -8,7 +8,7 @@ from rig.station.events import RunEvent
 class OperatorListener:
     """A listener of a run that passes instructions by hand on to the laboratory's operator.
 
-    The operator receives only what the line of text and the drawing show: the motion, and the side that points up.
+    The operator receives only the content of the line of text and the drawing: the motion, and the side that points up.
     """
 
     def __init__(self, control: str) -> None:

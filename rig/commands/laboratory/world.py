@@ -1,4 +1,4 @@
-"""`rig world`: only the simulated laboratory, in the foreground, for any client."""
+"""`rig world`: the simulated laboratory alone, in the foreground, for any client."""
 
 import subprocess
 import sys
@@ -37,7 +37,7 @@ def run(options: Namespace) -> int:
 
 
 def _practise(control: str) -> int:
-    """Cause each typed incident, in real time, until the end of the input; return 0."""
+    """Cause each incident typed by the user, until the end of the input; return 0."""
     from rig.commands.laboratory.practice import opening_text, practise
     from rig.station.plain_text import say
 

@@ -1,4 +1,4 @@
-"""The truth of a simulated laboratory, written by the laboratory into the run folder once a run is judged."""
+"""The truth of a simulated laboratory, which writes it into the run folder after the verdict."""
 
 from collections.abc import Iterator
 from contextlib import suppress
@@ -20,8 +20,8 @@ def write_truth(
 ) -> Iterator[DocumentWritten]:
     """Have the laboratory at `control` write the truth over the windows of a run; yield the event of its file.
 
-    The laboratory writes into the file `written` that it was given at its start. The file ends in the run's `folder`.
-    Nothing is written for a calibration over temperature: its values belong to another temperature than the run's.
+    The laboratory writes the file `written` that was named at its start, which is then moved to the run's `folder`.
+    Nothing is written for a calibration over temperature, whose values belong to another temperature than the run's.
     """
     if outcome.polynomials or not (outcome.results or outcome.accelerometers):
         return
@@ -34,7 +34,7 @@ def write_truth(
 def _windows(outcome: "Outcome", *, follows_arm: bool) -> dict[str, Any]:
     """Return the windows of all calibrated sensors in the form of `rig.world.board.windowed_truth`.
 
-    Only an arm's controller shares the laboratory's clock. With any other clock the whole time is one window.
+    Only an arm's controller shares the laboratory's clock; otherwise the whole time is one window.
     """
     recordings = outcome.recordings if follows_arm else ()
     gyroscopes = {}

@@ -1,4 +1,4 @@
-"""One run from its configuration to its verdict, in its folder and its laboratory: `rig run` and `rig resume`."""
+"""One run from its configuration to its verdict, in its folder and laboratory, for `rig run` and `rig resume`."""
 
 import shlex
 from contextlib import ExitStack

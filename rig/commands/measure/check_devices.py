@@ -28,7 +28,7 @@ def add(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     """Check the board and the arm; print the devices present and missing. Return 0 if a run could start, else 2.
 
-    With `--json` print all at the end, in the schema "rig.check/1".
+    With `--json` print everything at the end, in the schema "rig.check/1".
     """
     lines: list[str] = []
     tell: Tell = lines.append if options.json else say
@@ -135,7 +135,7 @@ def _check_turner(configured: "Configured", tell: Tell) -> list[Problem]:
 def _find_other_claims(host: str) -> list[Problem]:
     """Return a problem if another rig has claimed the arm.
 
-    The claim is released at once, because a check of the arm disturbs no other rig.
+    No claim is kept, because a check of the arm disturbs no other rig.
     """
     from rig.commands.laboratory.claims import claim_arm
 

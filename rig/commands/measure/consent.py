@@ -1,4 +1,4 @@
-"""Consent to the addresses of a run folder that may have come from anywhere: rig connects only to the user's own."""
+"""Consent to the addresses in a run folder from anywhere: the rig connects only to addresses of the user's own runs."""
 
 import hashlib
 import os

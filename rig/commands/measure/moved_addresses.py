@@ -1,4 +1,4 @@
-"""Changes allowed in a resumed run: the addresses of its devices, and nothing else."""
+"""The only changes allowed in a resumed run: the addresses of its devices."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""`rig resume`: go on with an interrupted run."""
+"""`rig resume`: continue an interrupted run."""
 
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
@@ -26,12 +26,12 @@ def add(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Continue an interrupted run with its own script: finished sweeps count, the others are made.
+    """Continue an interrupted run with its own script, for the sweeps that are not finished.
 
-    A sweep that the verdict named as disturbed is repeated. In another user's folder, `--script` names the script,
-    which is executed, and `--connect` the addresses that may be used; `--set` gives new addresses of devices. Return
-    the exit status that `rig run` would. Raise Refused `no_run`, `already_finished`, and as `refuse_links`,
-    `read_result`, `refuse_other_changes`, `refuse_foreign_addresses`, `script_identity` and `kept_script` do.
+    Sweeps that the verdict named as disturbed are repeated. In another user's folder, `--script` names the script,
+    which is executed, and `--connect` the addresses that may be used; `--set` gives new addresses of devices. Return an
+    exit status as `rig run` does. Raise Refused `no_run`, `already_finished`, and as `refuse_links`, `read_result`,
+    `refuse_other_changes`, `refuse_foreign_addresses`, `script_identity` and `kept_script` do.
     """
     page = read_page_wish(options)
     from rig.commands.configured import open_configured

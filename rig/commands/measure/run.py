@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def add(parser: ArgumentParser, *, script: bool = True) -> None:
-    """Add the arguments of `rig run`, without `--script` if a procedure's script is run itself."""
+    """Add the arguments of `rig run`, without `--script` if `script` is itself run."""
     add_config(parser)
     if script:
         add_script(parser)
@@ -60,7 +60,7 @@ def run(options: Namespace) -> int:
 def prepare_run(options: Namespace) -> "Iterator[tuple[Path, Configured]]":
     """Yield a new run folder and its configuration; during the block a simulated laboratory has its own address.
 
-    If the operator does not agree, the folder is removed, so the same command can be repeated. Raise Refused as
+    If the operator does not agree, the folder is removed, so that the same command can be repeated. Raise Refused as
     `load_configured` and `new_folder` do; `only_on_linux` for a simulated laboratory elsewhere.
     """
     from rig.commands.configured import open_configured

@@ -1,4 +1,4 @@
-"""`rig look FILE`: the contents of a log of another program, the solutions it allows, and the map of its columns."""
+"""`rig look FILE`: the contents of another program's log, its possible solutions, and the map of its columns."""
 
 from argparse import ArgumentParser, Namespace
 from collections.abc import Mapping, Sequence
@@ -130,7 +130,7 @@ def _try_solutions(
 
 
 def _adopt(columns: dict[str, Any], *, inverse: bool, scalar_last: bool) -> None:
-    """Change the map of a reference's columns to its quaternions' convention."""
+    """Change the map of a reference's columns to the convention of its quaternions."""
     from rig.data.recording.motion_file import QUATERNION
 
     if inverse:
@@ -142,7 +142,7 @@ def _adopt(columns: dict[str, Any], *, inverse: bool, scalar_last: bool) -> None
 
 
 def _write(path: Path, looks: "Sequence[LookedFile]", columns: Mapping[str, Any]) -> None:
-    """Write the map to a new file. Raise Refused `configuration_not_written`, and `bad_option` if there is no map."""
+    """Write the map to a new file. Raise Refused `configuration_not_written`, and `bad_option` without a map."""
     import yaml
 
     from rig.config.files.safe_writing import write_new

@@ -1,4 +1,4 @@
-"""`rig reversal`: a magnetometer's own bias, from runs between which it was turned over on its extension."""
+"""`rig reversal`: a magnetometer's own bias, from runs with the sensor turned over on its extension between them."""
 
 from argparse import ArgumentParser, Namespace
 from pathlib import Path

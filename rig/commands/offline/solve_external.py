@@ -221,7 +221,7 @@ def _build_recording(options: Namespace) -> "RunData":
 
 
 def _read_only(options: Namespace) -> tuple[str, ...]:
-    """Return the sensors to calibrate; all of them if none is named. Raise Refused `bad_option`."""
+    """Return the sensors to calibrate, empty for all. Raise Refused `bad_option`."""
     from rig.data.installed_kinds import quantities
     from rig.data.quantity import RATE
 

@@ -1,7 +1,7 @@
-"""The bench of a station: devices and configuration that all parts share, and the run of one part.
+"""The bench of a station: the common devices and configuration of all parts, and the run of one part.
 
-The claims, the simulated laboratory, the configuration and its script remain. The turner is reconnected for each part,
-because a run stops it for good; this happens ahead of time, while the part is changed.
+The claims, the simulated laboratory, the configuration and its script remain. A run stops its turner for good, so it is
+reconnected for each part, ahead of time, while the part is changed.
 """
 
 import json
@@ -46,7 +46,7 @@ from rig.turners.turner_registry import kind_of
 class PartListener:
     """A listener of one run.
 
-    It stores the connected board, whether anything was recorded, and whether refused sweeps can be repeated.
+    It notes the connected board, whether anything was recorded, and whether refused sweeps can be repeated.
     """
 
     chip: Chip | None = None
@@ -120,7 +120,7 @@ class RigBench:
         return find_other_board(config, chip.board, parts, own_numbers, simulated=self.simulated)
 
     def fit(self, serial: str) -> None:
-        """Make the simulated operator fit the part, if there is one."""
+        """Make the simulated operator, if any, fit the part."""
         if self.control is not None:
             make_fitter(self.control)(serial)
 
@@ -204,9 +204,9 @@ class RigBench:
         return outcome, repeated, truth
 
     def _compare_with_truth(self, folder: Path, configured: Configured, outcome: Outcome, station: Stations) -> str:
-        """Have a simulated laboratory write its truth; return how the result agrees with it, empty without a truth.
+        """Have a simulated laboratory write its truth; return the result's agreement in words, empty without a truth.
 
-        A run that was begun in another laboratory is not compared, because its windows are on another clock.
+        A run begun in another laboratory, on another clock, is not compared.
         """
         (folder / TRUTH).unlink(missing_ok=True)
         if self.control is None or folder not in self.begun:
@@ -217,7 +217,7 @@ class RigBench:
 
     @property
     def _named(self) -> tuple[str, ...]:
-        """The sensors that have the part's serial number."""
+        """The names of the sensors that have the part's serial number."""
         config = self.configured.loaded.config
         return config.station.sensors or tuple(config.to_calibrate)
 
@@ -264,7 +264,7 @@ def refuse_other_sensors(config: RigConfig) -> None:
 
 
 def _read_ended(folder: Path, configured: Configured) -> PartEnded | None:
-    """Remember a run that ended before the station was killed; return its result, None if sweeps must be repeated."""
+    """Enter a run that ended before the station was killed; return its result, None if sweeps must be repeated."""
     result = read_result(folder)
     failed = [check for check in result.checks if not check.passed]
     if any(check.means.sweep is not None for check in failed):

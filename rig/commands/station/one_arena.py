@@ -1,7 +1,7 @@
-"""The memory of a command that runs for hours: every part starts threads, and glibc gives each thread an arena.
+"""The memory of a long-running command: every part starts threads, and glibc gives each thread an arena.
 
-Memory that one thread has freed remains unused in its arena, some megabytes more with every part (mallopt(3),
-M_ARENA_MAX). With one arena it is used again.
+Freed memory remains unused in a thread's arena, some megabytes more with every part (mallopt(3), M_ARENA_MAX). With one
+arena it is reused.
 """
 
 import ctypes

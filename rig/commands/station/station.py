@@ -1,4 +1,4 @@
-"""`rig station`: one part after the other on one rig."""
+"""`rig station`: part after part on one rig."""
 
 import json
 import shlex
@@ -117,7 +117,7 @@ def _carry_out_batch(options: Namespace, configured: "Configured", operator: "Op
 
 @contextmanager
 def _send_heartbeats(config: "RigConfig", present: "Present") -> Iterator[None]:
-    """Send the station's heartbeat to the history of its runs during the block, if there is one."""
+    """Send the station's heartbeat to the history of its runs, if any, during the block."""
     from rig.floor.heartbeat import heartbeat
     from rig.history.storage.address import choose_history_address
 

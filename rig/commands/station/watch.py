@@ -129,7 +129,7 @@ def _read_ending(folder: Path, result: "ResultDocument | None") -> "Iterator[Run
 
 
 def read_last_words(folder: Path) -> str:
-    """Return that a run has no result, with the last message of its log."""
+    """Return a sentence that a run has no result, with the last message of its log."""
     from rig.data.run_folder import LOG
 
     try:

@@ -1,1 +1,1 @@
-"""A finished run in the form of a history: its result, its rows, its certificates."""
+"""A finished run in the form that a history stores: its result, rows and certificates."""

@@ -43,11 +43,11 @@ class FinishedRun:
     - document: its content.
     - rig: the rig's name.
     - check_standards: serial numbers of the sensors that monitor the rig.
-    - simulated: whether the laboratory is.
+    - simulated: whether the laboratory is simulated.
     - computer, path: location of the folder.
     - recordings: the recordings in the folder.
     - operator, note: statements of the configuration.
-    - certificate: the one in the folder, if any.
+    - certificate: the certificate in the folder, if any.
     - documents: name and SHA-256 of each document; for result.json the hash of its content.
     """
 
@@ -66,7 +66,7 @@ class FinishedRun:
 
     @property
     def content_sha256(self) -> str:
-        """The checksum of the result without its time of computation, so equal numbers have equal checksums."""
+        """The checksum of the result without its time of computation: equal numbers have equal checksums."""
         return content_sha256(self.text)
 
 
@@ -114,7 +114,7 @@ def read_finished_run(folder: Path, document: "ResultDocument | None" = None) ->
 def document_sha256(folder: Path, name: str) -> str | None:
     """Return the checksum of a file in a run folder (for result.json, of its content); None if it is missing.
 
-    Raise OSError, and UnfitFile for a file that cannot be a run's.
+    Raise OSError, and UnfitFile for a file that cannot belong to a run.
     """
     try:
         content = read_regular_file(folder / name, PAGE_MAX_BYTES)
@@ -129,7 +129,7 @@ def document_sha256(folder: Path, name: str) -> str | None:
 
 
 def recording_of(file: Path) -> EnteredRecording:
-    """Return a recording with its hash. Raise OSError, and UnfitFile for a file that cannot be a run's."""
+    """Return a recording with its hash. Raise OSError, and UnfitFile for a file that cannot belong to a run."""
     digest, size = hashlib.sha256(), 0
     with open_regular_file(file, RECORDING_MAX_BYTES) as stream:
         while chunk := stream.read(CHUNK_BYTES):
@@ -146,7 +146,7 @@ def compact(document: Any) -> str:
 def content_sha256(text: str) -> str:
     """Return the hash of a result.json's content, with sorted keys and without `solved_utc`.
 
-    Raise ValueError if it is not JSON or has a key twice, and other errors for a result of another form.
+    Raise ValueError for a text that is not JSON or has a duplicate key, and other errors for a result of another form.
     """
     document = json.loads(text, object_pairs_hook=refuse_duplicate_keys)
     document["provenance"].pop("solved_utc", None)
@@ -170,9 +170,9 @@ def read_configuration(folder: Path) -> "Loaded | None":
 
 
 def _certificate(folder: Path, document: "ResultDocument", stated: "StatedFacts") -> Issued | None:
-    """Return the certificate in the folder if its content matches this result; an equal number proves nothing.
+    """Return the certificate in the folder if its content, not only its number, matches this result.
 
-    An amended certificate is not entered here, but when it is made.
+    An amended certificate is entered when it is made, not here.
     """
     try:
         page = read_regular_file(folder / PAGE, PAGE_MAX_BYTES)

@@ -1,4 +1,4 @@
-"""The rows of a run that repeat values of its result; written at its entry, and compared later. Pure."""
+"""The columns of a run that repeat values of its result, written at its entry and compared later. Pure."""
 
 import hashlib
 import math
@@ -40,7 +40,7 @@ def measurement_sha256(document: ResultDocument) -> str:
 
 
 def fit(document: ResultDocument) -> bool:
-    """Return whether the measurement passed its own checks; whether the sensor is within its limits does not matter."""
+    """Return whether the measurement passed its checks of fitness, whatever the sensor's conformity."""
     return all(check.passed for check in document.checks if check.means.kind == "fitness")
 
 

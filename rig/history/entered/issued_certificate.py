@@ -1,4 +1,4 @@
-"""A certificate in a history: its number, its statements about itself, and the hashes of its files. Pure."""
+"""A certificate in a history: its number, its day, its marks, and the hashes of its files. Pure."""
 
 import hashlib
 from collections.abc import Mapping
@@ -13,8 +13,8 @@ if TYPE_CHECKING:
 class Issued:
     """An issued certificate.
 
-    `issued` is a day; `replaces` the number that it amends; `marks` the text across its pages, empty if there is none.
-    `files` are its files, name and SHA-256.
+    `issued` is a day; `replaces` the number of the certificate that it amends; `marks` the text across its pages, or
+    empty; `files` the names and SHA-256 of its files.
     """
 
     number: str

@@ -1,4 +1,4 @@
-"""Comparison of a result with that of its recordings: all numbers, checks and provenance. Pure."""
+"""Comparison of a result with one recomputed from its recordings: all numbers, checks and provenance. Pure."""
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
@@ -20,8 +20,8 @@ def not_given(claimed: ResultDocument, recomputed: ResultDocument) -> list[str]:
     """Return the parts of a `claimed` result that differ from the recomputed one beyond a processor's rounding.
 
     `recomputed` is solved from the recordings. Calibrations agree within 1e-6 of their standard uncertainty, other
-    numbers within 1e-6 of the largest in their list. Texts are not compared, and fields that the claim lacks are not
-    required: both change from version to version.
+    numbers within 1e-6 of the largest in their list. Texts, and fields that the claim lacks, are not compared: both
+    change from version to version.
     """
     origin = _origin(recomputed)
     rows = [f"provenance.{name}" for name, value in _origin(claimed).items() if value != origin.get(name)]
@@ -58,7 +58,7 @@ def _origin(document: ResultDocument) -> dict[str, object]:
 
 
 def _numbers_of(document: ResultDocument) -> dict[str, object]:
-    """Return the numbers of a result as JSON; checks are keyed by name, so that added ones shift no others."""
+    """Return the numbers of a result as JSON, with checks keyed by name, so that added checks shift no others."""
     fields: dict[str, object] = json.loads(document.text())
     checks = {check.name: [check.value, check.limit, check.uncertainty] for check in document.checks}
     return {**{name: value for name, value in fields.items() if name != "provenance"}, "checks": checks}

@@ -1,1 +1,1 @@
-"""All recordings of a history solved again, and the changes of their results."""
+"""The recomputation of all recordings of a history, and the changes of their results."""

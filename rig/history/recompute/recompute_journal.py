@@ -1,6 +1,6 @@
 """The journal of a recomputation: a line for each solved recording, so that no recording is solved twice.
 
-Its first line is the question. Answers to another question are not mixed with it.
+The first line is the question; answers to other questions are not mixed in.
 """
 
 import json
@@ -31,7 +31,7 @@ class RecomputeQuestion:
     estimator: str | None
 
     def line(self) -> str:
-        """Return the first line of its journal."""
+        """Return the journal's first line."""
         return json.dumps({"schema": SCHEMA, **asdict(self)})
 
 
@@ -56,7 +56,7 @@ class RecomputeJournal(AbstractContextManager["RecomputeJournal"]):
         os.close(self._descriptor)
 
     def note(self, key: str, answer: Answer) -> None:
-        """Add an answer. Only solutions are stored, so that everything else is tried again."""
+        """Add an answer. Only solutions are stored; everything else is tried again."""
         if isinstance(answer, RecomputedResult):
             self._write(json.dumps({"key": key, "given": asdict(answer)}, allow_nan=False))
 

@@ -60,7 +60,7 @@ STATE_WORDS = {
 
 
 def recompute_csv(outcome: RecomputeOutcome) -> str:
-    """Return CSV with a line for each calibration and its most changed parameter, or for a run without calibrations."""
+    """Return CSV with a line for each calibration, with its most changed parameter, and for each run without one."""
     out = io.StringIO(newline="")
     writer = csv.DictWriter(out, COLUMNS, lineterminator="\n", restval="")
     writer.writeheader()

@@ -24,7 +24,7 @@ class StatedResult:
     """A result of the history, with its recordings and the certificates that rely on it.
 
     - `run_id`, `content_sha256`, `started_utc`, `rig`, `verdict`: the run.
-    - `calibrations`: the selected valid ones.
+    - `calibrations`: the selected valid calibrations.
     - `recordings`: its recordings. `places`: computer and folder, the newest first.
     - `certificates`: those in force, without a mark and not replaced.
     """
@@ -134,13 +134,13 @@ class Compared:
 
     @property
     def same(self) -> bool:
-        """Whether the recomputed result and verdict agree with the stated ones."""
+        """Whether the recomputed values and verdict agree with the stated ones."""
         return isinstance(self.answer, RecomputedResult) and not (self.moved or self.verdict_changed)
 
 
 @dataclass(frozen=True, slots=True)
 class RecomputeOutcome:
-    """All comparisons in the order of time, and their numbers."""
+    """All comparisons in the order of time; values that moved by more than `of_u` of the stated U count as changed."""
 
     of_u: float
     compared: tuple[Compared, ...]
@@ -184,7 +184,7 @@ class RecomputeOutcome:
 
     @property
     def same(self) -> bool:
-        """Whether all recordings were solved and gave the stated result."""
+        """Whether all recordings were solved with the stated results."""
         return all(comparison.same for comparison in self.compared)
 
     @property

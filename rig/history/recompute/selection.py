@@ -1,4 +1,4 @@
-"""The results of a history that are to be solved again, by a few queries."""
+"""The results of a history that are to be recomputed, by a few queries."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Mapping

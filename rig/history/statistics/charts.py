@@ -1,9 +1,9 @@
 """Control charts of single results: Shewhart's for a jump, EWMA for a small persistent shift.
 
-A chart needs the mean and the standard deviation of a process in control. They are not known in advance, and estimates
-from a few first runs would give far more alarms than designed. So each result is compared with those before it by
-Student's t (self-starting charts: Hawkins and Olwell, Cumulative Sum Charts, 1998, 7.1). In control, all deviations are
-independent and normal, and false alarms are as rare as designed for any length of the history.
+A chart needs the mean and the standard deviation of a process in control. Estimates of these from a few first runs
+would give far more alarms than designed. So each result is compared with all earlier ones by Student's t (self-starting
+charts: Hawkins and Olwell, Cumulative Sum Charts, 1998, 7.1). In control, all deviations are independent and normal,
+and false alarms are as rare as designed for any length of the history.
 """
 
 from dataclasses import dataclass
@@ -84,10 +84,10 @@ def raise_alarms(deviation: Array, average: Array, limit: float | Array) -> Alar
 
 
 def _deviation(values: Array, std: Array, counted: Alarms) -> Array:
-    """Return the last result's deviation (…) from the earlier ones (…, i) as a normal deviate of equal probability.
+    """Return the last result's deviation (…) from the earlier ones (…, i) as a standard normal deviate.
 
-    With equal stds it is (x − x̄)/(s √(1 + 1/n)) for any std; otherwise the weights include the variance between runs
-    (as in `random_effects.fit`).
+    With equal stds, of any size, it is Student's (x − x̄)/(s √(1 + 1/n)) converted to a normal deviate; otherwise
+    weights include the variance between runs (as in `random_effects.fit`).
     """
     before, newest = values[..., :-1], values[..., -1]
     fixed = counted / std[..., :-1] ** 2

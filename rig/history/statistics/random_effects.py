@@ -11,7 +11,7 @@ CONFIDENCE = 0.95
 
 @dataclass(frozen=True, slots=True)
 class Fitted:
-    """`coefficients` (p,) and their `covariance` (p, p); `between_std` is the scatter beyond the values' stated stds.
+    """The coefficients (p,), their covariance (p, p), and `between_std`, the scatter beyond the values' stated stds.
 
     `dof` is n − p.
     """
@@ -23,7 +23,7 @@ class Fitted:
 
     @property
     def std(self) -> Array:
-        """Standard deviations (p,) of the coefficients."""
+        """The standard deviations (p,) of the coefficients."""
         return np.sqrt(np.diag(self.covariance))
 
     @property
@@ -34,7 +34,7 @@ class Fitted:
         return float(stdtrit(self.dof, (1 + CONFIDENCE) / 2))
 
     def p_value(self, index: int) -> float:
-        """Return the probability of a coefficient at least as far from 0 if the true value is 0."""
+        """Return the probability of a coefficient at least as far from 0 as this one if the true value is 0."""
         from scipy.special import stdtr
 
         return float(2 * stdtr(self.dof, -abs(self.coefficients[index]) / self.std[index]))

@@ -1,4 +1,4 @@
-"""Effects of rigs on results. Sensors that were calibrated on several rigs separate them from effects of sensors."""
+"""Effects of rigs on results, separated from effects of sensors by sensors calibrated on several rigs."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ class RigEffect:
 
     @property
     def expanded(self) -> float:
-        """Expanded uncertainty of the effect, for 95 %."""
+        """The expanded uncertainty of the effect, for 95 %."""
         return self.coverage_factor * self.std
 
 
@@ -31,8 +31,8 @@ def rig_effects(rigs: Sequence[str], sensors: Sequence[str], values: Array, std:
     """Return the effects of rigs on results (n,) with stds (n,), by `rigs` (n) and `sensors` (n).
 
     The two-way model is value = sensor + rig + run, with random runs (`random_effects.fit`). Within each group of rigs
-    connected by sensors, the effects are relative to the rig with the most results; a rig without shared sensors has
-    none.
+    connected by sensors, effects are relative to the rig with the most results; a rig without shared sensors has no
+    effect.
     """
     effects: list[RigEffect] = []
     names = np.array(rigs)

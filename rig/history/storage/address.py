@@ -22,7 +22,7 @@ NAME = "history.sqlite"
 
 @dataclass(frozen=True, slots=True)
 class HistoryAddress:
-    """`where` is an SQLite file or a server's URL; `label` is its name for people, without a password."""
+    """An address: `where` is an SQLite file or a server's URL; `label` is its name for people, without a password."""
 
     label: str
     where: "Path | URL"
@@ -45,7 +45,7 @@ def choose_history_address(
 def default_history_address(address: str | None) -> HistoryAddress | None:
     """Return the user's history; None if it is switched off.
 
-    It is the command's `address`; without it `RIG_HISTORY`; without both the user's own file. Raise Refused
+    It is at the command's `address`, else at `RIG_HISTORY`, else in the user's own file. Raise Refused
     `history_address`.
     """
     address = address or os.environ.get(ENVIRONMENT)

@@ -1,7 +1,7 @@
-"""Identity of the histories that this process has opened, to detect another history in the same place.
+"""Identity of the histories that this process has opened, to detect another history at the same address.
 
-A history is identified by its file, its time of creation, and the last seen entry of its journal: because entries are
-only added, this entry remains forever.
+A history is identified by its file, its time of creation, and the last seen entry of its journal, which remains for
+ever because entries are only added.
 """
 
 from dataclasses import dataclass
@@ -59,13 +59,13 @@ def refuse_unlike(before: FileIdentity | None, file: Path, label: str) -> None:
 
 
 def refuse_anew(address: HistoryAddress) -> None:
-    """Raise Refused `history_gone` for a history that had tables before and has none now."""
+    """Raise Refused `history_gone` for a history that had tables before and no longer has any."""
     if address.where in _identities:
         raise _history_gone(address.label)
 
 
 def refuse_another(address: HistoryAddress, connection: Connection) -> None:
-    """Raise Refused `history_exchanged` for a history that lacks its earlier entries, else store its identity."""
+    """Raise Refused `history_exchanged` for a history that lacks its earlier entries; otherwise store its identity."""
     identity, created_utc = _identities.get(address.where), _read_created_utc(connection)
     if identity is not None and (identity.created_utc != created_utc or not journal.has(connection, identity.head)):
         raise _history_exchanged(address.label)

@@ -1,8 +1,8 @@
-"""The journal of entries: a line for each entry, with the hash of its rows, numbered without gaps, chained.
+"""The journal of entries: a line for each entry, with the hash of its rows, numbered without gaps and chained.
 
-So a row that was changed, added or removed outside of the rig is detected. A changed line is detected too: each
-contains its own hash and that of the chain before it. Whoever may write all tables can write a consistent new journal,
-or cut off its end. That is detected by a `Head` of it that is kept elsewhere: a signed certificate names one.
+So a row changed, added or removed outside of the rig is detected. A changed line is detected too: a line contains its
+own hash and that of the chain before it. A user who may write all tables can write a consistent new journal, or cut off
+its end, which only a `Head` stored elsewhere detects: a signed certificate names one.
 """
 
 import hashlib
@@ -25,7 +25,7 @@ ENTERED: Mapping[str, Table] = {
 
 @dataclass(frozen=True, slots=True)
 class Broken:
-    """An inconsistency: `what` it concerns, and `why`."""
+    """An inconsistency of `what`, its `state`, and `why`."""
 
     what: str
     state: Literal["changed", "missing"]
@@ -41,13 +41,13 @@ class Head:
 
 
 def alone(connection: Connection) -> None:
-    """Lock out other writers until the end of the transaction; on SQLite a writing transaction already does."""
+    """Lock out other writers until the end of the transaction; on SQLite a writing transaction does so itself."""
     if connection.dialect.name == "postgresql":
         connection.execute(text("SELECT pg_advisory_xact_lock(:lock)"), {"lock": LOCK})
 
 
 def note(connection: Connection, table: Table, *key: int | str) -> None:
-    """Add a line for the row with this primary key; for a run it covers all its parts. The caller must hold `alone`."""
+    """Add a line for the row with this primary key, and for a run's parts. The caller must have called `alone`."""
     before = head(connection)
     line = {
         "number": before.number + 1,
@@ -135,7 +135,7 @@ def _sha256(connection: Connection, table: Table, key: tuple[int | str, ...]) ->
 
 
 def _rows(connection: Connection, table: Table, key: tuple[int | str, ...]) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield the row, and for a run its parts, without nulls: a column that is added later changes no hash."""
+    """Yield the row, and for a run its parts, without nulls, so that a column added later changes no hash."""
     condition = [column == value for column, value in zip(table.primary_key, key, strict=True)]
     questions = [(table.name, select(table).where(*condition))]
     if table is schema.run:

@@ -1,7 +1,7 @@
 """Connection options of PostgreSQL's client: encryption, authentication, timeouts. Pure.
 
-The client takes passwords from `~/.pgpass` and PGPASSWORD by itself. To disclose no password, SCRAM proves that both
-sides have it; a server that asks for it in clear text or as an MD5 hash is refused. Source: PostgreSQL 16's
+The client itself takes passwords from `~/.pgpass` and PGPASSWORD. SCRAM proves that both sides have a password without
+disclosing it; a server that asks for it in clear text or as an MD5 hash is refused. Source: PostgreSQL 16's
 documentation, 34.1.2, `require_auth`, `sslmode`, `tcp_user_timeout`.
 """
 
@@ -20,10 +20,10 @@ SILENCE_S = 5  # time after which an unresponsive connection is closed
 
 
 def connect_arguments(server: "URL", environment: Mapping[str, str] = os.environ) -> dict[str, str | int]:
-    """Return the options of a connection; one to another computer is always encrypted and authenticated.
+    """Return the options of a connection, which to another computer is always encrypted and authenticated.
 
-    On this computer nobody can listen on a network, and the system may authenticate the user without a password. A user
-    may require more encryption by PGSSLMODE, and another method, such as `gss`, by PGREQUIREAUTH.
+    On this computer there is no network to listen on, and the system may authenticate the user without a password. A
+    user may require more encryption by PGSSLMODE, and another method, such as `gss`, by PGREQUIREAUTH.
     """
     is_local = _is_on_this_computer(server, environment)
     options: dict[str, str | int] = {

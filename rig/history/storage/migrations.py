@@ -1,7 +1,7 @@
-"""Tables of a history are made when it is opened, or migrated from an older version; other versions are refused.
+"""Creation of a history's tables when it is opened, or their migration from an older version.
 
-A migration is a function from a connection to the next version. All run in one transaction. They only add: existing
-entries remain unchanged.
+A migration is a function from a connection to the next version. All run in one transaction, and only add: entries
+remain unchanged. Other versions are refused.
 """
 
 from collections.abc import Callable, Mapping

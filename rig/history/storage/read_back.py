@@ -13,7 +13,7 @@ from rig.history.storage.journal import Head
 def refuse_lost(connection: Connection, address: HistoryAddress, before: Head, after: Head) -> None:
     """Raise Refused `entry_not_kept` if entries between two ends of the journal are missing or changed.
 
-    Raise also as `continuity.refuse_another` does.
+    Also raise as `continuity.refuse_another` does.
     """
     if not journal.has(connection, after):
         raise _entry_not_kept(address, f"entry {after.number} of its journal")

@@ -1,4 +1,4 @@
-"""Numbers of a history's rows: counted up by one, so that a removed row leaves a gap."""
+"""Numbers of a history's rows, without gaps, so that a removed row is detected."""
 
 from collections.abc import Iterator
 
@@ -11,7 +11,7 @@ NUMBERED = (schema.run, schema.location, schema.calibration, schema.certificate)
 
 
 def next_number(connection: Connection, table: Table) -> int:
-    """Return the number of the next row. Call it in a transaction during which no other connection can write."""
+    """Return the number of the next row, in a transaction during which no other connection can write."""
     return int(connection.scalar(select(func.coalesce(func.max(table.c.id), 0))) or 0) + 1
 
 

@@ -1,4 +1,4 @@
-"""The tables of a history. Rows are only ever added and never changed (`triggers`, `journal`).
+"""The tables of a history. Rows are only added, never changed (`triggers`, `journal`).
 
 `run.result` is the complete `result.json`; all other columns of a run, its calibrations and parameters are an index of
 it.

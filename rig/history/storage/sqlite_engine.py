@@ -23,7 +23,7 @@ WRITES = "rig_writes"  # execution option of a connection that will write
 
 @dataclass(slots=True)
 class _Shared:
-    """An engine with the number of its users."""
+    """An engine and the number of its users."""
 
     engine: Engine
     users: int = 0
@@ -99,7 +99,7 @@ def _connect_to_write(file: Path, *, new: bool) -> sqlite3.Connection:
 
 
 def _connect_to_read(file: Path) -> sqlite3.Connection:
-    """Open a file for reading only, in a folder in which the user can make no files.
+    """Open a file for reading only, in a folder in which the user cannot create files.
 
     A writer would keep a log in that folder. Without a log the file does not change while it is read, so no lock is
     needed.
@@ -114,7 +114,7 @@ def _connect(file: Path, options: str) -> sqlite3.Connection:
 
 
 def _begin_anew() -> None:
-    """Forget the parent's engines in a forked process, which opens its own."""
+    """Drop the parent's engines in a forked process, which opens its own."""
     _engines.clear()
     _sharing.release()
 

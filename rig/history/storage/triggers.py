@@ -1,4 +1,4 @@
-"""Triggers by which the database refuses to change or remove rows, for any program.
+"""Triggers of the database that refuse changes and removals of rows by any program.
 
 They protect against mistakes and against roles without the right to drop triggers, not against the owner of the
 database. `unlike_made` detects missing or changed triggers.

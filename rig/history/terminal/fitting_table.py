@@ -1,4 +1,4 @@
-"""A table that fits the terminal: it omits columns, but never cuts a name or a number."""
+"""A table that fits the terminal by omitting columns, never by cutting a name or a number."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ STROKES, ROUND_A_CELL = 1, 3  # width of the frame: one stroke, and for each cel
 
 @dataclass(frozen=True, slots=True)
 class TableColumn:
-    """A column with its `heading`. If columns do not fit, that of the highest `rank` is omitted first; 0 remains.
+    """A column with its `heading`. If columns do not fit, the highest `rank` is omitted first, and 0 never.
 
     A `shorter` column replaces it before it is omitted. A column that `wraps` may use several lines, and is at least
     `least` cells wide.
@@ -47,7 +47,7 @@ class FittingTable:
     columns: Sequence[TableColumn]
 
     def fitting(self, width: int) -> list[TableColumn]:
-        """Return the columns that fit into `width` cells, without empty ones."""
+        """Return the columns that fit into `width` cells, without empty columns."""
         shown = [column for column in self.columns if any(column.cells)]
         while _total_width(shown) > width:
             first = max(shown, key=lambda column: column.rank)

@@ -75,7 +75,7 @@ def trend_lines(trends: Mapping[str, Trend]) -> Iterator[str]:
 def changes_table(title: str, changes: Sequence[Change]) -> FittingTable:
     """Return a table of changes: each parameter before and now, the difference, and E_n.
 
-    A narrow terminal shows values without U, which E_n includes; the narrowest one also omits the values before.
+    A narrow terminal shows values without U, which E_n includes; the narrowest also omits the values before.
     """
 
     def values(heading: str, parameters: Sequence[Parameter], rank: int, shorter_rank: int) -> TableColumn:
@@ -166,7 +166,7 @@ def value_text(parameter: Parameter) -> str:
 
 
 def rig_in_words(past: Past) -> str:
-    """Return the rig's name, or the source of readings that have no rig."""
+    """Return the rig's name, or the source of readings without a rig."""
     return "readings from files" if past.rig == NO_ARM else past.rig
 
 

@@ -12,8 +12,8 @@ MOST = 16  # number of the newest results
 def picture(trend: Trend) -> str:
     """Return a block for each of the newest results, whose height shows the value.
 
-    The lowest block represents the lowest value − U, the highest block the highest value + U, so values with equal
-    blocks differ by less than U. Empty for a single result.
+    The lowest block is the lowest value − U, the highest block the highest value + U, so values with equal blocks
+    differ by less than U. Empty for a single result.
     """
     newest = trend.parameters[-MOST:]
     if len(newest) < 2:

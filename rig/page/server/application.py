@@ -1,4 +1,4 @@
-"""The page's addresses: its files, the event stream, the certificate, and two that act."""
+"""The page's routes: its files, the event stream, the certificate, and two that control the run."""
 
 import json
 from collections.abc import Awaitable, Callable, Sequence
@@ -25,7 +25,7 @@ Handler = Callable[[Request], Awaitable[Response]]
 
 
 def guard_routes(routes: Sequence[Route], door: Door, connections: Connections) -> Guard:
-    """Return the addresses behind their guard."""
+    """Return the routes behind their guard."""
     return Guard(Starlette(routes=routes), door, connections)
 
 
@@ -119,7 +119,7 @@ def _file(path: Path) -> Handler:
 
 
 async def _answer(request: Request) -> tuple[int, bool] | None:
-    """Return the question's number and the answer; None if the body is something else."""
+    """Return the question's number and the answer; None for another body."""
     try:
         document = json.loads(await body_of(request))
     except ValueError:

@@ -1,7 +1,8 @@
-"""Connections to the page: their number, their timeouts, and which one is closed for a new one.
+"""Connections to the page: their number, their timeouts, and the choice of one to close for a new one.
 
-Each takes a descriptor of the process that moves the arm, and anyone on this computer can open one. Connections without
-the token are strangers: if there is one too many, the oldest stranger of the address with the most is closed.
+A connection takes a descriptor of the process that moves the arm, and anyone on this computer can open one. Connections
+without the token are strangers: if there are too many, the oldest stranger of the address with the most strangers is
+closed.
 """
 
 import asyncio
@@ -29,7 +30,7 @@ class Connections:
         self._deadlines: dict[Client, asyncio.TimerHandle] = {}
 
     def add(self, client: Client, transport: asyncio.WriteTransport) -> None:
-        """Add a connection; if there are too many, close another."""
+        """Add a connection; if there are too many, close an older one."""
         if len(self._strangers) >= STRANGERS:
             most = Counter(address for address, _ in self._strangers).most_common(1)[0][0]
             oldest = next(client for client in self._strangers if client[0] == most)
@@ -83,5 +84,5 @@ def counting_protocol(connections: Connections) -> "type[H11Protocol]":
 
 
 def client_of(peer: Any) -> Client:
-    """Return a peer's address and port, of a socket or of ASGI (IPv6 has more fields); empty if the peer has gone."""
+    """Return a peer's address and port, from a socket or ASGI (IPv6 has more fields); empty if the peer has gone."""
     return (str(peer[0]), int(peer[1])) if peer else ("", 0)

@@ -1,6 +1,6 @@
-"""Requests of a browser to a run: to stop it and, if the page asks the operator, to agree.
+"""A browser's requests to a run: to stop and, if the page asks the operator, to agree.
 
-A stop interrupts the thread that runs the procedure, as Ctrl-C does, so the same code stops the arm and keeps the data.
+A stop interrupts the procedure's thread like Ctrl-C, so the same code stops the arm and keeps the data.
 """
 
 import _thread
@@ -17,7 +17,7 @@ STOP_SIGNAL = getattr(signal, "SIGUSR1", signal.SIGINT)  # SIGINT may be ignored
 
 
 class Control:
-    """The page's control of a run, between the server's thread and the run's, which is the main one."""
+    """The page's control of a run, between the server's thread and the run's, which is the main thread."""
 
     def __init__(self, *, may_answer: bool) -> None:
         self._may_answer = may_answer
@@ -59,7 +59,7 @@ class Control:
     def ask(self, announcement: Sequence[str], to_do: str) -> bool | None:
         """Wait for the operator's answer from a browser; return None if no page is left to answer.
 
-        The page shows the question as it shows all events.
+        The page shows the question like all events.
         """
         with self._changed:
             self._question += 1
@@ -93,7 +93,7 @@ class Control:
 
 
 def _interrupt_the_main_thread() -> None:
-    """Interrupt the main thread, even while it waits, if the system allows that."""
+    """Interrupt the main thread, if possible even while it waits."""
     if hasattr(signal, "pthread_kill"):
         signal.pthread_kill(threading.main_thread().ident or 0, STOP_SIGNAL)
     else:

@@ -1,8 +1,8 @@
 """The feed from the run's thread to any number of browsers, which cannot delay it.
 
 The run's thread changes the page's state and continues. The server's thread builds a frame of the changes ten times a
-second and puts it into each browser's mailbox, which holds one. A browser that has not taken its last frame gets none;
-when it reads again, it gets the complete state.
+second and puts it into each browser's mailbox, which holds one frame. A browser that has not taken its last frame gets
+none; later it gets the complete state.
 """
 
 import asyncio
@@ -45,7 +45,7 @@ class Feed:
         self._seen_at = ""  # wall-clock time of the last arrival, for people
 
     def event(self, event: RunEvent) -> None:
-        """Handle an event, as a Listener does: change the state without waiting."""
+        """Change the state by an event without waiting."""
         with self._lock:
             before = self._shown.ended
             self._shown.take(event)
@@ -96,7 +96,7 @@ class Mailbox:
         self.closed = False
 
     def put(self, frame: bytes) -> None:
-        """Store a frame. If there is one already, drop both, and send the complete state next."""
+        """Store a frame. If the mailbox is full, drop both frames, and send the complete state next."""
         self._behind = self._behind or self._frame is not None
         self._frame = None if self._behind else frame
         self._news.set()
@@ -127,7 +127,7 @@ class Broadcast:
         self._closing = False
 
     def full(self, *, has_token: bool) -> bool:
-        """Return whether no further browser, with the token or without, is admitted: the limits are separate."""
+        """Return whether no further browser is admitted; the limits with and without the token are separate."""
         return sum(trusted == has_token for trusted in self._mailboxes.values()) >= (
             CLIENTS if has_token else STRANGERS
         )

@@ -1,7 +1,7 @@
-"""Access control of the server: a browser must use its proper name, come from its own page, and act with the token.
+"""Access control of the server: requests need its proper name, its own page as origin, and the token to act.
 
-A foreign page can make a browser send requests here, and its name server can even give this address for its own name
-(DNS rebinding). Neither can change the Host, Origin and Sec-Fetch-Site that the browser sends.
+A foreign page can make a browser send requests here, even under its own name if its name server gives this address (DNS
+rebinding). It cannot change the Host, Origin and Sec-Fetch-Site that the browser sends.
 """
 
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""The content of a page by sections, each any JSON value, replaced as a unit. Used for pages that do not show a run."""
+"""The content of a page that does not show a run: sections, each a JSON value that is replaced as a unit."""
 
 import threading
 from typing import Any

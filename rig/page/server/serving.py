@@ -34,7 +34,7 @@ LARGEST_HEADERS = 8192  # bytes of the headers
 
 @dataclass(frozen=True, slots=True)
 class PageAddress:
-    """The page's address: without a `port` the usual port, or any free port if another program uses that."""
+    """The page's address; without a `port` the usual port, or a free one if another program uses that."""
 
     host: str = ADDRESS
     port: int | None = None
@@ -51,7 +51,7 @@ class PageAddress:
 
 @dataclass(frozen=True, slots=True)
 class Page:
-    """The page that opens first (`home`), and its addresses beyond those for spectators."""
+    """The page that opens first (`home`), and its routes beyond those for spectators."""
 
     home: str = "page.html"
     routes: "Callable[[Door], Sequence[Route]]" = lambda door: ()
@@ -66,8 +66,8 @@ def serving(
 ) -> Iterator[str]:
     """Show `feed` to browsers during the block; yield the page's address, with the token.
 
-    Without a `folder` there is no run to stop, and no certificate. If the page fails, it prints this on stderr and
-    ends: the run continues. Raise Refused `page_address`.
+    Without a `folder` there is no run to stop, and no certificate. If the page fails, it ends with a message on stderr,
+    and the run continues. Raise Refused `page_address`.
     """
     check(address)
     listening = _listen(address)

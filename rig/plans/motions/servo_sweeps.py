@@ -25,8 +25,8 @@ def plan_servo_six_observation(
 
     Each turn is a revolution and `overtravel_deg` more at constant speed, centred on `servo.home_deg`, so that a cable
     winds by slightly more than half a turn in either direction. `start_q_rad` is the shaft's angle (home if None); from
-    there the plan goes home first, slowly, and each stage begins and ends at home. `done` holds the indices of turns to
-    leave out; a stage without remaining turns has no steps.
+    there the plan first goes home slowly, and each stage begins and ends at home. `done`: the indices of finished
+    turns, which are left out; a stage without remaining turns has no steps.
     """
     home = (math.radians(servo.home_deg),)
     shaft, pace = SweepPose(0, "shaft", home), pace_of(servo.transfer_speed_deg_s, procedure.acceleration_deg_s2)

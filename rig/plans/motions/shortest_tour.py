@@ -23,7 +23,7 @@ def _length(order: list[int], between_s: Array) -> float:
 
 
 def _nearest_neighbours(between_s: Array, first: int) -> list[int]:
-    """Return the order that goes from point 0 to `first`, and then to the nearest remaining point each time."""
+    """Return the order from point 0 to `first`, and then always to the nearest remaining point."""
     order, remaining = [0, first], [point for point in range(1, len(between_s)) if point != first]
     while remaining:
         order.append(min(remaining, key=lambda point: float(between_s[order[-1], point])))
@@ -32,7 +32,7 @@ def _nearest_neighbours(between_s: Array, first: int) -> list[int]:
 
 
 def _improve(order: list[int], between_s: Array) -> list[int]:
-    """Return the order after reversing the part between two edges repeatedly, each time the part that helps most."""
+    """Return the order after repeatedly reversing the part between two edges that shortens it most."""
     while True:
         starts, ends = np.array(order), np.roll(order, -1)
         durations_s = between_s[starts, ends]

@@ -36,7 +36,7 @@ WRIST_1, WRIST_2, WRIST_3 = (JOINT_NAMES.index(name) for name in ("wrist_1", "wr
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """The `stations` in order, each with the `directions`, which every second station reverses if it `alternates`."""
+    """The `stations` in order, each swept in the `directions`, reversed in every second one if it `alternates`."""
 
     stations: tuple[SweepPose, ...]
     directions: tuple[tuple[Direction, ...], ...]
@@ -53,11 +53,10 @@ def plan_six_observation(
 
     With `axes: 6` wrist 1 turns about three more axes, with wrists 2 and 3 turned. With several speeds, all sweeps are
     made at each speed. A sweep turns by `arc_deg` about the home pose, one revolution by default. An order and
-    directions that the file leaves open are chosen so that a steady drift of the bias does least harm (`drift_effect`).
-    The whole series repeats `procedure.repeats` times. `start_q_rad` is the arm's pose (home if None); from there the
-    plan goes home first, slowly, and it ends at home. `done` holds the indices of sweeps to leave out: those an
-    interrupted run has finished. If the item is mounted in several stages, each stage has all of this, with the wrists
-    that are swept in it. Limits are checked by the turner's `problems`. Raise Refused `axes_do_not_span`.
+    directions that the file leaves open are chosen for the least effect of a steady drift of the bias (`drift_effect`).
+    The whole series repeats `procedure.repeats` times, in each stage with its wrists. `start_q_rad` is the arm's pose
+    (home if None); from there the plan first goes home slowly, and it ends at home. `done`: the indices of finished
+    sweeps, which are left out. The turner's `problems` checks limits. Raise Refused `axes_do_not_span`.
     """
     home = find_home(arm)
     swept = _order_sweeps(arm, procedure)
@@ -94,7 +93,7 @@ def _axes_of_items(mounted: Iterable[Mounted]) -> Iterator[Array]:
 
 
 def _trials(sweeps: Sequence[Sweep], home: Joints) -> Iterator[Step]:
-    """Yield a small turn, and back, of each joint that is swept; it shows how the item is mounted."""
+    """Yield a small turn, and its reverse, of each joint that is swept, which show the item's mounting."""
     for joint, name in dict.fromkeys((sweep.joint, sweep.joint_name) for sweep in sweeps):
         station = SweepPose(joint, name, home)
         yield from trial(f"trial of {name}", f"back from the trial of {name}", station, TRIAL_RAD, TRIAL_PACE)
@@ -130,8 +129,8 @@ def _order_sweeps(arm: ArmSection, procedure: SixSweepsSection) -> tuple[Sweep, 
 def _stations(home: Joints, procedure: SixSweepsSection, order: Sequence[str]) -> tuple[SweepPose, ...]:
     """Return the sweep poses in the order of the wrists.
 
-    Wrist 1 has further poses after its own, with the other wrists turned. Wrist 2 is turned by 45° so that the flange
-    moves away from the forearm.
+    Wrist 1 has further poses, with the other wrists turned: wrist 2 by 45°, so that the flange moves away from the
+    forearm.
     """
     tilt_rad = math.radians(-45 if math.sin(home[WRIST_2]) > 0 else 45)
     offsets = ((tilt_rad, 0.0), (tilt_rad, math.pi / 2), (0.0, math.pi / 4)) if procedure.axes == 6 else ()
@@ -182,8 +181,7 @@ def _flange_axis(station: SweepPose, sign: int) -> Vector3:
 def _connect(sweeps: Sequence[Sweep], arm: ArmSection, procedure: SixSweepsSection) -> Iterator[Step]:
     """Yield sweeps with the rests after them and the transfers between, from home and back.
 
-    A transfer leads through home if the straight one takes the flange or its payload to the forearm, as wrists 1 and 2
-    may when they turn together.
+    A transfer leads through home if the straight path brings the flange or its payload too near to the forearm.
     """
     carried, model = read_load(arm), model_of(arm)
     pace = pace_of(arm.transfer_speed_deg_s, procedure.acceleration_deg_s2)

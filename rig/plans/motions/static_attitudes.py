@@ -22,9 +22,9 @@ def plan_static_attitudes(
 ) -> Plan:
     """Plan home, every attitude once in the order that takes the arm least time, `repeats` times, and home again.
 
-    `start_q_rad` is the arm's pose (home if None); from there the plan goes home first, slowly. `done` holds the
-    indices of dwells to leave out: those an interrupted run has finished. Limits and clearances are checked by the
-    turner's `problems`, the rank of the attitudes by `rig.analysis.design.attitude_information`.
+    `start_q_rad` is the arm's pose (home if None); from there the plan first goes home slowly. `done`: the indices of
+    finished dwells, which are left out. The turner's `problems` checks limits and clearances,
+    `rig.analysis.design.attitude_information` the rank of the attitudes.
     """
     before = approach(start_q_rad, find_home(arm), pace_of(arm.transfer_speed_deg_s, procedure.acceleration_deg_s2))
     return append_steps(before, dwells(arm, procedure, procedure.repeats, done))

@@ -1,4 +1,4 @@
-"""The effect of a steady drift of the bias on a calibration, by the plan alone. Pure."""
+"""The effect of a steady drift of the bias on a calibration, from the plan alone. Pure."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ NEGLIGIBLE = 1e-6  # ratio to the largest singular value: directions that attitu
 class PlannedAverage:
     """A planned average: the flange's rate, the arm's pose (of a sweep at its start), its middle and duration.
 
-    `on_the_way` are poses evenly along an arc; there are none along whole turns.
+    `on_the_way`: poses evenly along an arc; empty for whole turns.
     """
 
     rate_rad_s: Vector3
@@ -31,9 +31,9 @@ class PlannedAverage:
 def drift_effect(steps: Sequence[Step]) -> float:
     """Return the change of the calibration, rad/s, for a bias that rises by 1 rad/s from first sweep to last step.
 
-    The vector model of sweeps and rests, m = F ω + c (+ G a, with rests: `rig.estimation.gyroscope.vector_model`), is
-    fitted to that ramp about its middle: the changes of the scale, at the mean speed of the sweeps, and of the bias are
-    added in quadrature. The arm stands on the floor; the weights are for white noise.
+    The vector model m = F ω + c, and with rests G a (`rig.estimation.gyroscope.vector_model`), is fitted to that ramp
+    about its middle: the changes of the scale, at the mean speed of the sweeps, and of the bias are added in
+    quadrature. The base is upright; weights are for white noise.
     """
     looks = list(_list_averages(steps))
     rates = np.array([look.rate_rad_s for look in looks])

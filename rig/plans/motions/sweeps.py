@@ -23,14 +23,14 @@ class SweepPose:
     pose_q_rad: Joints
 
     def rotate_joint(self, by_rad: float) -> Joints:
-        """Return the pose with its joint turned by `by_rad`."""
+        """Return the pose with the joint turned by `by_rad`."""
         pose, joint = self.pose_q_rad, self.joint
         return (*pose[:joint], pose[joint] + by_rad, *pose[joint + 1 :])
 
 
 @dataclass(frozen=True, slots=True)
 class Profile:
-    """The course of a sweep: a ramp, `even_rad` at constant speed with `averaged_rad` in the middle, a ramp."""
+    """A sweep's course: a ramp, `even_rad` at constant speed with `averaged_rad` in the middle, a ramp."""
 
     averaged_rad: float
     even_rad: float
@@ -78,7 +78,7 @@ def connect_sweeps(
 
 
 def trial(name: str, return_name: str, station: SweepPose, by_rad: float, pace: Pace) -> Iterator[Transfer]:
-    """Yield a small turn and its reverse, under these names; it shows how the item is mounted."""
+    """Yield a small turn and its reverse, under these names, which show the item's mounting."""
     home, tried = station.pose_q_rad, station.rotate_joint(by_rad)
     for step in transfer(name, home, tried, pace):
         yield replace(step, tries=True)
@@ -93,7 +93,7 @@ def build_stages(
 ) -> Plan:
     """Return the approach, then every stage: its remaining sweeps, from home and back.
 
-    Sweeps in `done` are left out. They are numbered through all stages. A stage without remaining sweeps has no steps.
+    Sweeps are numbered through all stages; those in `done` are left out. A stage without remaining sweeps has no steps.
     """
     steps, stages, numbers = list(approach.steps), list[Stage](), count()
     for section, sweeps in mounted:

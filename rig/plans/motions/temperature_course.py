@@ -1,7 +1,8 @@
 """The temperatures that a calibration over temperature still lacks. Pure.
 
 The sensors go from one end of the range to the other, and back if both directions are wanted. A set of sweeps counts at
-the mean of its temperatures. Neighbours may be a gap apart, the outermost a quarter of it from the ends of the range.
+the mean of its temperatures. Neighbouring sets may be `max_step_k` apart, the outermost a quarter of that from the ends
+of the range.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -21,7 +22,7 @@ REMEMBERS_S = 30.0  # integral time of the controller
 class TemperatureCourse:
     """The course through a range of temperatures with gaps of at most `max_step_k`.
 
-    `sets` are the measured ones. `warming` is its present direction, None before a temperature is known.
+    `sets`: those measured. `warming`: the present direction, None before a temperature is known.
     """
 
     from_c: float
@@ -106,7 +107,7 @@ class TemperatureCourse:
 class Ramp:
     """The setpoint that a heater follows, and the power for it: 0 to `most_power`.
 
-    It moves at `rate_k_s` and waits for a sensor that cannot follow. `now_c` is the sensor's temperature.
+    It changes at `rate_k_s` and waits for a sensor that cannot follow.
     """
 
     rate_k_s: float

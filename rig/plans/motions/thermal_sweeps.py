@@ -23,8 +23,8 @@ def plan_thermal(
 ) -> Plan:
     """Plan the sets in sequence, at most `procedure.repeats` of them, each from home and back.
 
-    Before each the arm rests at home until the temperature is right. A set that is not complete in `done` is repeated:
-    its sweeps belong to one temperature. Raise Refused `axes_do_not_span`.
+    Before each set the arm rests at home until the temperature is right. A set that is incomplete in `done` is
+    repeated, because its sweeps belong to one temperature. Raise Refused `axes_do_not_span`.
     """
     plan = approach(start_q_rad, find_home(arm), pace_of(arm.transfer_speed_deg_s, procedure.acceleration_deg_s2))
     for steps in _sets(arm, procedure):

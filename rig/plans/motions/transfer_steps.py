@@ -10,7 +10,7 @@ from rig.motion.turner_state import Joints
 
 @dataclass(frozen=True, slots=True)
 class Pace:
-    """The speed and the acceleration of a motion, of the joint that travels farthest."""
+    """The speed and acceleration of a motion's joint that travels farthest."""
 
     speed_rad_s: float
     acceleration_rad_s2: float
@@ -26,7 +26,7 @@ LEISURE = pace_of(30, 60)
 
 
 def approach(start_q_rad: Joints | None, home: Joints, pace: Pace) -> Plan:
-    """Return the first motion, slowly home from the turner's pose; empty if that is unknown or is home."""
+    """Return the slow motion home from the turner's pose; empty if that is unknown or is home."""
     start = home if start_q_rad is None else start_q_rad
     speed_rad_s = min(pace.speed_rad_s, LEISURE.speed_rad_s)
     acceleration_rad_s2 = min(pace.acceleration_rad_s2, LEISURE.acceleration_rad_s2)

@@ -1,6 +1,6 @@
-"""The correction of readings on this computer, before they are recorded, for a sensor without a board.
+"""The correction of readings on this computer, before recording, for a sensor without a board.
 
-So a KVH 1775, which cannot store a calibration, is verified by the same movement and comparison.
+It serves to verify a KVH 1775, which cannot store a calibration.
 """
 
 from collections.abc import Mapping

@@ -1,7 +1,7 @@
-"""The board's own calibration, as in SIX: it keeps the readings of a sweep, averages the revolution and solves.
+"""The board's own calibration, as in SIX: the board keeps the readings of a sweep, averages the revolution and solves.
 
-Only the host can determine when the revolution was and how fast, from the arm's joints and both clocks. After each
-sweep it sends two board times and the measured speed, and at the end asks for the solution. All answers are recorded;
+Only the host knows the revolution's times and speed, by the arm's joints and both clocks. After each sweep it sends two
+board times and the speed, and at the end requests the solution. All answers are recorded;
 `rig.analysis.gyroscope.onboard_check` compares them with the host's own results.
 """
 
@@ -59,7 +59,7 @@ class BoardCalibration:
                 self.note(BoardRecalled(name, sweep))
 
     def begin(self) -> None:
-        """Make the host keep data even before the first sample, for the time base of the first sweep."""
+        """Make the host keep data from now on, for the time base of the first sweep."""
         self.acquisition.keep()
 
     def keep(self, sweep: Sweep) -> None:
@@ -81,7 +81,7 @@ class BoardCalibration:
             pool.shutdown(wait=False, cancel_futures=True)
 
     def observe(self, sweep: Sweep, revolutions: Attempts[str, Revolution]) -> None:
-        """Make the board average the revolutions; one that it cannot use is recorded as such and omitted."""
+        """Make the board average the revolutions; those that it cannot use are recorded as such and omitted."""
         for name, fault in revolutions.faults.items():
             self.note(BoardNotObserved(name, sweep.index, str(fault)))
         for name, revolution in revolutions.results.items():

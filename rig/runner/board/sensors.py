@@ -77,7 +77,7 @@ def open_board_source(config: SensorsConfig, on_samples: OnSamples, *, calibrate
 
 
 def set_up_sensors(board: Board, config: SensorsConfig, *, calibrated: bool) -> Mapping[str, BoardSensor]:
-    """Set up every configured sensor on the board; those to calibrate stream corrected readings if `calibrated`.
+    """Set up all configured sensors on the board; those to calibrate stream corrected readings if `calibrated`.
 
     Return them by name. Raise Refused as `find_sensor` and `read_stored_calibration` do.
     """
@@ -119,7 +119,7 @@ def _set_up_corrected(board: Board, name: str, section: SensorSection) -> BoardS
 
 
 def describe_corrected(sensor: RecordedSensor, calibration: Calibration, sensitivity_rad_s: float) -> RecordedSensor:
-    """Return the description of a sensor whose rates the board corrects and sends in counts of `sensitivity_rad_s`."""
+    """Return the description of a sensor with rates corrected by the board, in counts of `sensitivity_rad_s`."""
     raw = sensor.channel(RATE)
     assert raw.full_scale_counts is not None, "every driver states it"
     limit_rad_s = raw.full_scale_counts * raw.unit_per_count

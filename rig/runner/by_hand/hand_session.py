@@ -1,7 +1,7 @@
-"""A session by hand while it happens: asks for a move, waits for the rest after it, accepts the move or asks again.
+"""A session by hand in progress: requests a move, waits for the rest after it, and accepts or refuses the move.
 
-Nothing here can move anything. The first sensor to calibrate decides; the others are recorded too, and all are solved
-from the recording afterwards, without the refused moves.
+The first sensor to calibrate decides; others are only recorded. All are solved from the recording afterwards, without
+the refused moves.
 """
 
 import time
@@ -188,7 +188,7 @@ class HandSession:
         return Fault("turn_not_closed", what, "Lay it against the ruler, and turn again")
 
     def _next(self, now: SessionProgress, face: Face | None) -> Instruction | None:
-        """Return the next instruction; None once the session has enough moves."""
+        """Return the next instruction, or None if the session has enough moves."""
         wanted = self.settings.wanted_scale_u
         enough = wanted is not None and now.solution is not None and float(max(now.expanded_scale)) <= wanted
         return None if enough else next_instruction(self._open, face)
@@ -204,10 +204,10 @@ class HandSession:
         self.note(HandMoveAccepted(*self._board_us(move), kind, before, face, self._accepted[-1].turns))
 
     def _refuse_move(self, wrong: Fault, move: Move | None, rest: HandRest) -> bool:
-        """Omit what a fault concerns: the move, the rest, or everything before it. Return whether the rest counts.
+        """Omit the move, the rest, or everything before, by the fault. Return whether the rest counts.
 
-        If the bias has changed at one rest, the item may have crept, so that rest is omitted. If it has changed at the
-        next rest too, the bias itself has changed. Raise the fault if no move can correct it.
+        If the bias has changed at one rest, the item may have crept, and the rest is omitted; if at the next rest too,
+        the bias itself has changed. Raise a fault that no move can correct.
         """
         self._refused += 1
         if wrong.name not in MENDED_BY_HAND:
@@ -251,7 +251,7 @@ class HandSession:
             self.note(self._request)
 
     def _face(self, of_sensor: str) -> Face:
-        """Return the face of the item that is up when the sensor's axis `of_sensor` is."""
+        """Return the face of the item that is up if the sensor's axis `of_sensor` is."""
         return rotate_face(of_sensor, np.array(self.sensor.mounting).T)
 
     def _board_us(self, part: HandRest | Move) -> tuple[int, int]:

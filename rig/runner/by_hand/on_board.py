@@ -1,6 +1,6 @@
-"""A gyroscope's calibration by hand that the board makes itself: the host instructs, follows, and checks the answer.
+"""A gyroscope's calibration by hand, made by the board: the host instructs, follows, and checks the result.
 
-The board detects rests and moves and solves without the host, whose instructions follow from the board's reports.
+The board detects rests and moves and solves without the host, which instructs by the board's reports.
 """
 
 import time
@@ -66,7 +66,7 @@ class FollowedSession:
     def take(self, report: HandReport) -> None:
         """Process the board's report and announce its changes.
 
-        If the board's button has begun a new session, begin a new one here as well.
+        If the board's button has begun a new session, this session begins anew, too.
         """
         wrong = None
         if self.reports and report.judged < self.reports[-1].judged:
@@ -104,7 +104,7 @@ class FollowedSession:
         self.tell(HandRested(report.after_us, report.end_us, self._lay[-1]))
 
     def _ask(self, wrong: Fault | None) -> None:
-        """Request the next move of the list; after its last move the list begins again until the board has enough."""
+        """Request the next move of the list, which is repeated until the board has enough moves."""
         flips = self.moves
         while (remaining := still_open(WantedMoves(flips, 0), self._accepted, self._lay)).done:
             flips += len(ROUND)

@@ -1,4 +1,4 @@
-"""Format C's magnetic field: readings assembled from one axis per message, x y z in three of every four. Pure."""
+"""Format C's magnetic field: three of four messages contain one axis each, x, y, z. Pure."""
 
 from typing import Any
 
@@ -13,7 +13,7 @@ GAUSS_T = 1e-4
 
 
 class MagneticFieldReader:
-    """The assembler of one stream's samples, FIELD_SAMPLE_DTYPE; a reading in which an axis is missing is lost.
+    """The assembler of one stream's samples, FIELD_SAMPLE_DTYPE; a reading with a missing axis is lost.
 
     `t_per_count` is the size of a count, `full_scale_counts` the largest count. A sample has the time of its middle
     axis; numbers start at the first complete reading.

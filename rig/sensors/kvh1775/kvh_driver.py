@@ -119,11 +119,11 @@ class Kvh1775:
 
     @property
     def lost(self) -> int:
-        """The number of messages lost in the stream."""
+        """The number of lost messages."""
         return 0 if self._counter is None else self._counter.lost
 
     def listen(self, duration_s: float) -> None:
-        """Receive the stream for `duration_s`. Raise errors that occur in this time."""
+        """Receive the stream for `duration_s`. Raise errors that occur meanwhile."""
         self.own_port.wait(lambda: False, duration_s)
 
     def close(self) -> None:
@@ -179,7 +179,7 @@ class Kvh1775:
         self._write("=CONFIG,0")  # this command has no answer
 
     def _write(self, command: str) -> None:
-        """Send a command. A line end precedes it, in case an incomplete command was sent before."""
+        """Send a command, after a line end in case an incomplete command was sent before."""
         self.own_port.write(b"\r\n" + command.encode("ascii") + b"\r\n")
 
     # -- the reader's thread ---------------------------------------------------------------------------------------

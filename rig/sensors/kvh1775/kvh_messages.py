@@ -99,9 +99,9 @@ class MessageBatch:
 
 
 class MessageReader:
-    """The parser of a byte stream in blocks of any size. It returns only messages with the right CRC or sum.
+    """The parser of a byte stream in blocks of any size, which returns only messages with the right CRC or sum.
 
-    After damage it searches from the byte after the bad header, so a damaged message costs no other.
+    After damage it searches from the byte after the bad header, so no other message is lost.
     """
 
     def __init__(self) -> None:
@@ -174,7 +174,7 @@ def encode(
 
 
 def encode_one(name: Format, rotation: Sequence[float], acceleration_g: Sequence[float], **tail: float) -> bytes:
-    """Return the bytes of one message, without arrays; `tail` contains at least the other fields of the format."""
+    """Return the bytes of one message, without arrays; `tail` contains the other fields of the format."""
     packer, fields = _PACKERS[name]
     data = packer.pack(_HEADERS[name], *rotation, *acceleration_g, *[tail[field] for field in fields])
     return data + _crc(data.translate(_BITS_REVERSED))

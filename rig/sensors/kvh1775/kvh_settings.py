@@ -1,8 +1,8 @@
-"""A KVH 1775's persistent settings: those that the rig corrects, and those that it refuses. Pure.
+"""A KVH 1775's persistent settings: which of them the rig corrects, and which it refuses. Pure.
 
-A previous user may have left any setting in its memory, and most would spoil a calibration unnoticed. So every setting
-is read. Settings of its output are set as the run needs them; settings that change the readings serve a purpose, and
-are refused. Names and values: ICD 56-0298 Rev. B, section 8.
+Most settings that a previous user may have made would spoil a calibration unnoticed, so all are read. Settings of the
+output are corrected for the run; settings that change the readings serve a purpose, and are refused. Names and values:
+ICD 56-0298 Rev. B, section 8.
 """
 
 from collections.abc import Iterable, Mapping
@@ -66,7 +66,7 @@ def corrections(stored: Mapping[str, str], required: Kvh1775Settings) -> dict[st
 
 
 def refusals(sensor: str, stored: Mapping[str, str]) -> Iterable[SensorError]:
-    """Yield `kvh_axes_not_identity`, `kvh_custom_filter` for stored settings that only their owner may change."""
+    """Yield `kvh_axes_not_identity`, `kvh_custom_filter` for stored settings that only the owner may change."""
     if not same(stored["AXES"], ",".join(str(value) for value in np.eye(3).ravel())):
         yield SensorError(
             "kvh_axes_not_identity",

@@ -35,7 +35,7 @@ INVALID_S = 1.0  # tolerated duration of messages in a row that are marked inval
 
 
 class Kvh1775Source:
-    """An instrument, set up for a run. A message with an axis marked invalid is no sample: it counts as lost."""
+    """An instrument, set up for a run. A message with an axis marked invalid counts as lost."""
 
     def __init__(self, name: str, section: SensorSection, on_samples: OnSamples, *, patience: Patience = USUAL) -> None:
         """Connect and set up the instrument.
@@ -125,7 +125,7 @@ class Kvh1775Source:
             )
 
     def _temperatures_c(self, messages: NDArray[Any]) -> Array:
-        """Return the temperatures (n,), °C, NaN for messages without one; in format C every fourth has one."""
+        """Return the temperatures (n,), °C, NaN for messages without one; in format C every fourth message has one."""
         if self._required.message == "C":
             celsius = np.where(messages["sequence"] % 4 == 0, messages["fourth"].astype(np.float64), np.nan)
         else:
@@ -140,7 +140,7 @@ def make_settings(section: SensorSection) -> Kvh1775Settings:
 
 
 def judge(driver: Kvh1775, name: str, section: SensorSection) -> Iterator[SensorError]:
-    """Yield the reasons not to use the instrument: another serial number, settings that only their owner may change."""
+    """Yield reasons not to use the instrument: another serial number, or settings that only the owner may change."""
     if driver.serial_number != section.serial_number:
         yield SensorError(
             "kvh_other_serial_number",
@@ -152,7 +152,7 @@ def judge(driver: Kvh1775, name: str, section: SensorSection) -> Iterator[Sensor
 
 
 def describe(name: str, section: SensorSection) -> RecordedSensor:
-    """Return the description of its samples for a recording."""
+    """Return the description of the instrument's samples for a recording."""
     channels = [fine_axes(RATE, radians(section.range_deg_s)), thermometer_channel(DEGREES_PER_COUNT, 0.0)]
     if section.acceleration is not None:
         channels.append(fine_axes(ACCELERATION, range_m_s2(section.acceleration)))
@@ -176,7 +176,7 @@ def kvh1775(
 
 
 def look(name: str, section: SensorSection) -> Iterator[str | SensorError]:
-    """Yield the instrument's state and problems; its memory is not changed. Raise as `Kvh1775` does."""
+    """Yield the instrument's state and problems, without changes of its memory. Raise as `Kvh1775` does."""
     line = _port_section(section)
     with closing(Kvh1775(name, line.port, line.baud)) as driver:
         yield f"KVH 1775 at {line.port}: serial number {driver.serial_number}"

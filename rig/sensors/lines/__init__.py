@@ -1,1 +1,1 @@
-"""Any device that prints its samples as lines of text, on a serial port of its own."""
+"""Devices that print samples as lines of text, on a serial port of their own."""

@@ -1,6 +1,6 @@
 """Decimal numbers in text, parsed many at a time: digits are summed column by column, not string by string. Pure.
 
-Seven numbers take a few tens of nanoseconds each, and each is exactly the printed number.
+A number takes a few tens of nanoseconds, and is exactly the printed one.
 """
 
 from contextlib import suppress
@@ -18,7 +18,7 @@ _POWERS = 10.0 ** np.arange(MOST_DECIMALS + 1)
 
 
 def parse_numbers(text: NDArray[np.uint8], starts: NDArray[np.intp], ends: NDArray[np.intp]) -> Array:
-    """Return the numbers (n,) in `text`, from each of `starts` to before the next of `ends`; NaN for other text."""
+    """Return the numbers (n,) in `text` from `starts` to before `ends`; NaN for other text."""
     if not len(starts):
         return np.empty(0)
     integer, digits = _sum_digits(text, starts, ends)

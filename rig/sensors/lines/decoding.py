@@ -1,9 +1,8 @@
 """Lines of text decoded to arrays of numbers, in blocks of bytes as they arrive. Pure.
 
-A line is a sample if it contains as many numbers as there are columns, with the right separators, and the right
-checksum if there is one. Allowed are a trailing separator, colour codes around the line, any text in an unused column,
-and an empty field or a word for "none" in others (`rig.sensors.lines.fields`). All other lines are counted by their
-kind.
+A line is a sample if it contains a number for each column, with the right separators and checksum, if any. Allowed are
+a trailing separator, colour codes around the line, any text in an unused column, and an empty field or a word for
+"none" in others (`rig.sensors.lines.fields`). All other lines are counted by their kind.
 """
 
 import re
@@ -35,10 +34,11 @@ for _value, _digit in enumerate("0123456789abcdef"):
 
 @dataclass(frozen=True, slots=True)
 class LineBatch:
-    """Decoded lines: `values` (n, columns) of the samples, as printed, and the lines that were no samples.
+    """Decoded lines: `values` (n, columns) of the samples, as printed, and counts of all other lines.
 
     A value that the device does not provide is NaN, as is text in an unused column. `samples_before` (m,): the number
-    of this block's samples before each rejected line (no sample, no comment). `first_rejected`: how the first begins.
+    of this block's samples before each rejected line (no sample, no comment). `first_rejected`: the beginning of the
+    first.
     """
 
     values: Array
@@ -48,7 +48,7 @@ class LineBatch:
 
 
 class LineReader:
-    """The parser of a byte stream in blocks of any size. It skips the first line, which may be incomplete."""
+    """The parser of a byte stream in blocks of any size, which skips the first line, as it may be incomplete."""
 
     def __init__(self, section: LinesSection) -> None:
         self._columns = len(section.columns)
@@ -136,7 +136,7 @@ class LineReader:
 
     @staticmethod
     def _match(raw: NDArray[np.uint8], starts: NDArray[np.intp], text: bytes) -> NDArray[np.bool_]:
-        """Return the lines that begin with `text`, which has no line end, so that no shorter line matches."""
+        """Return a mask of the lines that begin with `text`, which contains no line end."""
         expected = np.frombuffer(text, np.uint8)
         positions = np.minimum(starts[:, None] + np.arange(len(expected)), len(raw) - 1)
         matches: NDArray[np.bool_] = (raw[positions] == expected).all(axis=1)
@@ -146,7 +146,7 @@ class LineReader:
     def _match_checksums(
         raw: NDArray[np.uint8], text: NDArray[np.uint8], starts: NDArray[np.intp], ends: NDArray[np.intp]
     ) -> NDArray[np.bool_]:
-        """Return which lines end with a correct checksum `*hh` (XOR), and blank it in `text`."""
+        """Return a mask of lines that end with a correct checksum `*hh` (XOR), and blank the checksum in `text`."""
         star = np.maximum(ends - 3, 0)
         high, low = _HEX[raw[ends - 2]], _HEX[raw[ends - 1]]
         body_starts = starts + np.isin(raw[starts], np.frombuffer(b"$!", np.uint8))
@@ -160,7 +160,7 @@ class LineReader:
         return sum_ok
 
     def _mark_keys(self, text: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """Return the text with each key replaced by its marker, after replacing bytes that look like a marker."""
+        """Return the text with keys replaced by their markers, after replacing bytes that look like a marker."""
         data = np.where(text >= _KEYS, np.uint8(0x7F), text).tobytes()
         for key, marker in self._keys.items():
             data = data.replace(key, marker)
@@ -207,7 +207,7 @@ class LineReader:
 def _have_valid_bytes(
     classes: NDArray[np.uint8], line_starts: NDArray[np.intp], line_ends: NDArray[np.intp]
 ) -> NDArray[np.bool_]:
-    """Return which lines have only bytes that a sample may contain. Bytes between lines belong to no line."""
+    """Return a mask of lines with only bytes that a sample may contain. Bytes between lines belong to no line."""
     good = np.ones(len(line_starts), np.bool_)
     others = np.flatnonzero(classes == _OTHER)
     if len(others):
@@ -229,7 +229,7 @@ def _are_in_lines(
     line_ends: NDArray[np.intp],
     selection: NDArray[np.bool_],
 ) -> NDArray[np.bool_]:
-    """Return which of `positions` lie in the selected lines."""
+    """Return a mask of the `positions` in the selected lines."""
     first, after = np.searchsorted(positions, line_starts[selection]), np.searchsorted(positions, line_ends[selection])
     if int((after - first).sum()) == len(positions):  # the usual case
         return np.ones(len(positions), np.bool_)
@@ -241,7 +241,7 @@ def _are_in_lines(
 
 
 def _markers(keys: tuple[str, ...]) -> Mapping[bytes, bytes]:
-    """Return for each key a marker of its length. Longer keys come first, as they may contain shorter ones."""
+    """Return for each key a marker of its length. Longer keys come first, because they may contain shorter ones."""
     by_length = sorted(enumerate(keys), key=lambda indexed_key: -len(indexed_key[1]))
     return MappingProxyType({key.encode(): bytes([_KEYS + index]) + b" " * (len(key) - 1) for index, key in by_length})
 

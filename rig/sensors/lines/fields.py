@@ -1,4 +1,4 @@
-"""One line of text parsed to its columns, if some hold no number: unused text, or a value that is not provided."""
+"""The parser of a line with columns that hold no number: unused text, or a value that is not provided."""
 
 import re
 from collections.abc import Mapping
@@ -20,7 +20,7 @@ _AROUND_KEYS = " \t,;{}[]()\"'|&"
 
 
 class TextFieldReader:
-    """The reader of single lines by a section, for those that `LineReader` cannot parse as numbers alone."""
+    """The reader, by a section, of single lines that `LineReader` cannot parse as numbers alone."""
 
     def __init__(self, section: LinesSection) -> None:
         self._columns = section.columns

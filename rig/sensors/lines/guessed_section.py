@@ -1,4 +1,4 @@
-"""The section of a sensor as `rig lines` writes it: the guess, and a gap for each unknown. Pure."""
+"""The section of a sensor that `rig lines` writes: the guess, and a gap for each unknown. Pure."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ ROUND = (1, 2, 2.5, 4, 5, 8, 10)
 
 @dataclass(frozen=True, slots=True)
 class StatedProperties:
-    """The user's statements about what no line shows, None if not yet stated; `by_hand`: for a session by hand."""
+    """The user's statements about facts that no line shows, or None; `by_hand`: for a session by hand."""
 
     serial_number: str | None = None
     range_deg_s: str | None = None

@@ -51,7 +51,7 @@ class Guess:
     - `columns`, `rate_hz`: the columns' names, and the sample rate.
     - `time`, `sequence_wrap`, `clock`: the sections of these names.
     - `units`: unit and scale of each triad, by its letter.
-    - `reasons`, `gaps`: sentences about what decided, and about what the user must look up.
+    - `reasons`, `gaps`: sentences about the grounds of the guess, and about facts that the user must look up.
     """
 
     columns: list[str]
@@ -111,7 +111,7 @@ def guess_triads(names: tuple[str, ...], values: Array, still: Flags, rate_hz: f
 
 
 def _match_names(names: tuple[str, ...]) -> dict[int, str]:
-    """Return the columns that a header names, by index; a name that occurs twice is ignored."""
+    """Return the names of columns in a header, by index; duplicates are ignored."""
     names_by_index: dict[int, str] = {}
     for index, name in enumerate(names):
         plain = re.sub(r"\s*[\[(].*?[\])]", "", name).strip().lower()
@@ -230,7 +230,7 @@ def _kind(values: Array, still: Flags) -> str | None:
 
 
 def _gravity(level: float) -> tuple[str, float] | None:
-    """Return the unit and scale in which the norm equals gravity."""
+    """Return the unit and scale in which the norm `level` equals gravity, or None."""
     for size, unit in ((G, "m/s2"), (1.0, "g"), (1000.0, "mg")):
         if abs(level / size - 1) < TOLERANCE / 2:
             return unit, 1.0

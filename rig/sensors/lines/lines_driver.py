@@ -36,7 +36,7 @@ OnValues = Callable[[Array, NDArray[np.int64], NDArray[np.int64], float], None]
 
 @dataclass(slots=True)
 class Counts:
-    """Counts of samples, comments, lines rejected before the first sample and after it, and the first rejected line."""
+    """Counts of samples, comments, and lines rejected before the first sample and after it; the first rejected line."""
 
     samples: int = 0
     comments: int = 0
@@ -126,7 +126,7 @@ class LinesDevice:
     def _look(self, timeout_s: float) -> float:
         """Return the sample rate according to the device's own time; NaN if it prints none.
 
-        Raise as the constructor does.
+        Raise SensorError as the constructor does.
         """
         has_enough = self.own_port.wait(self._has_enough, timeout_s)
         if not has_enough and not self.counts.samples:
@@ -143,7 +143,7 @@ class LinesDevice:
         return rate_hz
 
     def _has_enough(self) -> bool:
-        """Return whether the samples suffice to judge the rate: at a low rate few do, coarse times need more."""
+        """Return whether the samples suffice to judge the rate: few at a low rate, more with coarse times."""
         if self._section.time is None:
             return self.counts.samples >= 3
         is_long_enough = self.counts.samples >= 5 and self._span_s() >= LOOK_S

@@ -1,4 +1,4 @@
-"""A configured device that prints lines, as a source of samples: its numbers converted to counts in SI units."""
+"""A configured device that prints lines, as a source of samples: its numbers are converted to counts."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import closing
@@ -81,7 +81,7 @@ class LinesSource:
         self._device.start()
 
     def check(self, clock_s: float | None = None) -> None:
-        """Raise SensorError `lines_damaged`, `lines_time_jumped`, `temperature_lost`, or one of `OwnPort.check`."""
+        """Raise SensorError `lines_damaged`, `lines_time_jumped`, `temperature_lost`, or as `OwnPort.check` does."""
         self._device.own_port.check(clock_s)
 
     def close(self) -> None:
@@ -165,7 +165,7 @@ def _make_readers(
 def stamp_std_s(lines: LinesSection, rate_hz: float, step_s: float = 0.0) -> float | None:
     """Return the standard uncertainty of a sample's time on the clock that stamps it; None if it is negligible.
 
-    The device prints its time in steps of `step_s`. If that is 0, it prints whole units, except for seconds.
+    The device prints its time in steps of `step_s`; 0 for whole units, except seconds.
     """
     if lines.clock == "arrival":
         return 1e-3 * lines.jitter_ms / 3**0.5
@@ -230,7 +230,7 @@ def _mean(values: Array) -> Array:
 def _make_triad(
     lines: LinesSection, quantity: Quantity, section: _TriadSection, full_scale: float
 ) -> tuple[Channel, _Printed]:
-    """Return a channel of three axes, with the last digit's step or a coarser 32-bit one, and its printed columns."""
+    """Return a channel of three axes, with the step of the last digit or a coarser 32-bit step, and its columns."""
     unit = section.scale * UNITS[section.unit].size
     step = 0.0 if section.decimals is None else unit * 10.0**-section.decimals
     step = max(step, full_scale / FULL_SCALE_COUNTS)

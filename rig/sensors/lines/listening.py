@@ -1,4 +1,4 @@
-"""Ten seconds of an unknown device's lines, at the first usual baud rate that gives text."""
+"""Ten seconds of an unknown device's lines, at the first usual baud rate that yields text."""
 
 import time
 from collections.abc import Callable

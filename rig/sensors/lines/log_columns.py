@@ -1,4 +1,4 @@
-"""A map of the columns of an unknown log, in the form of `--columns`: by headings, and by plausible numbers."""
+"""A map of the columns of an unknown log, in the form of `--columns`, by headings and plausible numbers."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -42,7 +42,7 @@ ColumnEntry = Mapping[str, Any]  # a column's entry: its name or number, and its
 class LogColumns:
     """The columns of a log: maps of `samples` and `motion` as in the file of `--columns`, and sentences on them.
 
-    `gaps` state what nothing shows; `others` are the columns that are not read.
+    `gaps`: sentences on unknown properties; `others`: the columns that are not read.
     """
 
     samples: Mapping[str, ColumnEntry]
@@ -86,7 +86,7 @@ def _guess_samples(
 ) -> tuple[dict[str, ColumnEntry], list[str]]:
     """Return the map of the columns of readings, and sentences on what could not be determined.
 
-    Of two sensors the first is read.
+    The first of two sensors is read.
     """
     samples: dict[str, ColumnEntry] = {}
     gaps: list[str] = []
@@ -116,7 +116,7 @@ def _guess_samples(
 
 
 def _may_be_gyroscope(names: Sequence[str], guessed: Guess) -> bool:
-    """Return whether three columns without names or units can be a gyroscope, and not an accelerometer."""
+    """Return whether three columns without names or units can be a gyroscope, not an accelerometer."""
     is_nameless = not any(names) or not guessed.units
     return is_nameless and len(names) == 3 and set(guessed.units) <= {"m"}
 
@@ -137,7 +137,7 @@ def _map_triad(
 
 
 def _list_others(layout: TableLayout, entries: Sequence[ColumnEntry]) -> list[str]:
-    """Return the columns that have a heading or numbers and that the map does not contain."""
+    """Return the columns with a heading or numbers that the map does not contain."""
     read = {entry["column"] for entry in entries}
     return [
         heading or f"column {index + 1}"
@@ -147,12 +147,12 @@ def _list_others(layout: TableLayout, entries: Sequence[ColumnEntry]) -> list[st
 
 
 def _name_once(names: list[str]) -> list[str]:
-    """Return the names with repeated ones made blank, because of two sensors of one name the first is read."""
+    """Return the names with repeated ones blanked, because the first of two sensors of one name is read."""
     return [name if name not in names[:index] else "" for index, name in enumerate(names)]
 
 
 def find_still(values: Array, rate_hz: float) -> NDArray[np.bool_]:
-    """Return the rows (n,) at rest: blocks in which every column scatters as little as in its quietest block."""
+    """Return a mask (n,) of rows at rest: blocks in which every column scatters about as in its quietest block."""
     width = max(int(BLOCK_S * rate_hz), 5)
     count = len(values) // width
     if count < 2:
@@ -200,7 +200,7 @@ KINDS = {
 
 
 def _strip_units(words: list[str]) -> list[str]:
-    """Return the words of a heading up to the axis if a unit follows, as in x_rad_s."""
+    """Return a heading's words up to the axis, without a unit that follows, as in x_rad_s."""
     axes = [position for position, word in enumerate(words) if word in AXES]
     if axes and axes[-1] < len(words) - 1 and all(word in UNIT_WORDS for word in words[axes[-1] + 1 :]):
         kind = {"rad": "gyro", "deg": "gyro", "dps": "gyro", "m": "acc", "t": "mag", "ut": "mag"}.get(
@@ -217,9 +217,9 @@ UNIT_WORDS = {"rad", "s", "deg", "dps", "mdps", "m", "s2", "g", "mg", "t", "ut"}
 def _group_columns(
     layout: TableLayout, values: Array, quaternion: Mapping[str, int], rate_hz: float
 ) -> Iterator[_ColumnGroup]:
-    """Yield the columns that vary, in groups that have values in the same rows: one group for each rate of the logger.
+    """Yield the columns that vary, in groups with values in the same rows: one group for each rate of the logger.
 
-    Columns of a reference are left out.
+    Columns of time and of a reference are left out.
     """
     names = _name_once([_plain_name(layout, index) for index in range(len(layout.headings))])
     used = {layout.time, *quaternion.values(), *(i for i, name in enumerate(layout.headings) if name in REFERENCE)}
@@ -235,7 +235,7 @@ def _group_columns(
 
 
 def _list_angles(layout: TableLayout) -> list[int]:
-    """Return the columns that their headings call angles of an attitude, and that have no unit of a rate."""
+    """Return the columns with headings of attitude angles and without a unit of a rate."""
     return [
         index
         for index in layout.numbers
@@ -267,7 +267,7 @@ def _have_length_1(values: Array) -> bool:
 
 
 def _unit_of(kind: str, unit: dict[str, Any], values: Array, still: NDArray[np.bool_]) -> tuple[dict[str, Any], str]:
-    """Return unit and factor of a triad in the form of a column map, and the reason if they are uncertain."""
+    """Return unit and factor of a triad in the form of a column map, and the reason if these are uncertain."""
     if (scale := unit.pop("scale", None)) is not None:
         steps = 1 / float(scale)
         near = min(ROUND_STEPS, key=lambda round_steps: abs(steps / round_steps - 1))
@@ -309,7 +309,7 @@ def _time_entry(layout: TableLayout, time: Array | None) -> dict[str, Any]:
 
 
 def _find_wrap(time: Array) -> int | None:
-    """Return the power of two, in steps of a time counter, at which it restarts; None if it does not."""
+    """Return the power of two, in steps, at which a time counter restarts; None if it does not."""
     time = time[np.isfinite(time)]
     has_fall = len(time) > 1 and bool((np.diff(time) < -0.5 * np.ptp(time)).any())
     if not has_fall or time.max() < 100 or time.min() < 0:

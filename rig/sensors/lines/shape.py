@@ -44,7 +44,7 @@ class Shape:
     - separator, prefix, keys, checksum: as in a section `lines`.
     - names: the columns' names in a header.
     - values (n, columns): the numbers, NaN if missing or text.
-    - arrived_s (n,): their times of arrival.
+    - arrived_s (n,): the samples' times of arrival.
     - decimals (columns,): the decimals of a column, -1 if they vary.
     - others: the number of other lines.
     """
@@ -147,7 +147,7 @@ def _find_field_shape(checked: Sequence[_CheckedLine]) -> Shape | None:
 
 
 def _split_by(sign: str, name: str, checked: Sequence[_CheckedLine]) -> Shape | None:
-    """Return the shape of lines with the separator `sign`, called `name`; None if they do not have it."""
+    """Return the shape of lines with the separator `sign`, called `name`, or None."""
     rows = [[field.strip() for field in text.split(sign or None)] for _, text, _ in checked]
     count, frequency = Counter(map(len, rows)).most_common(1)[0]
     if not 3 <= count <= MOST_NUMBERS or frequency < ENOUGH * len(checked):
@@ -230,7 +230,7 @@ def _interpret_texts(common: tuple[str, ...]) -> tuple[str, str, tuple[str, ...]
 
 
 def _find_header(others: Sequence[str], separator: str, count: int) -> tuple[str, ...]:
-    """Return the `count` column names in one of the other lines; empty if there are none."""
+    """Return the `count` column names in one of the other lines, or empty."""
     sign = {name: sign for sign, name in _SEPARATORS.items()}[separator]
     for text in others:
         names = [name.strip(" \"'") for name in text.lstrip("#%/ ").split(sign or None)]

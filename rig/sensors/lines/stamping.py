@@ -30,9 +30,9 @@ class Stamper:
 
     - `section`, `rate_hz`: the configuration.
     - `where`: the device in messages.
-    - `step_s`: the step of the printed time; a coarse one is smoothed.
+    - `step_s`: the step of the printed time; a coarse time is smoothed.
     - `lost`: the number of samples that did not arrive.
-    - `odd`: the number of samples left out because their time or number goes back, or jumps by more than 2 s.
+    - `odd`: the number of samples left out because their time or number goes back or jumps by more than 2 s.
     """
 
     section: LinesSection
@@ -129,7 +129,7 @@ class Stamper:
         self._last_sequence = float(row[columns.index("sequence")]) if "sequence" in columns else None
 
     def _select_possible(self, values: Array) -> NDArray[np.bool_]:
-        """Return the rows of (n, columns) whose time or number can follow that of the previous row.
+        """Return a mask of the rows of (n, columns) whose time or number can follow the previous row's.
 
         Raise SensorError `lines_time_jumped`.
         """
@@ -151,7 +151,7 @@ class Stamper:
         return is_sample
 
     def _is_possible(self, passed_s: Array, steps: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Return which samples can follow the previous one: later, or equal if times are coarse, and not too late."""
+        """Return a mask of samples that can follow the previous one: later, or equal for coarse times, within 2 s."""
         later = passed_s > 0 if self.section.time is not None and not self._is_coarse else passed_s >= 0
         in_time = (passed_s <= LONGEST_GAP_S) & (steps >= 1) & (steps <= LONGEST_GAP_S * self.rate_hz + 1)
         possible: NDArray[np.bool_] = later & in_time
@@ -188,7 +188,7 @@ class Stamper:
 
     # -- times ---------------------------------------------------------------------------------------------------
     def _add_late(self, steps: NDArray[np.int64], host_time_s: float) -> NDArray[np.int64]:
-        """Return the sequence steps plus the lost samples that show only as a delay of the lines."""
+        """Return the sequence steps plus the lost samples that show only by late lines."""
         if "sequence" in self.section.columns or self._smoothed is None:
             return steps
         late_s = host_time_s - (self._host_began_s or 0.0) - self._smoothed.predict_s(int(steps.sum()))
@@ -212,7 +212,7 @@ class Stamper:
 
 @dataclass(slots=True)
 class SmoothedClock:
-    """A clock that follows input times slowly, by the number of samples: a phase-locked loop of second order."""
+    """A clock that slowly follows input times by the number of samples: a phase-locked loop of second order."""
 
     rate_hz: float
     number: int = -1

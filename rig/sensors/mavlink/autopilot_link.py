@@ -93,7 +93,7 @@ class AutopilotLink:
 
     # -- the dialogue ----------------------------------------------------------------------------------------------
     def parameters(self, needed: Iterable[str], others: Iterable[str] = ()) -> Mapping[str, AutopilotParameter]:
-        """Read the parameters `needed`, and those of `others` that exist.
+        """Read the parameters `needed`, and existing ones of `others`.
 
         Raise SensorError `autopilot_silent` if no request is answered.
         """
@@ -260,7 +260,7 @@ class AutopilotLink:
                 self.own_port.news.notify_all()
 
     def _is_from_autopilot(self, message: Any) -> bool:
-        """Return whether the autopilot sent a message. The first autopilot whose heartbeat comes is selected."""
+        """Return whether the selected autopilot, the first one with a heartbeat, sent a message."""
         source = (message.get_srcSystem(), message.get_srcComponent())
         if self.autopilot is None and message.get_type() == "HEARTBEAT":
             if message.autopilot in FIRMWARES:

@@ -44,7 +44,7 @@ WIDEST = 0.98  # fraction of the 16-bit range, because undoing a correction may 
 
 
 class _ImuStream:
-    """One configured IMU of the stream: its correction, its numbers, the intervals of its first messages.
+    """One configured IMU of the stream: its correction, numbering, and the intervals of its first messages.
 
     `without_reading` counts the messages without a new rate, or without a new force if that is recorded.
     """
@@ -65,7 +65,7 @@ class _ImuStream:
 
     @property
     def has_enough_messages(self) -> bool:
-        """Whether enough messages came to judge them."""
+        """Whether enough messages came to judge the rate."""
         return max(len(self.intervals_us), self.without_reading) >= RATE_LOOK
 
     def settle(self) -> None:
@@ -148,7 +148,7 @@ class MavlinkSource:
         self.link.own_port.stream()
 
     def check(self, clock_s: float | None = None) -> None:
-        """Raise errors since the last call: SensorErrors of `OwnPort.check`, and `autopilot_armed`."""
+        """Raise errors since the last call: those of `OwnPort.check`, and SensorError `autopilot_armed`."""
         self.link.own_port.check(clock_s)
 
     def close(self) -> None:
@@ -250,7 +250,7 @@ def mavlink(
 
 
 def look(sections: Mapping[str, SensorSection]) -> Iterator[str | SensorError]:
-    """Yield the autopilot's state and its problems; nothing is changed. Raise the SensorErrors of `AutopilotLink`."""
+    """Yield the autopilot's state and problems, without changes. Raise the SensorErrors of `AutopilotLink`."""
     (first, section), *_ = sections.items()
     line = mavlink_section(section)
     messages: list[Any] = []

@@ -28,11 +28,11 @@ class ParameterNames:
     """The names of one IMU's parameters.
 
     - `gyro_offset`, `force_offset`, `force_scale`: its correction, a name for each axis.
-    - `orientation`: that of its board.
+    - `orientation`: the orientation of its board.
     - `must_be_zero`: parameters of corrections that cannot be undone, if they exist.
     - `filters`: its low-pass filters.
-    - `others`: parameters that are not 0 if the autopilot has a further IMU.
-    - `identity`: a parameter that must not be 0; otherwise the correction is not applied.
+    - `others`: parameters of further IMUs, 0 if there are none.
+    - `identity`: a parameter that is 0 if the correction is not applied.
     """
 
     gyro_offset: tuple[str, ...]

@@ -53,14 +53,14 @@ class ImuReading:
 
 
 def is_integer(imu: str) -> bool:
-    """Return whether the message holds integers, truncated toward zero."""
+    """Return whether an IMU's message holds integers, truncated toward zero."""
     return imu != "HIGHRES_IMU"
 
 
 def decode_reading(message: Any) -> ImuReading:
     """Decode a message of pymavlink.
 
-    Its temperature is that of the IMU, except in HIGHRES_IMU, which has that of the barometer.
+    The temperature is that of the IMU, in HIGHRES_IMU that of the barometer.
     """
     kind = message.get_type()
     sent: Mapping[Field, Array] = {

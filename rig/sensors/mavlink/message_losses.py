@@ -15,9 +15,9 @@ MISSING = 1.5  # in intervals between samples: after a longer one a sample is mi
 
 @dataclass(slots=True)
 class LinkCounter:
-    """The count of one autopilot's messages over one link: they share one sequence number, modulo 256.
+    """The count of one autopilot's messages over one link, which share one sequence number modulo 256.
 
-    A message that comes after a later one is useless: it remains counted as lost.
+    A message that comes after a later one counts as lost.
     """
 
     lost: int = 0
@@ -46,8 +46,7 @@ class ImuCounter:
     - `name`, `interval_us`: the sensor, and the nominal interval of its samples.
     - `unit_us`: the unit of the autopilot's time.
     - `repeated`: the count of messages without a new time.
-    - `number`, `time_us`: those of the last sample; the time is unwrapped (32 bits of milliseconds wrap after 49.7
-      days).
+    - `number`, `time_us`: of the last sample; the time is unwrapped (32 bits of milliseconds wrap after 49.7 days).
     """
 
     name: str

@@ -40,7 +40,7 @@ def encode_value(value: float) -> bytes:
 
 
 def decode_float(field: bytes) -> float:
-    """Return the float that pymavlink decodes from those four bytes."""
+    """Return the float that pymavlink decodes from the four bytes of `field`."""
     return float(SINGLE.unpack(field)[0])
 
 

@@ -1,7 +1,7 @@
 """Two sets of an autopilot's parameters, old and new: a file that restores them, and a journal during the change.
 
-The journal is in the user's own folder, by the autopilot's number, from before the first write until all are read back.
-So the next connection, after any interruption, learns of a mixed set.
+The journal is in the user's folder, by the autopilot's number, from before the first write until all parameters are
+read back. So the next connection after an interruption detects a mixed set.
 """
 
 import json
@@ -24,7 +24,7 @@ SCHEMA = "rig.autopilot/1"
 class ParameterChange:
     """The parameters of one autopilot before a change, `old`, and after it, `new`; both have the same names.
 
-    `autopilot_id` is its number, or its port if it has none. `backup` is the file that restores them.
+    `autopilot_id` is the autopilot's number, or else its port. `backup` is the file that restores the old parameters.
     """
 
     autopilot_id: str
@@ -34,7 +34,7 @@ class ParameterChange:
     backup: Path
 
     def state(self, parameters: Mapping[str, AutopilotParameter]) -> str:
-        """Return which set `parameters` equal, bit by bit: "old", "new" or, if neither, "mixture"."""
+        """Return the set that `parameters` equal, bit by bit: "old", "new", or else "mixture"."""
         fields = {name: parameter.field for name, parameter in parameters.items()}
         for name, expected in (("new", self.new), ("old", self.old)):
             if fields == {key: parameter.field for key, parameter in expected.items()}:
@@ -53,7 +53,7 @@ class ParameterChange:
         return json.dumps({**head, **sets}, indent=2) + "\n"
 
     def keep(self) -> None:
-        """Write the file that restores them. Raise Refused `autopilot_not_kept`; an existing file is not replaced."""
+        """Write the file that restores the old parameters. Raise Refused `autopilot_not_kept`, also if it exists."""
         try:
             _write(self.backup, self.serialize(), exclusive=True)
         except OSError as error:

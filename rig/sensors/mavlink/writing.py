@@ -9,15 +9,15 @@ from rig.sensors.mavlink.parameter_journal import ParameterChange, find_change
 
 
 def autopilot_id(link: AutopilotLink) -> str:
-    """Return the mark that identifies an autopilot: its unique number, or its port if it has none."""
+    """Return the identifier of an autopilot: its unique number, or else its port."""
     return link.identity.uid or link.port
 
 
 def change(link: AutopilotLink, planned: ParameterChange, target: Mapping[str, AutopilotParameter]) -> None:
     """Write the parameters `target` to an autopilot: the old or the new ones of a planned change.
 
-    Raise SensorError as `AutopilotLink.set_parameter` does, and `autopilot_not_stored` if it reads back another value;
-    then the journal still holds the change. Raise Refused as `ParameterChange.begin` does.
+    Raise SensorError as `AutopilotLink.set_parameter` does, and `autopilot_not_stored` if another value is read back;
+    the journal then still holds the change. Raise Refused as `ParameterChange.begin` does.
     """
     planned.begin()
     for parameter in target.values():

@@ -19,13 +19,13 @@ class Clock(Protocol):
         """Wait for an event; return whether it came in time."""
 
     def wait_for(self, changed: threading.Condition, done: Callable[[], bool], timeout_s: float) -> bool:
-        """Wait until `done` is true, evaluated whenever the locked condition `changed` notifies; return its value."""
+        """Wait until `done`, evaluated on each notice of the locked condition `changed`, is true; return its value."""
 
 
 class HostClock:
-    """The host's clock, with stamps of the raw monotonic clock, which is never slewed or set, if the system has one.
+    """The host's clock, with stamps of the raw monotonic clock, never slewed or set, if the system has one.
 
-    The servo's clock (Realtime Tick) does not serve: it counts milliseconds of an oscillator with 1 % tolerance.
+    The servo's clock (Realtime Tick) is unsuitable: it counts milliseconds of an oscillator with 1 % tolerance.
     """
 
     def now_s(self) -> float:

@@ -1,4 +1,4 @@
-"""The first contact with a servo: identity and settings. Nothing moves, and no change outlasts its supply."""
+"""The first contact with a servo: identity and settings. Nothing moves, and changes last only until power-off."""
 
 import time
 
@@ -48,7 +48,7 @@ def look_at(bus: Bus, port: str, servo_id: int) -> ServoReport:
 def _ping(bus: Bus, port: str, servo_id: int) -> None:
     """Raise Refused unless exactly one servo answers pings.
 
-    One wrong answer in four is accepted: it may be a late one.
+    One wrong answer in four is accepted, because it may be late.
     """
     answers = odd = 0
     for _ in range(PINGS):

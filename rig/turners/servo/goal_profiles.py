@@ -1,7 +1,7 @@
-"""Movements in the servo's terms: a goal in pulses, and a profile in milliseconds. Pure.
+"""Movements in the servo's units: a goal in pulses, and a profile in milliseconds. Pure.
 
-Only the time-based profile is used (firmware 42 and later). The velocity-based one has steps of 1.37 °/s and of 21
-°/s², too coarse for a sweep at 60 °/s. The duration of the whole move in milliseconds sets its speed to 2e-4.
+Only the time-based profile is used (firmware 42 and later): the duration of the whole move in milliseconds determines
+its speed to 2e-4. The velocity-based profile has steps of 1.37 °/s and 21 °/s², too coarse for a sweep at 60 °/s.
 """
 
 from collections.abc import Iterable
@@ -23,7 +23,7 @@ class ProfileMove(NamedTuple):
 
 
 def move_of(motion: Motion) -> ProfileMove:
-    """Return the servo's profile nearest to a motion: same total duration, ramps as long as its units allow."""
+    """Return the servo's profile nearest to a motion: the same total duration, and ramps to the nearest unit."""
     total_ms = max(SHORTEST_MS, round(1000 * motion.duration_s))
     ramp_ms = min(round(1000 * motion.speed_rad_s / motion.acceleration_rad_s2), total_ms // 2)
     return ProfileMove(round(motion.target_q_rad[0] / PULSE_RAD), total_ms, ramp_ms)

@@ -22,9 +22,8 @@ BRAKE_MS, BRAKE_RAMP_MS = 200, 100  # the profile of a stop
 def make_ready(bus: Bus, watchdog: int) -> None:
     """Make the servo hold its shaft at its position, with its watchdog armed. Raise Refused by name, BusError.
 
-    `watchdog` is in the register's units. Operating mode and drive mode lie in the EEPROM and are written only if they
-    differ. Writing the mode sets the profile to zero, the fastest motion; so the profile comes after it and the goal
-    after the profile, both before the torque.
+    `watchdog` is in the register's units. Operating mode and drive mode are in the EEPROM and written only if they
+    differ. Writing the mode sets the profile to zero, the fastest motion, so the order is mode, profile, goal, torque.
     """
     for register, wanted in ((DRIVE_MODE, TIME_BASED), (OPERATING_MODE, EXTENDED_POSITION)):
         if bus.look_up(register) != (wanted,):

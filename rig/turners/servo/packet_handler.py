@@ -48,7 +48,7 @@ class InstructionDenied(BusError):
 
 
 class PortGone(BusError):
-    """A failed port. The bus cannot be used any more; another `Bus` may open the port again."""
+    """A failed port. The bus is unusable; another `Bus` may open the port again."""
 
 
 class Bus:
@@ -78,14 +78,14 @@ class Bus:
         self._port.close()
 
     def ping(self) -> int:
-        """Return the model number. Raise Lost, PortGone."""
+        """Return the model number. Raise ReplyLost, PortGone."""
         with self._failing():
             number, result, error = self._packets.ping(self._port, self._id)
         self._judge(result, error, RETURN_LEVEL)
         return int(number)
 
     def more_came(self, wait_s: float) -> bool:
-        """Return whether another byte, which nobody requested, arrives within `wait_s`."""
+        """Return whether another byte arrives within `wait_s`, without a request."""
         with self._failing():
             for _ in range(max(1, round(wait_s / 0.002))):
                 if self._port.readPort(1):
@@ -93,14 +93,14 @@ class Bus:
         return False
 
     def read(self, register: Register) -> tuple[int, ...]:
-        """Read a register's values. Raise Lost, Denied, PortGone."""
+        """Read a register's values. Raise ReplyLost, InstructionDenied, PortGone."""
         return register.unpack(self.read_bytes(register))
 
     def read_bytes(self, register: Register) -> bytes:
-        """Read a register's bytes. Raise Lost, Denied, PortGone.
+        """Read a register's bytes. Raise ReplyLost, InstructionDenied, PortGone.
 
-        The packet handler's own `readTxRx` takes the requested number of bytes from a reply of any length, so it would
-        take the checksum of a late acknowledgement for data.
+        The packet handler's `readTxRx` takes the requested number of bytes from a reply of any length, and so the
+        checksum of a late acknowledgement for data.
         """
         with self._failing():
             result = self._packets.readTx(self._port, self._id, register.address, register.size)
@@ -113,7 +113,7 @@ class Bus:
         return bytes(reply[DATA : DATA + register.size])
 
     def look_up(self, register: Register) -> tuple[int, ...]:
-        """Read a register's values, with a second attempt after a lost reply. Raise Lost, Denied, PortGone."""
+        """Read a register's values, again after a lost reply. Raise ReplyLost, InstructionDenied, PortGone."""
         for _ in range(ATTEMPTS - 1):
             try:
                 return self.read(register)
@@ -124,7 +124,8 @@ class Bus:
     def write(self, register: Register, *values: int) -> None:
         """Write absolute values, so that a repeated write does no harm.
 
-        Without an acknowledgement, read the register, and repeat a lost instruction. Raise Lost, Denied, PortGone.
+        Without an acknowledgement, read the register, and repeat a lost instruction. Raise ReplyLost,
+        InstructionDenied, PortGone.
         """
         data = register.pack(*values)
         for attempt in range(ATTEMPTS):
@@ -154,8 +155,7 @@ class Bus:
     def settle(self) -> None:
         """Wait until the line has been silent for `SLACK_S`.
 
-        Raise PortGone. A late reply would be taken for the next one, because replies do not name the instruction that
-        they answer.
+        Replies do not name their instruction, so a late reply would be taken for the next one. Raise PortGone.
         """
         with self._failing():
             now_s = self.clock.now_s()
@@ -175,7 +175,7 @@ class Bus:
 
     @contextmanager
     def _failing(self) -> Iterator[None]:
-        """Translate the exceptions of the packet handler into Lost and PortGone."""
+        """Translate the exceptions of the packet handler into ReplyLost and PortGone."""
         if self._gone:
             raise PortGone("it has been closed")
         try:

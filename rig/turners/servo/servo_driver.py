@@ -44,9 +44,9 @@ def _watch_nothing() -> None:
 class Servo:
     """The servo `servo_id` at `port`, a context manager that receives from its entry and leaves the shaft at rest.
 
-    `model` is the configured one (`servo_models`). `on_state` gets every state in order, from a thread of
-    this class, and must not wait: a servo without traffic for `watchdog_s` stops. After a failure of the servo or its
-    line all methods raise `Fault` by name, with the shaft already stopped. `Refused` means that nothing has moved.
+    `model` is the configured one (`servo_models`). `on_state` gets every state in order, from a thread of this class,
+    and must not wait: a servo without traffic for `watchdog_s` stops. After a failure of the servo or its line all
+    methods raise `Fault` by name, after the shaft was stopped. `Refused` means that nothing has moved.
     """
 
     def __init__(
@@ -123,7 +123,7 @@ class Servo:
         ]
 
     def check(self) -> None:
-        """Raise the problem that a supervising thread found. A shaft under control is stopped by then."""
+        """Raise the problem that a supervising thread found, after a shaft under control was stopped."""
         if self._link is not None and (problem := self._thread_problem(self._link)) is not None:
             self._fail(problem)
         if self._problem is None and not (self._link is not None and self._stopper.begun):
@@ -194,8 +194,8 @@ class Servo:
     def stop(self) -> StopOutcome:
         """Stop the shaft and return its state; takes less than 1 s.
 
-        It may be called at any time, repeatedly, from any thread. A Ctrl-C during the stop is raised after it.
-        Afterwards this object no longer moves the shaft.
+        Callable at any time, repeatedly, from any thread. A Ctrl-C during the stop is raised after it. Afterwards this
+        object no longer moves the shaft.
         """
         return self._stopper.outcome() if self._holds else NOT_CONTROLLED
 

@@ -27,7 +27,7 @@ Job = Callable[[Bus], Any]
 
 
 class JobCancelled(BusError):
-    """An instruction that is no longer sent, after a stop."""
+    """The end of a job that a stop has cancelled."""
 
 
 class ServoLink:
@@ -63,7 +63,7 @@ class ServoLink:
         self._thread.start()
 
     def close(self) -> None:
-        """End the thread; the bus remains open. If the system delays the thread, it ends later."""
+        """End the thread; the bus remains open. A delayed thread ends later."""
         self._closing.set()
         self._woken.set()
         if self._thread.ident is not None:
@@ -71,7 +71,7 @@ class ServoLink:
 
     @property
     def alive(self) -> bool:
-        """Whether the thread still polls."""
+        """Whether the thread is polling."""
         return self._thread.is_alive()
 
     def stop(self, work: Callable[[Bus], None]) -> None:
@@ -87,7 +87,7 @@ class ServoLink:
     def call(self, job: Job, *, also_stopped: bool = False) -> Any:
         """Run a job between two polls; return its value or raise its error.
 
-        Raise PortGone if the thread does not run it, and Stopped after a stop unless `also_stopped`.
+        Raise PortGone if the thread does not run it, and JobCancelled after a stop unless `also_stopped`.
         """
         done = threading.Event()
         outcome: dict[str, Any] = {}
@@ -179,7 +179,7 @@ class ServoLink:
         return False
 
     def _look(self) -> None:
-        """Check torque and watchdog, which the block of states lacks."""
+        """Check torque and watchdog, which are not in the block of states."""
         if not self.supervising:
             return
         self._looks += 1

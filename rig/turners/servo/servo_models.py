@@ -1,4 +1,4 @@
-"""The supported servos, a row each, and the units of their registers.
+"""The supported servos, one per row, and the units of their registers.
 
 Source: ROBOTIS e-Manual, pages of the models: "Specifications" (stall torque, no-load speed, both at 12 V) and "Control
 Table" (numbers, units).
@@ -22,7 +22,7 @@ LOAD_FRACTION = 0.2
 
 @dataclass(frozen=True, slots=True)
 class ServoModel:
-    """One model: names, model number, stall torque at 12 V, no-load speed, and the quantity of its load register."""
+    """A model: names, model number, stall torque at 12 V, no-load speed, and whether its load register is a current."""
 
     name: str
     number: int

@@ -1,9 +1,9 @@
-"""The serial port under the maker's packet handler, with the method names that the handler calls.
+"""The serial port under the maker's packet handler, with the methods that the handler calls.
 
-The handler builds and reads the packets; the caller chooses the port. The maker's own `PortHandler` polls with a full
-processor core, measures its time-outs by the wall clock, which may be set, has one time-out for every adapter, shares
-the port with other programs, and remains busy after an exception. In this handler the system waits, the clock is
-monotonic, the time-out suits the line, the port is locked, and a failed port is never used again.
+The maker's own `PortHandler` polls with a full processor core, measures time-outs by the wall clock, which may be set,
+has one time-out for every adapter, shares the port with other programs, and remains busy after an exception. In this
+one the system waits, the clock is monotonic, the time-out suits the line, the port is locked, and a failed port is
+never used again.
 """
 
 from collections.abc import Sequence
@@ -21,9 +21,9 @@ BITS = 10  # bits per byte on the line: start, eight, stop
 class Port:
     """The port at a path or at socket://host:port. Raises `serial.SerialException` if it cannot be opened.
 
-    A path is locked for this process, against programs that ask for a lock; the server behind a socket takes one client
-    at a time. TIOCEXCL would bind all programs, but outlasts a killed program while another holds the port open.
-    `slack_s`: the delay of a reply beyond the time of its bytes.
+    A path is locked against programs that request a lock; the server behind a socket takes one client at a time.
+    (TIOCEXCL would exclude all programs, but outlasts a killed program while another has the port open.) `slack_s`: the
+    delay of a reply beyond the time of its bytes.
     """
 
     def __init__(self, path: str, baud: int, slack_s: float, clock: Clock) -> None:

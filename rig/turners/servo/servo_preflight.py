@@ -133,7 +133,7 @@ def _condition(report: ServoReport) -> list[Problem]:
 
 
 def _load(report: ServoReport, carried: FlangeLoad) -> list[Problem]:
-    """Return a problem if a payload's torque is too high for a horizontal shaft (its direction is unknown)."""
+    """Return a problem if a payload's torque is too high for a horizontal shaft; the shaft's direction is unknown."""
     lever_m = math.hypot(*carried.centre_m[:2])
     torque_nm = carried.payload_kg * GRAVITY_M_S2 * lever_m
     most_nm = LOAD_FRACTION * report.servo.stall_torque_nm
@@ -150,7 +150,7 @@ def _load(report: ServoReport, carried: FlangeLoad) -> list[Problem]:
 
 
 def hardware_problem(bits: int) -> Problem:
-    """Return the problem that the most serious bit of a hardware error states."""
+    """Return the problem by the most serious bit of a hardware error."""
     what = f"the servo reports {error_words(bits)}"
     if bits & BY_LOAD:
         remedy = "Find what blocked the shaft; hold the board, and switch the servo off and on"

@@ -85,7 +85,7 @@ def decode(
 
 
 def stands(states: Sequence[ServoState]) -> bool:
-    """Return whether the newest `STILL_STATES` of `states` (in order), or more, show a shaft at rest."""
+    """Return whether the newest `STILL_STATES` of `states`, in order, show a shaft at rest."""
     if len(states) < STILL_STATES:
         return False
     newest = states[-1]
@@ -98,7 +98,7 @@ def stands(states: Sequence[ServoState]) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class ServoReport:
-    """The servo's settings and state for pre-flight, a `Report`; `startup` is None without such a register.
+    """A `Report` of the servo's settings and state for pre-flight; `startup` is None without such a register.
 
     `round_trip_s` is the duration of reading a state.
     """

@@ -62,9 +62,9 @@ class Arm:
     """The arm at `host`, a context manager that receives states from its entry and leaves the arm stopped.
 
     `on_state` gets every state in order, from a thread of this class. `state_rate_hz` is in the controller's time.
-    `client_log` takes the output of the `ur_rtde` client; a PolyScope X is asked at `robot_api_port` too. After a
-    failure of the arm or its driver all methods raise `Fault` by name, with the arm already stopped. `Refused` means
-    that nothing has moved.
+    `client_log` takes the output of the `ur_rtde` client; `robot_api_port` is for a PolyScope X. After a failure of the
+    arm or its driver all methods raise `Fault` by name, after the arm was stopped. `Refused` means that nothing has
+    moved.
     """
 
     def __init__(
@@ -129,7 +129,7 @@ class Arm:
         return read_report(self._host, self._controller, self.latest, self._robot_api_port)
 
     def check(self) -> None:
-        """Raise the problem that a supervising thread found. An arm under control is stopped by then."""
+        """Raise the problem that a supervising thread found, after an arm under control was stopped."""
         if self._problem is None and not self._stopper.begun:
             return
         problem = self._problem or Problem("arm_stopped", "the arm was stopped on request", "Start again when ready")
@@ -220,8 +220,8 @@ class Arm:
     def stop(self) -> StopOutcome:
         """Stop the arm and return its state; takes less than 1 s.
 
-        It may be called at any time, repeatedly, from any thread. A Ctrl-C during the stop is raised after it.
-        Afterwards the control script has ended, and this object no longer moves the arm.
+        Callable at any time, repeatedly, from any thread. A Ctrl-C during the stop is raised after it. Afterwards the
+        control script has ended, and this object no longer moves the arm.
         """
         if not self._holds_arm:
             return NOT_CONTROLLED
@@ -310,7 +310,7 @@ class Arm:
         self.check()
 
     def _explain(self, problem: Problem) -> Problem:
-        """Return the problem of an ended program, with the controller's reason, such as a refused payload, if known."""
+        """Return the problem of an ended program, with the controller's reason, if known, such as a refused payload."""
         watch = self._watch
         if watch is None or problem.name != "program_stopped":
             return problem
@@ -359,7 +359,7 @@ class Arm:
         return self.latest.at_rest and distance_rad < ARRIVAL_RAD
 
     def _take(self, message: Message) -> None:
-        """Handle a received message of the child, on the link's reader thread."""
+        """Handle a message of the child, on the link's reader thread."""
         match message:
             case ChildHeartbeat():
                 self._silent_s = max(self._silent_s, message.silent_s)

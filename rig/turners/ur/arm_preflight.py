@@ -1,4 +1,4 @@
-"""Pre-flight of the arm: problems that can be foreseen before it moves. Pure functions of plans and a report."""
+"""Pre-flight of the arm: predictable problems, from plans and a report. Pure."""
 
 import math
 from collections.abc import Sequence
@@ -30,8 +30,8 @@ MAX_TOOL_ROTATION_RAD = 1e-3  # above a pendant's rounding, below any intended r
 def preflight_problems(plans: Sequence[Plan], arm: ArmSection, report: ArmReport) -> list[Problem]:
     """Return all reasons against moving: another arm, a plan beyond a limit, an arm that is not ready.
 
-    The last of the `plans` is the one to drive. If it is another arm, only that is reported, because all other reasons
-    concern the configured arm.
+    The last of `plans` is to be driven. For another arm only that is reported, because all other reasons concern the
+    configured arm.
     """
     if others := identity_problems(arm, report):
         return others
@@ -52,7 +52,7 @@ def _plan_problems_on(plan: Plan, arm: ArmSection, report: ArmReport) -> list[Pr
 def arm_problems(plan: Plan, report: ArmReport) -> list[Problem]:
     """Return the problems of the arm's state for this plan: modes, stops, control, the motion to the start.
 
-    The payload is not compared here: `Arm.take_control` sets it and confirms that the controller uses it.
+    `Arm.take_control` sets and confirms the payload.
     """
     problems = []
     if unready := readiness(report.state):
@@ -87,7 +87,7 @@ def arm_problems(plan: Plan, report: ArmReport) -> list[Problem]:
 
 
 def _tool_problems(plan: Plan, report: ArmReport) -> list[Problem]:
-    """Return the problem of a rotated tool frame, for plans with attitudes and if the controller reports the frame."""
+    """Return the problem of a rotated tool frame, if the plan has attitudes and the controller reports the frame."""
     if not plan.dwells or report.tcp_offset is None:
         return []
     rotation_rad = abs(math.remainder(math.hypot(*report.tcp_offset[3:]), math.tau))
@@ -106,8 +106,8 @@ def _tool_problems(plan: Plan, report: ArmReport) -> list[Problem]:
 def kinematics_problems(arm: ArmSection, report: ArmReport) -> list[Problem]:
     """Return the problems of the controller's description of its arm, if the configuration uses it.
 
-    Problems are a missing description, and each wrist whose axis differs from the drawing's, in the flange's frame at
-    the home pose.
+    These are a missing description, and wrists whose axes in the flange's frame at the home pose differ from the
+    drawing's.
     """
     if arm.kinematics == "nominal":
         return []

@@ -10,7 +10,7 @@ MAKER = "Universal Robots"
 
 @dataclass(frozen=True, slots=True)
 class ArmSetup:
-    """The arm for which the controller is set up: the maker's type number, its lengths, its joints' limits."""
+    """The arm for which the controller is set up: the maker's type number, lengths, joint limits."""
 
     robot_type: int
     drawing: DenavitHartenberg
@@ -19,7 +19,7 @@ class ArmSetup:
 
 @dataclass(frozen=True, slots=True)
 class ArmReport:
-    """The arm's report of itself, a `Report`; None for items that the controller does not report.
+    """The arm's `Report` of itself; None for items that the controller does not report.
 
     - host: its address.
     - version: its software (major, minor, bugfix, build).
@@ -30,9 +30,9 @@ class ArmReport:
     - state: the state at that time.
     - kinematics: the arm's geometry as measured in the factory.
     - tcp_offset: the pose of its tool centre point in the flange's frame.
-    - setup: the arm for which it is set up.
+    - setup: the arm for which the controller is set up.
     - called: the dashboard's name for it.
-    - model: the maker's name of the arm that these items mean.
+    - model: the maker's name of the arm, by these items.
     - registers_free: whether a half of the registers is free for the client's script.
     """
 

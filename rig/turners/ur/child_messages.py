@@ -53,7 +53,7 @@ class Connected:
 class ChildHeartbeat:
     """The child's sign of life; `states` are those since the last one, oldest first.
 
-    `silent_s`: the least time without data from the controller (`StateStream`).
+    `silent_s`: the shortest possible time without data from the controller (`StateStream`).
     """
 
     states: tuple[ArmState, ...]
@@ -67,7 +67,7 @@ class ScriptStarted:
 
 @dataclass(frozen=True, slots=True)
 class ControlTaken:
-    """Full control: the control script runs and the payload is set."""
+    """The beginning of full control: the control script runs and the payload is set."""
 
 
 @dataclass(frozen=True, slots=True)

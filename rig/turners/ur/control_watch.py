@@ -1,8 +1,8 @@
-"""The supervision, while the arm is under control, of the rig's ability to stop it without its client.
+"""The supervision of the rig's ability to stop an arm under control without the client.
 
-Local control disables every independent stop, and neither the states nor the client report it. Sources that do: the
-dashboard, which is polled (from 5.6 on); the Robot API of a PolyScope X (from 10.12 on); and the primary interface,
-whose connections the controller closes at that moment (the maker's client library, and issue 459 of its ROS driver). A
+Local control disables every independent stop, and neither the states nor the client report it. The dashboard reports it
+if polled (from 5.6 on), as do the Robot API of a PolyScope X (from 10.12 on), and the primary interface, whose
+connections the controller closes at that moment (the maker's client library, and issue 459 of its ROS driver). A
 controller of the CB3 series has no local control.
 """
 
@@ -33,8 +33,8 @@ ControlMode = Remote | Literal["gone"]
 class ControlWatch:
     """A thread that calls `on_problem` once, if the arm at `host` can no longer be stopped through its ports.
 
-    `newest_s()` returns the time of the newest state (monotonic time): a lost link, which the link reports, loses them
-    too.
+    `newest_s()` returns the monotonic time of the newest state; without states the link is lost, which the link
+    reports.
     """
 
     def __init__(

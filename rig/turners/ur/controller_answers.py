@@ -1,7 +1,7 @@
-"""The controller's answers while nothing moves: is the rig able to stop its arm, and the report of the arm.
+"""The controller's answers while nothing moves: the rig's ability to stop its arm, and the arm's report.
 
-A controller with PolyScope 5 is asked through its dashboard. A PolyScope X has no dashboard: RTDE, the primary
-interface and the Robot API answer what they can.
+A controller with PolyScope 5 answers by its dashboard. A PolyScope X has none: RTDE, the primary interface and the
+Robot API answer as far as possible.
 """
 
 from contextlib import closing
@@ -110,7 +110,7 @@ def _add_robot_api_answers(report: ArmReport, api: RobotApi) -> ArmReport:
 
 
 def _read_description(host: str) -> ArmDescription:
-    """Return the controller's description of its arm, which is empty if the primary interface is closed."""
+    """Return the controller's description of its arm, empty if the primary interface is closed."""
     try:
         return read_description(host, ANSWER_S)
     except OSError:

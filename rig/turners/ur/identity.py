@@ -2,7 +2,7 @@
 
 All limits depend on the model: the clearance between wrist and forearm, joint speeds, payload. Controllers report the
 type as a number (the maker's client library, `RobotType`), which later models share with earlier ones of the same
-construction; so the lengths decide as well, and the series, which the version of the software shows.
+construction, so the lengths, and the series by the software's version, decide as well.
 """
 
 from collections.abc import Mapping
@@ -57,7 +57,7 @@ def is_polyscope_x(version: tuple[int, ...]) -> bool:
 def series_problem(host: str, version: tuple[int, ...]) -> Problem | None:
     """Return the problem of a controller of another series, or of software too old for the rig to stop its arm.
 
-    If the configured arm is of the CB3 series, `cb3_not_supported` does not apply.
+    For a configured arm of the CB3 series, `cb3_not_supported` does not apply.
     """
     if is_polyscope_x(version) and version < POLYSCOPE_X_SINCE:
         since = ".".join(map(str, POLYSCOPE_X_SINCE))

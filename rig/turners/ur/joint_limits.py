@@ -1,4 +1,4 @@
-"""Limits of position, speed and acceleration, joint by joint: of the arm's model, and of its controller. Pure."""
+"""Joint limits of position, speed and acceleration, of the arm's model and of its controller. Pure."""
 
 import math
 from collections.abc import Iterator
@@ -97,7 +97,7 @@ def _find_excess(values: Array, ours: Joints, theirs: Joints | None) -> Iterator
 
 
 def _fractions(motion: Motion) -> Array:
-    """Return the travel (6,) of each joint relative to the longest one; speeds have the same ratios."""
+    """Return the travel (6,) of each joint relative to the longest travel; speeds have the same ratios."""
     travel_rad = np.abs(travel(motion.start_q_rad, motion.target_q_rad))
     fractions: Array = travel_rad / travel_rad.max()
     return fractions

@@ -1,4 +1,4 @@
-"""The supervision of an arm under control by its states: which states end the run, and with which problem. No I/O."""
+"""The supervision of an arm under control by its states, some of which end the run with a problem. No I/O."""
 
 from enum import Enum, auto
 
@@ -29,7 +29,7 @@ class ControlStage(Enum):
 
 
 class Supervision:
-    """The judge of one state after the other. All times are the controller's."""
+    """The judge of consecutive states. All times are the controller's."""
 
     def __init__(self) -> None:
         self.stage = ControlStage.LOOKING
@@ -40,9 +40,9 @@ class Supervision:
         self._limited_since_s: float | None = None
 
     def judge(self, state: ArmState) -> Problem | None:
-        """Return why the arm cannot continue; the safety bits that explain a stopped program may come one packet later.
+        """Return why the arm cannot continue, or None; the safety bits that explain a stop may come one packet later.
 
-        An interruption ends our program. A program that runs a moment later belongs to another client.
+        An interruption ends our program; a program that runs soon after belongs to another client.
         """
         if self.stage is ControlStage.LOOKING:
             return None

@@ -94,7 +94,7 @@ class ChildLink:
 
     @contextmanager
     def patience(self) -> Iterator[None]:
-        """Accept a long silence inside the block, in which a constructor of the client blocks the child."""
+        """Accept a long silence in the block, in which a constructor of the client blocks the child."""
         self._patient = True
         try:
             yield
@@ -174,7 +174,7 @@ class ChildLink:
             self._sending.release()
 
     def _give_up(self, name: str, what: str) -> None:
-        """End an unresponsive child, because its client would upload its script again if it reconnects."""
+        """End an unresponsive child, whose client would upload its script again if it reconnected."""
         self._ended.set()
         self._process.kill()
         self._lose(name, what)
@@ -197,7 +197,7 @@ def _writable(pipe: "Connection[Request, Message]") -> bool:
 
 @contextmanager
 def _block_interrupts() -> Iterator[None]:
-    """Hold back Ctrl-C in the block: a child started there never receives it; the parent receives it afterwards."""
+    """Hold back Ctrl-C in the block: the parent receives it afterwards, a child started there never."""
     if not hasattr(signal, "pthread_sigmask"):  # Windows: the child ignores Ctrl-C once it runs
         yield
         return

@@ -1,9 +1,9 @@
 """The supervised process, the only place of the `ur_rtde` client.
 
-After a lost connection the client can block for minutes, loop or crash the interpreter; here that harms only this
+After a lost connection the client can block for minutes, loop or crash the interpreter, which here harms only this
 process. The main thread reads states and sends heartbeats and never waits for the client; other threads serve the
-parent's requests, so that a stop is served during a move, and watch for the end of a move. If the parent is gone, the
-arm is stopped and the process ends.
+parent's requests, so that a stop is served during a move, and await the end of a move. If the parent is gone, the arm
+is stopped and the process ends.
 """
 
 import os
@@ -168,9 +168,9 @@ class _Child:
             self.abandon()
 
     def watch_parent(self) -> None:
-        """Stop the arm if the parent is silent for too long: it hangs, and nobody supervises the arm.
+        """Stop the arm if the parent is silent for too long, so that nothing supervises the arm.
 
-        A thread of its own does this, because sending states to a parent that does not read them blocks in the end.
+        This needs a thread of its own, because sending states to a parent that does not read them finally blocks.
         """
         while True:
             time.sleep(TICK_S)
@@ -182,7 +182,7 @@ class _Child:
     def watch_move(self) -> NoReturn:
         """Report the end of a move.
 
-        It has a thread of its own, because the client may take long to answer, and heartbeats cannot wait.
+        This needs a thread of its own, because the client may take long to answer, and heartbeats cannot wait.
         """
         while True:
             time.sleep(MOVE_POLL_S)
@@ -234,9 +234,8 @@ class _Child:
     def _await_payload(self, wanted_kg: float) -> Message:
         """Wait until the states show the payload; the parent judges everything else in the states.
 
-        Older states may still wait to be read, because the client's constructor held the interpreter or this process
-        got no processor. The payload therefore counts as refused only if the first state on a new connection does not
-        show it.
+        Older states may still be unread, because the client's constructor blocked the interpreter or this process got
+        no processor. So the payload counts as refused only if the first state on a new connection does not show it.
         """
         host_s, arm_s = time.monotonic(), self._latest.state.time_s
         while abs((latest := self._latest).payload_kg - wanted_kg) > PAYLOAD_TOLERANCE_KG:
@@ -261,7 +260,7 @@ class _Child:
             return states.first.payload_kg
 
     def _link_problem(self, *, silent: bool = False) -> Problem | None:
-        """Return the problem of a lost link, if any, so that its consequences are not reported as faults of the arm."""
+        """Return the problem of a lost link, if any, whose consequences are no faults of the arm."""
         if self._states.problem is not None or not (self._states.closed or silent):
             return self._states.problem
         return link_lost(f"no new state arrives from the arm at {self._host}")
@@ -289,7 +288,7 @@ class _Child:
     def _await_state(self) -> None:
         """Wait for a new state. If no state comes, the move did not begin because the link is lost.
 
-        In that case the parent reports the lost link before this wait ends.
+        The parent then reports the lost link before this wait ends.
         """
         latest, began_s = self._latest, time.monotonic()
         while self._latest is latest and time.monotonic() - began_s < ABANDON_S:
@@ -310,7 +309,8 @@ class _Child:
     def abandon(self) -> NoReturn:
         """Stop the arm, which is no longer supervised, and exit.
 
-        The program is stopped over the controller's ports. If no path confirms it, the RTDE client brakes the arm.
+        The program is stopped over the controller's ports. If no path confirms the stop, the RTDE client brakes the
+        arm.
         """
         if self._holds_arm:
             # The client's stop may wait forever for a controller that is gone; the system's alarm ends that.
@@ -331,7 +331,8 @@ def _exit_at_once(status: int) -> NoReturn:
 def _outlive_the_parent() -> None:
     """Ignore signals to the process group, because this process has to stop the arm.
 
-    A closed pipe ends it. SIGTERM stops the arm, and SIGALRM ends a stop in `_Child.abandon` that does not return.
+    A closed pipe ends the process. SIGTERM stops the arm, and SIGALRM ends a stop in `_Child.abandon` that does not
+    return.
     """
     for number in ENDING_SIGNALS:
         if number not in (signal.SIGTERM, getattr(signal, "SIGALRM", None)):
@@ -343,7 +344,7 @@ def _outlive_the_parent() -> None:
 def _send_output_to(log: str | None) -> None:
     """Redirect stdout and stderr to the log: the client prints to both, and stdout is reserved for results.
 
-    If the run folder has been removed, nothing is logged: the parent reports that.
+    If the run folder has been removed, nothing is logged; the parent reports this.
     """
     try:
         sink = os.open(os.devnull, os.O_WRONLY) if log is None else open_to_append(log)

@@ -43,7 +43,7 @@ class ProgramException:
 
 @dataclass(frozen=True, slots=True)
 class ProgramStopped:
-    """The end of the program of that name, for whatever reason."""
+    """The end of the named program, for any reason."""
 
     program: str
 

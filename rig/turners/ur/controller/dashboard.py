@@ -33,7 +33,7 @@ class Dashboard:
     def ask(self, command: str) -> str:
         """Send one command and return the controller's answer, without the line end.
 
-        The first command does not wait for the greeting, so that a `stop` also reaches a controller that greets slowly.
+        The first command does not wait for the greeting, so that a `stop` also reaches a slow controller.
         """
         deadline_s = time.monotonic() + self._timeout_s
         self._socket.sendall(command.encode() + b"\n")
@@ -44,8 +44,8 @@ class Dashboard:
     def stop_program(self) -> None:
         """Stop the running program, and with it the arm.
 
-        In local control the controller refuses with a sentence. Without a running program it may fail to execute the
-        command, which is not a refusal.
+        In local control the controller refuses with a sentence. An answer that it failed to execute the command, as
+        without a running program, is no refusal.
         """
         answer = self.ask("stop")
         self.acknowledged = answer == STOPPED

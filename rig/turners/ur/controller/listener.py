@@ -1,4 +1,4 @@
-"""The process of this machine that listens at an address: a simulated controller shares the machine's processors."""
+"""The process of this machine that listens at an address: a simulated controller, which shares the processors."""
 
 import socket
 from collections.abc import Iterator

@@ -1,7 +1,7 @@
-"""The controller's description of its arm and of its tool's frame: primary interface, port 30001. Receives only.
+"""The controller's description of its arm and tool frame, from the primary interface, port 30001. Receives only.
 
-Every UR is measured in the factory, and its controller computes with the result. (Client interface description of the
-maker for PolyScope 5: packages of a big-endian size, i32, a type, u8, and a payload; a robot state, type 16, contains
+Every UR is measured in the factory, and its controller uses the result. (Client interface description of the maker for
+PolyScope 5: packages of a big-endian size, i32, a type, u8, and a payload; a robot state, type 16, contains
 sub-packages of the same form. Of these KinematicsInfo, type 5, and Configuration Data, type 6, are sent once after
 connecting: the factory's measurement of this arm, and the arm that the controller is set up for; Cartesian Info, type
 4, in every state: the tool centre point's pose in the base's frame and in the flange's. A robot message, type 20, holds
@@ -48,7 +48,7 @@ class ArmDescription:
 
     @property
     def complete(self) -> bool:
-        """Whether all expected items have come. The software comes before all others, if at all."""
+        """Whether all expected items have come; the software comes before all others, if at all."""
         return None not in (self.kinematics, self.tcp_offset, self.setup)
 
 

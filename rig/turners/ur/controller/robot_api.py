@@ -1,4 +1,4 @@
-"""The Robot API of a PolyScope X, HTTP at port 80: for items that no other interface reports, and for the stop.
+"""The Robot API of a PolyScope X, HTTP at port 80, for items that no other interface reports, and for the stop.
 
 (The maker's client library, `DashboardClientImplX`: programs are stopped from 10.11 on, the control mode is reported
 from 10.12 on, the serial number from 10.14 on. In local control an order is answered by 403.)
@@ -25,7 +25,7 @@ WORD, ANSWER = 60, 160  # characters of an answer
 
 
 class RobotApi:
-    """The Robot API at `host` and `port`; an answer is None if none comes within `timeout_s`."""
+    """The Robot API at `host` and `port`; methods return None without an answer within `timeout_s`."""
 
     def __init__(self, host: str, port: int, timeout_s: float) -> None:
         self._host, self._port, self._timeout_s = host, port, timeout_s
@@ -71,9 +71,9 @@ class RobotApi:
 
 
 class RobotApiStop:
-    """The order to end the program, by the Robot API at `host` and `port`, as one path of a stop.
+    """The order to end the program by the Robot API at `host` and `port`, one path of a stop.
 
-    Its report on programs is not used, because it may not include those of clients (undocumented).
+    The API's report on programs is not used, because it may not include clients' programs (undocumented).
     """
 
     name = "Robot API"
@@ -95,7 +95,7 @@ class RobotApiStop:
             self.refusal = " ".join(filter(None, (f"HTTP status {status}", _message(body))))
 
     def program_running(self) -> bool:
-        """Raise `ConnectionError`, because the Robot API is not asked about programs."""
+        """Raise `ConnectionError`: the Robot API is not asked about programs."""
         raise ConnectionError("the Robot API is not asked")
 
     def close(self) -> None:

@@ -45,7 +45,7 @@ def impossible_state(state: ArmState) -> Problem | None:
 
 
 def _is_possible(state: ArmState) -> bool:
-    """Return whether every value is finite and within its limits. (A sum is finite only if all its numbers are.)"""
+    """Return whether every value is finite and within its limits."""
     q_rad, qd_rad_s, fraction = state.q_rad, state.qd_rad_s, state.target_speed_fraction
     return (
         math.isfinite(state.time_s + state.speed_scaling + sum(q_rad) + sum(qd_rad_s))

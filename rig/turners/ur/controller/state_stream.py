@@ -1,8 +1,8 @@
 """The complete stream of the arm's states: the receiving half of RTDE, port 30004, protocol version 2.
 
-The receive interface of `ur_rtde` keeps only the newest packet and does not signal its arrival: a reader that is
-delayed, by another thread or a busy machine, loses states. Here they wait in the socket until they are read. This
-module only receives; `ur_rtde` drives the arm. (Real-Time Data Exchange guide of the maker.)
+The receive interface of `ur_rtde` keeps only the newest packet and does not signal its arrival, so a delayed reader
+loses states. Here they wait in the socket until they are read. This module only receives; `ur_rtde` drives the arm.
+(Real-Time Data Exchange guide of the maker.)
 """
 
 import math
@@ -58,7 +58,7 @@ class StatePacket:
 
 
 class NotSupported(ConnectionError):
-    """A controller that answers, but does not support the requested item `what`; `version`: of its software."""
+    """The error of a controller that answers without support for the item `what`; `version`: of its software."""
 
     def __init__(self, what: str, version: tuple[int, ...]) -> None:
         super().__init__(f"it does not know {what}")
@@ -116,15 +116,15 @@ class StateStream:
 
     @property
     def first(self) -> StatePacket:
-        """The first packet; `read` returns the packets after it."""
+        """The first packet; `read` returns the following ones."""
         return self._first
 
     def read(self, timeout_s: float) -> list[StatePacket]:
         """Return the packets received, oldest first; wait at most `timeout_s` for the first one.
 
-        Once `closed`, there are no states. A packet with an impossible state or time is omitted and becomes the
-        stream's `problem`. An impossible state also closes the stream. After a step of the clock the states continue,
-        because they still show whether the arm is at rest.
+        A `closed` stream has no states. A packet with an impossible state or time is omitted and becomes the stream's
+        `problem`. An impossible state also closes the stream; after a step of the clock the states continue, because
+        they still show whether the arm is at rest.
         """
         looked_s = time.monotonic()
         if self.closed:
@@ -172,7 +172,7 @@ class StateStream:
 
     @property
     def _missed_s(self) -> float:
-        """The longest time, s of the controller's clock, for which recent silences may have lost states.
+        """The longest time, s of the controller's clock, for which states may have been lost in recent silences.
 
         A local controller's connection loses no states, unless it was silent for `SILENT_S`; then any number may be
         lost.

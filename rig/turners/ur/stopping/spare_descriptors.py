@@ -1,4 +1,4 @@
-"""Descriptors reserved for the stop: it needs sockets even if this process has used up its limit."""
+"""Descriptors reserved for the sockets of a stop, in case this process has used up its limit."""
 
 import os
 

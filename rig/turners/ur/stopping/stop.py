@@ -22,7 +22,8 @@ BRAKE_RAD_S2 = 5.0
 class StopOrder:
     """The order to end the program, given to the controller on all `paths` at once, each in its own thread.
 
-    A path that hangs does not delay the others. Each then asks for at most `timeout_s` whether the program has ended.
+    A path that hangs does not delay the others. Each path then polls for at most `timeout_s` whether the program has
+    ended.
     """
 
     def __init__(self, paths: Sequence[StopPath], timeout_s: float) -> None:
@@ -85,7 +86,7 @@ class StopOrder:
             self._remove(path, self._pending, self._active, self._unanswered)
 
     def _note(self, path: StopPath, result: StopConnection | OSError) -> None:
-        """Record a path's answer; an error that follows an answer does not replace it."""
+        """Record a path's answer; a later error does not replace it."""
         with self._changed:
             if isinstance(result, OSError):
                 if path.name in self._pending:
@@ -125,9 +126,10 @@ class StopOrder:
 class ArmStop:
     """The stop of an arm through its controller's ports and through the client, at the same time.
 
-    `paths` returns the paths of a stop, `send` passes a request to the child, `braked` returns its answer, None before
-    it comes; `await_rest(since_s, timeout_s)` waits for a state newer than `since_s` (monotonic time) and returns
-    whether it shows the arm at rest and its program ended.
+    - `paths`: returns the paths of a stop.
+    - `send`: passes a request to the child; `braked`: returns the child's answer, or None before it.
+    - `await_rest(since_s, timeout_s)`: waits for a state newer than `since_s` (monotonic time) and returns whether it
+      shows the arm at rest and the program ended.
     """
 
     def __init__(
