@@ -1,7 +1,7 @@
-"""What the benchmarks are to reach, and the table of what they reached: `python benchmarks/goals.py BENCHMARK …`.
+"""The benchmarks' goals, and the table of their results: `python benchmarks/goals.py BENCHMARK …`.
 
-Runs the benchmarks one after the other and prints the table at its end. Ends with 1 where one of them fails, and with 3
-where a figure falls behind its goal by more than a fifth.
+Runs the benchmarks one after the other and prints the table at the end. The exit status is 1 if a benchmark fails, and
+3 if a figure misses its goal by more than a fifth.
 """
 
 import json
@@ -22,7 +22,7 @@ FAILED, FELL_BEHIND = 1, 3
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """A bound that a figure, or its `ratio` to a peer measured in the same run, is to keep: at `most`, or at least."""
+    """A bound of a figure, or of its `ratio` to a peer in the same run: upper if `most`, else lower."""
 
     bound: float
     compared: Literal["figure", "ratio"] = "figure"
@@ -31,7 +31,7 @@ class Goal:
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """What was measured: a value in a unit, and that of a peer in the same unit, where there is one."""
+    """A measured value in a unit, and a peer's in the same unit, if there is one."""
 
     what: str
     value: float
@@ -41,7 +41,7 @@ class Figure:
 
     @property
     def ratio(self) -> float | None:
-        """The figure over the peer's."""
+        """The value divided by the peer's."""
         return None if self.peer_value is None else self.value / self.peer_value
 
 
@@ -67,7 +67,7 @@ GOALS = {
 
 
 def record(what: str, value: float, unit: str, *, peer: str = "", peer_value: float | None = None) -> None:
-    """Give a figure of `GOALS` to the table, if this benchmark runs for one."""
+    """Add a figure of `GOALS` to the table, if this benchmark is run for a table."""
     assert what in GOALS, f"{what} has no goal"
     if file := os.environ.get(FIGURES):
         figure = Figure(what, value, unit, peer, peer_value)
@@ -76,14 +76,14 @@ def record(what: str, value: float, unit: str, *, peer: str = "", peer_value: fl
 
 
 def shortfall(figure: Figure, goal: Goal) -> float:
-    """Return by which part of its goal a figure misses it; 0 or less where it is met."""
+    """Return by which fraction of its goal a figure misses it; 0 or less if it is met."""
     value = figure.value if goal.compared == "figure" else figure.ratio
     assert value is not None, f"{figure.what} has no peer"
     return value / goal.bound - 1 if goal.most else goal.bound / value - 1
 
 
 def table(figures: Iterable[Figure]) -> Iterator[str]:
-    """The lines of the table, in Markdown."""
+    """Yield the lines of the table, in Markdown."""
     yield "| what | figure | peer | ratio | goal | met |"
     yield "| --- | ---: | ---: | ---: | ---: | --- |"
     for figure in figures:
@@ -99,7 +99,7 @@ def table(figures: Iterable[Figure]) -> Iterator[str]:
 
 
 def machine() -> str:
-    """The name of this machine's processor, and how many of them it has."""
+    """Return the name of this machine's processors, and their number."""
     lines = Path("/proc/cpuinfo").read_text("utf-8").splitlines() if Path("/proc/cpuinfo").exists() else []
     names = [line.partition(": ")[2] for line in lines if line.startswith("model name")]
     return f"{(names or [platform.processor() or platform.machine()])[0]}, {os.cpu_count()} processors"

@@ -91,7 +91,7 @@ def _samples(name: str, runs: Sequence[Sequence[Frame]], host_time_s: float) -> 
 
 
 def _continues(before: Frame, frame: Frame) -> bool:
-    """Return whether the samples of a sensor's frame are of the same kind as the previous frame's, and follow these."""
+    """Return whether a frame's samples follow those of the sensor's previous frame, and are of the same kind."""
     previous, current = before.values, frame.values
     return bool(
         frame.name == before.name
@@ -291,8 +291,8 @@ class BoardSolution:
 class StoredPolynomials:
     """The changes of scale and bias with the part's own temperature inside `range_c`, constant beyond its ends.
 
-    Row n − 1 of each matrix belongs to (T − `temperature_c`)ⁿ, n from 1 to 3, with a column for each axis: what is
-    added to 1 and multiplies m + b, and what is added to b.
+    Row n − 1 of each matrix (3, 3) belongs to (T − `temperature_c`)ⁿ, n from 1 to 3, with a column for each axis. One
+    plus the scale's change multiplies m + b; the bias' change is added to b.
     """
 
     range_c: tuple[float, float]

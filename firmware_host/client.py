@@ -118,7 +118,7 @@ class Board:
         return BoardObservation.decode(self._ask("observe", values))
 
     def recall(self, sensor: int, index: int, mean_rad_s: Sequence[float], speed_rad_s: float) -> BoardObservation:
-        """Add an observation from before a reset, with the `mean_rad_s` of that time; `index` is as in `observe`."""
+        """Add an observation made before a reset, with its `mean_rad_s`; `index` is as in `observe`."""
         values = {"sensor": sensor, "index": index, "mean_rad_s": mean_rad_s, "speed_rad_s": speed_rad_s}
         return BoardObservation.decode(self._ask("recall", values))
 
@@ -153,12 +153,12 @@ class Board:
     def write_calibration(self, sensor: int, calibration: Calibration) -> None:
         """Store a calibration for a configured sensor; its configured range becomes part of the record.
 
-        The old record remains until the new one is complete. A repeated request stores the same again, without harm.
+        The old record remains until the new one is complete. Repeating the request is harmless.
         """
         self._ask("write_calibration", {"sensor": sensor, **calibration.values()}, _FLASH_TIMEOUT_S)
 
     def erase_calibration(self, sensor: int) -> None:
-        """Erase a sensor's calibration on the board; it is no error if there is none."""
+        """Erase a sensor's calibration on the board; without one, do nothing."""
         self._ask("erase_calibration", {"sensor": sensor}, _FLASH_TIMEOUT_S)
 
     def heat(self, power: float) -> Heating:
@@ -267,7 +267,7 @@ class Board:
                 self._on_samples(batch)
 
     def _take(self, frame: Frame, request: str | None) -> None:
-        """Handle every other frame as it comes, on the reader thread."""
+        """Handle a frame outside the stream, on the reader thread."""
         if frame.name == "ack" and request in ("start", "stop", "reboot"):
             # On this thread, because samples of a started stream may already be in the next frame.
             self._streaming = request == "start"
@@ -289,7 +289,7 @@ class Board:
         )
 
     def _refusal(self, frame: Frame) -> BoardError:
-        """Return the error of an `error` frame, with the name in the table and the part that it concerns."""
+        """Return the error of an `error` frame, with its name in `protocol.ERRORS` and the part that it concerns."""
         code, sensor = frame.values["code"], frame.values["sensor"]
         problem = protocol.ERRORS.get(code)
         if problem is None:

@@ -14,8 +14,8 @@ def exceeds(delay: float, limit: float) -> bool:
 def crowding() -> float:
     """Return the number of programs per processor of this machine, 1 to CROWDED, by which a delay may be stretched.
 
-    It is the mean of the last minute or the present number, if larger: after 15 s the mean shows only a quarter of a
-    new crowd.
+    This is the mean of the last minute, or the present number if that is larger: after 15 s the mean shows only a
+    quarter of a new crowd.
     """
     if not hasattr(os, "getloadavg"):  # Windows
         return 1.0

@@ -149,14 +149,14 @@ def measure_stack(image: bytes, elf: bytes) -> int:
 
 
 def read_ram_sizes(elf: bytes) -> tuple[int, int]:
-    """Return the RAM that the linker allocated, and the part of it for the stack, bytes."""
+    """Return the RAM that the linker allocated, and the part of this for the stack, bytes."""
     sections = [s for s in ELFFile(io.BytesIO(elf)).iter_sections() if s["sh_flags"] & SH_FLAGS.SHF_ALLOC]
     in_ram = {section.name: int(section["sh_size"]) for section in sections if section["sh_addr"] in RAM}
     return sum(in_ram.values()), in_ram[".stack"]
 
 
 def main() -> int:
-    """Print the three numbers. Return 1 if one is over its limit."""
+    """Print the use of flash, RAM and stack. Return 1 if one exceeds its limit."""
     image, elf = (IMAGE / "rig_l432.bin").read_bytes(), (IMAGE / "rig_l432.elf").read_bytes()
     ram, room = read_ram_sizes(elf)
     stack = measure_stack(image, elf)

@@ -75,7 +75,7 @@ def encode(name: str, sequence: int, values: dict[str, Any] | None = None, items
 
 
 class _Layout(NamedTuple):
-    """The data of a message for decoding, looked up once."""
+    """A message's data for decoding, computed once."""
 
     name: str
     head: Callable[[bytes, int], tuple[Any, ...]]

@@ -13,7 +13,7 @@ SOURCE = Path(__file__).resolve().parents[1]
 
 
 def install_command(extra: str) -> str:
-    """Return the shell command that installs the optional part `extra` for this very program."""
+    """Return the shell command that installs the optional part `extra` for this installation."""
     editable, source = _source()
     return shlex.join([sys.executable, "-m", "pip", "install", *(["-e"] if editable else []), f"{source}[{extra}]"])
 

@@ -29,7 +29,7 @@ class BoardLink:
 
     `on_frame(frame, request)` gets every frame outside the stream on that thread, with the name of the request it
     answers or None; it returns before `ask` does. `on_stream(frames, host_time_s)` gets the frames of the stream, all
-    those received together. Their errors become the `fault`, as a lost port does.
+    those received together. Exceptions of either become the `fault`, as does a lost port.
     """
 
     def __init__(
@@ -95,8 +95,8 @@ class BoardLink:
     def ask(self, name: str, values: dict[str, Any] | None, timeout_s: float) -> Frame:
         """Send a request repeatedly until its answer comes; every request must tolerate a repetition.
 
-        Raise BoardError `board_link_lost` after `timeout_s`, and `fault` if there is one. On a crowded computer, where
-        neither the reader nor a simulated board may get a processor, the last attempt is repeated for longer.
+        Raise BoardError `board_link_lost` after `timeout_s`, and `fault`, if any. On a crowded computer, where neither
+        the reader nor a simulated board may get a processor, the last attempt is repeated for longer.
         """
         with self._sending:
             self._sequence = sequence = self._sequence % 255 + 1

@@ -1,4 +1,4 @@
-"""A driver for a calibration rig: a robot arm turns a board of inertial sensors and solves for their calibration.
+"""A driver for a calibration rig: it lets a robot arm turn a board of inertial sensors, and computes their calibration.
 
 In a notebook:
 
@@ -8,13 +8,13 @@ In a notebook:
     run["gyro"].to_frame(sweep=3)                                 # pandas, SI units in the names
     result = rig.solve(run)                                       # or rig.load_result(run.path)
     result["gyro"].scale, result["gyro"].scale_expanded           # ± U
-    result["gyro"].apply(readings)                                # (n, 3) rad/s of one's own
+    result["gyro"].apply(readings)                                # (n, 3) rad/s, your own
     rig.read_log("log.csv", "columns.yaml").to_frame()            # a log of another program, in SI units
     rig.changes(rig.load("runs/of_last_year"), run)               # E_n
-    rig.calibrations("LSM9DS1-001").to_frame()                    # all of a sensor, out of the history
+    rig.calibrations("LSM9DS1-001").to_frame()                    # a sensor's, from the history
 
 docs/how-to/with-code/notebook.md goes through all of it. These names are public; the modules that define them may
-change. To import them loads no arm driver. A refusal raises `Refused`, a failure `Fault`: docs/errors.md lists each by
+change. Importing them loads no arm driver. A refusal raises `Refused`, a failure `Fault`: docs/errors.md lists each by
 `error.name`.
 """
 

@@ -35,7 +35,7 @@ _GARBAGE_THRESHOLD = 200_000  # container objects
 class Command(NamedTuple):
     """A command: its module (`add` adds its arguments, `run` carries it out), its help line, and its page in docs.
 
-    `waits_for` is the line that it prints at once if it begins by loading libraries for a second.
+    `waits_for`: the line that a command prints at once if it begins by loading libraries for a second.
     """
 
     module: str

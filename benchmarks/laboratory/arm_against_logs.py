@@ -2,9 +2,9 @@
 
 A LOG is a CSV file: as the maker's RTDE recorder writes it (a heading, spaces between), or one without a heading from
 `jointwise_motion` of github.com/shamilmamedov/dynamic_calibration (time, angles, rates, …), in which the joint that its
-name ends with swings. Prints the same figures for each log and for the simulated arm, by the functions that
-tests/world/ur10e/test_measured_joints.py tests it with (tests/support/motions/joint_figures.py).
-docs/simulated-arm.md says which logs there are, and the results.
+name ends with swings. Prints the same figures for each log and for the simulated arm, by the functions of
+tests/support/motions/joint_figures.py, with which tests/world/ur10e/test_measured_joints.py tests the arm.
+docs/simulated-arm.md lists the logs and the results.
 """
 
 import argparse

@@ -1,9 +1,8 @@
-"""What a technician waits for: `python benchmarks/laboratory/commands.py [--rounds N]`.
+"""The time that commands take: `python benchmarks/laboratory/commands.py [--rounds N]`.
 
 `rig solve`, `show`, `plan`, `check` and `--help`, each in a process of its own, by the demonstration's configuration
-and a frozen recording of six sweeps. Printed are wall time and processor time (user and system, child processes
-included), the least of all rounds. The table has the processor time: the other tells of
-whatever else the computer does, too.
+and a frozen recording of six sweeps. Prints wall time and processor time (user and system, child processes included),
+the least of all rounds. The table has the processor time, because wall time depends on other programs too.
 """
 
 import argparse
@@ -29,7 +28,7 @@ COMMANDS = {
 
 
 def took_s(*arguments: str) -> tuple[float, float]:
-    """Wall and processor seconds of a command."""
+    """Return wall and processor time of a command, s."""
     before, began_s = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
     subprocess.run([sys.executable, "-m", "rig", *arguments], cwd=ROOT, capture_output=True, check=True)
     wall_s, after = time.perf_counter() - began_s, resource.getrusage(resource.RUSAGE_CHILDREN)

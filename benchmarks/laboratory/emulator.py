@@ -1,4 +1,4 @@
-"""How fast the emulated board runs: `python benchmarks/laboratory/emulator.py [virtual seconds]`."""
+"""The speed of the emulated board: `python benchmarks/laboratory/emulator.py [virtual seconds]`."""
 
 import sys
 import time

@@ -1,9 +1,9 @@
-"""What the end of a run costs: `python benchmarks/laboratory/end_of_run.py [RUN_FOLDER] [--rounds N]`.
+"""The processor time of a run's end: `python benchmarks/laboratory/end_of_run.py [RUN_FOLDER] [--rounds N]`.
 
-A verified run (by default the frozen one that the tests have) is observed and solved, and then judged, compared and
-written as a run's end does it, in turn, each in a process of its own. Printed is processor time, user and system, child
-processes included: the least of all rounds, and the ratio. Both have loaded SciPy's special functions before, as a run
-has; matplotlib is loaded by the end alone.
+A verified run (by default the tests' frozen one) is observed and solved, then judged, compared and written as at a
+run's end, in turn, each in a process of its own. Prints the processor time (user and system, child processes included),
+the least of all rounds, and the ratio. Both have loaded SciPy's special functions before, as a run has; only the end
+loads matplotlib.
 """
 
 import argparse
@@ -42,7 +42,7 @@ print(cpu_s() - began_s)
 
 
 def measure(what: str, recorded: Path) -> float:
-    """Return the processor seconds of `what`, with a recorded run."""
+    """Return the processor time of `what`, s, for a recorded run."""
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-c", MEASURE.format(what=what), str(recorded), folder]
         done = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, check=True)

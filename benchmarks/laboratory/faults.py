@@ -1,12 +1,12 @@
-"""Everything that can break, at random moments: `python benchmarks/laboratory/faults.py [--moments 20] [--jobs 2]`.
+"""All kinds of faults, at random moments: `python benchmarks/laboratory/faults.py [--moments 20] [--jobs 2]`.
 
-Each fault of tests/support/fault_matrix/catalogue.py meets a run of each procedure at that many moments, in a
-laboratory of its own. Held against what docs/reliability.md promises: a named end and its exit status, the arm at rest
-within a second, no sample lost, a readable file, a run that resumes to its verdict, and none that passes far from the
-truth.
+Each fault of tests/support/fault_matrix/catalogue.py occurs in a run of each procedure at that many moments, in a
+laboratory of its own. The results are compared with the promises of docs/reliability.md: a named end and its exit
+status, the arm at rest within a second, no sample lost, a readable file, a run that resumes to its verdict, and no
+passed run far from the truth.
 
-What was done already is kept in the folder given by --out and not done again; --again repeats what deviated. Printed is
-the table of docs/reliability.md; `deviations.json` says what is not as promised. Moments depend on --seed alone.
+Finished cells are kept in the folder given by --out and not repeated; --again repeats those that deviated. Prints the
+table of docs/reliability.md; `deviations.json` lists the deviations. Moments depend on --seed alone.
 """
 
 import argparse
@@ -65,7 +65,7 @@ def run_cell(key: Key, seed: int, span_s: float, kept: Path) -> dict[str, Any]:
 
 
 def table(cells: Iterable[dict[str, Any]]) -> Iterable[str]:
-    """Lines of Markdown, a row for each fault."""
+    """Yield the table's lines in Markdown, a row for each fault."""
     yield "| fault | runs | how they ended | arm at rest | not in the file | resumed to a pass | error | deviations |"
     yield "| --- | --- | --- | --- | --- | --- | --- | --- |"
     by_fault: dict[str, list[dict[str, Any]]] = {}
@@ -138,7 +138,7 @@ def measure_undisturbed_s(setup: str) -> float:
 
 
 def report(cell: dict[str, Any]) -> None:
-    """One line of progress."""
+    """Print one line of progress."""
     deviations = "; ".join(cell["deviations"]) or "as promised"
     print(
         f"{cell['fault']}, {cell['setup']} at {cell['moment']:.2f}: {cell['ending'] or 'not met'}, {deviations} "
@@ -149,7 +149,7 @@ def report(cell: dict[str, Any]) -> None:
 
 
 def conclude(cells: Sequence[dict[str, Any]], out: Path) -> int:
-    """Print the table; 1 when anything deviates."""
+    """Print the table; return 1 if anything deviates, else 0."""
     deviating = [cell for cell in cells if cell["deviations"]]
     (out / "deviations.json").write_text(json.dumps(deviating, indent=2), encoding="utf-8")
     print("\n".join(table(cells)))

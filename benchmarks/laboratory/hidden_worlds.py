@@ -1,12 +1,12 @@
-"""Whether what is stated holds in laboratories unseen before: `python benchmarks/laboratory/hidden_worlds.py FOLDER`.
+"""Errors and stated uncertainties in new laboratories: `python benchmarks/laboratory/hidden_worlds.py FOLDER`.
 
 Draws 60 laboratories with a quiet LSM9DS1, 40 with a noisy one, 20 with an ADIS16465 beside a quiet one, 20 of `imu`
 with three parts, 10 with a KVH 1775, 6 with a quiet LSM9DS1 on each of four other arms, 6 with an autopilot, and 100
 pairs and 40 of `imu` on arms that ripple by any order of the turn (tests/support/laboratories/hidden_worlds.py), runs
-`rig run` in each, and keeps its recording in FOLDER/family/seed; those that are there are not made again. Then all are
-solved, and a table says of each family, part and parameter: RMS of error over u, the share within U, the largest error
-over U, the spread of u, and which undamaged runs were refused and by what.
-`--solve-only` runs nothing. `--family NAME` and `--count N` take fewer.
+`rig run` in each, and keeps its recording in FOLDER/family/seed; existing ones are not repeated. Then all are solved,
+and a table states for each family, part and parameter: RMS of error over u, the share within U, the largest error over
+U, the spread of u, and the undamaged runs that were refused, with the reason. `--solve-only` runs nothing. `--family
+NAME` and `--count N` select fewer.
 """
 
 import argparse
@@ -21,7 +21,7 @@ from support.laboratories.hidden_worlds import FAMILIES, WORLDS, first_seed, rec
 
 
 def table(family: str, runs: list[Judged]) -> None:
-    """Printed."""
+    """Print the table of a family's runs."""
     refused = {run.folder.name: run.refused for run in runs if run.refused}
     print(f"{family}: {len(runs)} runs, {len(refused)} refused")
     for (part, parameter), line in compare_with_truth(runs).items():
@@ -31,7 +31,7 @@ def table(family: str, runs: list[Judged]) -> None:
 
 
 def main() -> None:
-    """As the module says."""
+    """Draw, run and solve the laboratories, and print the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--family", action="append", choices=list(FAMILIES))

@@ -1,8 +1,8 @@
-"""What a history costs: `python benchmarks/laboratory/history.py [--calibrations N]`.
+"""The processor time of a history: `python benchmarks/laboratory/history.py [--calibrations N]`.
 
-Printed are, each pair side by side in one run: how long it takes to look up one serial number among N calibrations and
-among a hundredth of them, and the ratio; how much longer the end of a run takes by its certificate and its entry, in a
-fresh process that has loaded what a run has; and what `rig --help` takes beside a Python that imports nothing.
+Prints, each pair measured in one run: the time to look up one serial number among N calibrations and among a hundredth
+of them, and the ratio; the time that certificate and entry add to the end of a run, in a new process with a run's
+modules loaded; and the time of `rig --help` and of a Python that imports nothing.
 """
 
 import argparse
@@ -47,7 +47,7 @@ print(between_s - began_s, time.perf_counter() - between_s)
 
 
 def make_runs(count: int) -> list[FinishedRun]:
-    """`count` runs of `count / OF_EACH` sensors, taken in turn."""
+    """Return `count` runs of `count / OF_EACH` sensors, in turn."""
     first = read_finished_run(FIXTURE)
     (sensor,) = first.document.gyroscopes.values()
     slim = sensor.model_copy(update={"observations": (), "rests": ()})
@@ -62,14 +62,14 @@ def make_runs(count: int) -> list[FinishedRun]:
 
 
 def measure_look_up_s(history: History) -> float:
-    """Median of many."""
+    """Return the median time of many look-ups, s."""
     selection = Selection(serial_number="S-0")
     assert len(history.calibrations(selection)) == OF_EACH
     return float(np.median(timeit.repeat(lambda: history.calibrations(selection), number=1, repeat=200)))
 
 
 def measure_process_s(*arguments: str) -> float:
-    """The least of several."""
+    """Return the shortest time of several processes, s."""
     least = np.inf
     for _ in range(5):
         began_s = time.perf_counter()

@@ -1,9 +1,9 @@
-"""What the operator's page takes of a core: `python benchmarks/laboratory/page.py [seconds]`.
+"""The load of a core by the operator's page: `python benchmarks/laboratory/page.py [seconds]`.
 
-A run's events fifty times a second, two sensors' worth of them. Told to nobody first, which is what this program takes
-of itself and is no part of the page; then to a page at which nobody looks; to one with five browsers that read ten
-frames a second; and with five more that never read. The browsers are processes of their own. Printed as well: the
-longest that the run's thread waited for the page, and the largest memory.
+A run with two sensors sends its events fifty times a second: first to no listener, which measures this program alone;
+then to a page without browsers; to one with five browsers that read ten frames a second; and with five more that never
+read. The browsers are processes of their own. Also prints the longest wait of the run's thread for the page, and the
+largest memory.
 """
 
 import multiprocessing
@@ -45,7 +45,7 @@ def open_stream(url: str) -> socket.socket:
 
 
 def browser(url: str, frames: "Synchronized[int]") -> None:
-    """A browser that reads all that comes, and counts the frames."""
+    """Read the event stream as a browser does, and count the frames."""
     connection = open_stream(url)
     while chunk := connection.recv(1 << 16):
         with frames.get_lock():
@@ -53,7 +53,7 @@ def browser(url: str, frames: "Synchronized[int]") -> None:
 
 
 def feed_events(events: Iterator[RunEvent], listener: Callable[[RunEvent], None], seconds: float) -> float:
-    """Hand events to the listener for `seconds`; return the longest time that one event took, s."""
+    """Pass events to the listener for `seconds`; return the longest time that one event took, s."""
     longest_s, end_s = 0.0, time.monotonic() + seconds
     while time.monotonic() < end_s:
         for event in islice(events, EVENTS):
@@ -103,7 +103,7 @@ def measure_with_page(seconds: float, reading: int, stalled: int) -> tuple[float
 
 
 def main() -> None:
-    """Print what it takes, without and with the page."""
+    """Print the load without and with the page."""
     seconds = float(sys.argv[1]) if len(sys.argv) > 1 else 20.0
     alone, _ = measure(make_events(seconds), lambda event: None, seconds)
     print(f"{'without listeners':30} {alone:5.2f} % of a core")

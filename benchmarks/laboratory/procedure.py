@@ -1,7 +1,7 @@
-"""How long a whole procedure takes: `python benchmarks/laboratory/procedure.py [CONFIG]`.
+"""The duration of a whole procedure: `python benchmarks/laboratory/procedure.py [CONFIG]`.
 
 Runs the configuration twice, at its own time scale and in real time, and prints the wall time of each command and the
-ratio of the time the arm took (first motion to last, by the controller's clock) to the planned motions and rests.
+ratio of the arm's time (first motion to last, by the controller's clock) to that of the planned motions and rests.
 """
 
 import subprocess
@@ -22,7 +22,7 @@ DEMO = Path(__file__).parents[2] / "configs" / "demo.yaml"
 
 
 def measure(config: Path, time_scale: float, out: Path) -> tuple[float, float]:
-    """Wall time of `rig run`, and the arm's time from its first motion to its last, both in seconds."""
+    """Return the wall time of `rig run`, and the arm's time from its first motion to its last, s."""
     command = [sys.executable, "-m", "rig", "run", str(config), "--out", str(out)]
     began_s = time.perf_counter()
     subprocess.run([*command, "--set", f"world.time_scale={time_scale}"], check=True, capture_output=True)

@@ -1,8 +1,9 @@
-"""Whether runs stay calm on a busy machine: `python benchmarks/laboratory/under_load.py [--demos N] [--busy N]`.
+"""Whether runs succeed on a busy machine: `python benchmarks/laboratory/under_load.py [--demos N] [--busy N]`.
 
 Runs the demonstration alone, then N times, two at a time, beside busy loops, each on a loopback address of its own.
-Prints how many runs came to a verdict, the faults and refusals of the others by name, the arm states that were missed
-and how much longer a run took than alone. `--keep DIR` keeps the folders of runs that did not pass, with their logs.
+Prints the number of runs with a verdict, the faults and refusals of the others by name, the number of missed arm
+states, and how much longer a run took than alone. `--keep DIR` keeps the folders of runs that did not pass, with their
+logs.
 """
 
 import argparse
@@ -35,7 +36,7 @@ VERDICTS = {0: "pass", 1: "fail"}
 
 @dataclass(frozen=True, slots=True)
 class Demo:
-    """How one run ended: its verdict, or the name of the error and its message; its arm states and those missing."""
+    """The end of a run: verdict, or name of the error and message; numbers of recorded and of missing arm states."""
 
     ending: str
     message: str
@@ -73,7 +74,7 @@ def run_demo(config: Path, folder: Path, keep: Path | None, number: int) -> Demo
 
 
 def count_states(recording: Path, state_rate_hz: float) -> tuple[int, int]:
-    """The arm states of a recording, and how many are missing between its first and last; none without a recording."""
+    """Return the numbers of a recording's arm states and of those missing in between; 0 without a recording."""
     if not recording.exists():
         return 0, 0
     time_s = read_run(recording).states["time_s"]
@@ -83,7 +84,7 @@ def count_states(recording: Path, state_rate_hz: float) -> tuple[int, int]:
 
 @contextmanager
 def busy_loops(number: int) -> Iterator[None]:
-    """So many processes that never rest, for the length of the `with` block."""
+    """Run `number` processes that never wait, during the `with` block."""
     loops = [subprocess.Popen([sys.executable, "-c", BUSY_LOOP]) for _ in range(number)]
     try:
         yield

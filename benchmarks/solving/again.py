@@ -1,12 +1,12 @@
-"""How much faster two workers solve a history: `python benchmarks/solving/again.py [--recordings N] [--rounds N]`.
+"""The gain of a second worker in solving a history: `python benchmarks/solving/again.py [--recordings N] [--rounds N]`.
 
 A history of N recordings is solved one by one in this process, by one Dask worker, and by two, each worker a process
 with one thread. One and two workers take turns, round by round. The recordings are copies of the frozen ones of six
-sweeps, each in a folder and under a number of its own; the solver does not use the fact that they are alike.
-It prints the shortest time of each, and the ratio. The answers of all three must be equal to the last digit.
+sweeps, each in a folder and under its own number; the solver does not exploit that they are alike. Prints the shortest
+time of each, and the ratio. The answers of all three must be equal to the last digit.
 
-Needs the extra `dask` and two idle processors. If others use them, the processor time shows the
-ratio without them: the workers share the solving, while this one process distributes the tasks.
+Needs the extra `dask` and two idle processors. If others use them, the processor time shows the ratio without them: the
+workers share the solving, while this one process distributes the tasks.
 """
 
 import argparse
@@ -51,7 +51,7 @@ def make_tasks(count: int, folder: Path) -> list[Task]:
 
 
 def solve_on_cluster(tasks_to_solve: list[Task], workers: int) -> tuple[Duration, dict[str, Answer]]:
-    """Return duration and answers, after the workers have imported all modules by one of each kind."""
+    """Return duration and answers, after every worker has imported all modules by a task of each kind."""
     from distributed import Client, LocalCluster
 
     with (

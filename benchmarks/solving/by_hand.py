@@ -1,10 +1,9 @@
-"""The same sessions by hand through imucal and through the rig's graph of rests and moves: errors of scale and axes.
+"""Errors of scale and axes by imucal and by the rig's graph of rests and moves, from the same sessions by hand.
 
 python benchmarks/solving/by_hand.py [SESSIONS]          # needs the extra `bench`
 
 A session of 40 s is twelve flips over all six faces and a whole turn back about each axis, as the simulated hand makes
-them (`rig.world.hand`). imucal is given its six holds and three turns without an error of annotation; the rig is given
-the readings and nothing else.
+them (`rig.world.hand`). imucal gets the exact times of the six holds and three turns; the rig gets only the readings.
 """
 
 import sys

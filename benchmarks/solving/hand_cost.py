@@ -1,4 +1,4 @@
-"""What a calibration by hand costs on the board: instructions of a reading and of a move, counted, and stack.
+"""The cost of a calibration by hand on the board: instructions of a reading and of a move, and stack.
 
 python benchmarks/solving/hand_cost.py
 
@@ -32,7 +32,7 @@ SOLVING = 20_000  # no block so many unless it ends a move
 
 
 def build(folder: Path) -> Path:
-    """The program, with the compiler and the flags of the firmware's Makefile."""
+    """Compile the program with the compiler and the flags of the firmware's Makefile; return its path."""
     environment = {
         name: value for name, value in os.environ.items() if name not in ("MAKEFLAGS", "MAKELEVEL", "MFLAGS")
     }
@@ -45,7 +45,7 @@ def build(folder: Path) -> Path:
 
 
 def main() -> int:
-    """Print what a reading, a block of them, and a move cost."""
+    """Print the cost of a reading, of a block of them, and of a move."""
     hand, now_s = SimulatedHand(Habits(), 1), 1.5
     for face in FLIPS:
         now_s = hand.act(FlipAction(face), now_s) + REST_S

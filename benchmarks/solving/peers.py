@@ -1,10 +1,10 @@
-"""The same simulated Ferraris session through imucal and through the rig's vector model: errors and time.
+"""Errors and time of imucal and of the rig's vector model, for the same simulated Ferraris session.
 
 python benchmarks/solving/peers.py          # needs the extra `bench`
 
-The session is imucal's: six still holds with ±x, ±y, ±z upwards, and one turn of −360° about each axis, 6 × 1000 and
-3 × 600 samples at 100 Hz. The sensor is mounted 3° askew, its accelerometer is ideal but for noise. imucal's
-reading = K_g R_g ω + b_g + K_ga a is the vector model with g-sensitivity; its 1/K_g is our scale, −b_g our bias.
+The session is imucal's: six still holds with ±x, ±y, ±z upwards, and one turn of −360° about each axis, 6 × 1000 and 3
+× 600 samples at 100 Hz. The sensor is mounted 3° askew, its accelerometer is ideal but for noise. imucal's reading =
+K_g R_g ω + b_g + K_ga a is the vector model with g-sensitivity; its 1/K_g is our scale, −b_g our bias.
 """
 
 import sys
@@ -37,7 +37,7 @@ RUNS, ROUNDS = 300, 10
 
 
 def session(seed: int) -> Session:
-    """Samples by imucal's section names: `gyr_…` in rad/s, `acc_…` in m/s², each (n, 3)."""
+    """Simulate samples by imucal's section names: `gyr_…` in rad/s, `acc_…` in m/s², each (n, 3)."""
     rng = np.random.default_rng(seed)
     mounting = sim.draw_mountings(rng, 1, float(np.sin(np.radians(3))))[0]
     F = sim.build_sensitivity(SCALE, mounting)
@@ -86,7 +86,7 @@ def solve_by_vector_model(samples: Session, *, with_gravity: bool = False) -> Ar
 
 
 def main() -> None:
-    """Print errors over 300 sessions and the median time of one, taken in turns: a busy computer slows all alike."""
+    """Print errors over 300 sessions and the median time of one, in turns, so that a busy computer slows all alike."""
     truth = np.concatenate([SCALE, BIAS_RAD_S])
     sessions = [session(seed) for seed in range(RUNS)]
     converted = [convert_to_degrees(samples) for samples in sessions]

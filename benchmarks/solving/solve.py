@@ -1,4 +1,4 @@
-"""How long one calibration takes to solve, compared with Levenberg–Marquardt on the same six averaged readings.
+"""The time to solve one calibration, compared with Levenberg–Marquardt on the same six averaged readings.
 
 python benchmarks/solving/solve.py
 """

@@ -1,14 +1,15 @@
-"""What a calibration costs on the board: instructions of one solve, counted on an emulated Cortex-M4F, and stack.
+"""The cost of a calibration on the board: instructions of one solve, counted on an emulated Cortex-M4F, and stack.
 
 python benchmarks/solving/solver_cost.py
 
 The firmware's own solver.c and a Levenberg–Marquardt in C (benchmarks/solving/levenberg_marquardt.c) are compiled with
 the firmware's compiler and flags and called with the same observations. Counts are instructions, not time.
 
-Same accuracy: every answer is compared with the same observations solved in double precision. Levenberg–Marquardt stops
-after a step below its tolerance, which is the largest power of ten with which its root-mean-square differences, in
-scale and in bias, are within twice those of the closed form: single precision brings neither nearer. It must work for
-any number of observations; the last row is for six only, with every loop written out as the closed form's are.
+Both must be equally accurate: every answer is compared with the same observations solved in double precision.
+Levenberg–Marquardt stops after a step below its tolerance, which is the largest power of ten with which its
+root-mean-square differences, in scale and in bias, are within twice those of the closed form, as far as single
+precision permits. It must work for any number of observations; the last row is for six only, with every loop written
+out as the closed form's are.
 """
 
 import os
@@ -60,7 +61,7 @@ TOLERANCES = tuple(10.0**-power for power in range(1, 8))
 
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """Of one call, or of the dearest of several."""
+    """The cost of one call, or the greatest cost of several."""
 
     instructions: int
     stack_bytes: int
@@ -68,7 +69,7 @@ class Cost:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """Scale (3,), bias (3,) in rad/s, how many passes, and what they cost."""
+    """Scale (3,), bias (3,) in rad/s, the number of iterations, and their cost."""
 
     scale: Array
     bias_rad_s: Array
@@ -92,7 +93,7 @@ class Observations:
 
 
 class Core:
-    """A Cortex-M4F with nothing around it, that calls functions of an ELF file."""
+    """A Cortex-M4F without peripherals, which calls functions of an ELF file."""
 
     def __init__(self, elf: Path) -> None:
         self._engine, self._timeline = Engine(), Timeline()
@@ -125,7 +126,7 @@ class Core:
         return np.frombuffer(self.read(address, 4 * count), dtype="<f4").astype(np.float64)
 
     def call(self, function: str, *words: int, number: float = 0.0) -> tuple[int, Cost]:
-        """The word it returns, and what it cost. `number` is its one argument in a floating-point register."""
+        """Call a function; return its word and its cost. `number` is its one argument in a floating-point register."""
         self._engine.write(STACK_TOP - STACK_BYTES, bytes([PAINT]) * STACK_BYTES)
         (number_word,) = struct.unpack("<I", struct.pack("<f", number))
         self._arguments.write([*words, *[0] * (3 - len(words)), number_word, STACK_TOP, RETURN | 1])
@@ -138,7 +139,7 @@ class Core:
 
 
 def build(folder: Path, *defines: str) -> Path:
-    """Compile both solvers with the compiler and the flags of the firmware's Makefile."""
+    """Compile both solvers with the compiler and the flags of the firmware's Makefile; return the program's path."""
     environment = {
         name: value for name, value in os.environ.items() if name not in ("MAKEFLAGS", "MAKELEVEL", "MFLAGS")
     }
@@ -151,7 +152,7 @@ def build(folder: Path, *defines: str) -> Path:
 
 
 def observe(population: Population, seed: int) -> Observations:
-    """Six sweeps at 60°/s of a gyroscope of the population, mounted some degrees off, with its noise left in."""
+    """Simulate six sweeps at 60°/s of a gyroscope of the population, mounted some degrees off, with noise."""
     rng = np.random.default_rng(seed)
     scale, bias = population.draw(rng)
     mounting = Rotation.from_rotvec(np.radians(5) * rng.normal(size=3))
@@ -182,7 +183,7 @@ def solve(core: Core, observations: Observations, method: str) -> Answer:
 
 
 def levenberg_marquardt(core: Core, observations: Observations, tolerance: float) -> Answer:
-    """From k = 1 and b = 0, the sensor uncalibrated, as in SIX."""
+    """Solve by Levenberg–Marquardt from k = 1 and b = 0, an uncalibrated sensor, as in SIX."""
     core.write(MEANS, observations.means_rad_s.tobytes())
     core.write(SPEEDS, observations.speeds_rad_s.tobytes())
     core.write(PROBLEM, struct.pack("<III", MEANS, SPEEDS, len(observations.speeds_rad_s)))
@@ -195,7 +196,7 @@ def levenberg_marquardt(core: Core, observations: Observations, tolerance: float
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One solver over all cases: medians of the counts, the most stack, root-mean-square differences."""
+    """A solver's results over all cases: medians of the counts, the most stack, root-mean-square differences."""
 
     name: str
     instructions: float

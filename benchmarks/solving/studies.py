@@ -1,7 +1,7 @@
-"""How long each study takes on one core: `python benchmarks/solving/studies.py [NAME …]`.
+"""The processor time of each study: `python benchmarks/solving/studies.py [NAME …]`.
 
-The second segment of every study is timed by the processor's clock and multiplied by their number; the rest of the
-study is timed as it is. `rig study` lists these durations (rig/study/study_catalogue.py).
+The second segment of every study is timed by the processor's clock and multiplied by the number of segments; the rest
+of the study is timed once. `rig study` lists these durations (rig/study/study_catalogue.py).
 """
 
 import sys
@@ -15,7 +15,7 @@ from rig.study.study_report import Settings
 
 
 class EnoughTimed(Exception):
-    """Two segments are enough to extrapolate."""
+    """Raised after the second segment, from which the time is extrapolated."""
 
 
 def measure_core_s(name: str) -> float:

@@ -2,13 +2,14 @@
 
 Ten million damaged frames to the firmware's receiver, under the sanitizers for addresses and undefined behaviour, and
 ten million to the host's: bits flipped, runs lost, doubled, swapped, overwritten and inserted, ends cut, delimiters
-lost, blocks over-long, a wrong CRC in a frame of the right length, a right CRC around nonsense. Each is compared with
-a receiver written from the protocol's description alone, bit by bit, which decides what is to be accepted: the
-firmware's must take the same, block by block, and the board must continue to answer; the host's must hear the same
-frames as from the whole blocks alone. A hundred thousand damaged messages of RTDE, dashboard and primary interface
-each, to the rig's readers and to the simulated controller's: no crash, no hang, an end with a name.
+lost, blocks over-long, a wrong CRC in a frame of the right length, a right CRC around nonsense. A third receiver,
+written from the protocol's description alone, decides bit by bit which frames to accept: the firmware's must accept the
+same, block by block, and the board must continue to answer; the host's must receive the same frames as from the intact
+blocks alone. A hundred thousand damaged messages each of RTDE, dashboard and primary interface to the rig's readers and
+to the simulated controller's: no crash, no hang, a named end.
 
-How many wrong frames to expect: damage that leaves a block of sound COBS passes a CRC of 32 bits with a chance of 2⁻³².
+The expected number of wrong frames: damage that leaves a block of sound COBS passes a CRC of 32 bits with a chance of
+2⁻³².
 """
 
 import argparse
@@ -87,7 +88,7 @@ def check_readers(side: str, carry: Callable[[str, int, int], Counter[str]], num
 
 
 def read_resident_bytes() -> int:
-    """Resident memory of this process, bytes."""
+    """Return the resident memory of this process, bytes."""
     return int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1]) * resource.getpagesize()
 
 

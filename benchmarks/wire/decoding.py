@@ -1,9 +1,9 @@
-"""How fast the host decodes what the board sends: `python benchmarks/wire/decoding.py [megabytes]`.
+"""The host's speed of decoding the board's stream: `python benchmarks/wire/decoding.py [megabytes]`.
 
-What the emulated board sends becomes batches of samples, on this machine and as on one where package `cobs` could not
-compile its fast part. Beside it, a decoder that takes one byte after the other, and pymavlink on as many RAW_IMU
-messages as there are samples. The board's few seconds are sent again and again, each time to a reader that has not
-heard them yet; fails where not every sample is found in them, and under 20 MB/s.
+The emulated board's stream is decoded to batches of samples, on this machine and as on one where package `cobs` could
+not compile its fast part. For comparison: a decoder that takes one byte after the other, and pymavlink on as many
+RAW_IMU messages as there are samples. The board's few seconds are sent repeatedly, each time to a new reader; fails if
+a sample is missing, and under 20 MB/s.
 """
 
 import sys
@@ -55,30 +55,30 @@ def record_stream(rates_hz: dict[str, float]) -> bytes:
 
 
 def read(once: bytes) -> Iterator[list[Frame]]:
-    """The frames of each chunk that the port brings, to a new reader."""
+    """Yield the frames that a new reader finds in each chunk from the port."""
     reader = FrameReader()
     return (reader.feed(once[i : i + CHUNK]) for i in range(0, len(once), CHUNK))
 
 
 def frames(once: bytes) -> int:
-    """Samples in the frames that a FrameReader makes of the stream."""
+    """Return the number of samples in the stream's frames, decoded by a FrameReader."""
     return sum(len(frame.items) for frames in read(once) for frame in frames if frame.name in SAMPLES)
 
 
 def batches(once: bytes) -> int:
-    """The same, the frames of each chunk made batches."""
+    """Return the number of samples in batches, made of the frames of each chunk."""
     streamed = ([frame for frame in frames if frame.name in SAMPLES] for frames in read(once))
     return sum(len(batch.samples) for frames in streamed for batch in sample_batches(frames, 0.0))
 
 
 def batches_without_compiler(once: bytes) -> int:
-    """The same by plain Python alone."""
+    """Return the number of samples in batches, decoded in plain Python."""
     with patch.object(codec, "unstuff", stuffing.unstuff_in_python):
         return batches(once)
 
 
 def byte_loop(once: bytes) -> int:
-    """Samples by a decoder as a small controller has it: COBS and CRC byte by byte, then the integers."""
+    """Return the number of samples by a small controller's decoder: COBS and CRC byte by byte, then the integers."""
     samples, body, remaining, crc = 0, bytearray(), -1, 0xFFFF_FFFF
     for byte in once:
         if byte == 0:
@@ -100,7 +100,7 @@ def byte_loop(once: bytes) -> int:
 
 
 def _counts(body: bytearray) -> list[list[int]]:
-    """x, y, z and temperature of every sample in a decoded `samples` frame."""
+    """Return x, y, z and temperature, in counts, of every sample in a decoded `samples` frame."""
     items = range(2 + _SAMPLES.head.size, len(body) - 4, _SAMPLES.item_dtype.itemsize)
     return [[body[offset + k] | body[offset + k + 1] << 8 for k in range(4, 12, 2)] for offset in items]
 
@@ -115,13 +115,13 @@ def make_mavlink_stream(samples: int) -> bytes:
 
 
 def pymavlink(once: bytes) -> int:
-    """Messages in the stream."""
+    """Return the number of messages in the stream, decoded by pymavlink."""
     receiver = mavlink.MAVLink(None)
     return sum(len(receiver.parse_buffer(once[i : i + CHUNK]) or ()) for i in range(0, len(once), CHUNK))
 
 
 def measure(decode: Callable[[bytes], int], once: bytes, samples: int, megabytes: float) -> float:
-    """Megabytes a second of processor time, the best of some rounds. Fails where not all samples are decoded."""
+    """Return megabytes per second of processor time, the best of some rounds. Fail if samples are missing."""
     times, best_s = max(1, round(megabytes * 1e6 / len(once))), float("inf")
     for _ in range(ROUNDS):
         began_s = time.process_time()

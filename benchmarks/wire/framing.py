@@ -1,10 +1,10 @@
 """A million frames over a line that damages them, to both receivers: `python benchmarks/wire/framing.py [frames]`.
 
-Prints, for lines of several qualities, what was damaged, accepted and lost. Fails when the host's receiver or the
-firmware's accepts a frame that was not sent, misses one that no fault touched, or when a loss is counted wrong.
+Prints, for lines of several qualities, the numbers of damaged, accepted and lost frames. Fails if the host's receiver
+or the firmware's accepts a frame that was not sent, misses an intact one, or counts a loss wrong.
 
-How many wrong frames to expect: damage that leaves a block of sound COBS is as good as random to the CRC, so a damaged
-block passes one of 32 bits with a probability of at most 2⁻³², and would pass one of 16 bits with 2⁻¹⁶.
+The expected number of wrong frames: damage that leaves a block of sound COBS is as good as random to the CRC, so a
+damaged block passes one of 32 bits with a probability of at most 2⁻³², and would pass one of 16 bits with 2⁻¹⁶.
 """
 
 import sys

@@ -1,6 +1,6 @@
-"""How fast the host decodes what a KVH 1775 sends: `python benchmarks/wire/kvh1775_decoding.py [megabytes]`.
+"""The host's speed of decoding a KVH 1775's messages: `python benchmarks/wire/kvh1775_decoding.py [megabytes]`.
 
-In reads of 64 KB, as a recording would be, and of 4 KB. Fails under 20 MB/s; 4147200 Bd bring 0.4.
+The stream is read in pieces of 64 KB, like a recording, and of 4 KB. Fails under 20 MB/s; 4147200 Bd bring 0.4.
 """
 
 import sys
@@ -22,7 +22,7 @@ ROUNDS = 3
 
 
 def sent(name: Format, megabytes: float) -> bytes:
-    """So much of a stream at 1000 Hz."""
+    """Return `megabytes` of a stream at 1000 Hz in the format `name`."""
     numbers = np.arange(round(megabytes * 1e6 / MESSAGE_BYTES[name]))
     vectors = np.random.default_rng(1).normal(size=(2, len(numbers), 3))
     return encode(
@@ -35,7 +35,7 @@ def sent(name: Format, megabytes: float) -> bytes:
 
 
 def measure(name: Format, stream: bytes, size: int) -> float:
-    """Megabytes a second of processor time, decoded and counted; the best of some rounds."""
+    """Return the megabytes decoded and counted per second of processor time, the best of some rounds."""
     best_s = float("inf")
     for _ in range(ROUNDS):
         reader, counter = MessageReader(), MessageCounter("kvh", 1000.0, timed=name == "B")

@@ -1,7 +1,7 @@
-"""How fast the host decodes lines: `python benchmarks/wire/lines_decoding.py [megabytes]`.
+"""The host's speed of decoding lines of text: `python benchmarks/wire/lines_decoding.py [megabytes]`.
 
-Compared with the obvious loop, `readline().split()`: from a serial port by pyserial, as it would be used, and
-from memory. Fails under 5 MB/s, and where the loop on a port is more than a fifth as fast.
+Compared with the obvious loop, `readline().split()`: from a serial port by pyserial, as it would be used, and from
+memory. Fails under 5 MB/s, and if the loop on a port is more than a fifth as fast.
 """
 
 import io
@@ -37,14 +37,14 @@ SECTION = LinesSection.model_validate(
 
 
 def make_stream(megabytes: float) -> bytes:
-    """Return this many megabytes of a stream at 1000 Hz."""
+    """Return `megabytes` of a stream at 1000 Hz."""
     rows = np.random.default_rng(1).normal(0, 50, (round(megabytes * 1e6 / 56), 6))
     form = "%d,%.3f,%.3f,%.3f,%.4f,%.4f,%.4f\r\n"
     return b"0\n" + "".join(form % (1000 * number, *row) for number, row in enumerate(rows)).encode()
 
 
 def measure_decoding(stream: bytes, size: int) -> float:
-    """Megabytes a second of processor time, decoded, numbered and timed."""
+    """Return the megabytes decoded, numbered and timed per second of processor time."""
     reader, stamper = LineReader(SECTION), Stamper(SECTION, 1000.0, "sensors.imu")
     began_s = time.process_time()
     for offset in range(0, len(stream), size):
@@ -53,7 +53,7 @@ def measure_decoding(stream: bytes, size: int) -> float:
 
 
 def measure_split(source: io.RawIOBase | io.BytesIO | serial.Serial, size: int) -> float:
-    """Megabytes a second of the thread's processor time by the plain loop, of so many bytes."""
+    """Return the megabytes per second of the thread's processor time by the plain loop, for `size` bytes."""
     read, began_s = 0, time.thread_time()
     while read < size:
         line = source.readline()
@@ -63,7 +63,7 @@ def measure_split(source: io.RawIOBase | io.BytesIO | serial.Serial, size: int) 
 
 
 def measure_split_at_port(stream: bytes) -> float:
-    """The plain loop at a pseudo-terminal that is filled as fast as it is read."""
+    """Return the megabytes per second of the plain loop at a pseudo-terminal that is filled as fast as it is read."""
     master, slave = os.openpty()
     tty.setraw(slave)
 

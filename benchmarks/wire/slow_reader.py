@@ -1,8 +1,8 @@
-"""What a slow reader costs the simulated laboratory: `python benchmarks/wire/slow_reader.py [--pace N] [--reads N]`.
+"""A slow reader's effect on the simulated laboratory: `python benchmarks/wire/slow_reader.py [--pace N] [--reads N]`.
 
-Starts the demonstration's world at N times real time. A prompt reader of the arm's states measures how fast the
-world's time passes, in turns alone and together with a client that reads N times a second, so that both see the same
-machine. Prints both paces, what the slow client changes, and the longest time in which the prompt reader got nothing.
+Starts the demonstration's world at N times real time. A prompt reader of the arm's states measures how fast the world's
+time passes, in turns alone and together with a client that reads N times a second, so that both see the same machine.
+Prints both paces, the change by the slow client, and the longest wait of the prompt reader.
 """
 
 import argparse
@@ -25,7 +25,7 @@ def package(kind: str, payload: bytes) -> bytes:
 
 
 def reader(host: str) -> socket.socket:
-    """A connection that is sent the controller's time stamp 125 times a second of its own time."""
+    """Return a connection that receives the controller's time stamp 125 times per second of its clock."""
     client = socket.create_connection((host, 30004), 10.0)
     setup = (("V", struct.pack(">H", 2), 4), ("O", struct.pack(">d", 125.0) + b"timestamp", 10), ("S", b"", 4))
     for kind, payload, answer in setup:
@@ -37,7 +37,7 @@ def reader(host: str) -> socket.socket:
 def measure_pace(
     prompt: socket.socket, slow: socket.socket | None, reads_hz: float, duration_s: float
 ) -> tuple[float, float]:
-    """The world's seconds in a wall second, over `duration_s`, and the longest wait for a state (wall time)."""
+    """Return the world's seconds per wall second over `duration_s`, and the longest wait for a state, wall s."""
     times_s, read_s = [time.monotonic()], time.monotonic()
     stamps_s = []
     while times_s[-1] - times_s[0] < duration_s:

@@ -1,7 +1,7 @@
 """Full rates over the serial link without a loss: `python benchmarks/wire/throughput.py [simulated seconds]`.
 
 The image streams from the emulated board at 921600 Bd: for 10 simulated minutes three sensors at their usual rates and
-one at 952 Hz, for one minute all three as fast as they convert, raw and calibrated. Fails when a conversion is missing.
+one at 952 Hz, for one minute all three as fast as they convert, raw and calibrated. Fails if a conversion is missing.
 """
 
 import sys

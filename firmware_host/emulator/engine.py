@@ -69,7 +69,7 @@ _ATTEMPTS = {
 
 
 class EngineFault(Exception):
-    """A failure of the core, or missing memory; the message is Unicorn's."""
+    """A failure of the core, or an access to missing memory; the message is Unicorn's."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,8 +11,8 @@ NEVER = 1 << 62
 class Timeline(Time):
     """The present tick, and one next due tick for each registered action.
 
-    The machine's block hook reads `now` and `deadline` on every block, in machine code: `deadline` is the tick of the
-    next action or of the limit, or 0 after `interrupt`.
+    The machine's block hook reads `now` and `deadline` on every block, in machine code: `deadline` is the earlier of
+    the next action's tick and the limit, or 0 after `interrupt`.
     """
 
     def __init__(self) -> None:
@@ -55,7 +55,7 @@ class Timeline(Time):
         self.deadline = min(self.next_due, limit if may_continue is None else self.now + 1)
 
     def go_on(self) -> bool:
-        """Run due actions while the core runs; return whether it may go on: no interrupt, the limit still ahead."""
+        """Run due actions while the core runs; return whether it may continue: no interrupt, limit not reached."""
         if self.deadline:
             self.run_due()
         if not self.deadline or self.now >= self._limit:

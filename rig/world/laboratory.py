@@ -88,7 +88,7 @@ class Laboratory:
         return self.motion_source.time_s
 
     def plug_in(self) -> None:
-        """Power the board, if there is a board without power."""
+        """Power the board, if there is one and it has no power."""
         if self.board is None and self._config.board is not None:
             time_s = self._time_s
             self._elements = {}

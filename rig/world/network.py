@@ -73,7 +73,7 @@ class ClientConnection:
             self.read()
 
     def read(self) -> bool:
-        """Read the client's bytes; close if the client has hung up. Return whether more bytes may follow."""
+        """Read the client's bytes; close the connection if the client has. Return whether more bytes may follow."""
         try:
             data = self._peer.recv(65536)
         except BlockingIOError:
@@ -242,7 +242,7 @@ class PortListener:
             connection.watch()
 
     def hang_up(self) -> None:
-        """Close every connection; go on listening."""
+        """Close every connection, but continue to listen."""
         for connection in self.connections:
             connection.close()
 

@@ -27,7 +27,7 @@ _TYPE_AT, _NUMBER_AT, _UNREAD_AT = 4, 8, 16 + 4 + 48 + 4
 
 
 class SocketTable:
-    """The system's socket table, asked for the other ends of connections."""
+    """The system's socket table, which is queried for the other ends of connections."""
 
     def __init__(self) -> None:
         self._netlink: socket.socket | None = None
@@ -80,8 +80,8 @@ class Wire:
     """The pace of one client, which may lag `lag_s` of virtual time before the world waits for it.
 
     A wait ends when a real laboratory would have continued, because otherwise other clients would regard the world as
-    dead. The world waits for a client that reads as fast as it can, even if it is slow. One that does not read is
-    waited for only as long as its patience lasts, and then not again until it has kept pace.
+    dead. The world waits for a client that reads as fast as it can, even if it is slow. It waits for one that does not
+    read only until its patience ends, and then not again until that client has kept pace.
     """
 
     def __init__(self, count_unread: Unread, lag_s: float, wall: Callable[[], float]) -> None:

@@ -59,7 +59,7 @@ class World:
     """Laboratory, clock and sockets."""
 
     def __init__(self, loaded: Loaded, truth_file: Path | None = None) -> None:
-        """Open all ports. The world may write its truth into `truth_file`, if there is one."""
+        """Open all ports. The world may write its truth into `truth_file`, if given."""
         section = read_world_section(loaded)
         self._truth, self._truth_file = SimulatedTruth(loaded.config, section), truth_file
         self.laboratory = Laboratory(loaded.config, section)
@@ -217,8 +217,8 @@ class World:
     def run(self, alive: Callable[[], None] = lambda: None) -> None:
         """Serve until `end`. A tick ends when its bytes have been delivered to the clients, which set the pace.
 
-        While nobody is connected, the world runs no faster than a real laboratory, because that would only waste
-        processor time. `alive` is called after every tick, and whenever none is due.
+        While no client is connected, the world runs no faster than a real laboratory, because more speed would only
+        waste processor time. `alive` is called after every tick, and whenever none is due.
         """
         polled_s = 0.0
         while not self._is_ended:

@@ -30,7 +30,7 @@ _SENSOR_BUS_FUNCTIONS = {"PB3": 5, "PB4": 5, "PB5": 5}
 class Chip:
     """Everything around the core. `on_reset(cause)` is called to reset the chip, `on_clock` after a change of clock.
 
-    Cause is one of the RESET_… flags of `rcc`.
+    `cause` is one of the RESET_… flags of `rcc`.
     """
 
     def __init__(
@@ -132,7 +132,7 @@ class Chip:
         return self._ports[pin[1]]
 
     def _make_pin_check(self, functions: dict[str, int]) -> Callable[[], bool]:
-        """Return a function that tells whether the firmware has selected these functions on these pins."""
+        """Return a function that returns whether the firmware has selected these functions on these pins."""
         wires = [(self._port_of(pin), int(pin[2:]), function) for pin, function in functions.items()]
         ports = {port for port, _pin, _function in wires}
         checked_count, answer = -1, False

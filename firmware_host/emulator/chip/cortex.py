@@ -108,7 +108,7 @@ class Cortex:
     def return_from_exception(self) -> None:
         """Undo `enter_pending` inside a hook, after the core branched to a return code (EXC_RETURN).
 
-        The run goes on at the return address, without the cost of stopping and starting.
+        The run continues at the return address, without the cost of a stop and a start.
         """
         address, base = self._return_state.read()
         return_code = address | 1

@@ -58,7 +58,7 @@ class SpiDevice(Protocol):
         """Exchange one byte. Raise Violation for accesses that the part forbids or the model lacks."""
 
     def predict(self) -> bytes:
-        """Return the answers to the next pairs of bytes, whichever bytes come, until chip select rises.
+        """Return the answers to the next pairs of bytes, if they do not depend on these bytes, until chip select rises.
 
         Called after the first pair of an access; predicted bytes count as exchanged.
         """
@@ -97,7 +97,7 @@ _UNCHECKED = -1
 
 
 class SpiBus:
-    """The wires between SPI1 and the devices. `pins_connected()`: has the firmware put SPI1 on its pins?"""
+    """The wires between SPI1 and the devices. `pins_connected()`: whether the firmware has put SPI1 on its pins."""
 
     def __init__(self, timeline: Timeline, spi: Spi1, pins_connected: Callable[[], bool]) -> None:
         self._timeline = timeline

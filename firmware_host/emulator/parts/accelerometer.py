@@ -1,4 +1,4 @@
-"""The simulated accelerometers: from the true specific force, through the part's errors and its noise, to counts."""
+"""The simulated accelerometers: from the true specific force, through the part's errors and its noise, to readings."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""The common part of all simulated gyroscopes: from the true motion, through errors and noise, to counts."""
+"""The common part of all simulated gyroscopes: from the true motion, through errors and noise, to readings."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -31,8 +31,8 @@ class GyroTruth:
       along its axis, and with the rate's magnitude.
     - `bandwidth_hz`, `delay_s`: a low-pass of first order (None: no filter) and a delay, which noise and bias bypass.
     - `instability_rad_s`, `instability_time_s`, `random_walk_rad_s_per_sqrt_s`: the bias drift, see `Drift`.
-    - `hysteresis_rad_s`: b is larger by it after warming and smaller after cooling.
-    - `die`: the temperature that all this follows, if it is not the thermometer's.
+    - `hysteresis_rad_s`: b is larger by this after warming, smaller by this after cooling.
+    - `die`: the structure whose temperature determines all these, if it is not the thermometer's.
     """
 
     scale: Sequence[float] = (1.0, 1.0, 1.0)

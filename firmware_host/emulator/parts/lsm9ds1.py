@@ -1,7 +1,4 @@
-"""The LSM9DS1's gyroscope, accelerometer and thermometer at register level (data sheet DocID025715).
-
-By its sections 2, 3, 5, 6 and 7.
-"""
+"""The LSM9DS1's gyroscope, accelerometer and thermometer at register level (DocID025715, sections 2, 3, 5–7)."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -131,7 +128,7 @@ class Lsm9ds1:
         return 0xFF
 
     def predict(self) -> bytes:
-        """Return nothing: each read changes the following data."""
+        """Return no predictions: each read changes the following data."""
         return b""
 
     # --- registers

@@ -99,7 +99,7 @@ class Lsm9ds1Magnetometer:
         return 0xFF
 
     def predict(self) -> bytes:
-        """Return nothing: each read changes the following data."""
+        """Return no predictions: each read changes the following data."""
         return b""
 
     # --- registers

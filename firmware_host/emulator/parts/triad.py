@@ -54,7 +54,7 @@ class TriadErrors:
 
 
 class Triad:
-    """Three elements with these errors, of a part whose temperature is one number or a function of time.
+    """Three elements with `TriadErrors`, of a part whose temperature is one number or a function of time.
 
     `read` makes a reading of the vector that `sense` returns, plus other sensed quantities; `readings` makes many at
     once.
@@ -149,7 +149,7 @@ class Triad:
 
 
 class CachedMotion:
-    """A part's motion, evaluated once for each time although two triads sense it."""
+    """A part's motion, evaluated once for each time although two triads use it."""
 
     def __init__(self, motion_at: Callable[[float], Sequence[float]]) -> None:
         self._motion_at = motion_at

@@ -34,7 +34,7 @@ UPDATED, TEMPERATURE_UPDATED = 0x3F, 0x1000
 
 @dataclass(slots=True)
 class AutopilotFaults:
-    """Faults that a test can set: fractions of messages `lost` and `doubled`; `slowest`: actual per requested rate."""
+    """Faults that a test can set: fractions of messages `lost` and `doubled`; `slowest`: actual over requested rate."""
 
     lost: float = 0.0
     doubled: float = 0.0

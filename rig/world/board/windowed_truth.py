@@ -1,4 +1,4 @@
-"""The truth of the simulated sensors over the windows of a run, for people who compare it with the result.
+"""The truth of the simulated sensors over the windows of a run, for comparison with its result.
 
 The world writes it into a file of its own. Nothing that estimates reads that file.
 """

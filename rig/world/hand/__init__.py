@@ -1,1 +1,1 @@
-"""The simulated hand: how a person turns a box on a table and lays it down, with that person's mistakes."""
+"""The simulated hand: a person's motions while turning a box on a table and laying it down, including mistakes."""

@@ -51,7 +51,7 @@ class SimulatedHand:
         self._add(build_course(self._attitude, np.array([-STEP_S, 0.0]), np.zeros((2, 3)), habits), 0.0)
 
     def act(self, action: Action, start_s: float) -> float:
-        """Perform the action from `start_s` on; return its end, s. Raise ValueError if the last one has not ended."""
+        """Perform the action from `start_s` on; return its end, s. Raise ValueError during another action."""
         if start_s < self.lies_from_s:
             raise ValueError(f"the hand is busy until {self.lies_from_s:.2f} s")
         mistake = action.mistake

@@ -8,7 +8,7 @@ from rig.world.clock import TICK_S
 
 @dataclass(frozen=True, slots=True)
 class AtProgramStart:
-    """An action a fixed time after the start of every program, as by a fieldbus adapter without its connection."""
+    """An action a fixed time after the start of every program, like that of a fieldbus adapter without a connection."""
 
     act: Callable[[], object]
     after_s: float

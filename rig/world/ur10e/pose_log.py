@@ -1,4 +1,4 @@
-"""The log of a controller's poses as another program writes it: few rows a second, late, and not evenly late."""
+"""The log of a controller's poses as another program writes it: few rows a second, with a delay that varies."""
 
 from collections.abc import Sequence
 from math import cos, hypot, sin

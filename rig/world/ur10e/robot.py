@@ -143,7 +143,7 @@ class Robot:
 
     @property
     def reported_time_s(self) -> float:
-        """The time stamp in its states and messages, s."""
+        """The time stamp in the controller's states and messages, s."""
         return self.time_s + self.faults.clock_step_s
 
     def step(self) -> None:
@@ -209,12 +209,12 @@ class Robot:
 
     @property
     def is_polyscope_x(self) -> bool:
-        """Whether its software is PolyScope X, which has a Robot API, or nothing, instead of a dashboard."""
+        """Whether the controller's software is PolyScope X, which has no dashboard, and later a Robot API."""
         return self.identity.polyscope >= POLYSCOPE_X
 
     @property
     def local_control(self) -> bool:
-        """Whether it accepts orders from the pendant only; the CB3 series has no such mode."""
+        """Whether the controller accepts orders from the pendant only; the CB3 series has no such mode."""
         return not self.remote_control and self.identity.polyscope >= E_SERIES
 
     # -- programs ------------------------------------------------------------------------------------------------

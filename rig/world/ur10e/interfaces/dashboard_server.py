@@ -137,7 +137,7 @@ class DashboardSession:
 
     @property
     def _may_order(self) -> bool:
-        """Whether it accepts orders."""
+        """Whether the dashboard accepts orders."""
         return not (self._opened_in_local_control or self._robot.local_control)
 
     # -- questions ---------------------------------------------------------------------------------------------

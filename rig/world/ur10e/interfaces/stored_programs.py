@@ -29,7 +29,7 @@ class StoredPrograms:
         return name in self._documents
 
     def read(self, name: str) -> str:
-        """Return a program's document. Raise KeyError if there is none of this name."""
+        """Return a program's document. Raise KeyError for an unknown name."""
         return self._documents[name]
 
     def store(self, form: bytes, *, replace: bool) -> str:

@@ -54,7 +54,7 @@ class Encoders:
         )
 
     def _draw(self, time_s: float) -> Sequence[float]:
-        """Return the standard normal numbers of a tick, whichever ticks were requested before."""
+        """Return the standard normal numbers of a tick, which do not depend on the ticks requested before."""
         block, index = divmod(round(time_s / TICK_S), TICKS_PER_SECOND)
         if block != self._block[0]:
             rng = np.random.default_rng([self.seed, block])

@@ -17,7 +17,7 @@ class Ripple:
     components: tuple[tuple[int, float, float], ...] = ()
 
     def angle(self, smooth_rad: float) -> float:
-        """Return the joint's angle at the smooth angle, rad."""
+        """Return the joint's angle, rad, for a smooth angle."""
         ripple = 0.0
         for n, a, phase in self.components:
             ripple += a * sin(n * smooth_rad + phase)
