@@ -1,1 +1,1 @@
-"""What the tests share: worlds, drivers and boards to test against, synthetic recordings, where things lie."""
+"""The shared parts of the tests: simulated worlds, drivers and boards, synthetic recordings, paths."""

@@ -1,4 +1,4 @@
-"""The page of commands: what each is for and what it takes, made from the command line itself.
+"""The page of commands: their purposes and arguments, generated from the parsers.
 
 PYTHONPATH=tests python -m support.commands_page > docs/commands.md
 """
@@ -56,7 +56,7 @@ def parsers() -> Iterator[tuple[str, argparse.ArgumentParser]]:
 
 
 def _section(parser: argparse.ArgumentParser) -> Iterator[str]:
-    """Yield what a command takes, and what the commands below it take."""
+    """Yield the lines on a command's arguments, and on its subcommands."""
     below = [action for action in parser._actions if isinstance(action, argparse._SubParsersAction)]
     if not below:
         shown = [action for action in parser._actions if not isinstance(action, argparse._HelpAction)]

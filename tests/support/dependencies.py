@@ -1,4 +1,4 @@
-"""What the program needs, as the installed packages themselves say: names, licences."""
+"""The program's dependencies by the installed packages' metadata: names, licences."""
 
 from collections.abc import Iterable, Iterator
 from importlib.metadata import Distribution, PackageNotFoundError, distribution
@@ -10,7 +10,7 @@ ITSELF = "calibration-rig"
 
 
 def list_needed(extras: Iterable[str]) -> dict[str, Distribution]:
-    """Every package that an installation with these extras brings, by its name, without the program itself."""
+    """Return by name every package that an installation with these extras needs, without the program itself."""
     distributions: dict[str, Distribution] = {}
     visited: set[tuple[str, str]] = set()
     to_ask = [(ITSELF, extra) for extra in ("", *extras)]
@@ -37,7 +37,7 @@ def _list_required(package: Distribution, extra: str) -> Iterator[tuple[str, str
 
 
 def licence(package: Distribution) -> str:
-    """Return its licence: an SPDX expression, else classifiers, else the first line of its text; may be ""."""
+    """Return a package's licence: SPDX expression, else classifiers, else the first line of its text; may be ""."""
     metadata = package.metadata
     if "License-Expression" in metadata:
         return str(metadata["License-Expression"])

@@ -1,4 +1,4 @@
-"""Which errors the source raises, read from its syntax: names stand written out where an error is made."""
+"""The errors that the source raises, read from its syntax: names are written out where an error is made."""
 
 import ast
 import functools
@@ -27,7 +27,7 @@ FIELDS = 3  # name, what, remedy
 
 @dataclass(frozen=True, slots=True)
 class Raised:
-    """An error made at `location`, "file:line". `name` is None when it is not written out there."""
+    """An error made at `location`, "file:line". `name` is None if it is not written out there."""
 
     name: str | None
     kind: str
@@ -36,7 +36,7 @@ class Raised:
 
 @functools.cache
 def find_errors() -> list[Raised]:
-    """Every error that is made anywhere in the packages, by file and line."""
+    """Return every error made in the packages, by file and line."""
     files = sorted({file for package in PACKAGES for file in (ROOT / package).rglob("*.py")} - {THE_FORM_ITSELF})
     texts = {file.relative_to(ROOT): file.read_text(encoding="utf-8") for file in files}
     return [
@@ -48,7 +48,7 @@ def find_errors() -> list[Raised]:
 
 
 def find_errors_in(source: str, file: Path) -> list[Raised]:
-    """The same of one file's text."""
+    """Return every error made in one file's text."""
     module = _Module(ast.parse(source))
     return [
         Raised(name, kind, f"{file}:{call.lineno}")
@@ -64,7 +64,7 @@ def kind_of(raised: Sequence[Raised]) -> str:
 
 
 def _spell_dotted(called: ast.expr) -> str:
-    """Return what is called as it is written: `ast.unparse` takes a hundred times as long."""
+    """Return a called expression as written; `ast.unparse` takes a hundred times as long."""
     match called:
         case ast.Name(id=name):
             return name
@@ -76,7 +76,7 @@ def _spell_dotted(called: ast.expr) -> str:
 
 
 class _Module:
-    """A module's tree, where a name is looked for through parameters to callers and through variables to values."""
+    """A module's tree, in which a name is followed through parameters to callers and through variables to values."""
 
     def __init__(self, tree: ast.Module) -> None:
         self._functions: dict[ast.AST, ast.FunctionDef] = {}  # node → the innermost function it stands in

@@ -1,8 +1,8 @@
-"""The house in two pictures, of the layers contracts in pyproject.toml: its rooms, and the order inside each of them.
+"""Two drawings of the packages, from the layers contracts in pyproject.toml: the packages, and the order inside each.
 
     PYTHONPATH=tests python -m support.house_picture
 
-draws both anew in docs/architecture.md, between their markers.
+draws both again in docs/architecture.md, between their markers.
 """
 
 import ast
@@ -21,7 +21,7 @@ WORDS = 92  # columns of what is in it
 
 
 def picture() -> str:
-    """Return the drawing of the rooms: scripts above them in the contract's order, the board's half below."""
+    """Return the drawing of the packages: scripts above them in the contract's order, the board's half below."""
     rooms = [[(name, f"rig/{name}") for name in layer] for layer in _contracts()["rig"]]
     layers = [[("procedures", "procedures")], *rooms, [("firmware_host", "firmware_host")]]
     rows = ["".join(_row(name, _read_summary(path)) for name, path in layer) for layer in layers]
@@ -29,7 +29,7 @@ def picture() -> str:
 
 
 def inside() -> str:
-    """Return the drawing of each room's inside: layers from the top to the bottom, folders with a slash."""
+    """Return the drawing of each package's inside: layers from top to bottom, folders with a slash."""
     rooms = {name: layers for name, layers in _contracts().items() if name != "rig"}
     rows = ["".join(_inside(name.replace(".", "/"), layers)) for name, layers in rooms.items()]
     return _rule("┌", "┬", "┐") + _rule("├", "┼", "┤").join(rows) + _rule("└", "┴", "┘")
@@ -57,7 +57,7 @@ def _contracts() -> dict[str, list[list[str]]]:
 
 
 def _read_summary(path: str) -> str:
-    """Return the first line of a room's docstring."""
+    """Return the first line of a package's docstring."""
     package = ROOT / path / "__init__.py"
     source = package if package.exists() else ROOT / f"{path}.py"
     docstring = ast.get_docstring(ast.parse(source.read_text(encoding="utf-8")))
@@ -72,7 +72,7 @@ def _row(name: str, texts: str) -> str:
 
 
 def drawn(page: str) -> str:
-    """Return the page with both drawings made anew."""
+    """Return the page with both drawings made again."""
     return _replace_drawing(_replace_drawing(page, BEGIN, picture()), BEGIN_INSIDE, inside())
 
 

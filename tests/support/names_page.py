@@ -1,4 +1,4 @@
-"""The page of public names: what a user's program or file may name, with its meaning, made from the code.
+"""The page of public names: names for users' programs and files, with meanings, generated from the code.
 
 PYTHONPATH=tests python -m support.names_page > docs/names.md
 """
@@ -39,7 +39,7 @@ def page_text() -> str:
 
 
 def entries() -> Iterator[tuple[str, str, Mapping[str, Any]]]:
-    """Yield each entry once: the document it is first in, its name without `Entry`, and the keys it has."""
+    """Yield each entry once: the first document with it, its name without `Entry`, and its keys."""
     names: set[str] = set()
     for document, model in DOCUMENTS.items():
         schema = model.model_json_schema()

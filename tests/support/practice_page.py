@@ -1,4 +1,4 @@
-"""The page `practise-a-fault`, taken for a script: what is typed in which terminal, and what each shows then."""
+"""The page `practise-a-fault` as a script: the input of each terminal, and the output that must follow."""
 
 import re
 from collections.abc import Iterator
@@ -20,7 +20,7 @@ MASKS = (
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """What is typed after `prompt`, and the texts shown after it in their order. No prompt: of the run on its way."""
+    """The input after `prompt`, and the texts that must follow, in order. Without a prompt: texts of a running one."""
 
     prompt: str
     typed: str
@@ -35,7 +35,7 @@ def mask(text: str) -> str:
 
 
 def exercises() -> dict[str, list[Step]]:
-    """Return the steps of each section by its title; what stands before the first has the title ''."""
+    """Return the steps of each section by its title; those before the first have the title ''."""
     first, *others = re.split(r"^## ", PAGE.read_text(encoding="utf-8"), flags=re.MULTILINE)
     sections = {"": first, **{title: text for title, _, text in (other.partition("\n") for other in others)}}
     blocks = {title: re.findall(r"```console\n(.*?)```", text, re.DOTALL) for title, text in sections.items()}
@@ -52,6 +52,6 @@ def _steps(block: str) -> Iterator[Step]:
 
 
 def _texts(shown: str) -> tuple[str, ...]:
-    """Return the texts that a block shows: a line each, but one that goes on over lines, or has a gap `…`."""
+    """Return the texts that a block shows: one per line, except for continued lines and gaps `…`."""
     lines = re.split(r"\n(?=[a-z]+: |the data are|done: |not ready|Type go|PASS|An empty| )", shown)
     return tuple(mask(text) for line in lines for text in line.split(" … ") if text.strip())

@@ -1,1 +1,1 @@
-"""The firmware on this machine and on the emulated chip, and what surrounds it."""
+"""The firmware on this machine and on the emulated chip, with its surroundings."""

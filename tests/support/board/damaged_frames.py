@@ -1,4 +1,4 @@
-"""Frames that came to harm by the million, made by `damaged_frames.c`: for the firmware's receiver or the host's."""
+"""Damaged frames by the million, made by `damaged_frames.c`, for the firmware's receiver or the host's."""
 
 import json
 import subprocess
@@ -31,11 +31,11 @@ OF_EACH = 40  # sound frames of each message
 
 @dataclass(frozen=True, slots=True)
 class Sent:
-    """What was sent, and what a receiver written from the protocol's description makes of it.
+    """Counts of what was sent, by a receiver written from the protocol's description.
 
-    Of all `blocks` between two delimiters `valid` are whole and have a right CRC: those `as_sent`, whatever happened
-    around them; those that were `made` so on purpose, around nonsense; and those that damage made so by `chance`.
-    `answers` and `errors` are frames of the board's, all and refusals among them.
+    Of all `blocks` between two delimiters, `valid` ones are intact with a correct CRC: `as_sent` ones, those `made` so
+    on purpose around nonsense, and those that damage made so by `chance`. `answers` counts the board's frames, `errors`
+    the refusals among these.
     """
 
     frames: int
@@ -50,14 +50,14 @@ class Sent:
 
 
 def build(folder: Path) -> Path:
-    """The program, built with sanitizers in `folder`."""
+    """Compile the program with sanitizers in `folder`, and return its path."""
     command = ["make", "-s", "-C", str(FIRMWARE), "damaged", f"OUT={folder}", f"PYTHON={sys.executable}"]
     subprocess.run(command, check=True)
     return folder / "fuzz" / "damaged_frames"
 
 
 def write_sound(path: Path, sender: str, seed: int) -> Path:
-    """Frames of all messages of a sender, with any contents that the protocol has."""
+    """Write frames of all messages of a sender, with random valid contents."""
     random = np.random.default_rng(seed)
     wires = [
         _sound(random, message) for message in protocol.MESSAGES if message.sender == sender for _ in range(OF_EACH)
@@ -83,7 +83,7 @@ def _sound(random: np.random.Generator, message: protocol.Message) -> bytes:
 
 
 def damage_requests(program: Path, frames: int, seed: int, sound: Path) -> Sent:
-    """Damaged requests to the firmware's receiver and board. Raises AssertionError with what the sanitizers say."""
+    """Send damaged requests to the firmware's receiver and board. Raise AssertionError with the sanitizers' report."""
     run = subprocess.run([program, str(frames), str(seed), sound], capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stderr
     return Sent(**json.loads(run.stderr.splitlines()[-1]))
@@ -91,9 +91,9 @@ def damage_requests(program: Path, frames: int, seed: int, sound: Path) -> Sent:
 
 @dataclass(frozen=True, slots=True)
 class Heard:
-    """What the host's receiver made of a stream: its frames by name, and a digest of all they say in their order.
+    """The host receiver's result of a stream: frames by name, and a digest of their contents in order.
 
-    `damaged` blocks it refused, `repeated` ones had come before.
+    `damaged`: the number of refused blocks; `repeated`: of blocks received before.
     """
 
     frames: Counter[str]
@@ -103,7 +103,7 @@ class Heard:
 
     @property
     def accepted(self) -> int:
-        """Blocks that it took for whole frames."""
+        """The number of blocks accepted as frames."""
         return sum(self.frames.values()) + self.repeated
 
 
@@ -119,7 +119,7 @@ _READ: dict[str, Callable[[Frame], object]] = {
 
 
 def listen(stream: IO[bytes]) -> Heard:
-    """All that the host's receiver makes of a stream, and those who read what it accepts."""
+    """Return the result of the host's receiver and decoders for a stream."""
     reader, names, digest = FrameReader(), Counter[str](), sha256()
     while data := stream.read(CHUNK):
         for frame in reader.feed(data):
@@ -133,7 +133,10 @@ def listen(stream: IO[bytes]) -> Heard:
 
 
 def damage_answers(program: Path, frames: int, seed: int, sound: Path) -> tuple[Sent, Heard, Heard]:
-    """Damaged answers and samples to the host's receiver: what was sent, heard, and heard of the whole blocks alone."""
+    """Send damaged answers and samples to the host's receiver.
+
+    Return what was sent, the result, and the result of the intact blocks alone.
+    """
     whole = sound.with_suffix(".whole")
     command = [str(program), str(frames), str(seed), str(sound), str(whole)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:

@@ -1,4 +1,4 @@
-"""A serial line that damages what it carries, and what a receiver makes of it."""
+"""A serial line that damages its bytes, and the results of receivers behind it."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ class Transmission:
 
 @dataclass(frozen=True, slots=True)
 class Received:
-    """What a receiver made of it. `wrong`: accepted, never sent; `missed`: not accepted though no fault touched it."""
+    """A receiver's result. `wrong`: accepted, but never sent; `missed`: not accepted, although no fault touched it."""
 
     accepted: int
     wrong: int
@@ -35,11 +35,11 @@ class Received:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What became of a damaged transmission: by the host's receiver and by the firmware's.
+    """The results of the host's and the firmware's receiver for a damaged transmission.
 
-    `touched` counts frames that a fault touched, or the delimiter before them; `intact` frames that arrived as sent;
-    `damaged` whatever arrived between two delimiters and was not. Losses are counted between the first frame received
-    and the last: as they are, and as the sequences of frames and of samples tell the host.
+    `touched` counts frames of which a fault touched a byte or the preceding delimiter; `intact`: frames that arrived as
+    sent; `damaged`: other blocks between two delimiters. Losses are counted between the first and the last received
+    frame: the true ones, and those by the sequences of frames and of samples.
     """
 
     sent: int
@@ -57,7 +57,7 @@ class Outcome:
 
 
 def transmission(random: np.random.Generator, count: int) -> Transmission:
-    """`count` frames as the firmware makes them, of 1 to 18 samples."""
+    """Return `count` frames of 1 to 18 samples, as the firmware makes them."""
     sizes = random.integers(1, 19, count)
     first = np.concatenate(([0], np.cumsum(sizes)))
     counts = random.integers(-400, 400, (first[-1], 3)).astype("<i2")
@@ -74,7 +74,7 @@ def transmission(random: np.random.Generator, count: int) -> Transmission:
 
 
 def damage(random: np.random.Generator, stream: bytes, faults: int) -> tuple[bytes, list[tuple[int, int]]]:
-    """`stream` with `faults` at random places, and the spans of it they touched.
+    """Return `stream` with `faults` at random places, and the spans of it that they touched.
 
     A fault flips one bit or several, or loses, doubles, overwrites or inserts a run of bytes, of random length.
     """
@@ -115,7 +115,7 @@ def damage(random: np.random.Generator, stream: bytes, faults: int) -> tuple[byt
 
 
 def _find_touched(wires: list[bytes], spans: list[tuple[int, int]]) -> set[int]:
-    """Numbers of the frames of which a span has a byte, or the delimiter before them."""
+    """Return the numbers of the frames of which a span contains a byte or the preceding delimiter."""
     begins = np.concatenate(([0], np.cumsum([len(wire) for wire in wires])))
     touched: set[int] = set()
     for begin, end in spans:
@@ -126,7 +126,7 @@ def _find_touched(wires: list[bytes], spans: list[tuple[int, int]]) -> set[int]:
 
 
 def carry(seed: int, count: int, faults: int) -> Outcome:
-    """Sends `count` frames over a line with `faults`, and has both receivers take what arrives."""
+    """Send `count` frames over a line with `faults` to both receivers, and return their results."""
     random = np.random.default_rng(seed)
     sent = transmission(random, count)
     stream = b"".join(sent.wires)

@@ -1,4 +1,4 @@
-"""What a part's data sheet says that every register model must do."""
+"""The requirements of a part's data sheet on its register model."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -11,7 +11,7 @@ from support.board.spi_master import NO_ERRORS, Driver, Rate, still
 
 @dataclass(frozen=True)
 class DataSheet:
-    """A part's datasheet: `per_count_deg_s`, `per_count_g`: range → sensitivity; `forbidden`: accesses."""
+    """A part's data sheet. `per_count_deg_s`, `per_count_g`: sensitivity by range; `forbidden`: accesses."""
 
     name: str
     new: Callable[..., Driver]
@@ -33,7 +33,7 @@ class DataSheet:
         range_g: float = 8.0,
         **others: Any,
     ) -> Driver:
-        """A part that runs, by default at its fastest rate here and in the ranges that all parts have."""
+        """Return the driver of a running part, by default at its fastest rate here and in the ranges of all parts."""
         driver = self.new(rate_at, truth, range_deg_s=range_deg_s, **others)
         driver.start(rate_hz or self.rates_hz[-1], range_deg_s, range_g)
         return driver

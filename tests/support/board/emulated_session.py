@@ -1,4 +1,4 @@
-"""The product's image on an emulated board, spoken to over its serial line at virtual times."""
+"""The product's image on an emulated board, addressed over its serial line at virtual times."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -27,7 +27,7 @@ MAGNETIC = MagnetometerTruth((1.02, 0.97, 1.01), (12e-6, -30e-6, 8e-6))
 
 
 def magnetometer(motion_at: Callable[[float], Sequence[float]], *_truth: Any, seed: int, **_others: Any) -> SpiDevice:
-    """Made as the gyroscopes are; it feels one field, and its conversions are counted like theirs."""
+    """Return a magnetometer in a constant field, whose conversions are counted as those of the gyroscopes."""
 
     def field_at(time_s: float) -> Sequence[float]:
         motion_at(time_s)
@@ -50,15 +50,15 @@ ACCELERATION = AccelerometerTruth((1.02, 0.99, 1.01), (0.2, -0.1, 0.3))
 
 
 def make_shipped_flash() -> FlashMemory:
-    """A chip as it comes from the programmer."""
+    """Return a flash with the shipped program."""
     return FlashMemory((IMAGE / "rig_l432.bin").read_bytes())
 
 
 class Session:
-    """A board with the sensors `parts`, and every frame it has sent. The virtual clock moves by `tick_s` at a time.
+    """A board with the sensors `parts`, and every frame it has sent. Virtual time passes in steps of `tick_s`.
 
-    `sensors`: the simulated parts, by name, to break and to mend; `readings`: how many conversions each has made.
-    `flash`: of another session, after a power cut.
+    `sensors`: the simulated parts by name, whose faults can be set; `readings`: the number of conversions of each.
+    `flash`: that of another session, after a power cut.
     """
 
     def __init__(
@@ -105,7 +105,7 @@ class Session:
         return counted_rate_at
 
     def run(self, duration_s: float) -> list[Frame]:
-        """Let time pass. Returns the frames that arrived in it."""
+        """Let time pass; return the frames that arrived meanwhile."""
         for _ in range(round(duration_s / self._tick_s)):
             self.time_s += self._tick_s
             self.board.advance(self.time_s)
@@ -118,7 +118,7 @@ class Session:
         return frames
 
     def ask(self, name: str, **values: Any) -> Frame:
-        """Send a request. Returns its answer, which comes within 50 ms."""
+        """Send a request; return its answer, which must come within 50 ms."""
         self._asked = self._asked % 255 + 1
         self.board.receive(encode(name, self._asked, values))
         (answer,) = [frame for frame in self.run(0.05) if frame.values.get("reply_to") == self._asked]
@@ -127,7 +127,7 @@ class Session:
     def configure(
         self, part: str, rate_hz: float | None = None, range_deg_s: float | None = None, range_g: float = 0.0
     ) -> Frame:
-        """Set a part up, by default at its usual rate and range, without accelerations. Returns the board's `setup`."""
+        """Set a part up, by default at its usual rate and range, without accelerations. Return the board's `setup`."""
         usual_rate_hz, usual_range_deg_s = RATES_AND_RANGES[part]
         setup = self.ask(
             "configure",
@@ -141,21 +141,22 @@ class Session:
         return setup
 
     def configure_magnetometer(self, rate_hz: float = 80.0, range_gauss: float = 4.0) -> Frame:
-        """The same of the magnetometer."""
+        """Set the magnetometer up; return the board's `setup`."""
         ranges = {"range_deg_s": 0.0, "range_g": 0.0, "range_gauss": range_gauss}
         number = list(BOARD_PARTS).index("lsm9ds1_magnetometer")
         return self.ask("configure", sensor=number, rate_hz=rate_hz, **ranges)
 
     def stream(self, duration_s: float, rate_hz: float = 238.0, range_deg_s: float = 245.0) -> np.ndarray:
-        """Configure and start the LSM9DS1, then run. Returns what `samples` does."""
+        """Configure and start the LSM9DS1, then run. Return its samples as `samples` does."""
         self.configure("lsm9ds1", rate_hz, range_deg_s)
         self.board.receive(encode("start", 78, {"sensors": 0}))
         return samples(self.run(duration_s))
 
 
 def samples(frames: Sequence[Frame], sensor: int = 0) -> np.ndarray:
-    """The samples of one sensor in `frames`, (n,) records: time_us, counts (3,), acceleration (3,), temperature,
-    sequence; accelerations that are not sent are zeros.
+    """Return one sensor's samples (n,) in `frames`: time_us, counts (3,), acceleration (3,), temperature, sequence.
+
+    Accelerations that were not sent are zeros.
     """
     dtype = [
         ("time_us", "u8"),

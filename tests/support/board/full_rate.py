@@ -1,4 +1,4 @@
-"""Sensors streaming from the emulated board for a while, and an account of every conversion."""
+"""A session of sensors that stream from the emulated board, with an account of every conversion."""
 
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
@@ -46,7 +46,7 @@ class Account:
     _last_us: int | None = None
 
     def take(self, frame: Frame) -> None:
-        """A frame of this sensor's samples."""
+        """Count a frame of this sensor's samples."""
         values = frame.values
         self.lost += values["sequence"] - (self.samples + self.lost)
         self.samples += values["count"]
@@ -60,7 +60,7 @@ class Account:
 
     @property
     def complaint(self) -> str | None:
-        """What is missing."""
+        """A description of missing or irregular samples, or None."""
         if self.lost or self.late or self.dropped:
             return f"{self.lost} lost, {self.dropped} dropped by the board, {self.late} irregular time stamps"
         if not -STOPPING <= self.readings - self.samples <= STARTING:
@@ -70,7 +70,7 @@ class Account:
 
 @dataclass(frozen=True, slots=True)
 class Stream:
-    """What came of a stream: each part's account, and what the board and the reader say of the link."""
+    """The results of a stream: each part's account, and losses on the link as counted by the board and the reader."""
 
     accounts: dict[str, Account]
     bytes_sent: int
@@ -80,7 +80,7 @@ class Stream:
 
     @property
     def complaints(self) -> list[str]:
-        """Everything that was not as it should be."""
+        """Descriptions of all defects."""
         texts = [f"{part}: {account.complaint}" for part, account in self.accounts.items() if account.complaint]
         if self.frames_lost or self.tx_overruns or self.bus_errors:
             texts.append(
@@ -92,8 +92,9 @@ class Stream:
 def stream(
     rates_hz: Mapping[str, float], duration_s: float, calibrated: Collection[str] = (), range_g: float = 0.0
 ) -> Stream:
-    """Streams the named parts at these rates for so long, in simulated seconds; those in `calibrated` calibrated, all
-    others with accelerations unless `range_g` is 0.
+    """Stream the named parts at these rates for `duration_s` of simulated time.
+
+    Those in `calibrated` are calibrated, all others send accelerations unless `range_g` is 0.
     """
     session = Session(parts=list(rates_hz))
     session.run(0.2)

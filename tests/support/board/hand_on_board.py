@@ -1,4 +1,4 @@
-"""A session by hand played to the board's core: readings in, and what the board says of every move and at the end."""
+"""A session by hand played to the board's core: readings in, reports of every move and the solution out."""
 
 import ctypes
 import socket
@@ -29,7 +29,7 @@ class CReading(ctypes.Structure):
 
 @dataclass(frozen=True)
 class Played:
-    """What the board saw, and what it said: its reports, one of each move it judged, and its solution."""
+    """The readings of a session, and the board's answers: a report of each judged move, and the solution."""
 
     times_us: np.ndarray
     rates: Array
@@ -42,7 +42,7 @@ class Played:
 
     @property
     def scale(self) -> Array:
-        """(3,) k of g = K (m + b)."""
+        """The scale factors k (3,) of g = K (m + b)."""
         return np.asarray(1 / np.linalg.norm(np.linalg.inv(np.array(self.solved.matrix)), axis=1))
 
     @property
@@ -51,12 +51,12 @@ class Played:
 
     @property
     def readings(self) -> BoardReadings:
-        """What the host would have received."""
+        """The readings as the host would have received them."""
         return BoardReadings(self.times_us, np.arange(len(self.times_us)), self.rates, 1e-6)
 
 
 def begun(rate_hz: float = 119.0, moves: int = 12, scale_std: float = 1e-3) -> tuple[HostBoard, dict[str, Any]]:
-    """A board whose LSM9DS1 is about to be turned by hand, and its setup."""
+    """Return a board that calibrates its LSM9DS1 by hand from now on, and the sensor's setup."""
     board = HostBoard()
     setup = configure(board, 0, rate_hz, RANGE_DEG_S, RANGE_G)
     (answer,) = board.ask("by_hand", sensor=0, moves=moves, scale_std=scale_std)
@@ -65,13 +65,13 @@ def begun(rate_hz: float = 119.0, moves: int = 12, scale_std: float = 1e-3) -> t
 
 
 def query(board: HostBoard, name: str) -> Frame:
-    """The answer to a request without fields."""
+    """Return the answer to a request without fields."""
     (answer,) = (frame for frame in board.ask(name, 7) if frame.values.get("reply_to") == 7)
     return answer
 
 
 def convert_to_counts(recorded: Recorded, setup: dict[str, Any]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Times in microseconds, rates and accelerations as the part gives them."""
+    """Return times in µs, rates and accelerations in the part's counts."""
     rates, forces = (
         np.clip(np.round(values / per_count), -32768, 32767).astype(np.int16)
         for values, per_count in (
@@ -83,13 +83,13 @@ def convert_to_counts(recorded: Recorded, setup: dict[str, Any]) -> tuple[np.nda
 
 
 def give(board: HostBoard, time_us: int, number: int, rate: np.ndarray, force: np.ndarray) -> None:
-    """One reading."""
+    """Pass one reading to the board."""
     reading = CReading((ctypes.c_int16 * 3)(*rate.tolist()), (ctypes.c_int16 * 3)(*force.tolist()), 0)
     board.core.hand_add(0, ctypes.c_uint64(time_us), number, ctypes.byref(reading))
 
 
 def play(recorded: Recorded, moves: int = 12, scale_std: float = 1e-3, number: np.ndarray | None = None) -> Played:
-    """Plays a whole recording, whose readings have the numbers `number`; the host asks five times a second."""
+    """Play a whole recording, whose readings have the numbers `number`; the host asks for reports 5 times a second."""
     board, setup = begun(1 / float(np.median(np.diff(recorded.time_s))), moves, scale_std)
     times_us, counts, forces = convert_to_counts(recorded, setup)
     numbers = np.arange(len(times_us)) if number is None else number
@@ -108,7 +108,7 @@ def play(recorded: Recorded, moves: int = 12, scale_std: float = 1e-3, number: n
 
 @contextmanager
 def serve(board: HostBoard) -> Iterator[str]:
-    """A board's serial line as a `socket://` port; in the `with` block nobody else may talk to it."""
+    """Serve a board's serial line as a `socket://` port; only one client may use it in the `with` block."""
     ended = threading.Event()
     with socket.create_server(("127.0.0.1", 0)) as server:
         server.settimeout(0.02)
@@ -133,7 +133,7 @@ def serve(board: HostBoard) -> Iterator[str]:
 
 
 def _answer(board: HostBoard, host: socket.socket, ended: threading.Event) -> None:
-    """Pass on what the host says until it hangs up."""
+    """Pass on the host's bytes until it hangs up."""
     while not ended.is_set():
         try:
             heard = host.recv(4096)
@@ -150,7 +150,7 @@ def _answer(board: HostBoard, host: socket.socket, ended: threading.Event) -> No
 
 
 def press(board: HostBoard, begin_us: int, lasts_us: int = 60_000) -> None:
-    """The button is down for so long, while the main loop runs."""
+    """Press the button for `lasts_us`, while the main loop runs."""
     board.core.host_press(True)
     for time_us in range(begin_us, begin_us + lasts_us, 5_000):
         board.set_time(time_us)
@@ -160,14 +160,14 @@ def press(board: HostBoard, begin_us: int, lasts_us: int = 60_000) -> None:
 
 
 def alone(*, locked: bool = True) -> HostBoard:
-    """A board that nobody has asked for anything."""
+    """Return a board without any request from a host."""
     board = HostBoard()
     board.core.host_lock_clock(locked)
     return board
 
 
 def run_button_session(recorded: Recorded) -> HostBoard:
-    """A board whose button was pressed, and which was then turned as recorded, without a computer."""
+    """Return a board after a session started by its button, as recorded, without a computer."""
     board = alone()
     press(board, 100_000)
     setup = {"sensitivity_rad_s": np.radians(0.0175), "sensitivity_m_s2": 0.244e-3 * 9.80665}

@@ -30,9 +30,9 @@ _LINE = ctypes.CFUNCTYPE(ctypes.c_bool, ctypes.c_uint)
 
 @functools.cache
 def core() -> ctypes.CDLL:
-    """The core, built when its sources have changed, with undefined behaviour ending the process.
+    """Return the core, built again if its sources have changed; undefined behaviour ends the process.
 
-    With RIG_COVERAGE in the environment it is built there and notes which lines run: `make coverage` reads that.
+    With RIG_COVERAGE in the environment it is built there, and records the executed lines for `make coverage`.
     """
     out = os.environ.get("RIG_COVERAGE") or ROOT / "build" / "host"
     Path(out).mkdir(parents=True, exist_ok=True)
@@ -90,35 +90,35 @@ class HostBoard:
         self.core.board_reset()
 
     def set_time(self, time_us: int) -> None:
-        """The chip's counter, which wraps at 32 bits."""
+        """Set the chip's counter, which wraps at 32 bits."""
         self.core.host_set_time_us(ctypes.c_uint32(time_us & 0xFFFFFFFF))
 
     def wait_until(self, time_us: int) -> None:
-        """Let time pass, unless the firmware has waited that long itself."""
+        """Let time pass until `time_us`, unless the firmware has waited that long itself."""
         if (time_us - self.core.port_time_us()) % 2**32 < 2**31:
             self.set_time(time_us)
 
     def sent(self) -> None:
-        """The transmitter's interrupt."""
+        """Raise the transmitter's interrupt."""
         self.core.link_sent()
 
     def receive(self, data: bytes) -> None:
-        """Bytes from the host, then one pass of the main loop."""
+        """Let bytes from the host arrive, then run the main loop once."""
         for byte in data:
             self.core.link_byte_received(byte)
         self.run()
 
     def data_ready(self, captured_us: int, sensor: int = 0) -> None:
-        """A sensor's interrupt."""
+        """Raise a sensor's data-ready interrupt."""
         self.core.acquisition_data_ready(sensor, ctypes.c_uint32(captured_us & 0xFFFFFFFF))
 
     def run(self, passes: int = 2) -> None:
-        """Passes of the main loop; two, because what the first queues behind a busy line the second sends."""
+        """Run the main loop, by default twice: the second pass sends what the first one queued for a busy line."""
         for _ in range(passes):
             self.core.board_run()
 
     def frames(self) -> list[Frame]:
-        """Whole frames sent since the last call."""
+        """Return the complete frames sent since the last call."""
         reader = FrameReader()
         frames = reader.feed(bytes(self.wire))
         assert reader.damaged == 0
@@ -126,13 +126,13 @@ class HostBoard:
         return frames
 
     def ask(self, name: str, sequence: int = 1, **values: object) -> list[Frame]:
-        """Sends a request; what the board sent until it had answered."""
+        """Send a request; return the frames sent up to its answer."""
         self.receive(encode(name, sequence, values))
         return self.frames()
 
 
 def streaming_board() -> HostBoard:
-    """A board whose LSM9DS1 has just been started at 238 Hz, with nothing on the wire yet."""
+    """Return a board whose LSM9DS1 has just been started at 238 Hz, with an empty transmit buffer."""
     board = HostBoard()
     assert [
         frame.name for frame in board.ask("configure", sensor=0, rate_hz=238, range_deg_s=245, range_g=0, range_gauss=0)
@@ -143,7 +143,7 @@ def streaming_board() -> HostBoard:
 
 
 def settle(board: HostBoard, time_us: int = 0) -> None:
-    """The LSM9DS1's conversions after a configure that are no samples yet."""
+    """Make the LSM9DS1's conversions after a configuration that are not samples yet."""
     for _ in range(SETTLING):
         convert(board, time_us, (32767, 32767, 32767), late_us=0)
 
@@ -158,7 +158,7 @@ def convert(
     acceleration: Sequence[int] = (0, 0, 0),
     temperature_counts: int = -48,
 ) -> None:
-    """One conversion: the interrupt at `time_us`, the main loop `late_us` after."""
+    """Make one conversion: the interrupt at `time_us`, the main loop `late_us` later."""
     list(board.parts.values())[sensor].convert(counts, temperature_counts, acceleration)
     board.data_ready(time_us, sensor)
     board.wait_until(time_us + late_us)
@@ -166,14 +166,14 @@ def convert(
 
 
 def error_of(frames: list[Frame]) -> str:
-    """The name of the error that is the only frame."""
+    """Return the name of the error in `frames`, which must be a single error frame."""
     (frame,) = frames
     assert frame.name == "error"
     return ERRORS[frame.values["code"]].name
 
 
 def sample_sequences(frames: list[Frame], sensor: int = 0) -> list[int]:
-    """The sequence numbers of a sensor's samples."""
+    """Return the sequence numbers of a sensor's samples."""
     batches = [
         f for f in frames if f.name in ("samples", "imu_samples", "field_samples") and f.values["sensor"] == sensor
     ]
@@ -183,7 +183,7 @@ def sample_sequences(frames: list[Frame], sensor: int = 0) -> list[int]:
 def configure(
     board: HostBoard, sensor: int, rate_hz: float = 200, range_deg_s: float = 125, range_g: float = 0
 ) -> dict[str, Any]:
-    """Sets a sensor up. Returns what the board answers."""
+    """Set a sensor up; return the board's answer."""
     (setup,) = board.ask(
         "configure", sensor=sensor, rate_hz=rate_hz, range_deg_s=range_deg_s, range_g=range_g, range_gauss=0
     )
@@ -198,7 +198,7 @@ def first_samples(
     conversions: int = 40,
     acceleration: tuple[int, int, int] = (0, 0, 0),
 ) -> Frame:
-    """Start, let the sensor convert the same over and over, stop. Returns the first batch."""
+    """Start, let the sensor convert the same reading repeatedly, and stop. Return the first batch."""
     board.ask("start", 2, sensors=0)
     for k in range(conversions):
         convert(board, 100_000 + 5000 * k, counts, sensor=sensor, acceleration=acceleration)

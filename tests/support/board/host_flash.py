@@ -1,4 +1,4 @@
-"""The host library's flash; its power fails in the middle of an operation and leaves what flash cells may hold."""
+"""The host library's flash, whose power can fail during an operation and leave any content that real cells may have."""
 
 import ctypes
 import random
@@ -22,7 +22,7 @@ class Operation:
 class HostFlash:
     """The flash of the host library, erased. `operations` are those begun since the last power-up.
 
-    A doubleword that is `worn`, (page, offset), does not keep what is programmed, as the next operation will show.
+    A `worn` doubleword, (page, offset), loses its programmed value at the next operation.
     """
 
     def __init__(self) -> None:
@@ -34,7 +34,7 @@ class HostFlash:
         self.power_up()
 
     def power_up(self, lasts: int | None = None, rng: random.Random | None = None) -> None:
-        """Power that fails in the middle of the operation after `lasts`; None lasts for ever."""
+        """Power up. Power fails during the operation after `lasts` ones; never with None."""
         self.operations: list[Operation] = []
         self._lasts = lasts
         self._rng = rng or random.Random(0)
@@ -49,11 +49,11 @@ class HostFlash:
         return ctypes.string_at(self._core.host_flash_bytes(page), PAGE_BYTES)
 
     def put(self, page: int, data: bytes) -> None:
-        """Write to the cells, whatever they hold."""
+        """Write to the cells, whatever their content."""
         ctypes.memmove(self._core.host_flash_bytes(page), data, len(data))
 
     def tear(self, page: int, offset: int) -> None:
-        """Reading this doubleword fails until the page is erased."""
+        """Make reading this doubleword fail until the page is erased."""
         self._core.host_flash_tear(page, ctypes.c_size_t(offset))
 
     def _begin(self, page: int, offset: int, pointer: "ctypes._Pointer[ctypes.c_uint64]") -> bool:
@@ -72,7 +72,7 @@ class HostFlash:
         return False
 
     def _cut_erase(self, page: int) -> None:
-        """The cells are as before, on their way to 1, at 1, or anything; some doublewords no longer match their ECC."""
+        """Interrupt an erase: cells as before, on their way to 1, at 1, or random; some ECCs no longer match."""
         rng, old = self._rng, int.from_bytes(self.contents(page), "little")
         noise = rng.getrandbits(8 * PAGE_BYTES)
         sparse = noise & rng.getrandbits(8 * PAGE_BYTES) & rng.getrandbits(8 * PAGE_BYTES)

@@ -1,4 +1,4 @@
-"""The firmware's codec and receiver, called from here."""
+"""The firmware's codec and receiver, called from Python."""
 
 import ctypes
 
@@ -22,7 +22,7 @@ class _CFrame(ctypes.Structure):
 
 
 def encode_in_c(kind: int, sequence: int, payload: bytes) -> bytes:
-    """One frame with its delimiter."""
+    """Return one frame with its delimiter."""
     buffer = (ctypes.c_uint8 * len(payload)).from_buffer_copy(payload)
     frame = _CFrame(kind, sequence, len(payload), ctypes.cast(buffer, ctypes.POINTER(ctypes.c_uint8)))
     wire = ctypes.create_string_buffer(_WIRE_MAX)
@@ -31,7 +31,7 @@ def encode_in_c(kind: int, sequence: int, payload: bytes) -> bytes:
 
 
 def decode_in_c(block: bytes) -> Frame | None:
-    """A block without its delimiter; None when it is damaged."""
+    """Decode a block without its delimiter; return None if it is damaged."""
     buffer = ctypes.create_string_buffer(block, max(len(block), 1))
     frame = _CFrame()
     if not core().frame_decode(buffer, ctypes.c_size_t(len(block)), ctypes.byref(frame)):
@@ -40,18 +40,18 @@ def decode_in_c(block: bytes) -> Frame | None:
 
 
 class CReceiver:
-    """The firmware's receiver after a reset; there is one in a process."""
+    """The firmware's receiver after a reset. There is one per process."""
 
     def __init__(self) -> None:
         core().link_reset()
 
     @property
     def damaged(self) -> int:
-        """Blocks that did not decode."""
+        """The number of blocks that could not be decoded."""
         return int(core().link_rx_errors())
 
     def feed(self, data: bytes) -> list[Frame]:
-        """The frames that `data` completes."""
+        """Return the frames that `data` completes."""
         frames: list[Frame] = []
         on_frame = _ON_FRAME(
             lambda kind, sequence, payload, size: frames.append((kind, sequence, ctypes.string_at(payload, size)))

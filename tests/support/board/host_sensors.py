@@ -1,20 +1,20 @@
-"""The parts as the drivers see them: registers behind a chip select, enough to tell what a driver does."""
+"""The parts as the drivers see them: registers behind a chip select, as far as needed to test a driver."""
 
 from typing import Protocol
 
 
 class Part(Protocol):
-    """What is at the other end of a chip select, and the level of its data-ready line."""
+    """A part behind a chip select, with the level of its data-ready line."""
 
     @property
     def line_is_high(self) -> bool: ...
 
     def transfer(self, data: bytes, max_hz: int, time_us: int, /) -> bytes:
-        """One chip select: the bytes in, the bytes out."""
+        """Make one access, from chip select to chip select; return the received bytes."""
 
 
 class Nobody:
-    """A wire that nobody drives: all ones by the pull-up, or all zeros where it is shorted."""
+    """A line without a part: all ones by the pull-up, or all zeros if it is shorted."""
 
     def __init__(self, level: int = 0xFF) -> None:
         self.level = level
@@ -27,9 +27,9 @@ class Nobody:
 
 
 class ByteRegisters:
-    """Registers of one byte that count up in a burst. `fresh`: there is a conversion that nobody has read.
+    """Registers of one byte; the address counts up in a burst. `fresh`: whether there is an unread conversion.
 
-    `max_hz`: the fastest clock of the bus. What a burst reads, and what that changes, is the part's own `read`.
+    `max_hz`: the fastest clock of the bus. Each part's `read` defines what a burst reads and changes.
     """
 
     max_hz = 10e6
@@ -43,11 +43,11 @@ class ByteRegisters:
 
     @property
     def line_is_high(self) -> bool:
-        """False, for parts with pulses."""
+        """False, for parts that signal by pulses."""
         return False
 
     def transfer(self, data: bytes, max_hz: int, time_us: int) -> bytes:
-        """One chip select: the bytes in, the bytes out."""
+        """Make one access, from chip select to chip select; return the received bytes."""
         assert max_hz <= self.max_hz
         self.transfers.append(len(data))
         address, reading = data[0] & 0x7F, data[0] & 0x80
@@ -60,9 +60,9 @@ class ByteRegisters:
         return bytes(len(data))
 
     def write(self, address: int, value: int) -> None:
-        """Handle a byte that is written to the part."""
+        """Handle a byte written to the part."""
         self.values[address] = value
 
     def read(self, address: int, size: int) -> bytes:
-        """The bytes from `address` on, and what reading them changes."""
+        """Return the bytes from `address` on, with all effects of reading them."""
         return bytes(self.values[address : address + size])

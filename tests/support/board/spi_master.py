@@ -1,4 +1,4 @@
-"""A bus master for one simulated sensor, written out in Python, and what each part's driver offers."""
+"""A bus master for one simulated sensor, in plain Python, and the interface of each part's driver."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -22,14 +22,14 @@ def still(_time_s: float) -> Sequence[float]:
 
 
 class Master:
-    """Speaks to `part` and lets its time pass."""
+    """A bus master that addresses `part` and advances its time."""
 
     def __init__(self, part: SpiDevice) -> None:
         self.part = part
         self.time_s = 0.0
 
     def exchange(self, data: bytes) -> bytes:
-        """One access, from chip select to chip select, after a short pause. Returns what came back."""
+        """Make one access, from chip select to chip select, after a short pause; return the received bytes."""
         self.advance(self.time_s + PAUSE_S)
         self.part.select(self.time_s)
         answer = bytes(self.part.transfer(byte, self.time_s) for byte in data)
@@ -50,17 +50,17 @@ class Master:
 
 
 class Driver(Protocol):
-    """The same few things of every part."""
+    """The common interface of all parts' drivers."""
 
     part: SpiDevice
 
     def identity(self) -> int: ...
     def start(self, rate_hz: float, range_deg_s: float, range_g: float = 8.0) -> None: ...
     def read(self) -> tuple[list[int], int]:
-        """The rates and the temperature of the conversion that is waiting, as counts."""
+        """Return the rates (3,) and the temperature of the waiting conversion, in counts."""
 
     def accelerations(self) -> list[int]:
-        """Of the same conversion; to be asked for first."""
+        """Return the accelerations (3,) of the waiting conversion, in counts; call this before `read`."""
 
     def exchange(self, data: bytes) -> bytes: ...
     def advance(self, time_s: float) -> None: ...
@@ -68,12 +68,12 @@ class Driver(Protocol):
 
 
 def integers(data: bytes, order: str) -> list[int]:
-    """16-bit two's complement numbers, `order` "<" or ">"."""
+    """Return 16-bit two's complement numbers, in the byte order `order`, "<" or ">"."""
     return [int(value) for value in np.frombuffer(data, f"{order}i2")]
 
 
 class Registers(Master):
-    """Parts with registers of one byte, bit 7 of the address set for reading."""
+    """A driver of parts with registers of one byte, with bit 7 of the address set for reading."""
 
     def get(self, address: int, count: int = 1) -> bytes:
         return self.exchange(bytes([0x80 | address]) + bytes(count))[1:]
@@ -83,7 +83,7 @@ class Registers(Master):
 
 
 class ModelledRegisters(Registers):
-    """Speaks to a new `model`, of such a part."""
+    """A driver for a new `model` of such a part."""
 
     model: Callable[..., SpiDevice]
 

@@ -1,4 +1,4 @@
-"""The chip as its maker describes it, register by register."""
+"""The maker's description of the chip, register by register."""
 
 import xml.etree.ElementTree as ET
 import zipfile
@@ -8,7 +8,7 @@ from pathlib import Path
 
 @cache
 def device() -> ET.Element:
-    """The maker's description of the STM32L4x2, as pyOCD's wheel carries it."""
+    """Return the maker's description of the STM32L4x2, from pyOCD's wheel."""
     import pyocd  # with all its probes and targets
 
     archive = Path(pyocd.__file__).parent / "debug" / "svd" / "svd_data.zip"
@@ -18,13 +18,13 @@ def device() -> ET.Element:
 
 @cache
 def peripherals() -> dict[str | None, ET.Element]:
-    """The peripherals by their names."""
+    """Return the peripherals by name."""
     return {p.findtext("name"): p for p in device().iter("peripheral")}
 
 
 @cache
 def interrupts() -> dict[str | None, int]:
-    """The numbers of the interrupts by their names."""
+    """Return the interrupts' numbers by name."""
     return {i.findtext("name"): int(i.findtext("value", "")) for i in device().iter("interrupt")}
 
 
@@ -33,7 +33,7 @@ def number(element: ET.Element, tag: str) -> int:
 
 
 def register(peripheral: str, name: str) -> ET.Element:
-    """A register's description, also where one peripheral is described as a copy of another."""
+    """Return a register's description, also of a peripheral that is described as a copy of another."""
     element = peripherals()[peripheral]
     element = peripherals()[element.get("derivedFrom", peripheral)]
     return next(r for r in element.iter("register") if r.findtext("name") == name)

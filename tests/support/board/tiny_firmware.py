@@ -1,4 +1,4 @@
-"""Tiny Cortex-M4 images, compiled on the spot, for what the product's own image must never do."""
+"""Tiny Cortex-M4 images, compiled during the test, for actions that the product's own image must never do."""
 
 import subprocess
 from collections.abc import Sequence
@@ -74,7 +74,7 @@ __attribute__((noinline, unused)) static void put(uint8_t byte)
 
 
 def build(source: str, folder: Path, includes: Sequence[Path] = ()) -> tuple[bytes, bytes]:
-    """Compile `source` (which defines main) after the prelude. Returns the flash image and the ELF file."""
+    """Compile `source`, which defines main, after the prelude. Return the flash image and the ELF file."""
     searched = [f"-I{path}" for path in includes]
     (folder / "tiny.ld").write_text(_LINKER_SCRIPT)
     (folder / "start.c").write_text(_START)
@@ -88,11 +88,11 @@ def build(source: str, folder: Path, includes: Sequence[Path] = ()) -> tuple[byt
 
 
 def board(source: str, folder: Path, devices: Sequence[SpiDevice] = ()) -> EmulatedBoard:
-    """A board with exact crystal, powered up at time 0, that runs `source`."""
+    """Return a board with an exact crystal, powered up at time 0, that runs `source`."""
     image, elf = build(source, folder)
     return power_up(FlashMemory(image), elf, devices)
 
 
 def power_up(flash: FlashMemory, elf: bytes, devices: Sequence[SpiDevice] = ()) -> EmulatedBoard:
-    """A board with exact crystal, powered up at time 0, that runs what is in `flash`."""
+    """Return a board with an exact crystal, powered up at time 0, that runs the program in `flash`."""
     return EmulatedBoard(flash=flash, elf=elf, devices=devices, unique_id=bytes(12), crystal_ppm=0.0, boot_time_s=0.0)

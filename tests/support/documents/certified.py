@@ -1,4 +1,4 @@
-"""Results with a budget, and the content of their certificates as a reader finds it."""
+"""Results with a budget, and the content of their certificates as shown to a reader."""
 
 import functools
 from collections.abc import Collection, Mapping
@@ -59,7 +59,7 @@ LABORATORY = StatedFacts(
 
 @functools.cache
 def result() -> ResultDocument:
-    """Return the result of a recording whose budget is complete. The checks of a board are left out."""
+    """Return the result of a recording whose budget is complete. It contains no checks of a board."""
     document = document_of(calibrate([synthetic_run(Setup(stated_kinematics=NOMINAL))]))
     checks = tuple(check for check in document.checks if not check.name.startswith("gyro.board"))
     return document.model_copy(update={"checks": checks, "verdict": "pass"})
@@ -189,7 +189,7 @@ def magnetometer() -> MagnetometerEntry:
 
 
 def reversal(document: ResultDocument) -> ReversalEntry:
-    """Return the reversal of that magnetometer, from this run and a later one; never turned over along x."""
+    """Return the reversal of the magnetometer, from this run and a later one, without a reversal along x."""
     entry = magnetometer()
     as_mounted = {"mounting": IDENTITY, "bias_t": entry.bias_t, "bias_std_t": (5e-9,) * 3, "field_base_t": entry.bias_t}
     began = (document.provenance.started_utc, "2026-11-22T18:00:00+00:00")
@@ -288,8 +288,11 @@ def over_temperature() -> OverTemperatureEntry:
 
 
 def everything() -> ResultDocument:
-    """A gyroscope that felt gravity and found the Earth's rate, an accelerometer of second order, a magnetometer, and
-    biases by repeat: more than one run finds."""
+    """Return a result with everything, which no single run finds.
+
+    A gyroscope with gravity's effect and the Earth's rate, an accelerometer of second order, a magnetometer, and biases
+    by repeat.
+    """
     document = add_accelerometer(
         accelerometer().model_copy(
             update={"second_order_s2_m": (9.72e-6, -9.478e-5, 0.0), "second_order_std_s2_m": (4.6e-6,) * 3}
@@ -340,13 +343,13 @@ def certificate(
     stated: StatedFacts = LABORATORY,
     reversals: Mapping[str, ReversalEntry] = MappingProxyType({}),
 ) -> Certificate:
-    """Return the certificate of a result, by a laboratory that states all it can."""
+    """Return the certificate of a result, by a laboratory that makes all possible statements."""
     return certificate_of(document or result(), stated, reversals)
 
 
 @dataclass
 class Page(HTMLParser):
-    """A parsed page: `text` as it is read, `under` by clause the text of its elements, `tags` with their attributes."""
+    """A parsed page: `text` as displayed, `under`: the elements' text by clause, `tags` with their attributes."""
 
     text: str = ""
     tags: list[tuple[str, dict[str, str | None]]] = field(default_factory=list)
@@ -393,7 +396,7 @@ def read(certificate: Certificate) -> Page:
 
 
 def plant(value: Any, text: str, kept: Collection[str]) -> Any:
-    """Return a document in which every text that others could have written is `text`."""
+    """Return a document in which every text that others may have written is replaced by `text`."""
     if isinstance(value, dict):
         return {key: part if key in kept else plant(part, text, kept) for key, part in value.items()}
     if isinstance(value, (list, tuple)):

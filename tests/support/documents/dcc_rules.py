@@ -1,7 +1,7 @@
-"""What PTB has to say about a digital certificate: its schemas, where they are at hand, and its Schematron.
+"""PTB's rules for a digital certificate: its schemas, if available, and its Schematron.
 
-The schemas (DCC 3.2.1, D-SI 2.1.0, LGPL-3, and the W3C's for signatures) are no part of this project. They are looked
-for in the folder RIG_DCC_SCHEMAS names, in tests/fixtures/dcc, and in shared/dcc beside the repository.
+The schemas (DCC 3.2.1, D-SI 2.1.0, LGPL-3, and the W3C's for signatures) are no part of this project. They are searched
+in the folder named by RIG_DCC_SCHEMAS, in tests/fixtures/dcc, and in shared/dcc beside the repository.
 """
 
 import functools
@@ -28,7 +28,7 @@ PLACES = [
 
 
 def schema_faults(xml: bytes) -> list[str]:
-    """Return the errors by the schema; skip the test, by name, if there is no schema."""
+    """Return the errors by the schema; skip the test, with a reason, if there is no schema."""
     folder = next((candidate for candidate in PLACES if (candidate / MAIN).is_file()), None)
     if folder is None:
         pytest.skip("PTB's schemas are not here: set RIG_DCC_SCHEMAS to their folder")
@@ -49,7 +49,7 @@ def _schema(folder: Path) -> etree.XMLSchema:
 
 
 def rule_faults(xml: bytes) -> list[str]:
-    """Errors by PTB's Schematron; its warnings and remarks are left out."""
+    """Return the errors by PTB's Schematron, without its warnings and remarks."""
     report = _rules().validate_str(xml.decode())
     return [
         failed_assertion.text

@@ -1,4 +1,4 @@
-"""Results of runs that nobody made, for how runs end: of one sensor and of six, with checks that failed."""
+"""Invented results of one sensor and of six, with failed checks, for tests of how runs end."""
 
 from rig.data.result_file import ResultDocument, read_result
 from support.paths import RECORDINGS
@@ -7,7 +7,7 @@ ONE = read_result(RECORDINGS / "verified")
 
 
 def make_three_parts() -> ResultDocument:
-    """Three gyroscopes and three accelerometers, with every check of each."""
+    """Return three gyroscopes and three accelerometers, with every check of each."""
     one = read_result(RECORDINGS / "imu")
     names = ("lsm9ds1", "mpu9250", "adis16465")
     checks = [
@@ -28,7 +28,7 @@ def make_three_parts() -> ResultDocument:
 
 
 def fail_checks(result: ResultDocument, *names: str) -> ResultDocument:
-    """The result with checks of these names far beyond their limits."""
+    """Return the result with the checks of these names far beyond their limits."""
     checks = [
         check.model_copy(update={"passed": False, "value": 3 * (check.limit or 1)}) if check.name in names else check
         for check in result.checks

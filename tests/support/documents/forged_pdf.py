@@ -1,4 +1,4 @@
-"""Forgeries of a signed PDF: ways to make it say something else under the signature that it has."""
+"""Forgeries of a signed PDF: ways to change its message under the existing signature."""
 
 import io
 from collections.abc import Callable, Sequence
@@ -108,7 +108,7 @@ def no_page(writer: IncrementalPdfFileWriter) -> None:
 
 
 def note(writer: IncrementalPdfFileWriter) -> None:
-    """Put an annotation over the page, as a reader's comment."""
+    """Put an annotation over the page, like a reader's comment."""
     box = ArrayObject(map(NumberObject, (0, 0, 500, 800)))
     names = {"/Type": "/Annot", "/Subtype": "/FreeText"}
     annotation = DictionaryObject({pdf_name(key): NameObject(value) for key, value in names.items()})

@@ -1,4 +1,4 @@
-"""Forgeries of a signed digital certificate: ways to make it say something else under the signature that it has."""
+"""Forgeries of a signed digital certificate: ways to change its message under the existing signature."""
 
 import copy
 import re

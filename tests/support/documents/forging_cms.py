@@ -1,4 +1,4 @@
-"""Tools to forge what the signature of a PDF comes in (CMS): certificates, lists and stamps that it does not cover."""
+"""Tools to forge the container of a PDF's signature (CMS): certificates, lists and stamps that it does not protect."""
 
 from collections.abc import Callable
 from typing import Any
@@ -41,7 +41,7 @@ def certificate_added(make_holder: Callable[[], Holder]) -> Forgery:
 
 
 def certificate_altered(signed: Any, _: Any) -> None:
-    """Change the first day of the authority's certificate, which no signature of a document covers."""
+    """Change the first valid day of the authority's certificate, which no signature of a document covers."""
     altered = []
     for choice in signed["certificates"]:
         der = choice.chosen.dump()

@@ -1,4 +1,4 @@
-"""Documents of `result.json` for tests: those of a verified run, changed."""
+"""Documents of `result.json` for tests, made from those of a verified run."""
 
 from collections.abc import Mapping
 
@@ -10,7 +10,7 @@ SENSOR, REFERENCE = VERIFIED.gyroscopes["gyro"], VERIFIED.gyroscopes["reference"
 
 
 def result_document(sensors: Mapping[str, GyroscopeEntry], *, passed: bool = True) -> ResultDocument:
-    """A result of these sensors whose last check passed or did not."""
+    """Return a result of these sensors whose last check passed or failed."""
     last = VERIFIED.checks[-1].model_copy(update={"passed": passed})
     return VERIFIED.model_copy(
         update={

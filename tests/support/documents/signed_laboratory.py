@@ -1,4 +1,4 @@
-"""A laboratory that has signed the certificate of one run, and what `rig verify` says of its files."""
+"""A laboratory that has signed the certificate of one run, and the output of `rig verify` on its files."""
 
 import json
 import shutil
@@ -22,10 +22,10 @@ PDF, XML, RESULT, PAGE = "certificate.pdf", "certificate.xml", "result.json", "c
 
 @dataclass(frozen=True)
 class Laboratory:
-    """A run folder whose certificate was signed once, its history, and who is behind it.
+    """A run folder whose certificate was signed once, its history, and the certificates of its signer.
 
-    `root` is the certificate of the authority as PEM; `stranger` a folder with the same certificate, signed by somebody
-    else of the same name.
+    `root`: the authority's certificate as PEM; `stranger`: a folder with the same certificate, signed by another person
+    of the same name.
     """
 
     folder: Path
@@ -47,7 +47,7 @@ class Laboratory:
     def verified(
         self, *names: str, history: bool = True, trust: bool = True, signer: str | None = None
     ) -> tuple[int, str]:
-        """Return the exit status of `rig verify … --json`, and what it printed."""
+        """Return the exit status and the output of `rig verify … --json`."""
         command = ["verify", *(str(self.folder / name) for name in names), "--json"]
         command += ["--history", str(self.history)] if history else []
         command += ["--trust", str(self.root)] if trust else []
@@ -62,7 +62,7 @@ def names_of(output: str) -> list[str]:
 
 @contextmanager
 def make_signed_laboratory(base: Path) -> Iterator[Laboratory]:
-    """A laboratory in the folder `base`; while it is there, the passphrase of its keys is in the environment."""
+    """Yield a laboratory in the folder `base`; meanwhile the passphrase of its keys is in the environment."""
     folder, history = base / "run", base / "history.sqlite"
     folder.mkdir()
     write_result(result(), folder)

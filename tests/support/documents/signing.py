@@ -1,4 +1,4 @@
-"""Keys and certificates of an invented laboratory, and a time server: everything that signatures need."""
+"""Keys and certificates of an invented laboratory, and a time server, for signatures."""
 
 import threading
 from collections.abc import Iterator, Sequence
@@ -32,7 +32,7 @@ Key = rsa.RSAPrivateKey | ec.EllipticCurvePrivateKey
 
 @dataclass(frozen=True, slots=True)
 class Holder:
-    """A key with its certificate and those above it."""
+    """A key with its certificate and the certificates of its issuers."""
 
     key: Key
     chain: tuple[x509.Certificate, ...]
@@ -51,7 +51,7 @@ class Holder:
         return file
 
     def certificates(self) -> bytes:
-        """Return the certificate and those above it, in PEM."""
+        """Return the certificate and those of its issuers, in PEM."""
         return b"".join(certificate.public_bytes(Encoding.PEM) for certificate in self.chain)
 
 
@@ -71,7 +71,7 @@ def issue(
 ) -> Holder:
     """Return the holder of this key, whose certificate has this key usage and these purposes (extended key usage).
 
-    Without a `usage` it is that of who signs documents or, without one above, of an authority; an empty one is absent.
+    The default `usage` is that of a document's signer or, without an issuer, of an authority; an empty one is omitted.
     """
     subject = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, name)])
     issuer = subject if above is None else above.chain[0].subject
@@ -97,7 +97,7 @@ def stamping(name: str, above: Holder) -> Holder:
 
 
 def signing_as(by: Holder) -> Signatory:
-    """Return the signatory with this key, which nothing asks whether it may sign documents."""
+    """Return the signatory with this key, without a check that it may sign documents."""
     from asn1crypto import keys
     from asn1crypto import x509 as asn1
     from pyhanko.sign.signers import SimpleSigner
@@ -123,7 +123,7 @@ def revocation_list(by: Holder, *revoked: Holder, days: tuple[int, int] = (-1, 7
 
 @contextmanager
 def time_server(by: Holder, answers: Sequence[bytes] = ()) -> Iterator[str]:
-    """Serve RFC 3161 on loopback with an RSA key; yield its URL. `answers`, if there are any, are its only ones."""
+    """Serve RFC 3161 on loopback with an RSA key; yield its URL. `answers`, if any, replace its own."""
     from asn1crypto import keys, tsp
     from asn1crypto import x509 as asn1
     from pyhanko.sign.timestamps import DummyTimeStamper

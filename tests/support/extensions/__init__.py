@@ -1,1 +1,1 @@
-"""What somebody's own packages add: a kind of sensor, a turner."""
+"""Extensions as a user's own packages add them: a kind of sensor, a turner."""

@@ -22,7 +22,7 @@ SCALE, BIAS_RAD, PER_COUNT, NOISE_RAD = np.array([1.02, 0.97]), np.array([0.004,
 
 
 def write(folder: Path) -> None:
-    """The frozen recording's samples, and those of an inclinometer by the board's clock."""
+    """Write the frozen recording's samples, and those of an inclinometer by the board's clock."""
     run = open_run(RECORDINGS / "imu").movement[0]
     observed = observe_run(run, run.settings.observation)
     tilt = RecordedSensor("tilt2", "I-1", 100.0, (Channel(INCLINATION.name, "tilt", "<i4", PER_COUNT, 0.0, 10**6),))

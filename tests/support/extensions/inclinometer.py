@@ -1,7 +1,7 @@
-"""A kind of sensor that the rig does not know: a two-axis inclinometer, as somebody's package adds it.
+"""A kind of sensor unknown to the rig: a two-axis inclinometer, as a user's package adds it.
 
-φ = a m + c along x and y, φ the angle by which the axis rises above the horizontal: k = 1/a … in the rig's words
-m = φ / k + b.
+φ = a m + c along x and y, φ the angle by which the axis rises above the horizontal: k = 1/a … in the rig's words m = φ
+/ k + b.
 """
 
 from collections.abc import Iterator, Mapping
@@ -79,7 +79,7 @@ class InclinometerEntry(Entry):
 
 
 def solve(name: str, placements: Placements, site: Site) -> OfKind:
-    """Lines through the readings over the angles of rise, axis by axis, weighted by their and the table's variances."""
+    """Fit lines through the readings over the angles of rise, axis by axis, weighted by all variances."""
     read = placements.read
     up = placements.attitudes.swapaxes(1, 2) @ np.array(site.up)
     rise, means = np.arcsin(up[:, :2]), read.means[INCLINATION]

@@ -1,4 +1,4 @@
-"""A turntable's run with a gyroscope, as the runner would record it: `python -m support.extensions.turned_run DIR`."""
+"""A turntable's run with a gyroscope, as the runner records it: `python -m support.extensions.turned_run DIR`."""
 
 import sys
 from pathlib import Path
@@ -29,7 +29,7 @@ BIAS_RAD_S = np.array([0.01, -0.02, 0.005])
 
 
 def write(folder: Path) -> None:
-    """The run folder, as far as it is recorded."""
+    """Write the run folder, with everything that is recorded during a run."""
     (folder / CONFIG).write_text(TEXT, encoding="utf-8")
     loaded = load_configured(folder / CONFIG)
     config, plan = loaded.loaded.config, loaded.phase.plan()
@@ -80,7 +80,7 @@ def write(folder: Path) -> None:
 
 
 def _samples(states: list[State]) -> np.ndarray:
-    """Readings about the table's axis, which is z, by a clock that began 97 s after the table's."""
+    """Return readings about the table's axis z, by a clock that began 97 s after the table's."""
     turned = CubicSpline([state.time_s for state in states], [state.q_rad[0] for state in states])
     time_s = np.arange(states[0].time_s + 0.3, states[-1].time_s - 0.3, 1 / SENSOR.rate_hz)
     rate = np.column_stack([np.zeros((len(time_s), 2)), turned(time_s, 1)])

@@ -1,6 +1,6 @@
-"""A turner that the rig does not know: a turntable of one joint, as somebody's package adds it, and a procedure for it.
+"""A turner unknown to the rig: a turntable of one joint, as a user's package adds it, and a procedure for it.
 
-The table turns in virtual time: nothing waits.
+The table turns in virtual time, without waiting.
 """
 
 from collections.abc import Callable, Collection, Iterator, Sequence
@@ -59,7 +59,7 @@ class TurntableSection(TurnerSection):
 
 @dataclass(frozen=True, slots=True)
 class TableState:
-    """A `State` that tells the motor's current as well."""
+    """A `State` that also contains the motor's current."""
 
     time_s: float
     host_time_s: float
@@ -68,18 +68,18 @@ class TableState:
     current_a: float
 
     def to_record(self) -> Row:
-        """The values in their order."""
+        """Return the values in their order."""
         return self.time_s, self.host_time_s, self.q_rad, self.qd_rad_s, self.current_a
 
     @property
     def at_rest(self) -> bool:
-        """Whether it stands."""
+        """Whether the table stands."""
         return self.qd_rad_s == (0.0,)
 
 
 @dataclass(frozen=True, slots=True)
 class TableReport:
-    """A `Report` of it."""
+    """A `Report` of a table."""
 
     host: str
     state: TableState
@@ -91,7 +91,7 @@ class TableReport:
 
     @property
     def words(self) -> str:
-        """It in a line of text."""
+        """The report in a line of text."""
         return f"Toys T1, serial number {self.serial_number}"
 
 
@@ -110,14 +110,14 @@ class Turntable:
         return TableReport(self._section.serial_port, self.latest)
 
     def check(self) -> None:
-        """Nothing goes wrong with it."""
+        """Check nothing, because the table has no faults."""
 
     def take_control(self, carried: FlangeLoad) -> None:
-        """It is ready at once."""
+        """Return at once, because the table is always ready."""
         self._held = True
 
     def move(self, motion: Motion, watch: Callable[[], None] = lambda: None) -> None:
-        """Turn to where the motion ends."""
+        """Turn to the end of the motion."""
         assert self._held
         begin_s, start, (travel_rad,) = (
             self._time_s,
@@ -145,7 +145,7 @@ class Turntable:
 
 @contextmanager
 def connect(section: TurntableSection, on_state: OnState, log: Path) -> Iterator[Turntable]:
-    """The table, which stands when it is let go."""
+    """Yield the table, which stands still at the end."""
     yield Turntable(section, on_state)
 
 
@@ -183,7 +183,7 @@ KIND = TurnerKind(
 
 
 class OneAxisSection(ProcedureSection):
-    """Turns about the table's axis."""
+    """The section of a procedure about the table's axis."""
 
     speed_deg_s: float = Field(default=60.0, gt=0)
 
@@ -191,7 +191,7 @@ class OneAxisSection(ProcedureSection):
 def plan(
     table: TurntableSection, procedure: OneAxisSection, start_q_rad: Joints | None = None, done: Collection[int] = ()
 ) -> Plan:
-    """A turn either way with a rest before each."""
+    """Plan a turn either way with a rest before each."""
     steps: list[Step] = []
     pose, speed = start_q_rad or (0.0,), radians(procedure.speed_deg_s)
     half_travel, rates = pi + speed**2 / ACCELERATION_RAD_S2, (speed, ACCELERATION_RAD_S2)

@@ -1,1 +1,1 @@
-"""Files as other programs and other people write them, sound and hostile."""
+"""Files as other programs and people write them, valid and hostile."""

@@ -1,6 +1,6 @@
-"""A six-axis arm that reports its attitudes slowly, late and off, and the readings of a gyroscope in its hand.
+"""A six-axis arm that reports its attitudes slowly, late and with errors, and readings of a gyroscope on its flange.
 
-The arm's error is a function of where it stands, the same at each visit. Nothing is shared with the rig.
+The arm's error is a function of its joint angles, the same at each visit. No code is shared with the rig.
 """
 
 from dataclasses import dataclass
@@ -28,9 +28,9 @@ GRAVITY = np.array([0, 0, 9.8])
 
 @dataclass(frozen=True)
 class ArmLog:
-    """An arm that goes through `stops` attitudes, `visits` times each, and rests for `rests_s` to twice that, or never.
+    """An arm that visits `stops` attitudes, `visits` times each, and rests for once to twice `rests_s`, or never.
 
-    - `poses_hz`, `latency_s`, `jitter_s`: of the reports, which hold for `latency_s` later than stamped.
+    - `poses_hz`, `latency_s`, `jitter_s`: of the reports, which are valid `latency_s` later than stamped.
     - `error_rad` with its `form`: RMS of the attitude error as a function of the joints; `report_rad`: new each time.
     - `noise`: a class of `NOISES`; `readings_hz`; `gaps`: of a tenth of a second each; `reading_jitter_s`.
     - `axes`: the joints that move, `one_by_one` or together; `fastest_rad_s` of a joint.
@@ -177,7 +177,7 @@ def _reports(
 def _compute_reported(
     log: ArmLog, joints: Array, attitudes: Rotation, indices: NDArray[np.intp], rng: np.random.Generator
 ) -> Rotation:
-    """Return the reported attitudes, whose errors less what is alike everywhere have the RMS `error_rad`."""
+    """Return the reported attitudes, whose errors without their common part have the RMS `error_rad`."""
     true = attitudes[indices]
     if log.form in ("joint zeros", "joint gains"):
         sizes = rng.normal(size=6)
@@ -207,7 +207,7 @@ def _compute_reported(
 
 
 def turning(recorded: Recorded) -> Turning:
-    """Return the rig's input, with rows as short as the reports."""
+    """Return the rig's input, with rows as short as the interval of the reports."""
     half_s = min(float(np.diff(recorded.stamps_s).min()) / 2.1, 0.005)
     rows_s = np.column_stack([recorded.stamps_s - half_s, recorded.stamps_s + half_s])
     return Turning(recorded.time_s, recorded.readings, rows_s, recorded.attitudes)

@@ -1,4 +1,4 @@
-"""A box with an accelerometer that a hand lays down on its faces: nothing is shared with the rig."""
+"""A box with an accelerometer that a hand lays down on its faces; no code is shared with the rig."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +18,7 @@ REST_S, MOVE_S = 4.0, 1.0
 
 @dataclass(frozen=True)
 class Box:
-    """It lies on its six faces `rounds` times, of which the first `named` rests are told to the rig.
+    """A box that lies on its six faces `rounds` times; the rig gets the first `named` rests.
 
     A placement tilts it by `tilt_rad` about each axis and changes each reading by `changes_m_s2`.
     """
@@ -33,7 +33,7 @@ class Box:
 
 @dataclass(frozen=True)
 class Laid:
-    """Readings (n, 3) at `time_s` (n,), rows [start_s, end_s, qw, qx, qy, qz] of the rests named, the truth."""
+    """Readings (n, 3) at `time_s` (n,), rows [start_s, end_s, qw, qx, qy, qz] of the named rests, and the truth."""
 
     time_s: Array
     readings: Array
@@ -60,7 +60,7 @@ def lay_down(box: Box, seed: int) -> Laid:
 
 
 def write(folder: Path, laid: Laid) -> tuple[Path, Path]:
-    """The two files of `rig solve --attitudes`."""
+    """Write the two files of `rig solve --attitudes`."""
     columns = ("time_s", "x_m_s2", "y_m_s2", "z_m_s2")
     samples = write_table(folder / "samples.csv", columns, laid.time_s, laid.readings)
     return samples, write_table(folder / "attitudes.csv", ("start_s", "end_s", "qw", "qx", "qy", "qz"), laid.rows)

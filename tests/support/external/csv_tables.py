@@ -1,4 +1,4 @@
-"""CSV files as `rig solve` takes them."""
+"""CSV files for `rig solve`."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -9,6 +9,6 @@ from rig.estimation.arrays import Array
 
 
 def write_table(path: Path, columns: Sequence[str], *parts: Array) -> Path:
-    """Parts (n,) or (n, k) side by side."""
+    """Write columns (n,) or (n, k) side by side."""
     np.savetxt(path, np.column_stack(parts), "%.10g", ",", header=",".join(columns), comments="")
     return path

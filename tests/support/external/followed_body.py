@@ -1,6 +1,6 @@
-"""A body moved by hand, the gyroscope on it, and a reference that says its attitude: nothing is shared with the rig.
+"""A body moved by hand, a gyroscope on it, and a reference for its attitude; no code is shared with the rig.
 
-Yaw, pitch and roll are sums of sines, of which the rates are known in closed form: nothing has to be integrated.
+Yaw, pitch and roll are sums of sines, whose rates are known in closed form, without integration.
 """
 
 from dataclasses import dataclass
@@ -24,8 +24,8 @@ class World:
     """A body that swings by `swing_rad` about all axes with periods of `fastest_s` and more, `duration_s` long.
 
     `random_walk_rad_sqrt_s` and `bias_walk_rad_s_sqrt_s` of the gyroscope; the reference errs by `attitude_rad` about
-    each axis at `looks_hz`, alike over `colour_s`; its look at t was at t + `late_s`. From each of `stops_s` on it
-    stands still for `stop_lasts_s`, and the reference errs by `AT_REST` of that.
+    each axis at `looks_hz`, with the correlation time `colour_s`; its look stamped t was at t + `late_s`. From each of
+    `stops_s` on the body stands still for `stop_lasts_s`, and the reference errs by the fraction `AT_REST`.
     """
 
     duration_s: float = 40.0
@@ -44,7 +44,7 @@ class World:
 
 @dataclass(frozen=True)
 class Followed:
-    """Readings (n, 3) at `time_s` (n,), the reference's `attitudes` (k, 3, 3) of the moments `looks_s` (k,), the truth.
+    """Readings (n, 3) at `time_s` (n,), the reference's `attitudes` (k, 3, 3) at `looks_s` (k,), the truth.
 
     `rates_rad_s` (k, 3) are the true ones at the looks.
     """
@@ -100,7 +100,7 @@ class _Swings:
 
 
 def _stopping(swings: _Swings, world: World, time_s: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Attitudes (n, 3, 3) and rates (n, 3) as of `swings` with the stops, and whether it moves (n,)."""
+    """Return attitudes (n, 3, 3) and rates (n, 3) of `swings` with the stops, and whether the body moves (n,)."""
     since_s = time_s[:, None] - np.array(world.stops_s)
     stood_s = np.clip(since_s, 0, world.stop_lasts_s)
     moving = np.all((since_s <= 0) | (since_s >= world.stop_lasts_s), axis=1)

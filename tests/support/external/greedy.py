@@ -1,4 +1,4 @@
-"""Readers of files that take more than they may: for `rig.data.processes.reading_process`."""
+"""Readers of files that exceed a limit, for `rig.data.processes.reading_process`."""
 
 import os
 import signal
@@ -13,7 +13,7 @@ ZEROS = np.zeros(1_000_000)
 
 
 def memory(path: Path) -> Iterator[Part]:
-    """Keep without end."""
+    """Allocate memory without end."""
     kept = []
     while True:
         kept.append(bytes(1 << 20))
@@ -21,20 +21,20 @@ def memory(path: Path) -> Iterator[Part]:
 
 
 def processor(path: Path) -> Iterator[Part]:
-    """Reckon without end."""
+    """Compute without end."""
     while True:
         pass
     yield dict[str, object]()
 
 
 def output(path: Path) -> Iterator[Part]:
-    """Tell without end."""
+    """Send parts without end."""
     while True:
         yield ZEROS
 
 
 def room(path: Path) -> Iterator[Part]:
-    """Unpack without end, beside what is told."""
+    """Write to the disk without end, beside the parts sent."""
     with Path(os.environ["TMPDIR"], "unpacked").open("wb") as file:
         while True:
             file.write(ZEROS.tobytes())
@@ -42,7 +42,7 @@ def room(path: Path) -> Iterator[Part]:
 
 
 def patience(path: Path) -> Iterator[Part]:
-    """Sleep without end, which uses up nothing, once there is a file that says so."""
+    """Create the file `asleep`, then sleep without end, which uses no processor."""
     (path / "asleep").touch()
     while True:
         signal.pause()
@@ -50,13 +50,13 @@ def patience(path: Path) -> Iterator[Part]:
 
 
 def crash(path: Path) -> Iterator[Part]:
-    """End as a library does that breaks down."""
+    """Crash as a library does."""
     os.kill(os.getpid(), signal.SIGSEGV)
     yield {}
 
 
 def words(path: Path) -> Iterator[Part]:
-    """Print, on every stream, and complain at length."""
+    """Print, directly and by `print`, and raise an error with a long text."""
     os.write(1, b"it is corrupt\n")
     print("it is corrupt")
     yield {"whole": "yes"}

@@ -32,7 +32,7 @@ RATE, LEVEL = ("x_rad_s", "y_rad_s", "z_rad_s"), ("x_m_s2", "y_m_s2", "z_m_s2")
 
 @dataclass(frozen=True)
 class Part:
-    """A sensor as its data sheet has it, read at `rate_hz`; its clock is off by as much as `clock_ppm`."""
+    """A sensor by its data sheet, read at `rate_hz`; its clock has an error of up to `clock_ppm`."""
 
     rate_hz: float = 119.0
     noise_rad_s: float = 1e-3
@@ -92,7 +92,7 @@ def handle(
 
 
 def creeping(recorded: Recorded, start_s: float, end_s: float, turning_rad_s: Array) -> Recorded:
-    """Return the recording of a body that turned slowly (3,) in a rest; the hand turns it back as it takes it up."""
+    """Return the recording of a body that turned slowly (3,) in a rest; the hand then turns it back."""
     rates = recorded.rates.copy()
     mask = (recorded.time_s >= start_s) & (recorded.time_s <= end_s)
     after = (recorded.time_s > end_s) & (recorded.time_s <= end_s + 0.15)
@@ -109,7 +109,7 @@ def bent(rates: Array, nonlinearity: float, seed: int) -> Array:
 
 
 def write(path: Path, recorded: Recorded, *, level: bool = True) -> Path:
-    """Write the file of `rig solve --turns`, with the accelerometer's columns or without."""
+    """Write the file of `rig solve --turns`, with or without the accelerometer's columns."""
     columns = ("time_s", *RATE, *(LEVEL if level else ()))
     readings = np.hstack([recorded.rates, recorded.acceleration]) if level else recorded.rates
     return write_table(path, columns, recorded.time_s, readings)

@@ -1,4 +1,4 @@
-"""Files made to harm their reader: bags, logs of PX4 and tables. Each is created on demand.
+"""Files designed to harm their reader: bags, logs of PX4 and tables. Each is created on demand.
 
 Their content is known from the formats alone: "ROS 2 bag" (rosbag2's metadata.yaml and sqlite3 storage), "MCAP File
 Format" (mcap.dev/spec), "ULog File Format" (docs.px4.io).

@@ -1,6 +1,6 @@
 """Logs in the style of other loggers: rounded stamps or stamps of arrival, losses, knocks, a large bias.
 
-Nothing is shared with the rig. The truth is m = F ω + b, and diag k of g = K (m + b) is one over the columns of F⁻¹.
+No code is shared with the rig. The truth is m = F ω + b, and diag k of g = K (m + b) is one over the columns of F⁻¹.
 """
 
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ FORCES = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 
 
 
 def polled(time_s: Array, every_s: float, late_s: float = 0.0, inner_s: float = 0.0, seed: int = 0) -> Array:
-    """The stamps of readings that wait for the next poll, packet or radio event, `late_s` at most behind it."""
+    """Return the stamps of readings that wait for the next poll, packet or radio event, at most `late_s` after it."""
     event = np.ceil(time_s / every_s - 1e-9).astype(int)
     late = late_s * np.random.default_rng(seed).random(event[-1] + 1)
     first = np.concatenate([[True], np.diff(event) > 0])
@@ -35,14 +35,14 @@ def polled(time_s: Array, every_s: float, late_s: float = 0.0, inner_s: float = 
 
 
 def stale_at_first(time_s: Array, count: int, every_s: float = 2.5e-3) -> Array:
-    """The stamps of arrival of a log whose first `count` readings had waited in a buffer."""
+    """Return the arrival times of a log whose first `count` readings waited in a buffer."""
     stamps = time_s.copy()
     stamps[:count] = time_s[count] - every_s * np.arange(count, 0, -1)
     return stamps
 
 
 def stalled(time_s: Array, at_s: float, lasts_s: float, every_s: float = 5e-4) -> Array:
-    """The stamps of arrival over a link that stands still, and sends at once what waited meanwhile."""
+    """Return the arrival times over a link that stalls, and then sends at once everything that waited."""
     first = int(np.searchsorted(time_s, at_s))
     stamps = time_s.copy()
     stamps[first:] = np.maximum(stamps[first:], at_s + lasts_s + every_s * np.arange(len(stamps) - first))
@@ -51,7 +51,7 @@ def stalled(time_s: Array, at_s: float, lasts_s: float, every_s: float = 5e-4) -
 
 @dataclass(frozen=True)
 class Log:
-    """Readings (n, 3) taken at `time_s` (n,), and the `rows` (k, …) that tell the motion."""
+    """Readings (n, 3) taken at `time_s` (n,), and the `rows` (k, …) that describe the motion."""
 
     time_s: Array
     readings: Array
@@ -73,7 +73,7 @@ class Stamps:
     gaps: tuple[tuple[int, int], ...] = ()
 
     def stamp(self, time_s: Array, seed: int = 0) -> tuple[Array, NDArray[np.bool_]]:
-        """The stamps (k,) of the readings that were kept (n,)."""
+        """Return the stamps (k,) of the readings kept, and which of all were kept (n,)."""
         rng = np.random.default_rng(seed)
         kept = rng.random(len(time_s)) >= self.lost
         for first, count in self.gaps:
@@ -91,9 +91,7 @@ class Stamps:
 
 
 def swept(rate_hz: float, seed: int = 1, noise_rad_s: float = 5e-4, bias_rad_s: Array | None = None) -> Log:
-    """Draw a table's sweeps of one revolution in 4 s, in six directions, with ramps outside their rows, and rests
-    between.
-    """
+    """Draw a table's sweeps of one revolution in 4 s, in six directions, with ramps outside their rows, and rests."""
     rng = np.random.default_rng(seed)
     period_s = 2 * REST_S + 2 * RAMP_S + 4.6
     time_s = np.arange(round((6 * period_s) * rate_hz)) / rate_hz
@@ -132,7 +130,7 @@ def _read(rates: Array, rng: np.random.Generator, noise_rad_s: float, bias_rad_s
 
 @dataclass(frozen=True)
 class Knock:
-    """What an accelerometer feels besides in `samples` readings from one on, m/s² along an axis."""
+    """A knock that an accelerometer senses in `samples` readings from number `sample` on, m/s² along an axis."""
 
     sample: int
     size_m_s2: float

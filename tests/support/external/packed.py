@@ -1,4 +1,4 @@
-"""Bytes as zstd packs them, which Python has from 3.14 on."""
+"""Compression by zstd, which Python has from 3.14 on."""
 
 import sys
 from functools import cache
@@ -12,13 +12,13 @@ MEGABYTE = bytes(1 << 20)
 
 
 def zstd(data: bytes) -> bytes:
-    """The bytes, packed."""
+    """Return the compressed bytes."""
     return compress(data)
 
 
 @cache
 def pack_zeros(size: int) -> bytes:
-    """So many zeros, packed to a thirty-thousandth, in one piece that says how many."""
+    """Return `size` zeros compressed to a thirty-thousandth, in one frame that states the size."""
     packing = ZstdCompressor()
     packing.set_pledged_input_size(size)
     parts = [packing.compress(MEGABYTE) for _ in range(size >> 20)]

@@ -1,6 +1,6 @@
 """Example files of docs/how-to/without-an-arm/known-attitudes.md: TRIAX's table and sensor as published.
 
-python tests/support/external/rate_table_files.py DIR     # writes them anew
+python tests/support/external/rate_table_files.py DIR     # writes them again
 """
 
 import sys

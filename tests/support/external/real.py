@@ -1,7 +1,7 @@
-"""Recordings that nobody here made, of sensors turned by hand and before cameras.
+"""Other people's recordings of sensors turned by hand and in front of cameras.
 
-They are no part of this project; their README says whose they are. They are looked for in the folder
-RIG_REAL_RECORDINGS names and in shared/real beside the repository.
+They are no part of this project; their README names the owners. They are searched in the folder named by
+RIG_REAL_RECORDINGS and in shared/real beside the repository.
 """
 
 import gzip
@@ -16,7 +16,7 @@ PLACES = [Path(os.environ.get("RIG_REAL_RECORDINGS", "")), ROOT.parent / "shared
 
 
 def recording(name: str) -> Path:
-    """The folder of one; the test is skipped, by name, where there is none."""
+    """Return the folder of a recording; skip the test, with a reason, if it is not available."""
     for root in PLACES:
         if (root / name).is_dir():
             return root / name
@@ -24,7 +24,7 @@ def recording(name: str) -> Path:
 
 
 def unpack(name: str, file: str, folder: Path) -> Path:
-    """A file of one, as a user has it, in a folder of the test's."""
+    """Unpack a file of a recording into the test's `folder`, as a user has it; return its path."""
     packed = recording(name) / f"{file}.gz"
     path = folder / file
     path.write_bytes(

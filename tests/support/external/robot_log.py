@@ -1,8 +1,8 @@
-"""Made-up logs of a robot that carries a low-cost IMU: docs/examples/robot_log.txt and robot_poses.csv are one of them.
+"""Synthetic logs of a robot that carries a low-cost IMU, such as docs/examples/robot_log.txt and robot_poses.csv.
 
 The computer stamps readings when they arrive, four at once, in whole milliseconds, 80 ms after the poses. The robot
-reports its pose 14 times a second, by quaternions that take room to body coordinates, and its attitudes are off by up
-to a degree, as a smooth function of the attitude (joint zeros). Write them by
+reports its pose 14 times a second, by quaternions that take room to body coordinates, with errors of up to a degree
+that are a smooth function of the attitude (joint zeros). Write them by
 
     PYTHONPATH=tests python -m support.external.robot_log docs/examples
 """
@@ -108,9 +108,9 @@ def compose(steps: Rotation) -> Rotation:
 
 
 def orientation_errors_deg(log: RobotLog, rates_rad_s: np.ndarray) -> np.ndarray:
-    """Return how far integrated rates (n, 3) miss the true rotation of each move, from rest to rest.
+    """Return the errors of integrated rates (n, 3) for each move from rest to rest, degrees.
 
-    A constant rotation between sensor and body, the mounting, is no error: the best one is removed.
+    The best constant rotation between sensor and body, the mounting, is removed first.
     """
     index = [int(np.argmin(np.abs(log.time_s - middle_s))) for middle_s in log.rests_s.mean(axis=1)]
     steps = Rotation.from_rotvec((rates_rad_s[1:] + rates_rad_s[:-1]) / 2 / RATE_HZ)

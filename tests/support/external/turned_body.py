@@ -1,7 +1,6 @@
-"""A gyroscope that a hand turns about the edges of a box and lays down in between: nothing is shared with the rig.
+"""A gyroscope that a hand turns about the edges of a box and lays down in between; no code is shared with the rig.
 
-Every turn is made in pushes of a raised cosine about an axis that leans a little in the body, and ends a little off
-where it should.
+Every turn consists of pushes of a raised cosine about an axis that leans a little in the body, and ends with an error.
 """
 
 from dataclasses import dataclass
@@ -19,7 +18,7 @@ REST_S, PAUSE_S = 1.5, 0.15
 class Hand:
     """Turns by `angle_rad` about each of `axes` (w, 3), `fastest_rad_s` at most, read at `rate_hz`.
 
-    A turn ends off by `ends_rad` about each axis; its axis leans by `leans_rad`.
+    A turn ends with an error of `ends_rad` about each axis; its axis leans by `leans_rad`.
     """
 
     axes: Array
@@ -34,7 +33,7 @@ class Hand:
 
 @dataclass(frozen=True)
 class Session:
-    """Readings (n, 3) at `time_s` (n,), rows [start_s, end_s, axis, angle_rad] as somebody marked them, the truth."""
+    """Readings (n, 3) at `time_s` (n,), rows [start_s, end_s, axis, angle_rad] as a person marks them, the truth."""
 
     time_s: Array
     readings: Array
@@ -73,13 +72,13 @@ def turn(hand: Hand, seed: int) -> Session:
 
 
 def across(axis: Array, rng: np.random.Generator) -> Array:
-    """(3,) at right angles to an axis, a normal deviate each way."""
+    """Draw a vector (3,) at right angles to an axis, with normally distributed components."""
     drawn = rng.normal(size=3)
     return np.asarray(drawn - axis * (axis @ drawn), dtype=np.float64)
 
 
 def write(folder: Path, session: Session) -> tuple[Path, Path]:
-    """The two files of `rig solve --sweeps`."""
+    """Write the two files of `rig solve --sweeps`."""
     columns = ("time_s", "x_rad_s", "y_rad_s", "z_rad_s")
     samples = write_table(folder / "samples.csv", columns, session.time_s, session.readings)
     turns = ("start_s", "end_s", "axis_x", "axis_y", "axis_z", "angle_rad")

@@ -16,9 +16,9 @@ COMBINED = (
 
 
 def write_ulog(path: Path, time_us: np.ndarray, rates: np.ndarray, forces: np.ndarray, raw_every: int = 1) -> None:
-    """A log of one IMU, its readings (n, 3) rad/s and m/s² at times (n,) in µs.
+    """Write a log of one IMU, with readings (n, 3) rad/s and m/s² at times (n,) in µs.
 
-    With `raw_every` > 1 the raw topics hold one of so many readings, and `sensor_combined` all.
+    With `raw_every` > 1 the raw topics hold every `raw_every`-th reading, and `sensor_combined` all.
     """
     with path.open("wb") as file:
         file.write(b"ULog\x01\x12\x35\x01" + pack("<Q", int(time_us[0])))

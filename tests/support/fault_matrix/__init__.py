@@ -1,1 +1,1 @@
-"""Faults at random moments of whole runs: what is broken, how a run then ended, and what of that is not as promised."""
+"""Faults at random moments of whole runs: the faults, the runs' ends, and the deviations from the promises."""

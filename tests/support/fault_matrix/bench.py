@@ -1,4 +1,4 @@
-"""One run on a bench of its own: a laboratory, wires to it, the command `rig run`, and hands on all of them."""
+"""One run on a bench of its own: a laboratory, wires to it, the command `rig run`, and control over all of them."""
 
 import os
 import signal
@@ -24,7 +24,7 @@ POLL_S = 0.02
 
 
 class Bench:
-    """A laboratory with a run in it. `wire` holds the wires by name: those of the arm, and `board`."""
+    """A laboratory with a run in it. `wire`: the wires by name, those of the arm and `board`."""
 
     def __init__(self, world: WorldHandle, wire: dict[str, Wire], config: Path, environment: Mapping[str, str]) -> None:
         self.world, self.wire, self.config = world, wire, config
@@ -38,7 +38,7 @@ class Bench:
         self.process = self.rig("run", str(self.config), "--out", str(self.out), "--yes")
 
     def rig(self, *arguments: str) -> "subprocess.Popen[bytes]":
-        """`rig …` in a session of its own, as a terminal would start it; with libraries loaded first by the system."""
+        """Start `rig …` in a session of its own, like a terminal; with an environment, the system starts it."""
         start = start_by_system if self._environment else start_module
         with (self.config.parent / f"{arguments[0]}.txt").open("wb") as errors:
             return start(
@@ -63,7 +63,7 @@ class Bench:
 
     @property
     def driver_pid(self) -> int | None:
-        """The child that talks to the arm."""
+        """The process id of the child that communicates with the arm."""
         for pid in children(self.pid):
             with suppress(OSError):
                 if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes():
@@ -71,12 +71,12 @@ class Bench:
         return None
 
     def send(self, number: signal.Signals) -> None:
-        """A signal to the command and all its processes in the foreground, as a terminal sends it."""
+        """Send a signal to all processes of the command in the foreground, like a terminal."""
         with suppress(ProcessLookupError):
             os.killpg(self.pid, number)
 
     def until(self, condition: Callable[[dict[str, Any]], bool], timeout_s: float, *, running: bool = True) -> bool:
-        """Wait for a state of the world, as long as the command runs; whether it came."""
+        """Wait for a state of the world while the command runs; return whether it occurred."""
         deadline_s = time.monotonic() + timeout_s
         while not condition(self.world.state()):
             if time.monotonic() > deadline_s or (running and not self.running):
@@ -92,7 +92,7 @@ class Bench:
         return not self.running
 
     def read_output(self, command: str) -> str:
-        """Return the text that `rig COMMAND` has written on stderr."""
+        """Return the text that `rig COMMAND` has written to stderr."""
         return (self.config.parent / f"{command}.txt").read_text(encoding="utf-8", errors="replace")
 
     # -- the laboratory ----------------------------------------------------------------------------------------------
@@ -100,7 +100,7 @@ class Bench:
         self.world.control({"do": "pace", "time_scale": time_scale})
 
     def end(self) -> None:
-        """Leave no process behind."""
+        """Kill all processes that still run, and wait for their end."""
         going_on = self.process is not None and self.running  # of one that has ended the number may be another's by now
         pids = [self.pid, *filter(None, [self.driver_pid])] if going_on else []
         for pid in pids:
@@ -114,14 +114,14 @@ class Bench:
 
 
 def children(pid: int) -> list[int]:
-    """The process ids of a process' children, none when it has ended."""
+    """Return the process ids of a process' children; none if it has ended."""
     with suppress(OSError):
         return [int(word) for word in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
     return []
 
 
 def alive(pid: int) -> bool:
-    """Return whether a process runs or hangs; one that has ended and was not waited for does not."""
+    """Return whether a process runs or hangs; a zombie does neither."""
     with suppress(OSError):
         return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
     return False
@@ -129,7 +129,7 @@ def alive(pid: int) -> bool:
 
 @contextmanager
 def bench(folder: Path, changes: Mapping[str, Any], environment: Mapping[str, str]) -> Iterator[Bench]:
-    """A laboratory with these changes to the ideal demonstration, and wires between it and a rig that has not begun."""
+    """Yield a laboratory with these changes to the ideal demonstration, wired to a rig that has not started."""
     folder.mkdir(parents=True)
     with ExitStack() as stack:
         world = stack.enter_context(worlds(folder))(changes)

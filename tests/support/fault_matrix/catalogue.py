@@ -1,4 +1,4 @@
-"""The faults, each with how it is brought about and mended, and how a run that meets it may end."""
+"""The faults: how each is caused and repaired, and how a run with it may end."""
 
 import os
 import resource
@@ -30,17 +30,20 @@ HELLO_S, CLOSED_S = 0.5, 0.3  # a board that has restarted says so, docs/protoco
 
 
 def nothing(bench: Bench, random: Random) -> None:
-    """Nothing to do."""
+    """Do nothing."""
 
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """`names` and `statuses` are how a run that met it may end early; `may_pass` whether it may go on to its verdict,
-    `late_may_pass` the same where all was recorded before it that a calibration is found from.
+    """A fault, with the permitted ends of a run.
 
-    `known_s`: after so long it can be known, by real time (None: only by what has been recorded, and the arm goes on
-    until then). `lasts_s`: it is mended after so long, also while the run goes on (None: when the run has ended).
-    `kept_s`: of what was received before, so much at the end may be missing from the file: it was in memory.
+    - `names`, `statuses`: the permitted early ends.
+    - `may_pass`: whether the run may reach its verdict; `late_may_pass`: the same if all data for a calibration were
+      recorded before the fault.
+    - `known_s`: the real time after which the rig can detect it (None: only in the recorded data, and until then the
+      arm continues).
+    - `lasts_s`: the time until its repair, also during the run (None: after the run).
+    - `kept_s`: the last part of the received data may be missing from the file, because it was in memory.
     """
 
     area: str
@@ -172,7 +175,7 @@ def _kill(number: signal.Signals, whose: str) -> Act:
 
 
 def _kill_any(bench: Bench, random: Random) -> None:
-    """One process of the rig, whichever."""
+    """Kill a random process of the rig."""
     _kill(signal.SIGKILL, random.choice(["rig", "driver"]))(bench, random)
 
 
@@ -183,9 +186,9 @@ def _signal(number: signal.Signals) -> Fault:
 
 # -- disk and clocks ---------------------------------------------------------------------------------------------------
 def _fill_disk(bench: Bench, random: Random) -> None:
-    """No file of the rig can grow any more. The limit on a file's size is the full disk that needs no other disk.
+    """Prevent all files of the rig from growing by a limit on file size, like a full disk but without another disk.
 
-    It shows when a file must grow: HDF5 takes room for some seconds of samples at a time.
+    The effect comes when a file must grow: HDF5 allocates space for some seconds of samples at a time.
     """
     size = (bench.out / "run.h5").stat().st_size
     resource.prlimit(bench.pid, resource.RLIMIT_FSIZE, (size, size))

@@ -1,4 +1,4 @@
-"""One fault at one moment of one procedure: carried out and judged."""
+"""One fault at one moment of one procedure: execution and judgement."""
 
 import re
 import time
@@ -30,7 +30,7 @@ BEHIND_S = 0.1  # what was handed to this machine so late may be on its way to t
 
 @dataclass(slots=True)
 class Cell:
-    """What came of it. `deviations` is empty when all is as promised."""
+    """The result of a cell. `deviations` is empty if all promises were kept."""
 
     fault: str
     setup: str
@@ -57,7 +57,7 @@ def carry_out(
     span_s: float,
     seed: int,
 ) -> Cell:
-    """A run of `setup` that meets the fault (None: none) after `moment` of the `span_s` it takes, in `folder`."""
+    """Run `setup` in `folder`, with the fault (None: none) after the fraction `moment` of the usual `span_s`."""
     cell, random, began_s = Cell(name, setup, moment), Random(seed), time.monotonic()
     environment = shift_clock(folder.parent) if fault is not None and "CLOCK_SHIFT" in fault.environment else {}
     with bench(folder, SETUPS[setup], environment) as rig_bench:
@@ -182,7 +182,7 @@ def _files(rig_bench: Bench, fault: Fault, cell: Cell, fault_wall_s: float) -> N
 
 
 def _find_delivered(rig_bench: Bench, from_s: float, to_s: float) -> set[int]:
-    """The board's time stamps of the samples that were handed to the rig in that time."""
+    """Return the board's time stamps of the samples that the rig received between two wall times, s."""
     reader, stamps = FrameReader(), set[int]()
     for wall_s, data in rig_bench.wire["board"].delivered or []:
         for frame in reader.feed(data):
@@ -211,7 +211,7 @@ def _resume(rig_bench: Bench, cell: Cell) -> None:
 
 
 def span(setup: str, folder: Path) -> tuple[Cell, float]:
-    """A run that nothing disturbs, and how long the arm's part of it takes by the controller's clock."""
+    """Run a setup without a fault; return its result, and the arm's duration by the controller's clock, s."""
     cell = carry_out("none", None, setup, folder, moment=1.0, span_s=0.0, seed=0)
     arm = read_run(folder / "run" / "run.h5").states
     moving = np.flatnonzero(np.abs(arm["qd_rad_s"]).max(axis=1) > 0)
@@ -219,5 +219,5 @@ def span(setup: str, folder: Path) -> tuple[Cell, float]:
 
 
 def document(cell: Cell) -> dict[str, Any]:
-    """As JSON has it."""
+    """Return a cell as a JSON document."""
     return {name: getattr(cell, name) for name in cell.__slots__}

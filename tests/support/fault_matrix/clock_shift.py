@@ -8,7 +8,7 @@ FILE = "clock_shift"  # in the folder of the run: by how many seconds
 
 
 def shift_clock(folder: Path) -> dict[str, str]:
-    """The environment of a program whose clock is off by what `folder`/clock_shift says, in seconds; needs gcc."""
+    """Return the environment of a program whose clock is shifted by the seconds in `folder`/clock_shift; needs gcc."""
     library = folder / "clock_shift.so"
     subprocess.run(["gcc", "-shared", "-fPIC", "-O2", "-o", library, SOURCE, "-ldl"], check=True)
     return {"LD_PRELOAD": str(library), "CLOCK_SHIFT_FILE": str(folder / FILE)}

@@ -1,4 +1,4 @@
-"""The short procedures that faults meet, on one sensor, and the truth of what a run of each states."""
+"""The short procedures in which faults occur, on one sensor, and the truth of their results."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -48,7 +48,7 @@ SETUPS: Mapping[str, dict[str, Any]] = {
 
 
 def errors_in_u(folder: Path) -> float:
-    """The largest error of what the run in `folder` states, in its expanded uncertainties."""
+    """Return the largest error in the results of the run in `folder`, in its expanded uncertainties."""
     result = read_result(folder)
     gyro = result.gyroscopes["gyro"]
     combined = gyro.covariance_combined if gyro.covariance_combined is not None else gyro.covariance

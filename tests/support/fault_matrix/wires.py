@@ -1,4 +1,4 @@
-"""TCP wires between the rig and its simulated laboratory, on an address of their own, that can be made to misbehave."""
+"""TCP wires between the rig and its simulated laboratory, on an address of their own, with faults."""
 
 import socket
 import struct
@@ -32,7 +32,7 @@ class Wire:
         threading.Thread(target=self._accept, daemon=True).start()
 
     def half_close(self) -> None:
-        """The far end says that it will send no more, and goes on listening."""
+        """Let the far end announce that it will send no more, while it continues to listen."""
         for near, _ in self._open:
             self._half_closed.add(near)
             with suppress(OSError):
@@ -49,7 +49,7 @@ class Wire:
             wire_end.close()
 
     def heal(self) -> None:
-        """As new, for the connections to come."""
+        """Remove all faults for the connections to come."""
         self.damage, self.delay_s, self.refusing = None, 0.0, False
         self.stalled.clear()
         self._half_closed.clear()
@@ -97,7 +97,7 @@ class Wire:
 
 @contextmanager
 def wires(far_host: str, ports: Mapping[str, int]) -> Iterator[tuple[str, dict[str, Wire]]]:
-    """A wire for each of these ports of `far_host`, and the address they are at."""
+    """Yield a wire for each of these ports of `far_host` by name, and the address of the wires."""
     host = fresh_host()
     running = {name: Wire(host, port, (far_host, port)) for name, port in ports.items()}
     try:
@@ -108,13 +108,13 @@ def wires(far_host: str, ports: Mapping[str, int]) -> Iterator[tuple[str, dict[s
 
 
 def losing(fraction: float, seed: int) -> Damage:
-    """So many of the bytes never arrive."""
+    """Return a damage that loses the fraction `fraction` of the bytes."""
     random = Random(seed)
     return lambda data: bytes(byte for byte in data if random.random() >= fraction)
 
 
 def flipping(fraction: float, seed: int) -> Damage:
-    """So many of the bytes have one wrong bit."""
+    """Return a damage that flips one bit in the fraction `fraction` of the bytes."""
     random = Random(seed)
     return lambda data: bytes(
         byte ^ (1 << random.randrange(8)) if random.random() < fraction else byte for byte in data
@@ -122,6 +122,6 @@ def flipping(fraction: float, seed: int) -> Damage:
 
 
 def repeating(fraction: float, seed: int) -> Damage:
-    """So many of the pieces come twice."""
+    """Return a damage that repeats the fraction `fraction` of the pieces."""
     random = Random(seed)
     return lambda data: data * 2 if random.random() < fraction else data

@@ -1,1 +1,1 @@
-"""Histories, their databases and those who use them."""
+"""Histories, their databases and their users."""

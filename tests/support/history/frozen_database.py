@@ -1,4 +1,4 @@
-"""A PostgreSQL that freezes: a relay before it passes everything on until it hears certain words, and nothing after."""
+"""A PostgreSQL that freezes: a relay passes everything on until certain words occur, and nothing afterwards."""
 
 import select
 import socket
@@ -11,7 +11,7 @@ from urllib.parse import parse_qs, urlsplit
 
 @contextmanager
 def freezing_at(words: bytes, url: str) -> Iterator[tuple[str, threading.Event]]:
-    """The relay's URL before the database of `url`, and whether it is frozen. Its connections stay open."""
+    """Yield a relay's URL for the database of `url`, and the event of its freezing. Its connections stay open."""
     folder = Path(parse_qs(urlsplit(url).query)["host"][0])
     frozen = threading.Event()
     with ExitStack() as stack:

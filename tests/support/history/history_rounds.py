@@ -1,4 +1,4 @@
-"""Rounds on one history: a station with its heartbeat, and other users who come and go at random moments."""
+"""Rounds on one history: a station with its heartbeat, and other users that start and end at random moments."""
 
 import json
 import os
@@ -33,9 +33,9 @@ BUSY_S = 400.0  # a busy machine's patience
 
 @dataclass(frozen=True, slots=True)
 class Guest:
-    """Who comes, how long after the one before, and how long until somebody ends it: `killed`, or by a signal to end.
+    """A user that starts `after_s` after the previous one and is ended after `lasts_s`: `killed`, or by a signal.
 
-    Nobody ends who ends by itself and is not killed.
+    Users that end by themselves and are not killed get no signal.
     """
 
     who: str
@@ -46,7 +46,7 @@ class Guest:
 
 @dataclass(frozen=True, slots=True)
 class Round:
-    """What is drawn from a seed. `killed_after_s` is of the station, None where it ends when its guests have gone."""
+    """The round drawn from a seed. `killed_after_s`: of the station; None if it ends after its guests."""
 
     seed: int
     whole: bool
@@ -67,10 +67,9 @@ def drawn(seed: int) -> Round:
 
 
 class Rounds:
-    """Rounds on the history at `address`, with all that was said to be entered in them so far, by calibration number.
+    """Rounds on the history at `address`, with all entries reported so far, by calibration number.
 
-    `refused` has what a whole station said that did not measure all its parts.
-    That is no fault of the history, so the rounds go on.
+    `refused`: the output of whole stations that did not measure all their parts, which is no fault of the history.
     """
 
     def __init__(self, address: str, folder: Path) -> None:
@@ -81,7 +80,7 @@ class Rounds:
         self._environment = {**os.environ, "RIG_HISTORY": address, "RIG_PAGE_TOKEN": "a-token-of-this-test"}
 
     def carry_out(self, this: Round) -> None:
-        """Let all work and end; then every reported entry is there once, and the history is valid."""
+        """Run a round to its end; then assert that every reported entry exists once, and that the history is valid."""
         with ExitStack() as stack:
             station = stack.enter_context(
                 self._whole(this) if this.whole else self._station(f"A{this.seed}", this.seed)
@@ -181,7 +180,7 @@ class Rounds:
 
 
 class _User:
-    """A process that works on the history; what it says goes into a file."""
+    """A process that works on the history; its output goes to a file."""
 
     def __init__(
         self, output_path: Path, module: str, words: tuple[str | Path, ...], environment: dict[str, str]
@@ -203,7 +202,7 @@ class _User:
         return self
 
     def ends(self) -> None:
-        """Wait until it has ended; a station ends when its standard input does."""
+        """Wait for the user's end; a station ends when its standard input does."""
         assert self.process.stdin is not None
         self.process.stdin.close()
         self.process.wait(BUSY_S)
@@ -230,5 +229,5 @@ def record(folder: Path) -> Path:
 
 
 def rounds(first: int, count: int) -> Iterator[Round]:
-    """Yield this many rounds, from this seed on."""
+    """Yield `count` rounds, from the seed `first` on."""
     yield from map(drawn, range(first, first + count))

@@ -1,9 +1,9 @@
-"""What works on a history while a test looks on, each as a process: `python -m support.history.history_users WHO …`.
+"""Users of a history during a test, each a process: `python -m support.history.history_users WHO …`.
 
-`station FOLDER RIG PAUSE_S SEED` is what a station does to the history that RIG_HISTORY names, and no more: its
-heartbeat, and of each part what is asked before the run and entered after it, by the program's own functions. The last
-part follows when its standard input has ended. `notebook SECONDS` looks calibrations up and keeps a history open
-meanwhile. Each line on stdout is JSON.
+`station FOLDER RIG PAUSE_S SEED` makes a station's accesses to the history named by RIG_HISTORY: its heartbeat, and for
+each part the queries before the run and the entries after it, by the program's own functions. The last part follows
+when its standard input has ended. `notebook SECONDS` looks calibrations up and keeps a history open meanwhile. Each
+line on stdout is JSON.
 """
 
 import json
@@ -27,7 +27,7 @@ def tell(**said: object) -> None:
 
 
 def run_folder(folder: Path, serial_number: str, second: int) -> Path:
-    """A finished run of that sensor: a short result, and a recording that nobody solves."""
+    """Make a finished run of a sensor, with a short result and a recording that is not solved; return its folder."""
     folder.mkdir(parents=True)
     result = json.loads((RECORDINGS / "six_observation" / "result.json").read_text(encoding="utf-8"))
     result["gyroscopes"]["gyro"] |= {"serial_number": serial_number, "observations": [], "rests": []}
@@ -39,7 +39,7 @@ def run_folder(folder: Path, serial_number: str, second: int) -> Path:
 
 
 def station(folder: Path, rig: str, pause_s: float, seed: int) -> None:
-    """Enter parts."""
+    """Enter parts as a station does."""
     from rig.batch.status import Now
     from rig.commands.history.remember import remember
     from rig.commands.history.run_serials import recall_sensors
@@ -75,7 +75,7 @@ def station(folder: Path, rig: str, pause_s: float, seed: int) -> None:
 
 
 def notebook(seconds: float) -> None:
-    """Keep the history open so long, and look at it all the time."""
+    """Keep the history open for `seconds`, and read it repeatedly."""
     import rig
     from rig.notebook.notebook_history import calibrations
 

@@ -1,4 +1,4 @@
-"""A history whose recordings lie there: copies of frozen ones, each entered as a run of its own."""
+"""A history whose recordings exist: copies of frozen ones, each entered as a run of its own."""
 
 import json
 import shutil
@@ -18,7 +18,7 @@ Change = Callable[[ResultDocument], ResultDocument]
 
 
 def keep(history: History, folder: Path, source: Path = CALIBRATION, change: Change | None = None) -> FinishedRun:
-    """Copy recordings to `folder` and enter the result beside them, changed if so, as if begun a day after the last."""
+    """Copy recordings to `folder` and enter their result, with any `change`, dated a day after the last entry."""
     shutil.copytree(source, folder)
     run = read_finished_run(folder)
     document = _later(run.document, len(list(history.kept())))
@@ -29,7 +29,7 @@ def keep(history: History, folder: Path, source: Path = CALIBRATION, change: Cha
 
 
 def certify(history: History, run: FinishedRun, number: str, *, marks: str = "", replaces: str | None = None) -> None:
-    """Note a certificate of that run, without a mark: what is to be relied on."""
+    """Enter a certificate of a run, by default without a mark, so that it can be relied on."""
     issued = Issued(number, "Calibration certificate", "2026-01-02", replaces, marks)
     assert history.certify(run.content_sha256, issued)
 

@@ -1,4 +1,4 @@
-"""What somebody does who may change the tables of a history: the triggers go first."""
+"""Changes by a person with write access to a history's tables, who first removes the triggers."""
 
 import sqlite3
 from collections.abc import Sequence
@@ -10,7 +10,7 @@ from rig.history.storage import continuity
 
 
 def drop_triggers(connection: Connection) -> None:
-    """All of them."""
+    """Remove all triggers."""
     if connection.dialect.name == "postgresql":
         connection.execute(text("DROP FUNCTION history_keeps_its_rows CASCADE"))
         return
@@ -19,8 +19,10 @@ def drop_triggers(connection: Connection) -> None:
 
 
 def forge(file: str, *statements: str, values: Sequence[str] = ()) -> None:
-    """Carry these out in a history's file, without its triggers, which stand there again afterwards; `values` are those
-    of the first."""
+    """Execute statements in a history's file without its triggers, which exist again afterwards.
+
+    `values` are those of the first statement.
+    """
     with closing(sqlite3.connect(file)) as other:
         triggers = other.execute("SELECT name, sql FROM sqlite_master WHERE type = 'trigger'").fetchall()
         for name, _ in triggers:
@@ -34,5 +36,5 @@ def forge(file: str, *statements: str, values: Sequence[str] = ()) -> None:
 
 
 def forget_histories() -> None:
-    """Forget what this process has seen of histories, as one that is started later has seen nothing."""
+    """Make this process forget all histories it has seen, like a new process."""
     continuity._identities.clear()

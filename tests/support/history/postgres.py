@@ -1,4 +1,4 @@
-"""A PostgreSQL of a test's own: a new cluster in a folder of its own, reached by a socket there, gone afterwards."""
+"""A PostgreSQL for one test: a new cluster in its own folder, reached by a socket there, and removed afterwards."""
 
 import os
 import pwd
@@ -16,7 +16,7 @@ FAST = ("-c", "fsync=off", "-c", "listen_addresses=", "-c", "shared_buffers=16MB
 
 @contextmanager
 def postgresql() -> Iterator[str]:
-    """Its URL. As root it runs as the user `postgres`, since PostgreSQL refuses to be root's."""
+    """Yield its URL. If the tests run as root, it runs as the user `postgres`, because PostgreSQL refuses root."""
     folders = sorted(PROGRAMS.glob("*/bin"), key=lambda path: int(path.parent.name))
     assert folders, "PostgreSQL is not installed: apt-get install postgresql"
     programs = folders[-1]

@@ -23,21 +23,21 @@ def answer_at_once(task: Task) -> Answer:
 
 
 def deadly(task: Task) -> Answer:
-    """Answer as `told`; one recording kills its worker."""
+    """Answer as scripted; one recording kills its worker."""
     if task.key == DEADLY:
         os.kill(os.getpid(), signal.SIGKILL)
     return answer_at_once(task)
 
 
 def failing(task: Task) -> Answer:
-    """Answer as `told`; one recording meets a defect of the program."""
+    """Answer as scripted; one recording raises an unexpected exception."""
     if task.key == DEADLY:
         raise ZeroDivisionError("a defect")
     return answer_at_once(task)
 
 
 def waiting(task: Task) -> Answer:
-    """Answer as `told`; some wait until their folder has a result."""
+    """Answer as scripted; some wait until their folder has a result."""
     if task.key.startswith(WAITING):
         deadline_s = time.monotonic() + 60
         while not (Path(task.places[0][1]) / RESULT).exists() and time.monotonic() < deadline_s:

@@ -1,4 +1,4 @@
-"""A command that shows a page, in a process of its own as an operator starts it."""
+"""A command with a page, started in a process of its own as by an operator."""
 
 import subprocess
 from collections.abc import Iterator
@@ -13,7 +13,7 @@ ADDRESS_PREFIX = "page: "
 
 @contextmanager
 def start_with_page(log: Path, *words: str | Path) -> Iterator[tuple["subprocess.Popen[bytes]", str]]:
-    """`rig …` without a terminal, and the address that it tells; all it says goes into the file `told`."""
+    """Yield a process of `rig …` without a terminal, and the address of its page; its output goes to the file `log`."""
     with (
         log.open("wb") as file,
         start_module(*words, stdin=subprocess.DEVNULL, stdout=file, stderr=file) as process,

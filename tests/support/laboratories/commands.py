@@ -59,7 +59,7 @@ def configuration(folder: Path, changes: dict[str, Any] | None = None, procedure
 
 
 def wait_for_log(folder: Path, words: str, times: int = 1) -> None:
-    """Wait until the run's log has these words this many times."""
+    """Wait until the run's log contains these words `times` times."""
     log = folder / "log.txt"
 
     def has_appeared() -> bool:

@@ -1,4 +1,4 @@
-"""Runs of the demonstration, held against the simulated truth."""
+"""Runs of the demonstration, compared with the simulated truth."""
 
 import json
 import subprocess
@@ -13,7 +13,7 @@ from support.processes.waiting import PATIENCE_S
 
 
 def compute_normalised_errors(rig: Sequence[str | Path], config: Path, seed: int, out: Path) -> np.ndarray:
-    """(6,) errors of scale and bias over their reported standard deviations, from one run by the command `rig`."""
+    """Return errors (6,) of scale and bias over their reported standard deviations, from one run by command."""
     host = fresh_host()
     command = [*map(str, rig), "run", str(config), "--json", "--out", str(out)]
     changes = {"world.seed": seed, "arm.host": host, "board.port": f"socket://{host}:7321"}

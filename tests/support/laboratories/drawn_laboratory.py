@@ -1,4 +1,4 @@
-"""Simulated laboratories in which everything that can be wrong is, drawn from its distribution, and their truth."""
+"""Simulated laboratories with all possible errors, drawn from their distributions, and their truth."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -32,7 +32,7 @@ PART_ERRORS: dict[str, dict[str, float]] = {  # standard deviations, as those va
 
 
 def drawn(seed: int) -> dict[str, Any]:
-    """A configuration: a LSM9DS1 and an ADIS16465 that are both to be calibrated, in a laboratory of its own."""
+    """Return a configuration to calibrate an LSM9DS1 and an ADIS16465, in a laboratory of its own."""
     rng = np.random.default_rng(seed)
     document = ideal_document(CONFIGS / "lsm9ds1_adis16465.yaml")
     for name in ("role", "turntable"):
@@ -90,7 +90,7 @@ def _arm(rng: np.random.Generator) -> dict[str, Any]:
 
 
 def draw_visible_vibration(rng: np.random.Generator) -> dict[str, float]:
-    """Of the servo, beside the one that no encoder sees; what is drawn after it is what it was without."""
+    """Draw a vibration that the encoders see, beside the one that they do not; later draws remain the same."""
     separate_sensor_errors = rng.spawn(1)[0]
     return {
         "vibration_measured_rms_rad_s": float(separate_sensor_errors.uniform(0, 0.002)),
@@ -119,7 +119,7 @@ def _sensor(rng: np.random.Generator, part: str) -> dict[str, Any]:
 
 
 def leaning(rng: np.random.Generator, part: str) -> list[float]:
-    """No farther than the data sheet lets axes lean."""
+    """Draw non-orthogonality angles within the data sheet."""
     most_deg = PARTS[part].non_orthogonality_deg
     leaning: list[float] = np.clip(rng.normal(0, SQUARE_DEG.get(part, 0.2), 3), -most_deg, most_deg).tolist()
     return leaning
@@ -128,13 +128,13 @@ def leaning(rng: np.random.Generator, part: str) -> list[float]:
 def truth(
     document: Mapping[str, Any], name: str, windows_s: Iterable[tuple[float, float]], speed_rad_s: float = SPEED_RAD_S
 ) -> np.ndarray:
-    """(6,) scale at plus and minus a speed and bias without gravity of a sensor, as means over times of the world."""
+    """Return (6,) a sensor's scale at plus and minus a speed and bias without gravity, as means over world times."""
     simulated, windows = _simulated(document), [*windows_s]
     return np.concatenate([simulated.scale(name, windows, speed_rad_s), simulated.bias_rad_s(name, windows)])
 
 
 def bias_at_0_g(document: Mapping[str, Any], name: str, windows_s: Iterable[tuple[float, float]]) -> np.ndarray:
-    """(3,) the mean reading of a sensor's accelerometer without noise and without specific force."""
+    """Return the mean reading (3,) of a sensor's accelerometer without noise and specific force."""
     return _simulated(document).bias_m_s2(name, [*windows_s])
 
 

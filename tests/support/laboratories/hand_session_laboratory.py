@@ -44,7 +44,7 @@ LIST = HandSettings(flips=12, turns=3, rest_s=1.0, box_rad=float(np.radians(0.2)
 
 @dataclass
 class Table:
-    """What happens at it: `events` of the session, in their order. At the rest number `creeps` it turns slowly."""
+    """A session: its `events` in their order. In the rest number `creeps` the item turns slowly."""
 
     seed: int
     mistakes: dict[str, float] = field(default_factory=dict)
@@ -71,12 +71,12 @@ class Table:
         )
 
     def sit(self) -> None:
-        """Go through the session. Raise Fault as it does, TimeoutError if it does not end."""
+        """Execute the session. Raise its Fault, or TimeoutError if it does not end."""
         self.session.carry_out(lambda: None)
 
     @property
     def handled(self) -> HandRecording:
-        """Return its rests and moves as the analysis finds them, without refused ones."""
+        """The session's rests and moves as found by the analysis, without refused ones."""
         segmenter, not_counted = Segmenter(range_of(SENSOR)), NotCounted()
         segmenter.feed(*readings_of(SENSOR, np.concatenate(self.samples)))
         for event in self.events:
@@ -85,23 +85,23 @@ class Table:
 
     @property
     def solution(self) -> HandSolution:
-        """Return the solution of the session."""
+        """The solution of the session."""
         return solve_by_hand(self.handled, CONDITIONS)
 
     @property
     def again(self) -> list[str]:
-        """Return the names of the errors for which something was asked again."""
+        """The names of the errors after which a move was requested again."""
         refused = (HandMoveRefused, HandRestRefused, HandBegunAnew)
         return [event.again for event in self.events if isinstance(event, refused)]
 
     @property
     def reminded(self) -> list[str]:
-        """Return the names of the reminders to repeat something."""
+        """The names of the reminders to repeat an action."""
         return [event.again for event in self.events if isinstance(event, HandAsked) and event.again is not None]
 
     @property
     def accepted(self) -> list[HandMoveAccepted]:
-        """Return the moves that count."""
+        """The accepted moves."""
         return [event for event in self.events if isinstance(event, HandMoveAccepted)]
 
     def _note(self, event: OfTheHand) -> None:

@@ -1,4 +1,4 @@
-"""What is asked of errors over their u, and what so many of them can say of it."""
+"""The requirements on errors over their u, and the power of a number of worlds to test them."""
 
 from dataclasses import dataclass
 
@@ -17,16 +17,16 @@ class Asked:
     within: tuple[float, float]
 
     def kept(self, rms: float, within: float) -> bool:
-        """Return whether both are within their bounds."""
+        """Return whether RMS and fraction are within their bounds."""
         return self.rms[0] <= rms <= self.rms[1] and self.within[0] <= within <= self.within[1]
 
 
 def require(values: int) -> Asked:
-    """Of fewer than enough values no more than that they do not refuse what is asked, in one test of a hundred.
+    """Return the bounds for these values; few values get wider bounds, so that one test of a hundred fails by chance.
 
-    As if a world told one value: χ² with a degree of freedom for each world for the RMS, a binomial count of worlds for
-    the share. Where its axes have little in common that is wider than it need be. Twenty worlds bound an RMS to 0.52
-    and 1.63, and a share to 75 %; what is meant to be 95 % they do not tell from 100.
+    Each world counts as one value: χ² with a degree of freedom per world for the RMS, a binomial count of worlds for
+    the fraction. If a world's axes have little in common, this is wider than necessary. Twenty worlds bound an RMS to
+    0.52 and 1.63, and a fraction to 75 %; they cannot distinguish 95 % from 100 %.
     """
     from scipy.special import chdtri
     from scipy.stats import binom

@@ -47,13 +47,13 @@ class Judged:
 
     @property
     def refused(self) -> tuple[str, ...]:
-        """Return why it did not pass; empty for an undamaged recording."""
+        """The reasons why the recording did not pass; empty for an undamaged one."""
         failed = tuple(check.name for check in self.checks if not check.passed)
         return failed if self.fault is None else (self.fault, *failed)
 
 
 def solve(folder: Path) -> Judged:
-    """Solve the run in `folder`/run, whose laboratory is `folder`/config.yaml, by today's code."""
+    """Solve the run in `folder`/run, whose laboratory is `folder`/config.yaml, by the present code."""
     document: dict[str, Any] = yaml.safe_load((folder / "config.yaml").read_text(encoding="utf-8"))
     try:
         outcome = judge_phases(open_run(folder / "run"), DEFAULT_ESTIMATOR)
@@ -90,11 +90,11 @@ def true_gyroscope(document: Mapping[str, Any], name: str, recording: ObservedRu
 
 
 def true_accelerometer(document: Mapping[str, Any], name: str, result: AccelerometerResult) -> np.ndarray:
-    """Return (6,) the scale of the readings at 1 g up and down, and the bias of that at 0 g.
+    """Return (6,) the scale of the readings at 1 g up and down, and the bias, by the reading at 0 g.
 
-    Neither moves by φ, for what is even is the same up and down, and nothing at 0 g. The scale is that of a part as
-    warm as in the mean of dwells and sweeps, the bias its mean over the run, as docs/uncertainty.md states it: what
-    wanders in sweeps and between the dwells counts as well.
+    Neither depends on φ, because an even term is the same up and down, and zero at 0 g. The scale is that at the mean
+    temperature of dwells and sweeps, the bias its mean over the run, as docs/uncertainty.md defines it: drift during
+    sweeps and between the dwells counts as well.
     """
     sensor = read_world_section(parse(yaml.safe_dump(dict(document)))).sensors[name]
     drawn = sensor.accelerometer

@@ -1,4 +1,4 @@
-"""Complete simulated laboratories with hidden truth: everything is drawn within what the configuration states of it.
+"""Complete simulated laboratories with hidden truth: everything is drawn within the configuration's statements.
 
 Each is a configuration for `rig run`, with the default `uncertainty`. The errors of arm, clocks and sensors lie within
 it and within the data sheets of rig/config/sensors/sensor_catalogue.py.
@@ -88,7 +88,7 @@ def imu(seed: int) -> dict[str, Any]:
 
 
 def kvh(seed: int) -> dict[str, Any]:
-    """Return a world with a KVH 1775 that measures the Earth's rate and has no g-sensitivity, as it states."""
+    """Return a world with a KVH 1775 that measures the Earth's rate and has, as stated, no g-sensitivity."""
     rng = np.random.default_rng(seed)
     document = merge(_document("own_port/kvh1775_earth"), _laboratory(seed, rng, speed_deg_s=60.0))
     document["world"]["site"]["gravity_m_s2"] = 9.80061 + float(rng.uniform(-5e-4, 5e-4))  # what rocks make of it
@@ -301,7 +301,7 @@ def _laboratory(seed: int, rng: np.random.Generator, *, speed_deg_s: float) -> d
 
 
 def _drive(rng: np.random.Generator) -> dict[str, Any]:
-    """Draw how the joints follow: about as the logs of real arms have it, with gears of another ratio now and then."""
+    """Draw the joints' response to targets: about that in logs of real arms, sometimes with gears of another ratio."""
     ratio = int(rng.choice([50, 80, 100, 100, 100, 101, 120, 160]))
     orders = [order for order in (ratio, 2 * ratio, 4 * ratio) if order <= MOST_ORDER]
     sizes = [(0.3e-3, 3e-3), (1e-3, 4e-3), (0.1e-3, 0.8e-3)]

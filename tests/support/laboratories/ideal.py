@@ -37,7 +37,7 @@ def _ideal_document(path: Path) -> dict[str, Any]:
 
 
 def ideal(path: Path, overrides: Sequence[str] = ()) -> Loaded:
-    """The same as a configuration, with overrides as `--set` takes them."""
+    """Return a file without these imperfections as a configuration, with overrides like those of `--set`."""
     return parse(yaml.safe_dump(ideal_document(path), sort_keys=False), overrides=overrides)
 
 

@@ -17,7 +17,7 @@ SENSORS = tuple(GYROSCOPES)  # the board's table
 
 @dataclass
 class Host:
-    """A host written out in ticks: it asks the board in process, so every byte has its moment."""
+    """A host driven tick by tick, which asks the board in process, so that the time of every byte is determined."""
 
     laboratory: Laboratory
     line: SerialLine
@@ -33,13 +33,13 @@ class Host:
             self.received += self.line.read_as_host(None)
 
     def samples(self, sensor: int = 0) -> np.ndarray:
-        """(n, 3) counts of every sample of one sensor received so far."""
+        """Return the counts (n, 3) of all samples of one sensor received so far."""
         frames = FrameReader().feed(bytes(self.received))
         samples = [frame for frame in frames if frame.name == "samples"]
         return np.concatenate([frame.items["counts"] for frame in samples if frame.values["sensor"] == sensor])
 
     def answer(self, name: str, values: dict[str, Any]) -> Frame:
-        """Ask, and wait for the answer."""
+        """Send a request, and wait for the answer."""
         self.received.clear()
         self.ask(name, 99, values)
         self.ticks(100)
@@ -49,7 +49,7 @@ class Host:
 
 
 def boot(loaded: Loaded) -> Host:
-    """A laboratory whose board has started."""
+    """Return a laboratory whose board has started."""
     laboratory = Laboratory(loaded.config, read_world_section(loaded))
     new = Host(laboratory, SerialLine(lambda: laboratory.board), bytearray())
     new.ticks(200)
@@ -57,7 +57,7 @@ def boot(loaded: Loaded) -> Host:
 
 
 def host(loaded: Loaded) -> Host:
-    """A laboratory whose board streams every sensor it has."""
+    """Return a laboratory whose board streams all its sensors."""
     new = boot(loaded)
     for sensor in loaded.config.sensors.values():
         index = SENSORS.index(sensor.part)

@@ -1,7 +1,7 @@
-"""Many calibrations in a row in one laboratory: their results, and the resources that the lasting processes keep.
+"""Many calibrations in a row in one laboratory: their results, and the resources held by the permanent processes.
 
-Two processes live all the time: the world, and a station, an interpreter that carries out one command line of `rig`
-after the other, as a notebook or a laboratory's script does. Some runs are processes of their own.
+Two processes are permanent: the world, and a station, an interpreter that executes one command line of `rig` after the
+other, as a notebook or a laboratory's script does. Some runs are processes of their own.
 """
 
 import json
@@ -48,7 +48,7 @@ for line in sys.stdin:
 
 @dataclass(frozen=True, slots=True)
 class Footprint:
-    """What a process holds: resident memory (bytes), threads, child processes, and its open files by kind."""
+    """The resources of a process: resident memory (bytes), threads, child processes, and open files by kind."""
 
     rss: int
     threads: int
@@ -71,7 +71,7 @@ class Footprint:
 
 @dataclass(frozen=True, slots=True)
 class Calibration:
-    """One run: how it ended, what it found with which standard uncertainty, the board times (µs) of its samples."""
+    """One run: its end, its solution with standard uncertainties, and the board times (µs) of its samples."""
 
     number: int
     in_station: bool
@@ -86,20 +86,20 @@ class Calibration:
 
     @property
     def wraps(self) -> int:
-        """Return how often the board's counter wrapped while it sampled."""
+        """The number of wraps of the board's counter during sampling."""
         return self.board_us[1] // WRAP_US - self.board_us[0] // WRAP_US
 
 
 @dataclass(frozen=True, slots=True)
 class Life:
-    """All of it, and what the board said of itself before the first run and after the last."""
+    """All runs, and the board's status before the first run and after the last."""
 
     runs: Sequence[Calibration]
     board: tuple[BoardStatus, BoardStatus]
 
     @property
     def wraps(self) -> int:
-        """Return how often the board's counter wrapped in all."""
+        """The number of wraps of the board's counter in all runs."""
         return int(self.board[1].uptime_s * 1e6) // WRAP_US
 
 
@@ -147,9 +147,9 @@ class Bench:
 
 
 def live(folder: Path, runs: int) -> Iterator[Calibration | Life]:
-    """Run this many calibrations in one laboratory; yield each when it has ended, and return all.
+    """Run `runs` calibrations in one laboratory; yield each at its end, then all together.
 
-    Before the third the laboratory waits so long that the board's counter should wrap in the middle of it.
+    Before the third the laboratory waits so long that the board's counter should wrap during that run.
     """
     done: list[Calibration] = []
     history = folder / "history.sqlite"
@@ -249,7 +249,7 @@ def courses(runs: Sequence[Calibration]) -> list[Course]:
 
 
 def complaints(life: Life, warm_up: int, sigma: float = 3.0) -> list[str]:
-    """Return broken promises after the first `warm_up` runs; chance exceeds `sigma` as often as in a normal law."""
+    """Return broken promises after the first `warm_up` runs, with limits of `sigma` standard deviations."""
     texts = [f"run {run.number} ended with status {run.status}" for run in life.runs if run.status]
     if texts:
         return texts

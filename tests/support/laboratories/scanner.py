@@ -15,7 +15,7 @@ from support.processes.warm import start_module
 
 
 class Scanner:
-    """At a station that was started with a terminal for its standard input."""
+    """The keyboard and display of a station that was started with a terminal as its standard input."""
 
     def __init__(self, process: "subprocess.Popen[bytes]", terminal: int) -> None:
         self.process = process
@@ -31,7 +31,7 @@ class Scanner:
         os.write(self._terminal, f"{line}\n".encode())
 
     def waits_for(self, words: str) -> None:
-        """Wait for these words, after those waited for before."""
+        """Wait for these words, behind those waited for before."""
         self._read = self.sees(words)
 
     def sees(self, words: str) -> int:

@@ -31,7 +31,7 @@ Act = Callable[["Seen"], None]
 
 @dataclass(slots=True)
 class Seen:
-    """What a run said, how it ended, and how fast the shaft was: times (monotonic) and rates, as the world knows it."""
+    """A run's output and end, and the shaft's true rate: times (monotonic) and rates."""
 
     process: "subprocess.Popen[str]"
     control_at: tuple[str, int]
@@ -53,13 +53,13 @@ class Seen:
 
     @property
     def at_rest_after_s(self) -> float:
-        """Return how long after the action the shaft last turned; the world ends soon after it stands still."""
+        """The time from the action to the shaft's last movement, s; the world ends soon after that."""
         moved = [time_s for time_s, rate in self.rates if abs(rate) > STANDS_RAD_S]
         return max([0.0, *(time_s - self.acted_s for time_s in moved if time_s > self.acted_s)])
 
     @property
     def stood(self) -> bool:
-        """Return whether the shaft was at rest in the end."""
+        """Whether the shaft was at rest in the end."""
         return bool(self.rates) and abs(self.rates[-1][1]) <= STANDS_RAD_S
 
 
@@ -77,7 +77,7 @@ def configure(folder: Path, changes: Mapping[str, Any] | None = None) -> Path:
 
 def carry_out(*command: str | Path, config: Path, when: str = "", times: int = 1, act: Act | None = None,
                 after_s: float = 0.0) -> Seen:  # fmt: skip
-    """Run `rig …` to its end; when it prints the words the n-th time, do `act` after this delay."""
+    """Run `rig …` to its end; when it prints the words `when` the `times`-th time, call `act` after `after_s`."""
     document = yaml.safe_load(config.read_text(encoding="utf-8"))
     host = document["board"]["port"].removeprefix("socket://").partition(":")[0]
     process = start_module(*command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)

@@ -1,4 +1,4 @@
-"""Simulated laboratories in which one thing is wrong, and how well anybody could calibrate a gyroscope there."""
+"""Simulated laboratories with a single error, and the best possible uncertainty of a calibration there."""
 
 from collections.abc import Mapping
 from enum import Enum
@@ -19,7 +19,7 @@ WALK_RAD_S_SQRT_S = 3e-5
 
 
 class Effect(Enum):
-    """What alone is wrong in a laboratory."""
+    """The only error of a laboratory."""
 
     WALK = "bias random walk"
     NONLINEARITY = "nonlinearity"
@@ -29,7 +29,7 @@ class Effect(Enum):
 
 
 def world_with_effect(effect: Effect, seed: int) -> dict[str, Any]:
-    """A configuration: a LSM9DS1 that flickers as its kind does, mounted 5° askew; nothing else is wrong or may be."""
+    """Return a configuration: an LSM9DS1 with its usual flicker noise, mounted 5° askew, without other errors."""
     rng = np.random.default_rng(seed)
     document = ideal_document(CONFIGS / "demo.yaml")
     sensor: dict[str, Any] = {
@@ -73,10 +73,10 @@ def world_with_effect(effect: Effect, seed: int) -> dict[str, Any]:
 
 
 def bound(effect: Effect, run: ObservedRun, document: Mapping[str, Any]) -> np.ndarray:
-    """(6,) standard deviations of scale and bias that an estimator leaves which knows how large effect and flicker are.
+    """Return the standard deviations (6,) of scale and bias by an estimator that knows the sizes of effect and flicker.
 
-    Generalised least squares for each axis, of a row of the matrix, the bias and gravity's share; with an effect's own
-    columns or covariance.
+    It is generalised least squares for each axis, of a row of the matrix, the bias and gravity's effect, with the
+    effect's own columns or covariance.
     """
     recorded = run.sensors["gyro"]
     averages = [*(turn.average for turn in recorded.revolutions), *recorded.rests]

@@ -1,4 +1,4 @@
-"""The simulated laboratory that a station has started, in the hands of a test that disturbs it."""
+"""The simulated laboratory that a station has started, disturbed by a test."""
 
 import json
 import socket
@@ -25,7 +25,7 @@ class Laboratory:
         return reply
 
     def disturb(self) -> None:
-        """In the first turn that begins from now on, the sensor is held fast a while: it feels the beginning longer."""
+        """Hold the sensor's input constant for a while in the next turn that begins."""
         self("pace", time_scale=1)
         while abs(self("state")["qd_rad_s"][WRIST_3]) > TURNING_RAD_S:
             time.sleep(0.005)

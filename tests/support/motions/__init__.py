@@ -1,1 +1,1 @@
-"""What sensors read while an arm, a servo or a table turns them, computed."""
+"""Computed readings of sensors that an arm, a servo or a table turns."""

@@ -30,7 +30,7 @@ def draw_true_attitudes(joints: Array, rms_rad: float, rng: np.random.Generator)
 
 
 def draw_true_arm(rms_rad: float, rng: np.random.Generator) -> Callable[[Array], Array]:
-    """Return the true poses (N, 4, 4) of such an arm's flange, at the joint angles (N, 6) that it reports."""
+    """Return a function from reported joint angles (N, 6) to the true poses (N, 4, 4) of such an arm's flange."""
     alpha, theta = np.array(NOMINAL.alpha_rad), np.array(NOMINAL.theta_rad)
     alpha[3:5] += rms_rad * rng.normal(size=2)
     theta[3:] += rms_rad * rng.normal(size=3)

@@ -1,4 +1,4 @@
-"""What a simulated arm's controller sends over RTDE, in process: every state of every tick, as a logger keeps them."""
+"""The states that a simulated arm's controller sends over RTDE, in process: one per tick, as a logger stores them."""
 
 import struct
 from collections.abc import Mapping, Sequence
@@ -36,7 +36,7 @@ class LoggedArm:
         PrimarySession(self.robot).receive(script.encode() + b"\n")
 
     def log(self, ticks: int) -> None:
-        """Log so many states."""
+        """Log `ticks` states."""
         layout = f">{sum(COLUMNS.values())}d"
         for _ in range(ticks):
             self.source.step()
@@ -53,7 +53,7 @@ class LoggedArm:
         self.log(after_ticks)
 
     def take(self) -> dict[str, Array]:
-        """Return what was logged since the last time: columns of (n,) or (n, 6)."""
+        """Return the log since the last call: columns (n,) or (n, 6)."""
         rows = np.array(self._rows)
         self._rows = []
         ends = np.cumsum(list(COLUMNS.values()))

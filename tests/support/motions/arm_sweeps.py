@@ -1,6 +1,6 @@
 """Sweeps and dwells of a UR10e that carries an accelerometer, whose readings follow from the motion of the flange.
 
-The acceleration comes from second differences of the flange's true motion; nothing is shared with the closed forms of
+The acceleration comes from second differences of the flange's true motion; no code is shared with the closed forms of
 `rig.estimation.reference.accelerometer_model`.
 """
 
@@ -59,7 +59,7 @@ def plan_sweeps(axes: int, speed_deg_s: float = 60.0) -> tuple[Sweep, ...]:
 
 
 def find_signed_speed(sweep: Sweep) -> float:
-    """Return the joint's speed in rad/s."""
+    """Return the joint's speed , rad/s."""
     return sweep.speed_rad_s if sweep.direction == "ccw" else -sweep.speed_rad_s
 
 
@@ -133,11 +133,11 @@ def record_dwells(truth: Truth, poses: Poses, joints: Array, density_ug: float, 
 
 @dataclass(frozen=True, slots=True)
 class Sampling:
-    """How a revolution is sampled, and what is not ideal in it.
+    """The sampling of a revolution, with its imperfections.
 
-    Each sample has the noise `noise_m_s2`; the servo's ripple is `vibration` of the rate, so many `cycles` in a
-    turn; the arm's states come `state_rate_hz` times a second with angles in steps of `encoder_step_rad`; the samples'
-    times, on the arm's clock, are late by `clock_error_s`.
+    Each sample has the noise `noise_m_s2`; the servo's ripple is the fraction `vibration` of the rate, with `cycles`
+    per turn; the arm's states come `state_rate_hz` times a second with angles in steps of `encoder_step_rad`; the
+    samples' times, on the arm's clock, are late by `clock_error_s`.
     """
 
     noise_m_s2: float
@@ -151,7 +151,7 @@ class Sampling:
 
 @dataclass(frozen=True, slots=True)
 class Samples:
-    """Of one revolution: time (n,), readings (n, 3), and the joint's angle and speed (n,) as the arm's states tell."""
+    """Samples of one revolution: time (n,), readings (n, 3); the joint's angle and speed (n,) by the arm's states."""
 
     time_s: Array
     readings_m_s2: Array

@@ -1,4 +1,4 @@
-"""Runs on the simulated servo in virtual time, whose registers are written and read as the driver does.
+"""Runs on the simulated servo in virtual time, whose registers are accessed as by the driver.
 
 Each run draws the encoder's phases and the noise, the errors of gear and adapter, and the sensor.
 """
@@ -48,7 +48,7 @@ MISSED = 2e-3  # of the states
 
 @dataclass(frozen=True, slots=True)
 class Drawn:
-    """The recordings of a run, a stage each, and what is true: scale and bias (3,) of g = K (m + b), and the shafts."""
+    """The recordings of a run, a stage each, and the truth: scale and bias (3,) of g = K (m + b), and the shafts."""
 
     runs: list[RunData]
     shafts: list[Shaft]
@@ -64,7 +64,7 @@ Source = Callable[
 
 
 class Far:
-    """A servo, spoken to in virtual time."""
+    """A servo addressed in virtual time."""
 
     def __init__(self, truth: ServoTruth) -> None:
         self.servo = SimulatedServo(truth, BEGINS_S - 1.0)
@@ -101,8 +101,8 @@ def drawn_servo(
 ) -> Drawn:
     """Draw a run of configs/servo.yaml with these `overrides`, with the samples of another `source` than a board.
 
-    One reading has that noise, the scale factors lie between those `scales`. The sensor's mounting is wrong by
-    `mounting_deg`, the item's in each stage by `adapter_deg`, in random directions.
+    `noise_rad_s`: of one reading; the scale factors lie between the `scales`. The sensor's mounting has an error of
+    `mounting_deg`, the item's in each stage of `adapter_deg`, in random directions.
     """
     rng = np.random.default_rng([seed, 43])
     configuration = load_servo((*(f"uncertainty.{key}" for key in GIVEN_UNCERTAINTIES), *overrides))
@@ -219,7 +219,7 @@ def _sample(
     *,
     rate_hz: float,
 ) -> tuple[RecordedSensor, np.ndarray]:
-    """Return the samples of a gyroscope mounted by `rows` (3, 3) on the shaft, `until` a time, by a drifting clock."""
+    """Return the samples of a gyroscope mounted by `rows` (3, 3) on the shaft until `until`, by a drifting clock."""
     (scale, bias), (end_s, drift, noise_rad_s) = model, until
     time_s = np.arange(BEGINS_S + 0.2, end_s - 0.2, 1 / rate_hz)
     rates = np.array([servo.rate_at(moment_s) for moment_s in time_s.tolist()])

@@ -1,7 +1,7 @@
 """The Earth's rate as a gyroscope on a UR10e senses it, in sweeps and attitudes, on an arm with geometric errors.
 
-The flange's mean rates come from differences of its attitudes along the true motion; the estimator shares nothing with
-them but the plan and the arm's own report.
+The flange's mean rates come from differences of its attitudes along the true motion; the estimator shares with them
+only the plan and the arm's own report.
 """
 
 from collections.abc import Callable, Iterator
@@ -59,10 +59,11 @@ LSM9DS1 = Part(0.008 * 3600 * DEG_H, 10 * DEG_H, 2.0 * DEG_H, 0.15 * DEG_H)
 
 @dataclass(frozen=True, slots=True)
 class Session:
-    """What is done: sweeps about so many axes, with rests, then dwells of `dwell_s` (none for 0).
+    """The session: sweeps about `axes` axes, with rests, then dwells of `dwell_s` (none for 0).
 
-    The arm: geometry and encoders off by `arm_rad`, hysteresis between both directions, turns timed to `timing_s` at
-    either end, axes that lean by `leaning_rad` for each sweep anew, a vibration about each of the flange's axes, RMS.
+    The arm: errors `arm_rad` of geometry and encoders, hysteresis between both directions, a timing error `timing_s` at
+    each end of a turn, axes that lean by `leaning_rad`, drawn for each sweep, an RMS vibration about each of the
+    flange's axes.
     """
 
     part: Part = KVH1775
@@ -91,8 +92,8 @@ class Truth:
 class Stretch:
     """A sweep or a rest.
 
-    Its duration, the true mean rate against the room, the mean attitude, true and as reported, and the arm's account of
-    the turn with the effect of its own errors on it.
+    Duration, true mean rate against the room, mean attitude, true and as reported, and the arm's report of the turn
+    with the effect of its own errors.
     """
 
     duration_s: float
@@ -152,9 +153,7 @@ def record(session: Session, seed: int) -> tuple[VectorInputs, Truth]:
 
 @cache
 def _turns(axes: int) -> tuple[tuple[Sweep, float, Array, Array, Array], ...]:
-    """Return of each sweep its signed speed, joint angles (POINTS + 1, 6), axis and mean attitude as the arm reports
-    them.
-    """
+    """Return each sweep's signed speed, joint angles (POINTS + 1, 6), axis and mean attitude by the arm's report."""
     angles = np.linspace(0, 2 * np.pi, POINTS + 1)
     turns = []
     for sweep in plan_sweeps(axes):
@@ -190,8 +189,10 @@ def _rests(session: Session, poses: Callable[[Array], Array], rng: np.random.Gen
 
 
 def _vibrating(session: Session, windows_s: Array, turns: int, rng: np.random.Generator) -> tuple[Array, Array, Array]:
-    """(N, 3) what noise and vibration leave in each average, by whole turns evenly, else as the rig averages rests; the
-    variances (N, 3) of that, and the windows (N, 2) as the rig tells them."""
+    """Return the errors (N, 3) of each average by noise and vibration, their variances (N, 3), and the windows (N, 2).
+
+    Whole turns are averaged evenly, others as the rig averages rests.
+    """
     windows = windows_s.copy()
     noises = []
     variances = []

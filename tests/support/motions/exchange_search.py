@@ -17,7 +17,7 @@ def log_determinant(information: Array, chosen: list[int]) -> float:
 
 
 def exchange_search(information: Array, count: int, rng: np.random.Generator, starts: int) -> list[int]:
-    """Return the best `count` different attitudes, by exchanges from random starts while any gains."""
+    """Return the best `count` different attitudes, by exchanges from random starts as long as one improves it."""
     designs = [_exchange(information, rng.permutation(len(information))[:count].tolist()) for _ in range(starts)]
     return max(designs, key=lambda chosen: log_determinant(information, chosen))
 

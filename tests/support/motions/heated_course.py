@@ -1,7 +1,7 @@
-"""What a run over temperature sees of a gyroscope on the simulated heated board, without a laboratory in real time.
+"""The data of a run over temperature with a gyroscope on the simulated heated board, without a laboratory in real time.
 
 The world's thermal model and the run's own course and ramp take the board of configs/thermal.yaml through its range.
-The means of readings over sweeps and rests are calculated from what the world makes of the sensor then.
+The means of readings over sweeps and rests are computed from the world's sensor at these temperatures.
 """
 
 from dataclasses import dataclass
@@ -34,7 +34,7 @@ NOISE_RAD_S, INSTABILITY_RAD_S, WALK_RAD_S_SQRT_S = 0.004, 4.8e-5, 1e-5
 
 @dataclass(frozen=True)
 class Warmed:
-    """What became of the board: by ticks (n,) the time, thermometer, sensor's temperature and branch; sets' starts."""
+    """The board's course: by ticks (n,) the time, thermometer, sensor's temperature and branch; the sets' starts."""
 
     time_s: Array
     thermometer_c: Array

@@ -1,6 +1,6 @@
 """Figures of an arm's joints, read from the states that its controller sent: the same for real and simulated arms.
 
-Times in s, angles in rad, rates in rad/s; one joint at a time unless arrays of all are asked for.
+Times in s, angles in rad, rates in rad/s; one joint at a time, unless an array of all is stated.
 """
 
 from collections.abc import Sequence
@@ -60,7 +60,7 @@ class SpeedRipple:
 def speed_ripple(q_rad: Array, qd_rad_s: Array, smooth_rad_s: Array) -> SpeedRipple:
     """Return the ripple of the rates (n,) about the `smooth` ones, at the angles `q_rad`.
 
-    Each order is fitted by itself: a cosine and a sine of so many times the angle, by least squares.
+    Each order is fitted by itself: a cosine and a sine of that multiple of the angle, by least squares.
     """
     residuals = qd_rad_s - smooth_rad_s
     residuals = residuals - residuals.mean()
@@ -73,7 +73,7 @@ def speed_ripple(q_rad: Array, qd_rad_s: Array, smooth_rad_s: Array) -> SpeedRip
 
 
 def band_rms(q_rad: Array, residuals_rad_s: Array, orders: Sequence[int]) -> float:
-    """Return the RMS of what all `orders` together explain of the rates' residuals, less what noise would explain."""
+    """Return the RMS of the rates' residuals explained by all `orders` together, less that explained by noise."""
     waves = np.column_stack([wave(order * q_rad) for order in orders for wave in (np.cos, np.sin)])
     fitted = waves @ np.linalg.lstsq(waves, residuals_rad_s, rcond=None)[0]
     residuals = residuals_rad_s - fitted
@@ -91,14 +91,17 @@ def smooth_sine(time_s: Array, qd_rad_s: Array, period_s: float, harmonics: int 
 
 
 def following_lag_s(q_rad: Array, target_q_rad: Array, target_qd_rad_s: Array, target_qdd_rad_s2: Array) -> float:
-    """Return by how much a joint is late: the following error (n,) per rate, beside parts per acceleration and none."""
+    """Return a joint's lag, s: the part of its following error (n,) that is proportional to rate.
+
+    Parts proportional to acceleration and a constant are fitted too.
+    """
     design = np.column_stack([target_qd_rad_s, target_qdd_rad_s2, np.ones(len(q_rad))])
     return float(np.linalg.lstsq(design, target_q_rad - q_rad, rcond=None)[0][0])
 
 
 @dataclass(frozen=True)
 class Settling:
-    """The end of a move: the extreme rate against its direction, and when it stayed below a rate of rest."""
+    """The end of a move: the extreme rate against its direction, and the time until it stayed below a rate of rest."""
 
     back_rad_s: float
     duration_s: float
@@ -123,7 +126,7 @@ class GentleStart:
 
 
 def gentle_start(time_s: Array, target_qd_rad_s: Array) -> GentleStart | None:
-    """Return how a move starts whose target speeds (n,) begin with it; None if it starts at its full acceleration."""
+    """Return the start of a move whose target speeds (n,) begin with it; None if it starts at its full acceleration."""
     acceleration = np.abs(np.diff(target_qd_rad_s) / np.diff(time_s))
     if len(acceleration) < 10:
         return None

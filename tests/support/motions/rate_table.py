@@ -1,4 +1,4 @@
-"""Attitudes and noise for the tri-axial estimators; the published numbers stand in `rig.study.rate_table`."""
+"""Attitudes and noise for the tri-axial estimators; the published numbers are in `rig.study.rate_table`."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -7,13 +7,13 @@ from rig.estimation.arrays import Array
 
 
 def attitudes(count: int, seed: int = 1) -> Array:
-    """(count, 3, 3) rotations body → table, spread over all there are."""
+    """Return rotations (count, 3, 3) from body to table, distributed over all rotations."""
     matrices: Array = Rotation.random(count, random_state=seed).as_matrix()
     return matrices
 
 
 def noisy(readings: Array, variances: Array, runs: int | None = None, seed: int = 1) -> Array:
-    """Readings with Gaussian noise; (runs, …) of them if asked for."""
+    """Return readings with Gaussian noise; (runs, …) of them if `runs` is given."""
     shape = readings.shape if runs is None else (runs, *readings.shape)
     result: Array = readings + np.random.default_rng(seed).normal(size=shape) * np.sqrt(variances)
     return result

@@ -102,7 +102,7 @@ def sample_autopilot(
 
 
 class _SampleSink:
-    """What a source handed on."""
+    """The samples that a source passed on."""
 
     def __init__(self) -> None:
         self._parts: list[np.ndarray] = []
@@ -114,7 +114,7 @@ class _SampleSink:
 
     @property
     def quiet_s(self) -> float:
-        """Return how long nothing has arrived."""
+        """The time without new samples, s."""
         return time.monotonic() - self._last_s
 
     def all_of(self, source: SampleSource, ended: Callable[[], bool]) -> np.ndarray:
@@ -126,7 +126,7 @@ class _SampleSink:
 
 
 def _make_motion(servo: SimulatedServo, rows: Array) -> Callable[[float], Sequence[float]]:
-    """Return rate in rad/s and specific force in g on a vertical shaft."""
+    """Return a function of time: rate in rad/s and specific force in g on a vertical shaft."""
     axis = rows[:, 2]
 
     def motion_at(time_s: float) -> Sequence[float]:

@@ -29,11 +29,11 @@ DATA_SHEET_BIAS_K, DATA_SHEET_SCALE_K = np.radians(0.03), 3e-4  # rad/s and a sh
 
 @dataclass(frozen=True)
 class Drawn:
-    """A gyroscope: k(T) = k₀ (1 + s₁ d + s₂ d²), what a reading adds c(T) = c₀ + c₁ d + c₂ d², d = T − 25 °C.
+    """A gyroscope: k(T) = k₀ (1 + s₁ d + s₂ d²), the addition to a reading c(T) = c₀ + c₁ d + c₂ d², d = T − 25 °C.
 
-    `hysteresis` (3,) is how much more it reads half-way when it warms, `lag_s` its thermometer's, `gradient_k` by how
-    much it is warmer in use than its thermometer says, beside how much it was in the run: at the middle of the range,
-    and what is more at its upper end. `leaning` (P, 3): what each place adds, such as an arm's axis that leans.
+    `hysteresis` (3,): how much more it reads half-way during warming; `lag_s`: the thermometer's lag; `gradient_k`: by
+    how much it exceeds its thermometer's reading in use more than in the run: at the middle of the range, and
+    additionally at its upper end. `leaning` (P, 3): the addition of each place, such as an arm's leaning axis.
     """
 
     scale: Array
@@ -176,7 +176,7 @@ def external(means: Array, course: Session, noise: float) -> ExternalData:
 
 
 def calibrate(sensor: Drawn, course: Session, rng: np.random.Generator) -> OverTemperature:
-    """Polynomials with all of the uncertainty that sweeps of files have."""
+    """Return polynomials with the whole uncertainty of sweeps from files."""
     moved, polynomials = correct_files(external(readings(sensor, course, rng), course, sensor.noise), REFERENCE_C)
     solution = solve_swept(moved, "vector")
     sign = np.diag(RATE.parameter_signs)

@@ -1,1 +1,1 @@
-"""Browsers, and pages of runs that nobody made."""
+"""Browsers, and pages of invented runs."""

@@ -53,7 +53,7 @@ needs_browser = pytest.mark.skipif(
 
 
 def _as_nice_as_all_else(service: Service) -> Service:
-    """Keep root's browser from the priority that it would give itself, over the laboratory whose run it shows."""
+    """Keep root's browser from raising its own priority above the laboratory's."""
     if os.geteuid() == 0 and (setpriv := shutil.which("setpriv")):
         driver, service.path = service.path, setpriv
         service.command_line_args = lambda: [  # pyrefly: ignore[method-assign]  # a stand-in
@@ -67,7 +67,7 @@ def _as_nice_as_all_else(service: Service) -> Service:
 
 @contextmanager
 def browser(size: tuple[int, int] = TABLET, *, dark: bool = False) -> Iterator[Chrome]:
-    """A window of that size. It remembers what its console says and which addresses it asked."""
+    """Yield a window of that size, which records its console and its requested addresses."""
     options = ChromeOptions()
     options.binary_location = CHROMIUM or ""
     for argument in (
@@ -105,7 +105,7 @@ def set_theme(driver: Chrome, *, dark: bool) -> None:
 
 @contextmanager
 def screen(driver: Chrome, width: int, height: int) -> Iterator[None]:
-    """A window whose page has just so many CSS pixels."""
+    """Give the page exactly this size in CSS pixels, inside the block."""
     metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
     driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
     try:
@@ -128,7 +128,7 @@ def picture(driver: Chrome, name: str, *, whole: bool = False) -> Path:
 
 
 def legible(driver: Chrome) -> None:
-    """Every text shown stands out from what is behind it."""
+    """Assert that every text shown has enough contrast with its background."""
     contrast, words = driver.execute_script(CONTRAST)
     assert contrast >= LEGIBLE, words
 
@@ -139,12 +139,12 @@ def text(driver: Chrome, element: str) -> str:
 
 
 def type_line(driver: Chrome, words: str) -> None:
-    """A line and Enter, as a keyboard or a scanner types them, wherever the cursor is."""
+    """Type a line and Enter, as a keyboard or a scanner does, wherever the cursor is."""
     driver.switch_to.active_element.send_keys(words, Keys.ENTER)
 
 
 def kind(driver: Chrome) -> str:
-    """The run's state, by the page's own name for it."""
+    """Return the run's state, by the page's own name for it."""
     return str(driver.execute_script("return document.body.dataset.kind"))
 
 
@@ -155,7 +155,7 @@ def severe(driver: Chrome) -> list[str]:
 
 
 def list_requested_hosts(driver: Chrome) -> set[str]:
-    """The hosts of every address the browser has asked for since it was asked last."""
+    """Return the hosts of all addresses that the browser has requested since the last call."""
     hosts = set()
     for entry in driver.get_log("performance"):
         message = json.loads(entry["message"])["message"]

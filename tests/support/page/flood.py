@@ -43,7 +43,7 @@ def alive(connection: socket.socket) -> bool:
 
 @contextmanager
 def flood(url: str, connections: int) -> Iterator[None]:
-    """For the length of the block so many half requests are held; each that is closed is opened anew."""
+    """Hold `connections` incomplete requests during the block; open each again that is closed."""
     parts = urlsplit(url)
     address = (parts.hostname or "", parts.port or 0)
     over, full = threading.Event(), threading.Event()

@@ -1,4 +1,4 @@
-"""A page in a browser that is told of a run which nobody made. As a program: one that is told until it is killed."""
+"""A page in a browser that receives the events of an invented run; as a program, until it is killed."""
 
 import sys
 import tempfile
@@ -30,10 +30,10 @@ GOING_ON = (StepStarted, StepFinished, Progress, SamplesTaken)
 
 
 class Telling:
-    """Events for a page in a browser, and the words it must show then.
+    """Events for a page in a browser, and the words that it must then show.
 
-    As of a run that goes on, newer samples and states come again and again after an arm that moves or a hand was seen,
-    until all falls `silent`, or the last ones are only `repeating`, which brings nothing new.
+    As in a real run, newer samples and states follow after a moving arm or a hand, until all is `silent`, or only
+    `repeating` the last ones.
     """
 
     def __init__(self, driver: Chrome, feed: Feed) -> None:
@@ -81,7 +81,7 @@ class Telling:
 
 
 def goes_on(state: ArmSeen | HandSeen) -> bool:
-    """Return whether more is to come: the program of an arm runs, a servo is held, a hand may always move."""
+    """Return whether more events follow: an arm's program runs, a servo is held, or a hand is used."""
     return not (
         isinstance(state, ArmSeen)
         and isinstance(state.state, ArmState)
@@ -90,7 +90,7 @@ def goes_on(state: ArmSeen | HandSeen) -> bool:
 
 
 def later(latest: ArmSeen | HandSeen) -> ArmSeen | HandSeen:
-    """The same a moment later."""
+    """Return the same state a moment later."""
     if isinstance(latest, HandSeen):
         return replace(latest, time_s=latest.time_s + AGAIN_S)
     state: Any = latest.state
@@ -98,7 +98,7 @@ def later(latest: ArmSeen | HandSeen) -> ArmSeen | HandSeen:
 
 
 def more(samples: SamplesTaken | None) -> SamplesTaken | None:
-    """Of each sensor one more that reads the same."""
+    """Return one more sample of each sensor with the same reading."""
     if samples is None:
         return None
     return SamplesTaken(tuple(replace(sensor, samples=sensor.samples + 1) for sensor in samples.sensors))
@@ -108,7 +108,7 @@ def more(samples: SamplesTaken | None) -> SamplesTaken | None:
 def showing(
     driver: Chrome, folder: Path, *, token: bool = True, may_answer: bool = True, about: About = ABOUT
 ) -> Iterator[Telling]:
-    """A page that has been loaded and told nothing yet."""
+    """Yield a page that has been loaded and has received no events yet."""
     feed = Feed(PageState(replace(about, may_answer=may_answer)))
     with serving(feed, Control(may_answer=may_answer), folder, PageAddress(port=0)) as url:
         driver.get(url if token else url.split("#")[0])
@@ -123,7 +123,7 @@ def showing(
 
 
 def main() -> None:
-    """Serve a page, print its address, and tell of movements without an end."""
+    """Serve a page, print its address, and send it movements without end."""
     feed = Feed(PageState(ABOUT))
     with (
         tempfile.TemporaryDirectory() as folder,

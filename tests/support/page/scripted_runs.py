@@ -73,7 +73,7 @@ def state(time_s: float, q_rad: Joints, qd_rad_s: Joints) -> ArmState:
 
 
 def report(q_rad: Joints) -> ArmReport:
-    """Return the report of an arm in this posture, whose model only its dashboard gives."""
+    """Return the report of an arm in this posture, whose model only its dashboard reports."""
     return ArmReport(
         host="127.0.0.2",
         version=(5, 14, 0, 0),
@@ -123,7 +123,7 @@ def before_it_moves(plan: Plan) -> Iterator[RunEvent]:
 
 
 def moving(plan: Plan, until_s: float, step_s: float = STEP_S) -> Iterator[RunEvent]:
-    """Yield the events from the first motion to this time."""
+    """Yield the events from the first motion to `until_s`."""
     yield SamplingStarted()
     time_s, done_s, q = 0.0, 0.0, plan.start_q_rad
     for number, step in enumerate(plan.steps, 1):

@@ -1,4 +1,4 @@
-"""A run of three boards' worth of sensors that nobody made: three gyroscopes, and an accelerometer beside each."""
+"""An invented run with the sensors of three boards: three gyroscopes, and an accelerometer beside each."""
 
 from collections.abc import Collection, Iterator
 from dataclasses import replace
@@ -22,7 +22,7 @@ IMU = RECORDINGS / "imu"
 
 
 def six_moving(until_s: float) -> Iterator[RunEvent]:
-    """The arm and the readings of all six, as far as that."""
+    """Yield the arm's motion and the readings of all six sensors until `until_s`."""
     for event in moving(plan_demo(), until_s):
         if isinstance(event, SamplesTaken):
             yield SamplesTaken(tuple(replace(event.sensors[1], sensor=name, lost=0) for name in PARTS))
@@ -48,9 +48,9 @@ def six_found() -> ResultDocument:
 
 
 def six_judged(folder: Path, *, passed: bool = True, broken: Collection[str] = ()) -> Iterator[RunEvent]:
-    """From the result to what the history says of it: one sensor has changed, two are there for the first time.
+    """Yield the events from the result to the comparison with the history: one sensor has changed, two are new.
 
-    The checks of these names are `broken` of each of the three boards.
+    `broken`: names of checks that fail for each of the three boards.
     """
     document = six_found()
     write_result(document, folder)

@@ -1,7 +1,7 @@
-"""What the tests know of each part of the board, by its data sheet: one file a part, with three things.
+"""The parts of the board by their data sheets: one file per part, with three definitions.
 
-`SHEET`: what its register model must do; `<Part>Registers`: the part as the firmware's driver sees it; a driver in
-Python, which speaks to the model. The magnetometers have the second alone.
+`SHEET`: the requirements on its register model; `<Part>Registers`: the part as the firmware's driver sees it; a driver
+in Python for the model. The magnetometers have only the second.
 """
 
 from collections.abc import Callable

@@ -10,7 +10,7 @@ from support.board.spi_master import NO_ERRORS, Master, Rate, integers, still
 
 
 class Adis16465Driver(Master):
-    """Analog Devices data sheet ADIS16465."""
+    """A driver by the Analog Devices data sheet ADIS16465."""
 
     def __init__(
         self,
@@ -43,7 +43,7 @@ class Adis16465Driver(Master):
         self.exchange(bytes([0x80 | address + 1, value >> 8]))
 
     def burst(self) -> bytes:
-        """The 20 bytes after the command."""
+        """Return the 20 bytes after the burst command."""
         return self.exchange(bytes([0x68]) + bytes(21))[2:]
 
     def identity(self) -> int:
@@ -82,7 +82,7 @@ SHEET = DataSheet(
 
 
 class Adis16465Registers:
-    """Words of 16 bits, high byte first; an answer comes one frame later, a setting some time after its writing."""
+    """Registers of 16 bits, high byte first; an answer comes one frame later, a setting acts later than its writing."""
 
     def __init__(self) -> None:
         self.words = {
@@ -110,11 +110,11 @@ class Adis16465Registers:
     line_is_high = False  # its line is down only while the registers change
 
     def answer_as(self, who_am_i: int) -> None:
-        """Be another part."""
+        """Answer with another identity."""
         self.words[0x72] = who_am_i
 
     def transfer(self, data: bytes, max_hz: int, time_us: int) -> bytes:
-        """One chip select: the bytes in, the bytes out."""
+        """Make one access, from chip select to chip select; return the received bytes."""
         assert max_hz <= (2e6 if len(data) == 2 else 1e6), "a burst is slow"
         assert (time_us - self._idle_since_us) % 2**32 >= 16, "the part needs 16 µs between frames"
         self._idle_since_us = time_us
@@ -163,7 +163,7 @@ class Adis16465Registers:
         acceleration: Sequence[int] = (0x0111, -0x0222, 0x0333),
         low_words: Sequence[int] = (0, 0, 0, 0, 0, 0),
     ) -> None:
-        """A new conversion in the output registers: upper words, and the lower ones of all six."""
+        """Put a new conversion into the output registers: upper words, and the lower words of all six."""
         self._data = [*counts, *acceleration, temperature]
         self.counter = (self.counter + 1) & 0xFFFF
         for output, (low, upper) in enumerate(zip(low_words, self._data[:6], strict=True)):

@@ -14,7 +14,7 @@ RANGES_G = {16.0: 0, 8.0: 1, 4.0: 2, 2.0: 3}
 
 
 class Icm42688PDriver(ModelledRegisters):
-    """Sections 14.1 to 14.59."""
+    """A driver by sections 14.1 to 14.59."""
 
     model = Icm42688P
 
@@ -62,7 +62,7 @@ SHEET = DataSheet(
 
 
 class Icm42688PRegisters(ByteRegisters):
-    """High byte first, in banks; reading the status clears it; the outputs are those of the latest conversion."""
+    """Registers in banks, high byte first; reading the status clears it; outputs are those of the latest conversion."""
 
     max_hz = 24e6
 
@@ -71,14 +71,14 @@ class Icm42688PRegisters(ByteRegisters):
         self._deliver()
 
     def _deliver(self) -> None:
-        """As after power-up, section 14."""
+        """Set all registers to their state after power-up (section 14)."""
         self.values[:] = bytes(128)
         defaults = {0x13: 0x05, 0x4C: 0x30, 0x4D: 0x91, 0x4F: 6, 0x50: 6, 0x51: 0x16, 0x52: 0x11, 0x53: 0x0D}
         for address, value in (defaults | {0x64: 0x10, 0x65: 0x10, 0x75: 0x47}).items():
             self.values[address] = value
 
     def answer_as(self, who_am_i: int) -> None:
-        """Be another part."""
+        """Answer with another identity."""
         self.values[0x75] = who_am_i
 
     def write(self, address: int, value: int) -> None:
@@ -100,7 +100,7 @@ class Icm42688PRegisters(ByteRegisters):
     def convert(
         self, counts: Sequence[int], temperature: int, acceleration: Sequence[int] = (0x11, -0x22, 0x33)
     ) -> None:
-        """A new conversion in the output registers."""
+        """Put a new conversion into the output registers."""
         words = (temperature, *acceleration, *counts)
         self.values[0x1D:0x2B] = b"".join(word.to_bytes(2, "big", signed=True) for word in words)
         self.fresh = True

@@ -19,7 +19,7 @@ RANGES_G = {2.0: 0, 4.0: 1, 8.0: 2, 16.0: 3}
 
 
 class Lsm6dsv16xDriver(ModelledRegisters):
-    """Sections 9.1 to 9.35."""
+    """A driver by sections 9.1 to 9.35."""
 
     model = Lsm6dsv16x
 
@@ -65,7 +65,7 @@ SHEET = DataSheet(
 
 
 class Lsm6dsv16xRegisters(ByteRegisters):
-    """Low byte first, in pages; a sensor's flag falls when a high byte of its outputs is read."""
+    """Registers in pages, low byte first; reading a high byte of a sensor's outputs clears its flag."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -73,7 +73,7 @@ class Lsm6dsv16xRegisters(ByteRegisters):
         self.resets_for = 2  # so often SW_RESET reads 1 before it is over
 
     def _deliver(self) -> None:
-        """As after power-up or a reset, section 8; the interface's settings outlive a reset (section 9.3)."""
+        """Set all registers to their state after power-up or a reset (section 8), which keeps the interface's (9.3)."""
         interface = self.values[0x03]
         self.values[:] = bytes(128)
         self.values[0x03] = interface
@@ -81,7 +81,7 @@ class Lsm6dsv16xRegisters(ByteRegisters):
         self._resetting = 0
 
     def answer_as(self, who_am_i: int) -> None:
-        """Be another part."""
+        """Answer with another identity."""
         self.values[0x0F] = who_am_i
 
     def write(self, address: int, value: int) -> None:
@@ -108,7 +108,7 @@ class Lsm6dsv16xRegisters(ByteRegisters):
     def convert(
         self, counts: Sequence[int], temperature: int, acceleration: Sequence[int] = (0x11, -0x22, 0x33)
     ) -> None:
-        """A new conversion in the output registers."""
+        """Put a new conversion into the output registers."""
         words = (temperature, *counts, *acceleration)
         self.values[0x20:0x2E] = b"".join(word.to_bytes(2, "little", signed=True) for word in words)
         self.fresh = True

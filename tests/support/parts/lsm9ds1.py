@@ -14,7 +14,7 @@ RANGES_G = {2.0: 0, 4.0: 2, 8.0: 3, 16.0: 1}
 
 
 class Lsm9ds1Driver(ModelledRegisters):
-    """Datasheet DocID025715."""
+    """A driver by the data sheet DocID025715."""
 
     model = Lsm9ds1
 
@@ -34,7 +34,7 @@ class Lsm9ds1Driver(ModelledRegisters):
         return self._vector(0x28)
 
     def _vector(self, address: int) -> list[int]:
-        """The part's own x points the other way than the right-handed one."""
+        """Read three outputs, and return them in right-handed axes: the part's own x has the opposite sign."""
         x, y, z = integers(self.get(address, 6), "<")
         return [max(-32768, min(32767, -x)), y, z]
 
@@ -57,9 +57,9 @@ SHEET = DataSheet(
 
 
 class Lsm9ds1Registers(ByteRegisters):
-    """Registers that count up in a burst; a new conversion raises flags that reading the last outputs lowers.
+    """Registers whose address counts up in a burst. Conversions raise flags; reading the last outputs clears them.
 
-    Both triads are left-handed: the registers hold x with the other sign.
+    Both triads are left-handed: the registers hold x with the opposite sign.
     """
 
     def __init__(self) -> None:
@@ -75,11 +75,11 @@ class Lsm9ds1Registers(ByteRegisters):
 
     @property
     def line_is_high(self) -> bool:
-        """Its line is up until it is read."""
+        """Whether the data-ready line is high; it is until the outputs are read."""
         return self.fresh
 
     def answer_as(self, who_am_i: int) -> None:
-        """Be another part."""
+        """Answer with another identity."""
         self.values[0x0F] = who_am_i
 
     def read(self, address: int, size: int) -> bytes:
@@ -100,7 +100,7 @@ class Lsm9ds1Registers(ByteRegisters):
         return read
 
     def convert(self, counts: Sequence[int], temperature: int, acceleration: Sequence[int] = (0, 0, 0)) -> None:
-        """A new conversion in the output registers, of vectors in right-handed axes."""
+        """Put a new conversion of vectors in right-handed axes into the output registers."""
         words = (temperature, -counts[0], *counts[1:], -acceleration[0], *acceleration[1:])
         for address, value in zip((0x15, 0x18, 0x1A, 0x1C, 0x28, 0x2A, 0x2C), words, strict=True):
             self.values[address : address + 2] = min(value, 32767).to_bytes(2, "little", signed=True)

@@ -6,7 +6,7 @@ from support.board.host_sensors import ByteRegisters
 
 
 class Lsm9ds1MagnetometerRegisters(ByteRegisters):
-    """The LSM9DS1's other die: bit 6 of an address lets it count up; data are fresh until all have been read."""
+    """The LSM9DS1's other die: with bit 6 an address counts up; data are fresh until all have been read."""
 
     def __init__(self) -> None:
         super().__init__(64)
@@ -16,7 +16,7 @@ class Lsm9ds1MagnetometerRegisters(ByteRegisters):
 
     @property
     def line_is_high(self) -> bool:
-        """Its line is up until it is read."""
+        """Whether the data-ready line is high; it is until the outputs are read."""
         return self.fresh
 
     def transfer(self, data: bytes, max_hz: int, time_us: int) -> bytes:
@@ -31,6 +31,6 @@ class Lsm9ds1MagnetometerRegisters(ByteRegisters):
         return read
 
     def convert(self, counts: Sequence[int], _temperature: int = 0, _acceleration: Sequence[int] = ()) -> None:
-        """A new conversion of the field; the die has no thermometer."""
+        """Put a new conversion of the field into the output registers; the die has no thermometer."""
         self.values[0x28:0x2E] = b"".join(count.to_bytes(2, "little", signed=True) for count in counts)
         self.fresh = True

@@ -13,7 +13,7 @@ RANGES_G = {2.0: 0, 4.0: 1, 8.0: 2, 16.0: 3}
 
 
 class Mpu9250Driver(ModelledRegisters):
-    """Register map RM-MPU-9250A-00."""
+    """A driver by the register map RM-MPU-9250A-00."""
 
     model = Mpu9250
 
@@ -56,7 +56,7 @@ SHEET = DataSheet(
 
 
 class Mpu9250Registers(ByteRegisters):
-    """High byte first; only sensor and interrupt registers are read faster than 1 MHz; reading clears the status."""
+    """Registers, high byte first; only those of sensors and interrupt allow over 1 MHz; reading clears the status."""
 
     max_hz = 20e6
 
@@ -66,7 +66,7 @@ class Mpu9250Registers(ByteRegisters):
         self.values[0x6B] = 0x01  # CLKSEL, as after power-up
 
     def answer_as(self, who_am_i: int) -> None:
-        """Be another part."""
+        """Answer with another identity."""
         self.values[0x75] = who_am_i
 
     def transfer(self, data: bytes, max_hz: int, time_us: int) -> bytes:

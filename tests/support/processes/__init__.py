@@ -1,1 +1,1 @@
-"""Processes, waiting and what the system does to both."""
+"""Processes, waiting for them, and the system's limits on both."""

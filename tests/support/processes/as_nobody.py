@@ -1,4 +1,4 @@
-"""A user who may not read what is closed to others: root may read everything."""
+"""A user without access to other users' files, because root may read everything."""
 
 import os
 from collections.abc import Iterator
@@ -9,7 +9,7 @@ NOBODY = 65534
 
 @contextmanager
 def drop_root() -> Iterator[None]:
-    """In this block the process is no root, in no matter whose hands the tests are."""
+    """Run the block without root's rights, whoever runs the tests."""
     root = os.geteuid() == 0
     if root:
         os.seteuid(NOBODY)

@@ -24,7 +24,7 @@ def local_cluster(**of: Any) -> Iterator[Any]:
 
 @contextmanager
 def killable_cluster(folder: Path) -> Iterator[tuple["subprocess.Popen[bytes]", str]]:
-    """A scheduler with one worker, each a process of its own: the scheduler's, and its address."""
+    """Yield the process of a scheduler with one worker, which is another process, and the scheduler's address."""
     file = folder / "scheduler.json"
     options = ("--scheduler-file", str(file), "--no-dashboard")
     with start_program("dask_scheduler", *options, "--port", "0") as scheduler:
@@ -37,7 +37,7 @@ def killable_cluster(folder: Path) -> Iterator[tuple["subprocess.Popen[bytes]", 
 
 @contextmanager
 def start_program(module: str, *arguments: str) -> Iterator["subprocess.Popen[bytes]"]:
-    """One of the programs of distributed, killed in the end."""
+    """Run a program of the package distributed during the block, then kill it."""
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     command = [sys.executable, "-m", f"distributed.cli.{module}", *arguments]
     with subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:

@@ -1,4 +1,4 @@
-"""Processes in which a test lets a function run beside itself, forked from one that has imported what these need."""
+"""Processes that run a function beside a test, forked from one that has imported the needed modules."""
 
 import multiprocessing
 from multiprocessing.context import ForkServerContext
@@ -14,7 +14,7 @@ IMPORTED = (
 
 
 def find_fork_server() -> ForkServerContext:
-    """Whose processes are forked so."""
+    """Return the context that forks such processes."""
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(list(IMPORTED))
     return context

@@ -1,4 +1,4 @@
-"""A disk that takes no more, as this process sees it."""
+"""A full disk, as this process sees it."""
 
 import sys
 from collections.abc import Iterator
@@ -7,9 +7,9 @@ from contextlib import contextmanager
 
 @contextmanager
 def full_disk(left_bytes: int = 0) -> Iterator[None]:
-    """No file can be written beyond `left_bytes` in this block: "File too large", as the system says then.
+    """Prevent writing any file beyond `left_bytes` in this block; the system's error is then "File too large".
 
-    Nor is what Python compiles of a module that is imported here: it would be kept cut short, and no error said.
+    Python stores no compiled modules here either: they would be truncated without an error.
     """
     import resource  # which Windows has not
 

@@ -1,7 +1,7 @@
-"""The processes that `support.processes.warm` has others forked from: `python nursery.py ENVIRONMENT`.
+"""The processes from which `support.processes.warm` forks others: `python nursery.py ENVIRONMENT`.
 
-One has imported everything; the other, in an environment with these variables as JSON, what only reads. The line on
-stdout says by module where orders are taken. They end with their standard input.
+One has imported everything; the other, in an environment with the variables in the JSON argument, only what readers of
+files need. The line on stdout gives by module the address for orders. They end with their standard input.
 """
 
 import gc
@@ -41,10 +41,10 @@ Order = dict[str, Any]
 
 
 class Forked(subprocess.Popen[Any]):
-    """As Popen, but for its birth and its end: it is no child of this process, so its status comes through a socket.
+    """A Popen whose process is no child of this one, so that its exit status comes through a socket.
 
-    `address` says where orders for it are taken, `command` what comes after `python -m`, with `safe_path` after
-    `python -P -m`.
+    `address`: where its order is sent; `command`: the words after `python -m`, or with `safe_path` after `python -P
+    -m`.
     """
 
     def __init__(self, address: str, command: list[str], *, safe_path: bool, **options: Any) -> None:
@@ -92,9 +92,9 @@ class Forked(subprocess.Popen[Any]):
 
 
 def fork_modules(modules: Collection[str], address: Callable[[str], str]) -> None:
-    """Have every `python -P -m MODULE …` of these modules forked that this process starts by Popen.
+    """Fork every `python -P -m MODULE …` of these modules that this process starts by Popen.
 
-    A laboratory is forked only into a session of its own, as a run starts one: then no signal for the run reaches it.
+    A laboratory is forked only into a session of its own, as a run does, so that no signal for the run reaches it.
     """
 
     class Named(Forked):
@@ -110,7 +110,7 @@ def fork_modules(modules: Collection[str], address: Callable[[str], str]) -> Non
 
 
 def _born(address: str, order: Order, streams: list[int]) -> tuple[int, socket.socket]:
-    """A new process: its identity, and where its status is told (as of `os.waitpid`, 4 bytes) when it has ended."""
+    """Fork a process; return its id, and the socket that gets its status at its end (of `os.waitpid`, 4 bytes)."""
     kept, child_end = socket.socketpair()
     with child_end, socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as orders:
         orders.connect(bytes.fromhex(address))
@@ -125,7 +125,7 @@ def _number(channel: socket.socket, flags: int = 0) -> int:
 
 
 def listening() -> socket.socket:
-    """A socket for orders, at an address that the system makes up."""
+    """Return a listening socket for orders, at an address that the system chooses."""
     orders = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     orders.bind("")
     orders.listen()
@@ -133,12 +133,12 @@ def listening() -> socket.socket:
 
 
 def address_of(orders: socket.socket) -> str:
-    """Return the address at which it listens, as written in JSON."""
+    """Return a socket's address as written in JSON."""
     return bytes(orders.getsockname()).hex()
 
 
 def serve_orders(orders: socket.socket) -> Order | None:
-    """Fork until standard input ends: in a process that was forked what it shall do, None in the end."""
+    """Fork until standard input ends; return the order in each forked process, and None at the end."""
     with selectors.DefaultSelector() as selector:
         selector.register(orders, selectors.EVENT_READ)
         selector.register(sys.stdin, selectors.EVENT_READ)
@@ -175,7 +175,7 @@ def _tell_status(process: int, channel: int) -> None:
 
 
 def _become(order: Order, streams: list[int], channel: int) -> None:
-    """The environment, folder, session, signals and streams of a process that the system has just started."""
+    """Take the environment, folder, session, signals and streams of a process that the system has just started."""
     if order["new_session"]:
         os.setsid()
     signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -198,7 +198,7 @@ def _become(order: Order, streams: list[int], channel: int) -> None:
 
 
 def _serve() -> None:
-    """Two processes, one with everything and one that only reads, which their children go on from."""
+    """Start both processes, with everything and for readers only; their forked children continue from here."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C in the terminal is for those that were forked
     sys.path[0] = str(Path.cwd())  # as of `python -m`
     everything, reading = listening(), listening()

@@ -1,4 +1,4 @@
-"""What needs no arm, run by an interpreter that lacks the modules which only Linux has."""
+"""Commands without an arm, run by an interpreter without the modules that only Linux has."""
 
 import os
 import shutil
@@ -48,9 +48,8 @@ print(*statuses.values(), file=sys.stderr)
 def run_without_linux_modules(interpreter: str | Path, folder: Path, paths: Sequence[Path] = ()) -> str:
     """Solve, show, verify and enter in the new `folder`; assert that all succeeds, and return the file of `rig`.
 
-    A simulated laboratory is refused by name, and leaves nothing behind.
-
-    `paths` are where the interpreter finds what is not installed in it.
+    A simulated laboratory is refused by name, and leaves no files. `paths`: search paths for packages that the
+    interpreter lacks.
     """
     (folder / "sitecustomize.py").write_text(HIDDEN, encoding="utf-8")
     (folder / "configs").mkdir()

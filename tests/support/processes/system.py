@@ -1,17 +1,17 @@
-"""What the system tells of processes (proc(5))."""
+"""Information of the system on processes (proc(5))."""
 
 from contextlib import suppress
 from pathlib import Path
 
 
 def resident_kb(process: int) -> int:
-    """Return the memory that it uses, kB."""
+    """Return a process' resident memory, kB."""
     status = Path(f"/proc/{process}/status").read_text(encoding="ascii")
     return int(status.split("VmRSS:")[1].split()[0])
 
 
 def descendant(process: int, word: str) -> int:
-    """The first of the processes that it or its own have started whose command has this word. Raises LookupError."""
+    """Return the first descendant of a process whose command contains this word. Raise LookupError if there is none."""
     family = [process]
     for relative in family:
         with suppress(OSError):  # one that has ended meanwhile
@@ -23,8 +23,8 @@ def descendant(process: int, word: str) -> int:
 
 
 def grown(memory_kb: list[int]) -> float:
-    """By which part memory has grown over parts in a row.
+    """Return the fraction by which memory has grown over consecutive parts.
 
-    Of a few parts the most counts: what is connected ahead comes and goes, and a part with repeated sweeps needs more.
+    The largest of a few parts counts, because connections ahead vary, and a part with repeated sweeps needs more.
     """
     return max(memory_kb[-4:]) / max(memory_kb[1:5]) - 1.0

@@ -1,4 +1,4 @@
-"""Waiting for what another process or thread does: for the event itself, never for so long."""
+"""Waiting for events in other processes or threads, never for a fixed time."""
 
 import subprocess
 import time
@@ -19,9 +19,9 @@ def wait_for(
     *,
     meanwhile: Callable[[], object] = lambda: None,
 ) -> Any:
-    """Wait until `condition` is true, and return what it said; `what` is for whoever reads that it never was.
+    """Wait until `condition` is true, and return its value; `what` names it in the error after `limit_s`.
 
-    `meanwhile` is done again and again: it raises what makes waiting vain.
+    `meanwhile` is called repeatedly; it raises an error that makes waiting futile.
     """
     end_s, look_s = time.monotonic() + limit_s, LOOK_S
     while not (answer := condition()):
@@ -33,7 +33,7 @@ def wait_for(
 
 
 def wait_for_error(kind: type[Error], act: Callable[[], object], limit_s: float = PATIENCE_S) -> Error:
-    """Do `act` again and again until it raises an error of that kind, and return the error."""
+    """Call `act` repeatedly until it raises an error of that kind, and return the error."""
 
     def raised() -> Error | None:
         try:
@@ -47,7 +47,7 @@ def wait_for_error(kind: type[Error], act: Callable[[], object], limit_s: float 
 
 
 def alive(process: "subprocess.Popen[Any]") -> Callable[[], None]:
-    """For `wait_for`, `meanwhile` a process goes on: once it has ended, what it said fails the test."""
+    """Return a `meanwhile` for `wait_for` that fails the test with a process' output once it has ended."""
 
     def check() -> None:
         assert process.poll() is None, process.communicate()

@@ -1,9 +1,9 @@
-"""Processes of `python -m rig …` that need not import everything anew, which takes longer than most of them run.
+"""Processes of `python -m rig …` without the imports, which take longer than most of them run.
 
-They are forked from one process that has imported what they need, and so are the laboratories that they start; what
-takes run files apart is forked from another. Of those that the system starts they differ in this alone that /proc shows
-another command line and another parent. Tests of what a process imports, of how soon it starts, of how much memory it
-takes and of variables of Python's own start one by the system, and so does all of `make proof`.
+They are forked from one process that has imported all they need, and so are the laboratories that they start; readers
+of run files are forked from another. They differ from processes started by the system only in command line and parent,
+as shown by /proc. Tests of a process' imports, start time and memory, and of Python's own variables start it by the
+system, and so does all of `make proof`.
 """
 
 import atexit
@@ -23,10 +23,10 @@ NURSERY = Path(__file__).with_name("nursery.py")
 
 
 class _Nursery:
-    """The processes that all are forked from. They are started when the first is wanted, and end with this one.
+    """The processes from which all others are forked. They start with the first use, and end with this process.
 
-    `addresses`: where their orders are taken. Several processes that run tests share those of the one that started
-    them, because to import everything takes seconds.
+    `addresses`: where orders are sent. Several test processes share those of the process that started them, because
+    importing everything takes seconds.
     """
 
     def __init__(self) -> None:
@@ -42,7 +42,7 @@ class _Nursery:
         return self.addresses.get(module, self.addresses["rig"])
 
     def begin(self) -> dict[str, str]:
-        """Start them; return their addresses."""
+        """Start the processes; return their addresses."""
         command = [sys.executable, str(NURSERY), json.dumps(ENVIRONMENT)]
         process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
         assert process.stdin is not None and process.stdout is not None
@@ -63,13 +63,13 @@ nursery = _Nursery()
 
 
 def readers_forked() -> None:
-    """Have what takes run files apart forked for this process too."""
+    """Fork the readers of run files for this process too."""
     fork_modules((READER,), nursery.address)
 
 
 @contextmanager
 def readers_of_system() -> Iterator[None]:
-    """For the length of the block they are processes that the system starts."""
+    """Start the readers by the system during the block."""
     forking = subprocess.Popen.__new__
     subprocess.Popen.__new__ = lambda kind, *_, **__: object.__new__(kind)  # pyrefly: ignore[bad-assignment, method-assign]  # of CPython itself
     try:
@@ -79,12 +79,12 @@ def readers_of_system() -> Iterator[None]:
 
 
 def start_module(*words: str | Path, module: str = "rig", **options: Any) -> "subprocess.Popen[Any]":
-    """`python -m MODULE WORDS …`; `options` as of Popen, but for those of what is done before the program begins."""
+    """Start `python -m MODULE WORDS …`. `options`: those of Popen, except for actions before the program begins."""
     if nursery.closed:
         return start_by_system(*words, module=module, **options)
     return Forked(nursery.address(module), [module, *map(str, words)], safe_path=False, **options)
 
 
 def start_by_system(*words: str | Path, module: str = "rig", **options: Any) -> "subprocess.Popen[Any]":
-    """As `started`, always by the system."""
+    """Start a module as `start_module` does, but always by the system."""
     return subprocess.Popen([sys.executable, "-m", module, *map(str, words)], **options)

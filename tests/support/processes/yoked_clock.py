@@ -1,4 +1,4 @@
-"""A clock that two processes share, and that goes no faster than both of them get a processor."""
+"""A clock shared by two processes, which stops while either of them gets no processor."""
 
 import threading
 import time
@@ -16,8 +16,8 @@ NOW, READ, DRIVEN, FREE, LIMIT = range(5)
 class YokedClock:
     """The time of a simulated servo and of its driver (a `Clock` of the driver's).
 
-    The simulation moves it on, by the clock on the wall, and waits for the driver's thread that has the line: while
-    either is held up, no time passes for both. `name` is that thread's.
+    The simulation advances it by wall time, and waits for the driver's thread that uses the line: while either is
+    delayed, time stands still for both. `name`: that of the thread.
     """
 
     def __init__(self, name: str) -> None:
@@ -27,12 +27,12 @@ class YokedClock:
         self.begin()
 
     def begin(self) -> None:
-        """Begin anew, with no driver so far."""
+        """Start again, without a driver."""
         self._cells[:] = [100.0, 100.0, 0.0, 0.0, float("inf")]
 
     # The simulation's ---------------------------------------------------------------------------------------------
     def move_on(self) -> None:
-        """Let time pass, as far as it may."""
+        """Let time pass, as far as permitted."""
         now_s, cells = time.monotonic(), self._cells
         passed_s, self._wall_s = min(now_s - self._wall_s, STEP_S), now_s
         yoked = cells[DRIVEN] and not cells[FREE]
@@ -40,12 +40,12 @@ class YokedClock:
         cells[NOW] = max(cells[NOW], min(cells[NOW] + passed_s, most_s))
 
     def time_s(self) -> float:
-        """Return the time, and let no more pass for that."""
+        """Return the time, without letting more pass."""
         return float(self._cells[NOW])
 
     # The driver's -------------------------------------------------------------------------------------------------
     def now_s(self) -> float:
-        """Return the time; read by the thread that has the line, or before there is one, it may go on."""
+        """Return the time; it may then continue, if the caller is the thread with the line or there is none yet."""
         now_s = float(self._cells[NOW])
         threads = {thread.name for thread in threading.enumerate()}
         if threading.current_thread().name == self._name or self._name not in threads:
@@ -71,7 +71,7 @@ class YokedClock:
     # A test's -----------------------------------------------------------------------------------------------------
     @contextmanager
     def without_the_driver(self) -> Iterator[None]:
-        """Inside, time passes though the driver reads no clock: it is held up, or dead."""
+        """Let time pass in the block although the driver, delayed or dead, reads no clock."""
         self._cells[FREE] = 1.0
         try:
             yield
@@ -79,7 +79,7 @@ class YokedClock:
             self._cells[READ], self._cells[FREE] = self._cells[NOW], 0.0
 
     def go_on_until(self, time_s: float) -> None:
-        """Let that much time pass without the driver, and no more."""
+        """Let time pass until `time_s` without the driver, then stop."""
         self._cells[LIMIT] = time_s
         with self.without_the_driver():
             while self._cells[NOW] < time_s:

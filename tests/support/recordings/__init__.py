@@ -1,1 +1,1 @@
-"""Recordings: computed, drawn, damaged and frozen, and how they are solved."""
+"""Recordings: computed, drawn, damaged and frozen, and their solution."""

@@ -25,7 +25,7 @@ OF_16_BITS_RAD_S = 500 * DEG / 2**15  # a step of a MEMS gyroscope's converter
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """How a source sends rates in rad/s: `sent` makes of them what is recorded, in this channel, of such a part."""
+    """A source of rates: `sent` converts rates in rad/s to the recorded values of `channel` of such a part."""
 
     part: str
     channel: Channel
@@ -43,7 +43,7 @@ def _single(rates: Array) -> Array:
 
 
 def _make_printer(digit: float, of_a_converter: float = 0.0) -> Callable[[Array], Array]:
-    """Numbers whose last digit is `digit`, rad/s, of readings in steps of a converter, if that has any."""
+    """Return a function that rounds rates, rad/s, to a converter's steps, if any, then to the last digit `digit`."""
 
     def sent(rates: Array) -> Array:
         read = np.rint(rates / of_a_converter) * of_a_converter if of_a_converter else rates
@@ -75,7 +75,7 @@ SOURCES: Mapping[str, Source] = MappingProxyType(
 
 @dataclass(frozen=True, slots=True)
 class Stated:
-    """What a recording says: errors of scale and bias (6,), their U (6,), the names of the checks that failed."""
+    """A recording's result: errors of scale and bias (6,), their U (6,), the names of failed checks."""
 
     error: Array
     expanded: Array
@@ -83,7 +83,7 @@ class Stated:
 
 
 def record(source: Source, seed: int, noise_rad_s: float, *, vibrates: bool) -> Drawn:
-    """A recording of a source, drawn as its part's data sheet and the arm's limits let it be."""
+    """Return a recording of a source, drawn within its part's data sheet and the arm's limits."""
     channels = (source.channel, thermometer_channel(0.01, 0.0))
     sensor = replace(SENSOR, part=source.part, rate_hz=100.0, channels=channels, clock="gyro")
     flicker_rad_s = float(np.radians(PARTS[source.part].bias_instability_deg_h / 3600))

@@ -39,7 +39,7 @@ class Readings:
 
     @property
     def values(self) -> Array:
-        """(n, 3) m/s² or T."""
+        """The values (n, 3), m/s² or T."""
         return np.asarray(self.counts * self.count, dtype=np.float64)
 
     @property
@@ -109,7 +109,7 @@ def readings_of(folder: str, sensor: str) -> Readings:
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """The checks of accelerometers and magnetometers, and why a magnetometer has none."""
+    """The checks of accelerometers and magnetometers, and the reason why a magnetometer has none."""
 
     checks: tuple[Check, ...]
     refused: frozenset[str]

@@ -1,4 +1,4 @@
-"""Readings of a recording, damaged on purpose as by a loose board, a broken wire or a tired sensor."""
+"""Readings of a recording, damaged on purpose as by a loose board, a broken wire or a worn sensor."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -174,7 +174,7 @@ def replace_readings(where: Callable[[Readings], Mask], by: int) -> Damage:
 
 
 def roll(where: Callable[[Readings], Mask], share: float) -> Damage:
-    """Put samples into another order: the first come last."""
+    """Rotate the order of samples: the last fraction `share` comes first."""
 
     def damage(readings: Readings) -> Readings:
         counts, chosen = readings.counts.copy(), where(readings)
@@ -208,7 +208,7 @@ def old(every: int) -> Damage:
 
 
 def late(by_s: float, where: Callable[[Readings], Mask]) -> Damage:
-    """Time stamps of a stretch shifted, squeezed at its end so that their order stays."""
+    """Delay the time stamps of a stretch, compressed at its end so that their order remains."""
 
     def damage(readings: Readings) -> Readings:
         chosen = np.flatnonzero(where(readings))

@@ -56,17 +56,17 @@ class Session:
 
     @property
     def times_s(self) -> Array:
-        """(N + M,) of the middles."""
+        """Times (N + M,) of the middles, s."""
         assert self.movement.sensor_errors is not None
         return np.asarray(self.movement.sensor_errors.windows_s.mean(axis=1), dtype=np.float64)
 
     @property
     def late(self) -> Array:
-        """(N + M,) 1 in the second half of the run."""
+        """Mask (N + M,): 1 in the second half of the run."""
         return np.asarray(self.times_s > (self.times_s.min() + self.times_s.max()) / 2, dtype=np.float64)
 
     def reading(self, more: Array, then: Array | float = 0.0) -> "Session":
-        """With so much (3 K,) more in its readings, which makes `then` (6,) of its parameters."""
+        """Return the session with `more` (3 K,) added to its readings, and `then` (6,) as its true parameters."""
         added, count = more.reshape(-1, 3), len(self.movement.dwells.readings_m_s2)
         dwells, sweeps = self.movement.dwells, self.movement.sweeps
         movement = replace(
@@ -166,7 +166,7 @@ def solve_session(session: Session) -> tuple[ImuSolution, Budget, Array]:
 
 
 def read_of(session: Session, solution: ImuSolution) -> ReferenceModel:
-    """Return the inputs of the checks of consistency."""
+    """Return the inputs of the consistency checks."""
     turned = plan_sweeps(AXES)
     stood = [
         *map(Posture, JOINTS),
@@ -190,7 +190,7 @@ Damage = Callable[[Session, float], Session]
 
 
 def bent(change: Callable[[Array], Array], scale: float = 0.0) -> Damage:
-    """By what an axis adds that feels so much; `scale` is the part of it that is seen at 1 g up and down."""
+    """Add `change` of the specific force to each axis; `scale`: the part that acts on the scale at ±1 g."""
 
     def damage(session: Session, size: float) -> Session:
         more = project_errors(

@@ -1,4 +1,4 @@
-"""Recordings of complete sensors on complete arms, drawn from what a configuration states of both: nothing is damaged.
+"""Recordings of complete sensors on complete arms, drawn within a configuration's statements on both, and undamaged.
 
 Errors that the arm's encoders do not see lie within `uncertainty.*`, those of the sensor within its data sheet. The
 p-values of checks that use exactly this knowledge are uniform.
@@ -44,9 +44,9 @@ OCTAVES_S = (0.5, 2.0, 8.0, 32.0, 128.0)
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """Of sensors: what is recorded of one, and standard deviations of what it does.
+    """A kind of sensor: the recorded one, and standard deviations of its noise.
 
-    `sent` makes of rates (n, 3) what a source sends of them, of one that rounds them otherwise than to counts.
+    `sent`: converts rates (n, 3) to the sent ones, for sources that do not round to counts.
     """
 
     sensor: RecordedSensor
@@ -98,9 +98,9 @@ KINDS = {
 
 @dataclass(frozen=True, slots=True)
 class Drawn:
-    """A recording, and what its damage is planted with: the controller's time of each sample, and what was felt.
+    """A recording, and data for planting damage: the controller's time of each sample, and the sensed rates.
 
-    The truth beside it: `scale` (3,) at the sweeps' speed, either way, and what was read at each time without turning.
+    The truth: `scale` (3,) at the sweeps' speed, either way, and the reading at each time without rotation.
     """
 
     run: RunData
@@ -113,7 +113,7 @@ class Drawn:
 def drawn(
     seed: int, kind: Kind, setup: Setup | None = None, ripple: Ripple | None = None, *, vibrates: bool = True
 ) -> Drawn:
-    """Draw a recording. The movement is that of `setup`; its unevenness is `ripple`, or usual, or none."""
+    """Draw a recording. The movement is that of `setup`; its ripple is `ripple`, by default drawn."""
     rng = np.random.default_rng(seed)
     generator = rng.spawn(1)[0]
     is_rough = seed % 4 == 0  # as no arm was seen to be; the others ripple as logged ones

@@ -1,7 +1,7 @@
-"""What an arm's speed ripples and vibrates by, drawn over all orders: 1 to 400 times a turn, 0 to 10 % of the rate.
+"""The ripple and vibration of an arm's speed, drawn over all orders: 1 to 400 times a turn, 0 to 10 % of the rate.
 
 Several lines, lines near each other, near a harmonic of the turn and near either end of the band in which lines are
-looked for; so small that nothing finds them, and so large that everything does.
+looked for; so small that no check detects them, and so large that every check does.
 """
 
 from collections.abc import Sequence
@@ -22,7 +22,7 @@ FILTERED = 0.9  # of the data rate: what is faster a sensor's filter keeps from 
 
 @dataclass(frozen=True, slots=True)
 class Ripple:
-    """How an arm's speed ripples, as a fraction of the rate, and vibrates, RMS of each wrist, at these frequencies."""
+    """The ripple of an arm's speed, as a fraction of the rate, and its vibrations, RMS of each wrist, by frequency."""
 
     orders: Sequence[int]
     fraction: float
@@ -46,7 +46,7 @@ def make_keys(ripple: Ripple) -> dict[str, Any]:
 
 
 def drawn_ripple(rng: np.random.Generator, turn_hz: float, sample_rates_hz: Sequence[float]) -> Ripple:
-    """Draw that of an arm which makes `turn_hz` turns a second, read at those rates."""
+    """Draw the ripple of an arm that makes `turn_hz` turns a second, for sensors read at `sample_rates_hz`."""
     orders = _orders(rng, [rate_hz / 2 / turn_hz for rate_hz in sample_rates_hz])
     most = min(MOST_FRACTION, MOST_PEAK / np.sqrt(2 * len(orders)))
     fastest_hz = min(MOST_HZ, FILTERED * min(sample_rates_hz))
@@ -86,7 +86,7 @@ def _order(rng: np.random.Generator) -> int:
 
 
 def _frequency(rng: np.random.Generator, orders: Sequence[int], slowest: float) -> float:
-    """Times a turn: anything, or near one of the ripple's orders."""
+    """Draw an order (times a turn): any, or near one of the ripple's orders."""
     order = float(np.exp(rng.uniform(np.log(slowest), np.log(MOST_ORDER))))
     if rng.random() < 0.4:
         order = slowest + abs(orders[int(rng.integers(len(orders)))] + float(rng.uniform(-2, 2)) - slowest)

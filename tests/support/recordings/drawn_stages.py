@@ -1,5 +1,7 @@
-"""Recordings of one sensor on one arm, mounted anew from stage to stage and each time a little off, drawn as
-`support.recordings.drawn_recording` draws one."""
+"""Recordings of one sensor on one arm, mounted again for each stage with another small error.
+
+Each is drawn as by `support.recordings.drawn_recording`.
+"""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,9 +1,10 @@
-"""Frozen recordings, one of each kind, and how another one is frozen:
+"""Frozen recordings, one of each kind, and the commands that freeze another one:
 
     rig run CONFIG --out RUN
     PYTHONPATH=tests python -m support.recordings.frozen RUN KIND
 
-A frozen recording is a run folder: recordings, the configuration they were made by, and the result they are to give."""
+A frozen recording is a run folder: recordings, their configuration, and the result that they must give.
+"""
 
 import shutil
 import sys
@@ -14,7 +15,7 @@ from support.paths import RECORDINGS
 
 
 def frozen() -> list[Path]:
-    """Return the folders of all of them."""
+    """Return the folders of all frozen recordings."""
     return sorted(path.parent for path in RECORDINGS.rglob("run.h5"))
 
 
@@ -34,7 +35,7 @@ def _recordings(folder: Path) -> list[Path]:
 
 
 def _compress(source: Path, target: Path) -> None:
-    """Copy attributes and rows compressed, as a run file reserves room for more."""
+    """Copy attributes and rows compressed, because a run file reserves space for more."""
     import h5py
 
     with h5py.File(source) as file, h5py.File(target, "w") as copy:

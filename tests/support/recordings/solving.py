@@ -1,4 +1,4 @@
-"""Recordings to calibrations in one step."""
+"""Calibrations from recordings in one step."""
 
 from collections.abc import Sequence
 

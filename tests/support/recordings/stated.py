@@ -1,6 +1,6 @@
-"""Comparison of two results of one recording, by the uncertainties that they state.
+"""Comparison of two results of one recording by their stated uncertainties.
 
-Rounding by another processor is no difference, nor is the order in which its kernel adds.
+Another processor's rounding is no difference, nor is the order of its additions.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -24,7 +24,7 @@ Number = tuple[str, float, float]  # its name, its value, and of what it may mov
 
 
 def differences(expected: ResultDocument, actual: ResultDocument) -> list[str]:
-    """Return every number of `expected` that differs in `found` or is missing, with verdict and checks.
+    """Return every number of `expected` that differs in `actual` or is missing, with verdict and checks.
 
     A value is compared by its standard uncertainty, an uncertainty by its own size, a check by its limit, a count
     exactly.
@@ -42,7 +42,7 @@ def differences(expected: ResultDocument, actual: ResultDocument) -> list[str]:
 
 
 def _summarise(check: CheckEntry) -> tuple[object, ...]:
-    """Return whether a check passed and its subject; a check of fitness may say more of that in a later version."""
+    """Return whether a check passed and its subject; a fitness check may add to its subject in a later version."""
     means = check.means
     return check.passed, means if means.kind == "conformity" else (means.kind, means.sweep)
 

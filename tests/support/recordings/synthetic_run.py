@@ -217,7 +217,7 @@ def readings(setup: Setup, rate: Array, rng: np.random.Generator, force_g: Array
 
 
 def sizes_of(parts: Mapping[str, str]) -> dict[str, dict[str, float]]:
-    """Return what `uncertainty` states of sensors of these parts, by name, where the configuration says nothing."""
+    """Return the defaults of `uncertainty` for sensors of these parts, by name."""
     return {what: {name: float(getattr(PARTS[part], what)) for name, part in parts.items()} for what in OF_SENSORS}
 
 
@@ -252,7 +252,7 @@ def run_data(setup: Setup, motion: Motion, board_s: Array, counts: Array) -> Run
 
 
 def encoder_angles(setup: Setup, q_rad: Array) -> Array:
-    """Return what the encoders say of the angles (n, 6): their noise, and steps."""
+    """Return the encoders' angles (n, 6), with their noise and steps."""
     noise = np.random.default_rng([setup.seed, 24]).standard_normal(q_rad.shape)
     return np.round((q_rad + setup.encoder_noise_rad * noise) / setup.encoder_step_rad) * setup.encoder_step_rad
 

@@ -32,14 +32,14 @@ REFERENCE = Setup(
 
 @dataclass(frozen=True, slots=True)
 class Stored:
-    """The calibration the board applies in calibrated mode; without an argument, the truth."""
+    """The calibration that the board applies in calibrated mode; by default the truth."""
 
     scale: Array
     bias_rad_s: Array
 
     @property
     def correction_matrix(self) -> Array:
-        """(3, 3) K."""
+        """The matrix K (3, 3)."""
         return np.diag(self.scale)
 
 

@@ -1,1 +1,1 @@
-"""What stands at the other end of a wire or in it: devices, relays, damage."""
+"""Devices at the other end of a wire, relays, and damage to its bytes."""

@@ -27,7 +27,7 @@ CONNECT = "control, receive = RTDEControlInterface(host), RTDEReceiveInterface(h
 
 
 class Client:
-    """A script around ur_rtde in its own process; what it says comes line by line."""
+    """A script around ur_rtde in its own process, with output line by line."""
 
     def __init__(self, host: str, script: str, connect: bool) -> None:
         code = (
@@ -48,7 +48,7 @@ class Client:
         assert answer == line, f"the client said {answer!r} instead of {line!r}"
 
     def next(self) -> str:
-        """Return the next line of the script, skipping what ur_rtde prints in between."""
+        """Return the next line of the script, without ur_rtde's own output."""
         for line in self._lines:
             if line.startswith(">"):
                 return line[1:].strip()

@@ -12,9 +12,9 @@ PACKET_BYTES, SLOW_S = 256, 0.02  # a slowed connection is soon far behind
 
 
 class ArmRelay:
-    """Passes on what comes at `host`. While `stalled` is set it takes nothing more in, either way.
+    """A relay at `host`. While `stalled` is set it reads nothing, in either direction.
 
-    While `slow` is set, the connections that were open at `slow_down` pass on less than comes.
+    While `slow` is set, the connections that were open at `slow_down` pass on fewer bytes than they get.
     """
 
     def __init__(self, far_host: str, host: str | None = None) -> None:
@@ -29,7 +29,7 @@ class ArmRelay:
             threading.Thread(target=self._accept, args=(listener, port), daemon=True).start()
 
     def slow_down(self) -> None:
-        """Pass on less than comes over the connections that are open now, until `slow` is cleared."""
+        """Pass on fewer bytes than arrive over the connections open now, until `slow` is cleared."""
         self._slowed = [*self._sockets]
         self.slow.set()
 

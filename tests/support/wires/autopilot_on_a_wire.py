@@ -1,4 +1,4 @@
-"""A simulated autopilot on a pseudo-terminal, without a laboratory around it: it turns as it is told."""
+"""A simulated autopilot on a pseudo-terminal, without a laboratory around it, with a given motion."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -28,7 +28,7 @@ PERFECT = SimulatedSensorSection(
 
 
 def section(port: str, imu: str = "HIGHRES_IMU", **changes: Any) -> SensorSection:
-    """A configured IMU of the autopilot at `port`."""
+    """Return the section of an IMU of the autopilot at `port`."""
     line = {"port": port, "baud": changes.pop("baud", 921600), "imu": imu, "uid": changes.pop("uid", None)}
     line["temperature"] = changes.pop("temperature", None)
     sensor = {"part": "mavlink", "serial_number": "FC-1", "mavlink": line, "acceleration": {"range_g": 16}, **changes}
@@ -36,7 +36,7 @@ def section(port: str, imu: str = "HIGHRES_IMU", **changes: Any) -> SensorSectio
 
 
 class AutopilotOnAWire:
-    """The autopilot, at most `pace` times as fast as the clock on the wall."""
+    """The autopilot, at most `pace` times as fast as real time."""
 
     def __init__(
         self,
@@ -115,7 +115,7 @@ def autopilot_on_a_wire(
     motion_at: Callable[[float], Sequence[float]] = lambda time_s: STILL,
     **of_it: Any,
 ) -> Iterator[AutopilotOnAWire]:
-    """For the length of the `with` block; over a `dead` line nothing has ever come."""
+    """Run the autopilot during the `with` block."""
     wire = AutopilotOnAWire(firmware, stored_parameters or {}, motion_at, **of_it)
     try:
         yield wire

@@ -1,4 +1,4 @@
-"""A bus of servos at a port of this computer, for programs that only want a port."""
+"""A bus of servos at a port of this computer, for programs that only need a port."""
 
 import selectors
 import socket
@@ -15,7 +15,7 @@ TICK_S = 0.002  # the world looks at its servos at least this often
 
 
 class Port(Protocol):
-    """Where the line's bytes come out; `path` is what to open."""
+    """The host's end of the line; `path` is the port to open."""
 
     path: str
 
@@ -26,8 +26,8 @@ class Port(Protocol):
 class TcpPort:
     """A port at socket://, for one client at a time.
 
-    What is sent is there at once. Through a pseudo-terminal a thread of the kernel's carries it, which may get no
-    processor for longer than an answer may take.
+    Bytes arrive at once. Through a pseudo-terminal a kernel thread carries them, which may get no processor for longer
+    than an answer may take.
     """
 
     def __init__(self, line: SerialLine, selector: selectors.BaseSelector) -> None:
@@ -54,7 +54,7 @@ class TcpPort:
             self._hang_up()
 
     def tick(self) -> None:
-        """Hand on what the servos sent."""
+        """Pass on the bytes that the servos sent."""
         if self._line.fresh and self._client is not None and (data := self._line.read_as_host(None)):
             with suppress(OSError):
                 self._client.sendall(data)
@@ -66,16 +66,16 @@ class TcpPort:
             self._client = None
 
     def close(self) -> None:
-        """Hang up, and listen no more."""
+        """Hang up, and stop listening."""
         self._hang_up()
         self._selector.unregister(self._listening)
         self._listening.close()
 
 
 class BusOnALine:
-    """`port` is what to open; `live` lets it live for a while, in whatever thread or process it is called.
+    """A bus at the port `port`; `live` simulates it for a while, in the caller's thread.
 
-    `now` is the time of its servos; where it does not pass by itself, `move_on` lets it.
+    `now`: the time of its servos; `move_on` advances it, if it does not pass by itself.
     """
 
     def __init__(
@@ -93,7 +93,7 @@ class BusOnALine:
         self.port = self._port.path
 
     def live(self, duration_s: float) -> None:
-        """Serve the port for so long by the wall; what has come is heard before it is late for the watchdog."""
+        """Serve the port for `duration_s` of wall time; received bytes are read before the watchdog can expire."""
         ends_s = time.monotonic() + duration_s
         while time.monotonic() < ends_s:
             self._move_on()
@@ -115,6 +115,6 @@ class BusOnALine:
             self._port = None
 
     def close(self) -> None:
-        """End with it."""
+        """Close the port."""
         self.pull_out()
         self._selector.close()

@@ -1,4 +1,4 @@
-"""What a bad way does to messages, and a watch over whoever reads them."""
+"""Damage to messages in transit, and a guard around their readers."""
 
 import signal
 import struct
@@ -11,7 +11,7 @@ NASTY = (b"\0", b"\xff", b"\n", b"\r", b"\x1b[2J", b"%s%n", b"\xed\xa0\x80", b"(
 
 
 def damage_message(random: Random, messages: Sequence[bytes]) -> bytes:
-    """One of the messages after one to four faults, unlike each of them."""
+    """Return one of the messages after one to four faults, different from all of them."""
     before = random.choice(messages)
     while True:
         bad = bytearray(before)

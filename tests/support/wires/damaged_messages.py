@@ -1,7 +1,7 @@
-"""Messages to and from the arm's controller that came to harm on the way, and how their readers end.
+"""Damaged messages to and from the arm's controller, and how their readers end.
 
-Nothing a reader may do but read, or refuse by name: what it raises otherwise reaches the caller of `carry_*`, with the
-bytes that did it. A reader that hangs is ended by an alarm.
+A reader must read or refuse by name: any other exception reaches the caller of `carry_*`, with the bytes that caused
+it. A reader that hangs is ended by an alarm.
 """
 
 import socket
@@ -58,7 +58,7 @@ DASHBOARD_ANSWERS = tuple(
 
 
 class Controller:
-    """Sends one client after the other what it is told, a part for each question or all unasked, and hangs up."""
+    """A server that sends given parts to one client after the other, one for each question or all at once."""
 
     def __init__(self, port: int) -> None:
         self._listeners = [socket.create_server((host, port), backlog=4) for host in HOSTS]
@@ -68,7 +68,7 @@ class Controller:
         threading.Thread(target=self._serve, daemon=True).start()
 
     def next(self, parts: Sequence[bytes]) -> str:
-        """The host to connect to for these parts."""
+        """Return the host to connect to for these parts."""
         self._parts = parts
         self._asked.release()
         return HOSTS[self._turn % len(HOSTS)]
@@ -124,7 +124,7 @@ def _read_account(host: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Reader:
-    """A reader of the rig's: where it connects, the sound dialogue, and how it is made to read it."""
+    """A reader of the rig: its port, an undamaged dialogue, and the function that reads it."""
 
     port: int
     sound: Sequence[bytes]
@@ -140,7 +140,7 @@ def _primary_states() -> Sequence[bytes]:
 
 
 def readers() -> dict[str, Reader]:
-    """By the protocol's name."""
+    """Return the readers by their protocol's name."""
     return {
         "RTDE": Reader(rtde_packages.PORT, RTDE_ANSWERS, _read_states),
         "dashboard": Reader(dashboard.DASHBOARD_PORT, DASHBOARD_ANSWERS, _ask_dashboard),
@@ -149,7 +149,7 @@ def readers() -> dict[str, Reader]:
 
 
 def _dialogue(name: str, random: Random, sound: Sequence[bytes]) -> tuple[list[bytes], bytes]:
-    """An answer for each question, with what comes unasked, one message of it all damaged; and that message."""
+    """Return an answer for each question, with unrequested messages, one of all damaged; and that message."""
     bad = damage_message(random, sound)
     if name == "RTDE":
         protocol, version, recipe, begun, state, message = sound
@@ -167,7 +167,7 @@ def _dialogue(name: str, random: Random, sound: Sequence[bytes]) -> tuple[list[b
 
 
 def carry_to_rig(name: str, count: int, seed: int) -> Counter[str]:
-    """So many damaged messages to the rig's reader of a protocol: how it ended, by name."""
+    """Send `count` damaged messages to the rig's reader of a protocol; return the counts of its ends by name."""
     random, reader, ends = Random(f"{name} {seed}"), readers()[name], Counter[str]()
     controller = Controller(reader.port)
     try:
@@ -213,7 +213,7 @@ def _laboratory() -> Laboratory:
 
 
 def _requests(random: Random) -> list[bytes]:
-    """Packages of a client of RTDE, with commands to a control program among them."""
+    """Return packages of an RTDE client, including commands to a control program."""
     numbers = [random.choice(NUMBERS) if random.random() < 0.3 else random.uniform(-3, 3) for _ in range(11)]
     data = struct.pack(">B2i11d", 1, random.choice(COMMANDS), random.randrange(2), *numbers)
     return [
@@ -237,10 +237,10 @@ SESSIONS: Mapping[str, Callable[[Robot], ClientSession]] = {
 
 
 def carry_to_world(name: str, count: int, seed: int) -> Counter[str]:
-    """So many damaged messages to the simulated controller's sessions of a protocol, a tick after each: what it said.
+    """Send `count` damaged messages to the simulated controller's sessions of a protocol, a tick after each.
 
-    A session is given sound messages between the damaged ones, and made afresh when it closes or after some: one that
-    waits for the rest of a message hears none of those that follow.
+    Return the counts of its reactions. A session gets undamaged messages between the damaged ones, and is replaced when
+    it closes or after some messages, because one that waits for the rest of a message reads none of the following ones.
     """
     random, ends, laboratory = Random(f"{name} {seed}"), Counter[str](), _laboratory()
     session: ClientSession | None = None
@@ -289,7 +289,7 @@ def _what_was_said(name: str, answer: bytes, robot: Robot) -> str:
 
 
 def _recover(laboratory: Laboratory) -> None:
-    """Powered, without a stop and without a program, whatever was ordered."""
+    """Bring the controller back to power, without a stop or a program, whatever was ordered."""
     robot = laboratory.robot
     robot.stop_program("")
     robot.release()

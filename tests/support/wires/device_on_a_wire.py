@@ -1,4 +1,4 @@
-"""A simulated device on a pseudo-terminal, with no laboratory around it: the thread that it lives in."""
+"""A simulated device on a pseudo-terminal, without a laboratory around it: its thread."""
 
 import fcntl
 import os
@@ -19,10 +19,10 @@ UNREAD = 1024  # bytes that its reader may be behind: a pseudo-terminal loses wh
 
 
 class DeviceOnAWire:
-    """The device lives at most `pace` times as fast as the clock on the wall, and no faster than it is read.
+    """A device simulated at most `pace` times as fast as real time, and no faster than it is read.
 
-    However long this process or the reader of `port` is held up, nothing is lost but by what a test spoils: the
-    device's time stands still meanwhile, and nothing is made up for. It stands still at `limit_s` too.
+    However long this process or the reader of `port` is delayed, only a test's faults lose bytes: meanwhile the
+    device's time stands still, and the delay is not made up for. The time also stands still at `limit_s`.
     """
 
     def __init__(self, device: Callable[[], Device | None], tick_s: float, pace: float, *, dead: bool = False) -> None:
@@ -40,12 +40,12 @@ class DeviceOnAWire:
         self._thread: threading.Thread | None = None
 
     def live(self, advance: Callable[[float], None]) -> None:
-        """Begin: `advance` lets the device live until a time."""
+        """Start the thread: `advance` simulates the device until a time."""
         self._thread = threading.Thread(target=self._run, args=(advance,), daemon=True)
         self._thread.start()
 
     def order(self, what: Callable[[], object]) -> None:
-        """Let the device's own thread do it, between two ticks, and wait until it is done."""
+        """Let the device's own thread call `what` between two ticks, and wait until it is done."""
         done = threading.Event()
 
         def carry_out() -> None:

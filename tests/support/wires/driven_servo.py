@@ -1,4 +1,4 @@
-"""The driver on a simulated servo, as tests take it; and as a process of its own that somebody kills."""
+"""The driver on a simulated servo, for tests; and as a process of its own to be killed."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -18,7 +18,7 @@ STANDS_RAD_S = 1e-9
 
 
 def turn(from_rad: float, by_deg: float, speed_deg_s: float = 120.0, ramp_s: float = 0.1) -> Transfer:
-    """From an angle by so much, at a speed between ramps."""
+    """Return a turn by `by_deg` from an angle, at a speed between ramps."""
     by_rad, speed_rad_s = math.radians(by_deg), math.radians(speed_deg_s)
     acceleration = speed_rad_s / ramp_s
     duration_s = trapezoid_duration(abs(by_rad), speed_rad_s, acceleration)
@@ -27,14 +27,14 @@ def turn(from_rad: float, by_deg: float, speed_deg_s: float = 120.0, ramp_s: flo
 
 @contextmanager
 def control_servo(wire: ServoOnAWire, watchdog_s: float = PATIENT_S, **how: Any) -> Iterator[Servo]:
-    """The servo under control."""
+    """Yield the servo under control."""
     with Servo(wire.port, MODEL, watchdog_s=watchdog_s, clock=wire.clock, **how) as servo:
         servo.take_control(BOARD)
         yield servo
 
 
 def act_at_speed(wire: ServoOnAWire, act: Callable[[], object]) -> Callable[[], None]:
-    """A watch that acts once, when the shaft turns."""
+    """Return a watch that calls `act` once, when the shaft turns."""
     done: list[bool] = []
 
     def watch() -> None:
@@ -46,7 +46,7 @@ def act_at_speed(wire: ServoOnAWire, act: Callable[[], object]) -> Callable[[], 
 
 
 def turn_on_and_on(port: str, watchdog_s: float, clock: YokedClock) -> None:
-    """A program that turns a servo to and fro until somebody ends it."""
+    """Turn a servo to and fro until the process is killed."""
     with Servo(port, MODEL, watchdog_s=watchdog_s, clock=clock) as servo:
         servo.take_control(BOARD)
         by_deg = 200.0

@@ -1,4 +1,4 @@
-"""A simulated KVH 1775 on a pseudo-terminal, without a laboratory around it: it turns as it is told."""
+"""A simulated KVH 1775 on a pseudo-terminal, without a laboratory around it, with a given motion."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -18,7 +18,7 @@ STILL = (0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
 def section(port: str, **changes: object) -> SensorSection:
-    """A configured sensor at `port`; `changes` may be of its serial section too."""
+    """Return the section of a sensor at `port`; `changes` may also contain keys of its serial section."""
     of_the_line: dict[str, object] = {
         key: changes.pop(key) for key in ("baud", "message", "rotation") if key in changes
     }
@@ -28,9 +28,9 @@ def section(port: str, **changes: object) -> SensorSection:
 
 
 class KvhOnAWire:
-    """The instrument, at most `pace` times as fast as the clock on the wall.
+    """The instrument, at most `pace` times as fast as real time.
 
-    `motion_at`: what it feels at a time, rad/s and g; `field_at`: the magnetic field in its axes, T.
+    `motion_at`: its motion at a time, rad/s and g; `field_at`: the magnetic field in its axes, T.
     """
 
     def __init__(
@@ -68,7 +68,7 @@ class KvhOnAWire:
         )
 
     def order(self, what: Callable[[SimulatedKvh1775], None]) -> None:
-        """Let the instrument's own thread do it, and wait until it is done."""
+        """Let the instrument's own thread call `what`, and wait until it is done."""
 
         def carry_out() -> None:
             assert self.kvh is not None
@@ -94,7 +94,7 @@ def kvh_on_a_wire(
     field_at: Callable[[float], Sequence[float]] = no_field,
     dead: bool = False,
 ) -> Iterator[KvhOnAWire]:
-    """For the length of the `with` block; over a `dead` line nothing has ever come."""
+    """Run the instrument during the `with` block; a `dead` line carries no bytes."""
     wire = KvhOnAWire(stored_settings or {}, motion_at, pace, uptime_s, field_at, dead=dead)
     try:
         yield wire

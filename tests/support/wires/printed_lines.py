@@ -1,4 +1,4 @@
-"""Lines as devices print them, and a pseudo-terminal that they come from."""
+"""Lines as devices print them, and a pseudo-terminal that prints them."""
 
 import os
 import select
@@ -18,7 +18,7 @@ SEVEN = ("time", "gx", "gy", "gz", "ax", "ay", "az")
 
 
 def lines_section(**changes: Any) -> LinesSection:
-    """A section of seven columns, so changed; None leaves a key out."""
+    """Return a section of seven columns with these changes; None removes a key."""
     usual: dict[str, Any] = {
         "columns": SEVEN,
         "time": {"unit": "us"},
@@ -31,7 +31,7 @@ def lines_section(**changes: Any) -> LinesSection:
 
 
 def sensor_section(port: str, *, rate_hz: float = 100, **changes: Any) -> SensorSection:
-    """A sensor whose device is at `port`; `changes` are of its lines."""
+    """Return the section of a sensor at `port`; `changes` are those of its section `lines`."""
     lines = lines_section(**changes)
     read = {"acceleration": {"range_g": 8}} if lines.acceleration is not None else {}
     document = {
@@ -42,13 +42,13 @@ def sensor_section(port: str, *, rate_hz: float = 100, **changes: Any) -> Sensor
 
 
 def add_checksum(text: str) -> bytes:
-    """A line with its sum as NMEA has it."""
+    """Return a line with its checksum as in NMEA."""
     return f"{text}*{reduce(xor, text.lstrip('$!').encode(), 0):02X}\r\n".encode()
 
 
 @contextmanager
 def pty_printing(chunks: Iterable[bytes], pace_s: float = 0.01) -> Iterator[tuple[str, threading.Event]]:
-    """A port from which a chunk comes every `pace_s`, until they are at an end, and an event that unplugs it."""
+    """Yield a port that prints one of `chunks` every `pace_s`, and an event that unplugs it."""
     master, slave = os.openpty()
     tty.setraw(slave)
     os.set_blocking(master, False)  # it is full when nobody reads, which must not hold up the end

@@ -14,7 +14,7 @@ def package(kind: str, payload: bytes) -> bytes:
 
 
 class RtdeReader:
-    """Receives the controller's time stamps at `rate_hz` of its own time."""
+    """A client that receives the controller's time stamps at `rate_hz` by the controller's clock."""
 
     def __init__(self, host: str, rate_hz: float = 125.0) -> None:
         self._socket = socket.create_connection((host, 30004), PATIENCE_S)

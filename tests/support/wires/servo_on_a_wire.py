@@ -1,4 +1,4 @@
-"""Simulated servos at a port, in a process of their own: what the driver has before it, and its faults."""
+"""Simulated servos at a port, in a process of their own, with the faults that a driver can meet."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -21,7 +21,7 @@ LINE = "servo"  # the driver's thread that has the line
 
 
 class _FarEnd:
-    """What the far process does when it is asked."""
+    """The simulated servos in the other process, with their actions."""
 
     def __init__(self, clock: YokedClock, truths: tuple[ServoTruth, ...], line: LineTruth, pty: bool) -> None:
         self._now = clock.time_s
@@ -64,7 +64,7 @@ class _FarEnd:
         self.servo.switch_supply(on, self._now())
 
     def let_go(self) -> None:
-        """Somebody else switches torque off."""
+        """Switch torque off, as another program would."""
         self.servo.obey(ServoPacket(1, WRITE, b"\x40\0\0", True), self._now())
 
     def trip(self) -> None:
@@ -72,11 +72,11 @@ class _FarEnd:
         self.servo.drive.trip(self._now())
 
     def reboot(self) -> None:
-        """Somebody else starts it anew."""
+        """Restart the servo, as another program would."""
         self.servo.obey(ServoPacket(1, REBOOT, b"", True), self._now())
 
     def add(self, truth: ServoTruth) -> None:
-        """Another servo is plugged in."""
+        """Plug in another servo."""
         self.far.bus.servos = [*self.far.bus.servos, SimulatedServo(truth, self._now())]
 
     def pull_out(self) -> None:
@@ -84,7 +84,7 @@ class _FarEnd:
 
 
 def _serve(pipe: "Connection[Any, Any]", clock: YokedClock) -> None:
-    """Be one far end after the other, as they are asked for."""
+    """Serve one request for a far end after the other."""
     end: _FarEnd | None = None
     with suppress(EOFError, OSError):
         while True:
@@ -104,7 +104,7 @@ def _serve(pipe: "Connection[Any, Any]", clock: YokedClock) -> None:
 
 
 class _Process:
-    """The process of all far ends of this one: to begin a process for each would take most of a test's time."""
+    """The process of all far ends, because starting a process for each would take most of a test's time."""
 
     def __init__(self) -> None:
         context = find_fork_server()
@@ -129,7 +129,7 @@ class ServoOnAWire:
         self.port: str = self.do("begin", truths, line, pty)
 
     def do(self, name: str, *arguments: object) -> Any:
-        """Let the far end do something; its answer."""
+        """Let the far end execute an action; return its answer."""
         self._pipe.send((name, arguments))
         return self._pipe.recv()
 
@@ -149,7 +149,7 @@ class ServoOnAWire:
 
 @contextmanager
 def servo_on_a_wire(*truths: ServoTruth, line: LineTruth = PLAIN, pty: bool = False) -> Iterator[ServoOnAWire]:
-    """For the length of the `with` block; one that is set up for the rig where no truth is given.
+    """Run servos during the `with` block, by default one that is set up for the rig.
 
     Its port is a pseudo-terminal (`pty`), or one at socket://, which carries no baud rate: the host's is `BAUD`.
     """

@@ -1,4 +1,4 @@
-"""Pre-flight as a UR10e has it: most tests are about that arm."""
+"""The pre-flight of a UR10e, the arm of most tests."""
 
 from rig.errors import Problem
 from rig.motion.carried import FlangeLoad
