@@ -79,8 +79,8 @@ def shortest_run(config: RigConfig, wanted: TargetUncertainty) -> Shortest:
     """Return the shortest run of this configuration whose predicted uncertainty meets the target.
 
     A family is skipped if its endless run misses the target by more than the factor `HOPELESS`. If all are, only the
-    longest run of the best family is evaluated. Raise Refused `not_foretold` if the uncertainty of the procedure or of
-    the target's quantity is not predicted.
+    longest run of the best family is evaluated. Raise Refused `not_predictable` if the uncertainty of the procedure or
+    of the target's quantity is not predicted.
     """
     what = find_search(config)
     _refuse_others(wanted, config)
@@ -118,18 +118,18 @@ def shortest_run(config: RigConfig, wanted: TargetUncertainty) -> Shortest:
 
 
 def find_search(config: RigConfig) -> Tried:
-    """Return the search among the runs of a configuration. Raise Refused `not_foretold`."""
+    """Return the search among the runs of a configuration. Raise Refused `not_predictable`."""
     procedure = config.procedure
     if not config.to_calibrate:
-        raise _not_foretold("nothing is to be calibrated")
+        raise _not_predictable("nothing is to be calibrated")
     if procedure.name not in TRIED or procedure.finds_earth_rate:
-        raise _not_foretold(f"the uncertainty of the procedure {procedure.name} is not predicted")
+        raise _not_predictable(f"the uncertainty of the procedure {procedure.name} is not predicted")
     return TRIED[procedure.name](config)
 
 
-def _not_foretold(what: str) -> Refused:
+def _not_predictable(what: str) -> Refused:
     return Refused(
-        "not_foretold",
+        "not_predictable",
         what,
         "Use six_observation or imu with the Earth's rate known or left out, static_attitudes, servo_six_observation, "
         "or by_hand",
@@ -137,14 +137,14 @@ def _not_foretold(what: str) -> Refused:
 
 
 def _refuse_others(wanted: TargetUncertainty, config: RigConfig) -> None:
-    """Raise Refused `not_foretold` if the target is for a kind of sensor that is not calibrated."""
+    """Raise Refused `not_predictable` if the target is for a kind of sensor that is not calibrated."""
     kinds = {"gyroscope": not isinstance(config.procedure, StaticAttitudesSection)}
     kinds["accelerometer"] = config.procedure.accelerometer_order > 0 and any(
         sensor.acceleration is not None for sensor in config.to_calibrate.values()
     )
     for (kind, calibrated), sizes in zip(kinds.items(), (SIZES[:2], SIZES[2:]), strict=True):
         if not calibrated and any(getattr(wanted, size) < inf for size in sizes):
-            raise _not_foretold(f"the procedure calibrates no {kind} whose uncertainty could be wanted")
+            raise _not_predictable(f"the procedure calibrates no {kind} whose uncertainty could be wanted")
 
 
 def plan_of(config: RigConfig, procedure: ProcedureSection) -> Plan:

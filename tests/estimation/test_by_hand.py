@@ -275,7 +275,7 @@ def test_a_bias_that_jumps_for_good_ends_a_session_at_the_right_rest(after: int)
 
 @pytest.mark.slow
 def test_without_a_level_somebody_has_to_say_which_face_was_up() -> None:
-    assert refused(handle(TWELVE, 2), level=False, told=replace(TOLD, first_face=None)) == "first_face_not_told"
+    assert refused(handle(TWELVE, 2), level=False, told=replace(TOLD, first_face=None)) == "first_face_unknown"
 
 
 @pytest.mark.slow

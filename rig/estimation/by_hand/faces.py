@@ -16,7 +16,7 @@ AXES = np.array([axis_of(face) for face in FACES])
 
 
 def find_faces(session: HandRecording, conditions: SessionConditions, integrals: MoveIntegrals) -> RestFaces:
-    """Find the face of every rest. Raise Refused `first_face_not_told`."""
+    """Find the face of every rest. Raise Refused `first_face_unknown`."""
     has_level = session.acceleration is not None
     up = _read_verticals(session) if has_level else _track_verticals(conditions, integrals)
     cosines = up @ AXES.T
@@ -40,7 +40,7 @@ def _track_verticals(conditions: SessionConditions, integrals: MoveIntegrals) ->
     """Return the verticals (N, 3) by dead reckoning, reset at every rest to the nominal direction of its face."""
     if conditions.first_face is None:
         raise Refused(
-            "first_face_not_told",
+            "first_face_unknown",
             "there are no accelerometer's readings, and the body's first face is not given",
             "Say which of its axes pointed upwards: --first-face +z; or record the accelerometer too",
         )

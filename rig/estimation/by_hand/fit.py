@@ -69,7 +69,7 @@ def fit_session(session: HandRecording, conditions: SessionConditions, trusted: 
     """Fit the gyroscope and all attitudes and biases to a session of at least one rest.
 
     The variance components are estimated from the first `trusted` rests, by default from all. Raise Fault `no_fit`,
-    Refused `first_face_not_told`.
+    Refused `first_face_unknown`.
     """
     biases = np.array([rest.mean_rad_s for rest in session.rests])
     stds = STATED

@@ -46,7 +46,7 @@ class SessionProgress:
 def assess_progress(session: HandRecording, conditions: SessionConditions) -> SessionProgress:
     """Assess an unfinished session of one rest or more; few rests are no error.
 
-    Raise Fault `mirrored_axis`, `swapped_axes`, `wrong_unit`; Refused `first_face_not_told`.
+    Raise Fault `mirrored_axis`, `swapped_axes`, `wrong_unit`; Refused `first_face_unknown`.
     """
     unknown = np.full(3, UNKNOWN)
     if not session.rests:

@@ -125,7 +125,7 @@ def calibrate_by_board(
     """Let the board calibrate one of its sensors; the board remains connected in the block.
 
     The session ends after at least `moves` moves, once the standard uncertainty of the scale is at most `scale_std`.
-    Raise Refused `clock_unknown`, `first_face_not_told`, and as `open_board_source` does; Fault `board_unverified`,
+    Raise Refused `clock_unknown`, `first_face_unknown`, and as `open_board_source` does; Fault `board_unverified`,
     `board_disagrees`, the error of ten refused moves in a row, and the board's own.
     """
     arrived: SimpleQueue[tuple[str, NDArray[Any]]] = SimpleQueue()
@@ -171,7 +171,7 @@ def read_kept_solution(board: Board) -> CalibratedByBoard:
 def _check(name: str, sensor: RecordedSensor, board: Board) -> None:
     if not sensor.measures(ACCELERATION):
         raise Refused(
-            "first_face_not_told",
+            "first_face_unknown",
             f"the board determines from accelerations which side is up, but sensors.{name} asks for none",
             f"Add acceleration: {{}} to sensors.{name}",
         )

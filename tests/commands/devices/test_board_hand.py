@@ -74,7 +74,7 @@ def test_a_sensor_without_accelerations_is_refused(tmp_path: Path) -> None:
     path.write_text(yaml.safe_dump(document))
     ended = rig("board", "hand", path)
     assert ended.returncode == 2
-    assert "first_face_not_told" in ended.stderr
+    assert "first_face_unknown" in ended.stderr
 
 
 # What the board has found alone

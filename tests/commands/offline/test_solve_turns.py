@@ -68,7 +68,7 @@ def test_a_rest_that_creeps_is_counted_with_its_time(tmp_path: Path, capsys: pyt
 def test_what_no_reading_shows_must_be_stated(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     samples = write(tmp_path / "samples.csv", handle(TWELVE, 1), level=False)
     assert "clock_unknown" in refused(capsys, samples, "--turns")
-    assert "first_face_not_told" in refused(capsys, samples, *CLOCK)
+    assert "first_face_unknown" in refused(capsys, samples, *CLOCK)
     assert "bad_option" in refused(capsys, samples, "--turns", "--clock-ppm", "-1")
     assert "wrong_face" in refused(capsys, samples, *CLOCK, "--first-face=-y")
     found = solved(capsys, samples, *CLOCK, "--first-face", "+z")

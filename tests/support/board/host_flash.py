@@ -84,7 +84,7 @@ class HostFlash:
                 self.tear(page, offset)
 
     def _cut_program(self, operation: Operation, value: int) -> None:
-        """The doubleword is as before, whole, on its way to 0, or anything; its ECC may not match."""
+        """Interrupt programming: the doubleword stays as before, is complete, partly 0, or random; its ECC may fail."""
         rng = self._rng
         noise = rng.getrandbits(64)
         content = rng.choice([2**64 - 1, value, value | noise, value | noise & rng.getrandbits(64), noise])

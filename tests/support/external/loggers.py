@@ -60,9 +60,9 @@ class Log:
 
 @dataclass(frozen=True)
 class Stamps:
-    """How a logger stamps: rounded to `rounded_s`, or packets of `burst` on arrival, `inner_s` apart; `late_s` at most.
+    """A logger's stamps: rounded to `rounded_s`, or packets of `burst` on arrival, `inner_s` apart, `late_s` at most.
 
-    Of the readings `lost` are missing by chance, and those of the `gaps` (first, count).
+    The fraction `lost` of the readings is missing at random, and all readings of the `gaps` (first, count).
     """
 
     rounded_s: float = 0.0
