@@ -32,7 +32,7 @@ def end_by_interrupt() -> None:
 
 
 def ignore_endings() -> None:
-    """From now on, ignore every signal that ends a process, except a kill."""
+    """Ignore from now on every signal that ends a process, except a kill."""
     for number in ENDING_SIGNALS:
         signal.signal(number, signal.SIG_IGN)
 

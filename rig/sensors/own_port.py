@@ -77,7 +77,7 @@ class OwnPort:
         return self._most_silent_s is not None
 
     def stream(self, more_s: float = 0.0) -> None:
-        """From now on, treat a silence longer than `Patience.silent_s` plus `more_s` as a fault."""
+        """Treat from now on a silence longer than `Patience.silent_s` plus `more_s` as a fault."""
         with self.news:
             self._most_silent_s, self.silence = self._patience.silent_s + more_s, PortSilence()
 
