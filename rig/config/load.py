@@ -15,7 +15,7 @@ from pydantic import BaseModel, ValidationError
 
 from rig.config.files.layers import BASE, SET, Layered, Places, merge_layers, read_layers
 from rig.config.files.verbatim_text import take_text_as_written
-from rig.config.files.yaml_text import Location, Unreadable, dotted_path
+from rig.config.files.yaml_text import Location, Unreadable, format_path
 from rig.config.models import ArmSection, ProcedureSection, RigConfig, SensorsConfig, StatementConfig, TurnerSection
 from rig.config.procedures.hand_sections import HandSection
 from rig.config.procedures.procedure_sections import DEFAULT_PROCEDURE, STOCK_SECTIONS
@@ -299,12 +299,12 @@ def _hint_at_override(section: Location, layered: Layered) -> str:
     others = [str(key) for key in siblings if key != section[-1] and layered.places.get((*section[:-1], key)) != SET]
     if not others or not section[:-1]:
         return ""
-    return f"; {dotted_path(section)} is given by --set only, the file has {', '.join(others)}"
+    return f"; {format_path(section)} is given by --set only, the file has {', '.join(others)}"
 
 
 def _describe_location(location: Location, places: Places) -> str:
     source = places.get(location)
-    return dotted_path(location) + (f" ({source})" if source else "")
+    return format_path(location) + (f" ({source})" if source else "")
 
 
 def _not_allowed(value: Any, allowed: Sequence[str]) -> str:

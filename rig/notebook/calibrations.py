@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rig.data.entries.budget import expanded_uncertainties
+from rig.data.entries.budget import expand_uncertainties
 from rig.data.quantity import Quantity
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.coverage import COVERAGE_FACTOR
 from rig.notebook.html import table
-from rig.notebook.own_readings import own_readings
+from rig.notebook.own_readings import convert_own_readings
 from rig.report.findings.finding import Finding
 from rig.report.findings.result_kind import DisplayRow
 from rig.report.kinds.triad import bias_of
@@ -113,7 +113,7 @@ class Calibration:
         `wrong_unit` for numbers that are impossible in SI units, such as °/s, g or µT.
         """
         limit = getattr(self.entry, self.quantity.file_key("range"), None)
-        valid = own_readings(readings, self.quantity, limit, f"the {self.quantity.sensor} {self.name}")
+        valid = convert_own_readings(readings, self.quantity, limit, f"the {self.quantity.sensor} {self.name}")
         corrected: Array = (valid - self.quantity.offset * self.bias) @ self.correction_matrix.T
         return corrected
 
@@ -124,7 +124,7 @@ class Calibration:
 
     @property
     def _expanded(self) -> Array:
-        return np.array(expanded_uncertainties(self.entry.budget, self.entry.covariance))
+        return np.array(expand_uncertainties(self.entry.budget, self.entry.covariance))
 
     def __repr__(self) -> str:
         scale, bias, unit = self.shown.scale, self.shown.numbers, self.shown.unit.name

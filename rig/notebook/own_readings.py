@@ -10,7 +10,7 @@ from rig.estimation.arrays import Array
 BEYOND = 2.0  # ratio to the nominal range: a part may exceed its range, but not twice
 
 
-def own_readings(readings: ArrayLike, quantity: Quantity, limit: float | None, whose: str) -> Array:
+def convert_own_readings(readings: ArrayLike, quantity: Quantity, limit: float | None, whose: str) -> Array:
     """Return readings as an array (n, 3), float64.
 
     `limit` is the sensor's nominal range in SI, None if unknown. Raise Refused `not_readings` for whole numbers, which

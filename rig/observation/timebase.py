@@ -239,7 +239,7 @@ def _coarse_offset(
     peaks = np.flatnonzero((correlation[1:-1] > correlation[:-2]) & (correlation[1:-1] >= correlation[2:])) + 1
     best = peaks[np.argsort(correlation[peaks])[::-1][:CANDIDATES]] - len(filled)
 
-    explained = _explained_fractions(turning, filled, moving, best)
+    explained = _compute_explained_fractions(turning, filled, moving, best)
     fraction, lag = max(zip(explained.tolist(), best.tolist(), strict=True), default=(0.0, 0))
     # Bin j of the board, whose middle lies half a step after its start, corresponds to point j + lag of the arm's grid.
     return fraction, float(start_s + lag * step_s - time_s[0] - step_s / 2)
@@ -253,7 +253,9 @@ def _fast_length(least: int) -> int:
     return length
 
 
-def _explained_fractions(turning: Array, filled: NDArray[np.bool_], moving: Array, lags: NDArray[np.intp]) -> Array:
+def _compute_explained_fractions(
+    turning: Array, filled: NDArray[np.bool_], moving: Array, lags: NDArray[np.intp]
+) -> Array:
     """Return the fraction (k,) of the variance that the arm's rate explains at each lag (k,) of bins; 0 if few overlap.
 
     The arm's rate (3, m) explains the board's rate (3, n) by a linear map, over the bins that are `filled` (n,). The

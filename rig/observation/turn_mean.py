@@ -15,7 +15,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.statistics.mean_weights import mean_weights
 from rig.estimation.statistics.rounding import Steps
 from rig.observation.statistics.coloured_noise import MEMORIES
-from rig.observation.statistics.mean import Mean, weighted_means, whole
+from rig.observation.statistics.mean import Mean, compute_weighted_means, whole
 from rig.observation.statistics.spectral_lines import (
     NONE,
     LineSearch,
@@ -89,7 +89,7 @@ def turn_mean(readings: Array, steps: Steps, turn: SampledTurn) -> tuple[Mean, A
     coefficients, _, rank, _ = np.linalg.lstsq(columns, readings, rcond=1e-6)
     smooth = columns @ coefficients
     noise = estimate_noise(readings - smooth, int(rank), steps, BRIEF if lines.not_encoded else MEMORIES)
-    (mean,) = weighted_means(readings, ones, weights, smooth=smooth, noise=noise, steps=steps)
+    (mean,) = compute_weighted_means(readings, ones, weights, smooth=smooth, noise=noise, steps=steps)
     slow = np.repeat(lines.cycles < SLOW, column_count(turn.beats))
     changed = np.zeros(3)
     if slow.any():

@@ -8,7 +8,7 @@ from rig.analysis.outcome import Origin, Outcome
 from rig.data.meaning import Meaning
 from rig.data.result_file import SCHEMA, CheckEntry, MountEntry, ProvenanceEntry, ResultDocument
 from rig.report.entries.budget import clock_entry
-from rig.report.entries.omission_entries import list_omissions, notes, unsolved_entries
+from rig.report.entries.omission_entries import list_omissions, list_unsolved_entries, notes
 from rig.report.entry import entry
 from rig.report.findings.result_kind import NoOutlet
 from rig.report.kinds.kind_registry import kinds
@@ -30,7 +30,7 @@ def document_of(outcome: Outcome) -> ResultDocument:
             "provenance": _provenance(outcome.provenance),
             **clock,
             **entries,
-            **({"unsolved": faults} if (faults := unsolved_entries(outcome)) else {}),
+            **({"unsolved": faults} if (faults := list_unsolved_entries(outcome)) else {}),
             **({"omitted": omissions} if (omissions := list_omissions(outcome)) else {}),
             **({"notes": remarks} if (remarks := notes(outcome)) else {}),
             **({"others": others} if others else {}),

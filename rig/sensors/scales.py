@@ -2,7 +2,7 @@
 
 from rig.config.sensors.stated_temperature import StatedTemperatureSection
 from rig.data.quantity import Quantity
-from rig.data.recording.channel import Channel, stated_temperature_channel, triad_channel
+from rig.data.recording.channel import Channel, make_stated_temperature_channel, triad_channel
 
 FULL_SCALE_COUNTS = 1 << 30  # half of the 32-bit range, and finer than single precision near the end
 DEGREES_PER_COUNT = 0.01
@@ -18,4 +18,4 @@ def thermometer_channels(provided: Channel | None, stated: StatedTemperatureSect
     """Return the channel of the temperature that the source provides, or of a stated one; empty without both."""
     if provided is not None:
         return (provided,)
-    return () if stated is None else (stated_temperature_channel(stated.stated_c, stated.stated_within_k),)
+    return () if stated is None else (make_stated_temperature_channel(stated.stated_c, stated.stated_within_k),)

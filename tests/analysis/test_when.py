@@ -12,7 +12,7 @@ from rig.analysis.analyses import calibrate
 from rig.analysis.gyroscope.calibration import observe_recordings
 from rig.analysis.measurement_conditions import gyroscope_conditions
 from rig.data.quantity import TEMPERATURE
-from rig.data.recording.channel import stated_temperature_channel
+from rig.data.recording.channel import make_stated_temperature_channel
 from rig.data.recording.recorded_sensor import RecordedSensor, sensor_of
 from rig.data.recording.run_data import RunData
 from rig.motion.geometry import NOMINAL
@@ -73,7 +73,7 @@ def without_thermometer(run: RunData) -> RunData:
     channels = [channel for channel in sensor.channels if channel.quantity != TEMPERATURE.name]
     samples = samples.copy()
     samples["temperature_counts"] = 0
-    sensor = replace(sensor, channels=(*channels, stated_temperature_channel(22.0, 5.0)))
+    sensor = replace(sensor, channels=(*channels, make_stated_temperature_channel(22.0, 5.0)))
     return replace(run, sensors={"gyro": sensor_of(parsed_attributes(sensor))}, samples={"gyro": samples})
 
 

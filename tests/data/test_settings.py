@@ -38,7 +38,7 @@ def test_a_sensor_s_stated_properties_are_recorded_and_its_part_s_by_default() -
     for what in OF_SENSORS:
         part = getattr(PARTS["adis16465"], what)
         assert getattr(said, what)["reference"] == (0.7 if what == "acceleration_bias_mg_k" else part)
-    assert said.stated_size("acceleration_bias_instability_ug", "reference") == 3.6
+    assert said.find_stated_size("acceleration_bias_instability_ug", "reference") == 3.6
 
 
 @pytest.mark.parametrize(("section", "key"), [("uncertainty", "axis_deg"), ("observation", "max_lost_fraction")])

@@ -20,7 +20,7 @@ PUBLIC_KEYS = {("HistorySection", "off"), ("SiteSection", "place"), ("AxisSectio
 # The simulated controller has its own modes, as a real one has; a notebook's run is what its reader calls a run.
 SHARED_CLASSES = {"RobotMode", "Run", "RuntimeState", "SafetyMode"}
 # A function's name begins with a verb. So many do not yet; whoever renames one lowers the number, and none is added.
-NAMES_WITHOUT_VERB = 71
+NAMES_WITHOUT_VERB = 46
 PREPOSITIONS = frozenset(WORDS["prepositions"])
 NOT_PARTICIPLES = {"feed", "speed", "seed", "need", "read", "embed"}
 RELATIVE_CLAUSE = re.compile(

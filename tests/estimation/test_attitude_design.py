@@ -11,8 +11,8 @@ from rig.estimation.design.attitude_design import (
     ExpectedStds,
     Order,
     assess_identifiability,
-    expected_stds,
     g_efficiency,
+    predict_stds,
 )
 from rig.estimation.reference.attitude_error import effects, find_whiteners
 from rig.estimation.reference.reference_model import KnownNorm, weighted_jacobian
@@ -32,7 +32,7 @@ def flange_to_base(wrists_deg: tuple[WristAngles, ...]) -> Array:
 def reached(wrists_deg: tuple[WristAngles, ...], error_rad: float, order: Order = 1) -> ExpectedStds:
     """By a KVH 1775 in 10 s."""
     noise = np.full(len(wrists_deg), KVH / np.sqrt(10))
-    return expected_stds(flange_to_base(wrists_deg), G * UP, noise, error_rad, order)
+    return predict_stds(flange_to_base(wrists_deg), G * UP, noise, error_rad, order)
 
 
 @pytest.mark.parametrize(
@@ -131,6 +131,6 @@ def test_what_is_expected_is_what_a_fit_reaches() -> None:
         )
         off.append([*(np.linalg.norm(fit.matrix, axis=1) - 1), *fit.bias])
     scale, bias = np.sqrt(np.mean(np.square(off).reshape(-1, 2, 3), axis=(0, 2)))
-    told = expected_stds(attitudes, G * UP, np.full(18, std), 0.0)
+    told = predict_stds(attitudes, G * UP, np.full(18, std), 0.0)
     assert scale == pytest.approx(told.scale_std, rel=0.15)
     assert bias == pytest.approx(told.bias_std_m_s2, rel=0.15)

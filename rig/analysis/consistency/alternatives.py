@@ -83,7 +83,7 @@ FAULT_MODES: tuple[FaultMode[Means], ...] = (  # (k, N, 3) each
 
 def changes(segments: Segments, axis_rates: Array) -> Alternatives:
     """Return by check the columns (3, N, k) of a scale factor, or a mounting, that changes with time."""
-    time = normalised_time(segments)
+    time = normalise_time(segments)
     for sweep in np.unique(segments.sweep):  # a change within a sweep is tested for that sweep
         time[segments.sweep == sweep] = time[segments.sweep == sweep].mean()
     turned = np.cross(np.eye(3)[:, None], axis_rates[None]) * time[None, :, None]  # (k, N, 3)
@@ -139,7 +139,7 @@ def step_columns(segments: Segments) -> list[Array]:
     return [step for step in steps if len(np.unique(step[segments.sweep < 0])) > 1]
 
 
-def normalised_time(segments: Segments) -> Array:
+def normalise_time(segments: Segments) -> Array:
     """Return the times (N,) of the segments' middles, from −1 to 1."""
     middle = segments.times_s.mean(axis=1)
     time: Array = (2 * middle - middle.max() - middle.min()) / np.ptp(middle)

@@ -100,7 +100,7 @@ def contradictions(
         checks += [
             fitness(name, "rate", what, *statistic) for what, statistic in {**tested.statistics, **of_readings}.items()
         ]
-        stated_deg = surroundings.uncertainty.stated_size("non_orthogonality_deg", name)
+        stated_deg = surroundings.uncertainty.find_stated_size("non_orthogonality_deg", name)
         non_orthogonality = _non_orthogonality_deg(explained.solution, stated_deg, false_alarm_probability)
         checks.append(fitness(name, "rate", NON_ORTHOGONALITY, *non_orthogonality, unit="°"))
         if has_limits:

@@ -20,7 +20,7 @@ from rig.analysis.consistency.alternatives import (
     Means,
     changes,
     differences,
-    normalised_time,
+    normalise_time,
     quarter_columns,
     repeat_per_axis,
     single_axis_columns,
@@ -313,4 +313,4 @@ def _build_scatter(segments: Segments, patterns_rad_s: Array, allowance: ErrorPa
 def _steady_columns(segments: Segments, *more: Array) -> Array:
     """Return orthonormal columns (N, k): a level of each sweep and of all rests, gravity, steady drift, and `more`."""
     segment_sets = [segments.sweep == sweep for sweep in np.unique(segments.sweep)]
-    return orthonormal_basis(np.column_stack([*segment_sets, segments.gravity_m_s2, normalised_time(segments), *more]))
+    return orthonormal_basis(np.column_stack([*segment_sets, segments.gravity_m_s2, normalise_time(segments), *more]))

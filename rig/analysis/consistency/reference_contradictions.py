@@ -91,7 +91,7 @@ def read_accelerometer(
     segments = list_windows(name, recordings, result.dwells)
     solution, movement, theta = result.solution, result.movement, result.solution.theta
     sensor, channel = result.sensor, result.sensor.channel(ACCELERATION)
-    flicker_m_s2 = MICRO_G_M_S2 * uncertainty.stated_size("acceleration_bias_instability_ug", name)
+    flicker_m_s2 = MICRO_G_M_S2 * uncertainty.find_stated_size("acceleration_bias_instability_ug", name)
     lag = lag_pattern(movement, 1e-3 * uncertainty.acceleration_lag_ms) / np.sqrt(3)
     delta_rad = solution.attitude_error.std_rad
     arm = StatedArm(recordings[0].motion.kinematics, uncertainty.axis_deg, np.array(sensor.mounting), delta_rad)

@@ -21,7 +21,7 @@ from rig.data.recording.settings import Uncertainty
 from rig.estimation.arrays import Array
 from rig.estimation.earth import EARTH_RATE_RAD_S
 from rig.estimation.gyroscope.nonlinearity import CUBE_MISSED, bending, curvature
-from rig.estimation.gyroscope.own_errors import KnownSensor, own_errors, rounding_errors
+from rig.estimation.gyroscope.own_errors import KnownSensor, list_own_errors, rounding_errors
 from rig.motion.geometry import AXIS_ERRORS, WAVES, WRIST_1, WRIST_2, WRIST_3
 from rig.observation.consistency.raw_readings import REST
 from rig.observation.consistency.segments import MotionInterval
@@ -126,7 +126,7 @@ def build_known_errors(
 ) -> KnownErrors:
     """Return the standard uncertainties of all modelled error sources of gyroscope `name` with the given full scale."""
     steady = np.array([angle.startswith(("twist", "zero")) for angle in ANGLES])
-    cube, square = (uncertainty.stated_size(what, name) / 100 / np.sqrt(3) for what in CURVE)
+    cube, square = (uncertainty.find_stated_size(what, name) / 100 / np.sqrt(3) for what in CURVE)
     return KnownErrors(
         angles_rad=np.radians(uncertainty.axis_deg) / np.sqrt(3) * np.where(steady, 1.0, WAVE_FRACTION),
         repeatability_rad=uncertainty.repeatability_std_rad,
@@ -352,7 +352,7 @@ def _temperature_patterns(segments: Segments, matrix: Array, known_errors: Known
         ),
     )
     turns = np.where((segments.sweep == REST)[:, None], 0.0, segments.rates_rad_s)
-    return [error.patterns / np.sqrt(3) for error in own_errors(warm, matrix, turns, segments.times_s, ())]
+    return [error.patterns / np.sqrt(3) for error in list_own_errors(warm, matrix, turns, segments.times_s, ())]
 
 
 def _rounding_patterns(segments: Segments) -> list[Array]:

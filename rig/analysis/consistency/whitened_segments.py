@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rig.analysis.consistency.alternatives import normalised_time, repeat_per_axis
+from rig.analysis.consistency.alternatives import normalise_time, repeat_per_axis
 from rig.analysis.consistency.residual_tests import (
     INDEPENDENT,
     Alternative,
@@ -112,7 +112,7 @@ def whiten_segments(segments: Segments, scatter: Scatter, bias: BiasProcess) -> 
 def _model_columns(segments: Segments) -> Array:
     """Return the columns (N, 8) of the model, common to all axes."""
     ones = np.ones(len(segments.sweep))
-    return np.column_stack([segments.rates_rad_s, ones, segments.gravity_m_s2, normalised_time(segments)])
+    return np.column_stack([segments.rates_rad_s, ones, segments.gravity_m_s2, normalise_time(segments)])
 
 
 def build_whitener(segments: Segments, scatter: Scatter, bias: BiasProcess) -> Array:

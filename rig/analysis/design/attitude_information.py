@@ -15,8 +15,8 @@ from rig.estimation.design.attitude_design import (
     Identifiability,
     Order,
     assess_identifiability,
-    expected_stds,
     g_efficiency,
+    predict_stds,
 )
 from rig.estimation.earth import MICRO_G_M_S2
 from rig.motion.geometry import flange_attitude
@@ -63,7 +63,7 @@ def attitude_account(config: RigConfig, plan: Plan) -> AttitudeAccount | None:
     attitude_std_rad = radians(config.uncertainty.axis_deg) / sqrt(3)  # of a half-width
     reference, dwells_s = config.site.gravity_m_s2 * up, np.array(list(seconds.values()))
     sensors = {
-        name: expected_stds(
+        name: predict_stds(
             attitudes,
             reference,
             PARTS[sensor.part].velocity_random_walk_ug_sqrt_s * MICRO_G_M_S2 / np.sqrt(dwells_s),

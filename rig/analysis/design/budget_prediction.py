@@ -88,7 +88,7 @@ def _budget(config: RigConfig, run: PlannedRun, turner: TurnerIdentity, name: st
         replace(turn, average=replace(turn.average, mean_rad_s=mean))
         for turn, mean in zip(turns, inputs.means_rad_s, strict=False)  # the rests come after them
     ]
-    axes_rad = float(np.radians(uncertainty.stated_size("non_orthogonality_deg", name)))
+    axes_rad = float(np.radians(uncertainty.find_stated_size("non_orthogonality_deg", name)))
     return six_observation_budget(explained, solve_six_observation(readings, "newton"), uncertainty_inputs, axes_rad)
 
 

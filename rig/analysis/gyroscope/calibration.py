@@ -204,7 +204,7 @@ def _budget_of(
     if isinstance(solution, VectorSolution):
         return budget(explained, unknown)
     if isinstance(solution, Solution) and solution.estimator == "newton":
-        axes_rad = float(np.radians(surroundings.uncertainty.stated_size("non_orthogonality_deg", name)))
+        axes_rad = float(np.radians(surroundings.uncertainty.find_stated_size("non_orthogonality_deg", name)))
         return six_observation_budget(explained, solution, unknown, axes_rad)
     return None
 

@@ -114,11 +114,11 @@ def describe_sensor(
 ) -> KnownSensor:
     """Return the stated properties of the sensor `name` with its range, and its temperature in each average (N,)."""
     return KnownSensor(
-        nonlinearity=uncertainty.stated_size("nonlinearity_percent", name) / 100,
+        nonlinearity=uncertainty.find_stated_size("nonlinearity_percent", name) / 100,
         full_scale_rad_s=full_scale_rad_s,
-        bias_rad_s_per_k=float(np.radians(uncertainty.stated_size("bias_deg_s_k", name))),
-        scale_per_k=PPM * uncertainty.stated_size("scale_ppm_k", name),
-        instability_rad_s=float(np.radians(uncertainty.stated_size("bias_instability_deg_h", name) / 3600)),
+        bias_rad_s_per_k=float(np.radians(uncertainty.find_stated_size("bias_deg_s_k", name))),
+        scale_per_k=PPM * uncertainty.find_stated_size("scale_ppm_k", name),
+        instability_rad_s=float(np.radians(uncertainty.find_stated_size("bias_instability_deg_h", name) / 3600)),
         temperature_c=temperature_c,
         temperature_step_k=temperature_step_k,
     )
@@ -201,7 +201,7 @@ def list_given(surroundings: Surroundings, name: str) -> EarthRatePrior:
     return EarthRatePrior(
         up=np.array(site.up),
         latitude_rad=site.latitude_rad,
-        g_sensitivity=uncertainty.stated_size("g_sensitivity_deg_s_g", name) > 0,
+        g_sensitivity=uncertainty.find_stated_size("g_sensitivity_deg_s_g", name) > 0,
         repeatability_rad=uncertainty.repeatability_std_rad,
         state_jitter_s=surroundings.state_jitter_s,
     )
@@ -229,7 +229,7 @@ def list_uncertainties(
         mount_rad=float(np.radians(uncertainty.mount_deg)),
         stamp_std_s=stamp_std_s or 0.0,
         sensor_offset_m=uncertainty.sensor_offset_mm / 1000,
-        g_sensitivity_rad_s_per_g=float(np.radians(uncertainty.stated_size("g_sensitivity_deg_s_g", name))),
+        g_sensitivity_rad_s_per_g=float(np.radians(uncertainty.find_stated_size("g_sensitivity_deg_s_g", name))),
         earth_rate=earth_rate is None and surroundings.site.earth_rate_rad_s is None,
         earth_covariance_rad2_s2=None if earth_rate is None else earth_rate.covariance_rad2_s2,
         earth_dof=np.inf if earth_rate is None else earth_rate.dof,

@@ -65,7 +65,7 @@ def read_datasheet(uncertainty: Uncertainty, name: str, range_m_s2: float) -> Da
     """Return the data of the accelerometer of the sensor `name`, from its data sheet or the configuration."""
 
     def errors_from_datasheet(what: OfSensor) -> float:
-        return uncertainty.stated_size(what, name)
+        return uncertainty.find_stated_size(what, name)
 
     return Datasheet(
         nonlinearity_percent=errors_from_datasheet("acceleration_nonlinearity_percent"),

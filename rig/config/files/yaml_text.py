@@ -170,11 +170,11 @@ def _survey(
         for key, value in node.value:
             line = key.start_mark.line + 1
             if key.tag not in (TEXT, MERGE):
-                yield f"{dotted_path(location)} (line {line}): the key {quote(key.value)} is no word; put it in quotes"
+                yield f"{format_path(location)} (line {line}): the key {quote(key.value)} is no word; put it in quotes"
                 continue
             path = (*location, key.value)
             if path in lines:
-                yield f"{dotted_path(path)}: given twice, on lines {lines[path]} and {line}"
+                yield f"{format_path(path)}: given twice, on lines {lines[path]} and {line}"
             lines[path] = line
             yield from _visible(key, path)
             yield from _survey(value, path, lines, written)
@@ -191,10 +191,10 @@ def _visible(node: yaml.ScalarNode, location: Location) -> Iterator[str]:
     """Yield a problem for a control character, which an escape sequence in quotes can produce unnoticed."""
     if (character := first_control_character(node.value)) is not None:
         line = node.start_mark.line + 1
-        yield f"{dotted_path(location)} (line {line}): holds the control character {printable(character)}"
+        yield f"{format_path(location)} (line {line}): holds the control character {printable(character)}"
 
 
-def dotted_path(location: Location) -> str:
+def format_path(location: Location) -> str:
     """Return a location in the form `sensors.gyro.rate_hz`; the whole file is `(file)`."""
     return ".".join(shorten(str(part)) for part in location) or "(file)"
 

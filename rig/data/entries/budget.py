@@ -54,7 +54,7 @@ class BudgetEntry(Entry):
         return tuple(math.inf if dof is None else dof for dof in self.degrees_of_freedom)
 
 
-def expanded_uncertainties(budget: BudgetEntry | None, covariance: Sequence[Sequence[float]]) -> Sequence[float]:
+def expand_uncertainties(budget: BudgetEntry | None, covariance: Sequence[Sequence[float]]) -> Sequence[float]:
     """Return U (6,) of scale and bias from the budget; without one, two standard deviations from the covariance."""
     if budget is not None:
         return budget.expanded

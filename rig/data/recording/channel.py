@@ -112,7 +112,7 @@ def thermometer_channel(c_per_count: float, offset_c: float) -> Channel:
     return Channel(TEMPERATURE.name, "temperature_counts", "<i2", c_per_count, offset_c)
 
 
-def stated_temperature_channel(stated_c: float, within_k: float) -> Channel:
+def make_stated_temperature_channel(stated_c: float, within_k: float) -> Channel:
     """Return the channel of a sensor without a thermometer: its stated temperature, and its possible change."""
     return replace(thermometer_channel(within_k, stated_c), stated=True)
 

@@ -19,7 +19,7 @@ def begin_reading(path: Path, timeout_s: float | None = None) -> ReadingTask:
 
     Raise Refused `no_run_file`, and as `ReadingTask` does.
     """
-    stored = _stored_bytes(path)
+    stored = _measure_stored_bytes(path)
     if timeout_s is None:
         timeout_s = READ_TIMEOUT_S + stored / READ_BYTES_PER_S
     return ReadingTask("rig.data.recording.extract:contents", path, {}, _limits(stored, timeout_s))
@@ -31,7 +31,7 @@ def _limits(stored_bytes: int, time_s: float) -> ReadingLimits:
     return ReadingLimits(LIBRARIES_BYTES + 3 * rows_bytes, time_s, time_s, 2 * rows_bytes)  # rows, and their copies
 
 
-def _stored_bytes(path: Path) -> int:
+def _measure_stored_bytes(path: Path) -> int:
     try:
         with open_regular_file(path, RECORDING_MAX_BYTES) as file:
             return size_without_holes(file)

@@ -118,7 +118,7 @@ class Uncertainty(UncertaintyKeys[dict[str, NonNegative]]):
         """Return whether error sizes are stated for the sensor `name`."""
         return all(name in getattr(self, what) for what in OF_SENSORS)
 
-    def stated_size(self, what: OfSensor, name: str) -> float:
+    def find_stated_size(self, what: OfSensor, name: str) -> float:
         """Return the stated size of the error `what` of the sensor `name`."""
         sizes: dict[str, float] = getattr(self, what)
         return sizes[name]

@@ -106,7 +106,7 @@ def g_efficiency(attitudes: Array, up: Array, order: Order = 1) -> float:
     return PARAMETER_COUNT[order] / max(float(values.max()), -float(climbed.fun))
 
 
-def expected_stds(
+def predict_stds(
     attitudes: Array, reference_m_s2: Array, noise_m_s2: Array, attitude_std_rad: float, order: Order = 1
 ) -> ExpectedStds:
     """Return the Cramér–Rao bound of mean readings with white noise `noise_m_s2` (N,) and attitude errors δ.

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rig.estimation.arrays import Array, scale_of
-from rig.estimation.gyroscope.levenberg_marquardt import squared_rate_jacobian, squared_rate_variance
+from rig.estimation.gyroscope.levenberg_marquardt import compute_squared_rate_jacobian, compute_squared_rate_variance
 from rig.estimation.reference.reference_model import covariance_bound, whitening
 from rig.estimation.sensor_axes import parameter_jacobian
 
@@ -23,8 +23,8 @@ def six_observation_bound(scale: ArrayLike, rates_rad_s: ArrayLike, variances_ra
     k, rates, variances = (np.asarray(a, dtype=np.float64) for a in (scale, rates_rad_s, variances_rad2_s2))
     theta = np.concatenate([k, np.zeros(3)])
     means = rates / k
-    jacobian = squared_rate_jacobian(theta, means)
-    return _inverse(jacobian / np.sqrt(squared_rate_variance(theta, means, variances))[:, None])
+    jacobian = compute_squared_rate_jacobian(theta, means)
+    return _inverse(jacobian / np.sqrt(compute_squared_rate_variance(theta, means, variances))[:, None])
 
 
 def vector_matrix_bound(rates_rad_s: ArrayLike, variances_rad2_s2: ArrayLike) -> Array:

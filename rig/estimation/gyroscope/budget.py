@@ -197,7 +197,7 @@ def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributo
         # One pattern for each axis of the base.
         base_axes = EARTH_RATE_RAD_S * np.moveaxis(inputs.attitudes, -1, 0) @ matrix.T
         yield evaluate_b("Earth's rate", EARTH_RATE_RAD_S, "rad/s", f"site.latitude_deg {NOT_GIVEN}", base_axes)
-    for error in inputs.own_errors(matrix):
+    for error in inputs.list_own_errors(matrix):
         yield evaluate_b(error.name, error.half_width, error.unit, error.source, error.patterns)
     per_m_s2 = unknown.g_sensitivity_rad_s_per_g / STANDARD_GRAVITY_M_S2
     unit_sensitivities = [per_m_s2 * np.outer(row, column) for row in np.eye(3) for column in np.eye(3)]

@@ -71,10 +71,10 @@ def solve_levenberg_marquardt(
     std = np.sqrt(4 * speeds**2 * variances.mean(axis=1) + by_speed) if weighted else np.ones(len(means))
 
     def residual(theta: Array) -> Array:
-        return (speeds**2 - squared_rate(theta, means)) / std
+        return (speeds**2 - compute_squared_rate(theta, means)) / std
 
     def slope(theta: Array) -> Array:
-        return -squared_rate_jacobian(theta, means) / std[:, None]
+        return -compute_squared_rate_jacobian(theta, means) / std[:, None]
 
     # From b = 0 the search diverges if the bias is about as large as the speed.
     start = np.concatenate([np.ones(3), -means.mean(axis=0)])
@@ -94,8 +94,8 @@ def solve_levenberg_marquardt(
     refusals.check_unit(theta[:3])
     weighted_jacobian = slope(theta)
     gain = np.linalg.solve(weighted_jacobian.T @ weighted_jacobian, weighted_jacobian.T) / std
-    variance = squared_rate_variance(theta, means, variances) + by_speed
-    residuals = speeds**2 - squared_rate(theta, means)
+    variance = compute_squared_rate_variance(theta, means, variances) + by_speed
+    residuals = speeds**2 - compute_squared_rate(theta, means)
     return LevenbergMarquardtSolution(
         scale=theta[:3],
         bias_rad_s=theta[3:],
@@ -113,18 +113,18 @@ def _conditioning(unit_means: Array, noise: float) -> refusals.Conditioning:
     return refusals.condition_of(design(unit_means), 6, 2 * noise * float(np.sqrt(len(unit_means))))
 
 
-def squared_rate(theta: Array, means: Array) -> Array:
+def compute_squared_rate(theta: Array, means: Array) -> Array:
     """Return ‖K (m + b)‖² (N,) of mean readings (N, 3) for θ = [k b] (6,): SIX, Eqs. (1), (2)."""
     return np.asarray(np.sum((theta[:3] * (means + theta[3:])) ** 2, axis=-1), dtype=np.float64)
 
 
-def squared_rate_jacobian(theta: Array, means: Array) -> Array:
-    """Return the derivative (N, 6) of `squared_rate` with respect to k and b."""
+def compute_squared_rate_jacobian(theta: Array, means: Array) -> Array:
+    """Return the derivative (N, 6) of `compute_squared_rate` with respect to k and b."""
     k, shifted = theta[:3], means + theta[3:]
     return np.concatenate([2 * k * shifted**2, 2 * k**2 * shifted], axis=-1)
 
 
-def squared_rate_variance(theta: Array, means: Array, variances: Array) -> Array:
-    """Propagate the variances (N, 3) of the mean readings to the variance (N,) of `squared_rate`, to first order."""
+def compute_squared_rate_variance(theta: Array, means: Array, variances: Array) -> Array:
+    """Propagate the variances (N, 3) of the mean readings to the variance (N,) of the squared rate, to first order."""
     k, shifted = theta[:3], means + theta[3:]
     return np.asarray(np.sum(4 * k**4 * shifted**2 * variances, axis=-1), dtype=np.float64)

@@ -55,7 +55,7 @@ class OwnError:
     source: str = OF_THE_PART
 
 
-def own_errors(
+def list_own_errors(
     sensor: KnownSensor, matrix: Array, turns_rad_s: Array, windows_s: Array, speeds_rad_s: tuple[float, ...]
 ) -> Iterator[OwnError]:
     """Yield nonlinearity and temperature errors for F (3, 3), rates (N, 3), zero at rest, and windows (N, 2).

@@ -17,7 +17,7 @@ from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.common_errors import CommonErrors, solve_with_common_errors
 from rig.estimation.gyroscope.nonlinearity import Nonlinearity, curvature, distinct_speeds, nonlinearity
-from rig.estimation.gyroscope.own_errors import KnownSensor, OwnError, own_errors, rounding_errors
+from rig.estimation.gyroscope.own_errors import KnownSensor, OwnError, list_own_errors, rounding_errors
 from rig.estimation.gyroscope.vector_model import VectorSolution, check_identifiable, design_matrix, propagate_speed_std
 from rig.estimation.statistics.bias_process import BiasProcess, bias_process
 
@@ -117,18 +117,18 @@ class VectorInputs:
         kinds = (self.axis_errors_rad_s, self.return_errors_rad_s, self.encoder_errors_rad_s, self.mount_errors_rad_s)
         return np.concatenate([none, *(kind for kind in kinds if kind is not None)])
 
-    def own_errors(self, matrix: Array) -> tuple[OwnError, ...]:
+    def list_own_errors(self, matrix: Array) -> tuple[OwnError, ...]:
         """Return the sensor's errors that the model does not contain, for F (3, 3)."""
         if self.sensor is None:
             return ()
         rounded = rounding_errors(self.means_rad_s, self.roundings_rad_s, self.variances_rad2_s2)
-        stated = own_errors(self.sensor, matrix, self.turns_rad_s, self.windows_s, self.speeds_rad_s)
+        stated = list_own_errors(self.sensor, matrix, self.turns_rad_s, self.windows_s, self.speeds_rad_s)
         return (*stated, *rounded)
 
     def sensor_error_patterns(self, matrix: Array) -> Array:
         """Return the effects (P, N, 3) of one standard deviation of each of the sensor's own errors."""
         none = np.zeros((0, *self.means_rad_s.shape))
-        return np.concatenate([none, *(own_error.patterns / np.sqrt(3) for own_error in self.own_errors(matrix))])
+        return np.concatenate([none, *(own_error.patterns / np.sqrt(3) for own_error in self.list_own_errors(matrix))])
 
     def centripetal_m_s2(self, lever_arm_m: Array) -> Array:
         """Return the acceleration (N, 3), flange's frame, at a lever arm (3,) or (N, 3) from the rotation axis."""

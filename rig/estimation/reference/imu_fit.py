@@ -24,7 +24,7 @@ from rig.estimation.reference.attitude_error import PASSES, SETTLED
 from rig.estimation.reference.reading_errors import noise, select_sweeps, walking
 from rig.estimation.reference.reference_model import REFERENCE, STEP_LIMIT, STEP_TOLERANCE, free_directions
 from rig.estimation.reference.shared_errors import Decorrelation, decorrelate, estimate_common_error
-from rig.estimation.statistics.expected_variances import ResidualInputs, expected_disturbances, expected_sizes
+from rig.estimation.statistics.expected_variances import ResidualInputs, estimate_disturbances, estimate_variances
 
 # Prior odds that one dwell or sweep of a run is disturbed, or that all sweeps have another bias, against neither.
 ODDS = 1 / 19
@@ -124,12 +124,12 @@ def refit_with_components(
     modelled, variances = noise(fit.theta, movement), np.diag(movement.noise())
     of_arm = partial(combine_effects, *split_effects(fit.theta, movement))
     scattered = ResidualInputs(residuals, fit.jacobian, modelled, of_arm, walking(sensor, movement), variances)
-    components = expected_sizes(scattered, own_shares)
+    components = estimate_variances(scattered, own_shares)
     unit = float(np.sqrt(np.median(variances)))
     separate = [np.diag(np.sqrt(variances))[:, segment] for segment in movement.segments()]
     causes = [*separate, unit * select_sweeps(movement)]
     odds = [*np.full(len(separate), ODDS / len(separate)), ODDS]
-    *louder, turning = expected_disturbances(scattered, components, causes, odds)
+    *louder, turning = estimate_disturbances(scattered, components, causes, odds)
     disturbed = replace(
         sensor, walk_m_s2_sqrt_s=components.walk, louder=np.array(louder), turning_m_s2=float(np.sqrt(turning)) * unit
     )

@@ -105,7 +105,7 @@ def _solve(x: Array, sizes: Array, prior: ReferencePrior) -> Array:
     return least_squares(x, sizes, prior.v_bar(x.shape[-2] // 3))
 
 
-def published_covariance(
+def compute_published_covariance(
     theta: Array, readings: Array, attitudes: Array, prior: ReferencePrior, variances: Array
 ) -> Array:
     """Return the covariance (p, p) of a published θ, to first order in errors of `variances` (N, 3).

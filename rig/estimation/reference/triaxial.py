@@ -44,7 +44,7 @@ from rig.estimation.reference.reference_model import (
     whitened,
     whitening,
 )
-from rig.estimation.reference.stacked import column_sizes, estimate_as_published, published_covariance, stack
+from rig.estimation.reference.stacked import column_sizes, compute_published_covariance, estimate_as_published, stack
 
 EqualWeights = Literal["as_published", "maximum_likelihood"]
 Method = EqualWeights | Literal["attitude_weighted"]
@@ -138,7 +138,7 @@ def solve_triaxial(
         whiteners = whitening(v)
         if method == "as_published":
             theta, iterations = start, solutions
-            covariance = published_covariance(theta, m, r, prior, v)
+            covariance = compute_published_covariance(theta, m, r, prior, v)
         elif method == "maximum_likelihood":
             theta, iterations = most_likely(start, m, r, v_bar, whiteners, norm_known=norm_known)
             covariance = covariance_bound(theta, r, v_bar, whiteners, norm_known=norm_known)

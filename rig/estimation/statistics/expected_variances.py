@@ -48,7 +48,7 @@ class ErrorSizes:
     own_share: float
 
 
-def expected_sizes(fit: ResidualInputs, shares: Sequence[float]) -> ErrorSizes:
+def estimate_variances(fit: ResidualInputs, shares: Sequence[float]) -> ErrorSizes:
     """Return the posterior mean squares of the variance components.
 
     Priors: spike-and-slab of the walk, log-uniform of its slab and of δ, equal probabilities of the `shares`.
@@ -77,7 +77,7 @@ def expected_sizes(fit: ResidualInputs, shares: Sequence[float]) -> ErrorSizes:
     return ErrorSizes(float(np.sqrt(walk_square)), float(np.sqrt(attitude_square.sum())), float(fraction))
 
 
-def expected_disturbances(
+def estimate_disturbances(
     fit: ResidualInputs, sizes: ErrorSizes, causes: Sequence[Array], odds: Sequence[float]
 ) -> Array:
     """Return the expected variance (k,) of each of `causes`, which hold the columns (n, …) of one std.

@@ -177,9 +177,9 @@ def fit_over_temperature(readings: RepeatedMeans, reference_c: float, gradient_k
     centre = fits.centre(chosen)
     weights = {orders: float(np.exp((chosen.aicc - fit.aicc) / 2)) for orders, fit in tried.items()}
     total = sum(weights.values())
-    chosen_coefficients = _centred_coefficients(chosen, centre)
+    chosen_coefficients = _centre_coefficients(chosen, centre)
     differences = [
-        (weights[orders] / total, _centred_coefficients(fit, centre) - chosen_coefficients)
+        (weights[orders] / total, _centre_coefficients(fit, centre) - chosen_coefficients)
         for orders, fit in tried.items()
     ]
     without_lag, loop = chosen.without_lag, chosen.loop
@@ -429,7 +429,7 @@ def _constant(changes: Array, centre: Array) -> Array:
     return constant
 
 
-def _centred_coefficients(fit: _TemperatureFit, centre: Array) -> Array:
+def _centre_coefficients(fit: _TemperatureFit, centre: Array) -> Array:
     """Return coefficients (24,), relative for k, that do not change the mean over the readings."""
     parts = [(changes, centre[i]) for i, changes in enumerate((fit.relative, fit.bias))]
     return np.concatenate([np.concatenate([_constant(*part)[None], part[0]]).ravel() for part in parts])

@@ -36,7 +36,7 @@ def rig_effects(rigs: Sequence[str], sensors: Sequence[str], values: Array, std:
     """
     effects: list[RigEffect] = []
     names = np.array(rigs)
-    for group in _connected_groups(rigs, sensors):
+    for group in _find_connected_groups(rigs, sensors):
         group_rigs = [rig for rig in dict.fromkeys(rigs) if rig in group]
         if len(group_rigs) < 2:
             continue
@@ -60,7 +60,7 @@ def rig_effects(rigs: Sequence[str], sensors: Sequence[str], values: Array, std:
     return tuple(effects)
 
 
-def _connected_groups(rigs: Sequence[str], sensors: Sequence[str]) -> list[set[str]]:
+def _find_connected_groups(rigs: Sequence[str], sensors: Sequence[str]) -> list[set[str]]:
     """Return groups of rigs that are connected by shared sensors."""
     rig_names, sensor_names = list(dict.fromkeys(rigs)), list(dict.fromkeys(sensors))
     nodes = len(rig_names) + len(sensor_names)

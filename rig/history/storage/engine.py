@@ -12,7 +12,7 @@ from rig.history.storage.address import HistoryAddress
 from rig.history.storage.forks import kept_from_children
 from rig.history.storage.libpq import connect_arguments
 from rig.history.storage.migrations import bring_up_to_date, version_of
-from rig.history.storage.sqlite_engine import WAIT_S, WRITES, shared_engine, sqlite_engine
+from rig.history.storage.sqlite_engine import WAIT_S, WRITES, share_engine, sqlite_engine
 from rig.history.storage.sqlite_file import history_is_there, new_file_in_place
 
 __all__ = ["WRITES", "connection_apart", "engine_of"]
@@ -30,7 +30,7 @@ def engine_of(address: HistoryAddress) -> Iterator[Engine]:
     if isinstance(where, Path) and not history_is_there(where):
         continuity.refuse_anew(address)
         _make(where, address.label)
-    with shared_engine(where, address.label) if isinstance(where, Path) else _server_engine(where) as engine:
+    with share_engine(where, address.label) if isinstance(where, Path) else _server_engine(where) as engine:
         with engine.connect() as connection:
             version = version_of(connection, address.label)
         if version == 0:

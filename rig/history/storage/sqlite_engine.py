@@ -34,7 +34,7 @@ _sharing = threading.Lock()
 
 
 @contextmanager
-def shared_engine(file: Path, label: str) -> Iterator[Engine]:
+def share_engine(file: Path, label: str) -> Iterator[Engine]:
     """Yield this process's engine of a history's file; when its last user has finished, its connections are closed."""
     key = file.parent.resolve() / file.name
     with _sharing:

@@ -89,7 +89,7 @@ def changes_table(title: str, changes: Sequence[Change]) -> FittingTable:
         values("before", [change.before for change in changes], 3, 1),
         values("now", [change.now for change in changes], 2, 0),
         TableColumn("difference", differences, rank=2, number=True, shorter=TableColumn("Δ", differences, number=True)),
-        TableColumn("E_n", [_normalised_error(change) for change in changes], number=True),
+        TableColumn("E_n", [_format_normalised_error(change) for change in changes], number=True),
     )
     return FittingTable(title, columns)
 
@@ -170,7 +170,7 @@ def rig_in_words(past: Past) -> str:
     return "readings from files" if past.rig == NO_ARM else past.rig
 
 
-def _normalised_error(change: Change) -> str:
+def _format_normalised_error(change: Change) -> str:
     return f"{'changed ' * change.has_changed}{change.normalised_error:.2f}"
 
 

@@ -20,7 +20,7 @@ from rig.observation.motion.arm_motion import ArmMotion
 from rig.observation.observe import Observation, fit_response
 from rig.observation.observed_run import ObservedRun
 from rig.observation.statistics.coloured_noise import correlation_inflation
-from rig.observation.statistics.mean import Mean, MeanNoise, weighted_means
+from rig.observation.statistics.mean import Mean, MeanNoise, compute_weighted_means
 from rig.observation.statistics.spectral_lines import (
     LineSearch,
     column_count,
@@ -246,7 +246,7 @@ def _average(
     readings = division.readings_rad_s
     groups, rows = division.groups[:, division.enough], weights[list(division.enough)]
     smooth = readings - residuals
-    means = weighted_means(readings, groups, rows, smooth=smooth, noise=noise, steps=division.steps)
+    means = compute_weighted_means(readings, groups, rows, smooth=smooth, noise=noise, steps=division.steps)
     last, segments = len(weights) - 1, list[Segment]()
     for index, mean, rate_rad_s in zip(division.enough, means, rows @ rates, strict=True):
         start_s, end_s = division.ends_s[index : index + 2].tolist()

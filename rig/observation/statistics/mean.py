@@ -92,7 +92,7 @@ def dof_by_axis(dofs: Iterable[Array | float]) -> Array:
     return np.array([np.broadcast_to(dof, 3) for dof in dofs])
 
 
-def weighted_means(
+def compute_weighted_means(
     readings: Array, groups: Array, weights: Array, *, smooth: Array, noise: MeanNoise, steps: Steps
 ) -> tuple[Mean, ...]:
     """Return the weighted means of p groups of readings: one for a whole window, several for its segments.
@@ -146,7 +146,7 @@ def even_mean(readings: Array, steps: Steps) -> Mean:
     )
     groups = whole(readings)
     still = np.zeros(readings.shape)
-    (mean,) = weighted_means(readings, groups, groups.T / len(readings), smooth=still, noise=noise, steps=steps)
+    (mean,) = compute_weighted_means(readings, groups, groups.T / len(readings), smooth=still, noise=noise, steps=steps)
     return mean
 
 
@@ -174,5 +174,5 @@ def average_tapered(readings: Array, time_s: Array, window: Window, steps: Steps
     noise = MeanNoise(scatter=variance, in_a_mean=at_zero, dof=np.full(3, dof_at_zero(len(readings))))
     tapered = weights(time_s, window.start_s, window.end_s)[None]
     still = np.zeros(readings.shape)
-    (mean,) = weighted_means(readings, whole(readings), tapered, smooth=still, noise=noise, steps=steps)
+    (mean,) = compute_weighted_means(readings, whole(readings), tapered, smooth=still, noise=noise, steps=steps)
     return mean

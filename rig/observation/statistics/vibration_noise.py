@@ -11,7 +11,7 @@ import numpy as np
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.rounding import Steps
 from rig.observation.statistics.coloured_noise import MEMORIES, fit_autoregression
-from rig.observation.statistics.mean import Mean, MeanNoise, mean_at_rest, weighted_means, whole
+from rig.observation.statistics.mean import Mean, MeanNoise, compute_weighted_means, mean_at_rest, whole
 from rig.observation.statistics.spectral_lines import LineSearch, find_lines, fit_columns, waves
 from rig.observation.statistics.tapered_weights import weights
 from rig.observation.windows import Window
@@ -28,7 +28,7 @@ def average_rest(readings: Array, time_s: Array, window: Window, steps: Steps) -
     smooth = columns @ fit_columns(columns, residuals)
     noise = estimate_noise(residuals - smooth, columns.shape[1], steps, BRIEF if shaking.size else MEMORIES)
     tapered = weights(time_s, window.start_s, window.end_s)[None]
-    (mean,) = weighted_means(readings, whole(readings), tapered, smooth=smooth, noise=noise, steps=steps)
+    (mean,) = compute_weighted_means(readings, whole(readings), tapered, smooth=smooth, noise=noise, steps=steps)
     return mean
 
 

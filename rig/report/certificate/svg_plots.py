@@ -18,7 +18,7 @@ from rig.report.findings.unexplained import (
     find_sweep_residuals,
 )
 from rig.report.tables.certificate import AXES
-from rig.report.words.printed_budget import printed_indices
+from rig.report.words.printed_budget import find_printed_indices
 
 WIDTH, LEFT_MARGIN, RIGHT_MARGIN = 340.0, 42.0, 8.0
 TOP, HEIGHT = 18.0, 104.0
@@ -116,7 +116,7 @@ def reach_in(largest: float, units: Sequence[DisplayUnit]) -> tuple[float, Displ
 
 def contributions(budget: BudgetEntry, scale: Sequence[float]) -> Contributions:
     """Return the ratio of each contributor's standard uncertainty to the combined one, at least 1e-4, for a plot."""
-    k, b = printed_indices(budget, scale)
+    k, b = find_printed_indices(budget, scale)
     across = (WIDTH - NAMES - RIGHT_MARGIN) / DECADES
 
     def position(fraction: float) -> float:

@@ -26,7 +26,7 @@ def list_omissions(outcome: "Outcome") -> dict[str, tuple[OmittedEntry, ...]]:
     return {name: tuple(parts) for name, parts in by_sensor.items() if parts}
 
 
-def unsolved_entries(outcome: "Outcome") -> dict[str, dict[str, ErrorEntry]]:
+def list_unsolved_entries(outcome: "Outcome") -> dict[str, dict[str, ErrorEntry]]:
     """Return why recorded quantities have no solution, by sensor and quantity."""
     reasons: dict[str, dict[str, ErrorEntry]] = {}
     faults = [(name, *failure) for name, sensor in outcome.external.items() for failure in sensor.unsolved.items()]

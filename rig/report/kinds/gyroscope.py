@@ -7,7 +7,7 @@ import numpy as np
 from rich.table import Table
 
 from rig.analysis.outcome import Outcome
-from rig.data.entries.budget import expanded_uncertainties
+from rig.data.entries.budget import expand_uncertainties
 from rig.data.entries.external import AttitudesEntry
 from rig.data.entries.result_types import ErrorEntry, Role
 from rig.data.quantity import RATE
@@ -22,7 +22,7 @@ from rig.report.findings.finding import Finding
 from rig.report.findings.linear_corrections import Corrected, noise_of
 from rig.report.findings.result_kind import CertifiedItem, DisplayRow, NoOutlet, ResultKind
 from rig.report.findings.unexplained import find_sweep_residuals
-from rig.report.kinds.triad import history_record, item_words, shown_of, tables, unsolved_lines
+from rig.report.kinds.triad import describe_unsolved, history_record, item_words, shown_of, tables
 from rig.report.tables import dcc_results
 from rig.report.tables.axis_tables import decimals, line_of, matrix_lines, triple
 from rig.report.words.detection_limit_words import detection_limit_field, detection_limit_lines
@@ -156,7 +156,7 @@ def _lines(finding: Finding[GyroscopeEntry]) -> Iterator[str]:
 
 def _describe_difference(sensor: GyroscopeEntry, other: EstimateEntry | VectorEntry) -> Iterator[str]:
     """Yield a sentence on the preferable one of two estimators that differ by more than U."""
-    expanded = expanded_uncertainties(sensor.budget, sensor.covariance)
+    expanded = expand_uncertainties(sensor.budget, sensor.covariance)
     values, others = ((*solution.scale, *solution.bias_rad_s) for solution in (sensor, other))
     differences = divide_or_infinity(np.abs(np.subtract(others, values)), expanded)
     worst = int(np.argmax(differences))
@@ -259,7 +259,7 @@ GYROSCOPE = ResultKind(
     shown=_build_row,
     followed=history_record,
     header=gyroscope_lines,
-    unsolved=lambda document: unsolved_lines(document, RATE),
+    unsolved=lambda document: describe_unsolved(document, RATE),
     figures=NoOutlet("its residuals are on the certificate and in the notebook"),
     block="gyroscope.html.j2:gyroscope",
     measured=_describe_item,

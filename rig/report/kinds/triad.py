@@ -9,7 +9,7 @@ import numpy as np
 from rich.table import Table
 
 from rig.analysis.outcome import Outcome
-from rig.data.entries.budget import expanded_uncertainties
+from rig.data.entries.budget import expand_uncertainties
 from rig.data.entries.magnetometer import ReversalEntry
 from rig.data.entries.result_types import ErrorEntry
 from rig.data.quantity import Quantity
@@ -51,7 +51,7 @@ def bias_of(quantity: Quantity, entry: object) -> Sequence[float]:
 def shown_of(finding: Finding[Any]) -> DisplayRow:
     """Return the row for page and notebook of a sensor with three axes."""
     quantity, entry = finding.quantity, finding.entry
-    expanded, size = expanded_uncertainties(entry.budget, entry.covariance), quantity.bias.size
+    expanded, size = expand_uncertainties(entry.budget, entry.covariance), quantity.bias.size
     count = len(entry.scale)
     bias = AxisValues(
         [value / size for value in bias_of(quantity, entry)], [value / size for value in expanded[count:]]
@@ -73,7 +73,7 @@ def history_record(finding: Finding[Any], document: ResultDocument) -> HistoryRe
 
 def tables(title: str, quantity: Quantity, entry: Calibrated) -> Iterator[Table]:
     """Yield scale and bias of each axis ± U, and the uncertainty budget."""
-    budget, expanded = entry.budget, expanded_uncertainties(entry.budget, entry.covariance)
+    budget, expanded = entry.budget, expand_uncertainties(entry.budget, entry.covariance)
     yield scale_and_bias_table(
         title, quantity, entry.scale, bias_of(quantity, entry), expanded, heading=heading_for(budget)
     )
@@ -116,7 +116,7 @@ def method_lines(entry: Any, quantity: Quantity, from_what: str = "") -> Iterato
             yield f"{method}{from_what}: k {triple(other.scale, '.6f')}, b {bias} {quantity.bias.name}"
 
 
-def unsolved_lines(document: ResultDocument, quantity: Quantity) -> Iterator[str]:
+def describe_unsolved(document: ResultDocument, quantity: Quantity) -> Iterator[str]:
     """Yield why a quantity of external readings has no solution."""
     for name, faults in document.unsolved.items():
         if (fault := faults.get(quantity.name)) is not None:
@@ -165,7 +165,7 @@ def triad_kind(
         for name, entry in all_entries.items():
             if isinstance(entry, ErrorEntry):
                 yield f"{quantity.label(name)}, not calibrated: {entry.error}"
-        yield from unsolved_lines(document, quantity)
+        yield from describe_unsolved(document, quantity)
 
     def render(finding: Finding[Any]) -> Iterator[Table | str]:
         entry = finding.entry

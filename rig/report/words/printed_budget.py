@@ -57,7 +57,7 @@ class PrintedBudget:
 
 def lay_out_budget(budget: BudgetEntry, scale: Sequence[float], bias: DisplayUnit) -> PrintedBudget:
     """Return the budget, largest contributions first and negligible ones in one line, with biases in unit `bias`."""
-    indices = printed_indices(budget, scale)
+    indices = find_printed_indices(budget, scale)
     sizes = [
         _Size.choose(budget.std[indices[0]], 1.0, ""),
         _Size.choose(budget.std[indices[1]], 1 / bias.size, bias.name),
@@ -75,7 +75,7 @@ def lay_out_budget(budget: BudgetEntry, scale: Sequence[float], bias: DisplayUni
     return PrintedBudget((first, second), tuple(printed))
 
 
-def printed_indices(budget: BudgetEntry, scale: Sequence[float]) -> tuple[int, int]:
+def find_printed_indices(budget: BudgetEntry, scale: Sequence[float]) -> tuple[int, int]:
     """Return the indices of the printed scale factor and bias, among kx ky kz bx by bz."""
     return int(np.argmax(np.divide(budget.expanded[:3], scale))), 3 + int(np.argmax(budget.expanded[3:]))
 

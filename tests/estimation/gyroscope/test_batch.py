@@ -7,7 +7,11 @@ from scipy.optimize import least_squares
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.accumulator import Accumulator, Solution
-from rig.estimation.gyroscope.levenberg_marquardt import solve_levenberg_marquardt, squared_rate, squared_rate_jacobian
+from rig.estimation.gyroscope.levenberg_marquardt import (
+    compute_squared_rate,
+    compute_squared_rate_jacobian,
+    solve_levenberg_marquardt,
+)
 from rig.estimation.gyroscope.six_observation_batch import algorithm_1_batch, newton_batch
 
 SPEED = np.pi / 3
@@ -86,7 +90,9 @@ def test_a_batch_agrees_with_a_loop_of_scipy() -> None:
     batch = newton_batch(means, speeds)
     start = np.concatenate([np.ones(3), np.zeros(3)])
     loop = [
-        least_squares(lambda x, m=m: speeds**2 - squared_rate(x, m), start, method="lm", xtol=1e-12, ftol=1e-12).x
+        least_squares(
+            lambda x, m=m: speeds**2 - compute_squared_rate(x, m), start, method="lm", xtol=1e-12, ftol=1e-12
+        ).x
         for m in means
     ]
     np.testing.assert_allclose(np.concatenate([batch.scale, batch.bias_rad_s], axis=1), loop, atol=1e-9)
@@ -160,9 +166,10 @@ def test_the_jacobian_is_the_derivative() -> None:
     theta, means = np.array([1.1, 0.9, 1.2, 0.3, -0.2, 0.1]), runs(1)[0][0]
     steps = 1e-6 * np.eye(6)
     numeric = np.stack(
-        [(squared_rate(theta + h, means) - squared_rate(theta - h, means)) / 2e-6 for h in steps], axis=1
+        [(compute_squared_rate(theta + h, means) - compute_squared_rate(theta - h, means)) / 2e-6 for h in steps],
+        axis=1,
     )
-    np.testing.assert_allclose(squared_rate_jacobian(theta, means), numeric, atol=1e-8)
+    np.testing.assert_allclose(compute_squared_rate_jacobian(theta, means), numeric, atol=1e-8)
 
 
 def test_levenberg_marquardt_refuses_a_repeated_direction() -> None:
