@@ -26,7 +26,6 @@ FEWEST_FREEDOM = 3  # with fewer, rounding down to the next integer would alone 
 def check_agree(data: ExternalData) -> None:
     """Check that every sweep agrees with the solution of all others (leave-one-out residuals).
 
-
     Raise Refused `bad_sweep` for the sweep that disagrees most, for example half a turn stated as a whole one, or a
     wrong axis; of an axis with only two sweeps both are named. Too few rows for a solution are not checked.
     """
