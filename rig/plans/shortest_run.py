@@ -52,21 +52,21 @@ RESTS_S = (1.0, 2.0, 3.0, 5.0, 10.0, 20.0)  # durations of a rest, and of a dwel
 # The endless run is predicted from a plan of two repeats, because in a single one noise is too large relative to the
 # errors that repeats share. Other rests and more repeats reduce its U further, but by no more than this factor.
 TWICE, HOPELESS = 2, 2.0
-ANEW = NOISE, WANDERING, FLICKER, STATES  # the budget lines that repeats reduce, also for accelerometers
+PER_REPEAT = NOISE, WANDERING, FLICKER, STATES  # the budget lines that repeats reduce, also for accelerometers
 FLIPS, TURNS_BY_HAND = (8, 10, 12, 16, 24, 36, 48), (0, 3, 6)
 REST_STEP_S = 0.1  # step of the last, fine search
 
 
-class Tried(Protocol):
+class RunSearch(Protocol):
     """The candidate runs of a procedure, with their predictions.
 
     - `predict`: returns the budgets, None for a run that is not possible.
-    - `anew`: the contributors with a new error in each repeat, which a run repeated without end lacks.
+    - `per_repeat`: the contributors with a new error in each repeat, which a run repeated without end lacks.
     - `ending`: the keys that end a run before its last repeat, when the target is reached.
     """
 
     @property
-    def anew(self) -> Collection[str]: ...
+    def per_repeat(self) -> Collection[str]: ...
     def candidates(self) -> Sequence[Candidate]: ...
     def select_endless(self, candidates: Sequence[Candidate]) -> Sequence[Candidate]: ...
     def finer(self, best: Candidate) -> Sequence[Candidate]: ...
@@ -86,7 +86,7 @@ def shortest_run(config: RigConfig, wanted: TargetUncertainty) -> Shortest:
     _refuse_others(wanted, config)
     candidates = what.candidates()
     floors = [
-        (candidate.family, once.omit(what.anew))
+        (candidate.family, once.omit(what.per_repeat))
         for candidate in what.select_endless(candidates)
         if (once := what.predict(candidate)) is not None
     ]
@@ -117,14 +117,14 @@ def shortest_run(config: RigConfig, wanted: TargetUncertainty) -> Shortest:
     )
 
 
-def find_search(config: RigConfig) -> Tried:
+def find_search(config: RigConfig) -> RunSearch:
     """Return the search among the runs of a configuration. Raise Refused `not_predictable`."""
     procedure = config.procedure
     if not config.to_calibrate:
         raise _not_predictable("nothing is to be calibrated")
-    if procedure.name not in TRIED or procedure.finds_earth_rate:
+    if procedure.name not in SEARCHES or procedure.finds_earth_rate:
         raise _not_predictable(f"the uncertainty of the procedure {procedure.name} is not predicted")
-    return TRIED[procedure.name](config)
+    return SEARCHES[procedure.name](config)
 
 
 def _not_predictable(what: str) -> Refused:
@@ -181,7 +181,7 @@ def _longest(candidates: Sequence[Candidate], family: tuple[object, ...], at_mos
 
 
 @dataclass(frozen=True, slots=True)
-class _Swept:
+class _TurnerSearch:
     """Runs of a turner with joints, with sweeps or attitudes.
 
     - `motions`: each motion's family, its angle, and its keys of the procedure.
@@ -191,7 +191,7 @@ class _Swept:
     motions: Callable[[RigConfig], Iterator[Motion]]
     waits: tuple[str, ...]
     config: RigConfig
-    anew: Collection[str] = ANEW
+    per_repeat: Collection[str] = PER_REPEAT
 
     def candidates(self) -> Sequence[Candidate]:
         candidates = []
@@ -277,11 +277,11 @@ def _down_from(wait_s: float) -> list[float]:
 
 
 @dataclass(frozen=True, slots=True)
-class _ByHand:
+class _HandSearch:
     """Sessions by hand with different numbers of flips and turns."""
 
     config: RigConfig
-    anew: Collection[str] = tuple(LINES)  # all that the readings determine
+    per_repeat: Collection[str] = tuple(LINES)  # all that the readings determine
 
     def candidates(self) -> Sequence[Candidate]:
         return [self._candidate(*numbers) for numbers in product(FLIPS, TURNS_BY_HAND, RESTS_S[:4])]
@@ -323,10 +323,10 @@ def _session(procedure: ProcedureSection) -> tuple[ByHandSection, Sequence[Instr
 
 
 # The search among the runs of a procedure, by its name.
-TRIED: Mapping[str, Callable[[RigConfig], Tried]] = {
-    "six_observation": partial(_Swept, vary_arm, ("rest_s",)),
-    "servo_six_observation": partial(_Swept, vary_servo, ("rest_s",)),
-    "static_attitudes": partial(_Swept, vary_attitudes, ("dwell_s",)),
-    "imu": partial(_Swept, vary_imu, ("rest_s", "dwell_s")),
-    "by_hand": _ByHand,
+SEARCHES: Mapping[str, Callable[[RigConfig], RunSearch]] = {
+    "six_observation": partial(_TurnerSearch, vary_arm, ("rest_s",)),
+    "servo_six_observation": partial(_TurnerSearch, vary_servo, ("rest_s",)),
+    "static_attitudes": partial(_TurnerSearch, vary_attitudes, ("dwell_s",)),
+    "imu": partial(_TurnerSearch, vary_imu, ("rest_s", "dwell_s")),
+    "by_hand": _HandSearch,
 }

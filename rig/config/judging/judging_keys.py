@@ -179,7 +179,7 @@ class UncertaintyKeys(BaseModel, Generic[OfSensors]):
 
 
 class ObservationSection(ObservationKeys, extra="forbid"):
-    """What an averaged revolution must fulfil, so that it is used."""
+    """The requirements on a revolution to be averaged."""
 
     _numbers = field_validator("*", mode="before")(classmethod(no_number_is_true))
 

@@ -122,7 +122,7 @@ class SiteSection(Section):
 
 
 class CertificateSection(Section):
-    """What a certificate says about the order and the responsible person; "not stated" for what is left out."""
+    """A certificate's statements on the order and the responsible person; "not stated" if left out."""
 
     customer: Words | None = Field(default=None, description="the customer's name")
     customer_address: Words | None = Field(default=None, description="the customer's address, in one line")

@@ -128,7 +128,7 @@ ScalarName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$", max_length=20)]
 
 
 class LinesSection(Section):
-    """What a device prints: one sample a line. See [a sensor that prints lines](how-to/at-the-rig/lines.md)."""
+    """The lines that a device prints, one per sample. See [a sensor that prints lines](how-to/at-the-rig/lines.md)."""
 
     columns: tuple[str, ...] = Field(
         min_length=3,

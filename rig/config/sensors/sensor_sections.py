@@ -111,7 +111,7 @@ class AccelerationSection(Section):
 
 
 class ConfiguredSensor(Protocol):
-    """What every sensor's section has, whatever it measures; what its part can do is in the catalogue."""
+    """The common keys of every sensor's section; the properties of its part are in the catalogue."""
 
     @property
     def part(self) -> str: ...

@@ -8,7 +8,7 @@ from rig.config.section import RATIO, Section
 
 
 class SimulatedFaultySection(Section):
-    """What the sensor's electronics do wrong with its rates, of a sensor with a port of its own."""
+    """Faults of the electronics in a sensor with a port of its own, which change its rates."""
 
     frozen_axis: Literal["x", "y", "z"] | None = Field(
         default=None, description="axis whose rate freezes at its last value; none if left out"
