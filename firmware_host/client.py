@@ -199,7 +199,7 @@ class Board:
         if self._link.closed:
             return
         if self._streaming and self._link.fault is None:
-            with contextlib.suppress(BoardError):  # the link may be gone, and closing is what was asked for
+            with contextlib.suppress(BoardError):  # the link may be lost, and closing must still succeed
                 self._link.tell("stop")
         self._link.close()
 

@@ -27,8 +27,8 @@ SOURCES = [
 RATE_HZ, REST_S, NOISE_RAD_S = 119.0, 1.6, 1e-3
 PER_RAD_S, PER_M_S2 = np.radians(0.0175), 0.122e-3 * 9.80665
 STATE = RAM + 0x4000
-SETTLING = 1_000  # instructions: no reading costs so many unless it ends a block
-SOLVING = 20_000  # no block so many unless it ends a move
+SETTLING = 1_000  # instructions: only a reading that ends a block costs more
+SOLVING = 20_000  # only a block that ends a move costs more
 
 
 def build(folder: Path) -> Path:

@@ -33,7 +33,7 @@ STREAMS = {
     "one at 952 Hz": {"lsm9ds1": 952.0},
 }
 LIMIT_MB_S = 20.0
-CHUNK = 4096  # what a read from the port brings at most
+CHUNK = 4096  # largest size of a read from the port
 RECORDED_S = 4.0
 ROUNDS = 3
 SLOW_FRACTION = 0.05  # of the stream is enough for the other decoders

@@ -24,7 +24,7 @@ from goals import record
 
 LIMIT_MB_S, LIMIT_RATIO = 5.0, 5.0
 READS = (65536, 4096)
-PORT_FRACTION = 50  # one part in so many of the stream goes through a port for the loop
+PORT_FRACTION = 50  # the stream over the part of it that goes through a port for the loop
 SECTION = LinesSection.model_validate(
     {
         "columns": ["time", "gx", "gy", "gz", "ax", "ay", "az"],
@@ -73,7 +73,7 @@ def measure_split_at_port(stream: bytes) -> float:
 
     filling = threading.Thread(target=fill, daemon=True)
     with serial.Serial(os.ttyname(slave), 921600) as port:
-        filling.start()  # not before: what has come when it opens is thrown away
+        filling.start()  # not before: bytes received before it opens are discarded
         speed_mb_s = measure_split(port, len(stream))
     filling.join()
     os.close(slave)

@@ -15,7 +15,10 @@ BEYOND, USUAL = 20.0, 0.99  # times the largest of the usual readings, which are
 CLIPPED, CLIPPED_RAD_S = 4, 1.0  # equal readings in a row at the end of an axis' readings; least range of these
 FINE = 0.5  # of the noise: steps of readings below it, so that equal ones are no chance
 GAP = 1.5  # intervals: no reading is missing
-FROZEN, COARSE = 50, 10  # equal readings in a row; if more than so many occur a second time, the axis is coarse
+FROZEN, COARSE = (
+    50,
+    10,
+)  # equal readings in a row that are a fault; length of a second such run that shows a coarse axis
 TURNED_RAD_S = 0.2  # change of another axis during them
 INNER = (0.05, 0.95)  # quantiles: single readings count for nothing
 NO_JUMP, SMOOTH = 0.8, 0.25  # of an axis' span: a jump over its end is larger, and all other steps are smaller

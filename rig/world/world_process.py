@@ -222,7 +222,7 @@ class World:
         """
         polled_s = 0.0
         while not self._is_ended:
-            if not (self.network.connections or self._ptys):  # nobody waits for what is to come
+            if not (self.network.connections or self._ptys):  # no client waits for the next ticks
                 self.clock.dialogue()
             wait_s = self.clock.wait_s()
             due = wait_s <= 0.0

@@ -11,7 +11,7 @@ from support.paths import ROOT
 
 PACKAGES = ("rig", "firmware_host", "procedures")
 THE_FORM_ITSELF = ROOT / "firmware_host" / "problem.py"
-# What makes an error from name, what and remedy → how the catalogue calls that
+# constructor of an error from name, what and remedy → the catalogue's kind
 MAKERS = {
     "Refused": "refused",
     "Fault": "fault",

@@ -17,7 +17,7 @@ BEGIN = "<!-- drawn from pyproject.toml by tests/support/house_picture.py -->\n`
 BEGIN_INSIDE = "<!-- the order inside, drawn from pyproject.toml by tests/support/house_picture.py -->\n```text\n"
 END = "```\n<!-- end of the drawing -->\n"
 NAMES = 15  # columns of a room's name
-WORDS = 92  # columns of what is in it
+WORDS = 92  # columns of its content
 
 
 def picture() -> str:

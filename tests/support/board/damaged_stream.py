@@ -10,7 +10,7 @@ from firmware_host.protocol import MESSAGES
 from support.board.host_frames import CReceiver, encode_in_c
 
 MEAN_FAULT_BYTES = 4
-CHUNK = 4096  # what a read from the port brings at most
+CHUNK = 4096  # largest size of a read from the port
 
 _SAMPLES = next(message for message in MESSAGES if message.name == "samples")
 
@@ -119,7 +119,7 @@ def _find_touched(wires: list[bytes], spans: list[tuple[int, int]]) -> set[int]:
     begins = np.concatenate(([0], np.cumsum([len(wire) for wire in wires])))
     touched: set[int] = set()
     for begin, end in spans:
-        # A byte before the span too: what is inserted right after a delimiter belongs to the next frame
+        # A byte before the span too: bytes inserted right after a delimiter belong to the next frame
         low, high = np.searchsorted(begins, (begin, end), "right") - 1
         touched.update(range(int(low), min(int(high) + 1, len(wires))))
     return touched

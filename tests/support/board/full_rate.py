@@ -16,7 +16,7 @@ CASES: dict[str, tuple[dict[str, float], tuple[str, ...]]] = {
     "all at their highest rates": (_FASTEST, ()),
     "all at their highest rates, calibrated": (_FASTEST, tuple(_FASTEST)),
 }
-SLICE_S = 1.0  # simulated, between looks at what came
+SLICE_S = 1.0  # simulated time between two reads
 CALIBRATION = {
     "model": 2,
     "serial_number": "simulated",

@@ -58,7 +58,7 @@ class HostBoard:
         self.mpu9250: Mpu9250Registers = self.parts["mpu9250"]
         self.adis16465: Adis16465Registers = self.parts["adis16465"]
         self.magnetometer: Lsm9ds1MagnetometerRegisters = self.parts["lsm9ds1_magnetometer"]
-        self.sensors: list[Part] = list(self.parts.values())  # what is really there, by the board's numbers
+        self.sensors: list[Part] = list(self.parts.values())  # the parts present, by the board's numbers
         self.line_is_free = True  # False: the transmitter is busy until `sent()`
         self.restarts = 0
         self.wire = bytearray()

@@ -60,7 +60,7 @@ EXCLUSIVE, WITH_COMMENTS = (
     "http://www.w3.org/2006/12/xml-c14n11#WithComments",
 )
 
-# What has been altered of what is signed.
+# Alterations of the signed content.
 OF_CONTENT: dict[str, Forgery] = {
     "a value": element(VALUE, text("1 1 1")),
     "an uncertainty": element(f".//{SI}uncertaintyXMLList", text("0 0 0")),

@@ -179,4 +179,4 @@ RESULT = ResultKind(
 )
 
 
-KIND = SimpleNamespace(quantity=INCLINATION, solve=solve, result=RESULT)  # what the entry point names
+KIND = SimpleNamespace(quantity=INCLINATION, solve=solve, result=RESULT)  # named by the entry point

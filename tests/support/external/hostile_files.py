@@ -24,7 +24,7 @@ IMU, POSE = "sensor_msgs/msg/Imu", "geometry_msgs/msg/PoseStamped"
 MAGIC = b"\x89MCAP0\r\n"
 GIGABYTE = 1 << 30
 TIMES = "time_s,x_rad_s,y_rad_s,z_rad_s\n"
-Makes = Callable[[Path], Path]  # what lies in that folder afterwards, as it is to be read
+Makes = Callable[[Path], Path]  # the file made in that folder, as it is to be read
 
 
 def reading(length: int = 0) -> bytes:
@@ -174,7 +174,7 @@ def laughs(name: str = "", levels: int = 9, times: int = 9) -> str:
     return "\n".join([*lines, name]) + "\n"
 
 
-# -- what is no file -----------------------------------------------------------------------------------------------
+# -- no regular files ----------------------------------------------------------------------------------------------
 def pipe(path: Path) -> None:
     os.mkfifo(path)
 

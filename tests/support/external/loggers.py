@@ -15,7 +15,7 @@ from support.external.csv_tables import write_table
 AXES = ("x", "y", "z")
 SIX_WAYS = ((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1))
 MATRIX = np.array([[1.02, 0.004, -0.006], [-0.003, 0.985, 0.005], [0.002, -0.004, 1.01]])
-SCALE = 1 / np.linalg.norm(MATRIX, axis=1)  # of an axis: one over what it reads of a rate along itself
+SCALE = 1 / np.linalg.norm(MATRIX, axis=1)  # of an axis: one over its response to a rate along itself
 GRAVITY_M_S2 = 9.80665
 RAMP_S, REST_S = 1.0, 2.0
 FACES = np.array([[1, 0, -1, 0], [1, 0, 1, 0], [1, 1, 0, 0], [1, -1, 0, 0], [2**0.5, 0, 0, 0], [0, 2**0.5, 0, 0]]) / (

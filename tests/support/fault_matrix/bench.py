@@ -101,7 +101,7 @@ class Bench:
 
     def end(self) -> None:
         """Kill all processes that still run, and wait for their end."""
-        going_on = self.process is not None and self.running  # of one that has ended the number may be another's by now
+        going_on = self.process is not None and self.running  # an ended process' id may belong to another by now
         pids = [self.pid, *filter(None, [self.driver_pid])] if going_on else []
         for pid in pids:
             with suppress(ProcessLookupError):

@@ -23,9 +23,9 @@ Act = Callable[[Bench, Random], object]
 STOPPED, INTERRUPTED, KILLED = 3, 130, -signal.SIGKILL
 LINK = frozenset({"arm_link_lost", "arm_driver_died", "arm_driver_hung"})
 BOARD = frozenset({"board_link_lost", "board_error", "lost_samples", "no_samples"})
-RECONNECTED = frozenset({"program_stopped"})  # a client that finds a lost arm again starts its program anew
+RECONNECTED = frozenset({"program_stopped"})  # a client that finds a lost arm again restarts its program
 CONTROL_S = 1.5  # the control mode is asked twice a second
-LINK_S, DRIVER_S, SUPERVISOR_S, BOARD_S = 0.8, 0.5, 2.0, 2.0  # silence that tells, docs/architecture.md
+LINK_S, DRIVER_S, SUPERVISOR_S, BOARD_S = 0.8, 0.5, 2.0, 2.0  # silences that are faults, docs/architecture.md
 HELLO_S, CLOSED_S = 0.5, 0.3  # a board that has restarted says so, docs/protocol.md; a port that closes is read
 
 
@@ -235,7 +235,7 @@ CATALOGUE: tuple[Fault, ...] = (
     Fault("controller", "silent for 3 s", _order("silence_arm", duration_s=3),
           names=LINK | RECONNECTED | {"arm_slower_than_planned"}, known_s=LINK_S),
     Fault("controller", "closes its connections", _order("close_arm"), names=LINK, known_s=LINK_S),
-    # Nobody is left who could stop it: the movement ends where it was told to, and the program waits on the pendant.
+    # No process is left to stop it: the movement ends at its target, and the program waits on the pendant.
     _net("controller gone: all ports refused", _hang_up(*ARM, refuse=True), known_s=None, mend=_heal_and_stop),
     _net("RTDE stalls", _stall("rtde")),
     _net("RTDE half-closed", _half_close("rtde")),

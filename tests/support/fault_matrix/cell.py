@@ -25,7 +25,7 @@ AT_REST_S = 1.0  # of the controller's time, after the fault can be known
 WATCHED_S = 4.0  # wall time after a fault in which the laboratory goes at its real pace
 WITHIN_U = 5.0
 RESUMES = 3  # a verdict that names a sweep is resumed again
-BEHIND_S = 0.1  # what was handed to this machine so late may be on its way to the rig yet
+BEHIND_S = 0.1  # later data may still be on their way to the rig
 
 
 @dataclass(slots=True)

@@ -25,7 +25,7 @@ from support.processes.warm import start_module
 
 OTHERS = ("list", "verify", "import", "floor", "notebook", "station")
 KILLED = 0.3  # of those who come, and of the stations they come to
-WHOLE_EVERY, FIRST_WHOLE = 40, 7  # of so many stations one is a whole `rig station`, with a laboratory
+WHOLE_EVERY, FIRST_WHOLE = 40, 7  # one station of these is a whole `rig station`, with a laboratory
 WHOLE_PARTS = 2
 PAUSE_S = 0.2
 BUSY_S = 400.0  # a busy machine's patience

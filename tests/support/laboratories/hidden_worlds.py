@@ -91,7 +91,7 @@ def kvh(seed: int) -> dict[str, Any]:
     """Return a world with a KVH 1775 that measures the Earth's rate and has, as stated, no g-sensitivity."""
     rng = np.random.default_rng(seed)
     document = merge(_document("own_port/kvh1775_earth"), _laboratory(seed, rng, speed_deg_s=60.0))
-    document["world"]["site"]["gravity_m_s2"] = 9.80061 + float(rng.uniform(-5e-4, 5e-4))  # what rocks make of it
+    document["world"]["site"]["gravity_m_s2"] = 9.80061 + float(rng.uniform(-5e-4, 5e-4))  # with the anomaly by rocks
     document["site"] = {"gravity_m_s2": 9.80061}  # it finds latitude and heading
     sensor = {
         "scale": rng.uniform(0.998, 1.002, 3).tolist(),
@@ -289,7 +289,7 @@ def _laboratory(seed: int, rng: np.random.Generator, *, speed_deg_s: float) -> d
         "procedure": {"speed_deg_s": speed_deg_s},
         "world": {
             "seed": seed,
-            "time_scale": 15,  # faster, and a busy machine asks the board too late for what it keeps
+            "time_scale": 15,  # if faster, a busy machine asks the board too late for stored readings
             "site": {**site, "base_tilt_deg": rng.normal(0, 0.15, 2).tolist()},
             "arm": _arm(rng),
             "board": {
@@ -320,7 +320,7 @@ def _drive(rng: np.random.Generator) -> dict[str, Any]:
 
 def _arm(rng: np.random.Generator) -> dict[str, Any]:
     vibration = draw_visible_vibration(rng)
-    separate = rng.spawn(1)[0]  # what is drawn after it is what it was without
+    separate = rng.spawn(1)[0]  # later draws remain the same
     drive, has_rough_ripple = _drive(separate), bool(separate.random() < 0.3)
     rough = float(rng.uniform(0, 0.05))
     axis_rad, again_rad = np.radians([STATED.axis_deg, STATED.repeatability_deg])

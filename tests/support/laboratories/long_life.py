@@ -28,13 +28,13 @@ from support.laboratories.worlds import WorldHandle, hardware, merge, worlds
 
 SETUP = merge(SETUPS["six_observation"], {"world": {"time_scale": 50}})
 PARAMETERS = ("kx", "ky", "kz", "bx", "by", "bz")
-OWN_EVERY, STORED_EVERY = 4, 10  # of so many runs one is a process of its own; one is stored on the board
+OWN_EVERY, STORED_EVERY = 4, 10  # one run of these is a process of its own; one is stored on the board
 WRAP_US = 1 << 32  # of the board's counter
 GROWTH_MAX = 0.05
 WITHIN_U = 5.0  # of the truth
 END_S = 300.0
 
-# Replies go to what was its standard output; what the commands print does not.
+# Replies go to its original standard output; the commands' output does not.
 STATION = """
 import json, os, sys
 replies = os.fdopen(os.dup(1), "w")
@@ -199,7 +199,7 @@ def _run(bench: Bench, number: int) -> Calibration:
         return Calibration(number, in_station, status, wall_s)
     gyro = read_result(out).gyroscopes["gyro"]
     times_us = read_run(out / "run.h5").samples["gyro"]["board_time_us"]
-    bench.world.state()  # it has heard by now that the rig has hung up
+    bench.world.state()  # after this the world knows that the rig has hung up
     return Calibration(
         number, in_station, status, wall_s,
         solution=(*gyro.scale, *gyro.bias_rad_s),
@@ -216,7 +216,7 @@ def _status(world: WorldHandle) -> BoardStatus:
         return board.status()
 
 
-# -- what is not as it should be -------------------------------------------------------------------------------------
+# -- defects ---------------------------------------------------------------------------------------------------------
 @dataclass(frozen=True, slots=True)
 class Course:
     """One parameter over the runs: its mean, slope per run with its standard uncertainty, and its spread.

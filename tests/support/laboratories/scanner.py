@@ -21,7 +21,7 @@ class Scanner:
         self.process = process
         self._terminal = terminal
         self._output = ""
-        self._read = 0  # what was waited for already ends here
+        self._read = 0  # end of the text waited for so far
         self._over = False  # it says no more
         self._more = threading.Condition()
         threading.Thread(target=self._listen, daemon=True).start()

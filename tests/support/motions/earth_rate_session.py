@@ -34,7 +34,7 @@ POINTS = 180  # of a turn
 PAUSE_S = 2.0
 REST_S = 3.0
 VIBRATION_HZ, SAMPLES_HZ = 14.0, 250.0  # of configs/own_port/kvh1775_earth.yaml
-ARM_RAD = 6e-4  # half of what `uncertainty.axis_deg` allows, as a standard deviation
+ARM_RAD = 6e-4  # half of the limit `uncertainty.axis_deg`, as a standard deviation
 
 
 @dataclass(frozen=True, slots=True)

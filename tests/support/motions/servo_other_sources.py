@@ -22,7 +22,7 @@ from support.processes.waiting import PATIENCE_S
 from support.wires.autopilot_on_a_wire import autopilot_on_a_wire, section
 from support.wires.printed_lines import pty_printing, sensor_section
 
-STILL_S = BEGINS_S - 0.9  # it stands from then on, before it is told to turn
+STILL_S = BEGINS_S - 0.9  # it stands from then on, before the first turn
 RATE_HZ = 200.0
 CHUNK_S = 0.05
 PACE = 8.0

@@ -23,7 +23,7 @@ CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
 TABLET = (1280, 800)
 
 LEGIBLE = 4.5  # of contrast, WCAG 2.2, success criterion 1.4.3
-# Of every text the worst contrast with what is behind it, and the text.
+# The worst contrast of every text with its background, and the text.
 CONTRAST = """
 const channel = (c) => (c /= 255) <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4;
 const light = ([r, g, b]) => 0.2126 * channel(r) + 0.7152 * channel(g) + 0.0722 * channel(b);

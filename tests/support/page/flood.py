@@ -67,7 +67,7 @@ def flood(url: str, connections: int) -> Iterator[None]:
     thread = threading.Thread(target=attack, daemon=True)
     thread.start()
     try:
-        full.wait(PATIENCE_S)  # before the limits were there it could not come to so many
+        full.wait(PATIENCE_S)  # without the limits fewer would be possible
         yield
     finally:
         over.set()

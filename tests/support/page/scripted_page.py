@@ -25,7 +25,7 @@ from support.page.browser import text
 from support.page.scripted_runs import ABOUT, before_it_moves, look, moving, plan_demo
 from support.processes.waiting import wait_for
 
-AGAIN_S = 0.2  # a run that goes on tells so all the time
+AGAIN_S = 0.2  # interval of events in a run
 GOING_ON = (StepStarted, StepFinished, Progress, SamplesTaken)
 
 

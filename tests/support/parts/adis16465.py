@@ -98,8 +98,8 @@ class Adis16465Registers:
         self.status = 0
         self.counter = 0
         self.taking_us = 150
-        self.cured_by_reset = False  # what DIAG_STAT says goes with the next reset
-        self.before_burst: Callable[[], None] | None = None  # what happens once, just before the registers are read
+        self.cured_by_reset = False  # whether the next reset clears DIAG_STAT
+        self.before_burst: Callable[[], None] | None = None  # called once, just before the registers are read
         self.after_burst: Callable[[], None] | None = None  # or just after
         self.damage = 0  # added to the next bursts' last data byte
         self._data = [0] * 7

@@ -67,10 +67,8 @@ class Lsm9ds1Registers(ByteRegisters):
         self.values[0x0F] = 0x68
         self.values[0x22] = 0x04  # IF_ADD_INC, as after power-up
         self.fresh_acceleration = False
-        self.again_after_reading = 0  # so many times a conversion comes just when the last one has been read
-        self.before_acceleration: Callable[[], None] | None = (
-            None  # what happens once, before the accelerations are read
-        )
+        self.again_after_reading = 0  # number of conversions right after a read
+        self.before_acceleration: Callable[[], None] | None = None  # called once, before the accelerations are read
         self.after_acceleration: Callable[[], None] | None = None  # or just after
 
     @property

@@ -20,7 +20,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-# What a run, its laboratory and what reads their result import sooner or later.
+# The modules that a run, its laboratory and readers of their result import sooner or later.
 IMPORTED = (
     *(
         "rig.cli",
@@ -33,7 +33,7 @@ IMPORTED = (
     *("rig.turners.ur.ur_kind", "rig.turners.servo.servo_kind", "rig.turners.hand.hand_kind"),
     *("h5py", "jinja2", "scipy.interpolate", "scipy.ndimage"),
 )
-# What reads a file of others is allowed little memory, and imports little.
+# A reader of foreign files is allowed little memory, and imports little.
 READS = ("h5py", "rig.data.recording.layout_keys", "rig.data.processes.reading_process")
 LABORATORY, READER = "rig.world", "rig.data.processes.reading_child"
 
@@ -212,7 +212,7 @@ def _serve() -> None:
     if not reads:
         import_module("firmware_host.emulator.hooks").address_of("block")  # translated here, for every laboratory
     gc.collect()
-    gc.freeze()  # what is never looked through is shared, not copied
+    gc.freeze()  # objects that are never scanned are shared, not copied
     if order := serve_orders(reading if reads else everything):
         fork_modules((LABORATORY, READER), addresses.__getitem__)
         sys.argv = ["", *order["words"]]

@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-PATIENCE_S = 900.0  # of wall time, after which what is waited for has failed: no busy computer takes as long
+PATIENCE_S = 900.0  # of wall time, after which the event has failed: no busy computer takes as long
 LOOK_S = 0.005  # until the second look: each takes longer than the one before …
 LONGEST_LOOK_S, LONGER = 0.02, 1.25  # … as it may take a processor from those who are waited for
 

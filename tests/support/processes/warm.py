@@ -51,7 +51,7 @@ class _Nursery:
         def end() -> None:
             for pipe in pipes:
                 pipe.close()
-            process.kill()  # it has nothing to put away, and whoever starts tests on many processes does not wait long
+            process.kill()  # it has nothing to save, and a parallel test run does not wait long
             process.wait()
 
         atexit.register(end)

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from support.processes.forked import find_fork_server
 
 STEP_S = 0.002  # of wall time that counts between two looks of who drives the clock
-LEAD_S = 0.002  # that it may be ahead of what whoever is driven by it has read
+LEAD_S = 0.002  # its largest lead over the time that the driver has read
 LOOK_S = 0.0005
 NOW, READ, DRIVEN, FREE, LIMIT = range(5)
 

@@ -15,9 +15,9 @@ MOST_FRACTION = 0.10
 MOST_PEAK = 0.22  # of the rate: a sweep whose smoothed rate strays by 0.25 is refused
 SLOWEST_LINE = 8  # times a turn; slower ones were never looked for
 LEAST_HZ, MOST_HZ = 0.1, 200.0
-UNSEEN_RAD_S, UNSEEN_ORDER = (2e-5, 4e-3), 4.0  # what nobody sees shake more slowly is a bias that wanders
+UNSEEN_RAD_S, UNSEEN_ORDER = (2e-5, 4e-3), 4.0  # unseen slower vibrations are bias drift
 SEEN_RAD_S, SEEN_ORDER = (2e-5, 3e-3), 1.3  # faster, and a standing arm is taken to move
-FILTERED = 0.9  # of the data rate: what is faster a sensor's filter keeps from it
+FILTERED = 0.9  # of the data rate: a sensor's filter removes faster vibrations
 
 
 @dataclass(frozen=True, slots=True)

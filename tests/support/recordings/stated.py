@@ -20,7 +20,7 @@ from rig.report.findings.history_records import Parameter
 from rig.report.kinds.kind_registry import history_records
 
 SHARE = 1e-6
-Number = tuple[str, float, float]  # its name, its value, and of what it may move by that share
+Number = tuple[str, float, float]  # name, value, and the quantity of which it may change by a share
 
 
 def differences(expected: ResultDocument, actual: ResultDocument) -> list[str]:

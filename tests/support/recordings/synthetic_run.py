@@ -90,13 +90,13 @@ class Setup:
     kinematics: DenavitHartenberg = NOMINAL  # how the arm is made
     procedure: tuple[tuple[str, str], ...] = ()  # further keys of its section, and their values
     angle_std_deg: float | None = None  # as it is stated of the encoders
-    encoders_err: float = 1.0  # as many times what is stated
+    encoders_err: float = 1.0  # true errors relative to the stated ones
     odd_per_rad_s: float = 0.0  # of each axis
     even_per_rad_s: float = 0.0
     stated_kinematics: DenavitHartenberg | None = None  # how its controller says it is made
-    g_sensitivity_rad_s_per_g: tuple[tuple[float, ...], ...] = ()  # of the sensor's axes to what they feel
+    g_sensitivity_rad_s_per_g: tuple[tuple[float, ...], ...] = ()  # of the sensor's axes to the sensed force
     offset_m: tuple[float, ...] = (0.0, 0.0, 0.0)  # from the flange's centre
-    part: str = "lsm9ds1"  # as it is called; what it does is said above
+    part: str = "lsm9ds1"  # its name; its properties are above
 
 
 def truth(setup: Setup) -> Array:
@@ -128,7 +128,7 @@ class Motion:
         self.phases = rng.uniform(0, 2 * np.pi, len(setup.orders))
         self.seen_rad_s, self.seen_hz = setup.seen_vibration_rad_s, setup.seen_vibration_hz
         self.unseen_rad_s, self.unseen_hz = setup.unseen_vibration_rad_s, setup.unseen_vibration_hz
-        self.seen_phases = rng.spawn(1)[0].uniform(0, 2 * np.pi, 3)  # what is drawn after it stays what it was
+        self.seen_phases = rng.spawn(1)[0].uniform(0, 2 * np.pi, 3)  # later draws remain the same
         self.end_s = float(self.ends[-1]) + 1.0
 
     def joints(self, time_s: Array) -> tuple[Array, Array]:

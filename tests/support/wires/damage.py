@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from random import Random
 
-HANG_S = 20  # wall time, far beyond what a reader that waits for the rest may take
+HANG_S = 20  # wall time, far longer than a reader may wait for the rest
 NASTY = (b"\0", b"\xff", b"\n", b"\r", b"\x1b[2J", b"%s%n", b"\xed\xa0\x80", b"(" * 300, b"9" * 400, b"1e999", b"-nan")
 
 

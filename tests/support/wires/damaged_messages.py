@@ -28,7 +28,7 @@ from support.laboratories.ideal import ideal
 from support.paths import DEMO
 from support.wires.damage import HANG_S, damage_message, ending_by_name
 
-SESSION, RECOVERY = 3, 60  # messages after which a session is made afresh, and the robot put right
+SESSION, RECOVERY = 3, 60  # messages after which the session is replaced, and the robot recovered
 PATIENCE_S = 0.25  # that the rig's readers are given for a controller that is next door
 HOSTS = tuple(f"127.19.{number}.1" for number in range(1, 9))  # so that there are ports enough for all connections
 

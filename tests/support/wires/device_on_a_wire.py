@@ -15,7 +15,7 @@ from rig.world.clock import WorldClock
 from support.processes.waiting import PATIENCE_S
 
 IDLE_S = 0.001
-UNREAD = 1024  # bytes that its reader may be behind: a pseudo-terminal loses what is beyond some thousand
+UNREAD = 1024  # bytes that its reader may lag: a pseudo-terminal loses more than some thousand
 
 
 class DeviceOnAWire:
@@ -34,7 +34,7 @@ class DeviceOnAWire:
         self._selector = selectors.DefaultSelector()
         self._pty = PtyPort(self.line, self._selector)
         self.port = self._pty.path
-        self._reader = os.open(self.port, os.O_RDWR | os.O_NOCTTY)  # to see what its reader sees
+        self._reader = os.open(self.port, os.O_RDWR | os.O_NOCTTY)  # to measure its reader's lag
         self._ending = threading.Event()
         self._orders: list[Callable[[], None]] = []
         self._thread: threading.Thread | None = None

@@ -51,7 +51,7 @@ def pty_printing(chunks: Iterable[bytes], pace_s: float = 0.01) -> Iterator[tupl
     """Yield a port that prints one of `chunks` every `pace_s`, and an event that unplugs it."""
     master, slave = os.openpty()
     tty.setraw(slave)
-    os.set_blocking(master, False)  # it is full when nobody reads, which must not hold up the end
+    os.set_blocking(master, False)  # without a reader it fills up, which must not delay the end
     ending, unplugged = threading.Event(), threading.Event()
 
     def over() -> bool:
