@@ -2,7 +2,7 @@
 
 python examples/own_export.py RUN
 
-As a format of `rig export` the function stands in rig/report/exports/, and its line in formats.py.
+As a format of `rig export` the function belongs in rig/report/exports/, and its line in formats.py.
 """
 
 import sys

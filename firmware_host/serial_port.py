@@ -21,11 +21,18 @@ def explain_closed(port: str, error: OSError) -> str:
 def describe_ports() -> str:
     """Return a clause on the serial ports of this computer; "" where they cannot be listed."""
     try:
-        from serial.tools import list_ports
+        ports = find_ports()
     except ImportError:
         return ""
-    ports = [f"{available.device} ({available.description})" for available in list_ports.comports()]
-    return f"this computer has {', '.join(ports) or 'no serial port'}"
+    return f"this computer has {', '.join(ports.values()) or 'no serial port'}"
+
+
+def find_ports() -> dict[str, str]:
+    """Return this computer's serial ports with a device, by name, each in words. Raise ImportError without pyserial."""
+    from serial.tools.list_ports import comports
+
+    ports = [port for port in sorted(comports()) if port.hwid != "n/a"]  # else a name without a device behind it
+    return {port.device: f"{port.device} ({port.description})" for port in ports}
 
 
 class SerialPort:

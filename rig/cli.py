@@ -263,6 +263,8 @@ def run_guarded(command: Callable[[], int]) -> int:
         )
     except KeyboardInterrupt as interrupt:
         ignore_endings()  # all is stopped: an impatient second Ctrl-C has nothing to end
+        if sys.stdin.isatty() and sys.stderr.isatty():
+            print(file=sys.stderr)  # the terminal shows ^C behind what stood in the line
         return _print_ending(str(interrupt) or "interrupted", INTERRUPTED)
     except OSError as error:
         return _print_ending(

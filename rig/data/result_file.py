@@ -41,7 +41,7 @@ from rig.data.entries.temperature import OverTemperatureEntry
 from rig.data.installed_kinds import quantities
 from rig.data.key_meanings import meaning_of
 from rig.data.meaning import Meaning
-from rig.data.run_folder import RESULT
+from rig.data.run_folder import CONFIG, RESULT
 from rig.data.validation import OfJoints, read_document
 from rig.errors import Refused
 
@@ -485,6 +485,8 @@ def write_result(document: ResultDocument, folder: Path) -> None:
 def read_result(path: Path) -> ResultDocument:
     """Return the `result.json` of a run folder, or at `path` itself. Raise Refused `no_result`, `not_a_result`."""
     remedy = "Give a run folder or its result.json"
+    if (path / CONFIG).is_file() and not (path / RESULT).exists():
+        remedy = "The run was not finished: go on with rig resume RUN, or solve what was recorded with rig solve RUN"
     return read_document(ResultDocument, _file(path), SIZE_MAX_BYTES, what="a run", remedy=remedy)
 
 

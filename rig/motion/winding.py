@@ -1,7 +1,7 @@
 """The winding of the flange's cable by a plan: each joint's travel to both sides of its present angle. Pure."""
 
 from collections.abc import Sequence
-from math import degrees, pi
+from math import ceil, degrees, pi
 
 from rig.motion.steps import Plan
 from rig.motion.turner_state import Joints
@@ -17,10 +17,15 @@ def windings_rad(plan: Plan, q_rad: Joints) -> list[tuple[float, float]]:
     return [(min(angles), max(angles)) for angles in travels]
 
 
+def _round_up_deg(angle_rad: float) -> int:
+    """Return whole degrees that are enough: 190 for 189.5°, but 190 for a 190° that is off by rounding."""
+    return ceil(degrees(angle_rad) - 1e-6)
+
+
 def cable_words(plan: Plan, q_rad: Joints, names: Sequence[str]) -> list[str]:
     """Return sentences on the slack that the flange's cable needs from its present position, by joint `names`."""
     travels = [
-        f"{name} by {-degrees(low):.0f}° one way (-) and {degrees(high):.0f}° the other (+)"
+        f"{name} by {_round_up_deg(-low)}° one way (-) and {_round_up_deg(high)}° the other (+)"
         for name, (low, high) in zip(names, windings_rad(plan, q_rad), strict=True)
         if max(-low, high) > SLACK_RAD
     ]

@@ -29,7 +29,8 @@ def hand_event_line(event: RunEvent) -> str | None:
             text = f"accepted: from {before} to {after}"
         case HandMoveAccepted(turns=turns, from_face=face):
             again_laid = f"accepted: laid down again with the side {face} up"
-            text = f"accepted: {turns:+d} whole turns with the side {face} up" if turns else again_laid
+            whole = "whole turn" if abs(turns) == 1 else "whole turns"
+            text = f"accepted: {turns:+d} {whole} with the side {face} up" if turns else again_laid
         case HandMoveRefused(again=again):
             text = f"not accepted: {again}"
         case HandRestRefused(again=again):

@@ -54,7 +54,7 @@ def line(event: RunEvent) -> str | None:
         case ArmConnected(report, called):
             text = f"{called}: {report.words} at {report.host}"
         case PreflightPassed(plan) if not plan.motions:
-            text = "pre-flight: nothing moves by itself; the board's clock follows its crystal"
+            text = "pre-flight: nothing moves by itself; the clock of each sensor is known"
         case PreflightPassed(plan, report, called):
             text = (
                 f"pre-flight: {called} {report.serial_number} at {report.host} is ready; "
@@ -66,7 +66,8 @@ def line(event: RunEvent) -> str | None:
             text = f"done: {step.name}, {took_s:.2f} s"
         case PhaseRecorded(sensors, missed_states):
             samples, lost = (sum(counts) for counts in zip(*((s.samples, s.lost) for s in sensors), strict=True))
-            text = f"recorded: {samples} samples, {lost} lost; {missed_states} arm states missed"
+            text = f"recorded: {samples} samples, {lost} lost"
+            text += f"; {missed_states} arm states missed" if missed_states else ""
         case _:
             text = hand_event_line(event) or _temperature_line(event) or _outcome_line(event)
     return text

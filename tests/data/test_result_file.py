@@ -84,3 +84,9 @@ def test_a_result_of_another_schema_names_it(tmp_path: Path) -> None:
     (tmp_path / "result.json").write_text(json.dumps(document))
     with pytest.raises(Refused, match=r"not_a_result: .* of the schema 'rig.result/9', and this version reads 'rig"):
         read_result(tmp_path)
+
+
+def test_a_run_that_was_not_finished_is_said_to_be_one(tmp_path: Path) -> None:
+    (tmp_path / "config.yaml").touch()
+    with pytest.raises(Refused, match=r"no_result: .*not finished: go on with rig resume RUN"):
+        read_result(tmp_path)

@@ -30,7 +30,7 @@ def test_every_public_name_stands_on_the_api_page() -> None:
 
 def test_every_check_that_the_method_explains_and_every_limit_says_what_to_do() -> None:
     method = (DOCS / "method.md").read_text(encoding="utf-8")
-    explained = method.split("## What contradicts itself")[1].split("\n## ")[0]
+    explained = method.split("## Consistency of a recording")[1].split("\n## ")[0]
     tables = [rest.split("\n\n")[0] for rest in explained.split("| check | what is added |")[1:]]
     checks = {name for table in tables for name in re.findall(r"^\| .*?`…?(\w+)`", table, re.MULTILINE)}
     assert len(checks) > 20

@@ -67,3 +67,9 @@ def test_pages_are_named_only_if_the_program_has_them(
     monkeypatch.setattr(supplied_files, "PACKAGE", tmp_path / "site-packages" / "rig")
     (tmp_path / "site-packages" / "docs").mkdir(parents=True)  # of another package
     assert "docs/" not in read_words()
+
+
+def test_a_name_that_is_like_several_is_offered_once_each(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["explain", "condtion"]) == 2
+    offered = capsys.readouterr().err.partition("Did you mean ")[2].strip().rstrip("?").split(" or ")
+    assert "condition" in offered and len(offered) == len(set(offered))

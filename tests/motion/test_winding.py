@@ -1,6 +1,6 @@
 """What the sensor's cable must allow is said from where the joints stand, to each side."""
 
-from math import degrees, radians
+from math import ceil, degrees, radians
 
 from rig.config.models import ArmSection
 from rig.config.procedures.procedure_sections import SixObservationSection
@@ -32,7 +32,7 @@ def test_a_wrist_that_stands_a_whole_turn_away_unwinds_to_one_side() -> None:
     (low, high), (low_home, _) = windings_rad(plan(), away)[5], windings_rad(plan(), home)[5]
     assert high == 0.0 and abs(low - (low_home - TURN)) < 1e-9
     words = cable_words(plan(), away, JOINT_NAMES)
-    assert f"wrist_3 by {degrees(-low):.0f}° one way (-) and 0° the other (+)" in words[0]
+    assert f"wrist_3 by {ceil(degrees(-low))}° one way (-) and 0° the other (+)" in words[0]
     assert words[1].startswith("wrist_3 is +360° from home")
     assert not [word for word in cable_words(plan(), home, JOINT_NAMES) if "from home" in word]
 

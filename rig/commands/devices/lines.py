@@ -77,7 +77,11 @@ def ask_stated(options: Namespace, *, by_hand: bool) -> "StatedProperties":
     questions = {
         "serial_number": ("serial number of this specimen", "--serial-number", check_serial_number),
         "range_deg_s": ("full scale of the gyroscope in its program, °/s", "--range-deg-s", positive_number),
-        "range_g": ("full scale of the accelerometer in its program, g", "--range-g", positive_number),
+        "range_g": (
+            "full scale of the accelerometer in its program, g (Enter: it has none)",
+            "--range-g",
+            _range_or_none,
+        ),
     }
     options_given = {key: getattr(options, key) for key in questions}
     answers = {
@@ -85,7 +89,7 @@ def ask_stated(options: Namespace, *, by_hand: bool) -> "StatedProperties":
         for key, (question, option, valid) in questions.items()
         if options_given[key] is not None or sys.stdin.isatty()
     }
-    return StatedProperties(**answers, by_hand=by_hand)
+    return StatedProperties(**{key: answer or None for key, answer in answers.items()}, by_hand=by_hand)
 
 
 def positive_number(text: str) -> str:
@@ -95,8 +99,12 @@ def positive_number(text: str) -> str:
     except ValueError:
         value = 0.0
     if not 0 < value < 1e6:
-        raise ValueError("must be a number above 0")
+        raise ValueError("must be a number above 0, without a unit")
     return text
+
+
+def _range_or_none(text: str) -> str:
+    return text and positive_number(text)
 
 
 def look_at_device(
@@ -107,6 +115,8 @@ def look_at_device(
     Raise Refused as `listen` does; `lines_no_pattern` for lines without a common pattern; for a configuration by hand,
     `lines_not_turned` if no columns look like a gyroscope's.
     """
+    import numpy as np
+
     from rig.commands.laboratory.claims import claim_sensor
     from rig.sensors.lines.guessed_section import section
     from rig.sensors.lines.guessing import guess
@@ -119,22 +129,27 @@ def look_at_device(
         shape = find_shape(lines)
         layout = guess(shape, still_s)
     except NoShape as why:
-        raise Refused(
-            "lines_no_pattern", f"{port}: {why}", "Let its program print one sample a line, numbers only"
-        ) from why
+        raise _no_pattern(port, why) from why
     for reason in layout.reasons:
         _tell(reason)
     for gap in layout.gaps:
         _tell(f"UNKNOWN {gap}")
     if user.by_hand and "gx" not in layout.columns:
+        if np.isnan(shape.values).any():
+            raise _no_pattern(port, "some of its columns are text, so no three of them are a gyroscope")
         still, turned = seconds
         raise Refused(
             "lines_not_turned",
-            f"{port}: no three columns read nothing at rest and much when it is turned, so nothing was written",
+            f"{port}: no three columns read about zero at rest and much when it is turned, so nothing was written",
             "Run it again, and when it says so turn the device about every axis, by half a turn and back; "
             f"--seconds {still:g} {2 * turned:g} gives more time",
         )
     return printable_lines(section(shape, layout, port, baud, name, user=user))
+
+
+def _no_pattern(port: str, why: object) -> Refused:
+    remedy = "Let its program print one sample a line, numbers only: no brackets, no JSON"
+    return Refused("lines_no_pattern", f"{port}: {why}", remedy)
 
 
 def _tell(what: str) -> None:

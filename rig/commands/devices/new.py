@@ -89,7 +89,9 @@ def _turner_answers(turner: "Turner", options: Namespace) -> dict[str, Any]:
             "arm_host": ask(
                 "address of the arm (pendant: Settings, System, Network)", "--host", check_host, value=options.host
             ),
-            "arm_model": ask_choice("Which arm is it?", "--model", _literals(usual.annotation), options.model),
+            "arm_model": ask_choice(
+                "Which arm is it?", "--model", _literals(usual.annotation), options.model, usual.default
+            ),
             "payload_kg": float(
                 ask(
                     "mass on the flange (board, holder, cable), kg",
@@ -130,7 +132,7 @@ def _literals(annotation: object) -> Mapping[str, str]:
 
 def _port(question: str, option: str, chosen_port: str | None) -> str:
     """Return a serial port that the user chooses from those of this computer, or types."""
-    from firmware_host.serial_port import describe_ports
+    from firmware_host.serial_port import describe_ports, find_ports
     from rig.config.section import check_port
 
     def valid(value: str) -> str:
@@ -139,16 +141,8 @@ def _port(question: str, option: str, chosen_port: str | None) -> str:
         except ValueError as error:
             raise ValueError("; ".join(filter(None, [str(error), describe_ports()]))) from None
 
-    if chosen_port is None and (ports := _find_ports()):
+    if chosen_port is None and (ports := find_ports()):
         choice = ask_choice(question, option, {**ports, ANOTHER: "another, or one that is not plugged in yet"})
         if choice != ANOTHER:
             return choice
     return ask("port, such as /dev/ttyUSB0, COM3 or socket://host:port", option, valid, value=chosen_port)
-
-
-def _find_ports() -> dict[str, str]:
-    """Return this computer's serial ports with a device, by name, each in words."""
-    from serial.tools.list_ports import comports
-
-    ports = [port for port in sorted(comports()) if port.hwid != "n/a"]  # a name without a device behind it
-    return {port.device: f"{port.device} ({port.description})" for port in ports}

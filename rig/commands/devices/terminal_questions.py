@@ -36,8 +36,13 @@ def ask(
             say(f"  {error}", sys.stderr)
 
 
-def ask_choice(question: str, option: str, choices: Mapping[KeyT, str], value: str | None = None) -> KeyT:
-    """Return the key of a choice; the user types it or its number; Enter selects the first. Raise as `ask` does."""
+def ask_choice(
+    question: str, option: str, choices: Mapping[KeyT, str], value: str | None = None, usual: KeyT | None = None
+) -> KeyT:
+    """Return the key of a choice; the user types it or its number; Enter selects `usual`, or the first.
+
+    Raise as `ask` does.
+    """
     keys = [*choices]
 
     def key_of(text: str) -> str:
@@ -52,7 +57,8 @@ def ask_choice(question: str, option: str, choices: Mapping[KeyT, str], value: s
         say(question, sys.stderr)
         for number, words in enumerate(choices.values(), 1):
             say(f"  {number}  {words}", sys.stderr)
-    answer = ask("  number", option, key_of, usual="1", value=value)
+    usual_number = 1 if usual is None else keys.index(usual) + 1
+    answer = ask("  number", option, key_of, usual=str(usual_number), value=value)
     return next(key for key in keys if key == answer)
 
 

@@ -31,7 +31,7 @@ def run(options: Namespace) -> int:
     name = " ".join(options.name).strip()
     lines = [*_explain_check(name), *_explain_limit(name), *_explain_error(name), *_explain_word(name)]
     if not lines:
-        alike = get_close_matches(name, _list_names(), cutoff=0.5)
+        alike = get_close_matches(name, {*_list_names()}, cutoff=0.5)
         remedy = f"Did you mean {' or '.join(alike)}?" if alike else "Give the name exactly as it was printed"
         raise Refused("nothing_known", f"there is no check, error, limit or word called {shorten(name)}", remedy)
     for line in lines:

@@ -76,8 +76,9 @@ def _print(
     convention = None
     if log is not None and reference is not None:
         reference = count_from(reference, log.origin_s)
-        convention = _find_convention(log, reference)
-        for line in describe_convention(convention):
+        is_order_named = _names_order(reference)
+        convention = _find_convention(log, reference, is_order_named=is_order_named)
+        for line in describe_convention(convention, is_order_named=is_order_named):
             say(line)
         if convention is not None and stated is None:
             _adopt(columns, inverse=convention.inverse, scalar_last=convention.scalar_last)
@@ -90,13 +91,18 @@ def _print(
         say("--write columns.yaml writes the map of these columns")
 
 
-def _find_convention(log: "LookedFile", reference: "LookedFile") -> "Convention | None":
-    from rig.analysis.external.convention import find_convention
+def _names_order(reference: "LookedFile") -> bool:
+    """Return whether the file's headings say which number of a quaternion is which."""
     from rig.data.recording.motion_file import QUATERNION
 
-    assert log.samples is not None and reference.attitudes is not None, "both were read"
     headings = () if reference.layout is None else reference.layout.headings
-    is_order_named = reference.layout is None or all(name in headings for name in QUATERNION)
+    return reference.layout is None or all(name in headings for name in QUATERNION)
+
+
+def _find_convention(log: "LookedFile", reference: "LookedFile", *, is_order_named: bool) -> "Convention | None":
+    from rig.analysis.external.convention import find_convention
+
+    assert log.samples is not None and reference.attitudes is not None, "both were read"
     return find_convention(log.samples, reference.attitudes, is_order_named=is_order_named)
 
 

@@ -70,8 +70,9 @@ class ByHandSection(ProcedureSection):
                 yield f"sensors.{name}: a {sensor.part} is not calibrated by hand"
             elif sensor.lines is not None and sensor.lines.clock == "arrival":
                 yield (
-                    f"sensors.{name}.lines.clock: by hand the device has to print the time: add a column time, or a "
-                    "column sequence if it samples by a timer"
+                    f"sensors.{name}.lines.clock: by hand the device has to print its time, for no other clock is "
+                    "there. Let its program begin each line with micros(), or with the sample's number if a timer "
+                    "starts it; then write a new file: rig lines PORT --write NEW.yaml"
                 )
             elif sensor.rate_hz < LEAST_RATE_HZ:
                 yield f"sensors.{name}.rate_hz: {sensor.rate_hz:g} is too slow for a hand; at least {LEAST_RATE_HZ:g}"

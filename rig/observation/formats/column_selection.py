@@ -163,7 +163,8 @@ def _check_columns(path: Path, names: Sequence[str], header: Header) -> None:
     problems = [*_list_missing(names, header), *_find_unexpected(names, header)]
     if problems:
         wanted = ", ".join(header.needed) + (f" and one of {', '.join(header.one_of)}" if header.one_of else "")
-        more = "".join(f"; {', '.join(group)} are allowed too" for group in header.optional)
+        more = "; ".join(", ".join(group) for group in header.optional)
+        more = f"; allowed too: {more}" if more else ""
         remedy = (
             f"Its first row must name {wanted}{more}; or state with --columns what its columns are: "
             "rig look FILE --write columns.yaml writes it"

@@ -22,7 +22,7 @@ from rig.report.words.printed_budget import find_printed_indices
 
 WIDTH, LEFT_MARGIN, RIGHT_MARGIN = 340.0, 42.0, 8.0
 TOP, HEIGHT = 18.0, 104.0
-NAMES, ROW, DECADES = 106.0, 13.0, 4
+NAMES, ROW, DECADES = 150.0, 13.0, 4
 
 
 @dataclass(frozen=True, slots=True)

@@ -195,7 +195,7 @@ def _attitude_lines(attitudes: AttitudesEntry | None, clocks: Iterable[TimeBaseE
             f"{1e6 * clock.drift:+.1f} ppm (± {2e6 * clock.drift_std:.2g}) at {clock.reference_board_s:.1f} s of theirs"
         )
     if attitudes.earth_rate_rad_s is None or attitudes.earth_rate_std_rad_s is None:
-        yield f"Earth's rate: {attitudes.earth_rate_error}; its size, in any direction, is in the uncertainty"
+        yield f"Earth's rate: {attitudes.earth_rate_error} Its size, in any direction, is in the uncertainty"
     else:
         rate, expanded = triple(attitudes.earth_rate_rad_s, "+.3e"), 2 * max(attitudes.earth_rate_std_rad_s)
         yield f"Earth's rate in table coordinates: {rate} rad/s (± {expanded:.1e}, k = 2)"

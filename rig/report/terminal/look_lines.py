@@ -65,14 +65,14 @@ def _describe_table(path: Path, layout: TableLayout, guess: LogColumns) -> Itera
         yield _row("missing", f"values are written as {' '.join(layout.missing)}")
 
 
-def describe_convention(convention: Convention | None) -> Iterator[str]:
-    """Yield the convention of the quaternions that the gyroscope shows."""
+def describe_convention(convention: Convention | None, *, is_order_named: bool) -> Iterator[str]:
+    """Yield the convention of the quaternions that the gyroscope shows; their order only if no heading names it."""
     if convention is None:
         yield _row("direction", "the gyroscope does not show that of the quaternions: is it one body and one clock?")
         return
-    order = "x y z w" if convention.scalar_last else "w x y z"
+    order = "" if is_order_named else f", read as {'x y z w' if convention.scalar_last else 'w x y z'}"
     direction = "room to body (motion_inverse)" if convention.inverse else "body to room"
-    yield _row("direction", f"{direction}, read as {order}: {100 * convention.explained:.2f} % of the motion agrees")
+    yield _row("direction", f"{direction}{order}: {100 * convention.explained:.2f} % of the motion agrees")
     if convention.up:
         yield _row("up", f"{convention.up} of the room, by the accelerometer")
     if abs(convention.lag_s) >= LEAST_LAG_S:

@@ -15,6 +15,7 @@ from rig.report.words.mounting_words import farthest_off
 from rig.report.words.printed_values import format_with_u, plus_minus
 from rig.station.plain_text import INDENT, wrap_line
 
+MOST_WITH_MODELS = 4  # more sensors leave no line for their formulas on a screen of 25
 NEAR = 0.9  # ratio to its limit, above which a passed check is named
 MOST_NEAR = 2
 CAUSES = ("stuck_axis", "repeated_readings")  # these cause other checks to fail: such readings do not follow the motion
@@ -168,8 +169,9 @@ def _describe_values(items: Sequence[_SensorValues]) -> Iterator[str]:
     if len(conditions) == 1:
         (kind, held_at) = conditions.pop()
         yield f"{kind}s {held_at}" if len(items) > 1 else held_at
-    if len(items) == 1 and items[0].shown.model:
-        yield items[0].shown.model
+    models = dict.fromkeys((item.kind, item.shown.model) for item in items if item.shown.model)
+    if len(items) <= MOST_WITH_MODELS:
+        yield from (f"{kind}: {model}" if len(items) > 1 else model for kind, model in models)
 
 
 def _count_passed(result: ResultDocument) -> str:

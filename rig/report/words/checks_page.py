@@ -14,7 +14,7 @@ def page_text() -> str:
         "A run passes when every check passes. The name of a check begins with the sensor's name:",
         "`gyro.scale_changed`. For an accelerometer `acceleration_` follows, for a magnetometer `field_`. How each",
         "check works, and how large a change it detects, is explained in",
-        "[method](method.md#what-contradicts-itself). `rig explain NAME` prints a row of",
+        "[method](method.md#consistency-of-a-recording). `rig explain NAME` prints a row of",
         "this table. What to do after a FAIL, step by step: [FAIL: what now](how-to/start/failed.md).",
         "",
         "| check | it fails when | what to do |",

@@ -79,7 +79,7 @@ def guess(shape: Shape, still_until_s: float) -> Guess:
     for index, name in known_columns.items():
         result.columns[index] = name
     text_columns = [index for index in range(count) if np.isnan(shape.values[:, index]).any()]
-    result.reasons += [f"column {index + 1} holds no number in every line" for index in text_columns]
+    result.reasons += [f"column {index + 1} is text, or empty at times: it is not read" for index in text_columns]
     _find_time(shape, result)
     _find_triads(shape, result, shape.arrived_s < still_until_s)
     _find_temperature(shape, result, shape.arrived_s < still_until_s)
@@ -208,7 +208,9 @@ def _find_triads(shape: Shape, guess: Guess, still: Flags) -> None:
         if kind + "x" in guess.columns:
             guess.units[kind] = _unit(shape, guess, kind, still)
     if "g" not in guess.units:
-        guess.gaps.append("which columns are the gyroscope: none reads nothing at rest, and much when it is turned")
+        guess.gaps.append(
+            "which columns are the gyroscope: no three read about zero at rest and much when they are turned"
+        )
 
 
 def _kind(values: Array, still: Flags) -> str | None:

@@ -30,6 +30,7 @@ NORM_TOLERANCE = 2e-3
 AXES = ("x", "y", "z")
 REFERENCE = {name for group in MOTIONS["attitudes"].optional for name in group} | {"start_s", "end_s"}
 QUATERNION_NAME = re.compile(r"(?:.*_)?(?:q|quat|quaternion|orientation|rot|rotation|attitude)_?([wxyz0-3])")
+POSITION_NAME = re.compile(r"(?:(?:p|t|pos|position|trans|translation)_?)?[xyz](?: \[.*\])?")
 DIGITS = {"0": "qw", "1": "qx", "2": "qy", "3": "qz"}
 GRAVITY = {"m/s2": STANDARD_GRAVITY_M_S2, "g": 1.0, "mg": 1000.0}
 ANGLE_WORDS = {"yaw", "pitch", "roll", "heading", "azimuth", "phi", "theta", "psi", "euler"}
@@ -91,8 +92,6 @@ def _guess_samples(
     samples: dict[str, ColumnEntry] = {}
     gaps: list[str] = []
     for group in _group_columns(layout, values, quaternion, rate_hz):
-        if quaternion and not any(group.names):
-            continue  # a reference's positions look like readings
         guessed = guess_triads(group.names, group.values, group.still, rate_hz)
         if "x_rad_s" not in samples and _may_be_gyroscope(group.names, guessed):
             guessed = guess_triads(("gx", "gy", "gz"), group.values, group.still, rate_hz)
@@ -219,19 +218,32 @@ def _group_columns(
 ) -> Iterator[_ColumnGroup]:
     """Yield the columns that vary, in groups with values in the same rows: one group for each rate of the logger.
 
-    Columns of time and of a reference are left out.
+    Left out are columns of a reference: next to a quaternion its positions too, which look like readings; and the
+    numbers of the rows, to which pandas gives no heading.
     """
     names = _name_once([_plain_name(layout, index) for index in range(len(layout.headings))])
     used = {layout.time, *quaternion.values(), *(i for i, name in enumerate(layout.headings) if name in REFERENCE)}
     used |= set(_list_angles(layout))
+    if quaternion:
+        used |= {index for index, name in enumerate(names) if not name or POSITION_NAME.fullmatch(name)}
     groups: dict[bytes, list[int]] = {}
     for index in layout.numbers:
-        if index not in used and np.nanstd(values[:, index]) > 0:
+        if index not in used and not _is_constant(values[:, index]) and not _counts_rows(layout, values, index):
             groups.setdefault(np.isfinite(values[:, index]).tobytes(), []).append(index)
     for indices in groups.values():
         part = values[np.isfinite(values[:, indices[0]])][:, indices]
         still = find_still(part, rate_hz * len(part) / max(len(values), 1))
         yield _ColumnGroup(indices, tuple(names[index] for index in indices), part, still)
+
+
+def _is_constant(column: Array) -> bool:
+    return bool(np.nanmin(column) == np.nanmax(column))
+
+
+def _counts_rows(layout: TableLayout, values: Array, index: int) -> bool:
+    """Return whether a column without a heading has the numbers of the rows, in a file that has headings."""
+    has_no_name = layout.has_heading and layout.headings[index] in ("", "Unnamed: 0")
+    return has_no_name and bool((np.diff(values[:, index]) == 1).all())
 
 
 def _list_angles(layout: TableLayout) -> list[int]:

@@ -33,7 +33,7 @@ STANDING_S = 3.0  # time within which states must show rest before control is ta
 UNWATCHED_S = 2.0  # time without supervision, after which a move is stopped
 HUNG_S = 1.0  # the link's thread repeats its loop at least this often
 KEPT_S = 1.0  # duration of the buffered states that distinguish rest from motion
-NOT_CONTROLLED = StopOutcome(True, "the servo was not under control")
+NOT_CONTROLLED = StopOutcome(True, "the rig has not moved the servo")
 NOT_ENDED = StopOutcome(False, "the stop has not ended", f"Look at the shaft: {SURE}")
 
 

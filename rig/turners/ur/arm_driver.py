@@ -50,7 +50,7 @@ SILENCE_S = 0.8  # after a longer silence the controller may have lost the clien
 REASON_S = 0.2  # a failure waits this long (wall time) for its explanation
 OUR_PROGRAM = "rtde_control"  # the client's name for it
 NOT_BEGUN = ("not_in_remote_control", "registers_in_use")  # reasons for which the client could not start a program
-NOT_CONTROLLED = StopOutcome(True, "the arm was not under control")
+NOT_CONTROLLED = StopOutcome(True, "the rig has not moved the arm")
 NOT_ENDED = StopOutcome(False, "the stop has not ended", "Look at the arm")
 
 

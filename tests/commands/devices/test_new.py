@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from firmware_host.serial_port import describe_ports, find_ports
 from rig.cli import main
 from rig.commands.devices.configuration_writing import write_checked
 from rig.config.config_schema import config_schema
@@ -121,6 +122,43 @@ def test_of_a_device_that_was_not_turned_no_file_is_written_and_the_remedy_is_to
     assert not (tmp_path / "my.yaml").exists()
 
 
+@pytest.mark.slow
+def test_enter_at_the_terminal_means_the_usual_arm_and_no_accelerometer(tmp_path: Path) -> None:
+    operator, terminal = pty.openpty()
+    words = [
+        sys.executable,
+        "-m",
+        "rig",
+        "new",
+        str(tmp_path / "my.yaml"),
+        "--turner",
+        "arm",
+        *LINES,
+        *ARM[2:4],
+        *ARM[-2:],
+    ]
+    os.write(operator, b"\nE-1\n500\n\n")  # which arm; serial number; full scales of gyroscope and accelerometer
+    with subprocess.Popen(words, stdin=terminal, stdout=terminal, stderr=terminal) as process:
+        os.close(terminal)
+        assert process.wait(PATIENCE_S) == 1  # an example's columns are to be filled in
+    os.close(operator)
+    text = (tmp_path / "my.yaml").read_text(encoding="utf-8")
+    assert "model: ur10e" in text and "range_deg_s: 500" in text
+
+
+@pytest.mark.slow
+def test_of_a_device_that_prints_json_no_file_is_written_and_the_remedy_is_to_print_numbers(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lines = (f'{{"t":{10_000 * n},"gyr":[0.{n % 3},0.1,-0.1],"acc":[0.01,-0.02,1.0]}}\r\n'.encode() for n in count())
+    with pty_printing(lines) as (port, _):
+        stated = ("--baud", "115200", "--serial-number", "E-1", "--range-deg-s", "500", "--range-g", "8")
+        assert main(["lines", port, "--seconds", "1", "1", "--write", str(tmp_path / "my.yaml"), *stated]) == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert "column 2 is text" in said and "lines_no_pattern" in said and "no JSON" in said
+    assert not (tmp_path / "my.yaml").exists()
+
+
 @pytest.mark.parametrize("port", ["1", "", "ttyUSB0", "yes"])
 def test_what_is_no_port_is_refused_with_the_ports_that_there_are(
     port: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -129,4 +167,5 @@ def test_what_is_no_port_is_refused_with_the_ports_that_there_are(
     assert main(["new", str(tmp_path / "my.yaml"), *words]) == 2
     said = " ".join(capsys.readouterr().err.split())
     assert f"bad_option: --port {port}: must be the name of a serial port, as /dev/ttyUSB0 or COM3" in said
-    assert "; this computer has " in said
+    assert f"; {describe_ports()}" in said
+    assert all(words in said for words in find_ports().values())

@@ -117,6 +117,17 @@ def test_the_convention_of_quaternions_is_found(inverse: bool, scalar_last: bool
     assert convention.lag_s == pytest.approx(0.084, abs=0.005)
 
 
+def test_row_numbers_and_positions_of_a_pose_file_are_no_gyroscope(tmp_path: Path) -> None:
+    log = make_log()
+    write_log(log, tmp_path)
+    numbers, still = np.arange(len(log.pose_s)), np.full(len(log.pose_s), 0.4)
+    columns = [numbers, log.pose_s, still, still + 1e-3 * np.sin(log.pose_s), still, *(log.poses * [1, -1, -1, -1]).T]
+    poses = write(tmp_path / "poses.csv", ",time,x,y,z,qw,qx,qy,qz", columns)
+    looked = rig_here("look", tmp_path / "robot_log.txt", poses).stdout.partition(f"{poses}:")[2]
+    assert "gyroscope" not in looked.partition("what it allows:")[0] and "not read      column 1 x y z" in looked
+    assert "direction     body to room: " in looked  # the headings say which number is which
+
+
 def test_gaps_are_told_with_row_and_time(tmp_path: Path) -> None:
     kept = np.r_[0:1000, 1009 : len(TIME_S)]
     log = write(
