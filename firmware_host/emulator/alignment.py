@@ -1,4 +1,4 @@
-"""The check of word accesses that the chip traps at addresses that are not a multiple of four, and Unicorn does not."""
+"""The check of word accesses for aligned addresses: the chip traps unaligned ones, Unicorn does not."""
 
 from collections.abc import Callable
 

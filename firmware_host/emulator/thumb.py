@@ -1,4 +1,4 @@
-"""The decoding of Thumb instructions that is needed to count them and to find those Unicorn is too lenient with."""
+"""The decoding of Thumb instructions, to count them and to find those that trap on the chip but not in Unicorn."""
 
 import struct
 from collections.abc import Iterator

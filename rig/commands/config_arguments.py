@@ -77,7 +77,7 @@ def read_column_map(path: Path | None) -> "ColumnMap":
 
 
 def find_logs(path: Path) -> list[Path]:
-    """Return the path of a log of another program, or those in a folder of `rig record`; an empty list for a run."""
+    """Return the paths of logs: the given log, or all in a folder of `rig record`; an empty list for a run."""
     from rig.observation.formats.sample_files import is_in_format, whole
 
     if is_in_format(path):

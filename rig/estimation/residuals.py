@@ -16,7 +16,10 @@ if TYPE_CHECKING:
 
 
 def residual_std_rad_s(explained: Explained) -> Array:
-    """Return the standard deviations (N, 3) of the vector model's residuals: (1 − H) V (1 − H)ᵀ, hat matrix H."""
+    """Return the standard deviations (N, 3), rad/s, of the vector model's residuals.
+
+    Their covariance is (1 − H) V (1 − H)ᵀ, with the hat matrix H and the covariance V of the mean readings.
+    """
     inputs, solution = explained.inputs, explained.solution
     rates, gravity = inputs.rates_rad_s, None if solution.g_sensitivity is None else inputs.apparent_gravity_m_s2
     variances = inputs.variances_rad2_s2 + propagate_speed_std(rates, inputs.speed_std_rad_s, solution.matrix) ** 2
@@ -31,7 +34,7 @@ def residual_std_rad_s(explained: Explained) -> Array:
 
 
 def dwell_residual_std_m_s2(solution: "ImuSolution", movement: "Movement") -> Array:
-    """Return the standard deviations (N, 3) of residuals of an accelerometer's dwells, solved from the `movement`."""
+    """Return the standard deviations (N, 3) of the residuals of dwells, for an accelerometer's solution."""
     from rig.estimation.reference import accelerometer_model
     from rig.estimation.reference.reading_errors import noise
 

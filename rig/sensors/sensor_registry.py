@@ -18,7 +18,7 @@ Sections = Mapping[str, SensorSection]
 
 
 class SensorSource(SampleSource, Protocol):
-    """A sensor that is a source by itself."""
+    """The sample source of a sensor with a port of its own."""
 
     @property
     def corrected(self) -> Mapping[str, str]:

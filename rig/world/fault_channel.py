@@ -36,9 +36,9 @@ A request is `{"do": NAME, …}`; the reply is one line, `{"ok": true, "time_s":
     instruct say face turns again               the instruction for the operator, if a hand turns the sensors
     servo_power on · servo_torque on            the servo's supply; its torque, as written by another program
     servo_fault held_fast dumb denies voltage_v temperature_c lose spoil   as above; `lose`, `spoil`: replies
-    servo_line silent listen                    a line that carries nothing; its port, that closes
+    servo_line silent listen                    `silent`: the line carries nothing; `listen` false: its port closes
     unplug_board · plug_in_board · reset_board · power_dip · silence_board on · host_baud baud (null: the board's own)
-    write_truth windows                         what is true over these windows, into the file that the world was given
+    write_truth windows                         writes the truth over these windows into the world's file
 """
 
 import json

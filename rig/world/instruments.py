@@ -59,12 +59,12 @@ class InstrumentMount:
 
 
 def sensor_seed(world: WorldSection, name: str, *more: int) -> np.random.SeedSequence:
-    """Return the seed of the noise and drift of the sensor `name`, or of one of several (`more`) that bear its name."""
+    """Return the seed of the noise and drift of the sensor `name`; `more` numbers distinguish sensors with one name."""
     return np.random.SeedSequence([world.seed, sorted(world.sensors).index(name), *more])
 
 
 def mount_magnetometer(config: RigConfig, world: WorldSection, name: str) -> MountedMagnetometer:
-    """Return the magnetometer inside the instrument that is the sensor `name`."""
+    """Return the magnetometer inside an instrument, which is configured as the sensor `name`."""
     simulated = world.sensors[name]
     return MountedMagnetometer(
         config.sensors[name].mounting, simulated.magnetometer, simulated.mounting_error_deg, simulated.offset_mm

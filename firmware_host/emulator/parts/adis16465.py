@@ -68,7 +68,7 @@ class Adis16465:
     The part samples from power-up on and cannot be stopped. With averaging (DEC_RATE, FILT_CTRL) its outputs have 32
     bits, and the upper 16 alone, in a burst, are rounded down. Averages and filters themselves are not simulated:
     `truth` states the noise of an output. Its bias registers hold their values until its next software reset,
-    independent of the board; `overrun` sets the flag of an overrun data path until then.
+    independent of the board; `overrun` sets the flag of an overrun data path until that reset.
     """
 
     name = "ADIS16465"

@@ -41,7 +41,7 @@ class Drift:
         return [a + fraction * (b - a) for a, b in zip(self._knots[knot], self._knots[knot + 1], strict=True)]
 
     def evaluate_all(self, time_s: np.ndarray) -> np.ndarray:
-        """Return the bias at times (n,), (n, 3)."""
+        """Return the bias (n, 3) at times (n,)."""
         self._extend(int(np.max(time_s, initial=0.0) / STEP_S))
         knots = np.array(self._knots)
         knot_times_s = np.arange(len(knots)) * STEP_S

@@ -1,4 +1,6 @@
-"""Connections do not survive a fork: neither SQLite's locks nor a server's session do.
+"""Engines whose connections a forked process does not use: it opens its own.
+
+Neither SQLite's locks nor a server's session survive a fork.
 
 Source: https://sqlite.org/howtocorrupt.html, 2.6; SQLAlchemy, "Using connection pools with multiprocessing".
 """

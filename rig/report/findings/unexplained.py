@@ -28,7 +28,7 @@ FROM_MEAN = "minus its mean"
 class Unexplained:
     """Residuals of N means, by their `labels`: `values` (N, 3) and standard deviations `stds` (N, 3), in SI units.
 
-    `shown` describes the values, `expectation` the deviations; rests begin at `split`.
+    `shown` and `expectation` are texts on the values and on the standard deviations; rests begin at `split`.
     """
 
     quantity: Quantity

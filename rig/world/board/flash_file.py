@@ -50,7 +50,7 @@ def open_flash(path: Path | None) -> FlashMemory:
 def _check(data: bytes) -> None:
     """Raise UnfitFile unless `data` is a flash.
 
-    The file will be replaced, and a foreign configuration may name any file.
+    This protects other files, because the named file will be replaced.
     """
     if len(data) < FLASH_BYTES or len(data) % 4:
         raise UnfitFile(f"it has {len(data)} bytes")

@@ -16,7 +16,7 @@ class ElementFault(StrEnum):
 
 
 class SensingElement:
-    """A part's `motion_at`: the true motion `motion_at`, unless a fault is set."""
+    """A function of time for a part: the true motion `motion_at`, or that of a fault."""
 
     def __init__(self, motion_at: MotionAt) -> None:
         self._motion_at = motion_at
