@@ -68,10 +68,7 @@ class Terminal:
     """The keyboard of the terminal, or a scanner that ends each number with Enter."""
 
     def answer(self, question: Question) -> str | None:
-        """Return the text typed after the question; earlier input is ignored.
-
-        None if the terminal is closed.
-        """
+        """Return the text typed after the question; earlier input is ignored. None if the terminal is closed."""
         _forget_what_was_typed()
         for line in (question.hint,) if question.hint else question.lines:
             print(format_for_file(printable_lines(line), sys.stderr), file=sys.stderr)

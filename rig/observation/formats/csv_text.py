@@ -47,10 +47,7 @@ def is_divided_by_spaces(line: str) -> bool:
 
 
 def is_harmless(path: Path, largest_mb: int) -> bool:
-    """Return whether a file is short and not packed.
-
-    Raise Refused `no_file`, also if it is too large.
-    """
+    """Return whether a file is short and not packed. Raise Refused `no_file`, also if it is too large."""
     with _raise_no_file(path), open_regular_file(path, largest_mb * 1_000_000) as file:
         return os.fstat(file.fileno()).st_size <= HARMLESS_BYTES and not _read_beginning(file).startswith(GZIP)
 

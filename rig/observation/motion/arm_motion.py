@@ -250,10 +250,7 @@ def _check_order(time_s: Array) -> None:
 
 
 def turner_of(run: RunData) -> "RecordedTurner":
-    """Return the turner of a recording.
-
-    Raise Refused `recorded_elsewhere` for a recording from files.
-    """
+    """Return the turner of a recording. Raise Refused `recorded_elsewhere` for a recording from files."""
     if run.turner is None:
         raise Refused(
             "recorded_elsewhere",
