@@ -10,11 +10,7 @@ from typing import Any, Literal
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from rig.config.judging.judging_keys import ObservationSection, UncertaintySection
-from rig.config.judging.judging_sections import (
-    CertificateSection,
-    HistorySection,
-    SiteSection,
-)
+from rig.config.judging.judging_sections import CertificateSection, HistorySection, SiteSection
 from rig.config.judging.station_section import StationSection
 from rig.config.judging.verdict_limits import LimitsSection
 from rig.config.ranges import PAYLOAD_RANGE_KG, SPEED_RANGE_DEG_S, ModelName

@@ -12,14 +12,7 @@ from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
 from rig.estimation.cubic_spline import CubicSpline
 from rig.motion.chain import DenavitHartenberg
-from rig.motion.geometry import (
-    NOMINAL,
-    axis_errors,
-    flange_arm,
-    flange_attitude,
-    flange_axes,
-    flange_rate,
-)
+from rig.motion.geometry import NOMINAL, axis_errors, flange_arm, flange_attitude, flange_axes, flange_rate
 from rig.motion.steps import Sweep
 from rig.motion.turner_state import JOINT_NAMES
 from rig.observation.motion.even_turn import SMOOTHED_S, find_even_turn, fit_lines, well_timed

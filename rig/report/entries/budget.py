@@ -3,13 +3,7 @@
 import numpy as np
 
 from rig.analysis.clock_comparison import ClockCheck
-from rig.data.entries.budget import (
-    BiasProcessEntry,
-    BudgetEntry,
-    ClockComparisonEntry,
-    ClockEntry,
-    ContributorEntry,
-)
+from rig.data.entries.budget import BiasProcessEntry, BudgetEntry, ClockComparisonEntry, ClockEntry, ContributorEntry
 from rig.estimation.gyroscope.budget import Budget
 from rig.estimation.gyroscope.vector_fit import Explained
 from rig.estimation.statistics.coverage import coverage_probability
