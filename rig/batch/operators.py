@@ -64,7 +64,7 @@ class Operator:
         """Ask whether the announced run may start; without a voice it may."""
         return self.voice is None or is_agreed(self.voice, question_before(announcement, to_do))
 
-    def hears(self, part: BatchPart) -> None:
+    def print_outcome(self, part: BatchPart) -> None:
         """Print a part's outcome on stdout in a line, and its agreement with a simulated truth in another."""
         ended = part.ended
         if ended is None:

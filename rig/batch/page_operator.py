@@ -95,7 +95,7 @@ def open_page(present: Present, address: PageAddress) -> Iterator[tuple[OnPage, 
     sections, control = Sections(), Control(may_answer=False)
     voice = OnPage(sections, control)
     with serving(sections, control, None, address, Page("station.html", voice.routes)) as url:
-        present.hears = (*present.hears, voice.hear)
+        present.listeners = (*present.listeners, voice.hear)
         voice.hear(present.now)
         try:
             with control.stoppable():

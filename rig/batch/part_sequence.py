@@ -144,7 +144,7 @@ class Work:
             self._write_label(part, ended)  # first: an ended part is not continued after a kill
         self._enter(ended)
         self._write_table()
-        self.operator.hears(self.journal.batch.parts[-1])
+        self.operator.print_outcome(self.journal.batch.parts[-1])
 
     def _write_label(self, part: BatchPart, ended: PartEnded) -> None:
         marks = "SIMULATED, NOT A MEASUREMENT" if self.bench.simulated else ""

@@ -75,11 +75,11 @@ class Now:
 class Present:
     """The present state of a station: a listener of its runs and of its batch.
 
-    The functions `hears` are called after every change and must not block.
+    The `listeners` are called after every change and must not block.
     """
 
     now: Now
-    hears: Sequence[Callable[[Now], None]] = field(default=())
+    listeners: Sequence[Callable[[Now], None]] = field(default=())
 
     def event(self, event: RunEvent) -> None:
         """Update the state after an event of a run."""
@@ -99,8 +99,8 @@ class Present:
     def _becomes(self, now: Now) -> None:
         if now != self.now:
             self.now = now
-            for hear in self.hears:
-                hear(now)
+            for listener in self.listeners:
+                listener(now)
 
 
 def update_by_batch(now: Now, batch: Batch) -> Now:

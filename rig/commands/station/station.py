@@ -126,7 +126,7 @@ def _send_heartbeats(config: "RigConfig", present: "Present") -> Iterator[None]:
         yield
         return
     with heartbeat(config.history.rig or config.turner.address or "by hand", address, present.now) as heart:
-        present.hears = (*present.hears, heart.hear)
+        present.listeners = (*present.listeners, heart.hear)
         yield
 
 
