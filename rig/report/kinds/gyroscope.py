@@ -74,7 +74,7 @@ def _render(finding: Finding[GyroscopeEntry]) -> Iterator[Table | str]:
 def _build_row(finding: Finding[GyroscopeEntry]) -> DisplayRow:
     speeds = speed_words(finding.entry)
     held_at = f"at {speeds} °/s" if speeds else ""
-    return replace(shown_of(finding), held_at=held_at, model=finding.entry.model)
+    return replace(shown_of(finding), held_at=held_at)
 
 
 def _describe_item(finding: Finding[GyroscopeEntry], _: object) -> CertifiedItem | None:

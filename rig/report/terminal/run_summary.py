@@ -169,7 +169,7 @@ def _describe_values(items: Sequence[_SensorValues]) -> Iterator[str]:
     if len(conditions) == 1:
         (kind, held_at) = conditions.pop()
         yield f"{kind}s {held_at}" if len(items) > 1 else held_at
-    models = dict.fromkeys((item.kind, item.shown.model) for item in items if item.shown.model)
+    models = dict.fromkeys((item.kind, item.shown.model.partition(",")[0]) for item in items if item.shown.model)
     if len(items) <= MOST_WITH_MODELS:
         yield from (f"{kind}: {model}" if len(items) > 1 else model for kind, model in models)
 

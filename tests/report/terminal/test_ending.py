@@ -218,3 +218,8 @@ def test_checks_that_failed_stand_first_and_rounding_is_not_printed(
     rows = capsys.readouterr().out.splitlines()
     at = {name: next(i for i, row in enumerate(rows) if name in row) for name in ("spikes", "board_scale")}
     assert at["spikes"] < at["board_scale"] and "e-20" not in "".join(rows)
+
+
+def test_the_formulas_of_a_gyroscope_and_an_accelerometer_tell_the_signs_of_their_biases() -> None:
+    text = " ".join(" ".join(ended(read_result(RECORDINGS / "imu"))).split())
+    assert "gyroscope: g = K (m + b)" in text and "accelerometer: m = F (s + φ s²) + b" in text
