@@ -91,7 +91,7 @@ def test_the_picture_of_contributions_is_of_the_values_of_the_budget() -> None:
         (line,) = (contributor for contributor in sensor.budget.contributors if contributor.name == name)
         for place, x in zip(places, drawn, strict=True):
             decades = np.log10(np.clip(line.std[place] / sensor.budget.std[place], 1e-4, 1.0))
-            assert x == pytest.approx(332 + decades * (332 - 106) / 4, abs=0.1)
+            assert x == pytest.approx(332 + decades * (332 - 150) / 4, abs=0.1)
     assert picture.end > picture.rows[-1][1] and picture.end - 18 >= 13 * len(picture.rows) - 1
 
 
