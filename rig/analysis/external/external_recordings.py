@@ -10,7 +10,7 @@ from rig.analysis.by_hand.gyroscope import solve_hand_samples
 from rig.analysis.check import Check, fitness, list_unsolved
 from rig.analysis.estimator_names import ESTIMATORS, Estimator, choose_estimator
 from rig.analysis.external.attitudes import InAttitudes, Result, find_method, solve_placed
-from rig.analysis.external.bias_of_sweeps import check_bias_steady, widen_bias
+from rig.analysis.external.changes_of_sweeps import check_sweeps_steady, widen_by_changes
 from rig.analysis.external.increment_calibration import InIncrements
 from rig.analysis.external.omissions import list_omitted, notes_on_reading, notes_on_speeds, notes_on_turns
 from rig.analysis.external.sweeps_agree import add_errors, check_agree, noise_dof, sweep_errors
@@ -183,13 +183,13 @@ def _solve_sweeps(read: ReadElsewhere, samples: Samples, name: str | None, refer
 def solve_swept(data: ExternalData, estimator: BySweeps | None) -> Estimate:
     """Solve by `estimator`; None chooses "increments" if the body was turned from rest to rest, else "vector".
 
-    Raise Fault `no_turns`, `bias_jumped`, and as the estimators do.
+    Raise Fault `no_turns`, `bias_jumped`, `scale_changed`, and as the estimators do.
     """
     if estimator is None:
         estimator = "vector" if data.turned is None else "increments"
     if estimator != "increments":
         check_agree(data)
-        check_bias_steady(data)
+        check_sweeps_steady(data)
         vector = _vector(data)
         if estimator == "vector":
             return add_errors(vector, data)
@@ -200,10 +200,10 @@ def solve_swept(data: ExternalData, estimator: BySweeps | None) -> Estimate:
             "no row of the sweeps has an angle and begins and ends at rest",
             "Let the body lie still for a second before and after each turn, and give angle_rad; or use vector",
         )
-    check_bias_steady(data)
+    check_sweeps_steady(data)
     start, turned = _vector(data), data.turned
     solution = solve_turned(turned.gyroscope, turned.turns, turned.means, start.matrix, start.bias_rad_s)
-    return widen_bias(solution, data)
+    return widen_by_changes(solution, data)
 
 
 def budget_of(solution: Estimate, data: ExternalData) -> Budget:
@@ -251,6 +251,7 @@ def _solve_attitudes(read: ReadElsewhere, samples: Samples, settings: RunSetting
         },
         unsolved=attempts.faults,
         omitted=tuple(list_omitted(placed, attempts.results)),
+        notes=tuple(gyroscope.notes) if isinstance(gyroscope, InIncrements) else (),
         installed_kinds=tuple(
             KindFound(read.item.name, read.item, quantity, result)
             for quantity, result in attempts.results.items()

@@ -6,8 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rig.analysis.external.attitude_budget import budget_by_causes
+from rig.analysis.external.changes import check_steady
 from rig.analysis.external.inverted import solve_unless_inverted
 from rig.analysis.external.rests_agree import check_rests_agree
+from rig.data.quantity import RATE
 from rig.estimation.arrays import scale_of
 from rig.estimation.external.increment_solution import KnownIncrements, solve_known_increments
 from rig.estimation.gyroscope.budget import Budget
@@ -48,6 +50,15 @@ class InIncrements:
             reason = "attitude_untrustworthy: they contradict all others"
             yield Omitted("increments", count, self.increments, reason, _spell_time(float(self.solution.aside_s[0])))
 
+    @property
+    def notes(self) -> Iterator[str]:
+        """A note on attitudes that are turned from some time on."""
+        if (reset := self.solution.reset) is not None:
+            yield (
+                f"from {reset[0]:.2f} s on all attitudes are turned by {np.degrees(reset[1]):.2g}° against those "
+                "before: the reference has a new home, or readings are missing there"
+            )
+
 
 def _spell_time(time_s: float) -> str:
     return f"at {time_s:.2f} s"
@@ -56,8 +67,8 @@ def _spell_time(time_s: float) -> str:
 def solve_turning(turning: Turning, window_s: float | None, *, any_mounting: bool) -> InIncrements:
     """Return the gyroscope's matrix and bias, with windows of a given or an automatically chosen length.
 
-    Raise Fault `inverted_attitudes`, and as `gather`, `solve_known_increments`, `check_rests_agree` and `check_axes`
-    do.
+    Raise Fault `inverted_attitudes`, and as `gather`, `solve_known_increments`, `check_steady`, `check_rests_agree` and
+    `check_axes` do.
     """
     solved = solve_unless_inverted(
         turning.attitudes, lambda attitudes: _solve(replace(turning, attitudes=attitudes), window_s), CONTRADICTING
@@ -66,6 +77,7 @@ def solve_turning(turning: Turning, window_s: float | None, *, any_mounting: boo
         matrix = solved.solution.matrix
         check_axes(matrix / np.linalg.norm(matrix, axis=1, keepdims=True), np.eye(3))
     check_rests_agree(turning, solved.solution)
+    check_steady(solved.solution.change, RATE)
     return solved
 
 

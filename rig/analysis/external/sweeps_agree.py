@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rig.analysis.external.bias_of_sweeps import estimate_bias_variance
+from rig.analysis.external.changes_of_sweeps import estimate_changes
 from rig.errors import Refused
 from rig.estimation.arrays import Array, bisect
 from rig.estimation.gyroscope.stated_motion import MotionErrors, StatedMotion, motion_errors
@@ -61,7 +61,7 @@ def _name_contradiction(worst: int, data: ExternalData) -> str:
 
 @dataclass(frozen=True, slots=True)
 class SweepErrors:
-    """The covariances that errors of the stated motion and changes of the bias add to a solution, with `dof`.
+    """The covariances that errors of the stated motion and changes of the sensor add to a solution, with `dof`.
 
     `covariance` (6, 6): of scale and bias; `matrix_covariance` (12, 12) and `angles_covariance_rad2` (6, 6): as in
     `VectorSolution`, scaled so that twice a standard uncertainty is U.
@@ -74,7 +74,7 @@ class SweepErrors:
 
 
 def sweep_errors(solution: VectorSolution, data: ExternalData) -> SweepErrors | None:
-    """Return the effect of the stated motion's errors, and of the bias's changes, on the vector model's `solution`.
+    """Return the effect of the stated motion's errors, and of the sensor's changes, on the vector model's `solution`.
 
     None for means corrected to one temperature: the polynomials include the contradictions of repeats.
     """
@@ -104,11 +104,10 @@ def sweep_errors(solution: VectorSolution, data: ExternalData) -> SweepErrors | 
         return np.asarray(inflation[:, None] * beyond * inflation, dtype=np.float64)
 
     dof = float(max(count_redundant_rows(data), FEWEST_FREEDOM))
-    wander = estimate_bias_variance(data)
-    of_parameters = inflate(parameter_jacobian(solution.matrix, axes.scale), dof, noise_dof(solution, data))
+    changes, to_parameters = estimate_changes(data, solution.matrix), parameter_jacobian(solution.matrix, axes.scale)
     return SweepErrors(
-        covariance=of_parameters + np.diag([0, 0, 0, *wander]),
-        matrix_covariance=inflate(np.eye(12), np.inf, np.inf) + np.diag([*np.zeros(9), *wander]),
+        covariance=inflate(to_parameters, dof, noise_dof(solution, data)) + to_parameters @ changes @ to_parameters.T,
+        matrix_covariance=inflate(np.eye(12), np.inf, np.inf) + changes,
         angles_covariance_rad2=inflate(to_angles, np.inf, np.inf),
         dof=dof,
     )

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from rig.errors import Fault, or_fault
 from rig.estimation import refusals
 from rig.estimation.arrays import Array, scale_of
+from rig.estimation.external.abrupt_change import AbruptChange
 from rig.estimation.external.attitude_drift import (
     BIAS,
     BIAS_CHANGES,
@@ -44,6 +45,7 @@ from rig.estimation.external.attitude_drift import (
     find_inliers,
 )
 from rig.estimation.external.axis_directions import find_inclinations
+from rig.estimation.external.increment_changes import find_increment_change, find_reset
 from rig.estimation.gyroscope.earth_rate import check_earth_seen
 from rig.estimation.statistics.variance_components import Mixed, MixedFit, MixedModel
 
@@ -91,8 +93,10 @@ class KnownIncrements:
     - matrix_scatter, bias_scatter_rad_s: standard deviation of each element between intervals of the recording.
     - residuals_rad (n, 3): of the increments.
     - aside_s (k,): start of each omitted outlier.
+    - reset: when all later attitudes are turned against those before, and the angle, as by a new home; None if never.
     - condition: of the scaled design.
     - iterations: number of Gauss-Newton steps.
+    - change: an abrupt change, on the attitudes' clock; U contains both states of the gyroscope. None without one.
     """
 
     matrix: Array
@@ -110,6 +114,8 @@ class KnownIncrements:
     aside_s: Array
     condition: float
     iterations: int
+    change: AbruptChange | None
+    reset: tuple[float, float] | None = None
 
     @property
     def set_aside(self) -> int:
@@ -134,9 +140,10 @@ def solve_known_increments(time_s: Array, readings: Array, fixes: Fixes, start: 
         recorded = replace(recorded, fixes=replace(recorded.fixes, joined=joined))
         settled = _settle(recorded, settled.state)
     _check(fixes, recorded.fixes, settled)
-    result = _build_result(settled, _times_s(fixes, fixes.joined & ~recorded.fixes.joined))
+    aside = fixes.joined & ~recorded.fixes.joined
+    result = _build_result(settled, _times_s(fixes, aside))
     _check_identified(result.matrix, result.covariance - result.causes[AXES])
-    return result
+    return replace(result, reset=find_reset(settled.averaged, fixes, aside, result.change))
 
 
 @dataclass(frozen=True, slots=True)
@@ -264,6 +271,10 @@ def _build_result(settled: _Settled, aside_s: Array) -> KnownIncrements:
     ratio = half_width / (2 * np.sqrt(np.einsum("qi,ij,qj->q", wanted, solved.covariance, wanted)))
     causes = {name: wanted @ cause @ wanted.T * ratio[:, None] * ratio for name, cause in _causes(settled).items()}
     causes[AXES] = _widen_by_axes(settled, wanted, np.sum(list(causes.values()), axis=0))
+    change = find_increment_change(settled.model, settled.std, settled.averaged, settled.fixes, state.matrix)
+    if change is not None:
+        known = np.ix_(*2 * [np.r_[0:9, 12:15]])  # F and b, without the Earth's rate
+        causes[STRETCHES][known] += change.covariance(state.matrix)
     sizes = partial(settled.causes.std_of, std=settled.std)
     return KnownIncrements(
         matrix=state.matrix,
@@ -281,6 +292,7 @@ def _build_result(settled: _Settled, aside_s: Array) -> KnownIncrements:
         aside_s=aside_s,
         condition=_conditioning(settled.model.mixed).condition,
         iterations=settled.iterations,
+        change=change,
     )
 
 

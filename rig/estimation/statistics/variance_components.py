@@ -84,6 +84,24 @@ class MixedModel:
         theta = covariance @ (design.T @ observed)
         return MixedFit(theta, covariance, likelihood, self.mixed.observed - self.mixed.design @ theta)
 
+    def log_posterior(self, std: Array) -> float:
+        """Return the log-posterior density of ln σ (k,).
+
+        Its constant is the same for a model of the same y with further columns, if their precision is 1.
+        """
+        return self.solve(std).likelihood + self._log_prior(np.log(std))
+
+    def restrict(self, std: Array) -> tuple[Array, Array]:
+        """Return P (m, m) and P y (m,) of the restricted likelihood: C⁻¹ less its projection onto the design."""
+        from scipy.linalg import cho_factor, cho_solve
+
+        factor = cho_factor(self.covariance(std), lower=True)
+        inverse = cho_solve(factor, np.eye(len(self.mixed.observed)))
+        weighted = inverse @ self.mixed.design
+        information = self.mixed.design.T @ weighted + np.diag(self.mixed.precision)
+        projected = inverse - weighted @ np.linalg.solve(information, weighted.T)
+        return projected, projected @ self.mixed.observed
+
     def find_maxima(self, start: Array | None = None) -> Array:
         """Return the standard deviations (n, k) at the maxima of the posterior, the most probable first.
 

@@ -24,6 +24,8 @@ from rig.data.quantity import RATE
 from rig.data.recording.motion_file import MOTIONS
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
+from rig.estimation.external.abrupt_change import AbruptChange
+from rig.estimation.external.row_changes import find_row_change
 from rig.estimation.refusals import check_reading_ratio
 from rig.observation.average import Average
 from rig.observation.external.csv_samples import Samples
@@ -68,6 +70,7 @@ class ExternalData:
     - `by_mean`: numbers of the rows with an angle that count by their mean speed, because the body moved before or
       after.
     - `omitted`: rows left out for missing readings, and the readings missing in the others.
+    - `change`: an abrupt change of the gyroscope that the rows show.
     """
 
     sweeps: tuple[Observation, ...]
@@ -76,6 +79,12 @@ class ExternalData:
     at_reference: bool = False
     by_mean: tuple[int, ...] = ()
     omitted: tuple[Omitted, ...] = ()
+    change: AbruptChange | None = None
+
+    @property
+    def all_rests(self) -> tuple[Average, ...]:
+        """The rests that are stated, or these and those found between turns."""
+        return self.rests if self.turned is None else self.turned.rests
 
 
 def read_sweeps(path: Path, mapped: Mapped | None = None, origin_s: int = 0) -> dict[str, Array]:
@@ -101,14 +110,34 @@ def average_sweeps(samples: Samples, sweeps: Mapping[str, Array]) -> ExternalDat
         np.column_stack([sweeps[name] for name in AXIS_COLUMNS]),
         samples.temperature_c,
     )
-    if "angle_rad" not in sweeps:
-        return data
+    if "angle_rad" in sweeps:
+        data = _add_turns(samples, sweeps, data)
+    return replace(data, change=_find_change(data))
+
+
+def _add_turns(samples: Samples, sweeps: Mapping[str, Array], data: ExternalData) -> ExternalData:
+    """Return the data with the turns from rest to rest among its rows, which have angles."""
     declared = DeclaredTurns(sweeps["angle_rad"], *(sweeps.get(name) for name in STD_COLUMNS))
     by_angle = find_turns(samples.time_s, samples.readings[RATE], declared, data.sweeps, data.rests)
     if by_angle is None:
         return replace(data, by_mean=tuple(sweep.sweep for sweep in data.sweeps))
     by_mean = tuple(sweep.sweep for sweep in data.sweeps if sweep.sweep not in (*by_angle.rows, *by_angle.hiding))
     return replace(data, turned=by_angle, by_mean=by_mean, omitted=(*_list_hiding(by_angle, data), *data.omitted))
+
+
+def _find_change(data: ExternalData) -> AbruptChange | None:
+    """Return the abrupt change of the gyroscope that the rows show, None if they show none."""
+    rows = [(sweep.average, sweep.speed_rad_s * sweep.axis_flange) for sweep in data.sweeps]
+    rows += [(rest, np.zeros(3)) for rest in data.all_rests]
+    rows.sort(key=lambda row: row[0].start_s)
+    averages = [average for average, _ in rows]
+    return find_row_change(
+        np.array([average.mean_rad_s for average in averages]),
+        np.array([average.variance_rad2_s2 for average in averages]),
+        np.array([rate for _, rate in rows]),
+        np.array([average.start_s for average in averages]),
+        (RATE.steady, 10 * RATE.steady),
+    )
 
 
 def _list_hiding(by_angle: TurnedData, data: ExternalData) -> Iterator[Omitted]:

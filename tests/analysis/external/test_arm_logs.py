@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from rig.analysis.external.increment_calibration import InIncrements, solve_turning
 from rig.errors import Fault
@@ -187,3 +188,50 @@ def test_a_bias_that_changes_between_rests_is_not_that_of_the_later_ones() -> No
     jumped = replace(sound, readings_rad_s=sound.readings_rad_s + 0.03 * later[:, None] * np.array([0.0, 0.0, 1.0]))
     with pytest.raises(Fault, match="bias_jumped: where the attitudes show the body at rest"):
         solve_turning(jumped, None, any_mounting=False)
+
+
+def changed(recorded: Recorded, bias_rad_s: Array, scale: Array) -> Recorded:
+    """The recording of a gyroscope whose bias and scale factors change by so much in the middle."""
+    later = (recorded.time_s > recorded.time_s[-1] / 2)[:, None]
+    more = bias_rad_s + scale * (recorded.readings - recorded.bias)
+    return replace(recorded, readings=recorded.readings + later * more)
+
+
+STEADY = replace(CLEAR, stops=8, error_rad=0.003, poses_hz=50, jitter_s=0.001)
+
+
+@pytest.mark.parametrize("rests_s", [1.0, 0.0])
+def test_u_contains_a_bias_that_jumps_by_less_than_is_refused(rests_s: float) -> None:
+    sound = record(replace(STEADY, rests_s=rests_s, visits=2), 1)
+    found = solved(changed(sound, np.array([0.004, 0.0, 0.0]), np.zeros(3)))
+    change = found.solution.change
+    assert change is not None and change.what == "bias"
+    assert change.from_s == pytest.approx(sound.time_s[-1] / 2, abs=2.0)
+    error, std = errors(found, sound)
+    for of_x in (error[3], error[3] - 0.004):  # at first and at the end
+        assert abs(of_x) < 2 * std[3]
+
+
+def test_a_larger_jump_of_the_bias_is_named_with_its_time_and_axis() -> None:
+    with pytest.raises(Fault, match=r"bias_jumped: from \d+.* s on the gyroscope reads 0\.0\d+ rad/s less on y than"):
+        solved(changed(record(STEADY, 1), np.array([0.0, -0.01, 0.0]), np.zeros(3)))
+
+
+@pytest.mark.parametrize("axes", [[2], [0, 1, 2]])
+def test_scale_factors_that_change_are_named(axes: list[int]) -> None:
+    by = np.where(np.isin(np.arange(3), axes), 0.03, 0.0)
+    with pytest.raises(Fault, match=r"scale_changed: from \d+.* s on the gyroscope reads [23](\.\d)? % more on"):
+        solved(changed(record(STEADY, 1), np.zeros(3), by))
+
+
+@pytest.mark.parametrize("error_rad", [0.003, 0.015])
+def test_a_new_home_of_the_reference_is_told_and_harms_nothing(error_rad: float) -> None:
+    sound = record(replace(STEADY, error_rad=error_rad, poses_hz=25), 2)
+    turned = Rotation.from_rotvec([0.15, 0.0, 0.21]).as_matrix()
+    later = sound.stamps_s > sound.stamps_s[-1] / 2
+    found = solved(replace(sound, attitudes=np.where(later[:, None, None], turned @ sound.attitudes, sound.attitudes)))
+    (note,) = found.notes
+    assert note.startswith("from ") and "all attitudes are turned by 15°" in note
+    error, std = errors(found, sound)
+    assert (np.abs(error) < 4 * std).all()
+    assert not list(solved(sound).notes)

@@ -1,4 +1,4 @@
-"""A bias that changes over a file of sweeps: named if it jumps, within U if it moves less."""
+"""A gyroscope that changes over a file of sweeps: named if it changes much, within U if less."""
 
 from pathlib import Path
 
@@ -63,3 +63,17 @@ def test_u_contains_a_bias_that_moves_less_between_turns(tmp_path: Path) -> None
     expanded = budget_of(solution, data).expanded
     for of_x in (BIAS_RAD_S[0], BIAS_RAD_S[0] + 0.001):  # at first and at the end
         assert abs(solution.bias_rad_s[0] + of_x) < expanded[3]
+
+
+@pytest.mark.slow
+def test_scale_factors_that_change_between_the_rounds_are_named(tmp_path: Path) -> None:
+    log = swept(HZ)
+    lasts_s = log.time_s[-1] + 1 / HZ
+    time_s = np.concatenate([log.time_s, log.time_s + lasts_s])
+    readings = np.concatenate([log.readings, BIAS_RAD_S + 1.02 * (log.readings - BIAS_RAD_S)])
+    later = log.rows + np.array([lasts_s, lasts_s, 0, 0, 0, 0])
+    data = average_files(*write_rates(tmp_path, Log(time_s, readings, np.concatenate([log.rows, later]))))
+    with pytest.raises(
+        Fault, match=r"scale_changed: from \d+.* s on the gyroscope reads 2 % more on [xyz] of the same"
+    ):
+        solve_swept(data, None)

@@ -1,0 +1,32 @@
+"""The refusal of a recording in which a sensor changes abruptly, by more than U may contain."""
+
+import numpy as np
+
+from rig.data.quantity import Quantity
+from rig.errors import Fault
+from rig.estimation.external.abrupt_change import CERTAIN, AbruptChange
+
+MOST_OF_SCALE = 0.01  # a part's scale factor changes by so much over tens of kelvins
+REMEDY = "Solve the parts before and after separately; look for a knock, or a range that was switched"
+
+
+def check_steady(change: AbruptChange | None, quantity: Quantity, least_evidence: float = CERTAIN) -> None:
+    """Raise Fault `bias_jumped` or `scale_changed` if a sensor changed by more than U may contain."""
+    if change is None or change.evidence < least_evidence:
+        return
+    axis = int(np.argmax(np.abs(change.sizes)))
+    size, name = float(change.sizes[axis]), quantity.axes[axis]
+    if change.what == "bias" and abs(size) > quantity.steady:
+        raise Fault(
+            "bias_jumped",
+            f"from {change.from_s:.6g} s on the {quantity.sensor} reads {abs(size):.2g} {quantity.unit} "
+            f"{'more' if size > 0 else 'less'} on {name} than before: its bias is another",
+            f"{REMEDY}; let it warm up",
+        )
+    if change.what == "scale" and abs(size) > MOST_OF_SCALE:
+        raise Fault(
+            "scale_changed",
+            f"from {change.from_s:.6g} s on the {quantity.sensor} reads {100 * abs(size):.2g} % "
+            f"{'more' if size > 0 else 'less'} on {name} of the same motion than before",
+            f"{REMEDY}; see that what tells the motion does not change either",
+        )

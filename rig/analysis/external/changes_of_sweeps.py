@@ -1,0 +1,68 @@
+"""The change of a gyroscope over the rows of a file of sweeps: refused if it is abrupt and large, else a part of U."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from rig.analysis.external.changes import check_steady
+from rig.data.quantity import RATE
+from rig.estimation.arrays import Array
+from rig.estimation.external.abrupt_change import AbruptChange
+from rig.estimation.external.row_changes import LEAST_EVIDENCE, POSSIBLE
+from rig.estimation.gyroscope.budget import Budget
+from rig.estimation.gyroscope.rotations_by_angle import BIAS, TurnedSolution
+from rig.estimation.sensor_axes import parameter_jacobian
+from rig.observation.arm_rests import estimate_bias_drift
+from rig.observation.external.csv_import import ExternalData
+
+OF_RATE = 0.01  # of the sweeps' rate: without rests, a smaller step may be that of the rate
+
+
+def check_sweeps_steady(data: ExternalData) -> None:
+    """Raise Fault `bias_jumped` or `scale_changed` if the gyroscope certainly changed between two of the rows."""
+    change = data.change
+    if change is None or data.at_reference:  # then polynomials contain the change
+        return
+    if change.what == "scale":
+        check_steady(change, RATE)
+    elif _is_certain(data, change):
+        check_steady(change, RATE, POSSIBLE)
+
+
+def estimate_changes(data: ExternalData, matrix: Array) -> Array:
+    """Return the covariance (12, 12) of F `matrix` (3, 3), row by row, and the bias due to changes over the rows.
+
+    It contains an abrupt change, and that of the bias from rest to rest. Zero if the rows show no change.
+    """
+    change = data.change
+    shown = change is not None and change.evidence >= LEAST_EVIDENCE
+    abrupt = change.covariance(matrix) if change is not None and shown else np.zeros((12, 12))
+    drift = np.diag([*np.zeros(9), *estimate_bias_drift(data.all_rests)])
+    return abrupt + np.maximum(drift - np.diag(np.diag(abrupt)), 0.0)  # a step scatters the rests too
+
+
+def widen_by_changes(solution: TurnedSolution, data: ExternalData) -> TurnedSolution:
+    """Return a solution by turns with the gyroscope's changes over the rows in its covariances and its budget."""
+    changes = estimate_changes(data, solution.matrix)
+    to_parameters = parameter_jacobian(solution.matrix, solution.scale)
+    more = to_parameters @ changes @ to_parameters.T
+    lines = solution.budget.contributors
+    return replace(
+        solution,
+        covariance=solution.covariance + more,
+        matrix_covariance=solution.matrix_covariance + changes,
+        budget=Budget(
+            tuple(replace(line, covariance=line.covariance + more) if line.name == BIAS else line for line in lines)
+        ),
+    )
+
+
+def _is_certain(data: ExternalData, change: AbruptChange) -> bool:
+    """Return whether rests on either side show a step of the bias too; without these, whether no rate explains it."""
+    axis = int(np.argmax(np.abs(change.sizes)))
+    size_rad_s = float(change.sizes[axis])
+    before = [rest.mean_rad_s[axis] for rest in data.all_rests if rest.start_s < change.from_s]
+    after = [rest.mean_rad_s[axis] for rest in data.all_rests if rest.start_s >= change.from_s]
+    if before and after:
+        return bool((np.median(after) - np.median(before)) / size_rad_s > 1 / 2)
+    return abs(size_rad_s) > OF_RATE * float(np.median([sweep.speed_rad_s for sweep in data.sweeps]))

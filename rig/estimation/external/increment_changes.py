@@ -1,0 +1,66 @@
+"""Abrupt changes between the increments of a recording: of the gyroscope, and of the attitudes' own coordinates."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.estimation.arrays import Array, rotation_vectors
+from rig.estimation.external.abrupt_change import (
+    LIKELY,
+    OF_SCALE,
+    AbruptChange,
+    Effects,
+    find_change,
+)
+from rig.estimation.external.attitude_drift import BIAS, MATRIX, FixedAttitudes, Fixes
+from rig.estimation.statistics.variance_components import MixedModel
+
+OF_BIAS_RAD_S = 5e-3  # prior standard deviation of a change of the bias
+OF_ATTITUDE_RAD = 0.2  # that of a turn of the attitudes' coordinates
+LEAST_RESET_RAD = 0.02  # least turn of the attitudes' coordinates that is named: errors of attitudes may be as large
+STAYS = 0.5  # fraction of the largest increment, of which so much is left after the last: a wild row leaves nothing
+
+
+def find_increment_change(
+    model: MixedModel, std: Array, averaged: FixedAttitudes, fixes: Fixes, matrix: Array
+) -> AbruptChange | None:
+    """Return the abrupt change that the increments show, None if they show none.
+
+    `model` is that of the increments between `fixes`, with the errors' most probable standard deviations `std` (k,);
+    `matrix` (3, 3) is F. The time is on the attitudes' clock.
+    """
+    sensitivities = np.diff(averaged.sensitivities, axis=0)[fixes.joined]
+    of_rows = sensitivities[..., MATRIX].reshape(-1, 3, 3, 3)  # of F's elements, by its row and column
+    possible = np.repeat((np.arange(len(sensitivities)) > 0)[:, None], 3, axis=1)
+    of_attitude = np.tile(OF_ATTITUDE_RAD * np.eye(3), (len(sensitivities), 1, 1))
+    effects = (
+        Effects("bias", OF_BIAS_RAD_S * sensitivities[..., BIAS], possible, OF_BIAS_RAD_S),
+        Effects("scale", OF_SCALE * np.einsum("niab,ab->nia", of_rows, matrix), possible, OF_SCALE),
+        Effects("attitude", of_attitude, possible, OF_ATTITUDE_RAD, lasts=False),
+    )
+    begins_s = fixes.at_s[np.searchsorted(fixes.fix, np.flatnonzero(fixes.joined))]
+    return find_change(model, std[None], effects, begins_s, LIKELY)
+
+
+def find_reset(
+    averaged: FixedAttitudes, fixes: Fixes, aside: NDArray[np.bool_], change: AbruptChange | None
+) -> tuple[float, float] | None:
+    """Return when all later attitudes are turned against those before, and the angle in rad; None if nowhere.
+
+    The increments that are not aside may show it as a `change`.
+
+    `aside` (N − 1,) are the increments between `fixes` that contradict all others. A reference that gets a new home
+    turns by as much as they turn altogether; after a wild row the attitudes are as before. The largest turn counts.
+    """
+    found: tuple[float, float] | None = None
+    if change is not None and change.what == "attitude" and np.linalg.norm(change.sizes) > LEAST_RESET_RAD:
+        found = change.from_s, float(np.linalg.norm(change.sizes))
+    for group in np.split(np.flatnonzero(aside), np.flatnonzero(np.diff(np.flatnonzero(aside)) > 1) + 1):
+        if not len(group):
+            continue
+        attitudes = averaged.attitudes[group[0] : group[-1] + 2]
+        singly = rotation_vectors(np.swapaxes(attitudes[:-1], -1, -2) @ attitudes[1:])
+        angle_rad = float(np.linalg.norm(rotation_vectors((attitudes[0].T @ attitudes[-1])[None])))
+        largest_rad = float(np.linalg.norm(singly, axis=1).max())
+        if angle_rad > max(LEAST_RESET_RAD, STAYS * largest_rad, 0.0 if found is None else found[1]):
+            found = float(fixes.at_s[np.searchsorted(fixes.fix, group[-1] + 1)]), angle_rad
+    return found

@@ -1,0 +1,84 @@
+"""An abrupt change of a sensor between two of the rows that state its motion.
+
+    m_j = F ω_j + c + (h  or  diag(h) F ω_j) [j ≥ r] + errors of the stated motion + noise
+
+The stated rates and axes err by a fraction that the rows themselves determine.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rig.estimation.arrays import Array, perpendicular_unit_vectors
+from rig.estimation.external.abrupt_change import OF_SCALE, AbruptChange, Effects, find_change
+from rig.estimation.statistics.variance_components import Mixed, MixedModel
+
+OF_RATE = 1e-4  # median of the prior of the rates' relative errors, and of the axes' inclinations in rad
+POSSIBLE, LEAST_EVIDENCE = -2.0, 2.0  # of a change that counts if it is large, and of one that U is to contain
+FEWEST, MOST = 6, 400  # rows: fewer show no change; more would take too long
+EITHER_SIDE = 2  # rows at least: a single row that differs is a wrong row
+FEWEST_FOR_ONE = 8  # rows that decide between a wrong first or last row and a bias that changes there
+SMALL = 0.01  # errors without the change, relative to those with it: a few rows may take it for an error
+LARGE = 0.5  # a row shows a scale factor if it has so much of the largest reading along its axis
+
+
+def find_row_change(
+    means: Array, variances: Array, rates_rad_s: Array, starts_s: Array, bias_sizes: Sequence[float]
+) -> AbruptChange | None:
+    """Return the change that rows in the order of time show, None if there is none.
+
+    `means` (N, 3) of the readings, their `variances` (N, 3), the stated rates (N, 3), zero at rest, and the rows'
+    `starts_s` (N,). `bias_sizes` are prior standard deviations of a change of the bias.
+
+    A bias changes with two rows at least before and after; but if no row is a rest, a wrong first or last row and a
+    change of the bias look the same.
+    """
+    count = len(means)
+    design = np.column_stack([rates_rad_s, np.ones(count)])
+    if not FEWEST <= count <= MOST or np.linalg.matrix_rank(design) < 4:
+        return None
+    speeds = np.linalg.norm(rates_rad_s, axis=1)
+    usual = np.sqrt(variances.mean(axis=1) + (OF_RATE * speeds) ** 2)[:, None]
+    fitted = np.linalg.lstsq(design / usual, means / usual, rcond=None)[0]
+    read = rates_rad_s @ fitted[:3]
+    across = np.zeros((2, count, 3))
+    for row in np.flatnonzero(speeds):
+        across[:, row] = speeds[row] * perpendicular_unit_vectors(rates_rad_s[row] / speeds[row])
+    across = across @ fitted[:3]
+    mixed = Mixed(
+        observed=(means - design @ fitted).ravel(),
+        design=np.asarray(np.kron(design, np.eye(3)), dtype=np.float64),
+        fixed=np.diag(variances.ravel()),
+        components=np.array([_by_row(read[None]), _by_row(across)]),
+        precision=np.zeros(12),
+        scales=np.array([OF_RATE, OF_RATE]),
+        alone=np.zeros((2, 2)),
+    )
+    model = MixedModel(mixed)
+    axes = np.tile(np.eye(3), (count, 1, 1))
+    either_side = EITHER_SIDE if (speeds == 0).any() or count < FEWEST_FOR_ONE else 1
+    places = np.arange(count)
+    inner = np.minimum(places, count - places) >= either_side
+    large = np.abs(read) > LARGE * np.abs(read).max(axis=0)
+    before = np.cumsum(large, axis=0) - large
+    seen = np.minimum(before, large.sum(axis=0) - before) >= EITHER_SIDE
+    std = model.find_maxima()[0]
+    return find_change(
+        model,
+        np.array([std, SMALL * std]),
+        (
+            *(Effects("bias", size * axes, np.repeat(inner[:, None], 3, axis=1), size) for size in bias_sizes),
+            Effects("scale", OF_SCALE * axes * read[:, None, :], seen, OF_SCALE),
+        ),
+        starts_s,
+        POSSIBLE,
+    )
+
+
+def _by_row(patterns: Array) -> Array:
+    """Return the covariance (3N, 3N) of independent errors of N rows, by their patterns (p, N, 3)."""
+    count = patterns.shape[1]
+    covariance = np.zeros((count, 3, count, 3))
+    rows = np.arange(count)
+    covariance[rows, :, rows, :] = np.einsum("pni,pnj->nij", patterns, patterns)
+    return covariance.reshape(3 * count, 3 * count)
