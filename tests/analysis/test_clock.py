@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -11,17 +12,21 @@ from rig.analysis.check import Check
 from rig.analysis.clock_comparison import check_clock
 from rig.analysis.verdict import clock_checks
 from rig.data.recording.run_data import RunData
+from rig.data.recording.settings import Uncertainty
 from rig.observation.consistency.arm_clock import find_encoder_noise_rad, state_jitter
 from rig.observation.observed_run import ObservedRun, observe_runs
 from rig.observation.timebase import NOMINAL_DRIFT
 from support.recordings.synthetic_run import Setup, synthetic_run
 
 PPM = 1e-6
-KNOWN = synthetic_run(Setup()).settings.stated_uncertainty  # 50, 1 and 20 ppm
-
-
 SIMULATED, REAL = "URSoftware 5.14.0.0 (simulated)", "URSoftware 5.14.0.0"
 FAST = Setup(speed_deg_s=120, noise_rad_s=0.002)
+
+
+@cache
+def find_stated() -> Uncertainty:
+    """Return the uncertainty that a run states if its configuration does not: of clocks 50, 1 and 20 ppm."""
+    return synthetic_run(Setup()).settings.stated_uncertainty
 
 
 def recorded(setup: Setup, host_slope: float, software: str = SIMULATED) -> RunData:
@@ -49,7 +54,7 @@ def of_clocks(setup: Setup, host_slope: float = 0.2, software: str = SIMULATED) 
 
     A computer that counts a fifth of the controller's seconds is a simulated laboratory's.
     """
-    return named(clock_checks([check_clock(observed(setup, host_slope, software), KNOWN)]))
+    return named(clock_checks([check_clock(observed(setup, host_slope, software), find_stated())]))
 
 
 def in_two(whole: RunData) -> tuple[RunData, RunData]:
@@ -71,7 +76,7 @@ def named(checks: Sequence[Check]) -> dict[str, Check]:
 @pytest.mark.slow
 def test_a_clock_that_runs_too_fast_is_found_by_the_computers() -> None:
     seen = observed(FAST, 1 - 40 * PPM)
-    check = check_clock(seen, KNOWN)
+    check = check_clock(seen, find_stated())
     assert [comparison.by for comparison in check.comparisons] == [
         "the computer's clock"
     ]  # no crystal drives that board
@@ -82,7 +87,7 @@ def test_a_clock_that_runs_too_fast_is_found_by_the_computers() -> None:
 @pytest.mark.slow
 def test_where_the_computers_clock_says_nothing_the_crystal_does() -> None:
     seen = observed(with_crystal(40, crystal_ppm=5), 0.2)
-    check = check_clock(seen, KNOWN)
+    check = check_clock(seen, find_stated())
     assert [comparison.by for comparison in check.comparisons] == ["the board's crystal"]
     assert abs(check.error - 40 * PPM) < 2 * check.std
     assert check.std == pytest.approx(10.7 * PPM, rel=0.02)  # 20 ppm / √3, and that it is within 50 ppm anyway
@@ -90,7 +95,7 @@ def test_where_the_computers_clock_says_nothing_the_crystal_does() -> None:
 
 @pytest.mark.slow
 def test_without_another_clock_nothing_is_corrected() -> None:
-    check = check_clock(observed(Setup(speed_deg_s=120), 0.2), KNOWN)
+    check = check_clock(observed(Setup(speed_deg_s=120), 0.2), find_stated())
     assert check.comparisons == () and check.error == 0.0
     assert check.std == pytest.approx(50 * PPM / np.sqrt(3))
 

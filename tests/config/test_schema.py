@@ -1,5 +1,6 @@
 """The schema for editors is what the models say, and every supplied configuration names it and satisfies it."""
 
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,11 @@ from rig.config.procedures.attitude_sets import SETS
 from support.paths import CONFIGS, DOCS
 
 PAGE = DOCS / "config.schema.json"
-VALIDATOR = Draft202012Validator(config_schema())
+
+
+@cache
+def validator() -> Draft202012Validator:
+    return Draft202012Validator(config_schema())
 
 
 def read(path: Path) -> dict[str, Any]:
@@ -33,7 +38,7 @@ def test_every_supplied_configuration_names_the_schema_and_satisfies_it(path: Pa
     first = path.read_text(encoding="utf-8").splitlines()[0]
     marker, _, named = first.partition("$schema=")
     assert marker == "# yaml-language-server: " and (path.parent / named).resolve() == PAGE
-    assert not [(list(error.path), error.message) for error in VALIDATOR.iter_errors(read(path))]
+    assert not [(list(error.path), error.message) for error in validator().iter_errors(read(path))]
 
 
 @pytest.mark.parametrize(
@@ -53,11 +58,11 @@ def test_what_an_editor_marks(place: tuple[str, ...], value: object) -> None:
     for key in place[:-1]:
         section = section[key]
     section[place[-1]] = value
-    (error,) = VALIDATOR.iter_errors(document)
+    (error,) = validator().iter_errors(document)
     assert list(error.path) == list(place)
 
 
 def test_each_set_of_attitudes_is_a_word_of_the_schema() -> None:
     for name in SETS:
-        assert VALIDATOR.is_valid({"procedure": {"name": "static_attitudes", "attitudes": name}})
-    assert not VALIDATOR.is_valid({"procedure": {"name": "static_attitudes", "attitudes": "nineteen"}})
+        assert validator().is_valid({"procedure": {"name": "static_attitudes", "attitudes": name}})
+    assert not validator().is_valid({"procedure": {"name": "static_attitudes", "attitudes": "nineteen"}})

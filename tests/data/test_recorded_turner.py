@@ -3,6 +3,7 @@
 import json
 from collections.abc import Callable
 from dataclasses import asdict, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 
 from rig.data.recording.recorded_turner import RecordedTurner, turner_of
+from rig.data.recording.run_data import RunData
 from rig.data.recording.run_file import RunRecorder, read_run
 from rig.errors import Refused
 from rig.motion.chain import DenavitHartenberg
@@ -18,7 +20,10 @@ from rig.motion.state_rows import StateField
 from rig.motion.turner_state import JointState
 from support.recordings.synthetic_run import SENSOR, UR, Setup, synthetic_run
 
-RUN = synthetic_run(Setup(rest_s=0.5, speed_deg_s=150))
+
+@cache
+def recorded_run() -> RunData:
+    return synthetic_run(Setup(rest_s=0.5, speed_deg_s=150))
 
 
 def turner(joints: int, fields: tuple[StateField, ...] = ()) -> RecordedTurner:
@@ -29,12 +34,13 @@ def turner(joints: int, fields: tuple[StateField, ...] = ()) -> RecordedTurner:
 
 def recorded(path: Path, described: RecordedTurner, states: int = 20) -> Path:
     joints = len(described.joints)
-    settings = replace(RUN.settings, home_q_rad=(0.0,) * joints)
+    run = recorded_run()
+    settings = replace(run.settings, home_q_rad=(0.0,) * joints)
     with RunRecorder(
         path,
-        config=RUN.config,
+        config=run.config,
         settings=settings,
-        provenance=RUN.provenance,
+        provenance=run.provenance,
         turner=described,
         sensors={"gyro": SENSOR},
     ) as recorder:
