@@ -30,8 +30,9 @@ demo: $(VENV)/demo.installed
 
 all-extras: $(VENV)/all.installed
 
-# Fast tests compute, so two run at a time on two processors; of all tests four, as many wait for a laboratory: every
-# simulated one has a loopback address of its own. As many threads for linear algebra would only be in each other's way.
+# Fast tests compute, so two run at a time on two processors; of all tests three, as many wait for a laboratory: every
+# simulated one has a loopback address of its own. With four, each takes an eighth more processor time from the others.
+# As many threads for linear algebra would only be in each other's way.
 PYTEST = OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n $(AT_A_TIME) --dist $(DIST)
 AT_A_TIME := 2
 DIST := worksteal
@@ -62,7 +63,7 @@ fast: build/collected.txt $(VENV)/dev.installed
 	$(PYTEST) -m "not slow"
 
 # A file's tests stay together: a whole run that several of them look at is made once. It takes a tenth less.
-whole: AT_A_TIME := 4
+whole: AT_A_TIME := 3
 whole: DIST := loadfile --no-loadscope-reorder
 whole: build/collected.txt $(VENV)/dev.installed
 	rm -rf build/coverage

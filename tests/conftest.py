@@ -6,7 +6,7 @@ import os
 import signal
 import tempfile
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,8 +29,10 @@ settings.register_profile("test", deadline=None, max_examples=30)
 settings.register_profile("proof", deadline=None, max_examples=300)
 settings.load_profile("test")
 
-# Rooms whose tests wait for a laboratory: first, so that at the end those that compute use every processor.
+# Rooms whose tests wait for a laboratory. Several laboratories at a time cost each other processor time, and one alone
+# leaves a processor idle: their files alternate with those that compute, of which there are some left for the end.
 WAITING = {"runner", "world", "turners", "page", "batch", "floor", "sensors"}
+WAITING_UNTIL = 0.75  # of the files
 
 NURSERY = "rig's nursery"  # of what xdist hands to the processes that run tests
 
@@ -68,7 +70,8 @@ def pytest_configure_node(node: Any) -> None:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """What `make test` has no time for is left to `make proof`: what is marked `thorough`, and of what is marked
     `one_in(n)` all cases but the first of every n."""
-    items.sort(key=lambda item: item.path.relative_to(Path(__file__).parent).parts[0] not in WAITING)
+    places = place_files(dict.fromkeys(item.path for item in items))
+    items.sort(key=lambda item: places[item.path])
     if config.getoption("--proof"):
         return
     cases = Counter[str]()
@@ -94,6 +97,14 @@ def pytest_collection_finish() -> None:
     """Garbage is looked for again, among what tests make."""
     gc.freeze()
     gc.enable()
+
+
+def place_files(files: Collection[Path]) -> dict[Path, float]:
+    """Return the places of test files in their new order, from 0 to 1."""
+    is_waiting = {file: file.relative_to(Path(__file__).parent).parts[0] in WAITING for file in files}
+    waiting, computing = ([file for file in files if is_waiting[file] == kind] for kind in (True, False))
+    places = {file: WAITING_UNTIL * number / len(waiting) for number, file in enumerate(waiting)}
+    return places | {file: (number + 0.5) / len(computing) for number, file in enumerate(computing)}
 
 
 @pytest.fixture
