@@ -268,6 +268,16 @@ def report_inverted() -> Fault:
     )
 
 
+def report_scalar_last() -> Fault:
+    """Return the error for quaternions whose scalar part was last in the file, and was read as if it were first."""
+    return Fault(
+        "inverted_attitudes",
+        "the readings contradict the attitudes and agree with quaternions in the order x y z w: qw holds x, qx y, qy z "
+        "and qz w",
+        "Name the columns in their order: qx, qy, qz, qw",
+    )
+
+
 @contextmanager
 def convergence_required() -> Iterator[None]:
     """Raise Fault `attitude_untrustworthy` if the block, a fit in attitudes, fails numerically."""

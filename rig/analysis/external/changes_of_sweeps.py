@@ -36,7 +36,7 @@ def estimate_changes(data: ExternalData, matrix: Array) -> Array:
     """
     change = data.change
     shown = change is not None and change.evidence >= LEAST_EVIDENCE
-    abrupt = change.covariance(matrix) if change is not None and shown else np.zeros((12, 12))
+    abrupt = change.find_covariance(matrix) if change is not None and shown else np.zeros((12, 12))
     drift = np.diag([*np.zeros(9), *estimate_bias_drift(data.all_rests)])
     return abrupt + np.maximum(drift - np.diag(np.diag(abrupt)), 0.0)  # a step scatters the rests too
 

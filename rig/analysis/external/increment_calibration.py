@@ -10,7 +10,7 @@ from rig.analysis.external.changes import check_steady
 from rig.analysis.external.inverted import solve_unless_inverted
 from rig.analysis.external.rests_agree import check_rests_agree
 from rig.data.quantity import RATE
-from rig.estimation.arrays import scale_of
+from rig.estimation.arrays import Array, scale_of
 from rig.estimation.external.increment_solution import KnownIncrements, solve_known_increments
 from rig.estimation.gyroscope.budget import Budget
 from rig.estimation.refusals import check_axes, check_unit
@@ -34,6 +34,11 @@ class InIncrements:
     window_s: float
     left_out: tuple[LeftOut, ...]
     increments: int
+
+    @property
+    def matrix(self) -> Array:
+        """F (3, 3)."""
+        return self.solution.matrix
 
     @property
     def budget(self) -> Budget:

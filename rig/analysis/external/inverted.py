@@ -1,21 +1,36 @@
-"""The detection of inverted attitudes, by solving with their inverses."""
+"""The detection of attitudes in another convention, by solving with their inverses.
+
+Quaternions that are read in the order w x y z and were written as x y z w are inverse rotations too, of a body and a
+room in other axes: the permutation is improper. So both explanations fit, and the axes of the sensor tell them apart.
+"""
 
 from collections.abc import Callable, Collection
-from typing import TypeVar
+from typing import Protocol, TypeVar
 
 import numpy as np
 
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.estimation.refusals import report_inverted
+from rig.estimation.refusals import report_inverted, report_scalar_last
 
-Solved = TypeVar("Solved")
+
+class HasMatrix(Protocol):
+    """A solution with the matrix F (3, 3) of a sensor."""
+
+    @property
+    def matrix(self) -> Array:
+        """F (3, 3)."""
+        ...
+
+
+Solved = TypeVar("Solved", bound=HasMatrix)
 
 
 def solve_unless_inverted(attitudes: Array, solve: Callable[[Array], Solved], contradicting: Collection[str]) -> Solved:
     """Return the result of `solve` with attitudes (N, 3, 3).
 
-    Raise its Faults, but `inverted_attitudes` instead of the names in `contradicting` if the inverse attitudes fit.
+    Raise its Faults, but `inverted_attitudes` instead of one of `contradicting` if the inverse attitudes agree with the
+    readings, with the order of the quaternions if this explains the axes of the sensor better.
     """
     try:
         return solve(attitudes)
@@ -23,7 +38,30 @@ def solve_unless_inverted(attitudes: Array, solve: Callable[[Array], Solved], co
         if fault.name not in contradicting:
             raise
         try:
-            solve(np.swapaxes(attitudes, -1, -2))
+            inverted = solve(np.swapaxes(attitudes, -1, -2))
         except Fault:
             raise fault from None
-        raise report_inverted() from None
+        raise _find_order(attitudes, solve, inverted) from None
+
+
+def _find_order(attitudes: Array, solve: Callable[[Array], Solved], inverted: Solved) -> Fault:
+    """Return the error for inverse attitudes, or for their order if the sensor's axes are then nearer to the body's."""
+    try:
+        reordered = solve(_read_scalar_last(attitudes))
+    except Fault:
+        return report_inverted()
+    aligned, other = (_find_alignment(solved.matrix) for solved in (reordered, inverted))
+    return report_scalar_last() if aligned > other else report_inverted()
+
+
+def _read_scalar_last(attitudes: Array) -> Array:
+    """Return the attitudes (N, 3, 3) whose quaternions were written x y z w and read as w x y z."""
+    from scipy.spatial.transform import Rotation
+
+    read = Rotation.from_matrix(attitudes).as_quat()[:, [3, 0, 1, 2]]
+    return np.asarray(Rotation.from_quat(read).as_matrix(), dtype=np.float64)
+
+
+def _find_alignment(matrix: Array) -> float:
+    """Return the mean cosine between the axes of a sensor, rows of F (3, 3), and those of the body."""
+    return float(np.mean(np.diag(matrix) / np.linalg.norm(matrix, axis=1)))

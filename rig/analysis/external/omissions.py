@@ -9,13 +9,17 @@ from rig.analysis.external.increment_calibration import InIncrements
 from rig.analysis.installed_solvers import OfKind
 from rig.data.quantity import RATE, Quantity
 from rig.data.recording.motion_file import ReadElsewhere
+from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.estimate import Estimate
 from rig.estimation.gyroscope.rotations_by_angle import TurnedSolution
 from rig.observation.external.attitude_import import PlacedReadings
-from rig.observation.external.csv_import import ExternalData
+from rig.observation.external.csv_import import QUARTER_DEG, ExternalData
 from rig.observation.external.csv_samples import Samples
 from rig.observation.external.omission import Omitted
 from rig.observation.external.placements import Placements
+
+WHOLE = 2e-3  # relative error of the time that a sweep lasts
+NOISY_RAD_S = 0.03  # standard deviation of single readings: 1.7 °/s; no part has so much
 
 
 def list_omitted(
@@ -43,13 +47,27 @@ def notes_on_reading(read: ReadElsewhere, samples: Samples) -> Iterator[str]:
 
 
 def notes_on_speeds(data: ExternalData) -> Iterator[str]:
-    """Yield a note on rates that hardly any gyroscope reads: both files may be in °/s."""
+    """Yield a note if speeds look like °/s: nothing but the bias depends on a unit that both files share."""
     fastest = max((sweep.speed_rad_s for sweep in data.sweeps), default=0.0)
+    remedy = "if both files are in °/s, name that unit with --columns, for the bias depends on it"
     if RATE.mistaken is not None and fastest > RATE.mistaken.unusual:
         yield (
             f"the sweeps turn at up to {fastest:.4g} rad/s ({np.degrees(fastest):.4g} °/s), faster than most "
-            "gyroscopes can read: if both files are in °/s, name that unit with --columns, for the bias depends on it"
+            f"gyroscopes can read: {remedy}"
         )
+        return
+    turned = np.array([sweep.speed_rad_s * (sweep.average.end_s - sweep.average.start_s) for sweep in data.sweeps])
+    if _are_whole(turned, QUARTER_DEG) and not _are_whole(turned, 2 * np.pi):
+        yield f"each sweep turns by a whole multiple of 90 rad, as turns in degrees do: {remedy}"
+    noise_rad_s = float(np.median([sweep.average.noise_rad_s for sweep in data.sweeps]))
+    if noise_rad_s > NOISY_RAD_S:
+        yield f"the readings scatter by {noise_rad_s:.2g} rad/s, more than those of a gyroscope do: {remedy}"
+
+
+def _are_whole(turned: Array, part: float) -> bool:
+    """Return whether all angles (k,) are whole multiples of a part, at least one."""
+    multiples = np.rint(turned / part)
+    return bool(len(turned) and (multiples > 0).all() and (np.abs(turned / part / multiples - 1) < WHOLE).all())
 
 
 def notes_on_turns(data: ExternalData, solution: Estimate) -> Iterator[str]:

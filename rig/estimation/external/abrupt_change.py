@@ -36,7 +36,7 @@ class AbruptChange:
     sizes: Array
     evidence: float
 
-    def covariance(self, matrix: Array) -> Array:
+    def find_covariance(self, matrix: Array) -> Array:
         """Return the covariance (12, 12) of F (3, 3), row by row, and the bias that contains both states of the sensor.
 
         A solution is between both states. Half of the change is the standard uncertainty, so U is the whole.
@@ -50,7 +50,7 @@ class AbruptChange:
 
 
 @dataclass(frozen=True, slots=True)
-class Effects:
+class PossibleChanges:
     """The effects `of_axes` (n, 3, 3) on the equations of n rows of a change of `what` of each axis by one `size`.
 
     `possible` (n, 3): whether the axis may have changed just before the row. `lasts`: whether later rows show it too.
@@ -64,7 +64,7 @@ class Effects:
 
 
 def find_change(
-    model: MixedModel, starts: Array, effects: Sequence[Effects], begins_s: Array, least_evidence: float
+    model: MixedModel, starts: Array, effects: Sequence[PossibleChanges], begins_s: Array, least_evidence: float
 ) -> AbruptChange | None:
     """Return the change that rows in the order of time, which begin at `begins_s` (n,), show, None if they show none.
 
@@ -72,7 +72,7 @@ def find_change(
     others with which to look for a place. A change is found from `least_evidence` on.
     """
     places = sum(int(effect.possible.any(axis=1).sum()) for effect in effects)
-    without, change = model.log_posterior(starts[0]) + float(np.log(max(places, 1))), None
+    without, change = model.evaluate_posterior(starts[0]) + float(np.log(max(places, 1))), None
     for std in starts:
         inverse, innovation = model.restrict(std)
         evidence = [_weigh_places(effect, inverse, innovation) for effect in effects]
@@ -85,14 +85,14 @@ def find_change(
         columns = changed.of_axes * changed.possible[first] * shows
         widened = MixedModel(_add_columns(model.mixed, columns.reshape(-1, 3)))
         own_std = widened.find_maxima(std)[0]
-        found = widened.log_posterior(own_std) - without
-        if found > (least_evidence if change is None else change.evidence):
+        odds = widened.evaluate_posterior(own_std) - without
+        if odds > (least_evidence if change is None else change.evidence):
             sizes = changed.size * widened.solve(own_std).theta[-3:]
-            change = AbruptChange(changed.what, float(begins_s[first]), sizes, found)
+            change = AbruptChange(changed.what, float(begins_s[first]), sizes, odds)
     return change
 
 
-def _weigh_places(effects: Effects, inverse: Array, innovation: Array) -> Array:
+def _weigh_places(effects: PossibleChanges, inverse: Array, innovation: Array) -> Array:
     """Return ln of the Bayes factor (n,) of a change before each row.
 
     `inverse` (3n, 3n) and `innovation` (3n,) are P and P y of the restricted likelihood.

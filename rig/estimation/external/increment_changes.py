@@ -8,7 +8,7 @@ from rig.estimation.external.abrupt_change import (
     LIKELY,
     OF_SCALE,
     AbruptChange,
-    Effects,
+    PossibleChanges,
     find_change,
 )
 from rig.estimation.external.attitude_drift import BIAS, MATRIX, FixedAttitudes, Fixes
@@ -33,9 +33,9 @@ def find_increment_change(
     possible = np.repeat((np.arange(len(sensitivities)) > 0)[:, None], 3, axis=1)
     of_attitude = np.tile(OF_ATTITUDE_RAD * np.eye(3), (len(sensitivities), 1, 1))
     effects = (
-        Effects("bias", OF_BIAS_RAD_S * sensitivities[..., BIAS], possible, OF_BIAS_RAD_S),
-        Effects("scale", OF_SCALE * np.einsum("niab,ab->nia", of_rows, matrix), possible, OF_SCALE),
-        Effects("attitude", of_attitude, possible, OF_ATTITUDE_RAD, lasts=False),
+        PossibleChanges("bias", OF_BIAS_RAD_S * sensitivities[..., BIAS], possible, OF_BIAS_RAD_S),
+        PossibleChanges("scale", OF_SCALE * np.einsum("niab,ab->nia", of_rows, matrix), possible, OF_SCALE),
+        PossibleChanges("attitude", of_attitude, possible, OF_ATTITUDE_RAD, lasts=False),
     )
     begins_s = fixes.at_s[np.searchsorted(fixes.fix, np.flatnonzero(fixes.joined))]
     return find_change(model, std[None], effects, begins_s, LIKELY)
@@ -51,9 +51,9 @@ def find_reset(
     `aside` (N − 1,) are the increments between `fixes` that contradict all others. A reference that gets a new home
     turns by as much as they turn altogether; after a wild row the attitudes are as before. The largest turn counts.
     """
-    found: tuple[float, float] | None = None
+    turned: tuple[float, float] | None = None
     if change is not None and change.what == "attitude" and np.linalg.norm(change.sizes) > LEAST_RESET_RAD:
-        found = change.from_s, float(np.linalg.norm(change.sizes))
+        turned = change.from_s, float(np.linalg.norm(change.sizes))
     for group in np.split(np.flatnonzero(aside), np.flatnonzero(np.diff(np.flatnonzero(aside)) > 1) + 1):
         if not len(group):
             continue
@@ -61,6 +61,6 @@ def find_reset(
         singly = rotation_vectors(np.swapaxes(attitudes[:-1], -1, -2) @ attitudes[1:])
         angle_rad = float(np.linalg.norm(rotation_vectors((attitudes[0].T @ attitudes[-1])[None])))
         largest_rad = float(np.linalg.norm(singly, axis=1).max())
-        if angle_rad > max(LEAST_RESET_RAD, STAYS * largest_rad, 0.0 if found is None else found[1]):
-            found = float(fixes.at_s[np.searchsorted(fixes.fix, group[-1] + 1)]), angle_rad
-    return found
+        if angle_rad > max(LEAST_RESET_RAD, STAYS * largest_rad, 0.0 if turned is None else turned[1]):
+            turned = float(fixes.at_s[np.searchsorted(fixes.fix, group[-1] + 1)]), angle_rad
+    return turned

@@ -273,8 +273,8 @@ def _build_result(settled: _Settled, aside_s: Array) -> KnownIncrements:
     causes[AXES] = _widen_by_axes(settled, wanted, np.sum(list(causes.values()), axis=0))
     change = find_increment_change(settled.model, settled.std, settled.averaged, settled.fixes, state.matrix)
     if change is not None:
-        known = np.ix_(*2 * [np.r_[0:9, 12:15]])  # F and b, without the Earth's rate
-        causes[STRETCHES][known] += change.covariance(state.matrix)
+        of_sensor = np.ix_(*2 * [np.r_[0:9, 12:15]])  # F and b, without the Earth's rate
+        causes[STRETCHES][of_sensor] += change.find_covariance(state.matrix)
     sizes = partial(settled.causes.std_of, std=settled.std)
     return KnownIncrements(
         matrix=state.matrix,

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from rig.estimation.arrays import Array, perpendicular_unit_vectors
-from rig.estimation.external.abrupt_change import OF_SCALE, AbruptChange, Effects, find_change
+from rig.estimation.external.abrupt_change import OF_SCALE, AbruptChange, PossibleChanges, find_change
 from rig.estimation.statistics.variance_components import Mixed, MixedModel
 
 OF_RATE = 1e-4  # median of the prior of the rates' relative errors, and of the axes' inclinations in rad
@@ -61,14 +61,14 @@ def find_row_change(
     inner = np.minimum(places, count - places) >= either_side
     large = np.abs(read) > LARGE * np.abs(read).max(axis=0)
     before = np.cumsum(large, axis=0) - large
-    seen = np.minimum(before, large.sum(axis=0) - before) >= EITHER_SIDE
+    both_sides = np.minimum(before, large.sum(axis=0) - before) >= EITHER_SIDE
     std = model.find_maxima()[0]
     return find_change(
         model,
         np.array([std, SMALL * std]),
         (
-            *(Effects("bias", size * axes, np.repeat(inner[:, None], 3, axis=1), size) for size in bias_sizes),
-            Effects("scale", OF_SCALE * axes * read[:, None, :], seen, OF_SCALE),
+            *(PossibleChanges("bias", size * axes, np.repeat(inner[:, None], 3, axis=1), size) for size in bias_sizes),
+            PossibleChanges("scale", OF_SCALE * axes * read[:, None, :], both_sides, OF_SCALE),
         ),
         starts_s,
         POSSIBLE,

@@ -84,7 +84,7 @@ class MixedModel:
         theta = covariance @ (design.T @ observed)
         return MixedFit(theta, covariance, likelihood, self.mixed.observed - self.mixed.design @ theta)
 
-    def log_posterior(self, std: Array) -> float:
+    def evaluate_posterior(self, std: Array) -> float:
         """Return the log-posterior density of ln σ (k,).
 
         Its constant is the same for a model of the same y with further columns, if their precision is 1.

@@ -235,3 +235,13 @@ def test_a_new_home_of_the_reference_is_told_and_harms_nothing(error_rad: float)
     error, std = errors(found, sound)
     assert (np.abs(error) < 4 * std).all()
     assert not list(solved(sound).notes)
+
+
+def test_quaternions_in_another_order_are_named_as_such() -> None:
+    sound = turning(record(CLEAR, 1))
+    scalar_last = Rotation.from_matrix(sound.attitudes).as_quat()
+    read = np.asarray(Rotation.from_quat(scalar_last[:, [1, 2, 3, 0]]).as_matrix())  # as if the first were qw
+    with pytest.raises(Fault, match=r"inverted_attitudes: .* in the order x y z w: qw holds x"):
+        solve_turning(replace(sound, attitudes=read), None, any_mounting=False)
+    with pytest.raises(Fault, match=r"inverted_attitudes: .* agree with their inverses"):
+        solve_turning(replace(sound, attitudes=np.swapaxes(sound.attitudes, 1, 2)), None, any_mounting=False)

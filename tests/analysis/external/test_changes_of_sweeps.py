@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from rig.analysis.external.external_recordings import budget_of, solve_swept
+from rig.analysis.external.omissions import notes_on_speeds
 from rig.errors import Fault
 from rig.observation.external.csv_import import ExternalData
 from support.external.loggers import Log, swept, turn_slowly, write_rates
@@ -77,3 +78,13 @@ def test_scale_factors_that_change_between_the_rounds_are_named(tmp_path: Path) 
         Fault, match=r"scale_changed: from \d+.* s on the gyroscope reads 2 % more on [xyz] of the same"
     ):
         solve_swept(data, None)
+
+
+@pytest.mark.slow
+def test_whole_turns_in_degrees_are_told_though_no_speed_is_unusual(tmp_path: Path) -> None:
+    log = swept(HZ)  # a turn in 4 s
+    slow = Log(4 * log.time_s, log.readings / 4, log.rows * np.array([4, 4, 1, 1, 1, 0.25]))
+    in_degrees = Log(slow.time_s, np.degrees(slow.readings), slow.rows * np.array([1, 1, 1, 1, 1, 180 / np.pi]))
+    assert not list(notes_on_speeds(average_files(*write_rates(tmp_path, slow))))
+    first, *_ = notes_on_speeds(average_files(*write_rates(tmp_path, in_degrees)))
+    assert first.startswith("each sweep turns by a whole multiple of 90 rad") and "if both files are in °/s" in first
