@@ -49,7 +49,7 @@ def find_row_change(
         observed=(means - design @ fitted).ravel(),
         design=np.asarray(np.kron(design, np.eye(3)), dtype=np.float64),
         fixed=np.diag(variances.ravel()),
-        components=np.array([_by_row(read[None]), _by_row(across)]),
+        components=np.array([_combine_patterns(read[None]), _combine_patterns(across)]),
         precision=np.zeros(12),
         scales=np.array([OF_RATE, OF_RATE]),
         alone=np.zeros((2, 2)),
@@ -75,7 +75,7 @@ def find_row_change(
     )
 
 
-def _by_row(patterns: Array) -> Array:
+def _combine_patterns(patterns: Array) -> Array:
     """Return the covariance (3N, 3N) of independent errors of N rows, by their patterns (p, N, 3)."""
     count = patterns.shape[1]
     covariance = np.zeros((count, 3, count, 3))
