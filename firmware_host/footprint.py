@@ -115,7 +115,7 @@ class Session:
 
 
 def measure_stack(image: bytes, elf: bytes) -> int:
-    """Return the most stack ever used, bytes, which the board reports after it has done everything."""
+    """Return the most stack, bytes, that the board reports after a session of all its tasks."""
     session = Session(image, elf)
     for sensor in SENSORS:
         ranges = {"range_deg_s": RANGE_DEG_S, "range_g": RANGE_G, "range_gauss": 0.0}

@@ -53,7 +53,7 @@ class SoFar:
 
 @dataclass(frozen=True, slots=True)
 class _RecordedPart:
-    """One recording's part of a gyroscope and its accelerometer; `clock` is None if it could not be determined."""
+    """What one recording shows of a gyroscope and its accelerometer; `clock` is None if undetermined."""
 
     clock: TimeBase | None
     sweeps: Attempts[int, Observation]

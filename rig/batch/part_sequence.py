@@ -1,4 +1,4 @@
-"""The sequence of parts: entries, questions and documents between their runs."""
+"""A batch, part by part: journal entries, questions and documents."""
 
 import gc
 from collections.abc import Callable, Sequence
@@ -30,7 +30,7 @@ LABELS = "labels"
 
 
 class Bench(Protocol):
-    """A bench that runs parts, with everything that remains between two parts."""
+    """A bench that exchanges and runs parts, and knows their history."""
 
     @property
     def simulated(self) -> bool: ...

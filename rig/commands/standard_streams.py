@@ -7,9 +7,9 @@ from typing import Any, TextIO
 
 
 class _Unbroken:
-    """A text stream whose loss ends nothing: output that it refuses, and all later output, is discarded.
+    """A text stream whose writes never fail: after an OSError, this and all later output is discarded.
 
-    `lost` is the error, None if the reader has gone away, having read enough.
+    `lost`: the error; None without one, or if the reader closed the pipe.
     """
 
     def __init__(self, stream: TextIO) -> None:

@@ -207,7 +207,7 @@ class OutputSection(Section):
 
 
 class StatementConfig(Section):
-    """A laboratory's statements on itself and on an order."""
+    """The sections on a laboratory and a customer's order."""
 
     site: SiteSection = SiteSection()
     certificate: CertificateSection = CertificateSection()

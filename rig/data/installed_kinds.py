@@ -13,12 +13,12 @@ GROUP = "rig.kinds"
 
 
 class InstalledKind(Protocol):
-    """A package's description of a kind of sensor, of which each room takes its own part.
+    """A kind of sensor from an installed package; each part of rig reads only what it needs.
 
-    - `quantity` is the measured one: its row of the table.
+    - `quantity` is what the sensor measures.
     - `solve` takes the sensor's name, its placements at rest and the site, and returns the solution
       (`rig.analysis.installed_solvers`).
-    - `result` is the kind of result (`rig.report.findings.result_kind.ResultKind`), for every outlet.
+    - `result` (`rig.report.findings.result_kind.ResultKind`) describes its results for every output.
     """
 
     @property

@@ -122,7 +122,7 @@ def trend_entry(trend: Trend) -> dict[str, Any]:
 
 
 def change_entry(change: Change) -> dict[str, Any]:
-    """Return a parameter in two calibrations."""
+    """Return a parameter's change for JSON."""
     return {
         "unit": change.unit,
         "before": _parameter(change.before),

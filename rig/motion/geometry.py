@@ -134,8 +134,8 @@ def distance_to_forearm(
 ) -> Array:
     """Return distances (…,), m, from a point of the flange's frame to the line from elbow to wrist 1.
 
-    The joint angles are `q_rad` (…, 6), the points (…, 3), by default the flange's centre. The line may be offset by
-    `offset_m` towards wrist 1.
+    The joint angles are `q_rad` (…, 6), the points (…, 3), by default the flange's centre. `offset_m` shifts the line
+    along the elbow's axis.
     """
     frames = _frames(q_rad, arm)
     _, elbow, wrist = _find_bends(frames)

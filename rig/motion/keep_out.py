@@ -86,7 +86,7 @@ def keeps_clear(start_q_rad: Joints, target_q_rad: Joints, carried: FlangeLoad, 
 
 
 def _clearance_m(radius_m: float, room_m: float) -> float:
-    """Return the smallest permitted distance, m, to the middle of a link."""
+    """Return the least permitted distance, m, to the middle of a link: radius plus room."""
     return round(radius_m + room_m, 6)
 
 

@@ -18,7 +18,7 @@ def windings_rad(plan: Plan, q_rad: Joints) -> list[tuple[float, float]]:
 
 
 def _round_up_deg(angle_rad: float) -> int:
-    """Return whole degrees that are enough: 190 for 189.5°, but 190 for a 190° that is off by rounding."""
+    """Round an angle up to whole degrees, but ignore rounding errors: 190 for 190.0000001°."""
     return ceil(degrees(angle_rad) - 1e-6)
 
 

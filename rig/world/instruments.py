@@ -33,8 +33,7 @@ class InstrumentMount:
     """The socket of an instrument.
 
     - kind: its name in control requests.
-    - build: returns the instrument with power, at a virtual time in s. What it stores without power is bound in
-      `build`.
+    - build: returns the instrument with power, at a virtual time in s; its non-volatile memory is bound in `build`.
     - pty: whether its port is also a pseudo-terminal.
     - bit_error_rate: at first, the fraction of wrong bits on its line.
     - stolen: at first, the fraction of its bytes that another program on the port reads.

@@ -91,7 +91,7 @@ class OutputRegisters:
         self._is_locked = [False, False, False]  # block update: low byte read, high byte not yet
 
     def show(self, vector: Sequence[float], per_count: float) -> None:
-        """Show a new conversion of a vector in the part's own axes."""
+        """Output `vector`, in the part's own axes, in counts of `per_count` each."""
         self._latest = data = _COUNTS.pack(*[saturate(round(component / per_count)) for component in vector])
         for axis, is_locked in enumerate(self._is_locked):
             if not is_locked:

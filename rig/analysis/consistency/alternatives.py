@@ -42,7 +42,7 @@ class Means:
 
 
 def _axis_patterns(columns: Array) -> Array:
-    """Return patterns (3, N, 3): a change (N, 3) of each axis alone."""
+    """Return patterns (3, N, 3): `columns` (N, 3) on one axis each."""
     return np.moveaxis(split_per_axis(columns), -1, 0).swapaxes(1, 2)
 
 
@@ -82,7 +82,7 @@ FAULT_MODES: tuple[FaultMode[Means], ...] = (  # (k, N, 3) each
 
 
 def changes(segments: Segments, axis_rates: Array) -> Alternatives:
-    """Return by check the columns (3, N, k) of a scale factor, or a mounting, that changes with time."""
+    """Return, for each check, columns (3, N, k): a scale factor or a mounting changes with time."""
     time = normalise_time(segments)
     for sweep in np.unique(segments.sweep):  # a change within a sweep is tested for that sweep
         time[segments.sweep == sweep] = time[segments.sweep == sweep].mean()

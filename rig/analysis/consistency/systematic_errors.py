@@ -356,6 +356,6 @@ def _temperature_patterns(segments: Segments, matrix: Array, known_errors: Known
 
 
 def _rounding_patterns(segments: Segments) -> list[Array]:
-    """Return the patterns of one standard deviation of rounding errors that segments share."""
+    """Return patterns of rounding errors that segments share, one standard deviation each."""
     rounded = rounding_errors(segments.means_rad_s, segments.roundings_rad_s, segments.variances_rad2_s2)
     return [error.patterns / np.sqrt(3) for error in rounded]

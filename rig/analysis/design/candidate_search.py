@@ -32,7 +32,7 @@ class ReachedUncertainty:
 
 @dataclass(frozen=True, slots=True)
 class Budgets:
-    """The budgets of a run by sensor: of gyroscopes, and of the accelerometers that attitudes calibrate."""
+    """The budgets of a run by sensor: of gyroscopes, and of accelerometers calibrated in attitudes."""
 
     rates: Mapping[str, Budget]
     accelerations: Mapping[str, Budget] = field(default_factory=dict)

@@ -1,8 +1,7 @@
-"""The check of a gyroscope's bias from increments between attitudes against its readings at rest.
+"""The check that a gyroscope's bias from increments between attitudes agrees with its readings at rest.
 
-A gyroscope at rest reads its bias, and motion that the reference does not show. The reference gives the rate in each
-rest; the scatter of these rates gives their uncertainty. The reference's errors in motion do not, because time-stamp
-errors may cause them.
+A gyroscope at rest reads its bias, and motion that the reference does not show. The uncertainty of this motion is from
+the scatter of the reference's rates in the rests, not from its errors in motion, which time stamps may cause.
 """
 
 import numpy as np

@@ -26,12 +26,12 @@ BIAS_LIMIT_RAD_S = 1e-5
 
 @dataclass(frozen=True, slots=True)
 class Agreement:
-    """A sensor's calibration by the board and in double precision; None if either has no solution.
+    """A sensor's calibration by the board, compared with the host's in double precision.
 
     - `solutions`: the board's, by method.
     - `not_observed`: the sweeps without an observation by the board, and why.
-    - `host_scale`, `host_bias_rad_s` (3,): the host's solution in double precision.
-    - `scale_difference` (relative), `bias_difference_rad_s`: the largest of three axes, for the closed form.
+    - `host_scale`, `host_bias_rad_s` (3,): the host's solution; None without one.
+    - `scale_difference` (relative), `bias_difference_rad_s`: largest of three axes, closed form; None if either failed.
     """
 
     solutions: Mapping[str, BoardSolved]

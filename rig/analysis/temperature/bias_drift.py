@@ -40,8 +40,8 @@ class ScaleFreeBias:
 class BiasDrift:
     """The bias of one quantity of a sensor by repeat, rad/s or m/s².
 
-    A gyroscope's bias contains the Earth's rate times the scale error, and without a stated Earth's rate
-    (`earth_rate_known`) all of it; either is the same in every repeat.
+    A gyroscope's bias includes the Earth's rate times the scale error, or all of the Earth's rate if none is stated
+    (`earth_rate_known`); both are the same in every repeat.
 
     - `scale_fixed`: with scale, axes and reference of the first repeat (accelerometers), or nominal (gyroscopes).
     - `common_std` (3,): a further standard deviation common to all biases.

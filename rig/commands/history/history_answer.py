@@ -1,4 +1,4 @@
-"""The answer of a history to a run, which waits for a few seconds only."""
+"""The answer of a history to a run, awaited for a few seconds only."""
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress

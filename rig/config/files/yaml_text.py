@@ -108,7 +108,7 @@ def _compose(text: str) -> "tuple[_Loader, yaml.Node | None]":
 
 
 class _Loader(yaml.SafeLoader):
-    """A loader of limited documents of plain data; `parser`: another parser of the same text."""
+    """A loader of plain data within limits; `parser`, if given, parses the same text faster."""
 
     def __init__(self, text: str, parser: yaml.CSafeLoader | None = None) -> None:
         super().__init__(text)

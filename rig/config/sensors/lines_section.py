@@ -90,7 +90,7 @@ class LineFieldSection(Section):
 
 
 class LineTemperatureSection(Section):
-    """The column `temperature`, in °C: printed value × scale + offset; without it, what is stated."""
+    """The column `temperature`, °C: printed value × scale + offset; without one, `stated_c`."""
 
     scale: Scale = 1.0
     offset_c: float = Field(default=0.0, description="temperature at a printed 0")

@@ -18,7 +18,7 @@ class RestByHandEntry(Entry):
 class MoveByHandEntry(Entry):
     """A move from one rest to the next, by `angle_rad`: a flip to another face, or whole `turns` on a face.
 
-    `closure_error_rad` is a turn's end minus its beginning, null for flips and without a stated edge.
+    `closure_error_rad` is a turn's end minus its start; null for flips and for turns against no edge.
     """
 
     kind: Literal["flip", "turn", "omitted"]

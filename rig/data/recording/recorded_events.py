@@ -191,7 +191,7 @@ class _Times:
 
 
 def _check_sweep(sweep: Sweep) -> None:
-    """Raise ValueError for a sweep that no plan contains."""
+    """Raise ValueError for a sweep with impossible numbers or indices."""
     low, high = sweep.revolution_rad
     rates = sweep.speed_rad_s, sweep.acceleration_rad_s2, sweep.duration_s
     numbers = (*sweep.axis_flange, *sweep.start_q_rad, *sweep.end_q_rad, low, high, *rates)

@@ -313,7 +313,7 @@ def _check_numbers(name: str, rows: NDArray[Any], most: float) -> None:
 
 @dataclass(frozen=True, slots=True)
 class _Named:
-    """The names of the sensors, under the rules of a configuration, because they become names of files."""
+    """The sensors' names, validated as in a configuration, because files are named after them."""
 
     sensors: tuple[SensorName, ...]
 

@@ -109,7 +109,7 @@ def solve_levenberg_marquardt(
 
 
 def _conditioning(unit_means: Array, noise: float) -> refusals.Conditioning:
-    """Return the conditioning of Eq. (7)'s design for centred unit readings; squares double the noise."""
+    """Return the conditioning of Eq. (7)'s design for centred unit readings; squaring doubles `noise`."""
     return refusals.condition_of(design(unit_means), 6, 2 * noise * float(np.sqrt(len(unit_means))))
 
 

@@ -61,9 +61,9 @@ class Fit:
 def covariance_bound(
     theta: Array, movement: Movement, attitude_std_rad: float, *, second_order: bool = False
 ) -> tuple[Array, Array]:
-    """Return the Cramér–Rao bound (22, 22) at the true θ (22,) and δ, and the response (22, 3 K).
+    """Return the Cramér–Rao bound (22, 22) at the true θ (22,) and δ, and ∂θ/∂readings (22, 3 K).
 
-    It depends on movement and noise, not on the readings themselves.
+    Both depend on movement and noise, not on the readings.
     """
     free = find_free_directions(theta, list_fixed(movement, second_order=second_order))
     readings = decorrelate(noise(theta, movement), effects(theta, movement))

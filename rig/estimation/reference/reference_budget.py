@@ -57,9 +57,9 @@ class Spread:
 
 @dataclass(frozen=True, slots=True)
 class KnownSize:
-    """The uncertainty of the reference's norm: expanded (k = 2) if it is `stated`, else a half-width.
+    """The uncertainty of the reference's norm: expanded (k = 2) if `stated`, else a half-width.
 
-    `relative` to the norm; `per_unit` converts that to `unit`.
+    `relative` is the uncertainty divided by the norm; multiplied by `per_unit`, in `unit`.
     """
 
     name: str

@@ -123,7 +123,7 @@ def average_posterior(sizes: Array, likelihood: Array) -> Array:
 
 
 def average_walks(sizes: Array, likelihood: Array) -> Array:
-    """Return the root-mean-square posterior sizes (2,) of (K, 2), with a uniform prior of the walk.
+    """Return the root-mean-square (2,) of sizes (K, 2) over the posterior with a uniform prior for walks.
 
     The scatter has the prior of `average_posterior`. This is for parameters over a long time, such as slopes over
     temperature: their uncertainty may come mostly from a walk that the averages hardly show. So a walk is assumed to

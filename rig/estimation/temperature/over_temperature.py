@@ -400,7 +400,7 @@ class _ParameterFits:
         return centre
 
     def covariance(self, covariance: Array, centre: Array) -> Array:
-        """Return the covariance (24, 24) of the coefficients, from that (18, 18) of the changes."""
+        """Return all coefficients' covariance (24, 24), from that (18, 18) of orders 1 to 3."""
         take = np.vstack([_coefficients_from_changes(centre, 0), _coefficients_from_changes(centre, 1)])
         return self.rescale(take @ covariance @ take.T)
 

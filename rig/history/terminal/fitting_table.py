@@ -40,7 +40,7 @@ class TableColumn:
 class FittingTable:
     """A table that shows as many of its `columns` as fit.
 
-    On a terminal with letters only, blocks are replaced by letters.
+    On an ASCII-only terminal, block characters are replaced.
     """
 
     title: str

@@ -71,8 +71,8 @@ def state_jitter(recordings: Sequence[ObservedRun]) -> Jitter:
 def find_encoder_noise_rad(recordings: Sequence[ObservedRun]) -> float:
     """Return the noise of one reading of a joint's angle, rad, from the joints that are at rest during a sweep.
 
-    Differences of the sixth order contain it, as in `state_jitter`; the encoders' steps count as noise. Zero for a
-    turner with one shaft, or whose single readings scatter.
+    It is the scatter of sixth differences, as in `state_jitter`, and includes the encoders' steps. Zero with a single
+    shaft, or if single angles are inaccurate.
     """
     squares = [
         np.mean(np.delete(steps_rad, sweep.joint, axis=1) ** 2)

@@ -12,9 +12,9 @@ STILL_RAD_S = 0.02  # largest rate between them; a camera's errors amount to hal
 
 
 def still_windows(windows_s: Array, attitudes: Array) -> list[Window]:
-    """Return the windows in which the rows show that the body lay still.
+    """Return the windows in which a reference's rows show the body at rest.
 
-    The rows have windows (N, 2), in any order, and `attitudes` (N, 3, 3), body to table coordinates.
+    Rows have windows (N, 2), in any order, and `attitudes` (N, 3, 3), body to table coordinates.
     """
     long = windows_s[:, 1] - windows_s[:, 0] >= DWELL_S
     windows = [Window(start_s, end_s) for start_s, end_s in windows_s[long].tolist()]

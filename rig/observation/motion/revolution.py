@@ -118,7 +118,7 @@ def arm_states_lost(where: str, extent: str) -> Fault:
 
 
 def _find_inner_states(travelled: Array, turn_rad: float, sweep: Sweep) -> tuple[int, int]:
-    """Return the indices of the first and last state within the revolution, which has states before and after it."""
+    """Return the indices of a revolution's first and last state. Raise Fault `incomplete_revolution`."""
     entries = np.flatnonzero((travelled[:-1] < 0) & (travelled[1:] >= 0)) + 1
     exits = np.flatnonzero((travelled[:-1] < turn_rad) & (travelled[1:] >= turn_rad))
     if len(entries) and len(exits) and exits[0] > entries[0]:

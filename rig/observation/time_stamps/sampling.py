@@ -155,7 +155,7 @@ def _list_wider(time_s: Array) -> list[_PeriodCandidate]:
 
 
 def _select_candidate(candidates: Sequence[_PeriodCandidate], typical_s: float) -> _PeriodCandidate | None:
-    """Return the first candidate that fits with few gaps, or None; wider ones would hide losses."""
+    """Return the narrowest candidate that fits with few gaps, or None. Wide candidates hide losses."""
     # The steps inside a burst would make the time between bursts look like a gap.
     fitting = [
         candidate for candidate in candidates if candidate.fit >= MOSTLY and candidate.interval_s > typical_s / 2

@@ -31,7 +31,7 @@ class BudgetColumn:
 
     @property
     def axis(self) -> str:
-        """The axis of the column."""
+        """The axis: x, y or z."""
         return "xyz"[self.index % 3]
 
 

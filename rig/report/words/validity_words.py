@@ -44,7 +44,7 @@ def warmth(when: ConditionsEntry, use: str = "") -> dict[str, float | None]:
 
 
 def label_source(use: str) -> str:
-    """Return the label for `warmth` that names a temperature's source."""
+    """Add a temperature's source to a label `use` of `warmth`."""
     return use if use.endswith(AS_STATED) else f"{use}, by its own thermometer"
 
 

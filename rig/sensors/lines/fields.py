@@ -20,7 +20,7 @@ _AROUND_KEYS = " \t,;{}[]()\"'|&"
 
 
 class TextFieldReader:
-    """The reader, by a section, of single lines that `LineReader` cannot parse as numbers alone."""
+    """A reader, set up by a section, of single lines that `LineReader` cannot parse as numbers."""
 
     def __init__(self, section: LinesSection) -> None:
         self._columns = section.columns

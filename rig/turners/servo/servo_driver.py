@@ -123,7 +123,7 @@ class Servo:
         ]
 
     def check(self) -> None:
-        """Raise the problem that a supervising thread found, after a shaft under control was stopped."""
+        """Raise the first problem or a requested stop, if any; stop a controlled shaft first."""
         if self._link is not None and (problem := self._thread_problem(self._link)) is not None:
             self._fail(problem)
         if self._problem is None and not (self._link is not None and self._stopper.begun):
@@ -140,7 +140,7 @@ class Servo:
     # Moving -----------------------------------------------------------------------------------------------------
 
     def take_control(self, carried: FlangeLoad) -> None:
-        """Make the servo hold its shaft at its position, with the watchdog armed. Raise `Refused` by name."""
+        """Hold the shaft in place, watchdog armed. Raise Refused for `problems`, or `servo_moves`."""
         self.check()
         refuse(self.problems(carried))
         ends_s = self._clock.now_s() + STANDING_S
