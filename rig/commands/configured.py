@@ -26,7 +26,7 @@ class Configured:
 def load_configured(
     config_path: Path, overrides: Sequence[str] = (), script: ScriptFile | Path | None = None
 ) -> Configured:
-    """Load a configuration; a `script` (a file, or loaded) replaces the procedure that it names.
+    """Load a configuration. A `script` (a file, or loaded) replaces the configuration's procedure.
 
     Raise Refused as `load`, `installed`, `load_script` and `first_phase` do; also `script_failed`.
     """

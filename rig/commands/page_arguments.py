@@ -1,4 +1,4 @@
-"""The arguments of the operator's page: its request, its address, and its permission to answer questions."""
+"""The arguments that request an operator's page, set its address, and let it answer questions."""
 
 import argparse
 import os

@@ -52,7 +52,7 @@ def output_lost() -> OSError | None:
 
 
 def say_where_the_result_is(result: Path) -> None:
-    """Print on stderr that `path` contains the complete result, if stdout has lost output; keep the exit status."""
+    """Print on stderr where the complete `result` is, if stdout has lost output. The exit status is unchanged."""
     from rig.station.plain_text import say
 
     if (lost := output_lost()) is not None:

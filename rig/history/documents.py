@@ -47,7 +47,7 @@ COLUMNS = (
 def history_document(
     pasts: Sequence[Past], trends: Mapping[Subject, Mapping[str, Trend]] | None = None
 ) -> dict[str, Any]:
-    """Return calibrations, and with `trends` their trends."""
+    """Return calibrations for JSON, and with `trends` also the trends of their parameters."""
     document: dict[str, Any] = {"schema": SCHEMA, "calibrations": [calibration_entry(past) for past in pasts]}
     if trends is not None:
         document["trends"] = [

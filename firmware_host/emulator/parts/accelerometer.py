@@ -43,7 +43,7 @@ class AccelerometerTruth:
 
 
 class Accelerometer:
-    """Three sensing axes with the errors of `truth`; without errors and noise if it is None.
+    """Three sensing axes with the errors of `truth`, or without errors and noise if `truth` is None.
 
     `motion_at`, `seed`, `temperature_c`: those of the part's `Gyroscope`, whose noise is independent. A motion of 3
     components has no force: then the part rests with z up.
@@ -61,7 +61,7 @@ class Accelerometer:
         self._triad = _triad(truth, seed, temperature_c) if truth is not None else None
 
     def read(self, time_s: float, settled: float = 1.0) -> list[float]:
-        """Return the next reading, (3,) m/s², at `time_s`; only the fraction `settled` of the force is sensed."""
+        """Return the next reading, (3,) m/s², at `time_s`. The part senses the fraction `settled` of the force."""
         delay_s = self._truth.delay_s if self._truth is not None else 0.0
         force_g = self._motion_at(time_s - delay_s)[3:] or _AT_REST_G
         force = [settled * STANDARD_GRAVITY_M_S2 * component for component in force_g]

@@ -233,7 +233,7 @@ class Adis16465:
         return fixed[address]
 
     def _take_diagnosis(self) -> int:
-        """Return the diagnosis and clear all of its flags except a persistent one."""
+        """Return the diagnosis and clear its flags, except that of a persistent overrun."""
         diagnosis, self._diagnosis = self._diagnosis, 0
         return diagnosis | (_OVERRUN if self.overrun else 0)
 
@@ -283,7 +283,7 @@ class Adis16465:
         return samples / (_RATE_HZ * self._speed)
 
     def _update(self, time_s: float) -> None:
-        """Set new output registers; the data-ready line signals them and is inactive shortly before the next."""
+        """Set new outputs. The data-ready line signals new outputs and is inactive shortly before."""
         self._show_temperature(time_s)
         rates = self._gyroscope.read(time_s)
         self._counts = [
@@ -306,7 +306,7 @@ class Adis16465:
         self._temperature = saturate(round(self._gyroscope.temperature_c(time_s) * 10)) & 0xFFFF
 
     def _read_output(self, output: int) -> int:
-        """Return an output as its 32-bit register pair: without averaging, the lower 16 bits are empty."""
+        """Return a 32-bit output. Without averaging or filter, the lower 16 bits are 0."""
         if self._registers.values[_DEC_RATE] or self._registers.values[_FILT_CTRL]:
             return self._counts[output]
         return saturate(self._counts[output] + 0x8000 >> 16) << 16

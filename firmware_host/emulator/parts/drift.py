@@ -48,7 +48,7 @@ class Drift:
         return np.column_stack([np.interp(time_s, knot_times_s, knots[:, axis]) for axis in range(3)])
 
     def _extend(self, knot: int) -> None:
-        """Add knots until there are some on both sides."""
+        """Add knots until the last one is later than `knot`."""
         while len(self._knots) < knot + 2:
             fresh = self._random.standard_normal((_BLOCK, len(self._flicker) + 1, 3))
             flickers, steps = self._fresh * fresh[:, 1:], self._step * fresh[:, 0]

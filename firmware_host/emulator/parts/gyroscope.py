@@ -92,7 +92,7 @@ class Gyroscope:
         self.temperature_c = self._triad.temperature_c
 
     def read(self, time_s: float, settled: float = 1.0) -> list[float]:
-        """Return the next reading, (3,) rad/s, at `time_s`; only the fraction `settled` of the motion is sensed."""
+        """Return the next reading, (3,) rad/s, at `time_s`. The part senses the fraction `settled` of the motion."""
         motion = self._motion_at(time_s - self._truth.delay_s)
         if settled != 1.0:
             motion = [settled * component for component in motion]

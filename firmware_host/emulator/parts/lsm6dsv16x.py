@@ -146,7 +146,7 @@ class Lsm6dsv16x:
         return 0xFF
 
     def predict(self) -> bytes:
-        """Return no predictions: reading the outputs clears flags, and a conversion may occur in between."""
+        """Return nothing in advance: a read clears flags, and a conversion may occur between two reads."""
         return b""
 
     # --- registers

@@ -219,6 +219,6 @@ class Lsm9ds1:
 
 
 def _flip_x(vector: Sequence[float]) -> Sequence[float]:
-    """Return a vector of right-handed axes in the axes of both triads."""
+    """Return a vector, given in right-handed axes, in the axes of gyroscope and accelerometer."""
     x, y, z = vector
     return -x, y, z

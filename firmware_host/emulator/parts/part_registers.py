@@ -54,7 +54,7 @@ class PartRegisters:
 
 
 class Conversions:
-    """The times of a part's conversions, evenly by its own oscillator, which is `oscillator_ppm` fast."""
+    """The times of a part's conversions, evenly spaced by an oscillator that is `oscillator_ppm` fast."""
 
     def __init__(self, oscillator_ppm: float) -> None:
         self._speed = 1 + oscillator_ppm * 1e-6

@@ -99,7 +99,7 @@ class Triad:
         return sensed
 
     def warmer_k(self, time_s: float) -> float:
-        """Return how much warmer the part is than the temperature of its stated errors, K."""
+        """Return the part's temperature minus that of the stated errors, K."""
         if not self._temperature_varies:
             return 0.0
         die = self._errors.die
@@ -130,7 +130,7 @@ class Triad:
         return [b + per_k * warmer_k + per_k2 * warmer_k**2 + size * branch for b, per_k, per_k2, size in rows]
 
     def all_warmer_k(self, time_s: np.ndarray) -> np.ndarray | float:
-        """Return how much warmer the part is than at its stated errors, K: (n,), or one number for all times."""
+        """Return `warmer_k`, K, at times (n,): (n,), or one number if the temperature is constant."""
         return np.array([self.warmer_k(t) for t in time_s.tolist()]) if self._temperature_varies else 0.0
 
     def readings(self, time_s: np.ndarray, sensed: Sequence[np.ndarray], warmer_k: np.ndarray | float) -> np.ndarray:
@@ -172,7 +172,7 @@ class LowPass:
         self._outputs: list[float] = []
 
     def step(self, time_s: float, inputs: list[float]) -> list[float]:
-        """Return the outputs at `time_s`, at which the inputs have reached these values."""
+        """Return the outputs at `time_s`; `inputs` are the values at that time."""
         step_s = time_s - self._time_s
         if math.isinf(step_s):
             self._outputs = inputs
@@ -188,7 +188,7 @@ class LowPass:
 
 
 def spawn_seed(seed: Seed, key: int) -> np.random.SeedSequence:
-    """Return a derived seed that depends on `seed` alone, so that draws from it do not affect others."""
+    """Return a seed derived from `seed` and `key` alone, so that its draws affect no other draws."""
     sequence = seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
     return np.random.SeedSequence(sequence.entropy, spawn_key=(*sequence.spawn_key, key))
 

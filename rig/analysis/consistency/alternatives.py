@@ -132,7 +132,7 @@ def sweep_columns(segments: Segments, sweep: int) -> Array:
 
 
 def step_columns(segments: Segments) -> list[Array]:
-    """Return a column (N, 1) for each end of a sweep with rests on both sides: 0 before that end, 1 after it."""
+    """Return a step (N, 1) for each end of a sweep with rests on both sides: 0 before the end, then 1."""
     middle = segments.times_s.mean(axis=1)
     ends = [segments.times_s[segments.sweep == sweep].max() for sweep in np.unique(segments.sweep[segments.sweep >= 0])]
     steps = [np.where(middle < end, 0.0, 1.0)[:, None] for end in ends]

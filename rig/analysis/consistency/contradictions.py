@@ -166,7 +166,7 @@ def check_references(
 
 
 def _false_alarm_probability(run: RunData, sensors: Sequence[str], settings: RunSettings, false_alarms: float) -> float:
-    """Return the false-alarm probability of one statistic; all kinds of readings of a run share its probability."""
+    """Return the false-alarm probability of one statistic: a run's `false_alarms`, divided among its statistics."""
     accelerometers = run.measuring(ACCELERATION).keys() & settings.to_calibrate
     return false_alarm_per_check(len(sensors) + len(accelerometers) + len(run.measuring(FIELD)), of_all=false_alarms)
 

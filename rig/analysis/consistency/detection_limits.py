@@ -38,7 +38,7 @@ class DetectionLimit:
 def find_gyroscope_limits(
     sizes: Mapping[str, float], name: str, result: "SensorResult", surroundings: Surroundings
 ) -> Iterator[DetectionLimit]:
-    """Yield the detection limits of the gyroscope `name`, with these `sizes` by fault mode."""
+    """Yield the detection limits of the gyroscope `name`; `sizes`: minimal detectable sizes by fault mode."""
     explained = result.explained
     if explained is None:
         return

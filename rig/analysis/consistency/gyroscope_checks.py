@@ -84,7 +84,7 @@ class ErrorPatterns:
 
 @dataclass(frozen=True, slots=True)
 class _Tested:
-    """Segments, the rates along the sensor's axes in them (N, 3), and their whitened model."""
+    """Segments, their mean rates (N, 3) along the sensor's axes, and the whitened model."""
 
     segments: Segments
     axis_rates: Array
@@ -186,9 +186,9 @@ def _inflate_transfers(segments_only: _Tested, matrix: Array, allowance: ErrorPa
 
 
 def _residual_chi_square(tested: _Tested) -> tuple[float, int]:
-    """Return the χ² of segments with all possible changes in the model, and its degrees of freedom.
+    """Return the residuals' χ² after a fit of model and all possible changes, and the degrees of freedom.
 
-    In sweeps without transfers some changes differ from the model only by noise of the rates: these are ignored.
+    In sweeps without transfers, changes that differ from the model only by noise of the rates are ignored.
     """
     changed = [*changes(tested.segments, tested.axis_rates).values(), quarter_columns(tested.means)]
     columns = [apply_whitener(tested.model.whitener, change) for change in changed if change is not None]

@@ -60,7 +60,7 @@ class WhitenedReference:
     def test(
         self, columns: Array | None, nuisance: Sequence[Array], false_alarm_probability: float
     ) -> Statistic | None:
-        """Return the likelihood-ratio statistic of the columns, and its limit.
+        """Return the likelihood-ratio statistic of the columns, and the critical value.
 
         The statistic is twice the logarithm of the ratio, χ² if δ is given. Both likelihoods have their own restricted
         maximum-likelihood δ (Welham and Thompson, J. R. Stat. Soc. B 59 (1997) 701). If δ is estimated, the limit

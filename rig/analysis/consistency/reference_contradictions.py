@@ -39,7 +39,7 @@ DISTURBED_DWELL = "disturbed_dwell"
 
 @dataclass(frozen=True, slots=True)
 class SegmentName:
-    """A sweep or dwell of the plan, by its index, or neither: the worst one, which does not contradict the others."""
+    """A sweep or dwell by index in the plan. Without index: the worst one, where none contradicts the others."""
 
     what: str
     sweep: int | None = None
@@ -53,7 +53,7 @@ def _name_dwell(index: int) -> SegmentName:
 
 @dataclass(frozen=True, slots=True)
 class ReferenceReadings:
-    """One sensor's readings: `counts` (n, 3) of each recording, its windows and dwells, and the model.
+    """One sensor's readings: `counts` (n, 3) by recording, raw `dwells` and `sweeps`, and the `model`.
 
     - `segments`: the dwells and sweeps of `model`, in its order.
     - `flicker_counts`: the Allan deviation of the bias' flicker, which makes the halves of a dwell differ.

@@ -26,7 +26,7 @@ Alternatives = Mapping[str, Array | None]  # by the check's name; None: all resi
 
 @dataclass(frozen=True, slots=True)
 class FaultMode(Generic[Subject]):
-    """A possible fault, the `check` that detects it, and the unit of its size, None for the reading's own.
+    """A possible fault, the `check` that detects it, and the `unit` of its size: None for the readings' unit.
 
     `patterns` return the readings' changes by one unit of the fault, one for each form in which it may occur. A change
     half-way through has zero mean, as a calibration absorbs the rest.

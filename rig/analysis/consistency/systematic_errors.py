@@ -170,7 +170,7 @@ def _earth(surroundings: Surroundings, name: str, earth_rate: "EarthRate | None"
 
 
 def unknown_earth_rate(*, is_known: bool) -> Array:
-    """Return the unknown part (3, k) rad/s of the Earth's rate, as in `KnownErrors`: none if the site states it."""
+    """Return the Earth's rate as an unknown (3, k), rad/s, as in `KnownErrors`: k = 0 if the site states the rate."""
     return np.asarray(EARTH_RATE_RAD_S / np.sqrt(3) * np.eye(3)[:, : 0 if is_known else 3], dtype=np.float64)
 
 
@@ -249,7 +249,7 @@ def _encoder_patterns(segments: Segments, encoder_rad: float) -> Array:
 
 
 def _sweeps_between_moves(segments: Segments, joint: int) -> list[list[int]]:
-    """Return the sweeps and transfers between successive moves of a joint; a transfer that moves it begins a new list.
+    """Return lists of the sweeps and transfers between moves of a joint; a transfer that moves it begins a list.
 
     `joint` counts from the end of the chain, from −1. If a transfer is missing, a changed angle or another recording
     shows that the joint moved.
@@ -304,7 +304,7 @@ def _end_patterns(interval: MotionInterval) -> list[Array]:
 
 
 def _stamp_patterns(segments: Segments, stamp_s: float) -> Array:
-    """Return the patterns of time-stamp errors of each transfer's first and last sample; they do not affect sweeps."""
+    """Return patterns of errors in the time stamps of each transfer's first and last sample; sweeps are unaffected."""
     transfers = np.flatnonzero((segments.sweep < REST) & (stamp_s > 0))
     patterns_by_mark = np.zeros((len(transfers), *segments.means_rad_s.shape))
     lasting_s = np.diff(segments.times_s[transfers])

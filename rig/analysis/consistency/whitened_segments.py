@@ -54,7 +54,7 @@ class WhitenedSegments:
     def test(
         self, columns: Array | None, nuisance: Sequence[Array], false_alarm_probability: float
     ) -> Statistic | None:
-        """Return the statistic of columns with its critical value: see `WhitenedModel`."""
+        """Return the χ² that columns explain, and the critical value: see `WhitenedModel`."""
         value, dof = self._explain(columns, nuisance)
         return (value, critical_value(false_alarm_probability)(dof)) if dof else None
 

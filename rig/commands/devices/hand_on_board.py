@@ -1,4 +1,4 @@
-"""`rig board hand`: the board calibrates a gyroscope that is turned by hand; its result is checked.
+"""`rig board hand`: the board calibrates a gyroscope turned by hand, and this computer checks the result.
 
 With `--fetch` the board's button started the session, and its result is used unchecked.
 """

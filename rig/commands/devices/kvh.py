@@ -1,4 +1,4 @@
-"""`rig kvh info`: inspect a KVH 1775 at a port or in a configuration. Nothing in its memory is changed."""
+"""`rig kvh info`: inspect a KVH 1775 at a port or in a configuration, without changing its memory."""
 
 import sys
 from argparse import ArgumentParser, Namespace

@@ -120,7 +120,7 @@ def _day(text: str) -> date:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Carry out the chosen command. Ctrl-C ends it at once, even while its database does not answer."""
+    """Carry out the chosen command. Ctrl-C ends the command at once, even if the database does not answer."""
     if options.of_history == RECOMPUTE:
         from rig.commands.history.recompute import recompute_history
 

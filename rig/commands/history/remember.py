@@ -64,7 +64,7 @@ def _enter_run(
 
 
 def _is_usual(address: "HistoryAddress") -> bool:
-    """Return whether this history is the default one, which commands use if they name none."""
+    """Return whether this history is the user's default, which commands use if no history is named."""
     from rig.history.storage.address import default_history_address
 
     try:

@@ -30,7 +30,7 @@ SolvedTask = tuple[Task, Answer]
 
 
 class Workers(Protocol):
-    """Workers, and the recordings that they are solving."""
+    """Workers that solve recordings, and the recordings in progress."""
 
     @property
     def busy(self) -> bool:
@@ -184,5 +184,5 @@ def _cluster_lost(what: str) -> Fault:
 
 
 def _ignore_interrupts() -> None:
-    """Ignore Ctrl-C, which reaches all processes of a terminal, to finish the recording; then the parent stops."""
+    """Ignore Ctrl-C in a worker, so that the parent stops only after the recording is finished."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)

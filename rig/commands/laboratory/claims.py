@@ -84,7 +84,7 @@ def _claim(name: str, device: str, description: str) -> Iterator[None]:
 
 
 def _describe_holder(address: str) -> str:
-    """Describe the process that holds the claim, with its command line if this may be read."""
+    """Describe the process that holds the claim, with the command line if this process may read it."""
     process = 0
     try:
         with socket.socket(socket.AF_UNIX) as question:

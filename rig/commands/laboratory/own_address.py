@@ -74,7 +74,7 @@ def _board_host(config: SensorsConfig) -> str:
 
 
 def _move_turner(config: RigConfig, text: str, host: str) -> Iterator[str]:
-    """Yield the turner's overrides for another host, under its own key of the file."""
+    """Yield the overrides that move the turner to `host`, under the key that the file has: `turner` or `arm`."""
     import yaml
 
     section = "turner" if "turner" in yaml.safe_load(text) else "arm"

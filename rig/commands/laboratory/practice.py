@@ -1,4 +1,4 @@
-"""Faults to practise in a running laboratory, and their remedies, which typed words cause."""
+"""Incidents (faults and remedies) that a person causes by typed words to practise in a running laboratory."""
 
 import re
 from collections.abc import Mapping

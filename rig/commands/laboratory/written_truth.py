@@ -1,4 +1,4 @@
-"""The truth of a simulated laboratory, which writes it into the run folder after the verdict."""
+"""The truth of a simulated laboratory, written by the laboratory into the run folder after the verdict."""
 
 from collections.abc import Iterator
 from contextlib import suppress

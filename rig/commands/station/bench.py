@@ -275,7 +275,7 @@ def _read_ended(folder: Path, configured: Configured) -> PartEnded | None:
 
 
 def _prepare_folder(folder: Path, configured: Configured) -> bool:
-    """Prepare a run folder for the part, unless a run was begun in it. Return whether it is new."""
+    """Prepare a run folder for the part, unless a run was begun there. Return whether the folder is new."""
     if (folder / CONFIG).exists():
         return False
     if folder.exists():  # the process was killed while it wrote the first files

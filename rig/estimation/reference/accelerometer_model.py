@@ -76,7 +76,7 @@ class Sweeps:
     stations: NDArray[np.intp]
 
     def alone(self) -> "Sweeps":
-        """Return the sweeps as if each had a station of its own."""
+        """Return the sweeps, each with a separate station."""
         return replace(self, stations=np.arange(len(self.stations)))
 
 
@@ -165,7 +165,7 @@ def find_force(theta: Array, movement: Movement) -> Array:
 
 
 def project_reference(delay_s: float, movement: Movement) -> Array:
-    """Return the matrices (K, 3, 3) that map v_ref to its part of the specific force."""
+    """Return the matrices (K, 3, 3) that map v_ref to the specific force that it causes."""
     sweeps = movement.sweeps
     to_flange = np.swapaxes(sweeps.attitudes, -1, -2)
     parallel = sweeps.axes_flange[:, :, None] * sweeps.axes_flange[:, None, :]
@@ -188,7 +188,7 @@ def _differentiate_lag(waves: Array, sweeps: Sweeps) -> Array:
 
 
 def project_lever_arm(delay_s: float, movement: Movement) -> Array:
-    """Return the matrices (K, 3, 3) from the lever arm to its acceleration; constant speed affects means alone."""
+    """Return the matrices (K, 3, 3) from lever arm to acceleration; a constant speed affects only the means."""
     sweeps, now, change = movement.sweeps, slice(0, 2), slice(2, 4)
     turning = sweeps.turning_rad2_s2
     phase = (delay_s * sweeps.speeds_rad_s)[:, None, None]

@@ -36,7 +36,7 @@ SETTLED = 1e-3  # relative change of δ at convergence
 class AttitudeError:
     """The std δ of attitudes about each axis, rad, beyond their stated uncertainty; `uncertainty_rad` is δ's own std.
 
-    Near zero the likelihood is one-sided: the std is that upwards.
+    Near zero the likelihood is one-sided, and `uncertainty_rad` is the std upwards.
     """
 
     std_rad: float

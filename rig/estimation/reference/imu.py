@@ -170,7 +170,7 @@ def _check_attitudes(start: Array, movement: Movement, fixed: list[int], fit: Fi
 
 
 def _find_worst_dwell(start: Array, movement: Movement, fixed: list[int], fit: Fit) -> tuple[int, float, float]:
-    """Return the dwell that fits worst, its error in rad relative to the other dwells, and their δ."""
+    """Return the dwell that fits worst, its error relative to the other dwells, and these dwells' δ, both in rad."""
     count = len(movement.dwells.readings_m_s2)
     residuals = (movement.readings() - predicted(fit.theta, movement))[:count]
     rotations = effects(fit.theta, movement)[: 3 * count].reshape(count, 3, -1)

@@ -58,5 +58,5 @@ def _linear(movement: Movement, readings: Array, norm: float, up: Array) -> Arra
 
 
 def _rms(columns: Array) -> float:
-    """Return the root mean square of a block of columns, 1 if it is empty."""
+    """Return the root mean square of a block of columns, or 1 for an empty block."""
     return float(np.sqrt(np.mean(columns**2))) if columns.size else 1.0

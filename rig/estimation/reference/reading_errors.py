@@ -116,7 +116,7 @@ def select_sweeps(movement: Movement) -> Array:
 
 
 def repeat_by_segment(values: Array, movement: Movement) -> Array:
-    """Return a value for each reading (K,) from a value for each segment (N + M,); a sweep has three readings."""
+    """Return `values` (N + M,) of segments as values (K,) of readings, three for each sweep."""
     dwells = len(movement.dwells.readings_m_s2)
     return np.concatenate([values[:dwells], np.repeat(values[dwells:], 3)])
 
@@ -127,7 +127,7 @@ def per_axis(columns: Array) -> Array:
 
 
 def project_errors(theta: Array, movement: Movement, change: Callable[[Array], Array]) -> Array:
-    """Return the patterns (3 K, 3) of a `change` of the force along each axis; in sweeps its harmonic."""
+    """Return patterns (3 K, 3) of a `change` of the force along each axis; in sweeps, its mean and first harmonic."""
     dwells, axes = len(movement.dwells.readings_m_s2), matrix(theta)
     felt_along = find_force(theta, movement) @ (axes / np.linalg.norm(axes, axis=1, keepdims=True)).T
     mean, cos, sin = np.moveaxis(felt_along[dwells:].reshape(-1, 3, 3), 1, 0)

@@ -146,7 +146,7 @@ def _fourier_columns(angle_rad: Array, count: int) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class _Uneven:
-    """The joint's `rate` (n,) minus its mean, `acceleration` (n,) and `jerk` (n,), and their fast part, SI units.
+    """The unevenness of a joint's motion: `rate` (n,) minus its mean, `acceleration` and `jerk` (n,), SI units.
 
     `fast` (4, n): the rate and its first three derivatives, without the lowest four harmonics of a revolution.
     """

@@ -13,7 +13,7 @@ SAME = 1e-6  # difference relative to the standard uncertainty: more than by the
 
 
 def run_row(document: ResultDocument) -> dict[str, str | bool]:
-    """Return the columns of a run that repeat values of its result."""
+    """Return the columns of a run's row that repeat values of the result."""
     origin = document.provenance
     return {
         "measurement_sha256": measurement_sha256(document),

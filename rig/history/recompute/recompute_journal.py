@@ -56,7 +56,7 @@ class RecomputeJournal(AbstractContextManager["RecomputeJournal"]):
         os.close(self._descriptor)
 
     def note(self, key: str, answer: Answer) -> None:
-        """Add an answer. Only solutions are stored; everything else is tried again."""
+        """Store an answer if it is a solution, so that a continued recomputation retries all others."""
         if isinstance(answer, RecomputedResult):
             self._write(json.dumps({"key": key, "given": asdict(answer)}, allow_nan=False))
 

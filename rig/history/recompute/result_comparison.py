@@ -66,7 +66,7 @@ Answer = RecomputedResult | Unsolved
 
 @dataclass(frozen=True, slots=True)
 class ParameterMove:
-    """One parameter as stated and as recomputed, None if the present result does not have it."""
+    """One parameter as stated (`before`) and as recomputed (`now`); `now` is None if no longer in the result."""
 
     before: Parameter
     now: Parameter | None
@@ -91,7 +91,7 @@ class ParameterMove:
 
 @dataclass(frozen=True)
 class Compared:
-    """A stated result and the present result of its recordings, None if they were not solved."""
+    """A stated result, and the present `answer` from its recordings; None without an answer."""
 
     stated: StatedResult
     answer: Answer | None

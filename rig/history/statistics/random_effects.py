@@ -34,7 +34,7 @@ class Fitted:
         return float(stdtrit(self.dof, (1 + CONFIDENCE) / 2))
 
     def p_value(self, index: int) -> float:
-        """Return the probability of a coefficient at least as far from 0 as this one if the true value is 0."""
+        """Return the probability that a coefficient with true value 0 is at least as far from 0 as number `index`."""
         from scipy.special import stdtr
 
         return float(2 * stdtr(self.dof, -abs(self.coefficients[index]) / self.std[index]))

@@ -22,7 +22,7 @@ NAME = "history.sqlite"
 
 @dataclass(frozen=True, slots=True)
 class HistoryAddress:
-    """An address: `where` is an SQLite file or a server's URL; `label` is its name for people, without a password."""
+    """A history's address `where`: an SQLite file or a server's URL; `label` names it without a password."""
 
     label: str
     where: "Path | URL"

@@ -1,4 +1,4 @@
-"""Engines whose connections a forked process does not use: it opens its own.
+"""Engines that a forked process may inherit: the new process opens its own connections.
 
 Neither SQLite's locks nor a server's session survive a fork.
 
@@ -15,7 +15,7 @@ _parent_pools: list[Pool] = []
 
 
 def kept_from_children(engine: Engine) -> Engine:
-    """Return the engine, made safe to inherit: a forked process opens its own connections."""
+    """Return the engine. A forked process that inherits the engine opens new connections."""
     _engines.add(engine)
     return engine
 

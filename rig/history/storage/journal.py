@@ -25,7 +25,7 @@ ENTERED: Mapping[str, Table] = {
 
 @dataclass(frozen=True, slots=True)
 class Broken:
-    """An inconsistency of `what`, its `state`, and `why`."""
+    """An inconsistency of a history: `what` has changed or is missing (`state`), and `why`."""
 
     what: str
     state: Literal["changed", "missing"]
@@ -41,7 +41,7 @@ class Head:
 
 
 def alone(connection: Connection) -> None:
-    """Lock out other writers until the end of the transaction; on SQLite a writing transaction does so itself."""
+    """Lock out other writers until the transaction ends; on SQLite, a writing transaction is exclusive anyway."""
     if connection.dialect.name == "postgresql":
         connection.execute(text("SELECT pg_advisory_xact_lock(:lock)"), {"lock": LOCK})
 
@@ -92,7 +92,7 @@ def _link(before: str, line: Mapping[Any, Any]) -> str:
 
 
 def broken(connection: Connection) -> Iterator[Broken]:
-    """Yield rows that differ from the journal, rows that it lacks, its gaps, and breaks of its chain."""
+    """Yield rows that differ from the journal or are not in the journal, and gaps and breaks of the chain."""
     remaining = {
         (name, json.dumps(tuple(key))): (table, tuple(key))
         for name, table in ENTERED.items()

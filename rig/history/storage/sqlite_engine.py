@@ -35,7 +35,7 @@ _sharing = threading.Lock()
 
 @contextmanager
 def share_engine(file: Path, label: str) -> Iterator[Engine]:
-    """Yield this process's engine of a history's file; when its last user has finished, its connections are closed."""
+    """Yield this process's engine of a history's file. The last user's exit closes the connections."""
     key = file.parent.resolve() / file.name
     with _sharing:
         if key not in _engines:
@@ -114,7 +114,7 @@ def _connect(file: Path, options: str) -> sqlite3.Connection:
 
 
 def _begin_anew() -> None:
-    """Drop the parent's engines in a forked process, which opens its own."""
+    """Drop the parent's engines in a forked process."""
     _engines.clear()
     _sharing.release()
 

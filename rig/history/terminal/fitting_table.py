@@ -15,7 +15,7 @@ STROKES, ROUND_A_CELL = 1, 3  # width of the frame: one stroke, and for each cel
 
 @dataclass(frozen=True, slots=True)
 class TableColumn:
-    """A column with its `heading`. If columns do not fit, the highest `rank` is omitted first, and 0 never.
+    """A table's column. If columns do not fit, the highest `rank` is omitted first, and rank 0 never.
 
     A `shorter` column replaces it before it is omitted. A column that `wraps` may use several lines, and is at least
     `least` cells wide.
@@ -31,7 +31,7 @@ class TableColumn:
 
     @property
     def width(self) -> int:
-        """The number of terminal cells that it needs."""
+        """The number of terminal cells that the column needs."""
         longest = max(map(cell_len, self.cells), default=0)
         return max(cell_len(self.heading), min(longest, self.least) if self.wraps else longest)
 

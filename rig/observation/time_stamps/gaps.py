@@ -18,7 +18,7 @@ REACH, FEWEST = 4, 12  # time on either side of a gap, in its lengths, and the f
 
 
 def hidden_angles_rad(time_s: Array, readings: Array, gaps: NDArray[np.intp]) -> Array:
-    """Return the standard deviation (k,) of the rotation over each of the steps `gaps` (k,), if it is interpolated.
+    """Return the standard deviation (k,), rad, of the rotation interpolated over each of the steps `gaps` (k,).
 
     `readings` (n, 3) are rates at rising times (n,); a step has the number of its first reading. The result is infinite
     for a gap that is too long, or without enough readings next to it.
@@ -28,7 +28,7 @@ def hidden_angles_rad(time_s: Array, readings: Array, gaps: NDArray[np.intp]) ->
 
 
 def find_hiding_gaps(time_s: Array, readings: Array, gaps: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return those of the `gaps` (k,) that cannot be interpolated; arguments as for `hidden_angles_rad`."""
+    """Return the `gaps` (k,) that cannot be interpolated. Arguments are as for `hidden_angles_rad`."""
     return np.asarray(gaps[hidden_angles_rad(time_s, readings, gaps) > HIDDEN_RAD], dtype=np.intp)
 
 

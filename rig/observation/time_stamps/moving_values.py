@@ -17,7 +17,7 @@ def find_least_around(values: Array, width: int) -> Array:
 
 
 def find_least_ahead(values: Array, width: int) -> Array:
-    """Return for each value (n,) the minimum of this and the next values, `width` in all."""
+    """Return for each value (n,) the minimum of `width` values from this one on."""
     least, covered = values.copy(), 1
     while covered < min(width, len(values)):
         more = min(covered, width - covered)
@@ -27,7 +27,7 @@ def find_least_ahead(values: Array, width: int) -> Array:
 
 
 def find_least_behind(values: Array, width: int) -> Array:
-    """Return for each value (n,) the minimum of this and the previous values, `width` in all."""
+    """Return for each value (n,) the minimum of `width` values up to this one."""
     return find_least_ahead(values[::-1], width)[::-1]
 
 

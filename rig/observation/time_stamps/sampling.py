@@ -100,7 +100,7 @@ class Sampling:
 
 @dataclass(frozen=True, slots=True)
 class _PeriodCandidate:
-    """The interval and missing readings (n − 1,) for a `width`; `fit` is the fraction of differences that agree."""
+    """The interval and missing readings (n − 1,) for a `width`; `fit`: the fraction of differences that agree."""
 
     width: int
     interval_s: float
@@ -165,7 +165,7 @@ def _select_candidate(candidates: Sequence[_PeriodCandidate], typical_s: float) 
 
 
 def _exceeds_rounding(time_s: Array, sampling: Sampling, resolution_s: float) -> bool:
-    """Return whether stamps (n,) are later than rounding to their resolution explains."""
+    """Return whether some stamps (n,) are later than rounding to `resolution_s` explains."""
     late_s = time_s - sampling.interval_s * sampling.numbers
     allowed_s = max(resolution_s, NEAR * sampling.interval_s)
     return float(np.max(late_s - find_least_around(late_s, sampling.width))) > MORE * allowed_s
@@ -215,7 +215,7 @@ def _is_beat(missing: NDArray[np.intp]) -> bool:
 
 
 def _interval_s(time_s: Array, missing: NDArray[np.intp], width: int) -> float:
-    """Return the mean interval, missing readings counted, between the least late readings at either end."""
+    """Return the mean interval between the least late readings at either end, including missing readings."""
     steps_s, few = np.diff(time_s), missing <= COUNTED
     interval_s = float(steps_s[few].sum() / (1 + missing[few]).sum())
     numbers = np.concatenate([[0], np.cumsum(1 + missing)])

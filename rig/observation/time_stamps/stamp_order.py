@@ -47,7 +47,7 @@ REACH = 6  # number of readings, in lengths of the step, within which a link has
 
 @dataclass(frozen=True, slots=True)
 class StampFinding:
-    """A kind of rows that are left out (`left_out`) or have new times: the reason, their `count`, the first of them.
+    """A `reason` why `count` rows of a log are left out (`left_out`) or have new times, and the first row.
 
     `sample` is the first row's number in the log, from 1; `time_s` its stamp.
     """
@@ -64,7 +64,7 @@ class StampFinding:
 
 @dataclass(frozen=True, slots=True)
 class OrderedStamps:
-    """The readings of a log in order: their `rows` (m,) in the log, their strictly increasing times (m,).
+    """The readings of a log in the order of time: `rows` (m,) in the log, and strictly increasing times (m,).
 
     `sampling` describes the stamps; `findings` lists the rows that are left out or have new times.
     """

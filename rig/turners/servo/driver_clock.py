@@ -7,7 +7,7 @@ from typing import Protocol
 
 
 class Clock(Protocol):
-    """A monotonic clock and waiting by it; a simulated servo may bring another."""
+    """A monotonic clock, and waits measured by that clock; a simulated servo may have its own."""
 
     def now_s(self) -> float:
         """Return the time by which time-outs are measured, s."""
@@ -16,7 +16,7 @@ class Clock(Protocol):
         """Return the time with which states are stamped, s."""
 
     def wait(self, event: threading.Event, timeout_s: float) -> bool:
-        """Wait for an event; return whether it came in time."""
+        """Wait for an event. Return whether the event occurred in time."""
 
     def wait_for(self, changed: threading.Condition, done: Callable[[], bool], timeout_s: float) -> bool:
         """Wait until `done`, evaluated on each notice of the locked condition `changed`, is true; return its value."""
@@ -38,7 +38,7 @@ class HostClock:
         return time.monotonic() if raw is None else time.clock_gettime(raw)
 
     def wait(self, event: threading.Event, timeout_s: float) -> bool:
-        """Wait for an event on the host's clock; return whether it occurred in time."""
+        """Wait for an event on the host's clock. Return whether the event occurred in time."""
         return event.wait(timeout_s)
 
     def wait_for(self, changed: threading.Condition, done: Callable[[], bool], timeout_s: float) -> bool:

@@ -19,7 +19,7 @@ BEARABLE_MS = 2
 
 
 def lower_latency(port: "serial.Serial", path: str, devices: Path = DEVICES) -> None:
-    """Make the adapter deliver received bytes at once. Raise Refused `servo_adapter_slow` if its timer remains long."""
+    """Make the adapter deliver received bytes at once. Raise Refused `servo_adapter_slow` if the timer remains long."""
     timer = devices / Path(path).resolve().name / "latency_timer"
     with suppress(ValueError, OSError, AttributeError, NotImplementedError):  # a port that has no such thing
         port.set_low_latency_mode(True)

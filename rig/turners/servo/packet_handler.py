@@ -28,7 +28,7 @@ WITHOUT_DATA = 4  # the length of a status packet without data: instruction, err
 
 
 class BusError(Exception):
-    """An error between this computer and the servo."""
+    """An error in the exchange between this computer and the servo."""
 
 
 class ReplyLost(BusError):

@@ -48,7 +48,7 @@ def torque_lost() -> Problem:
 
 
 def watchdog_tripped() -> Problem:
-    """Describe a servo that its watchdog has stopped."""
+    """Describe a servo stopped by its own watchdog."""
     return Problem(
         "servo_watchdog_tripped",
         "the servo's watchdog has stopped it: no instruction came in time",
@@ -62,7 +62,7 @@ def driver_died(error: Exception) -> Problem:
 
 
 def driver_hung(silent_s: float) -> Problem:
-    """Describe a link's thread that no longer runs its loop."""
+    """Describe a link whose thread hangs."""
     return Problem(
         "servo_driver_hung",
         f"the thread that has the servo's line has not come round for {silent_s:.1f} s",

@@ -238,7 +238,7 @@ class Servo:
         return self._link
 
     def _call(self, job: Job) -> None:
-        """Send an instruction; translate its errors into problems of the servo."""
+        """Send an instruction. Record an error as a problem of the servo, and raise as `check` does."""
         try:
             self._linked.call(job)
         except Refused as error:
@@ -250,7 +250,7 @@ class Servo:
         self.check()
 
     def _why_denied(self, error: InstructionDenied) -> Problem:
-        """Return the reason why the servo refused: usually a stop by its watchdog."""
+        """Return why the servo refused an instruction: usually because the watchdog had stopped the shaft."""
         with suppress(BusError):
             if self._linked.call(lambda bus: bus.look_up(WATCHDOG), also_stopped=True) == (TRIPPED,):
                 return problems.watchdog_tripped()

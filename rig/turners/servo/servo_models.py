@@ -22,7 +22,7 @@ LOAD_FRACTION = 0.2
 
 @dataclass(frozen=True, slots=True)
 class ServoModel:
-    """A model: names, model number, stall torque at 12 V, no-load speed, and whether its load register is a current."""
+    """A servo model: name, number, stall torque at 12 V, no-load speed, and whether register 126 is a current."""
 
     name: str
     number: int

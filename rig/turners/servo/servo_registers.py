@@ -21,7 +21,7 @@ class Register(NamedTuple):
         return struct.pack(self.form, *values)
 
     def unpack(self, data: bytes) -> tuple[int, ...]:
-        """Return bytes as values, with their signs."""
+        """Return the values in a register's bytes."""
         return struct.unpack(self.form, data)
 
 

@@ -132,7 +132,7 @@ class ServoReport:
 
     @property
     def software(self) -> str:
-        """The version of its firmware."""
+        """The version of the servo's firmware."""
         return f"firmware {self.firmware}"
 
     @property

@@ -25,7 +25,7 @@ SURE = "only the switch of its supply is sure"
 
 
 class ShaftStop:
-    """The stop of a shaft by its link.
+    """The stop of a servo's shaft through its `ServoLink`.
 
     `await_rest(since_s, timeout_s)` waits for states newer than `since_s` (reference time) and returns whether they
     show rest; `lets_go()` returns whether the servo has switched its motor off.
