@@ -97,7 +97,7 @@ def calibration_entry(past: Past) -> dict[str, Any]:
 
 
 def subject_entry(subject: Subject) -> dict[str, Any]:
-    """Return the sensor and the calibrated quantity."""
+    """Return a subject (sensor, quantity and range) for JSON."""
     return dict(zip(("part", "serial_number", "quantity", "full_scale", "simulated"), subject, strict=True))
 
 

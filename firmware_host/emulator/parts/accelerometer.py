@@ -45,7 +45,7 @@ class AccelerometerTruth:
 class Accelerometer:
     """Three sensing axes with the errors of `truth`, or without errors and noise if `truth` is None.
 
-    `motion_at`, `seed`, `temperature_c`: those of the part's `Gyroscope`, whose noise is independent. A motion of 3
+    `motion_at`, `seed`, `temperature_c`: as for the part's `Gyroscope`, whose noise is independent. A motion of 3
     components has no force: then the part rests with z up.
     """
 

@@ -175,7 +175,7 @@ class Lsm6dsv16x:
         return self._read_output(address)
 
     def _read_output(self, address: int) -> int:
-        """Read status, temperature or an output; the other addresses up to EIS_X_L read 0."""
+        """Read the status, temperature or an output. The other addresses up to EIS_X_L read 0."""
         if address < _OUTX_L_G:
             return int((self._status, 0, *self._temperature)[address - _STATUS_REG])
         if address == _EIS_X_L:

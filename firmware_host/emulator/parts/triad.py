@@ -31,7 +31,7 @@ _NONE = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True)
 class TriadErrors:
-    """The common fields of `GyroTruth`, `AccelerometerTruth` and `MagnetometerTruth`, which document them.
+    """The common fields of `GyroTruth`, `AccelerometerTruth` and `MagnetometerTruth`, where they are described.
 
     All are in the units of a reading.
     """

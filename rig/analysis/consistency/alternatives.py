@@ -147,7 +147,7 @@ def normalise_time(segments: Segments) -> Array:
 
 
 def repeat_per_axis(columns: Array) -> Array:
-    """Return columns (3, N, 3 k): for each axis, the columns (N, k) with coefficients of its own."""
+    """Return columns (3, N, 3 k) from (N, k): separate columns for each axis."""
     count, wide = columns.shape
     return np.asarray(np.einsum("ij,nk->injk", np.eye(3), columns).reshape(3, count, 3 * wide), dtype=np.float64)
 

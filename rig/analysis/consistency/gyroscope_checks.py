@@ -70,8 +70,8 @@ MOST, TRIED = 16.0, 7  # largest variance inflation by a synchronous ripple; num
 class ErrorPatterns:
     """The known errors of segments, one pattern of one standard deviation each: `patterns_rad_s` (P, N, 3).
 
-    - `encoders_rad_s` (E, N, 3): those among them by the encoders in arcs.
-    - `transfers`: the segments with the M − N transfers; `transfer_patterns_rad_s` (Q, M, 3): their patterns.
+    - `encoders_rad_s` (E, N, 3): the patterns among `patterns_rad_s` by the encoders in arcs.
+    - `transfers`: N segments and M − N transfers; `transfer_patterns_rad_s` (Q, M, 3): the error patterns of all M.
     - `instability_rad_s`: the sensor's bias instability.
     """
 
@@ -249,7 +249,7 @@ def _detection_limits(
 def _test_bias_jump(
     segments: Segments, axis_rates: Array, scatter: Scatter, false_alarm_probability: float
 ) -> Statistic | None:
-    """Return the χ² of the bias' largest jump between two rests, relative to drift; None with fewer than three rests.
+    """Return the χ² of the largest bias jump between two rests, beyond drift; None with fewer than three rests.
 
     The drift is re-estimated with the best jump in the model; otherwise it would contain the jump. Few rests determine
     the drift poorly, so the critical value is from F with one degree of freedom per possible jump, which simulated

@@ -42,7 +42,7 @@ class Workers(Protocol):
         ...
 
     def give(self, solve: Solve, task: Task) -> None:
-        """Pass one more recording to the workers."""
+        """Give the workers one more recording to solve."""
         ...
 
     def answers(self) -> Iterator[SolvedTask]:

@@ -222,7 +222,7 @@ class RigBench:
         return config.station.sensors or tuple(config.to_calibrate)
 
     def _configure(self, serial: str) -> Configured:
-        """Return the configuration of one part."""
+        """Return the configuration with the part's serial number, the operator and the work order."""
         values = {f"sensors.{name}.serial_number": serial for name in self._named}
         values |= {"history.operator": self.station.operator} if self.station.operator else {}
         values |= {"history.note": f"work order {self.station.work_order}"} if self.station.work_order else {}

@@ -111,7 +111,7 @@ class Movement:
     own_share: float = OWN_SHARE
 
     def omit(self, dwell: int) -> "Movement":
-        """Return the movement without one dwell."""
+        """Return the movement without the dwell of index `dwell`."""
         remaining = np.arange(len(self.dwells.readings_m_s2)) != dwell
         dwells, columns = self.dwells, np.arange(OWN_ERRORS * dwell, OWN_ERRORS * (dwell + 1))
         return replace(
@@ -151,7 +151,7 @@ class Movement:
 
 
 def predicted(theta: Array, movement: Movement) -> Array:
-    """Return the readings (K, 3) of the model."""
+    """Return the readings (K, 3) that the model predicts for θ."""
     s = find_force(theta, movement)
     readings: Array = (s + theta[SECOND] * _product(s, s, movement)) @ matrix(theta).T
     return readings + movement.constant()[:, None] * theta[BIAS]

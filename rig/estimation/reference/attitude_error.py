@@ -59,7 +59,7 @@ class Placed:
     norm_known: bool
 
     def omit(self, attitude: int) -> "Placed":
-        """Return the readings without one attitude."""
+        """Return the readings without the attitude of index `attitude`."""
         remaining = np.arange(len(self.readings)) != attitude
         return Placed(
             self.readings[remaining],

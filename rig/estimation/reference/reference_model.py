@@ -57,7 +57,7 @@ def sensed(theta: Array, attitudes: Array, v_bar: Array) -> Array:
 
 
 def predicted(theta: Array, attitudes: Array, v_bar: Array) -> Array:
-    """Return the readings v_m (…, N, 3) of the model."""
+    """Return the readings v_m (…, N, 3) that the model predicts for θ."""
     s = sensed(theta, attitudes, v_bar)
     if theta.shape[-1] > 15:
         s = s + theta[..., None, SECOND] * s**2
@@ -66,7 +66,7 @@ def predicted(theta: Array, attitudes: Array, v_bar: Array) -> Array:
 
 
 def matrix(theta: Array) -> Array:
-    """Return F (…, 3, 3)."""
+    """Return the matrix F (…, 3, 3) in θ."""
     return theta[..., F].reshape(*theta.shape[:-1], 3, 3)
 
 

@@ -31,12 +31,12 @@ class RecomputeQuestion:
     estimator: str | None
 
     def line(self) -> str:
-        """Return the journal's first line."""
+        """Return the question as the journal's first line."""
         return json.dumps({"schema": SCHEMA, **asdict(self)})
 
 
 class RecomputeJournal(AbstractContextManager["RecomputeJournal"]):
-    """The journal in an existing folder, new or continued; `solved` are its answers, by their keys.
+    """The journal of a recomputation in an existing folder, new or continued; `solved`: answers, by key.
 
     Raise Refused `another_question`, and `report_folder` if it cannot be read or, at any time, written.
     """

@@ -88,7 +88,7 @@ def recompute_page(outcome: RecomputeOutcome, question: RecomputeQuestion, histo
 
 
 def counts(outcome: RecomputeOutcome) -> Iterator[str]:
-    """Yield lines with the numbers of results."""
+    """Yield lines that count results, changes, and certificates to withdraw or unconfirmed."""
     unsolved = [f"{count} {STATE_WORDS[state]}" for state, count in sorted(outcome.unsolved.items())]
     unsolved += [f"{outcome.unreached} not reached"] if outcome.unreached else []
     yield f"{len(outcome.compared)} results: {', '.join([f'{outcome.solved} solved', *unsolved])}"
@@ -123,7 +123,7 @@ def _lines(outcome: RecomputeOutcome) -> Iterator[dict[str, str]]:
 
 
 def _line(compared: Compared, past: Past | None) -> dict[str, str]:
-    """Return the cells of one calibration."""
+    """Return the cells of a calibration, or of a result without one."""
     move = _most_moved(compared, past)
     has_moved = past is not None and past.id in compared.moved
     return {

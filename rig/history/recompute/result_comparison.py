@@ -174,12 +174,12 @@ class RecomputeOutcome:
 
     @property
     def withdrawn(self) -> tuple[Issued, ...]:
-        """All certificates to withdraw."""
+        """The certificates to withdraw, of all results."""
         return tuple(issued for comparison in self.compared for issued in comparison.withdrawn)
 
     @property
     def unconfirmed(self) -> tuple[Issued, ...]:
-        """All certificates that could not be checked."""
+        """The certificates that could not be checked, of all results."""
         return tuple(issued for comparison in self.compared for issued in comparison.unconfirmed)
 
     @property
@@ -189,14 +189,14 @@ class RecomputeOutcome:
 
     @property
     def notable(self) -> tuple[Compared, ...]:
-        """The comparisons that need attention."""
+        """The results that were not confirmed by recomputation."""
         return tuple(comparison for comparison in self.compared if not comparison.same)
 
 
 def match_answers(
     stated: Iterable[StatedResult], answers: Mapping[str, Answer], of_u: float = OF_U
 ) -> RecomputeOutcome:
-    """Return the results with their answers, matched by the checksum of the result."""
+    """Return each result with the answer under the result's checksum, if any."""
     return RecomputeOutcome(
         of_u, tuple(Compared(result, answers.get(result.content_sha256), of_u) for result in stated)
     )

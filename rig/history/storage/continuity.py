@@ -23,7 +23,7 @@ REMEDY = (
 
 @dataclass(frozen=True, slots=True)
 class _Identity:
-    """The identity of an opened history."""
+    """The identity of an opened history: `file`, time of creation, and last line of the journal."""
 
     file: FileIdentity | None
     created_utc: str | None

@@ -16,7 +16,7 @@ def next_number(connection: Connection, table: Table) -> int:
 
 
 def gaps(connection: Connection) -> Iterator[Broken]:
-    """Yield the missing row numbers."""
+    """Yield the gaps in the row numbers of the history's tables."""
     for table in NUMBERED:
         before = 0
         for number in connection.scalars(select(table.c.id).order_by(table.c.id)):

@@ -153,7 +153,7 @@ def effects_table(effects: Mapping[str, Sequence[RigEffect]]) -> FittingTable:
 
 
 def title_of(subject: Subject) -> str:
-    """Return sensor, quantity and range in words."""
+    """Return a subject's sensor, quantity and range in words."""
     part, serial_number, quantity, full_scale, simulated = subject
     unit = next((q.unit for q in quantities().values() if q.name in quantity.split()), "")
     range_text = f"±{full_scale:.4g} {unit}" if full_scale else "range not stated"

@@ -111,7 +111,7 @@ class Servo:
         return self._states[-1]
 
     def report(self) -> ServoReport:
-        """Return what the servo reported about itself when the port was opened, for the pre-flight check."""
+        """Return the servo's report from the opening of the port, for the pre-flight check."""
         self.check()
         return self._report
 
@@ -268,7 +268,7 @@ class Servo:
             watch()
 
     def _thread_problem(self, link: ServoLink) -> Problem | None:
-        """Return the problem of a link whose thread has ended."""
+        """Return the problem `driver_hung` if the link's thread hangs, otherwise None."""
         silent_s = self._clock.now_s() - link.turned_s
         if not link.alive or not computer_load.exceeds(silent_s, HUNG_S):
             return None

@@ -142,7 +142,7 @@ class ServoReport:
 
     @property
     def kinematics(self) -> DenavitHartenberg | None:
-        """The geometry: None, because a servo does not report it."""
+        """The servo's geometry: None, because no servo reports its geometry."""
         return None
 
     @property
