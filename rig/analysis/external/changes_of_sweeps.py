@@ -8,7 +8,7 @@ from rig.analysis.external.changes import check_steady
 from rig.data.quantity import RATE
 from rig.estimation.arrays import Array
 from rig.estimation.external.abrupt_change import AbruptChange
-from rig.estimation.external.row_changes import LEAST_EVIDENCE, POSSIBLE
+from rig.estimation.external.row_changes import EITHER_SIDE, LEAST_EVIDENCE
 from rig.estimation.gyroscope.budget import Budget
 from rig.estimation.gyroscope.rotations_by_angle import BIAS, TurnedSolution
 from rig.estimation.sensor_axes import parameter_jacobian
@@ -26,7 +26,7 @@ def check_sweeps_steady(data: ExternalData) -> None:
     if change.what == "scale":
         check_steady(change, RATE)
     elif _is_certain(data, change):
-        check_steady(change, RATE, POSSIBLE)
+        check_steady(change, RATE, LEAST_EVIDENCE)
 
 
 def estimate_changes(data: ExternalData, matrix: Array) -> Array:
@@ -35,8 +35,7 @@ def estimate_changes(data: ExternalData, matrix: Array) -> Array:
     It contains an abrupt change, and that of the bias from rest to rest. Zero if the rows show no change.
     """
     change = data.change
-    shown = change is not None and change.evidence >= LEAST_EVIDENCE
-    abrupt = change.find_covariance(matrix) if change is not None and shown else np.zeros((12, 12))
+    abrupt = change.find_covariance(matrix) if change is not None and _counts(change) else np.zeros((12, 12))
     drift = np.diag([*np.zeros(9), *estimate_bias_drift(data.all_rests)])
     return abrupt + np.maximum(drift - np.diag(np.diag(abrupt)), 0.0)  # a step scatters the rests too
 
@@ -57,12 +56,44 @@ def widen_by_changes(solution: TurnedSolution, data: ExternalData) -> TurnedSolu
     )
 
 
+def _counts(change: AbruptChange) -> bool:
+    """Return whether U is to contain a change: if it is likely, or a large change of the bias that is possible."""
+    is_large = change.what == "bias" and float(np.abs(change.sizes).max()) > RATE.steady
+    return is_large or change.evidence >= LEAST_EVIDENCE
+
+
 def _is_certain(data: ExternalData, change: AbruptChange) -> bool:
-    """Return whether rests on either side show a step of the bias too; without these, whether no rate explains it."""
+    """Return whether rests on either side show a step of the bias too; without these, whether no rate explains it.
+
+    A wrong first or last row looks like a step.
+    """
     axis = int(np.argmax(np.abs(change.sizes)))
     size_rad_s = float(change.sizes[axis])
+    averages = [*(sweep.average for sweep in data.sweeps), *data.all_rests]
+    is_later = np.array([average.start_s >= change.from_s for average in averages])
+    if change.evidence < LEAST_EVIDENCE or min(is_later.sum(), (~is_later).sum()) < EITHER_SIDE:
+        return False
     before = [rest.mean_rad_s[axis] for rest in data.all_rests if rest.start_s < change.from_s]
     after = [rest.mean_rad_s[axis] for rest in data.all_rests if rest.start_s >= change.from_s]
     if before and after:
         return bool((np.median(after) - np.median(before)) / size_rad_s > 1 / 2)
-    return abs(size_rad_s) > OF_RATE * float(np.median([sweep.speed_rad_s for sweep in data.sweeps]))
+    readings_rad_s = np.array([average.mean_rad_s[axis] for average in averages])
+    usual_rad_s = max(_find_median_speed(data), np.sqrt(2) * _find_leverage(data, readings_rad_s, is_later))
+    return abs(size_rad_s) > OF_RATE * usual_rad_s
+
+
+def _find_median_speed(data: ExternalData) -> float:
+    return float(np.median([sweep.speed_rad_s for sweep in data.sweeps]))
+
+
+def _find_leverage(data: ExternalData, readings_rad_s: Array, is_later: Array) -> float:
+    """Return the standard deviation of a step of one axis, rad/s, if all rates have independent relative errors of one.
+
+    `readings_rad_s` (N,) are those of the sweeps and rests, `is_later` (N,) whether the step is before them.
+    """
+    rates = [*(sweep.speed_rad_s * sweep.axis_flange for sweep in data.sweeps), *np.zeros((len(data.all_rests), 3))]
+    design = np.column_stack([rates, np.ones(len(rates))])
+    inverse = np.linalg.pinv(design)
+    rotation_rad_s = design[:, :3] @ (inverse @ readings_rad_s)[:3]
+    unexplained = is_later - design @ (inverse @ is_later)
+    return float(np.linalg.norm(unexplained * rotation_rad_s) / (unexplained @ unexplained))

@@ -58,9 +58,8 @@ def shown_of(finding: Finding[Any]) -> DisplayRow:
     )
     scale, combined = AxisValues(entry.scale, expanded[:count]), entry.budget is not None
     name, unit = quantity.label(finding.sensor), quantity.bias
-    return DisplayRow(
-        finding.sensor, quantity, name, unit, bias, combined, scale, labels=quantity.axes, model=entry.model
-    )
+    model: str = getattr(entry, "model", "")  # a kind from an installed package may have none
+    return DisplayRow(finding.sensor, quantity, name, unit, bias, combined, scale, labels=quantity.axes, model=model)
 
 
 def history_record(finding: Finding[Any], document: ResultDocument) -> HistoryRecord:

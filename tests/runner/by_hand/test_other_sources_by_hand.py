@@ -168,5 +168,5 @@ def test_a_clock_that_nobody_vouches_for_is_refused() -> None:
         parse(yaml.safe_dump(unsaid), turners=sections())
     columns = ["-", "gx", "gy", "gz", "ax", "ay", "az", "temperature"]
     arrival = {"sensors": {"imu": {"lines": {"columns": columns, "time": None, "clock": "arrival"}}}}
-    assert "sensors.imu.lines.clock: by hand the device has to print the time" in problems("lines", arrival)
+    assert "sensors.imu.lines.clock: by hand the device has to print its time" in problems("lines", arrival)
     assert "too slow for a hand" in problems("autopilot", {"sensors": {"imu1": {"rate_hz": 20}}})
