@@ -13,7 +13,7 @@ from rig.estimation.gyroscope.budget import Budget
 from rig.estimation.gyroscope.rotations_by_angle import BIAS, TurnedSolution
 from rig.estimation.sensor_axes import parameter_jacobian
 from rig.observation.arm_rests import estimate_bias_drift
-from rig.observation.external.csv_import import ExternalData
+from rig.observation.external.csv_import import ExternalData, stack_rows
 
 OF_RATE = 0.01  # of the sweeps' rate: without rests, a smaller step may be that of the rate
 
@@ -69,30 +69,26 @@ def _is_certain(data: ExternalData, change: AbruptChange) -> bool:
     """
     axis = int(np.argmax(np.abs(change.sizes)))
     size_rad_s = float(change.sizes[axis])
-    averages = [*(sweep.average for sweep in data.sweeps), *data.all_rests]
+    averages, rates_rad_s = stack_rows(data.sweeps, data.all_rests)
     is_later = np.array([average.start_s >= change.from_s for average in averages])
-    if change.evidence < LEAST_EVIDENCE or min(is_later.sum(), (~is_later).sum()) < EITHER_SIDE:
+    if min(is_later.sum(), (~is_later).sum()) < EITHER_SIDE:
         return False
     before = [rest.mean_rad_s[axis] for rest in data.all_rests if rest.start_s < change.from_s]
     after = [rest.mean_rad_s[axis] for rest in data.all_rests if rest.start_s >= change.from_s]
     if before and after:
         return bool((np.median(after) - np.median(before)) / size_rad_s > 1 / 2)
     readings_rad_s = np.array([average.mean_rad_s[axis] for average in averages])
-    usual_rad_s = max(_find_median_speed(data), np.sqrt(2) * _find_leverage(data, readings_rad_s, is_later))
+    median_rad_s = float(np.median([sweep.speed_rad_s for sweep in data.sweeps]))
+    usual_rad_s = max(median_rad_s, np.sqrt(2) * _find_leverage(rates_rad_s, readings_rad_s, is_later))
     return abs(size_rad_s) > OF_RATE * usual_rad_s
 
 
-def _find_median_speed(data: ExternalData) -> float:
-    return float(np.median([sweep.speed_rad_s for sweep in data.sweeps]))
-
-
-def _find_leverage(data: ExternalData, readings_rad_s: Array, is_later: Array) -> float:
+def _find_leverage(rates_rad_s: Array, readings_rad_s: Array, is_later: Array) -> float:
     """Return the standard deviation of a step of one axis, rad/s, if all rates have independent relative errors of one.
 
-    `readings_rad_s` (N,) are those of the sweeps and rests, `is_later` (N,) whether the step is before them.
+    The rows have stated rates (N, 3) and `readings_rad_s` (N,); `is_later` (N,): whether the step is before them.
     """
-    rates = [*(sweep.speed_rad_s * sweep.axis_flange for sweep in data.sweeps), *np.zeros((len(data.all_rests), 3))]
-    design = np.column_stack([rates, np.ones(len(rates))])
+    design = np.column_stack([rates_rad_s, np.ones(len(rates_rad_s))])
     inverse = np.linalg.pinv(design)
     rotation_rad_s = design[:, :3] @ (inverse @ readings_rad_s)[:3]
     unexplained = is_later - design @ (inverse @ is_later)

@@ -12,7 +12,7 @@ from rig.estimation.gyroscope.vector_model import VectorSolution, design_matrix,
 from rig.estimation.reference.reference_budget import fewest_dof
 from rig.estimation.sensor_axes import SensorAxes, parameter_jacobian
 from rig.estimation.statistics.coverage import coverage_factors, effective_dof
-from rig.observation.external.csv_import import ExternalData
+from rig.observation.external.csv_import import ExternalData, stack_rows
 from rig.observation.statistics.mean import dof_by_axis
 
 WRONG = 0.1  # leave-one-out residual relative to the sweep's rate: no rate table errs by this much, a wrong row does
@@ -185,10 +185,9 @@ def _additional_std(noise_std: Array, expanded: Array, known_dof: float, dof: fl
 
 def _equations(data: ExternalData) -> tuple[Array, Array, Array]:
     """Return mean readings (N, 3) of sweeps, then rests, their variances (N, 3), and the design (N, 4), [ω 1]."""
-    averages = [*(sweep.average for sweep in data.sweeps), *data.rests]
-    rates = [sweep.speed_rad_s * sweep.axis_flange for sweep in data.sweeps]
+    averages, rates_rad_s = stack_rows(data.sweeps, data.rests)
     return (
         np.array([average.mean_rad_s for average in averages]),
         np.array([average.variance_rad2_s2 for average in averages]),
-        design_matrix(np.array([*rates, *np.zeros((len(data.rests), 3))]), None),
+        design_matrix(rates_rad_s, None),
     )

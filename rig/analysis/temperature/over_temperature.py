@@ -27,7 +27,7 @@ from rig.estimation.temperature.over_temperature import (
     powers_at,
 )
 from rig.observation.average import Average
-from rig.observation.external.csv_import import ExternalData
+from rig.observation.external.csv_import import ExternalData, stack_rows
 from rig.observation.observe import Observation, SensorObservations
 from rig.observation.observed_run import ObservedRun
 from rig.observation.reference.dwell_acceleration import DwellReading
@@ -71,9 +71,7 @@ def correct_recordings(recordings: Sequence[ObservedRun], settings: RunSettings,
 
 def correct_files(data: ExternalData, reference_c: float) -> tuple[ExternalData, OverTemperature]:
     """Return sweeps and rests of files at the reference temperature. Raise Fault as `correct_recordings` does."""
-    averages = [*(sweep.average for sweep in data.sweeps), *data.rests]
-    rates_rad_s = [sweep.speed_rad_s * sweep.axis_flange for sweep in data.sweeps]
-    inputs = np.array([*rates_rad_s, *np.zeros((len(data.rests), 3))])
+    averages, inputs = stack_rows(data.sweeps, data.rests)
     repeated = RepeatedMeans(
         means=np.array([average.mean_rad_s for average in averages]),
         variances=np.array([average.variance_rad2_s2 for average in averages]),

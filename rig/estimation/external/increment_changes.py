@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.estimation.arrays import Array, rotation_vectors
+from rig.estimation.arrays import Array, equal_runs, rotation_vectors
 from rig.estimation.external.abrupt_change import (
     LIKELY,
     OF_SCALE,
@@ -54,13 +54,13 @@ def find_reset(
     turned: tuple[float, float] | None = None
     if change is not None and change.what == "attitude" and np.linalg.norm(change.sizes) > LEAST_RESET_RAD:
         turned = change.from_s, float(np.linalg.norm(change.sizes))
-    for group in np.split(np.flatnonzero(aside), np.flatnonzero(np.diff(np.flatnonzero(aside)) > 1) + 1):
-        if not len(group):
+    for start, end in equal_runs(aside).tolist():
+        if not aside[start]:
             continue
-        attitudes = averaged.attitudes[group[0] : group[-1] + 2]
+        attitudes = averaged.attitudes[start : end + 1]
         singly = rotation_vectors(np.swapaxes(attitudes[:-1], -1, -2) @ attitudes[1:])
         angle_rad = float(np.linalg.norm(rotation_vectors((attitudes[0].T @ attitudes[-1])[None])))
         largest_rad = float(np.linalg.norm(singly, axis=1).max())
         if angle_rad > max(LEAST_RESET_RAD, STAYS * largest_rad, 0.0 if turned is None else turned[1]):
-            turned = float(fixes.at_s[np.searchsorted(fixes.fix, group[-1] + 1)]), angle_rad
+            turned = float(fixes.at_s[np.searchsorted(fixes.fix, end)]), angle_rad
     return turned

@@ -89,18 +89,12 @@ class MixedModel:
 
         Its constant is the same for a model of the same y with further columns, if their precision is 1.
         """
-        return self.solve(std).likelihood + self._log_prior(np.log(std))
+        return self._whiten(std)[-1] + self._log_prior(np.log(std))
 
     def restrict(self, std: Array) -> tuple[Array, Array]:
         """Return P (m, m) and P y (m,) of the restricted likelihood: C⁻¹ less its projection onto the design."""
-        from scipy.linalg import cho_factor, cho_solve
-
-        factor = cho_factor(self.covariance(std), lower=True)
-        inverse = cho_solve(factor, np.eye(len(self.mixed.observed)))
-        weighted = inverse @ self.mixed.design
-        information = self.mixed.design.T @ weighted + np.diag(self.mixed.precision)
-        projected = inverse - weighted @ np.linalg.solve(information, weighted.T)
-        return projected, projected @ self.mixed.observed
+        lower, _, _, information, _ = self._whiten(std)
+        return self._project(lower, information)
 
     def find_maxima(self, start: Array | None = None) -> Array:
         """Return the standard deviations (n, k) at the maxima of the posterior, the most probable first.
@@ -195,6 +189,16 @@ class MixedModel:
         square = float(observed @ observed - projection @ projection)
         return lower, design, observed, information, -0.5 * (determinant + square)
 
+    def _project(self, lower: Array, information: Array) -> tuple[Array, Array]:
+        """Return P (m, m) and P y (m,), as `restrict`, from L (m, m) and the information (p, p) of `_whiten`."""
+        from scipy.linalg.lapack import dpotri
+
+        inverse = np.tril(dpotri(lower, lower=1)[0])
+        inverse += np.tril(inverse, -1).T
+        weighted = inverse @ self.mixed.design
+        projected = inverse - weighted @ np.linalg.solve(information, weighted.T)
+        return projected, projected @ self.mixed.observed
+
     def _log_prior(self, logarithms: Array) -> float:
         """Return the log-density of ln σ, up to a constant: half-Cauchy for σ, χ² for squares measured separately."""
         relative = logarithms - np.log(self.mixed.scales)
@@ -206,17 +210,11 @@ class MixedModel:
         """Return the negative log-posterior of ln σ (k,), its gradient and its average information (k, k)."""
         if self._last is not None and np.array_equal(self._last[0], logarithms):
             return self._last[1]
-        from scipy.linalg.lapack import dpotri
-
         try:
             lower, _, _, information, likelihood = self._whiten(np.exp(logarithms))
         except np.linalg.LinAlgError:  # ratios so large that rounding dominates
             return UNLIKELY, np.zeros(len(logarithms)), np.eye(len(logarithms))
-        inverse = np.tril(dpotri(lower, lower=1)[0])
-        inverse += np.tril(inverse, -1).T
-        weighted = inverse @ self.mixed.design
-        projected = inverse - weighted @ np.linalg.solve(information, weighted.T)
-        innovation = projected @ self.mixed.observed
+        projected, innovation = self._project(lower, information)
         squares = np.exp(2 * logarithms)
         shape = np.tanh(logarithms - np.log(self.mixed.scales))
         parts = squares[:, None] * (self.mixed.components @ innovation)

@@ -127,17 +127,22 @@ def _add_turns(samples: Samples, sweeps: Mapping[str, Array], data: ExternalData
 
 def _find_change(data: ExternalData) -> AbruptChange | None:
     """Return the abrupt change of the gyroscope that the rows show, None if they show none."""
-    rows = [(sweep.average, sweep.speed_rad_s * sweep.axis_flange) for sweep in data.sweeps]
-    rows += [(rest, np.zeros(3)) for rest in data.all_rests]
-    rows.sort(key=lambda row: row[0].start_s)
-    averages = [average for average, _ in rows]
+    averages, rates_rad_s = stack_rows(data.sweeps, data.all_rests)
+    starts_s = np.array([average.start_s for average in averages])
+    order = np.argsort(starts_s, kind="stable")
     return find_row_change(
-        np.array([average.mean_rad_s for average in averages]),
-        np.array([average.variance_rad2_s2 for average in averages]),
-        np.array([rate for _, rate in rows]),
-        np.array([average.start_s for average in averages]),
+        np.array([average.mean_rad_s for average in averages])[order],
+        np.array([average.variance_rad2_s2 for average in averages])[order],
+        rates_rad_s[order],
+        starts_s[order],
         (RATE.steady, 10 * RATE.steady),
     )
+
+
+def stack_rows(sweeps: Sequence[Observation], rests: Sequence[Average]) -> tuple[list[Average], Array]:
+    """Return the averages of N sweeps, then rests, and the stated rotation rates (N, 3) in rad/s, zero at rest."""
+    rates_rad_s = [sweep.speed_rad_s * sweep.axis_flange for sweep in sweeps]
+    return [*(sweep.average for sweep in sweeps), *rests], np.array([*rates_rad_s, *np.zeros((len(rests), 3))])
 
 
 def _list_hiding(by_angle: TurnedData, data: ExternalData) -> Iterator[Omitted]:
