@@ -4,6 +4,7 @@ import atexit
 import gc
 import os
 import signal
+import sys
 import tempfile
 from collections import Counter
 from collections.abc import Collection, Iterator
@@ -97,6 +98,12 @@ def pytest_collection_finish() -> None:
     """Garbage is looked for again, among what tests make."""
     gc.freeze()
     gc.enable()
+
+
+def pytest_sessionfinish() -> None:
+    """The firmware's executed lines are written while the process is sure to live: xdist kills one that ends slowly."""
+    if host_board := sys.modules.get("support.board.host_board"):
+        host_board.write_coverage()
 
 
 def place_files(files: Collection[Path]) -> dict[Path, float]:

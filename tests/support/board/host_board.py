@@ -48,6 +48,12 @@ def core() -> ctypes.CDLL:
     return library
 
 
+def write_coverage() -> None:
+    """Write what the core has executed in this process, if it was loaded."""
+    if core.cache_info().currsize:
+        core().host_write_coverage()
+
+
 class HostBoard:
     """The core after a reset. There is one core in a process, so one HostBoard at a time."""
 
