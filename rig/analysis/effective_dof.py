@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rig.estimation.arrays import Array
-from rig.estimation.gyroscope.budget import NOISE, WANDERING, Budget
+from rig.estimation.gyroscope.budget import BIAS_DRIFT, NOISE, Budget
 from rig.estimation.gyroscope.vector_fit import Explained
 from rig.estimation.gyroscope.vector_model import VectorSolution, design_matrix, regress
 from rig.estimation.sensor_axes import SensorAxes
@@ -104,7 +104,7 @@ def _reading_parts(noise: Array, walk: Array, explained: Explained) -> dict[str,
 
     If the readings show no bias drift, its part is omitted: the data sheet's flicker has infinite dof.
     """
-    return {NOISE: noise, **({WANDERING: walk} if explained.bias.is_drifting else {})}
+    return {NOISE: noise, **({BIAS_DRIFT: walk} if explained.bias.is_drifting else {})}
 
 
 def _split(whole: Array, parts: dict[str, Array], budget: Budget) -> Array:

@@ -35,7 +35,7 @@ from rig.config.section import Section
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
 from rig.estimation.by_hand.solution import LINES, REAL_HANDS
-from rig.estimation.gyroscope.budget import FLICKER, NOISE, STATES, WANDERING
+from rig.estimation.gyroscope.budget import BIAS_DRIFT, FLICKER, NOISE, STATES
 from rig.motion.by_hand import Instruction
 from rig.motion.steps import Plan
 from rig.plans.by_hand import WantedMoves as Asked
@@ -52,7 +52,7 @@ RESTS_S = (1.0, 2.0, 3.0, 5.0, 10.0, 20.0)  # durations of a rest, and of a dwel
 # The endless run is predicted from a plan of two repeats, because in a single one noise is too large relative to the
 # errors that repeats share. Other rests and more repeats reduce its U further, but by no more than this factor.
 TWICE, HOPELESS = 2, 2.0
-PER_REPEAT = NOISE, WANDERING, FLICKER, STATES  # the budget lines that repeats reduce, also for accelerometers
+PER_REPEAT = NOISE, BIAS_DRIFT, FLICKER, STATES  # the budget lines that repeats reduce, also for accelerometers
 FLIPS, TURNS_BY_HAND = (8, 10, 12, 16, 24, 36, 48), (0, 3, 6)
 REST_STEP_S = 0.1  # step of the last, fine search
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rig.analysis.effective_dof import acceleration_angle_dof, angle_dof
-from rig.estimation.gyroscope.budget import NOISE, WANDERING, Budget
+from rig.estimation.gyroscope.budget import BIAS_DRIFT, NOISE, Budget
 from rig.estimation.reference.reference_budget import ATTITUDES
 from rig.plans.recorded_run import judge_phases, open_run
 from support.paths import RECORDINGS
@@ -26,5 +26,5 @@ def test_a_line_that_angles_have_their_freedom_of_is_there_or_told_to_be_missing
 
 
 def test_a_budget_tells_that_it_has_no_such_line() -> None:
-    with pytest.raises(KeyError, match=WANDERING):
-        Budget(()).std_of(WANDERING)
+    with pytest.raises(KeyError, match=BIAS_DRIFT):
+        Budget(()).std_of(BIAS_DRIFT)

@@ -12,7 +12,7 @@ from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.settings import RunSettings, Uncertainty
 from rig.estimation.arrays import Array
 from rig.estimation.earth import MICRO_G_M_S2, STANDARD_GRAVITY_M_S2
-from rig.estimation.gyroscope.budget import FLICKER, WANDERING, Contributor
+from rig.estimation.gyroscope.budget import BIAS_DRIFT, FLICKER, Contributor
 from rig.estimation.gyroscope.own_errors import (
     BIAS_OVER_TEMPERATURE,
     NONLINEARITY,
@@ -23,7 +23,13 @@ from rig.estimation.gyroscope.own_errors import (
 )
 from rig.estimation.reference.accelerometer_errors import AccelerometerErrors
 from rig.estimation.reference.accelerometer_model import Movement
-from rig.estimation.reference.reading_errors import bending, bias_warming, flickering, scale_warming, wandering
+from rig.estimation.reference.reading_errors import (
+    bending,
+    bias_warming,
+    find_drift_covariance,
+    flickering,
+    scale_warming,
+)
 from rig.estimation.reference.reference_budget import Spread
 from rig.motion.chain import DenavitHartenberg
 from rig.motion.geometry import WRIST_1
@@ -160,7 +166,8 @@ def separate_sensor_errors(
     The spread's response is that of a fit of all parameters including φ, so the noise has a larger effect.
     """
     drift, flicker = (
-        spread.response @ shared @ spread.response.T for shared in (wandering(movement), flickering(movement))
+        spread.response @ shared @ spread.response.T
+        for shared in (find_drift_covariance(movement), flickering(movement))
     )
     warm = "; ".join(filter(None, (OF_THE_PART, datasheet.temperature_words)))
     of_range = f"% of {datasheet.over_g:.3g} g"
@@ -171,7 +178,7 @@ def separate_sensor_errors(
     }
     stability = f"least Allan deviation: {datasheet.bias_instability_ug:.3g} µg"
     lines = [
-        Contributor(WANDERING, "A", "normal", None, "", f"how the readings scatter, {IN_U}", np.inf, drift),
+        Contributor(BIAS_DRIFT, "A", "normal", None, "", f"how the readings scatter, {IN_U}", np.inf, drift),
         Contributor(FLICKER, "B", "normal", None, "", stability, np.inf, flicker),
         *(
             Contributor(name, "B", "rectangular", half_width, unit, source, np.inf, spread.covariance_of(patterns))

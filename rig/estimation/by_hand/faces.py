@@ -37,7 +37,10 @@ def _read_verticals(session: HandRecording) -> Array:
 
 
 def _track_verticals(conditions: SessionConditions, integrals: MoveIntegrals) -> Array:
-    """Return the verticals (N, 3) by dead reckoning, reset at every rest to the nominal direction of its face."""
+    """Return the verticals (N, 3) by dead reckoning, reset at every rest to the nominal direction of its face.
+
+    Raise Refused `first_face_unknown`.
+    """
     if conditions.first_face is None:
         raise Refused(
             "first_face_unknown",

@@ -117,7 +117,7 @@ def _start(integrals: MoveIntegrals, faces: RestFaces, initial: GyroscopeModel) 
 
 
 def _align_vertical(attitude: Array, up: Array) -> Array:
-    """Return the attitude (3, 3) nearest to a given attitude with the vertical `up` (3,) in the body's frame."""
+    """Return an attitude (3, 3), body to table, turned by the smallest angle that makes `up` (3,) its vertical."""
     from scipy.spatial.transform import Rotation
 
     vertical = attitude[2]

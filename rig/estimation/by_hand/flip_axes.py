@@ -53,7 +53,7 @@ def check_axes(session: HandRecording) -> None:
 
 
 def _check_turned(unit: Array) -> None:
-    """Raise Fault `wrong_mounting` if axes, the rows of (3, 3), are turned too far for a fit to begin."""
+    """Raise Fault `wrong_mounting` if the gyroscope's axes, rows (3, 3), are too far off for a fit to converge."""
     angle_rad = float(np.linalg.norm(rotation_vectors(nearest_rotation(unit)[None])[0]))
     if angle_rad > TURNED_RAD:
         raise Fault(

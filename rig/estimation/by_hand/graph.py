@@ -231,16 +231,18 @@ def _move(graph: Graph, row: int) -> Factor:
 
 
 def _tilt_factor(graph: Graph, row: int) -> Factor:
-    state, integrals, faces = graph.state, graph.integrals, graph.faces
-    up, angle = faces.up[row], float(faces.up[row] @ integrals.swept_rad[row])
-    perpendicular = perpendicular_axes(state.matrix @ up / np.linalg.norm(state.matrix @ up))
+    """Return two equations of whole turns by α about the face's normal n: ∫(m − b) dt/α = F n, perpendicular to F n."""
+    normal, matrix = graph.faces.up[row], graph.state.matrix
+    integral_rad, duration_s = graph.integrals.swept_rad[row], graph.integrals.durations_s[row]
+    angle_rad = float(normal @ integral_rad)
+    perpendicular = perpendicular_axes(matrix @ normal / np.linalg.norm(matrix @ normal))
     design = np.zeros((2, graph.width))
-    design[:, MATRIX] = -np.kron(perpendicular, up)
-    (_, first), (_, second) = _rest_columns(row), _rest_columns(row + 1)
-    design[:, first] = design[:, second] = -perpendicular * integrals.durations_s[row] / angle / 2
-    noisy = graph.walk_rad_sqrt_s * np.sqrt(integrals.durations_s[row]) / abs(angle)
-    causes = {"lean": np.full(2, LEAN_RAD), "noise": np.full(2, noisy)}
-    return Factor(LEANING, row, perpendicular @ (integrals.swept_rad[row] / angle - state.matrix @ up), design, causes)
+    design[:, MATRIX] = -np.kron(perpendicular, normal)
+    (_, bias_before), (_, bias_after) = _rest_columns(row), _rest_columns(row + 1)
+    design[:, bias_before] = design[:, bias_after] = -perpendicular * duration_s / angle_rad / 2  # b is their mean
+    noise = graph.walk_rad_sqrt_s * np.sqrt(duration_s) / abs(angle_rad)
+    causes = {"lean": np.full(2, LEAN_RAD), "noise": np.full(2, noise)}
+    return Factor(LEANING, row, perpendicular @ (integral_rad / angle_rad - matrix @ normal), design, causes)
 
 
 def _closure(graph: Graph, row: int) -> Factor:

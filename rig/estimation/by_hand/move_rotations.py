@@ -24,8 +24,8 @@ class MoveIntegrals:
       `by_matrix` (k, 3, 9), `by_bias` (k, 3, 3), `by_gravity` (k, 3, 9), `by_bends` (k, 3, 6).
     - `swept_rad` (k, 3): the integral of the reading minus offset, g-sensitivity and nonlinearity.
     - `durations_s` (k,), `paths_rad` (k,): the total angle, there and back.
-    - `changes_rad_s` (k,): the root sum of squares of the rate's changes from sample to sample; times the error of a
-      time stamp, an angle.
+    - `changes_rad_s` (k,): the root sum of squares of the rate's changes from sample to sample. Multiplied by the
+      standard deviation of the time stamps, it is that of the rotation.
     """
 
     rotations: Array

@@ -40,7 +40,7 @@ class BoardMove:
 
     - `whole`: a whole turn, which ends where it began.
     - `follows`: the previous move ended in the rest `before`.
-    - `settled`: the solution after this move is the next centre.
+    - `settled`: the equations of later moves are linearised about the solution after this one.
     """
 
     before: BoardRest

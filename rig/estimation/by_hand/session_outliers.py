@@ -132,9 +132,9 @@ def _fault_columns(fit: GraphFit, name: str, index: int) -> Array:
 
 
 def _tilt_columns(fit: GraphFit, row: Factor, index: int) -> Array:
-    """Return the columns (r, 2) of a factor for a table that tilts at rest `index`, and for the move before it.
+    """Return the columns (r, 2) by which a table that is tilted from rest `index` on changes a factor's equations.
 
-    At the last rest there are none: a tilted table looks like a body that does not lie flat.
+    They are zero for the move to the last rest, where a tilted table looks like a body that does not lie flat.
     """
     other = np.zeros((len(row.design), 2))
     if row.kind == ACCELERATION and row.index >= index:

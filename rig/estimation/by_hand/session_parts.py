@@ -108,9 +108,9 @@ LARGEST = HandStds(5e-3, 2e-2, 3e-3, 1e-3, 0.05)
 
 @dataclass(frozen=True, slots=True)
 class RestFaces:
-    """The face of each rest (N,), the axis that pointed upwards or None; `up` (N, 3): this axis, or as read.
+    """The face of each rest (N,), that is, the axis that pointed upwards, or None.
 
-    `turns` (N − 1,): the whole turns of each move on its face, else 0.
+    `up` (N, 3): this axis, or without a face the measured vertical; `turns` (N − 1,): the whole turns of each move.
     """
 
     faces: tuple[str | None, ...]

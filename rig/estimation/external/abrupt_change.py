@@ -1,10 +1,10 @@
 """An abrupt change of a sensor within a recording, by the ratio of marginal likelihoods.
 
-Before one of the rows, or increments, of a mixed model the sensor's bias or the scale factors of its axes change by
-δ ~ N(0, size² 1), or the coordinates of a reference's attitudes turn by δ. The ratio of the likelihoods with and
-without such a term (Bayes factor; Kass and Raftery, J. Am. Stat. Assoc. 90 (1995) 773) is computed for every place with
-given sizes of the errors, as those of the model without a change, in which a change is a part of these errors. The most
-probable place is then fitted with sizes of its own.
+Before one of the rows, or increments, of a mixed model the sensor's bias or the scale factors of its axes change by δ ~
+N(0, size² 1), or the coordinates of a reference's attitudes turn by δ. The ratio of the likelihoods with and without
+such a term is the Bayes factor (Kass and Raftery, J. Am. Stat. Assoc. 90 (1995) 773). It is first computed for every
+row, with the other errors' standard deviations fixed. For the most probable row these are then estimated together with
+the change, as they would otherwise include it.
 """
 
 from collections.abc import Sequence
@@ -25,10 +25,10 @@ WORTH_FITTING = 1.0  # least ln of the Bayes factor with the sizes of the model 
 
 @dataclass(frozen=True, slots=True)
 class AbruptChange:
-    """A change of `what` at the time `from_s`; of attitudes, that of their own coordinates.
+    """A change of `what` at the time `from_s`; "attitude" is a rotation of the reference's own coordinates.
 
     - `sizes` (3,): of each axis, in the unit of the readings, relative to the scale factor, or rad; zero if unknown.
-    - `evidence`: ln of the Bayes factor, beyond that of the number of places where the change might have been.
+    - `evidence`: ln of the Bayes factor minus ln of the number of possible changes (Bonferroni's correction).
     """
 
     what: Changing
@@ -39,7 +39,7 @@ class AbruptChange:
     def find_covariance(self, matrix: Array) -> Array:
         """Return the covariance (12, 12) of F (3, 3), row by row, and the bias that contains both states of the sensor.
 
-        A solution is between both states. Half of the change is the standard uncertainty, so U is the whole.
+        A solution lies between both states. Half of the change is the standard uncertainty, so U is all of it.
         """
         half = np.zeros((12, 3))
         if self.what == "bias":
@@ -51,9 +51,10 @@ class AbruptChange:
 
 @dataclass(frozen=True, slots=True)
 class PossibleChanges:
-    """The effects `of_axes` (n, 3, 3) on the equations of n rows of a change of `what` of each axis by one `size`.
+    """A change of `what`, by one standard deviation `size` of each axis: `of_axes` (n, 3, 3) are its effects on n rows.
 
-    `possible` (n, 3): whether the axis may have changed just before the row. `lasts`: whether later rows show it too.
+    `possible` (n, 3): whether the axis may have changed just before the row. `lasts`: whether it affects later rows
+    too.
     """
 
     what: Changing
@@ -66,16 +67,16 @@ class PossibleChanges:
 def find_change(
     model: MixedModel, starts: Array, effects: Sequence[PossibleChanges], begins_s: Array, least_evidence: float
 ) -> AbruptChange | None:
-    """Return the change that rows in the order of time, which begin at `begins_s` (n,), show, None if they show none.
+    """Return the most probable change before a row, or None if its evidence is at most `least_evidence`.
 
-    `starts` (s, k) are standard deviations of the model's errors: first the most probable ones without a change, then
-    others with which to look for a place. A change is found from `least_evidence` on.
+    The rows are in the order of time and begin at `begins_s` (n,). `starts` (s, k) are standard deviations of the
+    model's errors with which rows are compared: the most probable ones without a change, then others.
     """
-    places = sum(int(effect.possible.any(axis=1).sum()) for effect in effects)
-    without, change = model.evaluate_posterior(starts[0]) + float(np.log(max(places, 1))), None
+    count = sum(int(effect.possible.any(axis=1).sum()) for effect in effects)
+    without, change = model.evaluate_posterior(starts[0]) + float(np.log(max(count, 1))), None
     for std in starts:
         inverse, innovation = model.restrict(std)
-        evidence = [_weigh_places(effect, inverse, innovation) for effect in effects]
+        evidence = [_weigh_rows(effect, inverse, innovation) for effect in effects]
         most = max(range(len(effects)), key=lambda index: float(evidence[index].max()))
         first, changed = int(np.argmax(evidence[most])), effects[most]
         if evidence[most][first] < WORTH_FITTING:
@@ -92,10 +93,11 @@ def find_change(
     return change
 
 
-def _weigh_places(effects: PossibleChanges, inverse: Array, innovation: Array) -> Array:
-    """Return ln of the Bayes factor (n,) of a change before each row.
+def _weigh_rows(effects: PossibleChanges, inverse: Array, innovation: Array) -> Array:
+    """Return ln of the Bayes factor (n,) of a change before each row: (sᵀ (1 + H)⁻¹ s − ln det(1 + H))/2.
 
-    `inverse` (3n, 3n) and `innovation` (3n,) are P and P y of the restricted likelihood.
+    s = Aᵀ P y and H = Aᵀ P A, with the effects A (3n, 3) of the change, and P `inverse` (3n, 3n) and P y `innovation`
+    (3n,) of the restricted likelihood. A change that lasts has the sums of s and H over this and all later rows.
     """
     of_axes, possible = effects.of_axes, effects.possible
     count = len(of_axes)

@@ -2,8 +2,8 @@
 
 An inclination δ of such an axis always changes the stated rate ω by δ × ω. If the body turns about few axes, this looks
 like a matrix F with other angles between its axes, and with other scale factors where the axes of motion are not
-orthogonal. The residuals then do not show it, so F is estimated without δ, and its uncertainty contains what δ adds to
-the estimate (JCGM 100, F.2.4.5): the size of δ is as probable as prior and residuals make it.
+orthogonal. The residuals then do not show it. So F is estimated without δ, and its uncertainty includes the effect of δ
+on the estimate (JCGM 100, F.2.4.5), averaged over the posterior distribution of the size of δ.
 """
 
 from dataclasses import dataclass

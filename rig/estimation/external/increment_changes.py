@@ -4,13 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.estimation.arrays import Array, equal_runs, rotation_vectors
-from rig.estimation.external.abrupt_change import (
-    LIKELY,
-    OF_SCALE,
-    AbruptChange,
-    PossibleChanges,
-    find_change,
-)
+from rig.estimation.external.abrupt_change import LIKELY, OF_SCALE, AbruptChange, PossibleChanges, find_change
 from rig.estimation.external.attitude_drift import BIAS, MATRIX, FixedAttitudes, Fixes
 from rig.estimation.statistics.variance_components import MixedModel
 
@@ -44,12 +38,11 @@ def find_increment_change(
 def find_reset(
     averaged: FixedAttitudes, fixes: Fixes, aside: NDArray[np.bool_], change: AbruptChange | None
 ) -> tuple[float, float] | None:
-    """Return when all later attitudes are turned against those before, and the angle in rad; None if nowhere.
+    """Return time and angle (rad) of the largest lasting rotation of the attitudes' coordinates, None without one.
 
-    The increments that are not aside may show it as a `change`.
-
-    `aside` (N − 1,) are the increments between `fixes` that contradict all others. A reference that gets a new home
-    turns by as much as they turn altogether; after a wild row the attitudes are as before. The largest turn counts.
+    A reference that is given a new origin rotates them, by all consecutive outliers together; after a single wrong
+    attitude the next ones are as before. `aside` (N − 1,) is a mask of the increments between `fixes` that are
+    outliers; a `change` that the other increments show counts as well.
     """
     turned: tuple[float, float] | None = None
     if change is not None and change.what == "attitude" and np.linalg.norm(change.sizes) > LEAST_RESET_RAD:

@@ -25,13 +25,13 @@ LARGE = 0.5  # a row shows a scale factor if it has so much of the largest readi
 def find_row_change(
     means: Array, variances: Array, rates_rad_s: Array, starts_s: Array, bias_sizes: Sequence[float]
 ) -> AbruptChange | None:
-    """Return the change that rows in the order of time show, None if there is none.
+    """Return the abrupt change that rows in the order of time show, None if they show none.
 
     `means` (N, 3) of the readings, their `variances` (N, 3), the stated rates (N, 3), zero at rest, and the rows'
     `starts_s` (N,). `bias_sizes` are prior standard deviations of a change of the bias.
 
-    A bias changes with two rows at least before and after; but if no row is a rest, a wrong first or last row and a
-    change of the bias look the same.
+    At least two rows precede and follow a change of the bias, because a single wrong row at either end looks the same.
+    One is enough if no row is a rest and there are `FEWEST_FOR_ONE` rows.
     """
     count = len(means)
     design = np.column_stack([rates_rad_s, np.ones(count)])

@@ -19,7 +19,7 @@ from rig.estimation.statistics.bias_process import BiasProcess
 from rig.estimation.statistics.coverage import coverage_factors, effective_dof
 
 NOISE = "noise"
-WANDERING, FLICKER = "bias instability", "flicker of the bias"
+BIAS_DRIFT, FLICKER = "bias instability", "flicker of the bias"
 STATES = "times of the arm's states"
 CLOCK = "controller clock"
 ENCODERS = "turner's encoders"
@@ -265,12 +265,12 @@ def evaluate_a(name: str, source: str, covariance: Array, dof: float = np.inf) -
 
 def _evaluate_readings(explained: Explained) -> Iterator[Contributor]:
     """Yield the contributors of the readings: their noise, and the drift of the bias."""
-    bias, (flicker, wandering) = explained.bias, _split_bias_covariance(explained)
-    noise = explained.solution.covariance - flicker - wandering
+    bias, (flicker, drift) = explained.bias, _split_bias_covariance(explained)
+    noise = explained.solution.covariance - flicker - drift
     yield evaluate_a(NOISE, "scatter of the readings", noise, _find_noise_dof(explained))
     if bias.is_drifting:
         source = "scatter of rests and sweeps about each other"
-        yield evaluate_a(WANDERING, source, wandering, float(bias.dof))
+        yield evaluate_a(BIAS_DRIFT, source, drift, float(bias.dof))
     if bias.instability_rad_s:
         source = f"least Allan deviation: {np.degrees(bias.instability_rad_s) * 3600:.3g} °/h"
         yield Contributor(FLICKER, "B", "normal", None, "", source, np.inf, flicker)

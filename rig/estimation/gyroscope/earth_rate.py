@@ -221,7 +221,10 @@ def _tilt_sweeps(turns_rad_s: Array) -> Array:
 
 
 def _check_identifiable(inputs: VectorInputs, directions: Array, gravity: Array | None) -> None:
-    """Raise Fault unless sweeps and rests identify the Earth's rate with an ideal sensor."""
+    """Raise Fault unless sweeps and rests identify the Earth's rate with an ideal sensor.
+
+    The faults are `earth_rate_and_g_sensitivity`, `rank_deficient` and `ill_conditioned`.
+    """
     conditioning, parameters = _condition(inputs, directions, gravity)
     if conditioning.rank < parameters and gravity is not None and len(directions) == 3:
         without, fewer_parameters = _condition(inputs, directions, None)

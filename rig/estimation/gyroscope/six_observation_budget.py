@@ -86,9 +86,9 @@ def _propagate_speeds(inputs: VectorInputs, matrix: Array) -> Array:
 def _propagate_drift(bias: BiasProcess, response: Array, windows_s: Array) -> Array:
     """Return the covariance (6, 6) due to the drift of the bias."""
     flicker = replace(bias, walk_rad_s_sqrt_s=0.0, scatter_rad_s=0.0)
-    wandering = replace(bias, instability_rad_s=0.0)
+    drift = replace(bias, instability_rad_s=0.0)
     covariance: Array = np.sum(
-        [np.einsum("pni,nm,qmi->pq", response, part.covariance(windows_s), response) for part in (flicker, wandering)],
+        [np.einsum("pni,nm,qmi->pq", response, part.covariance(windows_s), response) for part in (flicker, drift)],
         axis=0,
     )
     return covariance

@@ -196,7 +196,7 @@ def project_lever_arm(delay_s: float, movement: Movement) -> Array:
 
 
 def _around_axes(turning_rad2_s2: Array, movement: Movement) -> Array:
-    """Return the matrices (K, 3, 3) that map a lever arm to its acceleration in sweeps by ω² and α (M, 2, 3)."""
+    """Return the matrices (K, 3, 3) from lever arm to acceleration for harmonics of ω² and α (M, 2, 3) of sweeps."""
     axes = movement.sweeps.axes_flange
     centripetal, euler = axes[:, :, None] * axes[:, None, :] - np.eye(3), cross(axes)
     squares, accelerations = np.moveaxis(turning_rad2_s2, 1, 0)[..., None, None]

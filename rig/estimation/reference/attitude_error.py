@@ -170,18 +170,18 @@ def maximise_likelihood(
     projected = residuals - basis @ (basis.T @ residuals)
 
     def negative_logs(log_deltas: Array) -> Array:
-        """Return the negative log-likelihoods (m,) at log δ (m,)."""
-        weights = 1 / (1 + np.exp(2 * log_deltas)[:, None] * growth)
+        """Return (χ² + ln det V + ln det of the slopes' information)/2, (m,), at ln δ (m,); V = diag(1 + δ² γ)."""
+        weights = 1 / (1 + np.exp(2 * log_deltas)[:, None] * growth)  # of the residuals: V⁻¹
         try:
-            lower = np.linalg.cholesky((basis.T * weights[:, None, :]) @ basis)
+            lower = np.linalg.cholesky((basis.T * weights[:, None, :]) @ basis)  # of the coefficients' information
         except np.linalg.LinAlgError:  # some δ is so far above the noise that rounding dominates
             if len(log_deltas) == 1:
                 return np.array([np.inf])
             return np.concatenate([negative_logs(log_delta) for log_delta in log_deltas[:, None]])
         explained = np.linalg.solve(lower, ((projected * weights) @ basis)[..., None])[..., 0]
-        chi_square = weights @ projected**2 - np.sum(explained**2, axis=1)
-        log_determinant = np.log(np.diagonal(lower, axis1=1, axis2=2)[:, :count]).sum(axis=1)
-        return np.asarray(0.5 * (chi_square - np.log(weights).sum(axis=1)) + log_determinant)
+        chi_square = weights @ projected**2 - np.sum(explained**2, axis=1)  # after a weighted fit of the basis
+        half_log_determinant = np.log(np.diagonal(lower, axis1=1, axis2=2)[:, :count]).sum(axis=1)
+        return np.asarray(0.5 * (chi_square - np.log(weights).sum(axis=1)) + half_log_determinant)
 
     def negative_log(log_delta: float) -> float:
         return float(negative_logs(np.array([log_delta]))[0])

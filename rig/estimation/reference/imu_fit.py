@@ -119,7 +119,7 @@ def _least_squares(theta: Array, movement: Movement, fixed: list[int], whitener:
 def refit_with_components(
     fit: Fit, movement: Movement, sensor: AccelerometerErrors, fixed: list[int], own_shares: Sequence[float]
 ) -> tuple[Movement, Fit]:
-    """Return movement and fit with variance components and disturbances estimated from the fit's residuals."""
+    """Return the movement with variance components estimated from the residuals of `fit`, and its new fit."""
     residuals = (movement.readings() - predicted(fit.theta, movement)).ravel()
     modelled, variances = noise(fit.theta, movement), np.diag(movement.noise())
     of_arm = partial(combine_effects, *split_effects(fit.theta, movement))

@@ -28,7 +28,9 @@ ANGLES = 72  # angles of a revolution at which nonlinear functions of the accele
 
 def noise(theta: Array, movement: Movement) -> Array:
     """Return the covariance (3 K, 3 K) of the readings from all errors except the arm's attitude errors."""
-    covariance = movement.noise() + _not_repeated(theta, movement) + flickering(movement) + wandering(movement)
+    covariance = (
+        movement.noise() + _not_repeated(theta, movement) + flickering(movement) + find_drift_covariance(movement)
+    )
     for patterns in (bending(theta, movement), bias_warming(movement), scale_warming(theta, movement)):
         covariance += patterns.T @ patterns
     return np.asarray(covariance, dtype=np.float64)
@@ -60,7 +62,10 @@ def bias_warming(movement: Movement) -> Array:
 
 
 def scale_warming(theta: Array, movement: Movement) -> Array:
-    """Return the patterns (6, 3 K) of κ, the scale's temperature coefficient, in the order of `bias_warming`."""
+    """Return the patterns (6, 3 K) of one standard uncertainty of κ, the temperature coefficient of each axis's scale.
+
+    Three are for the recorded temperature, three for changes smaller than a step of the thermometer.
+    """
     sensor = movement.sensor_errors
     if sensor is None:
         return np.zeros((0, movement.readings().size))
@@ -83,7 +88,7 @@ def flickering(movement: Movement) -> Array:
     return sensor.instability_m_s2**2 * _expand_bias(flicker_covariance(sensor.windows_s), movement)
 
 
-def wandering(movement: Movement) -> Array:
+def find_drift_covariance(movement: Movement) -> Array:
     """Return the covariance (3 K, 3 K) of the estimated bias drift: random walk and segments' disturbances."""
     sensor, covariance = movement.sensor_errors, np.zeros((movement.readings().size,) * 2)
     if sensor is not None and sensor.walk_m_s2_sqrt_s:

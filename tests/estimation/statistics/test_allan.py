@@ -17,7 +17,7 @@ def white(seed: int, readings: int = HOUR, random_walk: float = 1.0) -> Array:
     return drawn
 
 
-def wandering(seed: int, readings: int, time_constant_s: float = 20.0) -> Array:
+def draw_walk(seed: int, readings: int, time_constant_s: float = 20.0) -> Array:
     """(n, 3) a first-order Gauss–Markov bias of standard deviation 1."""
     keep = np.exp(-1 / RATE_HZ / time_constant_s)
     from scipy.signal import lfilter
@@ -97,9 +97,9 @@ def test_white_noise_has_no_bias_instability() -> None:
 
 
 @pytest.mark.slow
-def test_a_wandering_bias_has_a_floor() -> None:
+def test_a_drifting_bias_has_a_floor() -> None:
     """Least σ of N²/τ and a Gauss–Markov bias, whose own σ² is known (IEEE Std 952, C.1.4)."""
-    readings = white(5, 4 * HOUR, 0.5) + wandering(6, 4 * HOUR, 600.0)
+    readings = white(5, 4 * HOUR, 0.5) + draw_walk(6, 4 * HOUR, 600.0)
     curve = allan_curve([readings], 1 / RATE_HZ)
     ratio = curve.tau_s / 600.0
     walked = 2 / ratio * (1 - (3 - 4 * np.exp(-ratio) + np.exp(-2 * ratio)) / (2 * ratio)) / 1.0
@@ -127,6 +127,6 @@ def test_no_stretch_at_all_is_refused() -> None:
 def test_what_is_no_white_noise_has_no_random_walk() -> None:
     """A vibration of 1 Hz, or a bias that moves within seconds."""
     shaken = white(8, 15_000) + 3 * np.sin(2 * np.pi * np.arange(15_000) / RATE_HZ / 2)[:, None]
-    for readings in (shaken, white(9, 15_000, 0.01) + wandering(10, 15_000)):
+    for readings in (shaken, white(9, 15_000, 0.01) + draw_walk(10, 15_000)):
         found = read_axis(allan_curve([readings], 1 / RATE_HZ), 1).random_walk
         assert isinstance(found, Fault) and found.name == "not_white_noise"

@@ -19,7 +19,7 @@ def session() -> tuple[Array, Array]:
     return np.concatenate([sweeps, rests]), np.concatenate([SPEED_RAD_S * AXES, np.zeros((6, 3))])
 
 
-def wandering(windows_s: Array, rate: float, rng: np.random.Generator) -> tuple[Array, Array]:
+def draw_walk(windows_s: Array, rate: float, rng: np.random.Generator) -> tuple[Array, Array]:
     """Means (12, 3) of a random walk over the windows, and its mean (3,) over the whole time."""
     times_s = np.arange(windows_s.min(), windows_s.max(), STEP_S)
     walk = np.cumsum(rate * np.sqrt(STEP_S) * rng.standard_normal((len(times_s), 3)), axis=0)
@@ -33,7 +33,7 @@ def test_the_covariance_of_a_walk_is_that_of_many_walks() -> None:
     rng = np.random.default_rng(1)
     means = []
     for _ in range(1500):
-        seen, whole = wandering(windows_s, 1.0, rng)
+        seen, whole = draw_walk(windows_s, 1.0, rng)
         means.append((seen - whole).T)
     found = np.cov(np.concatenate(means).T)
     expected = walk_covariance(windows_s)
@@ -53,7 +53,7 @@ def test_a_bias_that_walks_is_as_uncertain_as_it_has_to_be(noise_rad_s: float) -
     known = BiasProcess(3e-5, 0.0, 0)
     best = solve(rates + 1e-9 * rng.standard_normal((12, 3)), rates, variances, known, windows_s)
     for _ in range(150):
-        wandered, whole = wandering(windows_s, 3e-5, rng)
+        wandered, whole = draw_walk(windows_s, 3e-5, rng)
         means = rates + wandered + np.sqrt(variances) * rng.standard_normal((12, 3))
         process = bias_process(design_matrix(rates, None), means, variances, windows_s)
         found = solve(means, rates, variances, process, windows_s)
@@ -97,7 +97,7 @@ def test_what_the_sweeps_turn_is_nothing_to_the_walk_that_is_found() -> None:
     """Of a sensor so quiet that its means lie a million standard deviations from zero."""
     windows_s, rates = session()
     variances, rng = np.full((12, 3), 1e-12), np.random.default_rng(4)
-    wandered = wandering(windows_s, 3e-6, rng)[0] + 1e-6 * rng.standard_normal((12, 3))
+    wandered = draw_walk(windows_s, 3e-6, rng)[0] + 1e-6 * rng.standard_normal((12, 3))
     design = design_matrix(rates, None)
     still = bias_process(design, wandered, variances, windows_s)
     turned = bias_process(design, rates + wandered, variances, windows_s)

@@ -126,7 +126,7 @@ def record(session: Session, seed: int) -> tuple[VectorInputs, Truth]:
 
     attitudes = np.array([stretch.attitude for stretch in stretches])
     reported = np.array([stretch.reported_attitude for stretch in stretches])
-    wandered, whole = _wandering(session.part, windows, rng)
+    wandered, whole = _draw_drift(session.part, windows, rng)
     rates = np.array([stretch.rate_rad_s for stretch in stretches]) + attitudes @ earth
     pulled = attitudes @ -UP @ np.reshape(session.g_sensitivity_rad_s_g, (3, 3)).T
     means = rates @ GYRO_MATRIX.T + pulled + GYRO_BIAS_RAD_S + wandered
@@ -213,7 +213,7 @@ def _vibrating(session: Session, windows_s: Array, turns: int, rng: np.random.Ge
     return np.array(noises), np.array(variances), windows
 
 
-def _wandering(part: Part, windows_s: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+def _draw_drift(part: Part, windows_s: Array, rng: np.random.Generator) -> tuple[Array, Array]:
     """Return the bias error of each average (N, 3), and its mean (3,) over the whole time."""
     times = np.arange(0.0, windows_s.max(), 0.1)
     walk = np.cumsum(part.walk_rad_s_sqrt_s * np.sqrt(0.1) * rng.normal(size=(len(times), 3)), axis=0)

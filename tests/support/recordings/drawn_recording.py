@@ -150,7 +150,7 @@ def drawn(
     room = EARTH_RATE_RAD_S * rng.uniform(-1, 1, 3)
     turned = flange_rate(q_rad, qd_rad_s, arm) + to_flange @ room
     rates, scale = _sense(turned, pull, kind, rng, np.radians(setup.speed_deg_s))
-    bias = rng.uniform(-0.02, 0.02, 3) + _wandering(len(time_s), kind, rng)
+    bias = rng.uniform(-0.02, 0.02, 3) + _draw_drift(len(time_s), kind, rng)
     read = rates + bias + kind.noise_rad_s * rng.standard_normal(rates.shape)
     run = _delay_encoders(run_data(setup, motion, board_s, _counts(read, kind)), motion, setup, rng)
     settings = replace(run.settings, uncertainty=uncertainty.model_copy(update=sizes_of({"gyro": kind.sensor.part})))
@@ -241,7 +241,7 @@ def _sense(turned: Array, pull: Array, kind: Kind, rng: np.random.Generator, spe
     return readings, scale / (whole * (1 + cube * (whole * speed_rad_s) ** 2))
 
 
-def _wandering(count: int, kind: Kind, rng: np.random.Generator) -> Array:
+def _draw_drift(count: int, kind: Kind, rng: np.random.Generator) -> Array:
     """Return the bias drift (n, 3): a random walk, and processes whose time constants are an octave or two apart."""
     from scipy.signal import lfilter
 

@@ -17,7 +17,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.earth import EARTH_RATE_RAD_S, STANDARD_GRAVITY_M_S2
 from rig.motion.geometry import flange_attitude, flange_pose, flange_rate
 from rig.plans.motions.six_sweeps import plan_six_observation
-from support.recordings.drawn_recording import Kind, _counts, _delay_encoders, _draw_true_motion, _sense, _wandering
+from support.recordings.drawn_recording import Kind, _counts, _delay_encoders, _draw_drift, _draw_true_motion, _sense
 from support.recordings.synthetic_run import Motion, Setup, run_data, sample_times, sizes_of
 
 QUARTER_TURNS = (
@@ -69,7 +69,7 @@ def drawn_stages(seed: int, kind: Kind, setup: Setup, off_deg: Array) -> tuple[l
         read = (
             rates
             + bias
-            + _wandering(len(time_s), kind, own_rng)
+            + _draw_drift(len(time_s), kind, own_rng)
             + kind.noise_rad_s * own_rng.standard_normal(rates.shape)
         )
         run = _delay_encoders(
