@@ -1,4 +1,4 @@
-"""The surroundings of a run: the site, and the clock that measures all speeds."""
+"""The environment of a run: the site, and the clock that measures all speeds."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -38,8 +38,8 @@ class Surroundings:
 def surroundings_of(recordings: Sequence[ObservedRun], settings: RunSettings) -> Surroundings:
     """Return the site and the clock comparison of a run.
 
-    The recording with the longest motion determines the clock best, and all share the controller's quartz. `clocks`
-    would show another quartz, or a wrong time of the computer.
+    The recording with the longest motion determines the clock, since all recordings share the controller's quartz. The
+    comparisons of all recordings are kept: they differ if the quartz or the computer's time was changed.
     """
     uncertainty = settings.stated_uncertainty
     longest = max(recordings, key=lambda run: float(run.motion.time_s[-1] - run.motion.time_s[0]))

@@ -256,7 +256,7 @@ def _gravity_effects(
     after: Sequence[ObservedRun],
     settings: RunSettings,
 ) -> tuple[Array, Array] | None:
-    """Return gravity's effects (N, 3) on the corrected readings of sensor and reference, which contain them.
+    """Return gravity's effects (N, 3) that the corrected readings of sensor and of reference contain.
 
     The centripetal acceleration acts like gravity. None if the calibration has no g-sensitivity.
     """

@@ -78,7 +78,10 @@ def accelerometer_conditions(recordings: Sequence[ObservedRun], name: str, dwell
 
 
 def magnetometer_conditions(recordings: Sequence[ObservedRun], name: str, dwells: Iterable[int]) -> When:
-    """Return the conditions, without temperature, of a magnetometer's readings in the last dwells of these indices."""
+    """Return the conditions of a magnetometer's readings, without temperature, in the dwells with these indices.
+
+    Of a repeated dwell the last one counts.
+    """
     wanted = frozenset(dwells)
     times_s = {
         index: (start_s + recording.clock_offset_s, end_s + recording.clock_offset_s)

@@ -41,9 +41,9 @@ class Origin:
 
 
 def origin_of(runs: "Sequence[RunData]") -> Origin:
-    """Return the origin of a run's recordings, at least one, with the present time of solution.
+    """Return equipment and times of a run's recordings, at least one; the solution's time is now.
 
-    A recording of another stage is no resumption, because the item was remounted.
+    `resumed_utc` does not list recordings that begin a new stage, in which the item was remounted.
     """
     return Origin(
         recorded=runs[0].provenance,

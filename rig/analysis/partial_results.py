@@ -157,7 +157,7 @@ def _observe_sweeps(
 
 
 def _bias(rests: Sequence[Average]) -> tuple[Array, Array] | None:
-    """Return the mean reading at rest, weighted by inverse variance, with the sign of b in g = K (m + b)."""
+    """Return b (3,) of g = K (m + b), the negative weighted mean reading at rest, and its std; None without rests."""
     if not rests:
         return None
     weights = 1 / np.array([rest.variance_rad2_s2 for rest in rests])

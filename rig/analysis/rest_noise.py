@@ -104,7 +104,7 @@ def _summarise_streams(intervals: Sequence[tuple[Stream, slice]], quantity: Quan
 
 
 def _summarise_noise(times_s: Sequence[Array], readings: Sequence[Array], quantity: Quantity) -> AtRest:
-    """Return the noise of readings at rest, from intervals with times (nᵢ,) and readings (nᵢ, 3)."""
+    """Return the noise of intervals at rest with times (nᵢ,) and readings (nᵢ, 3). Raise Fault `stuck_sensor`."""
     if not readings:
         raise too_short("nothing stood still for longer than a few readings")
     if any(not np.ptp(reading, axis=0).all() for reading in readings if len(reading) > FEWEST_TO_JUDGE):

@@ -84,7 +84,7 @@ class WhitenedReference:
     def minimal_detectable_size(
         self, fault_patterns: Array, alternatives: Sequence[Array], false_alarm_probability: float
     ) -> float:
-        """Return the minimal detectable size of fault patterns (n, k) by the alternatives: see `residual_tests`."""
+        """Return the smallest fault, of `fault_patterns` (n, k) per unit, that a test of the alternatives detects."""
         model = self._extend_model(())
         delta_rad = self._estimate_delta(model)
         size = np.sqrt(1 + delta_rad**2 * self.growth)[:, None]
@@ -136,7 +136,7 @@ class WhitenedReference:
         return float(projections @ projections)
 
     def _delta_dof(self, model: Array, delta_rad: float) -> float:
-        """Return the degrees of freedom of δ²."""
+        """Return the effective degrees of freedom of the estimated δ², from its expected information."""
         return 2 * information(self.growth, delta_rad, model) * delta_rad**4
 
     def _delta_fraction(self, model: Array, columns: Array, delta_rad: float) -> float:

@@ -54,7 +54,7 @@ class WhitenedSegments:
     def test(
         self, columns: Array | None, nuisance: Sequence[Array], false_alarm_probability: float
     ) -> Statistic | None:
-        """Return the χ² that columns explain, and the critical value: see `WhitenedModel`."""
+        """Return the χ² that columns explain, and its critical value; None if the model spans the columns."""
         value, dof = self._explain(columns, nuisance)
         return (value, critical_value(false_alarm_probability)(dof)) if dof else None
 
@@ -68,7 +68,7 @@ class WhitenedSegments:
         return float(np.max(projections**2)), critical_value(false_alarm_probability / columns.shape[1])(1)
 
     def minimal_detectable_size(self, patterns: Array, alternatives: Iterable[Alternative]) -> float:
-        """Return the minimal detectable size of patterns (k, N, 3) by alternatives (3, N, c)."""
+        """Return the smallest fault, of `patterns` (k, N, 3) per unit, that a test detects; columns are (3, N, c)."""
         whitened = ((apply_whitener(self.whitener, columns), limit) for columns, limit in alternatives)
         return minimal_detectable_size(
             orthonormal_basis(self.model),

@@ -146,12 +146,12 @@ class Shortest:
     directions: Array | None
 
     def least(self, size: str) -> Budgets:
-        """Return the budgets of the run whose U of this name (of `ReachedUncertainty`) is smallest."""
+        """Return the budgets of the run with the smallest U called `size`, a field of `ReachedUncertainty`."""
         return min(self.endless, key=lambda candidate: float(getattr(candidate.reached, size)))
 
     @property
     def at_any_length(self) -> ReachedUncertainty:
-        """The smallest U of each name that any run reaches."""
+        """The smallest value of each U that any run reaches, however long."""
         return ReachedUncertainty(*(getattr(self.least(size).reached, size) for size in SIZES))
 
 

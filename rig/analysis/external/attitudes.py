@@ -124,7 +124,7 @@ def _check_noisy(placements: Placements, quantity: Quantity) -> None:
 
 
 def find_method(name: str | None) -> Chosen | None:
-    """Return the method called `name`. Raise Refused `unknown_estimator`."""
+    """Return the method called `name`, None without a name. Raise Refused `unknown_estimator`."""
     return None if name is None else choose_estimator(CHOICES, name)
 
 
@@ -152,12 +152,7 @@ def _solve_placements(
     solution, laid = _solve(equations, method, placements), None
     _check_not_sole(solution, equations, placements, quantity)
     if method == "attitude_weighted":
-        laid = laid_down(
-            solution.theta,
-            equations.placed,
-            unplaced.means[quantity],
-            unplaced.variances[quantity],
-        )
+        laid = laid_down(solution.theta, equations.placed, unplaced.means[quantity], unplaced.variances[quantity])
         solution = _replace_parameters(solution, laid)
     if solution.second_order is not None:
         check_identifiable(solution.second_order, np.sqrt(np.diag(solution.covariance)[SECOND]), NOT_IDENTIFIABLE)

@@ -57,15 +57,16 @@ def widen_by_changes(solution: TurnedSolution, data: ExternalData) -> TurnedSolu
 
 
 def _counts(change: AbruptChange) -> bool:
-    """Return whether U is to contain a change: if it is likely, or a large change of the bias that is possible."""
+    """Return whether U must include a change: a likely one, or a possible large change of the bias."""
     is_large = change.what == "bias" and float(np.abs(change.sizes).max()) > RATE.steady
     return is_large or change.evidence >= LEAST_EVIDENCE
 
 
 def _is_certain(data: ExternalData, change: AbruptChange) -> bool:
-    """Return whether rests on either side show a step of the bias too; without these, whether no rate explains it.
+    """Return whether a step of the bias is certain, not an error of the stated motion.
 
-    A wrong first or last row looks like a step.
+    With rests before and after it, they must show at least half of the step; otherwise it must exceed the effect of
+    plausible errors of all stated rates. Single first or last rows are never certain: they may be wrong.
     """
     axis = int(np.argmax(np.abs(change.sizes)))
     size_rad_s = float(change.sizes[axis])
@@ -84,9 +85,9 @@ def _is_certain(data: ExternalData, change: AbruptChange) -> bool:
 
 
 def _find_leverage(rates_rad_s: Array, readings_rad_s: Array, is_later: Array) -> float:
-    """Return the standard deviation of a step of one axis, rad/s, if all rates have independent relative errors of one.
+    """Return the standard deviation of the step, rad/s, estimated on one axis if every rate had a relative error of 1.
 
-    The rows have stated rates (N, 3) and `readings_rad_s` (N,); `is_later` (N,): whether the step is before them.
+    The N rows have `rates_rad_s` (N, 3) and `readings_rad_s` (N,) of the axis; `is_later` (N,) is true after the step.
     """
     design = np.column_stack([rates_rad_s, np.ones(len(rates_rad_s))])
     inverse = np.linalg.pinv(design)

@@ -28,7 +28,7 @@ UPRIGHT = 0.97  # least component of gravity along the vertical axis of the room
 
 @dataclass(frozen=True, slots=True)
 class Convention:
-    """The convention under which the gyroscope, `lag_s` after the attitudes, explains a fraction of the rates.
+    """The convention that fits the gyroscope: delayed by `lag_s`, it explains the fraction `explained` of the rates.
 
     `scalar_last`: the columns read as qw qx qy qz contain qx qy qz qw. `inverse`: quaternions take room to body
     coordinates. `up`: the room's axis that points upwards, as for `--up`; "" if no accelerometer shows it.

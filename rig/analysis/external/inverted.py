@@ -29,8 +29,8 @@ Solved = TypeVar("Solved", bound=HasMatrix)
 def solve_unless_inverted(attitudes: Array, solve: Callable[[Array], Solved], contradicting: Collection[str]) -> Solved:
     """Return the result of `solve` with attitudes (N, 3, 3).
 
-    Raise its Faults, but `inverted_attitudes` instead of one of `contradicting` if the inverse attitudes agree with the
-    readings, with the order of the quaternions if this explains the axes of the sensor better.
+    Raise its Faults. A Fault among `contradicting` is replaced by `inverted_attitudes` if the inverse attitudes agree
+    with the readings; the message then names the cause, an inversion or the order of the quaternions' numbers.
     """
     try:
         return solve(attitudes)

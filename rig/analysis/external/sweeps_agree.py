@@ -93,15 +93,18 @@ def sweep_errors(solution: VectorSolution, data: ExternalData) -> SweepErrors | 
     rate_variance, axis_variance = sizes.median_variances
 
     def inflate(to_values: Array, dof: float, noise_dof: float) -> Array:
-        """Return the covariance (q, q) of values with derivatives (q, 12), scaled to U over all sizes of errors."""
-        on_noise, on_rate, on_axis, on_wrong = (
+        """Return the covariance (q, q), apart from the noise, of values with derivatives `to_values` (q, 12) by F, c.
+
+        It is that of errors of median size, scaled so that with the noise each value has its U over all sizes.
+        """
+        by_noise, of_rate, of_axis, by_wrong = (
             to_values @ effects @ effects.T @ to_values.T for effects in (noise, by_rate, by_axis, wrong)
         )
-        expanded = sizes.expanded(np.diag(on_noise + on_wrong), np.diag(on_rate), np.diag(on_axis))
-        beyond = rate_variance * on_rate + axis_variance * on_axis + on_wrong
-        std = _additional_std(np.sqrt(np.diag(on_noise)), expanded, noise_dof, dof)
-        inflation = std / np.sqrt(np.maximum(np.diag(beyond), np.finfo(np.float64).tiny))
-        return np.asarray(inflation[:, None] * beyond * inflation, dtype=np.float64)
+        expanded = sizes.expanded(np.diag(by_noise + by_wrong), np.diag(of_rate), np.diag(of_axis))
+        covariance = rate_variance * of_rate + axis_variance * of_axis + by_wrong
+        std = _additional_std(np.sqrt(np.diag(by_noise)), expanded, noise_dof, dof)
+        inflation = std / np.sqrt(np.maximum(np.diag(covariance), np.finfo(np.float64).tiny))
+        return np.asarray(inflation[:, None] * covariance * inflation, dtype=np.float64)
 
     dof = float(max(count_redundant_rows(data), FEWEST_FREEDOM))
     changes, to_parameters = estimate_changes(data, solution.matrix), parameter_jacobian(solution.matrix, axes.scale)

@@ -184,7 +184,7 @@ def _find_delay(recording: ObservedRun, sensor: str, reference: str) -> Delay | 
 
 
 def _mask_covered(time_s: Array, by_s: Array) -> NDArray[np.bool_]:
-    """Return a mask of the times (n,) with one of the times `by_s` (m,) shortly before and one shortly after."""
+    """Return a mask of the times (n,) that lie between two times of `by_s` (m,), both close by."""
     after = np.searchsorted(by_s, time_s)
     gaps = np.diff(by_s, prepend=-np.inf, append=np.inf)
     close: NDArray[np.bool_] = gaps[after] <= MAX_GAP * np.median(gaps)
@@ -208,7 +208,7 @@ def _summarise_errors(errors: Sequence[Array]) -> Deviation:
 
 
 def _estimate_noise(rests: Sequence[Array]) -> Array | None:
-    """Return the standard deviation (3,) within the rests, about the mean of each."""
+    """Return the standard deviation (3,) within the rests, about the mean of each; None without rests."""
     long_enough = [rest for rest in rests if len(rest) >= MIN_SAMPLES_AT_REST]
     if not long_enough:
         return None

@@ -129,7 +129,7 @@ def _average_observation(run: RunData, event: BoardObserved) -> _BoardObservatio
 
 
 def _events(run: RunData, sensor: str) -> Iterator[OfTheBoard]:
-    """Return the events of the board's own calibration of a sensor, in order."""
+    """Yield the events of the board's own calibration of a sensor, in order."""
     for recorded in run.events:
         if isinstance(recorded.event, OfTheBoard) and recorded.event.sensor == sensor:
             yield recorded.event

@@ -72,7 +72,7 @@ def verify(
 
 
 def _gravity_difference(gravity_rad_s: tuple[Array, Array] | None, rotation: Array) -> Array | None:
-    """Return gravity's effect (N, 3) on the sensor's readings minus that on the reference's."""
+    """Return gravity's effect (N, 3) on the sensor's readings minus that on the reference's, None if not estimated."""
     if gravity_rad_s is None:
         return None
     on_sensor, on_reference = gravity_rad_s

@@ -61,7 +61,7 @@ def _stack_rotations(postures: Sequence[Posture], arm: DenavitHartenberg, mounti
 
 
 def _rotations(posture: Posture, arm: DenavitHartenberg, mounting: Array) -> Array:
-    """Return the sizes (18, 3 or 10) of errors in a dwell or a sweep, as in `effects`, per radian of wrist error."""
+    """Return a dwell's or sweep's errors (18, 3 or 10), in the order of `effects`, per radian of each wrist error."""
     in_base = flange_errors(posture.q_rad, arm)
     in_flange = in_base @ (mounting @ flange_attitude(posture.q_rad, arm)).T
     if posture.wrist is None:
@@ -77,7 +77,7 @@ def _rotations(posture: Posture, arm: DenavitHartenberg, mounting: Array) -> Arr
 
 
 def _shift_harmonics(angle_rad: float) -> Array:
-    """Return the matrix (4, 4) that shifts harmonics of an angle's change to harmonics of the angle."""
+    """Return the matrix (4, 4) that refers the first two harmonics to θ itself, not to θ minus `angle_rad`."""
     cos, sin, cos_2, sin_2 = angle_waves(angle_rad)
     waves: Array = np.zeros((4, 4))
     waves[:2, :2] = [[cos, -sin], [sin, cos]]

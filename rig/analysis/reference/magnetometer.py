@@ -122,7 +122,7 @@ def _calibrate(
 
 
 def _drift(name: str, recordings: Sequence[ObservedRun], settings: RunSettings) -> FieldDrift | None:
-    """Return the field's drift between the rests at home; None with fewer than two. Raise Fault `field_drifts`."""
+    """Return the field's drift between the tests at home; None with fewer than two. Raise Fault `field_drifts`."""
     tests = [test for run in recordings for test in field_tests(run, name, settings.observation, settings.home_q_rad)]
     if len(tests) < 2:
         return None

@@ -103,7 +103,7 @@ def estimate_bias_drifts(recordings: Sequence[ObservedRun], settings: RunSetting
 
 
 def _select_complete(means: Mapping[int, DwellMean], table: Sequence[Sequence[int]]) -> list[list[DwellMean]]:
-    """Return the complete repeats, each with its attitudes in the same order."""
+    """Return the complete repeats, each with its attitudes in the same order. Raise Fault `not_all_attitudes`."""
     complete = [[means[index] for index in repeat] for repeat in table if means.keys() >= set(repeat)]
     if len(complete) < FEWEST_REPEATS:
         raise Fault(
