@@ -72,7 +72,7 @@ class Average:
 class Stream:
     """A sensor's n samples in physical units, on the controller's clock.
 
-    Rates are recorded in `steps`; `polynomials`, if any, correct readings to one temperature.
+    `steps` is the resolution of the recorded rates; `polynomials`, if any, correct readings to one temperature.
     """
 
     sensor: RecordedSensor

@@ -23,7 +23,7 @@ SETTLING_S = 0.2  # time removed at either end of a rest
 
 
 def find_companion(recording: ObservedRun, name: str) -> str | None:
-    """Return the sensor on the magnetometer's clock with an accelerometer that was read in dwells, or None."""
+    """Return the first sensor with accelerations in dwells that shares the magnetometer's clock, or None."""
     return find_dwelling_companion(
         recording.run, name, (sensor for sensor, observations in recording.sensors.items() if observations.dwells)
     )

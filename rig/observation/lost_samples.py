@@ -25,7 +25,7 @@ ON_OWN_PORT: Mapping[str, str] = MappingProxyType(
 
 
 def lost_samples(sensor: RecordedSensor, samples: NDArray[Any], where: str, what: str, then: str) -> Fault:
-    """Return the Fault `lost_samples` for samples (n,) of a sensor:
+    """Return the Fault `lost_samples` for samples (n,) of a sensor.
 
     `where` and `what` state what is missing, `then` the remedy. If only every k-th sample is present, the message says
     that the source sent fewer and the link lost none.

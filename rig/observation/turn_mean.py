@@ -76,30 +76,37 @@ class Lines:
 
 
 def turn_mean(readings: Array, steps: Steps, turn: SampledTurn) -> tuple[Mean, Array]:
-    """Return the mean of readings (n, 3) with resolution `steps`, and its weights (n,), also for the arm's rate.
-
-    A line slower than `SLOW` is poorly determined, so its possible effect on the mean adds variance.
-    """
+    """Return the mean of readings (n, 3) with resolution `steps`, and its weights (n,), also for the arm's rate."""
     ones = whole(readings)
     steady = np.column_stack([ones, turn.passing])
     lines = _find_turn_lines(readings, steady, turn)
-    shaking = waves(lines.cycles, turn.share, turn.beats)
-    weights = mean_weights(ones, np.column_stack([turn.passing, lines.rate, shaking]))
-    columns = unit_columns(np.column_stack([steady, lines.rate, shaking, lines.encoded]))
+    vibration = waves(lines.cycles, turn.share, turn.beats)
+    weights = mean_weights(ones, np.column_stack([turn.passing, lines.rate, vibration]))
+    # The noise is the residual of a fit of all that is not noise.
+    columns = unit_columns(np.column_stack([steady, lines.rate, vibration, lines.encoded]))
     coefficients, _, rank, _ = np.linalg.lstsq(columns, readings, rcond=1e-6)
     smooth = columns @ coefficients
     noise = estimate_noise(readings - smooth, int(rank), steps, BRIEF if lines.not_encoded else MEMORIES)
     (mean,) = compute_weighted_means(readings, ones, weights, smooth=smooth, noise=noise, steps=steps)
-    slow = np.repeat(lines.cycles < SLOW, column_count(turn.beats))
-    changed = np.zeros(3)
-    if slow.any():
-        nuisance = np.column_stack([turn.passing, lines.rate, shaking[:, ~slow]])
-        without = mean_weights(ones, nuisance)
-        even = _fit_residuals(np.column_stack([ones, turn.uneven_rad_s]), readings)
-        residuals = _fit_residuals(np.column_stack([ones, nuisance, lines.encoded]), readings)
-        change = (weights - without)[0]
-        changed = np.maximum((change @ even) ** 2, _line_variance(shaking[:, slow], change, residuals))
-    return replace(mean, variance=mean.variance + changed, cycles=lines.cycles), weights[0]
+    added = _slow_line_variance(readings, turn, lines, vibration, weights)
+    return replace(mean, variance=mean.variance + added, cycles=lines.cycles), weights[0]
+
+
+def _slow_line_variance(readings: Array, turn: SampledTurn, lines: Lines, vibration: Array, weights: Array) -> Array:
+    """Return the variance (3,) of the mean due to the lines slower than `SLOW`, which are poorly determined.
+
+    Weights that do not remove these lines give another mean. The variance is the square of the difference, or that of
+    the difference by the lines' fitted amplitudes at any phase, whichever is larger.
+    """
+    is_slow = np.repeat(lines.cycles < SLOW, column_count(turn.beats))
+    if not is_slow.any():
+        return np.zeros(3)
+    ones = whole(readings)
+    nuisance = np.column_stack([turn.passing, lines.rate, vibration[:, ~is_slow]])
+    change = (weights - mean_weights(ones, nuisance))[0]
+    without_ripple = _fit_residuals(np.column_stack([ones, turn.uneven_rad_s]), readings)
+    residuals = _fit_residuals(np.column_stack([ones, nuisance, lines.encoded]), readings)
+    return np.maximum((change @ without_ripple) ** 2, _line_variance(vibration[:, is_slow], change, residuals))
 
 
 def _line_variance(slow: Array, weights: Array, residuals: Array) -> Array:

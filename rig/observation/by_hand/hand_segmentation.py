@@ -50,7 +50,7 @@ def segment_session(
 
 
 def _find_gaps(time_s: Array, rates: Array) -> NDArray[np.bool_]:
-    """Return the indices (k,) of readings before a gap in which the body may have turned unobserved."""
+    """Return a mask (n,) of the readings before a gap in which the body may have turned unobserved."""
     mask = np.zeros(len(time_s), dtype=np.bool_)
     if len(time_s) > 1:
         steps = np.flatnonzero(find_sampling(time_s).gaps(time_s, GAP))
@@ -84,7 +84,7 @@ def _rest(time_s: Array, rates: Array, acceleration: Array | None, window: Windo
 
 
 def _find_clipped(rates: Array, range_rad_s: float | None) -> NDArray[np.bool_]:
-    """Return which readings (n,) are at the limit of the range.
+    """Return a mask (n,) of the readings that are at the limit of the range.
 
     If the range is unknown, long series of equal readings count as clipped.
     """
@@ -100,7 +100,7 @@ def _find_clipped(rates: Array, range_rad_s: float | None) -> NDArray[np.bool_]:
 
 
 def _find_held_intervals(time_s: Array, rates: Array, rests: tuple[HandRest, ...]) -> tuple[tuple[float, float], ...]:
-    """Return the intervals in which a hand held the body, which turned less than in a move and more than at rest."""
+    """Return the intervals in which a hand held the body: it turned more slowly than in a move, faster than at rest."""
     if not rests:
         return ()
     width = max(2, int(np.ceil(PAUSE_S / find_sampling(time_s).interval_s - ROUNDING)))

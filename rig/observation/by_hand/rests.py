@@ -35,11 +35,7 @@ CANDIDATES = 400  # blocks whose readings are tried as that of a rest
 
 
 def find_rests(
-    time_s: Array,
-    readings: Mapping[Quantity, Array],
-    *,
-    still_at_first: bool = False,
-    lying: Sequence[Window] = (),
+    time_s: Array, readings: Mapping[Quantity, Array], *, still_at_first: bool = False, lying: Sequence[Window] = ()
 ) -> tuple[Window, ...]:
     """Return the rests of at least two blocks, from readings (n, 3) of one or several quantities at rising times (n,).
 
@@ -109,7 +105,7 @@ def _mask_blocks(times: Array, windows: Sequence[Window]) -> NDArray[np.bool_]:
 def _find_unturned(
     means: Array, steady: NDArray[np.bool_], tolerance: Array, lying: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """Return a mask (count,) of blocks with the most frequent reading, in declared rests above all: that at rest."""
+    """Return a mask (count,) of blocks at rest: those with the most frequent reading, of declared rests if any."""
     declared = steady & lying
     pool = means[declared if declared.any() else steady]
     candidates = pool[:: -(-len(pool) // CANDIDATES)]

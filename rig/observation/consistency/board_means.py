@@ -42,10 +42,14 @@ def compare_board_means(sensor: str, recordings: Sequence[ObservedRun]) -> dict[
 
 
 def _deviation(recording: ObservedRun, stream: Stream, turn: Observation, observed: BoardObserved) -> float:
-    """Return the deviation, in standard deviations, of the board's average from the computer's in the same window."""
+    """Return the board's average minus the computer's of the same turn, largest axis, in standard deviations.
+
+    Before, the rotation between both windows and the effect of spectral lines are removed from the board's average.
+    """
     zero, average, board = stream.clock.zero_rate_rad_s, turn.average, observed.observation
     axis = turn.axis_flange
-    across = np.array(stream.sensor.mounting) @ (np.eye(3) - np.outer(axis, axis))  # motion across the axis is small
+    # From the flange's rate to readings: along the axis as the computer's mean shows, across it (small) nominal.
+    across = np.array(stream.sensor.mounting) @ (np.eye(3) - np.outer(axis, axis))
     by_rate = np.outer(average.mean_rad_s - zero, axis) / turn.speed_rad_s + across
     edges = np.searchsorted(stream.time_s, [average.start_s, average.end_s])
     boards = np.searchsorted(stream.board_time_s, np.array([board.start_us, board.end_us]) * 1e-6 - NEXT_S)

@@ -10,7 +10,7 @@ from rig.observation.windows import Window
 def compare_halves(dwell: RawDwell, steps: Steps) -> tuple[Array, Array]:
     """Return the difference of the means of a dwell's halves and its variance due to noise, (3,) each, in counts.
 
-    The counts come in `steps`. The arm's oscillation, as encoders measure it, is removed.
+    `steps` is the resolution of the counts. The arm's oscillation, as encoders measure it, is removed.
     """
     window, middle_s = dwell.window, dwell.middle_s
     halves = Window(window.start_s, middle_s), Window(middle_s, window.end_s)

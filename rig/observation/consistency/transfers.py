@@ -4,8 +4,8 @@ The sweeps about an axis follow each other, so they do not show a change of its 
 transfer two wrists turn by half a revolution, from standstill to standstill, and the arm states the mean rate as well
 as in a sweep.
 
-No spectral lines are sought in a transfer: it is short, and the servo's vibration sweeps up and down. At the data rate
-the vibration aliases to zero, an error of the mean that the scatter does not show: see
+No spectral lines are sought in a transfer: it is short, and the frequency of the servo's vibration rises and falls. A
+vibration at the data rate aliases to zero, an error of the mean that the scatter does not show: see
 `rig.analysis.consistency.gyroscope_checks`.
 """
 

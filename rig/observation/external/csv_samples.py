@@ -74,11 +74,11 @@ def read_samples(path: Path, needed: Sequence[Quantity] = (), mapped: Mapped | N
 def read_sample_table(
     path: Path, needed: Sequence[Quantity] = (), mapped: Mapped | None = None, only: Collection[str] = ()
 ) -> SampleTable:
-    """Return the columns of a file in any format: the quantities `needed` and all others it holds.
+    """Return the columns of a file in any format, which must hold the quantities `needed`.
 
-    `mapped` is for a table whose columns have other names. Rows with blank cells count if they hold all quantities in
-    `only`, or all that the file has. Raise Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`,
-    `blank_cells`, and as `readings_in` does.
+    `mapped` is for a table whose columns have other names. Rows of a table are left out if a quantity of the sensors
+    `only` is blank in them, by default any quantity. Raise Refused `no_file`, `wrong_columns`, `wrong_unit`,
+    `not_a_number`, `blank_cells`, and as `readings_in` does.
     """
     readings = readings_in(path)
     if readings is not None:
@@ -119,7 +119,7 @@ def _convert(path: Path, columns: Columns, mapped: Mapped | None) -> Columns:
 
 
 def _read(path: Path, table: CsvTable, quantity: Quantity) -> NDArray[np.bool_]:
-    """Return which rows (n,) hold a quantity. Raise Refused `not_a_number` if only some of its axes are blank."""
+    """Return a mask (n,) of the rows with a quantity. Raise Refused `not_a_number` if only some axes are blank."""
     blank = np.isnan([table.columns[name] for name in quantity.columns])
     if len(partly := np.flatnonzero(blank.any(axis=0) & ~blank.all(axis=0))):
         row = int(partly[0])

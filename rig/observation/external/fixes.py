@@ -170,7 +170,10 @@ def _find_joined(
 
 
 def _find_unknown_steps(turning: Turning) -> Iterator[tuple[str, NDArray[np.intp], Array]]:
-    """Yield a reason for unknown motion, the readings (k,) before it, and the stds (k,) of the hidden rotation."""
+    """Yield, by error name, the steps (k,) with unknown motion and the stds (k,) of the rotation in them, rad.
+
+    A step has the index of the reading before it.
+    """
     steps_s = np.diff(turning.time_s)
     readings = turning.readings_rad_s
     angle_rad = np.linalg.norm(readings[:-1] - np.median(readings, axis=0), axis=1) * steps_s

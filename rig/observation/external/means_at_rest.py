@@ -53,9 +53,9 @@ def means_at_rest(turning: Turning, clock_s: float) -> MeansAtRest | None:
 def find_rests_otherwise(
     time_s: Array, readings: Array, lying: Sequence[Window], rests: Sequence[Window]
 ) -> list[Window]:
-    """Return the declared rests without an observed rest, in which readings are quiet but differ: the bias changed.
+    """Return the declared rests that are quiet, but whose readings are not those of a rest: the bias changed.
 
-    `lying` are the declared windows, `rests` those that the readings (n, 3) at times (n,) show.
+    `lying` are the declared windows, `rests` the rests found in the readings (n, 3) at times (n,).
     """
     if not rests:
         return []

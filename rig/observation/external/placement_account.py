@@ -29,9 +29,10 @@ class AttitudeRows:
 
 @dataclass(frozen=True, slots=True)
 class Account:
-    """The placements among `rows` (N,) of a reference, for readings at `time_s` (n,): each row's `rest`, or −1.
+    """The placements among `rows` (N,) of a reference, for readings at `time_s` (n,).
 
-    `cuts` (N,) are each row's samples at rest. `dwells` (N,) marks the rows that are so long that they declare a rest.
+    For each row, `rest` (N,) is the number of its rest, or −1, and `cuts` (N,) are its samples at rest. `dwells` (N,)
+    marks rows so long that they declare a rest.
     """
 
     time_s: Array
@@ -126,7 +127,7 @@ class Account:
             yield Omitted("rows", len(moving), total, "not_at_rest: the body moves in them", where)
 
     def _find_gaps_s(self, rows: NDArray[np.bool_]) -> Array:
-        """Return the longest gap (N,), s, above a block in each of `rows` without a rest; 0 for other rows."""
+        """Return the longest gap (N,), s, in each of `rows` without a rest; 0 for other rows and gaps up to a block."""
         gaps_s = np.zeros(len(rows))
         for row in np.flatnonzero((self.rest < 0) & rows).tolist():
             longest_s = float(np.diff(self.time_s[self._inside(row)]).max(initial=0.0))

@@ -194,9 +194,9 @@ def _find_rest(time_s: Array, window: Window, rests: Sequence[_PlacedRest]) -> t
 
 
 def _mask_inner(rest: NDArray[np.intp], windows_s: Array, starts_s: Array, ends_s: Array) -> NDArray[np.bool_]:
-    """Return a mask of the rows (N,) at rest far enough from the ends of their rest; all rows of a rest if none is.
+    """Return a mask (N,) of the rows at rest, without those near either end of their rest.
 
-    A late reference shows motion while the body already lies still.
+    A reference that lags still shows motion there. A rest keeps all its rows if all are near an end.
     """
     at_rest = np.flatnonzero(rest >= 0)
     middles_s, number = windows_s[at_rest].mean(axis=1), rest[at_rest]

@@ -45,7 +45,7 @@ def map_samples(columns: ColumnMap) -> Mapped | None:
 
 
 def map_motion(columns: ColumnMap) -> Mapped | None:
-    """Return the map of a file of sweeps or attitudes, as `map_samples` does."""
+    """Return the column map of a file of sweeps or attitudes, or None, as `map_samples` does."""
     return _unless_empty(
         _build_map(columns.motion, columns.motion_skip_lines, columns.motion_rate_hz, columns.motion_missing)
     )
@@ -119,7 +119,7 @@ def _select_mapped(path: Path, headings: Sequence[str], width: int, header: Head
 
 
 def _find_column(path: Path, headings: Sequence[str], width: int, name: str, column: str) -> int:
-    """Return the index of a column that the map names by its heading, or by its number from 1."""
+    """Return the index of a column that the map names by heading or number from 1. Raise Refused `wrong_columns`."""
     named = [index for index, heading in enumerate(headings) if heading == column]
     named = named or [index for index, heading in enumerate(headings) if heading.strip() == column.strip(" #%")]
     if not named and column.isdecimal():

@@ -31,9 +31,10 @@ NONE: Array = np.zeros(0)
 class LineSearch:
     """The criteria of a spectral line.
 
-    Its power exceeds `stands_out` times the median power around it, and as many times `floor`, a power in the same
-    window, for data with less noise than the readings with which they are compared. It makes at least `slowest` cycles
-    in all readings, and has `beats` sidebands (`waves`). At most `most` lines are found, previous ones included.
+    - `stands_out`: its power exceeds this multiple of the median power around it, and of `floor`.
+    - `floor`: the median power of the readings in the same window, if the line is sought in data with less noise.
+    - `slowest`: its least number of cycles in all readings; `beats`: its number of sidebands (`waves`).
+    - `most`: the largest number of lines, previous ones included.
     """
 
     stands_out: float = 16.0  # one false line in seventy recordings costs nothing

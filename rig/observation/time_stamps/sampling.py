@@ -215,7 +215,10 @@ def _is_beat(missing: NDArray[np.intp]) -> bool:
 
 
 def _interval_s(time_s: Array, missing: NDArray[np.intp], width: int) -> float:
-    """Return the mean interval between the least late readings at either end, including missing readings."""
+    """Return the mean interval between readings, missing ones counted, over the recording's length.
+
+    The length is measured between the least late of the first and of the last `width` readings.
+    """
     steps_s, few = np.diff(time_s), missing <= COUNTED
     interval_s = float(steps_s[few].sum() / (1 + missing[few]).sum())
     numbers = np.concatenate([[0], np.cumsum(1 + missing)])
