@@ -21,14 +21,14 @@ from rig.data.entries.earth_rate import EarthRateEntry
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """The attributes of objects of `classes`, by name, that fill an entry, by field."""
+    """The sources of an entry: for each of its fields, the attribute of objects of `classes` that fills it."""
 
     classes: tuple[str, ...]
     attributes: Mapping[str, str]
 
 
 def _row(*classes: str, same: str = "", **renamed: str) -> Row:
-    """Return the correspondence of two classes: attributes of the `same` name as their field, and `renamed` ones."""
+    """Return the row of `classes`: fields `same`, filled by attributes of the same name, and `renamed` ones."""
     return Row(classes, {**{name: name for name in same.split()}, **renamed})
 
 
@@ -95,9 +95,7 @@ SOURCES: Final[Mapping[type[BaseModel], tuple[Row, ...]]] = {
     result.DeviationEntry: (_row("Deviation", same="samples mean_rad_s rms_rad_s mse_rad2_s2 max_rad_s"),),
     result.RevolutionErrorEntry: (
         _row(
-            "RevolutionError",
-            same="sweep direction error_rad_s std_rad_s gravity_rad_s angle_rad",
-            joint="joint_name",
+            "RevolutionError", same="sweep direction error_rad_s std_rad_s gravity_rad_s angle_rad", joint="joint_name"
         ),
     ),
     accelerometer.AccelerometerEntry: (
@@ -130,10 +128,7 @@ SOURCES: Final[Mapping[type[BaseModel], tuple[Row, ...]]] = {
     magnetometer.UniformityEntry: (_row("Uniformity", same="chi_square degrees_of_freedom limit attitude_error_rad"),),
     magnetometer.FieldDriftEntry: (_row("FieldDrift", same="change_t std_t chi_square limit"),),
     magnetometer.ReversalEntry: (
-        _row(
-            "Reversal",
-            same="bias_t arm_field_in_bias arm_field_t covariance chi_square degrees_of_freedom limit",
-        ),
+        _row("Reversal", same="bias_t arm_field_in_bias arm_field_t covariance chi_square degrees_of_freedom limit"),
         _row("MagnetometerReversal", same="scale scale_std correction_matrix"),
         _ITEM,
     ),
@@ -155,10 +150,7 @@ SOURCES: Final[Mapping[type[BaseModel], tuple[Row, ...]]] = {
     budget.BudgetEntry: (_row("Budget", same="std expanded coverage_factors"),),
     budget.BiasProcessEntry: (
         _row(
-            "BiasProcess",
-            same="scatter_rad_s",
-            random_walk_rad_s_sqrt_s="walk_rad_s_sqrt_s",
-            degrees_of_freedom="dof",
+            "BiasProcess", same="scatter_rad_s", random_walk_rad_s_sqrt_s="walk_rad_s_sqrt_s", degrees_of_freedom="dof"
         ),
     ),
     budget.ClockEntry: (_row("ClockCheck", same="error std"),),

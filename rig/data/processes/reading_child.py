@@ -81,7 +81,7 @@ def _end_with_parent() -> None:
 
 
 def _limit(limits: Mapping[str, Any]) -> int | None:
-    """Limit the resources of this process; return the largest length of a file that it may write, bytes."""
+    """Limit this process's resources; return the largest length, bytes, of a file that it may write, or None."""
     try:
         import resource
     except ModuleNotFoundError:  # Windows

@@ -108,7 +108,7 @@ class Item:
 
     @property
     def range_rad_s(self) -> None:
-        """The range of the sensor, rad/s, which the files do not state."""
+        """The range of the sensor, rad/s: always None, because the files do not state it."""
         return
 
     @property

@@ -422,7 +422,7 @@ def find_setting(item: str) -> str:
 
 
 def _override(settings: RunSettings, item: str) -> RunSettings:
-    """Return the settings with one `section.key=value` replaced."""
+    """Return the settings with one `section.key=value` replaced. Raise Refused `unknown_setting`, `wrong_setting`."""
     path, value = find_setting(item), item.partition("=")[2]
     section, _, key = path.partition(".")
     if settings.elsewhere is not None:

@@ -26,7 +26,7 @@ class UncertainNumbers:
 
 @dataclass(frozen=True, slots=True)
 class Units:
-    """The units of a characteristic's numbers: SI in print and in D-SI notation, and that in which they are `shown`."""
+    """The units of a characteristic's numbers: the SI unit as printed and in D-SI notation, and the unit `shown`."""
 
     si: str
     d_si: str
@@ -35,9 +35,9 @@ class Units:
 
 @dataclass(frozen=True, slots=True)
 class Series:
-    """A characteristic's names in a history: `prefix` and label, with `words` that contain the label's letters.
+    """A characteristic's names in a history: `prefix` and label; `words` describe them, with the label in the text.
 
-    `drawn` series are among the pictures; `opposite` ones are stored with the opposite sign of the certificates.
+    `drawn`: whether the history draws it. `opposite`: whether its sign there is opposite to that in certificates.
     """
 
     prefix: str
@@ -48,12 +48,12 @@ class Series:
 
 @dataclass(frozen=True, slots=True)
 class Characteristic:
-    """A quantity of a sensor other than scale factor and bias, which an entry states for each of `labels`.
+    """A quantity of a sensor other than scale factor and bias, with a number for each of `labels` in an entry.
 
     - `units`: the units, by the quantity that the sensor measures.
     - `read`: returns the numbers in an entry, or None.
-    - `series`: the names in a history; None if a history does not store it, which `exempt` explains.
-    - `exempt`: the outlets that do not use it, each with a reason.
+    - `series`: the names of its numbers in a history; None if a history does not store it, which `exempt` explains.
+    - `exempt`: the forms of output that do not show it, each with the reason.
     - `remark`: the digital certificate's remark before ± U, by the entry.
     """
 

@@ -79,8 +79,8 @@ class Corrected:
 def noise_of(means: Sequence[Averaged], at_rest: Sequence[tuple[Sequence[float], int]]) -> ReadingNoise:
     """Return the readings' noise, from each rest's standard deviation of one sample and number of samples.
 
-    The density is σ over √rate of the noisiest axis, for noise that is white up to half the rate. It is None for
-    readings in attitudes that a file states.
+    The density is σ over √rate of the noisiest axis, for noise that is white up to half the rate. Without a rest it is
+    None, as for readings in attitudes that a file states.
     """
     duration_s = sum(mean.duration_s for mean in means)
     rate_hz = sum(mean.samples for mean in means) / duration_s if duration_s > 0 else None

@@ -88,7 +88,7 @@ def _describe_item(finding: Finding[GyroscopeEntry], _: object) -> CertifiedItem
 
 
 def _build_correction(finding: Finding[GyroscopeEntry]) -> Corrected | None:
-    """Return the correction of readings to rates, in the frame nearest to the sensor's axes."""
+    """Return the correction of readings to rates, in the frame nearest to the sensor's axes; None for a reference."""
     sensor = finding.entry
     if finding.is_reference:
         return None

@@ -181,7 +181,7 @@ def _full_uncertainty(entry: GyroscopeEntry) -> tuple[BudgetEntry, Matrix6]:
 
 
 def _conditions(when: ConditionsEntry | None) -> str:
-    """Return time and temperature of the readings as a sentence; None for files, which do not state them."""
+    """Return time and temperature of the readings as a sentence; empty without `when`, as for readings of a file."""
     words = "" if when is None else f"{when_words(when)}. "
     return words[:1].upper() + words[1:]
 
@@ -215,7 +215,7 @@ def _joint(
 
 
 def _ellipsoid_factor(counted: Sequence[Freedom]) -> float:
-    """Return the factor of the joint ellipsoid of values with these degrees of freedom, None for infinite."""
+    """Return the factor of the joint ellipsoid of values with `counted` degrees of freedom (None: infinite)."""
     return find_ellipsoid_factor(len(counted), [math.inf if dof is None else dof for dof in counted])
 
 

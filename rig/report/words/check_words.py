@@ -38,7 +38,7 @@ def words_of(check: CheckEntry) -> CheckWords | None:
 
 
 def words_of_name(name: str) -> CheckWords | None:
-    """Return the words of a check by its name, with or without sensor, quantity and sweep.
+    """Return the words of a check by its name, with or without sensor, quantity and sweep; None for another name.
 
     A sensor may have the name of a check, so the last part that names a check counts.
     """
@@ -48,7 +48,7 @@ def words_of_name(name: str) -> CheckWords | None:
 
 
 def what_failed(check: CheckEntry, folder: Path | None) -> str | None:
-    """Return the meaning of a failed check and its remedy; the commands name the run folder and the limit's key.
+    """Return the meaning and remedy of a failed check, with run folder and limit's key; None for an unknown check.
 
     If no configuration has this limit, the advice to raise it is left out.
     """

@@ -82,7 +82,7 @@ def find_printed_indices(budget: BudgetEntry, scale: Sequence[float]) -> tuple[i
 
 @dataclass(frozen=True, slots=True)
 class _Size:
-    """The unit of a column's printed numbers, which add up: multiplied by `factor`, with `decimals`."""
+    """The `unit` of a column's printed numbers: standard uncertainties times `factor`, rounded to `decimals`."""
 
     unit: str
     factor: float
@@ -119,12 +119,7 @@ def _line(line: ContributorEntry, indices: tuple[int, int], sizes: Sequence[_Siz
     assumed = source if line.half_width is None else f"±{figures(line.half_width)} {line.unit}{stated}"
     dof = _explain_missing_dof(line) if line.degrees_of_freedom is None else dof_text(line.degrees_of_freedom)
     return Line(
-        line.name,
-        line.kind,
-        line.distribution,
-        assumed,
-        dof,
-        _parts(line.std, line.variance_fraction, indices, sizes),
+        line.name, line.kind, line.distribution, assumed, dof, _parts(line.std, line.variance_fraction, indices, sizes)
     )
 
 

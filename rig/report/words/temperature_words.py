@@ -36,7 +36,7 @@ def polynomial_contributors(entry: OverTemperatureEntry) -> Sequence[Temperature
 
 
 def about_lines(entry: OverTemperatureEntry, quantity: Quantity) -> Iterator[str]:
-    """Yield the validity of the polynomials, and the effects outside their uncertainty."""
+    """Yield lines on the range and orders of the polynomials, the thermometer's delay, and the hysteresis."""
     low, high = entry.range_c
     scale, bias = entry.orders
     yield f"it is valid from {low:.1f} to {high:.1f} °C only; polynomials of order {scale} for k and {bias} for b"
