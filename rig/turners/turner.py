@@ -12,7 +12,7 @@ class Turner(Protocol):
     """A connected turner, at rest until `take_control`, and stopped again at the end of its `with` block.
 
     The time of its states is the reference of a recording, which gets every state in order. A failure first stops the
-    turner; then every method raises `Fault` by name, or `Refused` while nothing has moved. `move` and `rest` call
+    turner; then every method raises a Fault that names it, or Refused if nothing has moved. `move` and `rest` call
     `watch` at least every 20 ms; its exception stops the turner and is passed to the caller.
     """
 
@@ -35,7 +35,7 @@ class Turner(Protocol):
         ...
 
     def take_control(self, carried: FlangeLoad) -> None:
-        """Make the turner ready to move its payload. Raise `Refused` by name."""
+        """Make the turner ready to move its payload. Raise Refused if the turner is not ready or refuses."""
         ...
 
     def move(self, motion: Motion, watch: Callable[[], None] = ...) -> None:

@@ -79,10 +79,10 @@ class Hand:
         return HandReport(self.latest)
 
     def check(self) -> None:
-        """Return at once: a hand has no faults to raise."""
+        """Do nothing: a hand has no faults to raise."""
 
     def take_control(self, carried: FlangeLoad) -> None:
-        """Return at once: a hand needs no preparation."""
+        """Do nothing: a hand needs no preparation."""
 
     def move(self, motion: Motion, watch: Callable[[], None] = lambda: None) -> None:
         """Raise Fault `unplanned_motion`: a hand makes no motion of joints."""

@@ -32,7 +32,10 @@ ANSWER_ALL = 2  # value of Status Return Level: every write is acknowledged
 
 
 def look_at(bus: Bus, port: str, servo_id: int) -> ServoReport:
-    """Read what the servo reports about itself. Raise Refused `no_servo`, `servo_not_alone`, `other_servo`."""
+    """Read what the servo reports about itself.
+
+    Raise Refused `no_servo`, `servo_not_alone`, `other_servo`, `servo_garbled`.
+    """
     try:
         _ping(bus, port, servo_id)
         _request_acknowledgements(bus)
@@ -46,7 +49,7 @@ def look_at(bus: Bus, port: str, servo_id: int) -> ServoReport:
 
 
 def _ping(bus: Bus, port: str, servo_id: int) -> None:
-    """Raise Refused unless exactly one servo answers pings.
+    """Raise Refused `no_servo` or `servo_not_alone` unless exactly one servo answers pings.
 
     One wrong answer in four is accepted, because it may be late.
     """

@@ -45,8 +45,8 @@ class Servo:
     """The servo `servo_id` at `port`, a context manager that receives from its entry and leaves the shaft at rest.
 
     `model` is the configured one (`servo_models`). `on_state` gets every state in order, from a thread of this class,
-    and must not wait: a servo without traffic for `watchdog_s` stops. After a failure of the servo or its line all
-    methods raise `Fault` by name, after the shaft was stopped. `Refused` means that nothing has moved.
+    and must not wait: a servo without traffic for `watchdog_s` stops. A failure of the servo or its line first stops
+    the shaft; then every method raises a Fault that names it, or Refused if nothing has moved.
     """
 
     def __init__(
@@ -82,7 +82,7 @@ class Servo:
     def start(self) -> None:
         """Open the port, read the servo's report, and start to receive states; nothing moves.
 
-        Raise `Refused` if no servo answers.
+        Raise Refused as `Bus` and `look_at` do, and `servo_silent` if no state comes.
         """
         self._bus = Bus(self._port, self._baud, self._id, self._clock)
         try:

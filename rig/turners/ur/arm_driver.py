@@ -62,9 +62,8 @@ class Arm:
     """The arm at `host`, a context manager that receives states from its entry and leaves the arm stopped.
 
     `on_state` gets every state in order, from a thread of this class. `state_rate_hz` is in the controller's time.
-    `client_log` takes the output of the `ur_rtde` client; `robot_api_port` is for a PolyScope X. After a failure of the
-    arm or its driver all methods raise `Fault` by name, after the arm was stopped. `Refused` means that nothing has
-    moved.
+    `client_log` takes the output of the `ur_rtde` client; `robot_api_port` is for a PolyScope X. A failure of the arm
+    or its driver first stops the arm; then every method raises a Fault that names it, or Refused if nothing has moved.
     """
 
     def __init__(
@@ -106,7 +105,7 @@ class Arm:
     def start(self) -> None:
         """Connect and start to receive states; nothing moves and no program is stopped.
 
-        Raise `Refused` if no arm answers.
+        Raise Refused for the problems of `connection_failure` and `stop_problem`.
         """
         with self._link.patience():
             self._link.start()
@@ -147,7 +146,8 @@ class Arm:
     def take_control(self, carried: FlangeLoad) -> None:
         """Upload the control script and set the payload.
 
-        Raise `Refused` by name. A running program is refused, because the client would end it.
+        Raise Refused for the problems of `readiness` and `local_control`, and `program_running`, because the client
+        would end that program.
         """
         self.check()
         problem = readiness(self.latest)
@@ -284,7 +284,7 @@ class Arm:
             self._watch.start()
 
     def _prove_the_stop(self) -> None:
-        """Test the stop; raise `Refused` if the arm cannot be stopped without the client."""
+        """Test the stop. Raise Refused as `stop_trial` explains if the arm cannot be stopped without the client."""
         problem = stop_trial(self._host, RobotApi(self._host, self._robot_api_port, ANSWER_S), self._shows)
         if problem is not None:
             self._holds_arm = False
@@ -423,6 +423,6 @@ def _not_started(motion: Motion) -> Problem:
 
 
 def look(host: str, robot_api_port: int = ROBOT_API_PORT) -> ArmReport:
-    """Read the arm's report; nothing moves and no program is stopped. Raise `Refused` by name."""
+    """Read the arm's report; nothing moves and no program is stopped. Raise as `Arm.start` and `read_report` do."""
     with Arm(host, robot_api_port=robot_api_port) as arm:
         return arm.report()

@@ -67,7 +67,7 @@ def reports_local_control(host: str, version: tuple[int, ...]) -> bool:
 def read_report(host: str, connected: Connected, state: ArmState, robot_api_port: int) -> ArmReport:
     """Return what the controller reports about itself and its arm, whose present state is `state`.
 
-    Raise `Refused` by name.
+    Raise Refused for the problem of `_describe_closed_port` if the dashboard does not answer.
     """
     description = _read_description(host)
     report = ArmReport(

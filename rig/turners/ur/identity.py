@@ -55,7 +55,7 @@ def is_polyscope_x(version: tuple[int, ...]) -> bool:
 
 
 def series_problem(host: str, version: tuple[int, ...]) -> Problem | None:
-    """Return the problem of a controller of another series, or of software too old for the rig to stop its arm.
+    """Return the problem of a controller of another series, or of software too old to stop its arm; else None.
 
     For a configured arm of the CB3 series, `cb3_not_supported` does not apply.
     """
@@ -110,7 +110,7 @@ def _models(report: ArmReport) -> Mapping[int, str]:
 
 
 def _robot_type(report: ArmReport) -> int | None:
-    """Return the type of arm as reported, or else by the arm's lengths, or else by its name."""
+    """Return the type of arm as reported, or else by the arm's lengths, or else by its name; None if unknown."""
     if report.setup is not None:
         return report.setup.robot_type
     if report.kinematics is not None:

@@ -31,11 +31,11 @@ class RobotApi:
         self._host, self._port, self._timeout_s = host, port, timeout_s
 
     def is_in_remote_control(self) -> bool | None:
-        """Return whether the pendant is in remote control."""
+        """Return whether the pendant is in remote control, None if the software does not report it."""
         return {"REMOTE": True, "LOCAL": False}.get(self._word(CONTROL_MODE, "mode") or "")
 
     def serial_number(self) -> str | None:
-        """Return the arm's serial number."""
+        """Return the arm's serial number, None if the software does not report it."""
         return self._word(INFORMATION, "serialNumber")
 
     def _word(self, question: str, key: str) -> str | None:

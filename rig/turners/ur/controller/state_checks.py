@@ -22,7 +22,7 @@ RESTART = "Restart the controller if it happens again"
 
 
 def impossible_state(state: ArmState) -> Problem | None:
-    """Return the problem of a state with values that are not finite, or impossible for an arm."""
+    """Return the problem of a state with values that are not finite, or impossible for an arm; None without one."""
     if _is_possible(state):  # five hundred states a second are; to name what is wrong takes ten times as long
         return None
     values = {
@@ -59,7 +59,7 @@ def _is_possible(state: ArmState) -> bool:
 
 
 def impossible_payload(mass_kg: float, centre_m: Sequence[float]) -> Problem | None:
-    """Return the problem of a payload that is not finite."""
+    """Return the problem of a payload that is not finite, or None."""
     numbers = (mass_kg, *centre_m)
     return None if all(map(math.isfinite, numbers)) else _impossible(f"its payload is {mass_kg:g} kg at {centre_m} m")
 
@@ -74,7 +74,7 @@ def impossible_motion(before: ArmState, after: ArmState) -> Problem | None:
 
 
 def clock_step(before_s: float, after_s: float, period_s: float, missed_s: float) -> Problem | None:
-    """Return the problem of a time that is not a whole number of periods after the last one.
+    """Return the problem of a time that is not a whole number of periods after the last one, or None.
 
     `missed_s` is the longest recent gap, on the controller's clock, in which states may have been lost.
     """
