@@ -323,7 +323,7 @@ class Calibration:
 
     @property
     def scale(self) -> Vector:
-        """The scale factors k by axis, 1/‖row i of F‖, where F⁻¹ is the matrix up to a rotation."""
+        """The scale factors by axis, 1/‖row i of `matrix`⁻¹‖, which a rotation of the corrected frame preserves."""
         if self.model == protocol.MODELS[1]:
             return self.matrix[0][0], self.matrix[1][1], self.matrix[2][2]
         kx, ky, kz = (1 / np.linalg.norm(np.linalg.inv(self.matrix), axis=1)).tolist()

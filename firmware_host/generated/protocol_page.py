@@ -77,7 +77,7 @@ def _row(message: Message) -> tuple[str, ...]:
 
 
 def _layout(fields: Sequence[Field], heading: str) -> Iterator[str]:
-    """Return the lines of a table of fields, which follow each other without gaps."""
+    """Yield the lines of a table of fields, which follow each other without gaps."""
     offset = 0
     offsets = []
     for field in fields:

@@ -105,7 +105,7 @@ class Laboratory:
         self.board = None
 
     def fit(self, part: str) -> bool:
-        """Exchange the board for another part's, without power: another chip that stores nothing.
+        """Exchange the unpowered board for that of another `part`: another chip, which stores nothing yet.
 
         Return whether the operator also plugs it in. An operator forgets this at most once per part.
         """

@@ -93,7 +93,7 @@ class ClientConnection:
         return True
 
     def tick(self) -> None:
-        """Let the session make its bytes of this tick, which `deliver` sends as soon as possible."""
+        """Simulate a tick of the session and queue the bytes that it sends; `deliver` sends them."""
         self._ticks += 1
         self.due = (b"" if self.listener.silent else self.due) + self.session.tick()
 
@@ -195,7 +195,7 @@ class PortListener:
         return [connection for connection in self._network.connections if connection.listener is self]
 
     def open(self) -> None:
-        """Start listening. Raise `Refused` if the address is not available."""
+        """Start listening. Raise Refused `port_in_use` if the address is not available."""
         if self._socket is not None:
             return
         host, port = self._address
@@ -287,7 +287,7 @@ class Network:
             key.data(events)
 
     def tick(self) -> None:
-        """Let every session make the bytes that it sends in this tick."""
+        """Simulate a tick of every session, and queue the bytes that they send."""
         for connection in tuple(self.connections):
             connection.tick()
 

@@ -300,18 +300,14 @@ def _find_closed_ports(arm: SimulatedArmSection, robot: Robot) -> set[int]:
 
 
 def _parse_address(key: str, url: str) -> tuple[str, int]:
-    """Return host and port of `socket://host:port`. Raise `Refused` for any other port."""
+    """Return host and port of `socket://host:port`. Raise Refused `board_port` for any other port."""
     parts = urlsplit(url)
     try:
         if parts.scheme == "socket" and parts.hostname and parts.port:
             return parts.hostname, parts.port
     except ValueError:
         pass  # the port is not a number
-    raise Refused(
-        "board_port",
-        f"{key} {url!r} is no address to listen on",
-        "Write socket://host:port",
-    )
+    raise Refused("board_port", f"{key} {url!r} is no address to listen on", "Write socket://host:port")
 
 
 def _open_pty(line: SerialLine, selector: selectors.BaseSelector) -> "PtyPort":
@@ -327,7 +323,7 @@ def _open_pty(line: SerialLine, selector: selectors.BaseSelector) -> "PtyPort":
 
 
 def serve(loaded: Loaded, until_eof: bool, late: Path | None = None, truth: Path | None = None) -> None:
-    """Run the world until end of input (`until_eof`) or Ctrl-C. Raise `Refused` if a port is not available.
+    """Run the world until end of input (`until_eof`) or Ctrl-C. Raise Refused if a port is not available.
 
     Reports of late steps are written to the file `late`, or to stderr if that is None; the truth to the file `truth`.
     """

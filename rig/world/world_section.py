@@ -10,7 +10,7 @@ from rig.errors import Refused
 def read_world_section(loaded: Loaded) -> WorldSection:
     """Return the section of the simulated laboratory. Sensors without their own position have the turner's.
 
-    Raise `Refused` `no_world` if the file has no such section.
+    Raise Refused `no_world` if the file has no such section.
     """
     if not loaded.simulated:
         raise Refused(

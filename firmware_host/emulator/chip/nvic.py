@@ -58,7 +58,7 @@ class Nvic:
         return bool(self._pending >> number & 1)
 
     def candidate(self) -> int | None:
-        """Return the pending exception that preempts the running code; the core applies BASEPRI and PRIMASK."""
+        """Return the pending exception that preempts the running code, if any; the core applies BASEPRI and PRIMASK."""
         waiting = self._pending & self._enabled
         if not waiting:
             return None

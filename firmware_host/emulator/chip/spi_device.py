@@ -120,7 +120,7 @@ class SpiBus:
         self._spi.bus.predicted_to = 0
 
     def exchange(self, pair: int) -> int:
-        """Pass two bytes, the first one low, to the selected device; return its answers likewise.
+        """Exchange two bytes with the selected device, the first one in the low byte of `pair` and of the answer.
 
         Raise Violation if the bus is not set up as required.
         """
@@ -191,7 +191,7 @@ class DeviceLink:
         self._settle()
 
     def exchange(self, pair: int) -> int:
-        """Pass two bytes to the device, the first one low, and return its answers likewise."""
+        """Exchange two bytes with the device, the first one in the low byte of `pair` and of the answer."""
         return self._transfer(pair) if self.device.fault is None else self._exchange_faulty(pair)
 
     def _transfer(self, pair: int) -> int:

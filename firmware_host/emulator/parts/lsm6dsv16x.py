@@ -146,7 +146,7 @@ class Lsm6dsv16x:
         return 0xFF
 
     def predict(self) -> bytes:
-        """Return nothing in advance: a read clears flags, and a conversion may occur between two reads."""
+        """Return no predicted answers: a read clears flags, and a conversion may occur between two reads."""
         return b""
 
     # --- registers

@@ -128,7 +128,7 @@ class Lsm9ds1:
         return 0xFF
 
     def predict(self) -> bytes:
-        """Return nothing in advance: each read changes later data."""
+        """Return no predicted answers: each read changes later data."""
         return b""
 
     # --- registers

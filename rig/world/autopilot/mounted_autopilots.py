@@ -14,7 +14,7 @@ from rig.world.instruments import FieldOf, InstrumentMount, MotionOf, sensor_see
 def build_autopilot_mounts(config: RigConfig, world: WorldSection) -> dict[str, InstrumentMount]:
     """Return the autopilots by port.
 
-    Raise `Refused` `autopilot_parameters` for a parameter that an autopilot does not have.
+    Raise Refused `autopilot_parameters` for a parameter that an autopilot does not have.
     """
     imus_by_port: dict[str, dict[int, str]] = {}
     for name, sensor in config.sensors.items():
@@ -25,7 +25,7 @@ def build_autopilot_mounts(config: RigConfig, world: WorldSection) -> dict[str, 
 
 
 def _mount(config: RigConfig, world: WorldSection, imus: dict[int, str], baud: int) -> InstrumentMount:
-    """Return an autopilot with these sensor names by IMU number. An IMU without a sensor has the first one's motion."""
+    """Return an autopilot with these sensors by IMU number; an IMU without a sensor has the first one's motion."""
     sections = (world.sensors[name].autopilot for name in config.sensors if name in imus.values())
     section = next((section for section in sections if section is not None), SimulatedAutopilotSection())
     try:

@@ -54,7 +54,7 @@ class SimulatedTruth:
         return mean
 
     def depends_on_speed(self, name: str) -> bool:
-        """Return whether a gyroscope's scale factors from rotations at plus and minus one speed depend on the speed."""
+        """Return whether the speed of two opposite rotations affects the scale factors that follow from them."""
         return self._world.sensors[name].nonlinearity_odd_per_rad_s != 0
 
     def _rates(self, name: str, windows_s: Windows, rate_rad_s: float) -> np.ndarray:
@@ -74,11 +74,7 @@ class SimulatedTruth:
         if sensor.accelerometer is None:
             raise ValueError(f"nothing reads the accelerometer of {name}")
         quiet = replace(
-            sensor.accelerometer,
-            noise_m_s2=0.0,
-            non_orthogonality_rad=(0.0, 0.0, 0.0),
-            bandwidth_hz=None,
-            delay_s=0.0,
+            sensor.accelerometer, noise_m_s2=0.0, non_orthogonality_rad=(0.0, 0.0, 0.0), bandwidth_hz=None, delay_s=0.0
         )
         force = np.full((len(time_s), 3), force_m_s2)
         return accelerations(quiet, time_s, force, self._seed(name), sensor.temperature_c)

@@ -10,7 +10,7 @@ from rig.world.kvh1775.memory import KvhMemory
 
 
 def build_kvh_mounts(config: RigConfig, world: WorldSection) -> dict[str, InstrumentMount]:
-    """Return the instruments by sensor name. Raise `Refused` `kvh_settings` for an unknown setting."""
+    """Return the instruments by sensor name. Raise Refused `kvh_settings` for an unknown setting."""
     names = sorted(name for name, sensor in config.sensors.items() if sensor.part == "kvh1775")
     return {name: _mount(config, world, name) for name in names}
 

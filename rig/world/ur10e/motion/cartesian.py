@@ -109,7 +109,10 @@ def plan_straight_line(
 def _sample_line(
     start: Joints, twist: Array, top_m_s: float, acceleration: float, links: Links
 ) -> Generator[None, None, tuple[list[MotionSegment], float]]:
-    """Return the segments of a line at the speed `top_m_s`, and the largest ratio of a joint's speed to its limit."""
+    """Sample a line at the speed `top_m_s`, some knots per tick; return its segments and a joint's largest speed ratio.
+
+    The ratio is that of a joint's speed to its limit.
+    """
     length = _length(twist)
     ramp_s = top_m_s / acceleration
     duration_s = ramp_s + length / top_m_s
