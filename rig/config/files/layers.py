@@ -77,7 +77,7 @@ def merge(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _layers(text: str, path: Path | None) -> Iterator[_Layer]:
-    """Return a file followed by the files it is based on."""
+    """Yield a file, then the files that it is based on."""
     layer, names = _layer(text, ""), ["this file"]
     files = []
     while BASE in layer.data:

@@ -1,4 +1,4 @@
-"""The sections that say where a measurement is made, and what becomes of its result: site, certificate, history."""
+"""Sections on the site of a measurement and on its result: site, certificate, history."""
 
 from datetime import date
 from typing import Annotated, Self
@@ -15,7 +15,7 @@ MIN_LEVEL = 0.1
 
 
 class SiteSection(Section):
-    """Where the arm stands. With latitude and heading the Earth's rate is removed. The texts are for certificates."""
+    """The site of the arm. With latitude and heading the Earth's rate is removed. The texts are for certificates."""
 
     laboratory: Words | None = Field(default=None, description="the laboratory's name, for certificates")
     address: Words | None = Field(default=None, description="the laboratory's address, in one line")
@@ -88,8 +88,7 @@ class SiteSection(Section):
         default=None, description="instrument that measured magnetic_field_ut; for certificates"
     )
     magnetic_field_upwards: bool = Field(
-        default=False,
-        description="whether this field points out of the ground, as south of the magnetic equator",
+        default=False, description="whether this field points out of the ground, as south of the magnetic equator"
     )
     base_up: Vector3 = Field(
         default=(0.0, 0.0, 1.0),
@@ -147,7 +146,7 @@ class CertificateSection(Section):
 
 
 class HistorySection(Section):
-    """Where finished runs are remembered. If left out: in a file of the user (`RIG_HISTORY` names another)."""
+    """The history that stores finished runs. If left out: a file of the user (`RIG_HISTORY` names another)."""
 
     url: str | None = Field(
         default=None,

@@ -139,7 +139,7 @@ def key_of(quantity: str | None, what: str | None) -> str | None:
 
 
 def limit_of(limits: Limits | None, quantity: str, what: str) -> tuple[Limit, float | None]:
-    """Return the row called `name`, and its limit, or None if it is not set. Raise KeyError for an unknown name."""
+    """Return the row of a quantity's check `what`, and its limit, None if not set. Raise KeyError without a row."""
     key = _KEYS[quantity, what]
     limit: float | None = getattr(limits, key, None)
     return LIMITS[key], limit

@@ -16,7 +16,7 @@ class HandSection(TurnerSection):
 
 
 class ByHandSection(ProcedureSection):
-    """An item is laid on its faces and turned by hand, as a line of text and a drawing ask for."""
+    """An item is laid on its faces and turned by hand, as requested by a line of text and a drawing."""
 
     flips: int = Field(
         default=12,

@@ -174,9 +174,7 @@ class SixObservationSection(SixSweepsSection):
         "that the board corrects, and compare them with the reference's",
     )
     stages: tuple[StageSection, ...] = Field(
-        default=(),
-        max_length=12,
-        description="mountings of the item, one after the other",
+        default=(), max_length=12, description="mountings of the item, one after the other"
     )
     target_scale_u: float | None = Field(
         default=None,
@@ -337,16 +335,12 @@ class StaticAttitudesSection(AttitudesSection):
 
 
 class BiasDriftSection(AttitudesSection):
-    """The arm visits the attitudes again and again: how the bias drifts. By default ten hours, as in TRIAX."""
+    """Repeated visits of the attitudes, which show the drift of the bias; by default for ten hours, as in TRIAX."""
 
     name: Literal["bias_drift"] = Field(default="bias_drift", description="this procedure")
     dwell_s: float = Field(default=200.0, ge=0.1, le=3600, description="time of standing still in each attitude")
     repeats: int = Field(
-        default=10,
-        ge=2,
-        le=100,
-        description="how many times the arm visits all attitudes",
-        json_schema_extra=RATIO,
+        default=10, ge=2, le=100, description="how many times the arm visits all attitudes", json_schema_extra=RATIO
     )
 
     def problems(self, config: RigConfig) -> Iterator[str]:
@@ -387,11 +381,7 @@ class ThermalSection(SixSweepsSection, AttitudesSection):
     )
     to_c: float = Field(ge=-40, le=85, description="upper end of the range")
     max_step_k: float = Field(
-        default=5.0,
-        gt=0,
-        le=50,
-        description="how far neighbouring sets may be apart",
-        json_schema_extra={"unit": "K"},
+        default=5.0, gt=0, le=50, description="how far neighbouring sets may be apart", json_schema_extra={"unit": "K"}
     )
     max_rate_k_per_min: float = Field(
         default=2.0,

@@ -45,7 +45,7 @@ class TargetUncertaintySection(Section):
 
 
 class ShortestSection(Section):
-    """Repeats of six_observation, with all its keys, until U is as wanted; at most `repeats`, 16 if left out."""
+    """Repeats of six_observation, with all its keys, until U reaches the target; at most `repeats`, 16 if left out."""
 
     name: Literal["shortest"] = Field(description="this procedure")
     target_uncertainty: TargetUncertaintySection

@@ -13,7 +13,7 @@ Instruction = Annotated[str, Field(min_length=1, max_length=500)]
 
 
 class StageMountSection(MountingSection):
-    """Which flange axis each axis of the item points along in this stage: a right-handed frame."""
+    """The flange axis along which each axis of the item points in this stage; they form a right-handed frame."""
 
     rotation_deg: Vector3 = Field(
         default=(0.0, 0.0, 0.0),
@@ -22,7 +22,7 @@ class StageMountSection(MountingSection):
 
 
 class StageSection(Section):
-    """One of a list of stages: the operator mounts the item so, then this is swept and recorded."""
+    """One stage: the operator mounts the item as stated, then its sweeps are made and recorded."""
 
     instruction: Instruction = Field(
         description="what the operator is to do before this stage, such as `turn the board by 90° about wrist 3`"

@@ -46,7 +46,7 @@ def _refuse_gap(value: str) -> str:
 
 
 class LineTimeSection(Section):
-    """The column `time`: when the device took the sample, by its own clock."""
+    """The column `time`: the time of the sample by the device's own clock."""
 
     unit: Literal["ns", "us", "ms", "s", "?"] = Field(description="unit in which the device prints it")
     wrap: Annotated[float, Field(ge=0)] = Field(
@@ -60,7 +60,7 @@ class LineTimeSection(Section):
 
 
 class LineRateSection(Section):
-    """The columns `gx gy gz`: what the gyroscope reads."""
+    """The columns `gx gy gz`: the gyroscope's readings."""
 
     unit: Literal["deg/s", "rad/s", "mdeg/s", "mrad/s", "?"] = Field(description="unit of the rates")
     scale: Scale = 1.0
@@ -70,7 +70,7 @@ class LineRateSection(Section):
 
 
 class LineAccelerationSection(Section):
-    """The columns `ax ay az`: what the accelerometer reads; at rest, 1 g upwards."""
+    """The columns `ax ay az`: the accelerometer's readings; at rest, 1 g upwards."""
 
     unit: Literal["m/s2", "g", "mg", "?"] = Field(description="unit of the accelerations")
     scale: Scale = 1.0
@@ -80,7 +80,7 @@ class LineAccelerationSection(Section):
 
 
 class LineFieldSection(Section):
-    """The columns `mx my mz`: what the magnetometer reads."""
+    """The columns `mx my mz`: the magnetometer's readings."""
 
     unit: Literal["uT", "nT", "T", "gauss", "mgauss", "?"] = Field(description="unit of the magnetic field")
     scale: Scale = 1.0
@@ -118,7 +118,7 @@ class LineTemperatureSection(Section):
 
 
 class LineScalarSection(Section):
-    """A column of what has no axes, such as the pressure of the air: recorded as the sensor `<sensor>_<name>`."""
+    """A column of a quantity without axes, such as air pressure; it is recorded as the sensor `<sensor>_<name>`."""
 
     unit: Literal["Pa", "hPa", "kPa", "degC", "K"] = Field(description="unit in which it is printed")
     scale: Scale = 1.0

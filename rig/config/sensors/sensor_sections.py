@@ -52,7 +52,7 @@ Baud = Literal[
 
 
 class OwnPortSection(Section):
-    """The serial port of a sensor that is not on the board, and what it sends there."""
+    """The serial port of a sensor that is not on the board, and its messages."""
 
     port: Port = Field(
         min_length=1,

@@ -6,7 +6,7 @@ from rig.config.section import Positive, Section
 
 
 class StatedTemperatureSection(Section):
-    """How warm the sensor is, where its source provides no temperature; if nothing is stated, U allows for 20 K."""
+    """The temperature of a sensor whose source provides none; if nothing is stated, U allows for 20 K."""
 
     stated_c: float = Field(ge=-40, le=85, description="how warm the sensor is")
     stated_within_k: Positive = Field(

@@ -15,7 +15,7 @@ Mistaken = Literal[
 
 
 class SimulatedHandSection(Section):
-    """The simulated operator, who does what the line of text and the drawing say, sooner or later, and errs."""
+    """The simulated operator, who follows each instruction after a reaction time and sometimes makes mistakes."""
 
     peak_deg_s: float = Field(default=250.0, ge=30, le=1500, description="peak rate of a push")
     wobble_deg: float = Field(default=1.5, ge=0, le=20, description="how far the axis of a move swings")

@@ -46,7 +46,7 @@ Gradient = Annotated[float, Field(ge=-1000, le=1000)]
 
 
 class WorldSiteSection(Section):
-    """Where the laboratory stands, and how the arm's base stands in it."""
+    """The site of the laboratory, and the attitude of the arm's base in it."""
 
     latitude_deg: float | None = Field(
         default=None, ge=-90, le=90, description="geographic latitude; without it the Earth does not turn"
@@ -92,7 +92,7 @@ class WorldSiteSection(Section):
 
 
 class CalibrationSection(Section):
-    """How the arm differs from its drawing, as its maker measured it. The controller reports this and uses it."""
+    """Deviations of the arm from its drawing, as measured by its maker. The controller reports and uses them."""
 
     delta_theta_rad: Joints = Field(default=NO_ANGLES, description="added to the angle of each joint")
     delta_a_mm: Lengths = Field(default=NO_LENGTHS, description="added to the length a of each link in the drawing")
@@ -312,24 +312,17 @@ Delay = Annotated[
 ]
 ScalePerK = Annotated[
     Vector3,
-    Field(
-        description="relative growth of each axis' scale factor with temperature",
-        json_schema_extra={"unit": "1/K"},
-    ),
+    Field(description="relative growth of each axis' scale factor with temperature", json_schema_extra={"unit": "1/K"}),
 ]
 
 
 ScalePerK2 = Annotated[
-    Vector3,
-    Field(
-        description="the same with the square of the temperature",
-        json_schema_extra={"unit": "1/K²"},
-    ),
+    Vector3, Field(description="the same with the square of the temperature", json_schema_extra={"unit": "1/K²"})
 ]
 
 
 class SimulatedAccelerometerSection(Section):
-    """The truth of one accelerometer: a = F (s + φ s²) + b, with the specific force s; as warm as its gyroscope."""
+    """The truth of one accelerometer: a = F (s + φ s²) + b, s the specific force, at the gyroscope's temperature."""
 
     scale: Vector3 = Field(
         default=(1.0, 1.0, 1.0),
@@ -365,7 +358,7 @@ class SimulatedAccelerometerSection(Section):
 
 
 class SimulatedKvhSection(Section):
-    """The simulated KVH 1775 around its gyroscope: its clock, and what its last user left in its memory."""
+    """The simulated KVH 1775 around its gyroscope: its clock, and the settings that its last user stored."""
 
     serial_number: str | None = Field(
         default=None,
@@ -482,8 +475,7 @@ class SimulatedSensorSection(Section):
     )
     kvh1775: SimulatedKvhSection | None = Field(default=None, description="the instrument it is in, of a `kvh1775`")
     autopilot: SimulatedAutopilotSection | None = Field(
-        default=None,
-        description="the autopilot it is in, of a `mavlink`; of several at one port the first says it",
+        default=None, description="the autopilot it is in, of a `mavlink`; of several at one port the first says it"
     )
     lines: SimulatedLinesSection | None = Field(default=None, description="the device it is in, of `part: lines`")
     faulty: SimulatedFaultySection = SimulatedFaultySection()

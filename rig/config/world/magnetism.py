@@ -23,7 +23,7 @@ class IronSection(Section):
 
 
 class SimulatedFieldSection(Section):
-    """The truth of one simulated magnetometer: m = F B + b, with the magnetic field B at its place."""
+    """The truth of one simulated magnetometer: m = F B + b, with the magnetic field B at its position."""
 
     scale: Vector3 = Field(
         default=(1.0, 1.0, 1.0),
