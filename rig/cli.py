@@ -97,9 +97,7 @@ COMMANDS = {
         "how-to/at-the-rig/station.md",
     ),
     "watch": Command(
-        "rig.commands.station.watch",
-        "replay a recorded run in a browser",
-        "how-to/at-the-rig/operators-page.md",
+        "rig.commands.station.watch", "replay a recorded run in a browser", "how-to/at-the-rig/operators-page.md"
     ),
     "solve": Command(
         "rig.commands.offline.solve",
@@ -229,7 +227,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _first_word(words: Sequence[str]) -> str | None:
-    """Return the name of the command: the first word that is not an option."""
+    """Return the name of the command: the first word that is not an option, or None."""
     return next((word for word in words if not word.startswith("-")), None)
 
 

@@ -23,8 +23,8 @@ def plan(config: str | Path, changes: Changes | None = None, *, script: str | Pa
     """Plan a calibration and print it, as `rig plan` does; connects to nothing.
 
     `changes` are values that replace the file's: `{"procedure.speed_deg_s": 90}`; `script` is a file with your own
-    procedure. Return the plan: angles in rad, speeds in rad/s, times in s. Raise Refused by name for an error in the
-    file, and for a motion that breaks a limit.
+    procedure. Return the plan: angles in rad, speeds in rad/s, times in s. Raise Refused for an error in the file, and
+    for a motion that breaks a limit.
     """
     from rig.commands.measure.plan import add, make_plan
     from rig.report.terminal.plan_table import print_plan

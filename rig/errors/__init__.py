@@ -56,7 +56,7 @@ def raise_as(kind: type[RigError]) -> Iterator[None]:
 
 
 def refuse(problems: Sequence[Problem]) -> None:
-    """Raise `Refused` under the first problem's name, with all problems and remedies; do nothing if there are none."""
+    """Raise Refused under the first problem's name, with all problems and remedies; do nothing if there are none."""
     if not problems:
         return
     *others, last = problems

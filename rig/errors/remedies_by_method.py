@@ -13,7 +13,7 @@ TABLE = Path(__file__).with_name("remedies_by_method.txt")
 def remedies_by_method(name: str) -> Mapping[CalibrationMethod, str]:
     """Return an error's remedy by method of calibration; empty if all methods share one.
 
-    Raise ValueError for a line of another form than `name | way | what to do`.
+    Raise ValueError for a line of another form than `name | method | what to do`.
     """
     methods: tuple[CalibrationMethod, ...] = get_args(CalibrationMethod)
     rows = [*read_rows(TABLE, f"name | {' or '.join(methods)} | what to do", 1, methods)]

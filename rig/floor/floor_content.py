@@ -93,11 +93,11 @@ def recalls(pasts: Sequence[Past], today: date) -> list[dict[str, Any]]:
 
 
 def _read(text: str) -> dict[str, Any]:
-    """Return a station's state, shortened for a card; None for an invalid text."""
+    """Return a station's state, shortened for a card; empty for an invalid text."""
     try:
         if len(text) > LONGEST:
             raise ValueError(f"it is longer than {LONGEST} characters")
-        now = validate(Now, parse_json(text), "told")
+        now = validate(Now, parse_json(text), "state")
     except (ValueError, RecursionError):
         return {}
     counts = {shorten(state): count for state, count in [*(now.counts or {}).items()][:MOST_STATES]}

@@ -93,7 +93,10 @@ def compare(run: Run, sensor: str, reference: str) -> SensorComparison:
 
 
 def _correction_of(run: Run, name: str, recordings: Sequence[ObservedRun]) -> Reference:
-    """Return the correction of a sensor's readings in these recordings: none if the board has corrected them."""
+    """Return the correction of a sensor's readings: that of the turntable or of the run, 1 and 0 if already applied.
+
+    Raise Refused `nothing_to_compare` if the run has no calibration.
+    """
     if recordings[0].run.sensors[name].mode == "calibrated":
         return Reference(name, np.ones(3), np.zeros(3))
     turntable = run.settings.reference

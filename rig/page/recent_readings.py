@@ -58,5 +58,5 @@ class PageHistory:
 
 
 def round_digits(vector: tuple[float, ...] | None) -> list[float] | None:
-    """Return the vector to six digits, more than a screen shows."""
+    """Return the vector to six digits, more than a screen shows; None for None."""
     return None if vector is None else [float(f"{component:.6g}") for component in vector]

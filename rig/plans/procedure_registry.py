@@ -32,8 +32,8 @@ SectionT_contra = TypeVar("SectionT_contra", bound=ProcedureSection, contravaria
 class Planner(Protocol[SectionT_contra]):
     """A pure function that plans the steps from the turner's pose `start_q_rad` (home if None) without those in `done`.
 
-    The `index` of sweeps and dwells, by which `done` names them, counts through the whole procedure. Raise Refused by
-    name if the movement is impossible.
+    The `index` of sweeps and dwells, by which `done` names them, counts through the whole procedure. Raise Refused if
+    the movement is impossible.
     """
 
     def __call__(

@@ -76,8 +76,8 @@ class Connector:
     def open(self) -> Iterator[Rig]:
         """Connect everything and start recording; at the end stop the turner and close the file.
 
-        Nothing moves. Raise `Refused` by name if the turner, the board or a sensor differs from the configuration or
-        from the recording so far, or if a sensor lacks the calibration for its corrected readings.
+        Nothing moves. Raise Refused if the turner, the board or a sensor differs from the configuration or from the
+        recording so far, or if a sensor lacks the calibration for its corrected readings.
         """
         whole_plan = self.phase.plan()
         if self.resumed.earlier and not self.phase.agreed:  # a later stage resumes nothing
@@ -196,11 +196,7 @@ class Connector:
         )
 
     def _record(
-        self,
-        stack: ExitStack,
-        made_with: Provenance,
-        turner: RecordedTurner,
-        described: Mapping[str, RecordedSensor],
+        self, stack: ExitStack, made_with: Provenance, turner: RecordedTurner, described: Mapping[str, RecordedSensor]
     ) -> Recording:
         self.resumed.refuse_other_instruments(made_with, described)
         with refusing():
@@ -276,12 +272,7 @@ class Connector:
         if self.settings.by_hand is not None or not (self.phase.procedure.calibrates_along and to_calibrate):
             return None
         onboard = BoardCalibration(
-            source.board,
-            acquisition,
-            recording.note,
-            self.settings.observation,
-            to_calibrate,
-            turner,
+            source.board, acquisition, recording.note, self.settings.observation, to_calibrate, turner
         )
         with refusing():
             onboard.recall(self.resumed.earlier, self.resumed.done)

@@ -104,7 +104,8 @@ class Run:
     ) -> tuple[RunData, ...]:
         """Carry out the phase's script, with `results` of the previous calibration; return all recordings of the phase.
 
-        During the mounting for a stage nothing is connected, because cables may have to be unplugged.
+        During the mounting for a stage nothing is connected, because cables may have to be unplugged. Raise Fault
+        `run_folder_removed`.
         """
         readings = phase.procedure.readings
         with self.report_end(self._advice, moved=moved):
@@ -136,13 +137,7 @@ class Run:
             return tuple(read_run(file) for file in files)
 
     def _record_stage(
-        self,
-        phase: Phase,
-        stage: int,
-        resumed: Resumption,
-        *,
-        moved: bool,
-        results: Mapping[str, SensorResult] | None,
+        self, phase: Phase, stage: int, resumed: Resumption, *, moved: bool, results: Mapping[str, SensorResult] | None
     ) -> Path:
         """Carry out the phase's script for one stage, or a plan without stages; return the recording's path."""
         path = next_recording(self.folder, phase.procedure.readings)

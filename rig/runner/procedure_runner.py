@@ -152,7 +152,7 @@ class Rig:
     def preflight(self) -> None:
         """Check every condition of a movement, ask the operator, and take control of the arm.
 
-        A movement with agreement in advance begins without a question, unless the arm has moved since. Raise `Refused`
+        A movement with agreement in advance begins without a question, unless the arm has moved since. Raise Refused
         with all problems before anything moves.
         """
         report, kind, section = self.devices.report, self.devices.kind, self.devices.section
@@ -222,7 +222,10 @@ class Rig:
             self._resting_rad_s[readings.name] = readings.rates_rad_s.mean(axis=0)
 
     def _collect_readings(self, lasting_s: float, watch: Callable[[], None]) -> list[GyroscopeReadings]:
-        """Return the gyroscopes' readings since the latest `keep`, once they span `lasting_s` on each clock."""
+        """Return the gyroscopes' readings since the latest `keep`, once they span `lasting_s` on each clock.
+
+        Raise Fault `no_samples`.
+        """
         acquisition = self.devices.acquisition
         sensors = {name: sensor for name, sensor in self.recording.sensors.items() if sensor.measures(RATE)}
 

@@ -74,7 +74,7 @@ def line(event: RunEvent) -> str | None:
 
 
 def _temperature_line(event: RunEvent) -> str | None:
-    """Return an event of a calibration over temperature in words."""
+    """Return an event of a calibration over temperature in words, else None."""
     match event:
         case TemperatureWanted(warming, now_c, next_c, heated):
             until = f"until it is at {next_c:.1f} °C; it is at {now_c:.1f} °C"
@@ -141,7 +141,7 @@ def _entry_words(history: str, numbers: Sequence[int], *, usual: bool) -> str:
 
 
 def reason(event: RunEvent) -> str | None:
-    """Return why a run ended early, for the log; on a terminal the command prints it last."""
+    """Return why a run ended early, for the log, else None; on a terminal the command prints it last."""
     match event:
         case Failed(error) if error.name == "script_failed" and error.__cause__ is not None:
             return f"{error}\n{''.join(format_exception(error.__cause__)).rstrip()}"

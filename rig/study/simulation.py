@@ -97,7 +97,7 @@ def build_sensitivity(scale: Array, mounting: Array, skew: Array | None = None) 
 
 
 def draw_mean_readings(rng: np.random.Generator, F: Array, bias_rad_s: Array, sweep: SimulatedSweep) -> Array:
-    """Draw averaged readings (…, 6, 3), rad/s, of the six sweeps, for F (…, 3, 3), before anything is squared."""
+    """Draw the mean readings (…, 6, 3), rad/s, of the six sweeps of sensors with F (…, 3, 3)."""
     return _draw_means(rng, F, bias_rad_s, sweep)[0]
 
 

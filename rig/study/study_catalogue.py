@@ -20,7 +20,7 @@ class StudyEntry:
     core_s: float | None = None
 
     def duration_s(self, jobs: int = 1) -> float | None:
-        """Return the approximate duration with `jobs` processes, s."""
+        """Return the approximate duration with `jobs` processes, s; None if it was not measured."""
         return None if self.core_s is None else self.core_s / jobs
 
     def run(self, settings: Settings) -> StudyReport:

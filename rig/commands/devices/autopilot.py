@@ -163,7 +163,10 @@ def _backup_path(options: Namespace) -> Path:
 
 @contextmanager
 def _connect(options: Namespace) -> Iterator[tuple["AutopilotLink", Mapping[str, "SensorSection"]]]:
-    """Connect to the only autopilot of a configuration, with its IMUs; start the simulated laboratory, if any."""
+    """Connect to the only autopilot of a configuration, with its IMUs; start the simulated laboratory, if any.
+
+    Raise Refused `no_autopilot_section`.
+    """
     from rig.commands.laboratory.claims import claim_sensor
     from rig.commands.laboratory.laboratory_process import run_simulated_laboratory
     from rig.commands.laboratory.own_address import load_at_own_address

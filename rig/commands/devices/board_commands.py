@@ -97,7 +97,7 @@ def write(options: Namespace) -> int:
 
 
 def erase(options: Namespace) -> int:
-    """Erase the calibrations of one sensor or of all configured ones."""
+    """Erase the calibrations of one sensor or of all configured ones. Raise Fault `not_erased`."""
     with _connect(options) as (config, board):
         refuse_other_firmware(board.identity)
         slots = [slot for slot in _read_slots(board, config, options.sensor, config.sensors) if slot.stored is not None]

@@ -130,7 +130,7 @@ def _run_session(
 def _fetch_session(
     config: RigConfig, among: dict[str, SensorSection]
 ) -> Iterator[tuple[Board, str, "CalibratedByBoard"]]:
-    """Read the result of the board's last session, which must be of one of the sensors."""
+    """Read the result of the board's last session. Raise Refused `another_sensor` if it is of no configured sensor."""
     from rig.runner.by_hand.on_board import read_kept_solution
 
     section = require_board_section(config)

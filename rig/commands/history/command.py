@@ -53,9 +53,7 @@ def add(history: argparse.ArgumentParser) -> None:
     import_parser = add_command("import", "enter runs that are not yet in the history; others stay unchanged")
     add_run(import_parser, "folders", "run folders, or folders that contain some", metavar="DIR", nargs="+")
     import_parser.add_argument(
-        "--solve",
-        action="store_true",
-        help="enter results recomputed from the recordings, not those of result.json",
+        "--solve", action="store_true", help="enter results recomputed from the recordings, not those of result.json"
     )
     add_command("verify", "check that rows, results and files are as they were entered; exit status 1 if not")
     again_parser = add_command(RECOMPUTE, "solve every recording by today's method and report what changes")
@@ -76,11 +74,7 @@ def add(history: argparse.ArgumentParser) -> None:
 
 def _add_recompute(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `rig history recompute`: method, number of processes or machines, folder of the report."""
-    add_set(
-        parser,
-        "judge by another threshold or limit than recorded, as in `rig solve`",
-        metavar="NAME=VALUE",
-    )
+    add_set(parser, "judge by another threshold or limit than recorded, as in `rig solve`", metavar="NAME=VALUE")
     parser.add_argument("--estimator", metavar="NAME", help="one estimator for all procedures, as in `rig solve`")
     parser.add_argument(
         "--u-fraction",
@@ -99,9 +93,7 @@ def _add_recompute(parser: argparse.ArgumentParser) -> None:
     workers = parser.add_mutually_exclusive_group()
     workers.add_argument("--jobs", type=int, default=1, metavar="N", help="processes on this computer (default: 1)")
     workers.add_argument(
-        "--dask",
-        metavar="ADDRESS",
-        help="workers of this Dask scheduler, as tcp://10.0.0.2:8786 (extra `dask`)",
+        "--dask", metavar="ADDRESS", help="workers of this Dask scheduler, as tcp://10.0.0.2:8786 (extra `dask`)"
     )
 
 

@@ -16,10 +16,7 @@ DEMO = "configs/demo.yaml"
 def add(parser: ArgumentParser) -> None:
     """Add the arguments of `rig demo`."""
     parser.add_argument(
-        "--files",
-        type=Path,
-        metavar="DIR",
-        help="only copy the supplied configurations and examples into this folder",
+        "--files", type=Path, metavar="DIR", help="only copy the supplied configurations and examples into this folder"
     )
     parser.add_argument("--out", type=Path, metavar="DIR", help="run folder (default: a new one in runs)")
     add_json(parser)
@@ -42,7 +39,7 @@ def run(options: Namespace) -> int:
 
 
 def _copy(folder: Path) -> int:
-    """Copy each supplied file to the folder under its path, unless it exists there."""
+    """Copy each supplied file to the folder, unless it exists there. Raise Refused `files_not_copied`."""
     import shutil
 
     copied = existing = 0

@@ -55,7 +55,7 @@ class Feed:
                 self._shown.put("ended", {"at": _clock(), "seen_at": self._seen_at})
 
     def look(self, look: Look) -> None:
-        """Show the analysis of the recording so far, from any thread."""
+        """Show the analysis of the recording so far; any thread may call this."""
         with self._lock:
             self._shown.look(look)
 

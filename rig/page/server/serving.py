@@ -172,7 +172,7 @@ def check(address: PageAddress) -> None:
 
 
 def _listen(address: PageAddress) -> socket.socket:
-    """Return the listening socket for uvicorn."""
+    """Return the listening socket for uvicorn. Raise Refused `page_address`."""
     ports = [PORT, 0] if address.port is None else [address.port]
     why: OSError | None = None
     for port in ports:

@@ -44,10 +44,7 @@ class Order:
 
 
 def plan_six_observation(
-    arm: ArmSection,
-    procedure: SixSweepsSection,
-    start_q_rad: Joints | None = None,
-    done: Collection[int] = (),
+    arm: ArmSection, procedure: SixSweepsSection, start_q_rad: Joints | None = None, done: Collection[int] = ()
 ) -> Plan:
     """Plan the movement of SIX, Section III: each wrist in turn rotates in one direction, rests, rotates back, rests.
 
@@ -81,7 +78,7 @@ def _check_span(axes: Array) -> None:
         raise Refused(
             "axes_do_not_span",
             "the swept wrists do not turn the sensors about three independent axes",
-            "Set wrist 2 in arm.home_deg near 90 or -90, and sweep all three wrists or mount the item in more ways",
+            "Set wrist 2 in arm.home_deg near 90 or -90, and sweep all three wrists or use more mountings",
         )
 
 

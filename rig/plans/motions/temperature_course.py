@@ -93,7 +93,7 @@ class TemperatureCourse:
         ]
 
     def _gap(self, temperatures_c: Sequence[float]) -> tuple[float, float] | None:
-        """Return the first gap between sets, counted from the cold end."""
+        """Return the first gap between sets, counted from the cold end, or None."""
         end_k = AT_THE_END * self.max_step_k
         if temperatures_c[0] > self.from_c + end_k:
             return self.from_c, temperatures_c[0]

@@ -154,7 +154,10 @@ class Kvh1775:
         return SensorError("no_kvh", f"{self._where}: nothing came within {self._patience.first_s:g} s", _CABLE)
 
     def _ask(self, command: str, name: str) -> str:
-        """Return the text after `name` in the answer to a command. Raise SensorError `kvh_command_refused`."""
+        """Return the text after `name` in the answer to a command.
+
+        Raise SensorError `kvh_command_refused`, `kvh_link_lost`.
+        """
         answer = re.compile(rb"%s,([^\r\n]*)[\r\n]" % re.escape(name.encode()))
         for wait_s in self._patience.attempts():
             with self.own_port.news:

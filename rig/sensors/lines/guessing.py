@@ -272,7 +272,7 @@ def _unit(shape: Shape, guess: Guess, kind: str, still: Flags) -> dict[str, obje
 
 
 def _rate_unit(shape: Shape, guess: Guess, rates: Array, still: Flags) -> tuple[str, float] | None:
-    """Return the unit and scale of the gyroscope, by a fit of gravity's rotation to its readings."""
+    """Return unit and scale of the gyroscope, by a fit of gravity's rotation to its readings; None if it fits none."""
     if "ax" not in guess.columns or not guess.rate_hz:
         return None
     forces = shape.values[:, [guess.columns.index("a" + axis) for axis in "xyz"]]

@@ -167,7 +167,10 @@ class LinesDevice:
         return float(passed.sum()) * UNITS[self._section.time.unit].size
 
     def _measure_rate_hz(self) -> float:
-        """Return the sample rate, from the median step of the device's time; if that is coarse, from the total time."""
+        """Return the sample rate, from the median step of the device's time; if that is coarse, from the total time.
+
+        Raise SensorError `lines_time_stands`.
+        """
         time_section = self._section.time
         if time_section is None or self.counts.samples < 5:
             return float("nan")

@@ -113,7 +113,11 @@ class MavlinkSource:
     def __init__(
         self, sections: Mapping[str, SensorSection], on_samples: OnSamples, *, patience: Patience = USUAL
     ) -> None:
-        """Connect and set up. Raise as `AutopilotLink` and `refusals` do; autopilot_rate, _other_uid, _several_imus."""
+        """Connect and set up.
+
+        Raise as `AutopilotLink` and `refusals` do; SensorError `autopilot_rate`, `autopilot_other_uid`,
+        `autopilot_several_imus`.
+        """
         self._on_samples = on_samples
         self._imus: dict[str, _ImuStream] = {
             mavlink_section(section).imu: _ImuStream(name, section) for name, section in sections.items()

@@ -101,9 +101,9 @@ def parameter_names(firmware: int, section: MavlinkSection) -> ParameterNames:
 
 
 def refusals(sensor: str, names: ParameterNames, parameters: Mapping[str, float]) -> Iterator[SensorError]:
-    """Yield errors for corrections that cannot be undone:
+    """Yield the SensorErrors of corrections that cannot be undone.
 
-    `autopilot_corrects`, `autopilot_orientation`, `autopilot_filter_slow`, `autopilot_not_calibrated`,
+    They are `autopilot_corrects`, `autopilot_orientation`, `autopilot_filter_slow`, `autopilot_not_calibrated`,
     `autopilot_parameter_missing`.
     """
     missing = [name for name in names.needed if name not in parameters]
