@@ -17,14 +17,8 @@ MAX_SCALE = 4.0  # largest ratio, or its inverse: a wrong unit gives more, a sen
 STUCK = 0.01  # fraction of the reading of the most sensitive axis, below which an axis is stuck
 MIN_ALIGNMENT = 0.7  # least cosine between an axis and its nominal direction; beyond 45° it is another axis
 CONFUSED_ANGLES = (  # ratios of reading to true value if the unit is wrong
-    (
-        180 / np.pi,
-        "the readings look like degrees per second given as rad/s",
-    ),
-    (
-        np.pi / 180,
-        "the readings look like rad/s declared as °/s, or the rates like degrees per second given as rad/s",
-    ),
+    (180 / np.pi, "the readings look like degrees per second given as rad/s"),
+    (np.pi / 180, "the readings look like rad/s declared as °/s, or the rates like degrees per second given as rad/s"),
 )
 CONFUSED_RATES = (  # ratios of a table's rates over those of its attitudes
     (180 / np.pi, "they look like degrees per second given as rad/s"),

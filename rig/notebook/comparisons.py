@@ -93,7 +93,7 @@ def compare(run: Run, sensor: str, reference: str) -> SensorComparison:
 
 
 def _correction_of(run: Run, name: str, recordings: Sequence[ObservedRun]) -> Reference:
-    """Return the correction of a sensor's readings: that of the turntable or of the run, 1 and 0 if already applied.
+    """Return the correction of a sensor's readings: the turntable's or the run's, or none if already applied.
 
     Raise Refused `nothing_to_compare` if the run has no calibration.
     """

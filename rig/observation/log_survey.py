@@ -62,6 +62,7 @@ def survey_log(samples: Samples) -> LogSurvey:
 
 
 def _count_turns(time_s: Array, rates: Array, rests: Sequence[Window]) -> dict[str, int]:
+    """Count the turns from rest to rest by their axis and sign; see `LogSurvey.turns`."""
     counts: dict[str, int] = {}
     for before, after in pairwise(rests):
         bias = np.mean([rates[inside(time_s, rest)].mean(axis=0) for rest in (before, after)], axis=0)

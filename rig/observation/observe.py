@@ -183,6 +183,7 @@ def _add_drift(average: Average, drift: Array) -> Average:
 def _average_revolution(
     stream: Stream, motion: ArmMotion, sweep: Sweep, turn: Revolution, settings: ObservationThresholds
 ) -> Observation:
+    """Return the observation of a revolution. Raise Fault if its samples or the arm's states are unusable."""
     where = describe(sweep)
     inside = slice_time(stream, turn.start_s, turn.end_s)
     lost = _count_lost(stream, inside, where, settings)

@@ -329,6 +329,7 @@ def _list_stages(
 
 
 def _iterate_clock(clock: TimeBase, board_time_s: Array, readings: Array, motion: KnownMotion) -> TimeBase:
+    """Refine the clock until it settles, with leaps if steps shrink slowly. Raise Fault `time_base_not_found`."""
     moved, inflation = np.zeros(2), None
     for number in range(1, FINE_STEPS + 1):
         before, last = clock, moved

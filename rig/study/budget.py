@@ -108,6 +108,7 @@ def _simulate_batch(effects: Effects, rng: np.random.Generator, draws: int) -> A
 
 
 def _simulate_session(effects: Effects, rng: np.random.Generator) -> Array:
+    """Return the errors / standard uncertainty (2, 6) of a session of sweeps and rests with random `effects`."""
     scale, bias = rng.uniform(0.9, 1.1, 3), rng.uniform(-0.02, 0.02, 3)
     true = _build_session(rng.normal(0, effects.axis_rad, (3, 2)), effects.speed_rad_s)
     nominal = _build_session(np.zeros((3, 2)), effects.speed_rad_s)

@@ -74,6 +74,7 @@ def _moves(readings: BoardReadings, reports: Sequence[HandReport]) -> Iterator[B
 
 
 def _move(readings: BoardReadings, report: HandReport, *, follows: bool) -> BoardMove:
+    """Return the readings of a move that the board accepted. Raise Fault unless all of them arrived."""
     assert report.before is not None and report.after is not None, "accepted moves are between faces"
     times_us, rates = readings.times_us, readings.rates
     marks = [report.rest_us, report.move_us, report.after_us, report.end_us]

@@ -47,7 +47,7 @@ class WhitenedReference:
     growth: Array
 
     def chi_square_of(self, alternatives: Sequence[Array], nuisance: Sequence[Array]) -> list[float]:
-        """Return the χ² of each alternative, with δ estimated together with the largest one: see `WhitenedModel`."""
+        """Return the χ² of each alternative, as `WhitenedModel` says; δ is estimated beside the most likely one."""
         model = self._extend_model(nuisance)
         rotated = [self.rotation @ columns for columns in alternatives]
         delta_rad = self._estimate_delta(model)

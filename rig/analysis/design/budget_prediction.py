@@ -63,6 +63,7 @@ def predict_budgets(config: RigConfig, plan: Plan, turner: TurnerIdentity) -> di
 
 
 def _budget(config: RigConfig, run: PlannedRun, turner: TurnerIdentity, name: str, sensor: SensorSection) -> Budget:
+    """Return the predicted budget of a gyroscope, by the analysis of noise-free readings of the plan."""
     uncertainty, mounting = run.uncertainty, mounting_matrix(sensor.mounting)
     scatters = turner.reading_std_rad > 0
     # The scatter of the readings already includes the jitter.
@@ -148,6 +149,7 @@ def _plan_recording_part(
 
 
 def _average(timed: Timed[Step], run: PlannedRun, sensor: SensorSection) -> Average:
+    """Return an average of zero with the white noise of the part's data sheet."""
     start_s, end_s = timed.window_s
     lasting_s, walk_rad_sqrt_s = end_s - start_s, PARTS[sensor.part].angle_random_walk_rad_sqrt_s
     samples = max(round(lasting_s * sensor.rate_hz), 2)

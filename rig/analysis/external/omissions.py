@@ -65,7 +65,7 @@ def notes_on_speeds(data: ExternalData) -> Iterator[str]:
 
 
 def _are_whole(turned: Array, part: float) -> bool:
-    """Return whether all angles (k,) are whole multiples of a part, at least one."""
+    """Return whether there are angles (k,), and each is a whole multiple, 1 or more, of `part`."""
     multiples = np.rint(turned / part)
     return bool(len(turned) and (multiples > 0).all() and (np.abs(turned / part / multiples - 1) < WHOLE).all())
 

@@ -149,6 +149,7 @@ class _AlignedRecording:
 
 
 def _align_recording(recording: ObservedRun, sensor: str, reference: Reference, rotation: Array) -> _AlignedRecording:
+    """Return both sensors' samples during movement, on the tested one's times. Raise Fault `no_overlap`."""
     delay = _find_delay(recording, sensor, reference.name)
     tested, reference_stream = recording.stream(sensor), recording.stream(reference.name)
     movement = mask_movement(recording.run, tested.time_s)
@@ -220,6 +221,7 @@ def _estimate_noise(rests: Sequence[Array]) -> Array | None:
 def _compare_revolutions(
     recordings: Sequence[ObservedRun], sensor: str, reference: Reference, rotation: Array, gravity_rad_s: Array | None
 ) -> tuple[RevolutionError, ...]:
+    """Return the tested sensor's mean rate minus the reference's, rotated into its axes, in each sweep."""
     turns = list_revolutions(sensor, recordings)
     tested = collect_mean_rates(turns)
     expected = collect_mean_rates(list_revolutions(reference.name, recordings), reference).rotate(rotation)

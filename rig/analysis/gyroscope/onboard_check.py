@@ -116,6 +116,7 @@ def _recall_observation(earlier: Sequence[RunData], recalled: BoardRecalled) -> 
 
 
 def _average_observation(run: RunData, event: BoardObserved) -> _BoardObservation:
+    """Return the mean of the board's samples; the board's own mean if lost messages held some, else NaN."""
     samples, observed = run.samples[event.sensor], event.observation
     times_us = samples["board_time_us"]
     used = slice(*np.searchsorted(times_us, [observed.start_us, observed.end_us]).tolist())

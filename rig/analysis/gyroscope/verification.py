@@ -108,7 +108,7 @@ def _check_complete(runs: Sequence[RunData]) -> None:
 
 
 def _find_reference_error(recordings: Sequence[ObservedRun], reference: Reference) -> float:
-    """Return the largest difference, rad/s, between the reference's speed and the arm's, whatever the mountings."""
+    """Return the largest difference, rad/s, between the magnitudes of the reference's and the arm's rates."""
     turns = list_revolutions(reference.name, recordings)
     rates_rad_s = np.linalg.norm(collect_mean_rates(turns, reference).rate_rad_s, axis=1)
     in_sweeps = rates_rad_s - [turn.speed_rad_s for turn in turns]

@@ -132,11 +132,7 @@ def calibrate_accelerometers(
 
 
 def _calibrate(
-    name: str,
-    recordings: Sequence[ObservedRun],
-    settings: RunSettings,
-    site: Site,
-    gyroscope: SensorResult | None,
+    name: str, recordings: Sequence[ObservedRun], settings: RunSettings, site: Site, gyroscope: SensorResult | None
 ) -> AccelerometerResult:
     sensor = recordings[0].run.sensors[name]
     dwells = tuple(dwell for recording in recordings for dwell in recording.sensors[name].dwells)

@@ -205,6 +205,7 @@ def _combine(
     *,
     earth_rate_known: bool,
 ) -> BiasDrift:
+    """Return the drift: biases with the scale fixed, those of `solve` by repeat, and the temperature slope."""
     times = np.array([np.mean([mean.time_s for mean in repeat]) for repeat in repeats], dtype=np.float64)
     temperatures = np.array([np.mean([mean.temperature_c for mean in repeat]) for repeat in repeats], dtype=np.float64)
     faults = dict[str, Fault]()

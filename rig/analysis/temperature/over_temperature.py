@@ -135,6 +135,7 @@ def _combine(
 def _correct_rates(
     recordings: Sequence[ObservedRun], name: str, surroundings: Surroundings, reference_c: float
 ) -> tuple[list[ObservedRun], OverTemperature]:
+    """Return the recordings with a gyroscope's means corrected to `reference_c`, and the polynomials."""
     inputs = collect_inputs(recordings, name, surroundings)
     parts = [recording.sensors[name] for recording in recordings]
     averages = [turn.average for part in parts for turn in part.revolutions]
@@ -161,6 +162,7 @@ def _correct_rates(
 def _correct_accelerations(
     recordings: Sequence[ObservedRun], name: str, surroundings: Surroundings, reference_c: float
 ) -> tuple[list[ObservedRun], OverTemperature]:
+    """Return the recordings with an accelerometer's means corrected to `reference_c`, and the polynomials."""
     parts = [recording.sensors[name] for recording in recordings]
     timed = [(dwell, recording.clock_offset_s) for recording in recordings for dwell in recording.sensors[name].dwells]
     dwells = [dwell for dwell, _ in timed]

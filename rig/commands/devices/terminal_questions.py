@@ -12,11 +12,7 @@ KeyT = TypeVar("KeyT", bound=str)
 
 
 def ask(
-    question: str,
-    option: str,
-    valid: Callable[[str], str] = str,
-    usual: str | None = None,
-    value: str | None = None,
+    question: str, option: str, valid: Callable[[str], str] = str, usual: str | None = None, value: str | None = None
 ) -> str:
     """Return the answer to a question: the option's value, or text typed by the user, requested until it is valid.
 

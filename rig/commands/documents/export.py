@@ -22,12 +22,7 @@ if TYPE_CHECKING:
 def add(parser: ArgumentParser) -> None:
     """Add the arguments of `rig export`."""
     add_run(parser, "run", "a run folder; for the formats of readings also a log of another program")
-    parser.add_argument(
-        "--format",
-        choices=FORMATS,
-        required=True,
-        help="the format",
-    )
+    parser.add_argument("--format", choices=FORMATS, required=True, help="the format")
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="folder of the files (default: export/FORMAT in the run folder)"
     )

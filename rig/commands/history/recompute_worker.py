@@ -13,14 +13,7 @@ from rig.history.recompute.result_comparison import Answer, RecomputedResult, St
 
 # Refusals that do not judge a recording: it has no such setting or estimator, or this computer cannot solve it.
 UNJUDGED = ("unknown_setting", "wrong_setting", "unknown_estimator")
-NOT_HERE = (
-    "missing_extra",
-    "another_script",
-    "no_script",
-    "not_a_script",
-    "script_failed",
-    "temporary_folder_full",
-)
+NOT_HERE = ("missing_extra", "another_script", "no_script", "not_a_script", "script_failed", "temporary_folder_full")
 
 
 @dataclass(frozen=True, slots=True)

@@ -167,12 +167,7 @@ class RigBench:
         )
 
     def _run_repeatedly(
-        self,
-        folder: Path,
-        configured: Configured,
-        listener: PartListener,
-        answer: Answer,
-        confirm: Callable[[], None],
+        self, folder: Path, configured: Configured, listener: PartListener, answer: Answer, confirm: Callable[[], None]
     ) -> tuple[Outcome, int, str]:
         """Return the part's outcome, the number of repetitions of sweeps, and the agreement with a simulated truth."""
         config = configured.loaded.config

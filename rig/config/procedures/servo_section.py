@@ -35,8 +35,7 @@ class ServoSection(TurnerSection):
         description="centre of mass of all this: x and y from the shaft's axis, z along the shaft from its horn",
     )
     home_deg: JointAngle = Field(
-        default=180.0,
-        description="angle of the shaft, by the servo's encoder, around which the sweeps turn",
+        default=180.0, description="angle of the shaft, by the servo's encoder, around which the sweeps turn"
     )
     transfer_speed_deg_s: float = Field(
         default=60.0, ge=1, le=FASTEST_DEG_S, description="speed of the movements between sweeps"
@@ -45,10 +44,7 @@ class ServoSection(TurnerSection):
         default=125.0, ge=100, le=250, description="how many times a second the shaft's angle is read"
     )
     watchdog_s: float = Field(
-        default=0.3,
-        ge=0.1,
-        le=2.0,
-        description="the servo stops by itself if it receives nothing for this long",
+        default=0.3, ge=0.1, le=2.0, description="the servo stops by itself if it receives nothing for this long"
     )
 
     @property

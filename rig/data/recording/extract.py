@@ -59,11 +59,7 @@ def extract(path: Path) -> Iterator[dict[str, Any] | NDArray[Any]]:
         for name, dataset in rows.items():
             _check(dataset, name)
         _refuse_endless(path, sum(int(dataset.nbytes) for dataset in rows.values()))
-        yield {
-            "schema": schema,
-            "texts": texts,
-            "described": described,
-        }
+        yield {"schema": schema, "texts": texts, "described": described}
         for dataset in rows.values():
             yield dataset[:]
 

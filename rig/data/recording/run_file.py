@@ -259,6 +259,7 @@ def _not_a_run_file(path: Path, why: str) -> Refused:
 
 
 def _settings(contents: Contents, sensors: Mapping[str, RecordedSensor]) -> RunSettings:
+    """Return the settings of a file. Raise ValueError if they contradict its schema or its sensors."""
     settings = settings_from_json(contents.texts["settings"])
     if (settings.elsewhere is None) != (contents.schema != SCHEMA_ELSEWHERE):
         raise ValueError("its settings are those of other readings")

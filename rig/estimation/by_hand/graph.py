@@ -215,6 +215,7 @@ def _rest_columns(row: int) -> tuple[slice, slice]:
 
 
 def _move(graph: Graph, row: int) -> Factor:
+    """Return the factor of a move: its integrated rates take the attitude before it into the attitude after it."""
     integrals, stds = graph.integrals, graph.stds
     design = np.zeros((3, graph.width))
     (first, first_bias), (second, second_bias) = _rest_columns(row), _rest_columns(row + 1)
@@ -246,6 +247,7 @@ def _tilt_factor(graph: Graph, row: int) -> Factor:
 
 
 def _closure(graph: Graph, row: int) -> Factor:
+    """Return the factor of a whole turn: about the vertical, the body returns to its heading."""
     up = graph.faces.up[row]
     design = np.zeros((1, graph.width))
     design[0, _rest_columns(row)[0]], design[0, _rest_columns(row + 1)[0]] = -up, up @ graph.between[row]
@@ -264,6 +266,7 @@ def _bias_walk(graph: Graph, row: int) -> Factor:
 
 
 def _rest(graph: Graph, row: int) -> Factor:
+    """Return the factor of a rest: the gyroscope reads its bias, and its sensitivity times the upward vertical."""
     session, state = graph.session, graph.state
     rest, up = session.rests[row], state.attitudes[row][2]
     design = np.zeros((3, graph.width))
@@ -277,6 +280,7 @@ def _rest(graph: Graph, row: int) -> Factor:
 
 
 def _flat(graph: Graph, row: int, face: int) -> Factor:
+    """Return the factor of a rest on a face: the vertical in the body is the normal of that face."""
     state = graph.state
     axis, up = axis_of(FACES[face]), state.attitudes[row][2]
     perpendicular = perpendicular_axes(axis)
@@ -288,6 +292,7 @@ def _flat(graph: Graph, row: int, face: int) -> Factor:
 
 
 def _acceleration(graph: Graph, row: int) -> Factor:
+    """Return the factor of a rest's mean acceleration, in two directions across the vertical and along it."""
     session, state, conditions = graph.session, graph.state, graph.conditions
     rest = session.rests[row]
     assert rest.acceleration_m_s2 is not None and rest.acceleration_noise_m_s2 is not None
@@ -311,6 +316,7 @@ def _acceleration(graph: Graph, row: int) -> Factor:
 
 
 def _priors(graph: Graph) -> Iterator[Factor]:
+    """Yield a prior for each block of parameters, for the first bias, and for each heading that no move determines."""
     state, conditions, width = graph.state, graph.conditions, graph.width
 
     def prior(name: str, columns: slice, residual: Array, std: float) -> Factor:

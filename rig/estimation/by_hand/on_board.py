@@ -109,6 +109,7 @@ def _vertical_on_face(centre: Array, face: int) -> tuple[Array, Array]:
 
 
 def _rest_equations(centre: Array, rest: BoardRest, noise_rad_s: float) -> Iterator[Equation]:
+    """Yield the equations of a rest, linear in a step from `centre` (33,): it reads the bias, and gravity's effect."""
     up, _ = _vertical_on_face(centre, rest.face)
     sensitivity = centre[GRAVITY].reshape(3, 3)
     for axis in range(3):
@@ -120,6 +121,7 @@ def _rest_equations(centre: Array, rest: BoardRest, noise_rad_s: float) -> Itera
 
 
 def _move_equations(centre: Array, move: BoardMove) -> Iterator[Equation]:
+    """Yield the equations of a move: its integrated rotation takes the vertical of one rest into that of the next."""
     matrix, sensitivity = centre[MATRIX].reshape(3, 3), centre[GRAVITY].reshape(3, 3)
     (up, up_axes), (after, after_axes) = (
         _vertical_on_face(centre, move.before.face),

@@ -259,6 +259,7 @@ def _find_first_face(session: HandRecording, conditions: SessionConditions, but:
 
 
 def _budget(fit: GraphFit, to_parameters: Array, clock: Array) -> Budget:
+    """Return the budget, which propagates each cause of the factors by the gain of the least-squares solution."""
     chosen = parameter_columns(fit)
     covariances = {name: np.zeros((6, 6)) for name in LINES}
     line_of = {cause: name for name, (_, causes, _) in LINES.items() for cause in causes}
@@ -292,6 +293,7 @@ def _largest_of_factor(fit: GraphFit, row: Factor) -> float:
 
 
 def _summarise_move(fit: GraphFit, row: int) -> MoveSummary:
+    """Return how a move turned the body, and how well it fits."""
     move, turns = fit.session.moves[row], fit.faces.turns[row]
     closure = next((factor for factor in fit.factors if factor.kind == CLOSURE and factor.index == row), None)
     return MoveSummary(

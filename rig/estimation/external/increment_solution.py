@@ -216,7 +216,10 @@ def _conditioning(mixed: Mixed) -> refusals.Conditioning:
 
 
 def _check(fixes: Fixes, remaining: Fixes, settled: _Settled) -> None:
-    """Raise Fault `attitude_untrustworthy`, `clocks_apart`, `ill_conditioned`, `wrong_unit`, `mirrored_axis`."""
+    """Raise a Fault if residuals, clock, outliers, precision or axes of the solution are implausible.
+
+    The Faults are `attitude_untrustworthy`, `clocks_apart`, `ill_conditioned`, `wrong_unit`, `mirrored_axis`.
+    """
     rms_rad = float(np.sqrt(np.mean(settled.solved.residuals**2)))
     if rms_rad > UNTRUSTWORTHY_RAD:
         raise refusals.untrustworthy_attitudes(f"the increments of attitudes and gyroscope differ by {rms_rad:.2g} rad")

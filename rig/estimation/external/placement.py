@@ -84,7 +84,7 @@ class _Linear:
 
 @dataclass(frozen=True, slots=True)
 class _PlacementFits:
-    """The fits for k values of ζ: steps (k, q), their covariances (k, q, q) by cause, log-likelihoods (k,)."""
+    """The fits for k placement errors ζ: steps (k, q) of θ, covariances (k, q, q) by cause, log-likelihoods (k,)."""
 
     steps: Array
     causes: dict[str, Array]

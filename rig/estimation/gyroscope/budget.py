@@ -156,6 +156,7 @@ def budget(explained: Explained, unknown: Unknown) -> Budget:
 
 
 def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributor]:
+    """Yield the contributors; the solution's response propagates a pattern of errors in the readings."""
     solution, inputs = explained.solution, explained.inputs
     matrix = solution.matrix
 

@@ -214,6 +214,7 @@ def solver(
 def _explain(
     inputs: VectorInputs, mounting: Array, gravity_m_s2: Array | None, process: BiasProcess | None
 ) -> Explained:
+    """Solve with a steady bias, take `process` or estimate it from the residuals, and solve again if it drifts."""
     several = len(inputs.speeds_rad_s) > 1
     arm_errors = inputs.arm_errors_rad_s
 

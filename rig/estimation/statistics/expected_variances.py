@@ -59,11 +59,7 @@ def estimate_variances(fit: ResidualInputs, shares: Sequence[float]) -> ErrorSiz
     sizes = np.geomspace(SMALLEST_RAD, LARGEST_RAD, SIZES)
     columns = fit.slopes.shape[1]
     free = np.linalg.qr(fit.slopes, mode="complete")[0][:, columns:].T  # contrasts, free of the columns
-    residuals, covariance, walk = (
-        free @ fit.residuals,
-        free @ fit.covariance @ free.T,
-        free @ fit.walk @ free.T,
-    )
+    residuals, covariance, walk = (free @ fit.residuals, free @ fit.covariance @ free.T, free @ fit.walk @ free.T)
     whiteners = [np.linalg.inv(np.linalg.cholesky(covariance + rate**2 * walk)) for rate in walks]
     of_arm = [free @ fit.effects(share) for share in shares]
     log_posterior = np.array(

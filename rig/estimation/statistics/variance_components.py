@@ -144,10 +144,7 @@ class MixedModel:
         factor = cho_factor(self.covariance(std), lower=True)
         weights = cho_solve(factor, self.mixed.design) @ fit.covariance
         parts = [self.mixed.fixed, *(np.square(std)[:, None, None] * self.mixed.components)]
-        return [
-            *(weights.T @ part @ weights for part in parts),
-            fit.covariance * self.mixed.precision @ fit.covariance,
-        ]
+        return [*(weights.T @ part @ weights for part in parts), fit.covariance * self.mixed.precision @ fit.covariance]
 
     def expand(self, maxima: Array, wanted: Array) -> Array:
         """Return the half-widths (q,) of 95.45 % intervals of `wanted` (q, p) combinations of θ about their estimates.
@@ -159,6 +156,7 @@ class MixedModel:
         variances = []
 
         def evaluate(logarithms: Array) -> float:
+            """Return the log-posterior of standard deviations; keep the estimates there and their variances."""
             try:
                 fit = self.solve(np.exp(logarithms))
             except np.linalg.LinAlgError:

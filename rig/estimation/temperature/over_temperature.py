@@ -259,6 +259,7 @@ class _ParameterFits:
     """The common part of fits of all orders: whitened readings without the poses' offsets."""
 
     def __init__(self, readings: RepeatedMeans, reference_c: float, range_c: tuple[float, float]) -> None:
+        """Whiten the readings. Powers are of (T − `reference_c`) / `span`, at most 1 in size within `range_c`."""
         self.span = max(abs(limit_c - reference_c) for limit_c in range_c)
         poses = np.eye(int(readings.poses.max()) + 1)[readings.poses]
         self.repeats = int(poses.sum(axis=0).min())
@@ -305,6 +306,7 @@ class _ParameterFits:
         return np.asarray(basis[:, poses.shape[1] :].T @ whitened[:, poses.shape[1] :], dtype=np.float64)
 
     def _process(self, readings: RepeatedMeans, poses: Array) -> BiasProcess:
+        """Return the bias process in the residuals of the polynomials of the highest order."""
         some = self.powers[:, 1 : self.highest + 1]
         turned = [readings.inputs * power[:, None] for power in some.T]
         design = np.column_stack([poses, some, *turned, *([self.loop] if self.both_ways else [])])
@@ -372,6 +374,7 @@ class _ParameterFits:
     def _fit(
         self, orders: tuple[int, int], values: Array, covariance: Array, fixed: Array, aicc: float
     ) -> _TemperatureFit:
+        """Return the fit of `orders` with `values` (p,): by axis those of scale, bias and loop, and last the lag."""
         of_scale, of_bias = orders
         per_axis = (len(values) - 1) // 3
         by_axis = values[:-1].reshape(3, per_axis)

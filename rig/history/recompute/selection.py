@@ -38,11 +38,7 @@ def list_stated_results(history: History, selection: Selection) -> tuple[StatedR
     runs = chosen(query.order_by(_RUN.started_utc, _RUN.id), replace(selection, serial_number=None, part=None))
     with history.engine.connect() as connection:
         rows = connection.execute(runs).all()
-        recordings, places, certificates = (
-            _recordings(connection),
-            _places(connection),
-            _certificates(connection),
-        )
+        recordings, places, certificates = (_recordings(connection), _places(connection), _certificates(connection))
     return tuple(
         StatedResult(
             row.id,

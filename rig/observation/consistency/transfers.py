@@ -166,6 +166,7 @@ def _find_transfers(run: RunData, stream: Stream, motion: ArmMotion) -> Iterator
 
 
 def _whole_transfer(start_s: float, end_s: float, stream: Stream, motion: ArmMotion) -> Iterator[MotionInterval]:
+    """Yield the wrists' transfer between two times, cut to whole samples; nothing if samples or states are missing."""
     transfer = find_transfer(motion, start_s, end_s)
     if transfer is None:
         return

@@ -236,6 +236,7 @@ def _list_omitted(rows: _ReferenceRows, kept: _ReferenceRows, reason: str) -> It
 
 
 def _rows(time_s: Array, rate: Array, fixes: _ReferenceRows) -> Rows:
+    """Average the samples in each row's window; without noise if a row has too few samples for an estimate."""
     cuts = [rate[inside(time_s, window)] for window in fixes.windows]
     counts = np.array([len(cut) for cut in cuts])
     noise = np.array([scatter_of(cut)[:2] for cut in cuts]) if counts.min() >= MIN_SAMPLES else None
@@ -295,6 +296,7 @@ def _windows(rows: Mapping[str, Array]) -> list[Window]:
 
 
 def _rotations(rows: Mapping[str, Array]) -> Array:
+    """Return the rotations (N, 3, 3) of the rows' quaternions. Raise Refused `bad_quaternion`."""
     from scipy.spatial.transform import Rotation
 
     quaternions = np.column_stack([rows[name] for name in QUATERNION])

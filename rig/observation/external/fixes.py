@@ -111,7 +111,7 @@ def _fixes(turning: Turning, still: NDArray[np.bool_], window_s: float) -> Fixes
 
 
 def _measure_walk(turning: Turning, rests_s: Array) -> tuple[float, float]:
-    """Return the sum of squares in rad²/s, and its dof, of the random walk in rests (k, 2), from means over `BATCH_S`.
+    """Return the angle random walk in rests (k, 2), from means over `BATCH_S`: sum of squares, rad²/s, and its dof.
 
     Batch means are used because the readings' noise may be coloured over a few samples.
     """

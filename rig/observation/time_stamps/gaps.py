@@ -33,6 +33,7 @@ def find_hiding_gaps(time_s: Array, readings: Array, gaps: NDArray[np.intp]) -> 
 
 
 def _hidden_rad(time_s: Array, readings: Array, turned: Array, gap: int) -> float:
+    """Return the standard deviation, rad, of the rotation over the step `gap`; see `hidden_angles_rad`."""
     lasts_s = float(time_s[gap + 1] - time_s[gap])
     if lasts_s > LONGEST_S:
         return np.inf

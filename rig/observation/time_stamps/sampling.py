@@ -177,6 +177,7 @@ def find_typical_interval_s(time_s: Array) -> float:
 
 
 def _count_missing(time_s: Array, width: int, quantile: float) -> _PeriodCandidate:
+    """Return the period, and the readings missing in each step, if readings arrive in packets of `width`."""
     steps_s, numbers = np.diff(time_s), np.arange(len(time_s))
     interval_s, last_s = _interval_quantile(time_s, max(8, 4 * width), quantile), 0.0
     missing, fit = np.zeros(len(steps_s), dtype=np.intp), 0.0

@@ -61,6 +61,7 @@ def bias_curves(entry: OverTemperatureEntry, quantity: Quantity) -> Curves:
 
 
 def _curves(entry: OverTemperatureEntry, values: Array, widths: Array, units: Sequence[DisplayUnit]) -> Curves:
+    """Return curves of values (n, 3) ± widths (n, 3) at the temperatures of the entry's table."""
     reach, unit = reach_in(float((np.abs(values) + widths).max()), units)
     low, high = entry.range_c
 

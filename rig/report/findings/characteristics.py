@@ -154,12 +154,7 @@ EARTHS: Final[Mapping[Outlet, str]] = {
     "exports": "it is a property of the site, not of the sensor",
 }  # fmt: skip
 EARTH_RATE_SIZE: Final = Characteristic(
-    "size of the Earth's rate",
-    [""],
-    _bias_units,
-    _size_of_earths_rate,
-    Series("e", "the Earth's rate"),
-    EARTHS,
+    "size of the Earth's rate", [""], _bias_units, _size_of_earths_rate, Series("e", "the Earth's rate"), EARTHS
 )
 EARTH_RATE: Final = Characteristic(
     "the Earth's rate in the arm's base",
@@ -183,7 +178,4 @@ OF_THE_RIG: Final = (
 
 def every_characteristic() -> tuple[Characteristic, ...]:
     """Return all characteristics in the order in which a history shows them; those of installed kinds are last."""
-    return (
-        *OF_THE_RIG,
-        *(row for kind in installed_kinds() for row in kind.result.characteristics),
-    )
+    return (*OF_THE_RIG, *(row for kind in installed_kinds() for row in kind.result.characteristics))

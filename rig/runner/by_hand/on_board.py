@@ -84,6 +84,7 @@ class FollowedSession:
             self._ask(wrong)
 
     def _judge(self, report: HandReport) -> Fault | None:
+        """Note the rest and the move that the board judged; return the Fault of a refused move."""
         if report.after is not None:
             self._note_rest(report, report.after)
         if report.outcome == "nothing":

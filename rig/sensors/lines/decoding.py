@@ -90,6 +90,7 @@ class LineReader:
         return LineBatch(np.zeros((0, self._columns)), np.zeros(0, np.int64), comments, b"")
 
     def _decode(self, data: bytes) -> LineBatch:
+        """Return the samples of whole lines: all at once, then those that failed one by one."""
         raw = np.frombuffer(data, np.uint8)
         self.unprintable += int(np.count_nonzero((raw >= 0x7F) | (raw < 9)))
         line_ends = np.flatnonzero(raw == _NEWLINE)

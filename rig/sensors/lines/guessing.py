@@ -158,6 +158,7 @@ def _find_time(shape: Shape, guess: Guess) -> None:
 
 
 def _set_time(guess: Guess, index: int, column: Array, unit: str) -> None:
+    """Enter the column as the time in `unit`, with its wrap and the rate of the lines, into the guess."""
     wrap = _wrap(column)
     if wrap is None and (unit in {"s", "ns"} or column.max() >= 2**32):
         wrap = 0
@@ -214,6 +215,7 @@ def _find_triads(shape: Shape, guess: Guess, still: Flags) -> None:
 
 
 def _kind(values: Array, still: Flags) -> str | None:
+    """Return the kind of a triad (n, 3), "g", "a" or "m", by its norms at rest and in rotation; None if unclear."""
     rest, moving = values[still], values[~still]
     sizes = np.linalg.norm(values, axis=1)
     level = float(np.median(sizes[still]))
@@ -307,6 +309,7 @@ def _rate_unit(shape: Shape, guess: Guess, rates: Array, still: Flags) -> tuple[
 
 
 def _find_temperature(shape: Shape, guess: Guess, still: Flags) -> None:
+    """Take the first unknown column with a mean of 10 to 60 and small changes as the temperature in °C."""
     if "temperature" in guess.columns:
         return
     for index, name in enumerate(guess.columns):

@@ -198,6 +198,7 @@ class Stamper:
         return steps
 
     def _compute_times_s(self, numbers: NDArray[np.int64], device_s: Array, host_time_s: float) -> Array:
+        """Return the samples' times: counted, by the device, or by smoothed arrival, as the section says."""
         if self.section.clock == "counted":
             return numbers / self.rate_hz
         if self.section.clock == "device":

@@ -106,6 +106,7 @@ class SimulatedHand:
         self.face = to
 
     def _turn(self, turns: int, start_s: float, mistake: Mistake | None) -> None:
+        """Turn the body about the vertical by whole `turns`, with the hand's error and a possible mistake."""
         kind = mistake.kind if mistake is not None else None
         turns = {"two_turns": 2 * turns, "other_way": -turns}.get(str(kind), turns)
         error_rad = 1e-3 * self.habits.closure_mrad * self._rng.normal()

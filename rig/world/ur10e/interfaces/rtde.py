@@ -216,7 +216,7 @@ class RtdeSession:
 
 
 def _size_bytes(kinds: list[str]) -> int:
-    """Return the bytes of values of these types, or of the types' list if larger."""
+    """Return the size in bytes of values of these types, or of the list of the types' names if larger."""
     return max(struct.calcsize(">" + "".join(TYPES[kind][0] for kind in kinds if kind in TYPES)), len(",".join(kinds)))
 
 
