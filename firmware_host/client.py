@@ -57,7 +57,10 @@ class Board:
     """
 
     def __init__(self, port: str, baud: int, on_samples: Callable[[SampleBatch], None], timeout_s: float = 4.0) -> None:
-        """Open the port, identify the board. Raise BoardError no_port, no_board, wrong_baud_rate, version_mismatch."""
+        """Open the port, identify the board.
+
+        Raise BoardError `no_port`, `no_board`, `wrong_baud_rate`, `version_mismatch`.
+        """
         self._on_samples = on_samples
         self._timeout_s = timeout_s
         self._streaming = False

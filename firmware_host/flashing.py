@@ -82,7 +82,7 @@ def _bad_image(why: str) -> BoardError:
 def find_probe(probe_id: str | None = None) -> Any:
     """Return the only connected debug probe (of pyocd), or the one whose id contains `probe_id`.
 
-    Raise BoardError: flash_extra_missing, no_probe, several_probes, other_microcontroller.
+    Raise BoardError `flash_extra_missing`, `no_probe`, `several_probes`, `other_microcontroller`.
     """
     try:
         from pyocd.core.helpers import ConnectHelper
@@ -123,8 +123,8 @@ def _other_microcontroller(what: str) -> BoardError:
 def flash_by_probe(image: bytes, probe: Any) -> None:
     """Program, read back and start `image` through a probe of `find_probe`.
 
-    Only the pages of the image are erased, so stored calibrations remain. Raise BoardError: other_microcontroller,
-    flash_failed.
+    Only the pages of the image are erased, so stored calibrations remain. Raise BoardError `other_microcontroller`,
+    `flash_failed`.
     """
     from pyocd.core.exceptions import Error
     from pyocd.core.session import Session
@@ -183,7 +183,7 @@ def flash_by_drive(image: bytes, drive: Path, timeout_s: float = DRIVE_TIMEOUT_S
     """Copy `image` to the Nucleo's USB drive and wait until the board has taken it.
 
     The drive is virtual: the probe programs the copied file, restarts the target, and mounts the drive again, with a
-    FAIL.TXT after a failure. Raise BoardError: no_drive, not_a_nucleo_drive, flash_failed, flash_unconfirmed.
+    FAIL.TXT after a failure. Raise BoardError `no_drive`, `not_a_nucleo_drive`, `flash_failed`, `flash_unconfirmed`.
     """
     refuse_other_drive(drive)
     copied, failure = drive / IMAGE_NAME, drive / "FAIL.TXT"
@@ -224,7 +224,7 @@ def flash_by_drive(image: bytes, drive: Path, timeout_s: float = DRIVE_TIMEOUT_S
 def find_drive(candidates: Iterable[Path] | None = None) -> Path:
     """Return the only Nucleo-L432KC's drive among `candidates`, by default all mounted drives.
 
-    Raise BoardError: no_drive, several_drives.
+    Raise BoardError `no_drive`, `several_drives`.
     """
     drives = [drive for drive in (_list_drives() if candidates is None else candidates) if _code(drive) == NUCLEO_CODE]
     if not drives:

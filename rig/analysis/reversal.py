@@ -63,7 +63,7 @@ def _require_calibrated(run: str, outcome: Outcome, name: str) -> AsMounted:
 
 
 def _reversal(runs: Sequence[AsMounted]) -> MagnetometerReversal:
-    """Separate the field of the magnetometer from that of the arm. Raise Refused `runs_do_not_match`."""
+    """Separate the magnetometer's bias from the arm's field. Raise Refused `runs_do_not_match`."""
     first = _list_common(runs[0])
     for other in runs[1:]:
         for what, value in _list_common(other).items():

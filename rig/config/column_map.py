@@ -103,7 +103,7 @@ class TableSection(Section):
 
     @model_validator(mode="after")
     def require_rates_of_all_axes(self) -> Self:
-        """Refuse rates of only some axes, because the item's rate needs the rates of all axes."""
+        """Refuse columns without a unit, and rates of only some axes, because the item's rate needs all axes."""
         _fit("time", self.time, TIME)
         if any(column.unit is None for axis in self.axes for column in (self.time, axis.angle, axis.rate) if column):
             raise ValueError("say the unit of every column of a table")
@@ -137,7 +137,7 @@ class ColumnMap(Section):
 
     @model_validator(mode="after")
     def check_combination(self) -> Self:
-        """Refuse a column whose stated unit contradicts the unit in its name."""
+        """Refuse a unit that contradicts a column's name, a rate beside a column of times, and motion with a table."""
         for section, rate_hz in ((self.samples, self.samples_rate_hz), (self.motion, self.motion_rate_hz)):
             for name, column in section.items():
                 _fit(name, column, next((what for suffix, what in SUFFIXES if name.endswith(suffix)), NUMBER))

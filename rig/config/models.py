@@ -241,7 +241,7 @@ class SensorsConfig(Section):
     @field_validator("sensors")
     @classmethod
     def match_sensors(cls, sensors: dict[str, SensorSection]) -> dict[str, SensorSection]:
-        """Refuse sensors that share a select line, port, IMU or name, and a second reference."""
+        """Refuse shared select lines, ports, IMUs and names, an overloaded port, a second or only a reference."""
         sensor_at: dict[str, str] = {}
         for name, sensor in sensors.items():
             if sensor.mavlink is not None:
@@ -270,7 +270,7 @@ class SensorsConfig(Section):
     @field_validator("sensors")
     @classmethod
     def check_link_rate(cls, sensors: dict[str, SensorSection], info: ValidationInfo) -> dict[str, SensorSection]:
-        """Refuse data rates that exceed the link's capacity. If a sensor has two message sizes, the larger must fit."""
+        """Refuse sensors on a missing board, and data rates beyond the link's capacity, by the larger message size."""
         streams = _streams(sensors)
         if "board" not in info.data or not streams:
             return sensors
@@ -284,7 +284,7 @@ class SensorsConfig(Section):
     def match_magnetometers(
         cls, magnetometers: dict[str, MagnetometerSection], info: ValidationInfo
     ) -> dict[str, MagnetometerSection]:
-        """Refuse a magnetometer with a sensor's name, and rates that exceed the link's capacity."""
+        """Refuse a magnetometer with a sensor's name or without a board, and rates that exceed the link's capacity."""
         sensors = info.data.get("sensors", {})
         if both := sorted({*sensors, *_device_sensor_names(sensors)} & magnetometers.keys()):
             raise ValueError(f"{', '.join(both)} is the name of one of the sensors already")
@@ -334,7 +334,7 @@ class RigConfig(SensorsConfig):
 
     @property
     def arm(self) -> ArmSection:
-        """The robot arm that turns the sensors. Raises TypeError if another turner does."""
+        """The robot arm that turns the sensors. Raise TypeError if another turner does."""
         if not isinstance(self.turner, ArmSection):
             raise TypeError(f"no arm turns the sensors: the configuration has a {type(self.turner).__name__}")
         return self.turner

@@ -274,7 +274,7 @@ def _check_saturation(stream: Stream, inside: slice, where: str) -> None:
 
 
 def _check_stuck(stream: Stream, inside: slice, where: str) -> None:
-    """Raise Fault `stuck_sensor` if no axis' readings change although the noise exceeds one count."""
+    """Raise Fault `stuck_sensor` if all axes repeat one reading for long, although the noise is a count or more."""
     counts = stream.sensor.channel(RATE).counts(stream.raw)
     if np.median(np.abs(np.diff(counts, axis=0)), axis=0).min() < 1:
         return

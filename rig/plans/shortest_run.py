@@ -258,7 +258,7 @@ class _TurnerSearch:
             return None
 
     def ending(self, procedure: ProcedureSection, wanted: TargetUncertainty) -> Mapping[str, float]:
-        """Return the keys that state the target, if the run has several repeats."""
+        """Return the keys that state the target, if the run has several repeats and no stages, else none."""
         if not isinstance(procedure, SixObservationSection) or procedure.repeats == 1 or procedure.stages:
             return {}
         sizes = {"target_scale_u": wanted.scale, "target_bias_u_rad_s": wanted.bias_rad_s}

@@ -56,14 +56,14 @@ class TurnerKind(Generic[SectionT, ReportT]):
     - name: the kind in a configuration (`turner: kind: name`).
     - section: the model of the section `turner:`.
     - connect: returns a context manager of the turner, which is stopped at its end. The function passed gets every
-      state, in order; the file takes the output of a maker's client. Raises Refused if no turner answers.
-    - look: reads the turner's report about itself; nothing moves and no program is stopped. Raises Refused as
+      state, in order; the file takes the output of a maker's client. Raise Refused if no turner answers.
+    - look: reads the turner's report about itself; nothing moves and no program is stopped. Raise Refused as
       `connect`.
     - stance: describes its pose in a line of text.
     - problems: lists all reasons not to execute the last of the plans, before anything moves; without a report, only
       those due to the plans. Pure.
     - describe_configured: returns the configured turner with its nominal geometry, before any connection.
-    - describe_connected: returns the connected turner for the recording. Raises `Refused` for another turner.
+    - describe_connected: returns the connected turner for the recording. Raise `Refused` for another turner.
     - carried: returns the payload to set on the turner.
     - words: its wording in documents and messages.
     - fields: the fields of its states after times and joints, in the order of `to_record`.

@@ -141,7 +141,7 @@ class ClientConnection:
         self.watch()
 
     def watch(self) -> None:
-        """Tell the selector which events this connection waits for."""
+        """Tell the selector which events this connection waits for; close it if its session ends and all is sent."""
         if self.session.closing and not self._unsent:
             self.close()
             return

@@ -24,7 +24,7 @@ class FlashMemory:
       detects; with `flags_lost` it does not report which, as in the chip's errata on a power loss during an operation.
     - `on_change`: called after every change.
 
-    Raises BoardError if the image does not fit.
+    Raise BoardError if the image does not fit.
     """
 
     def __init__(self, image: bytes, store: bytes = b"", torn: frozenset[int] = frozenset()) -> None:

@@ -65,7 +65,7 @@ def find_reference_limits(sizes: Mapping[str, float], quantity: Quantity) -> tup
 
 
 def _means_of_solve(explained: Explained) -> Means:
-    """Return the means from which the solution was computed."""
+    """Return the means of the solution: modelled rates along the sensor's axes, windows, and sweeps."""
     inputs_of_solve = explained.inputs
     turns = np.flatnonzero(inputs_of_solve.turns_rad_s.any(axis=1))
     sweep = np.full(len(inputs_of_solve.turns_rad_s), REST)

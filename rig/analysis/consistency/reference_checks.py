@@ -89,16 +89,14 @@ class WhitenedReference:
         delta_rad = self._estimate_delta(model)
         size = np.sqrt(1 + delta_rad**2 * self.growth)[:, None]
         rotated = [self.rotation @ columns for columns in alternatives]
-        nuisance = [(columns, remaining_directions(orthonormal_basis(model), columns)) for columns in rotated]
+        new_parts = [(columns, remaining_directions(orthonormal_basis(model), columns)) for columns in rotated]
         limits = [
             (columns, self._limit(model, new, delta_rad, false_alarm_probability))
-            for columns, new in nuisance
+            for columns, new in new_parts
             if new.shape[1]
         ]
-        decoupled = [(columns / size, lambda _, limit=limit: limit) for columns, limit in limits]
-        return minimal_detectable_size(
-            orthonormal_basis(model / size), self.rotation @ fault_patterns / size, decoupled
-        )
+        whitened = [(columns / size, lambda _, limit=limit: limit) for columns, limit in limits]
+        return minimal_detectable_size(orthonormal_basis(model / size), self.rotation @ fault_patterns / size, whitened)
 
     def _limit(self, model: Array, new: Array, delta_rad: float, false_alarm_probability: float) -> float:
         """Return the critical value of orthonormal columns that the model does not contain."""
@@ -184,12 +182,12 @@ def _detection_limits(
         [segment_columns(readings, dwell) for dwell in range(readings.dwells)],
         false_alarm_probability / segments,
     )
-    decoupled = {
+    sizes = {
         fault_mode.what: whitened.minimal_detectable_size(fault_mode.patterns(readings), *tests[fault_mode.check])
         for fault_mode in FAULT_MODES
         if fault_mode.check in tests
     }
-    return {what: size for what, size in decoupled.items() if np.isfinite(size)}
+    return {what: size for what, size in sizes.items() if np.isfinite(size)}
 
 
 def _whiten_readings(readings: ReferenceModel, *, drifting: bool) -> WhitenedReference:

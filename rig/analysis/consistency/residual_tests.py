@@ -84,11 +84,8 @@ def find_outliers(
     If only two segments determine a parameter, either may be the outlier, and both are returned.
     """
     remaining, nuisance = list(segments), list[Array]()
-    per_segment, most, outliers = (
-        false_alarm_probability / len(remaining),
-        (len(remaining) + 1) // 2,
-        list[tuple[int, Statistic]](),
-    )
+    outliers = list[tuple[int, Statistic]]()
+    per_segment, most = false_alarm_probability / len(remaining), (len(remaining) + 1) // 2
     while len(outliers) < most:
         chi_square_of = dict(zip(remaining, model.chi_square_of(list(map(columns, remaining)), nuisance), strict=True))
         worst = max(remaining, key=lambda segment: chi_square_of[segment])
@@ -105,9 +102,9 @@ def find_outliers(
 def orthonormal_basis(columns: Array) -> Array:
     """Return an orthonormal basis of the span of columns."""
     sizes = np.linalg.norm(columns, axis=0)
-    remaining, singular, _ = np.linalg.svd(columns / np.where(sizes > 0, sizes, 1.0), full_matrices=False)
-    outliers: Array = remaining[:, singular > 1e-6 * singular[0]]
-    return outliers
+    directions, singular, _ = np.linalg.svd(columns / np.where(sizes > 0, sizes, 1.0), full_matrices=False)
+    basis: Array = directions[:, singular > 1e-6 * singular[0]]
+    return basis
 
 
 def remaining_directions(model_basis: Array, columns: Array) -> Array:
@@ -115,9 +112,9 @@ def remaining_directions(model_basis: Array, columns: Array) -> Array:
     sizes = np.linalg.norm(columns, axis=0)
     new = columns / np.where(sizes > 0, sizes, 1.0)
     new = new - model_basis @ (model_basis.T @ new)
-    remaining, singular, _ = np.linalg.svd(new, full_matrices=False)
-    detected: Array = remaining[:, singular > INDEPENDENT]
-    return detected
+    directions, singular, _ = np.linalg.svd(new, full_matrices=False)
+    basis: Array = directions[:, singular > INDEPENDENT]
+    return basis
 
 
 def chi_square_of(readings: Array, base: Array, columns: Array | None) -> tuple[float, int]:
@@ -129,9 +126,9 @@ def chi_square_of(readings: Array, base: Array, columns: Array | None) -> tuple[
     unexplained = readings - model_basis @ (model_basis.T @ readings)
     if columns is None:
         return float(unexplained @ unexplained), len(readings) - model_basis.shape[1]
-    detected = remaining_directions(model_basis, columns)
-    outliers = detected.T @ unexplained
-    return float(outliers @ outliers), detected.shape[1]
+    new = remaining_directions(model_basis, columns)
+    projections = new.T @ unexplained
+    return float(projections @ projections), new.shape[1]
 
 
 def minimal_detectable_size(model_basis: Array, patterns: Array, alternatives: Iterable[Alternative]) -> float:
@@ -144,11 +141,11 @@ def minimal_detectable_size(model_basis: Array, patterns: Array, alternatives: I
     """
     from scipy.special import chndtrinc
 
-    detected = np.zeros(patterns.shape[1])
+    detected = np.zeros(patterns.shape[1])  # per fault pattern: 1 / the smallest detected size
     for columns, limit in alternatives:
         new = remaining_directions(model_basis, columns)
         if count := new.shape[1]:
             size = np.sqrt(chndtrinc(limit(count), count, 1 - DETECTION_PROBABILITY))
             detected = np.maximum(detected, np.linalg.norm(new.T @ patterns, axis=0) / size)
-    readings = detected.min() > VISIBLE * np.linalg.norm(patterns, axis=0).max(initial=0.0)
-    return float(1 / detected.min()) if readings else float(np.inf)
+    is_visible = detected.min() > VISIBLE * np.linalg.norm(patterns, axis=0).max(initial=0.0)
+    return float(1 / detected.min()) if is_visible else float(np.inf)

@@ -193,8 +193,8 @@ def patterns(segments: Segments, matrix: Array, known_errors: KnownErrors) -> Ar
         *_temperature_patterns(segments, matrix, known_errors),
         *_rounding_patterns(segments),
     ]
-    patterns_by_mark = np.concatenate([arm_patterns @ matrix.T, *sensor_patterns])
-    return np.asarray(patterns_by_mark[patterns_by_mark.any(axis=(1, 2))], dtype=np.float64)
+    all_patterns = np.concatenate([arm_patterns @ matrix.T, *sensor_patterns])
+    return np.asarray(all_patterns[all_patterns.any(axis=(1, 2))], dtype=np.float64)
 
 
 def _angle_patterns(segments: Segments, known_errors: KnownErrors) -> Array:
@@ -255,17 +255,17 @@ def _sweeps_between_moves(segments: Segments, joint: int) -> list[list[int]]:
     shows that the joint moved.
     """
     sweeps, firsts = np.unique(segments.sweep, return_index=True)
-    patterns_by_mark: list[list[int]] = []
+    between_moves: list[list[int]] = []
     motion, stood_rad = None, np.nan
     for first in sorted(firsts[sweeps != REST], key=lambda first: float(segments.times_s[first, 0])):
         interval = segments.intervals[first]
         start_rad, end_rad = interval.motion.angles(np.array([interval.start_s, interval.end_s]))[:, joint]
         stands = max(abs(start_rad - stood_rad), abs(end_rad - start_rad)) < STANDS_RAD
         if not stands or interval.motion is not motion:
-            patterns_by_mark.append([])
-        patterns_by_mark[-1].append(int(segments.sweep[first]))
+            between_moves.append([])
+        between_moves[-1].append(int(segments.sweep[first]))
         motion, stood_rad = interval.motion, end_rad
-    return patterns_by_mark
+    return between_moves
 
 
 def rate_errors(intervals: Sequence[MotionInterval], steps: int) -> Array:
@@ -306,12 +306,12 @@ def _end_patterns(interval: MotionInterval) -> list[Array]:
 def _stamp_patterns(segments: Segments, stamp_s: float) -> Array:
     """Return patterns of errors in the time stamps of each transfer's first and last sample; sweeps are unaffected."""
     transfers = np.flatnonzero((segments.sweep < REST) & (stamp_s > 0))
-    patterns_by_mark = np.zeros((len(transfers), *segments.means_rad_s.shape))
+    by_transfer = np.zeros((len(transfers), *segments.means_rad_s.shape))
     lasting_s = np.diff(segments.times_s[transfers])
-    patterns_by_mark[np.arange(len(transfers)), transfers] = (
+    by_transfer[np.arange(len(transfers)), transfers] = (
         np.sqrt(2) * stamp_s * segments.rates_rad_s[transfers] / lasting_s
     )
-    return patterns_by_mark
+    return by_transfer
 
 
 def _speed_patterns(segments: Segments) -> list[Array]:
@@ -330,14 +330,14 @@ def _mount_patterns(segments: Segments, mount_rad: float) -> list[Array]:
 
 def _nonlinearity_patterns(intervals: Sequence[MotionInterval], matrix: Array, curve: NonlinearityPrior) -> Array:
     """Return the patterns (6, N, 3) of cube and square, one standard deviation each, averaged over each interval."""
-    patterns_by_mark = []
+    by_interval = []
     for interval in intervals:
         edges = np.linspace(interval.start_s, interval.end_s, STEPS + 1)
         rates = interval.motion.rate((edges[1:] + edges[:-1]) / 2)
         bent = curvature(matrix, rates) if curve.free else bending(matrix, rates, curve.full_scale_rad_s)
-        patterns_by_mark.append(bent.mean(axis=1))
+        by_interval.append(bent.mean(axis=1))
     sizes = np.ones(6) if curve.free else np.repeat([curve.cube, curve.square], 3)
-    return np.asarray(sizes[:, None, None] * np.stack(patterns_by_mark, axis=1), dtype=np.float64)
+    return np.asarray(sizes[:, None, None] * np.stack(by_interval, axis=1), dtype=np.float64)
 
 
 def _temperature_patterns(segments: Segments, matrix: Array, known_errors: KnownErrors) -> list[Array]:

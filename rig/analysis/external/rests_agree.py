@@ -34,10 +34,10 @@ def check_rests_agree(turning: Turning, solution: KnownIncrements) -> None:
         return
     readings, turned = at_rest.readings_rad_s, at_rest.rates_rad_s @ solution.matrix.T
     bias = np.median(readings, axis=0) - turned.mean(axis=0)
-    wander = np.ptp(np.quantile(readings, (TAIL, 1 - TAIL), axis=0), axis=0) / 2
-    _check_steady(wander)
+    half_range = np.ptp(np.quantile(readings, (TAIL, 1 - TAIL), axis=0), axis=0) / 2
+    _check_steady(half_range)
     other = G_SENSITIVITY_RAD_S**2 + EARTH_RATE_RAD_S**2
-    std = np.sqrt(np.diag(solution.covariance)[BIAS] + wander**2 + _motion_std_rad_s(turned) ** 2 + other)
+    std = np.sqrt(np.diag(solution.covariance)[BIAS] + half_range**2 + _motion_std_rad_s(turned) ** 2 + other)
     normalised = np.abs(solution.bias - bias) / std
     worst = int(np.argmax(normalised))
     if normalised[worst] <= _critical_value(np.inf):
@@ -50,14 +50,14 @@ def check_rests_agree(turning: Turning, solution: KnownIncrements) -> None:
     )
 
 
-def _check_steady(wander_rad_s: Array) -> None:
+def _check_steady(half_range_rad_s: Array) -> None:
     """Raise Fault `bias_jumped` if half the range (3,) of the readings at rest exceeds a plausible bias drift."""
-    axis = int(np.argmax(wander_rad_s))
-    if wander_rad_s[axis] > MOST_RAD_S:
+    axis = int(np.argmax(half_range_rad_s))
+    if half_range_rad_s[axis] > MOST_RAD_S:
         raise Fault(
             "bias_jumped",
-            f"where the attitudes show the body at rest, the gyroscope reads {2 * wander_rad_s[axis]:.2g} rad/s more "
-            f"on {RATE.axes[axis]} at some times than at others",
+            f"where the attitudes show the body at rest, the gyroscope reads {2 * half_range_rad_s[axis]:.2g} rad/s "
+            f"more on {RATE.axes[axis]} at some times than at others",
             "Solve the parts before and after the change separately; look for a knock, or a range that was switched",
         )
 

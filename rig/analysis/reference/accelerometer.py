@@ -214,7 +214,7 @@ def _select_planned(dwells: Sequence[DwellReading], settings: RunSettings) -> tu
 def _split_dwells(
     dwells: Sequence[DwellReading], planned: Sequence[PlannedDwell]
 ) -> tuple[tuple[DwellReading, ...], tuple[DwellReading, ...]]:
-    """Return the dwells that the calibration uses, and those of the last repeat if there are several repeats."""
+    """Return the dwells to use, and those of the last of several repeats. Raise Fault `not_all_attitudes`."""
     if missing := {dwell.index for dwell in planned} - {dwell.index for dwell in dwells}:
         raise Fault(
             "not_all_attitudes",

@@ -70,15 +70,15 @@ class Datasheet:
 def read_datasheet(uncertainty: Uncertainty, name: str, range_m_s2: float) -> Datasheet:
     """Return the data of the accelerometer of the sensor `name`, from its data sheet or the configuration."""
 
-    def errors_from_datasheet(what: OfSensor) -> float:
+    def read_size(what: OfSensor) -> float:
         return uncertainty.find_stated_size(what, name)
 
     return Datasheet(
-        nonlinearity_percent=errors_from_datasheet("acceleration_nonlinearity_percent"),
-        over_g=errors_from_datasheet("acceleration_nonlinear_over_g") or range_m_s2 / STANDARD_GRAVITY_M_S2,
-        bias_mg_k=errors_from_datasheet("acceleration_bias_mg_k"),
-        scale_ppm_k=errors_from_datasheet("acceleration_scale_ppm_k"),
-        bias_instability_ug=errors_from_datasheet("acceleration_bias_instability_ug"),
+        nonlinearity_percent=read_size("acceleration_nonlinearity_percent"),
+        over_g=read_size("acceleration_nonlinear_over_g") or range_m_s2 / STANDARD_GRAVITY_M_S2,
+        bias_mg_k=read_size("acceleration_bias_mg_k"),
+        scale_ppm_k=read_size("acceleration_scale_ppm_k"),
+        bias_instability_ug=read_size("acceleration_bias_instability_ug"),
     )
 
 

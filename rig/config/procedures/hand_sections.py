@@ -58,7 +58,7 @@ class ByHandSection(ProcedureSection):
     )
 
     def problems(self, config: RigConfig) -> Iterator[str]:
-        """Yield the problems of sensors: an unknown clock, or a data rate too low for a hand's motion."""
+        """Yield the problems of sensors: an unsuitable part, an unknown clock, a data rate too low for a hand."""
         others = [name for name, sensor in config.sensors.items() if not sensor.on_board]
         if others and "crystal_ppm" not in config.uncertainty.model_fields_set:
             yield (

@@ -96,7 +96,7 @@ class SixSweepsSection(ProcedureSection):
 
     @model_validator(mode="after")
     def require_every_direction(self) -> Self:
-        """Refuse an order without one of the six directions that six parameters need (SIX, section II-B)."""
+        """Refuse an order without one of the six directions of SIX, section II-B, and a speed named twice."""
         order, directions = self.order or get_args(Wrist), self.directions or ("cw", "ccw")
         if len(set(order)) < 3 or len(order) > 3 or set(directions) != {"cw", "ccw"}:
             raise ValueError("order must name wrist_1, wrist_2 and wrist_3 once each, and directions both cw and ccw")
@@ -132,7 +132,7 @@ class SixSweepsSection(ProcedureSection):
         return self.speeds_deg_s or (self.speed_deg_s,)
 
     def problems(self, config: RigConfig) -> Iterator[str]:
-        """Yield sweeps beyond a sensor's range, and a verification that cannot pass."""
+        """Yield sweeps beyond a sensor's range, unfit arcs, an incomplete site, a verification that cannot pass."""
         for name, sensor in config.sensors.items():
             if max(self.speeds) * SPEED_TO_RANGE > sensor.range_deg_s:
                 key = "speeds_deg_s" if self.speeds_deg_s else "speed_deg_s"
@@ -203,9 +203,10 @@ class SixObservationSection(SixSweepsSection):
         return self.stages
 
     def problems(self, config: RigConfig) -> Iterator[str]:
-        """Yield the problems of the sweeps, and of stages or magnetometers together with a verification.
+        """Yield the problems of the sweeps, of stages with a target or a verification, and of magnetometers besides.
 
-        A magnetometer would be recorded, and its lack of a calibration would show only at the end of the run.
+        With stages or arcs a magnetometer would be recorded, but not calibrated, which only the end of the run would
+        show.
         """
         yield from SixSweepsSection.problems(self, config)
         if self.stages and (self.target_scale_u or self.target_bias_u_rad_s):
@@ -434,7 +435,7 @@ class ThermalSection(SixSweepsSection, AttitudesSection):
 
     @model_validator(mode="after")
     def check_temperature_range(self) -> Self:
-        """Refuse a range with too few sets for polynomials of the highest order; the order is chosen after the run."""
+        """Refuse a range with too few sets for polynomials, a reference near its ends, and a limit within it."""
         gaps, other = (2, "") if self.both_directions else (3, " with both_directions: false")
         if self.to_c - self.from_c < gaps * self.max_step_k:
             raise ValueError(

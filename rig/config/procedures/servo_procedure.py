@@ -95,7 +95,7 @@ class ServoSixObservationSection(ProcedureSection):
         return self
 
     def problems(self, config: RigConfig) -> Iterator[str]:
-        """Yield turns beyond a sensor's range, and sensors that a servo disturbs."""
+        """Yield turns beyond a sensor's range, sensors that a servo disturbs, and a site without a heading."""
         for name, sensor in config.sensors.items():
             if self.speed_deg_s * SPEED_TO_RANGE > sensor.range_deg_s:
                 yield (

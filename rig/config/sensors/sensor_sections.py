@@ -133,7 +133,7 @@ def check_serial_number(value: str) -> str:
 
 
 def the_part_has_it(value: float, info: ValidationInfo) -> float:
-    """Raise ValueError for a rate or range that the part does not have."""
+    """Return a rate or range as the part has it. Raise ValueError if the part has no such value."""
     part = CATALOGUE.get(info.data.get("part", ""))
     if part is None:
         return value
@@ -227,7 +227,7 @@ class SensorSection(Section):
     def check_accelerometer_range(
         cls, value: AccelerationSection | None, info: ValidationInfo
     ) -> AccelerationSection | None:
-        """Refuse a range that the part's accelerometer does not have."""
+        """Refuse a missing range, or one that the part's accelerometer does not have."""
         part = PARTS.get(info.data.get("part", ""))
         if value is None or part is None:
             return value
@@ -241,7 +241,7 @@ class SensorSection(Section):
 
     @model_validator(mode="after")
     def check_own_port(self) -> Self:
-        """Refuse an own port for a part on the board, and a part that needs one without it."""
+        """Refuse sections of a port or of lines that do not fit the part, and a baud rate too low or not supported."""
         if self.part == "mavlink" or self.mavlink is not None:
             return self._is_in_autopilot()
         own_port = PARTS[self.part].own_port

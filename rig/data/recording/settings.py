@@ -104,7 +104,7 @@ class Uncertainty(UncertaintyKeys[dict[str, NonNegative]]):
 
     @property
     def angle_std_rad(self) -> float:
-        """The standard deviation of a joint's angle by its encoder. Raises Refused `angle_std_not_stated`."""
+        """The standard deviation of a joint's angle by its encoder. Raise Refused `angle_std_not_stated`."""
         if self.angle_std_deg is None:
             raise _angle_std_not_stated()
         return float(np.radians(self.angle_std_deg))
@@ -230,7 +230,7 @@ class RunSettings:
 
     @property
     def stated_uncertainty(self) -> Uncertainty:
-        """The uncertainty that a run states. Raises ValueError for external readings, which state none."""
+        """The uncertainty that a run states. Raise ValueError for external readings, which state none."""
         if self.uncertainty is None:
             raise ValueError("its settings state no uncertainty, but those of a run do")
         return self.uncertainty

@@ -79,7 +79,7 @@ def list_own_errors(
 
 
 def rounding_errors(means_rad_s: Array, roundings_rad_s: Array | float, variances_rad2_s2: Array) -> Iterator[OwnError]:
-    """Yield the rounding errors that means (N, 3) share, as the standard uncertainty (N, 3) of each mean.
+    """Yield the rounding errors that means (N, 3) share, from the standard uncertainties (N, 3) of rounding them.
 
     Means that differ by less than a step, such as those of all rests, share one error, which averaging does not reduce.
     The variances (N, 3) contain the independent part of rounding. Negligible errors are omitted.

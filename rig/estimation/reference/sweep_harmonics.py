@@ -125,7 +125,7 @@ def _find_long_run_covariance(residuals: Array, scatter: Array, coloured: Callab
 
 
 def _mean_speed(time_s: Array, angle_rad: Array) -> float:
-    """Return the mean speed 2π/T of a revolution, which vibration does not change. Raise `incomplete_revolution`."""
+    """Return the mean speed of a revolution, which vibration does not change. Raise Fault `incomplete_revolution`."""
     travel = angle_rad[-1] - angle_rad[0] if len(angle_rad) else 0.0
     covered_rad = abs(travel) * len(angle_rad) / max(len(angle_rad) - 1, 1)  # with the last sample's interval
     if len(angle_rad) < MIN_SAMPLES or abs(covered_rad / (2 * np.pi) - 1) > WHOLE_TURN:

@@ -148,7 +148,7 @@ def _drop_thin(fixes: Fixes) -> Fixes:
 def _find_joined(
     turning: Turning, fixes: Fixes, clock_s: float
 ) -> tuple[NDArray[np.bool_], Array, tuple[LeftOut, ...]]:
-    """Return a mask (N − 1,) of fixes connected to the next one, the rotation in gaps, and what is left out."""
+    """Return a mask (N − 1,) of fixes joined to the next, the std of rotation in gaps, rad, and what is left out."""
     count = len(fixes.placement)
     first_s = clock_s + fixes.at_s[np.searchsorted(fixes.fix, np.arange(count))]
     last_s = clock_s + fixes.at_s[np.searchsorted(fixes.fix, np.arange(count), side="right") - 1]

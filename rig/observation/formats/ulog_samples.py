@@ -101,7 +101,7 @@ def _read_raw(topics: Mapping[tuple[str, int], Any], instance: int) -> dict[str,
 
 
 def _read_combined(data: Any) -> dict[str, Array]:
-    """Return the columns of `sensor_combined`. Raise ValueError if it has other fields."""
+    """Return the columns of `sensor_combined`. Raise ValueError if it lacks a field."""
     fields = [f"{field}[{axis}]" for field in COMBINED_FIELDS.values() for axis in range(3)]
     time_us, readings = _read_topic(COMBINED, data, fields)
     names = [name for quantity in COMBINED_FIELDS for name in quantity.columns]
@@ -109,7 +109,7 @@ def _read_combined(data: Any) -> dict[str, Array]:
 
 
 def _read_topic(topic: str, data: Any, fields: Sequence[str] = tuple("xyz")) -> tuple[Array, Array]:
-    """Return times (n,) in µs, increasing, and readings (n, k). Raise ValueError if the topic has other fields."""
+    """Return times (n,) in µs, increasing, and readings (n, k). Raise ValueError if the topic lacks a field."""
     stamp = "timestamp_sample" if "timestamp_sample" in data else "timestamp"
     if missing := [name for name in (stamp, *fields) if name not in data]:
         raise ValueError(f"its {topic} has no {' and no '.join(missing)}")

@@ -53,7 +53,7 @@ def _printable(statement: str | date | None) -> str:
 
 
 def values(name: str, numbers: Iterable[object]) -> Element:
-    """Return a list of numbers or units as text; floating-point numbers have all their digits."""
+    """Return an element whose text is a list of numbers or units; floating-point numbers have all their digits."""
     element = si(name)
     element.text = " ".join(str(number) for number in numbers)
     return element

@@ -34,7 +34,7 @@ class Kvh1775:
     ) -> None:
         """Open the port, end a stream that may be running, and read serial number and settings.
 
-        Raise SensorError: no_port, no_kvh, kvh_wrong_baud_rate, kvh_does_not_hear, kvh_command_refused.
+        Raise SensorError `no_port`, `no_kvh`, `kvh_wrong_baud_rate`, `kvh_does_not_hear`, `kvh_command_refused`.
         """
         self._sensor, self.port, self._baud = sensor, port, baud
         self._where = f"sensors.{sensor}: the KVH 1775 on {port}"

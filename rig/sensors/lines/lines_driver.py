@@ -73,7 +73,7 @@ class LinesDevice:
     ) -> None:
         """Open the port, and read until samples come at the stated rate.
 
-        Raise SensorError: no_port, lines_silent, lines_wrong_baud_rate, lines_other_format, lines_other_rate.
+        Raise SensorError `no_port`, `lines_silent`, `lines_wrong_baud_rate`, `lines_other_format`, `lines_other_rate`.
         """
         self._sensor, self._line, self._section, self._rate_hz = sensor, line, section, rate_hz
         self._on_values = on_values

@@ -147,7 +147,7 @@ def _find_field_shape(checked: Sequence[_CheckedLine]) -> Shape | None:
 
 
 def _split_by(sign: str, name: str, checked: Sequence[_CheckedLine]) -> Shape | None:
-    """Return the shape of lines with the separator `sign`, called `name`, or None."""
+    """Return the shape of lines with the separator `sign`, called `name`; None if most lines do not have it."""
     rows = [[field.strip() for field in text.split(sign or None)] for _, text, _ in checked]
     count, frequency = Counter(map(len, rows)).most_common(1)[0]
     if not 3 <= count <= MOST_NUMBERS or frequency < ENOUGH * len(checked):

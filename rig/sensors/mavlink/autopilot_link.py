@@ -56,8 +56,8 @@ class AutopilotLink:
     ) -> None:
         """Open the port, and wait for the heartbeat of an autopilot, which must not be armed.
 
-        Raise SensorError: no_port, no_autopilot, mavlink_no_message, mavlink_other_device, autopilot_armed; Refused
-        `missing_extra`.
+        Raise SensorError `no_port`, `no_autopilot`, `mavlink_no_message`, `mavlink_other_device`, `autopilot_armed`;
+        Refused `missing_extra`.
         """
         self._mavlink = dialect()
         self._sensor, self.port, self._baud, self._patience = sensor, port, baud, patience

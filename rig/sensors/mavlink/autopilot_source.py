@@ -73,7 +73,7 @@ class _ImuStream:
         self.description = describe(self.name, self.section, provides_temperature=self.thermometer.provides)
 
     def take(self, message: Any, *, is_consecutive: bool) -> tuple[int, int, ImuReading] | None:
-        """Return number, time and reading of a message; None for a repeated reading.
+        """Return number, time and reading of a message; None for a repeated or incomplete reading.
 
         `is_consecutive`: whether no message was lost before it.
         """

@@ -25,7 +25,7 @@ class AutopilotParameter:
 
     @property
     def value(self) -> float:
-        """The value of the four bytes. Raises ValueError for a type that does not fit four bytes."""
+        """The value of the four bytes. Raise ValueError for a type that does not fit four bytes."""
         if self.type in WHOLE and self.firmware == PX4:
             code = WHOLE[self.type]
             return float(struct.unpack_from(f"<{code}", self.field)[0])

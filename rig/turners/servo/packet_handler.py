@@ -55,7 +55,7 @@ class Bus:
     """The line to one servo, for one thread at a time."""
 
     def __init__(self, path: str, baud: int, servo_id: int, clock: Clock = HOST) -> None:
-        """Open and lock the port. Raise Refused `missing_extra`, `servo_port_in_use`, `no_servo_port`, …."""
+        """Open the port. Raise Refused `missing_extra`, `servo_port_in_use`, `no_servo_port`, `servo_adapter_slow`."""
         with requiring("servo"):
             from dynamixel_sdk import PacketHandler
         self._id, self._path, self.clock = servo_id, path, clock

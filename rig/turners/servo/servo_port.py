@@ -19,7 +19,7 @@ BITS = 10  # bits per byte on the line: start, eight, stop
 
 
 class Port:
-    """The port at a path or at socket://host:port. Raises `serial.SerialException` if it cannot be opened.
+    """The port at a path or at socket://host:port. Raise `serial.SerialException` if it cannot be opened.
 
     A path is locked against programs that request a lock; the server behind a socket takes one client at a time.
     (TIOCEXCL would exclude all programs, but outlasts a killed program while another has the port open.) `slack_s`: the
