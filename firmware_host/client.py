@@ -57,7 +57,7 @@ class Board:
     """
 
     def __init__(self, port: str, baud: int, on_samples: Callable[[SampleBatch], None], timeout_s: float = 4.0) -> None:
-        """Open the port, identify the board.
+        """Open the port, identify the board, and stop a stream that an earlier program has left running.
 
         Raise BoardError `no_port`, `no_board`, `wrong_baud_rate`, `version_mismatch`.
         """

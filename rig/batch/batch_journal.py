@@ -47,7 +47,8 @@ class Journal:
 def open_journal(out: Path | None, parent: Path, entry: Begun) -> Journal:
     """Continue or begin the batch in the folder `out`; without `out` begin one in a new folder below `parent`.
 
-    Raise Refused `run_folder`, and as `resume_journal` does; `no_batch` if only the new or the old part is simulated.
+    Raise Refused `run_folder`, and as `resume_journal` does; `no_batch` if the begun batch is simulated and this one is
+    not, or the reverse.
     """
     if out is not None and (out / JOURNAL).exists():
         journal = resume_journal(out)

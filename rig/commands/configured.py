@@ -28,7 +28,7 @@ def load_configured(
 ) -> Configured:
     """Load a configuration. A `script` (a file, or loaded) replaces the configuration's procedure.
 
-    Raise Refused as `load`, `installed`, `load_script` and `first_phase` do; also `script_failed`.
+    Raise Refused as `load`, `load_procedures`, `load_script` and `first_phase` do; also `script_failed`.
     """
     if isinstance(script, Path):
         script = load_script(script)

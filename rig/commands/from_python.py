@@ -56,7 +56,7 @@ def run(
 ) -> Run:
     """Run a calibration as `rig run` does: the same pre-flight checks, the same question, the same output.
 
-    The arm moves only if the operator at the terminal types yes, or if the caller agrees by `yes=True`; a notebook has
+    The arm moves only if the operator at the terminal types `go`, or if the caller agrees by `yes=True`; a notebook has
     no terminal. Ctrl-C stops the arm and keeps the data. `out` is the run folder, by default a new one; `changes` and
     `script` are as in `plan`; `other_boards` are serial numbers of sensors that were moved to another board. Return the
     run; its verdict is `rig.load_result(run.path).verdict`. Raise Refused if nothing has moved (`not_confirmed` without

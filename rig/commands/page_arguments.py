@@ -85,7 +85,7 @@ def add_page_address(parser: argparse.ArgumentParser) -> None:
 def read_page_token(options: argparse.Namespace) -> str | None:
     """Return the page's token, given by the command line, a file or the environment, if any.
 
-    Raise Refused `page_address` for a file that cannot be read, or that others can read.
+    Raise Refused `page_address` for a file that cannot be read, or that others can read or write.
     """
     path: Path | None = options.page_token_file
     if path is None:

@@ -237,7 +237,7 @@ class Icm42688P:
         self._start(time_s)
 
     def _start(self, time_s: float) -> None:
-        """Restart conversions, if the part is set up to convert."""
+        """Restart conversions, if the part is set up to convert. Raise Violation for unsupported settings."""
         registers = self._registers.values
         code = registers[_GYRO_CONFIG0] & 0x0F
         runs = registers[_PWR_MGMT0] == _BOTH_LOW_NOISE and registers[_INT_SOURCE0] & _DRDY

@@ -218,7 +218,7 @@ class Lsm6dsv16x:
             self._start(time_s)
 
     def _start(self, time_s: float) -> None:
-        """Restart conversions, if the part is set up to convert."""
+        """Restart conversions, if the part is set up to convert. Raise Violation for unsupported settings."""
         registers = self._registers.values
         self._conversions.stop()
         if not registers[_CTRL1] or not registers[_CTRL2]:

@@ -121,7 +121,7 @@ def erase(options: Namespace) -> int:
 
 @contextmanager
 def _connect(options: Namespace) -> Iterator[tuple[RigConfig, Board]]:
-    """Connect to the board of a configuration; start the simulated laboratory, if any."""
+    """Yield a configuration and a connection to its board; start the simulated laboratory, if any."""
     with ExitStack() as stack:
         loaded = stack.enter_context(load_at_own_address(options.config, options.overrides))
         section = require_board_section(loaded.config)

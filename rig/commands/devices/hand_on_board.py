@@ -113,7 +113,7 @@ def _select_sensors(config: RigConfig, wanted: str | None) -> dict[str, SensorSe
 def _run_session(
     config: RigConfig, name: str, options: Namespace, operator: OperatorListener | None
 ) -> Iterator[tuple[Board, str, "CalibratedByBoard"]]:
-    """Run a session on the board now, with the operator."""
+    """Run a session on the board with the operator; yield the board, the sensor's name and the result."""
     from rig.runner.by_hand.on_board import calibrate_by_board
 
     def tell(event: OfTheHand) -> None:
@@ -130,7 +130,10 @@ def _run_session(
 def _fetch_session(
     config: RigConfig, among: dict[str, SensorSection]
 ) -> Iterator[tuple[Board, str, "CalibratedByBoard"]]:
-    """Read the result of the board's last session. Raise Refused `another_sensor` if it is of no configured sensor."""
+    """Read the board's last session; yield the board, the sensor's name and the result.
+
+    Raise Refused `another_sensor` if it is of no configured sensor.
+    """
     from rig.runner.by_hand.on_board import read_kept_solution
 
     section = require_board_section(config)

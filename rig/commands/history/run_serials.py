@@ -65,7 +65,7 @@ def _load_of_sensors(address: "HistoryAddress", serial_numbers: list[str]) -> tu
 
 
 def _load_calibrations(address: "HistoryAddress", wanted: "Sequence[Selection]") -> tuple[CalibratedBefore, ...]:
-    """Return the valid calibrations of the selections, newest first; an empty list if the file is missing."""
+    """Return the valid calibrations of the selections, newest first; empty if the file is missing."""
     from rig.history.storage.continuity import is_there
     from rig.history.store import open_history
 

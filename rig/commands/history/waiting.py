@@ -10,8 +10,8 @@ T = TypeVar("T")
 def await_answer(work: Callable[[], T], within_s: float | None = None) -> T:
     """Return the result of `work`, from a thread of its own; pass on its exception.
 
-    Raise TimeoutError if it takes longer. Ctrl-C takes effect immediately. A late thread is abandoned and ends with the
-    process, because a library that waits for its server cannot be interrupted.
+    Raise TimeoutError if it takes longer than `within_s`, s. Ctrl-C takes effect immediately. A late thread is
+    abandoned and ends with the process, because a library that waits for its server cannot be interrupted.
     """
     from concurrent.futures import Future  # here, as `rig --help` does not need it
 

@@ -26,7 +26,7 @@ def add(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Check the board and the arm; print the devices present and missing. Return 0 if a run could start, else 2.
+    """Check board, sensors and turner; print the devices present and missing. Return 0 if a run could start, else 2.
 
     With `--json` print everything at the end, in the schema "rig.check/1".
     """

@@ -43,7 +43,7 @@ def _sha256(file: Path) -> str:
 
 
 def _list_addresses(loaded: Loaded) -> Iterator[tuple[str, str]]:
-    """Yield each device that a run would connect to, with its address.
+    """Yield each device that a run would connect to, and the history, with the address.
 
     A simulated laboratory connects to no device, but may store its board's flash in a file, which is then listed.
     """

@@ -22,8 +22,8 @@ __all__ = ["WRITES", "connection_apart", "engine_of"]
 def engine_of(address: HistoryAddress) -> Iterator[Engine]:
     """Yield the engine of a history, migrated and ready; a process has one engine for each file.
 
-    Raise Refused `missing_extra`, and as `bring_up_to_date`, `history_is_there` and `continuity` do; SQLAlchemyError
-    and OSError.
+    Raise Refused `missing_extra`, and as `bring_up_to_date`, `history_is_there` and the module `continuity` do;
+    SQLAlchemyError and OSError.
     """
     continuity.refuse_another_file(address)
     where = address.where
