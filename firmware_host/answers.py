@@ -300,7 +300,7 @@ class StoredPolynomials:
     bias_change_rad_s: Matrix
 
     def most(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the largest changes within the range, by axis: of scale (3,) as a fraction, of bias (3,) in rad/s."""
+        """Return upper bounds on the changes within the range: of scale (3,) as a fraction, of bias (3,) in rad/s."""
         powers = (self.range_c[1] - self.range_c[0]) ** np.arange(1, 4)
         return powers @ np.abs(self.scale_change), powers @ np.abs(self.bias_change_rad_s)
 

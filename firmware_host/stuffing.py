@@ -10,7 +10,7 @@ from cobs import cobs
 
 
 def stuff(body: bytes) -> bytes:
-    """Return `body` without zeros, without a delimiter."""
+    """Return `body` encoded by COBS, which contains no zeros; the delimiter is not appended."""
     return bytes(cobs.encode(body))
 
 

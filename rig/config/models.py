@@ -241,7 +241,7 @@ class SensorsConfig(Section):
     @field_validator("sensors")
     @classmethod
     def match_sensors(cls, sensors: dict[str, SensorSection]) -> dict[str, SensorSection]:
-        """Refuse shared select lines, ports, IMUs and names, an overloaded port, a second or only a reference."""
+        """Refuse sensors of one part, port, IMU or name, an overloaded port, and a second or a sole reference."""
         sensor_at: dict[str, str] = {}
         for name, sensor in sensors.items():
             if sensor.mavlink is not None:

@@ -294,7 +294,7 @@ class PageState:
 
 
 def _quantities(sensor: SensorSamples) -> Iterator[tuple[Quantity | Scalar, DisplayUnit]]:
-    """Yield the quantities of a sensor with their units of display, and the units of their biases."""
+    """Yield the quantities of a sensor, each with the displayed unit of its bias, or of a scalar's reading."""
     by_name = channel_contents()
     for quantity in (by_name[name] for name in select_displayed(sensor.latest)):
         yield quantity, quantity.bias if isinstance(quantity, Quantity) else quantity.reading

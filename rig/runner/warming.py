@@ -53,7 +53,7 @@ class Warming:
     _looked_s: float = -np.inf
 
     def prepare(self) -> None:
-        """Raise Refused `no_thermometer` for a sensor, or `no_heater` for the board, before anything moves."""
+        """Check thermometers and heater before anything moves. Raise Refused `no_thermometer`, `no_heater`."""
         for name in self.names:
             sensor = self.acquisition.counts[name].sensor
             if sensor.temperature_stated or not sensor.measures(TEMPERATURE):

@@ -178,7 +178,7 @@ class Lsm9ds1:
             self._conversions.stop()
 
     def _start(self, control: int, time_s: float) -> None:
-        """Restart conversions with a new data rate or range."""
+        """Restart conversions with a new data rate or range. Raise Violation for one that the part does not have."""
         rate_code, range_code = control >> 5, control >> 3 & 3
         if rate_code == 7 or range_code == 2:
             raise Violation(

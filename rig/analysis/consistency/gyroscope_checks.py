@@ -123,10 +123,10 @@ def check_gyroscope(
         differences(segments, axis_rates, np.concatenate([sweeps_alone, encoders.swapaxes(0, 1)], axis=2)),
         false_alarm_probability,
     )
-    if explain_step := with_transfers.model.test_single_columns(
+    if axis_changed := with_transfers.model.test_single_columns(
         single_axis_columns(with_transfers.segments, with_transfers.axis_rates), false_alarm_probability
     ):
-        statistics["axis_changed"] = explain_step
+        statistics["axis_changed"] = axis_changed
     bias_jump = _test_bias_jump(segments, axis_rates, scatter, false_alarm_probability)
     if bias_jump is not None:
         statistics["bias_jumped"] = bias_jump
@@ -231,13 +231,13 @@ def _detection_limits(
     per_sweep = critical_value(false_alarm_probability / len(sweeps))
     tests["disturbed_sweep"] = segments_only, [(sweep_columns(segments, sweep), per_sweep) for sweep in sweeps]
     if len(steps) > 1:
-        steady_columns = replace(
+        steady_model = replace(
             segments_only.model,
             model=apply_whitener(segments_only.model.whitener, repeat_per_axis(_steady_columns(segments))),
         )
         limit = _jump_critical_value(len(steps), false_alarm_probability)
         tests["bias_jumped"] = (
-            replace(segments_only, model=steady_columns),
+            replace(segments_only, model=steady_model),
             [(repeat_per_axis(step), lambda _: limit) for step in steps],
         )
     for fault_mode in FAULT_MODES:
@@ -281,11 +281,11 @@ def _test_bias_jump(
     return explain_step(steps[best], nuisance), _jump_critical_value(len(steps), false_alarm_probability)
 
 
-def _jump_critical_value(segment_sets: int, false_alarm_probability: float) -> float:
-    """Return the critical value for a jump that may occur at any of several sweep ends."""
+def _jump_critical_value(jumps: int, false_alarm_probability: float) -> float:
+    """Return the critical value for a bias jump that may occur at any of `jumps` places."""
     from scipy.special import fdtri
 
-    return 3 * float(fdtri(3, segment_sets, 1 - false_alarm_probability / segment_sets))
+    return 3 * float(fdtri(3, jumps, 1 - false_alarm_probability / jumps))
 
 
 def _estimate_bias_process(
@@ -313,5 +313,5 @@ def _build_scatter(segments: Segments, patterns_rad_s: Array, allowance: ErrorPa
 
 def _steady_columns(segments: Segments, *more: Array) -> Array:
     """Return orthonormal columns (N, k): a level of each sweep and of all rests, gravity, steady drift, and `more`."""
-    segment_sets = [segments.sweep == sweep for sweep in np.unique(segments.sweep)]
-    return orthonormal_basis(np.column_stack([*segment_sets, segments.gravity_m_s2, normalise_time(segments), *more]))
+    levels = [segments.sweep == sweep for sweep in np.unique(segments.sweep)]
+    return orthonormal_basis(np.column_stack([*levels, segments.gravity_m_s2, normalise_time(segments), *more]))

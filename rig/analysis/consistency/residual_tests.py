@@ -72,8 +72,8 @@ def test_alternatives(
     model: WhitenedModel, alternatives: Alternatives, false_alarm_probability: float
 ) -> dict[str, Statistic]:
     """Test every alternative that the model does not contain, each at `false_alarm_probability`."""
-    test = {name: model.test(columns, (), false_alarm_probability) for name, columns in alternatives.items()}
-    return {name: statistic for name, statistic in test.items() if statistic is not None}
+    statistics = {name: model.test(columns, (), false_alarm_probability) for name, columns in alternatives.items()}
+    return {name: statistic for name, statistic in statistics.items() if statistic is not None}
 
 
 def find_outliers(

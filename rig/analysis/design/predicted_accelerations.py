@@ -60,7 +60,9 @@ def _budget(accelerometer: PlannedAccelerometer) -> Budget:
     return combine_errors(spread, model.theta, movement, run.site, lag_s, datasheet=accelerometer.datasheet)
 
 
-def _new_fraction(dof: Uncertainty) -> float:
+def _new_fraction(stated: Uncertainty) -> float:
     """Return the stated fraction of δ² that is independent between dwells, limited to the range of solutions."""
-    fraction = dof.repeatability_deg**2 / max(dof.repeatability_deg**2 + dof.axis_deg**2, np.finfo(np.float64).tiny)
+    fraction = stated.repeatability_deg**2 / max(
+        stated.repeatability_deg**2 + stated.axis_deg**2, np.finfo(np.float64).tiny
+    )
     return float(np.clip(fraction, OWN_SHARES[0], OWN_SHARES[-1]))

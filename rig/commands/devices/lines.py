@@ -110,10 +110,10 @@ def _range_or_none(text: str) -> str:
 def look_at_device(
     port: str, baud: int | None, name: str, seconds: tuple[float, float], user: "StatedProperties"
 ) -> str:
-    """Read a device's lines for ten seconds and return its section as YAML; print the properties of the lines.
+    """Read lines of a device at rest, then in rotation; return its section as YAML, and print their properties.
 
-    Raise Refused as `listen` does; `lines_no_pattern` for lines without a common pattern; for a configuration by hand,
-    `lines_not_turned` if no columns look like a gyroscope's.
+    `seconds` are the two durations. Raise Refused as `listen` does; `lines_no_pattern` for lines without a common
+    pattern; for a configuration by hand, `lines_not_turned` if no columns look like a gyroscope's.
     """
     import numpy as np
 

@@ -34,7 +34,7 @@ _identities: dict[Path | URL, _Identity] = {}
 
 
 def is_there(address: HistoryAddress) -> bool:
-    """Return whether there is a history to open; True for a server that has not been asked yet.
+    """Return whether there is a history to open; for a server always True, because it is not asked.
 
     Raise as `refuse_another_file` does.
     """

@@ -27,7 +27,7 @@ metadata = MetaData()
 
 
 def number_column() -> Column[int]:
-    """Return the id column: numbers from 1 without gaps, assigned by the program (`numbers`).
+    """Return the id column: numbers from 1 without gaps, assigned by `next_number`.
 
     The database does not assign the numbers, because PostgreSQL's sequences leave a gap after a rollback.
     """

@@ -97,10 +97,10 @@ def find_placements(time_s: Array, readings: Mapping[Quantity, Array], rows: Att
         _PlacedRest(number, windows, np.concatenate([_closed_slice(time_s, window) for window in windows]))
         for number, windows in enumerate(joined)
     ]
-    starts, ends = np.array([windows.start_s for windows in rests]), np.array([windows.end_s for windows in rests])
+    starts, ends = np.array([placed.start_s for placed in rests]), np.array([placed.end_s for placed in rests])
     matches = []
     for window in rows.windows:
-        near = slice(*(int(np.searchsorted(*windows)) for windows in ((ends, window.start_s), (starts, window.end_s))))
+        near = slice(int(np.searchsorted(ends, window.start_s)), int(np.searchsorted(starts, window.end_s)))
         matches.append(_find_rest(time_s, window, rests[near]))
     rest, cuts = np.array([number for number, _ in matches]), [cut for _, cut in matches]
     inner = dwells | _mask_inner(rest, windows_s, starts, ends)
@@ -108,13 +108,13 @@ def find_placements(time_s: Array, readings: Mapping[Quantity, Array], rows: Att
     account = Account(time_s, rows, rest, cuts, dwells)
     account.check_mostly_at_rest()
     covered = [np.unique(np.concatenate([cuts[row] for row in group])) for group in groups]
-    named = {int(windows) for windows in rest}
+    named = {int(number) for number in rest}
     read, knocked = _read(time_s, readings, covered)
     return Placements(
         read,
         np.array([nearest_rotation(rows.attitudes[group].mean(axis=0)) for group in groups]),
         None if rows.std_rad is None else np.array([np.sqrt(np.mean(rows.std_rad[group] ** 2)) for group in groups]),
-        _read(time_s, readings, [windows.samples for windows in rests if windows.number not in named])[0],
+        _read(time_s, readings, [placed.samples for placed in rests if placed.number not in named])[0],
         int((rest < 0).sum()),
         tuple(account.list_omitted(knocked)),
     )
@@ -178,7 +178,7 @@ def _find_rest(time_s: Array, window: Window, rests: Sequence[_PlacedRest]) -> t
     met: list[tuple[int, float, NDArray[np.intp]]] = []
     for rest in rests:
         overlap_s = sum(
-            max(min(window.end_s, match.end_s) - max(window.start_s, match.start_s), 0) for match in rest.windows
+            max(min(window.end_s, part.end_s) - max(window.start_s, part.start_s), 0) for part in rest.windows
         )
         cut = rest.samples[slice(*np.searchsorted(rest.samples, [row.start, row.stop]).tolist())]
         if overlap_s <= 0 or not len(cut):

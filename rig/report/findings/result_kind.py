@@ -154,5 +154,5 @@ def row_of(term: Term, whose: str | None = None, noun: str | None = None) -> Dis
 
 
 def outlet_items(outlet: Callable[..., Iterable[ItemT]] | NoOutlet, *about: object) -> Iterable[ItemT]:
-    """Return the items that an outlet yields for `arguments`; empty if the kind lacks the outlet."""
+    """Return the items that an outlet yields for the arguments `about`; empty if the kind lacks the outlet."""
     return () if isinstance(outlet, NoOutlet) else outlet(*about)

@@ -52,7 +52,7 @@ class BoardSource:
         self.board.start([self.set_up[name].index for name in self.stored])
 
     def check(self, clock_s: float | None = None) -> None:
-        """Check the board (see `SampleSource`). Raises BoardError."""
+        """Check the board (see `SampleSource`). Raise BoardError."""
         self.board.check(clock_s)
 
 

@@ -156,7 +156,7 @@ class Servo:
         """Make one movement and return when the shaft has arrived and is at rest.
 
         `watch` is called first and then at least every 20 ms; its exception stops the shaft and is passed to the
-        caller. The servo executes `moves.move_of(motion)`.
+        caller. The servo executes `move_of(motion)`.
         """
         with stopping_on_error(self.stop):
             watch()
