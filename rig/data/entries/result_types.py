@@ -110,6 +110,6 @@ class OmittedEntry(Entry):
 
 
 class ErrorEntry(Entry):
-    """The reason why an estimator in addition to the chosen one has no solution."""
+    """The reason why a solution is missing."""
 
     error: str

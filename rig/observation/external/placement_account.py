@@ -87,10 +87,10 @@ class Account:
     def _missing(self, kept: Sequence[NDArray[np.intp]]) -> Iterator[Omitted]:
         """Yield an entry for the readings missing in dwells with the samples `kept`, if any."""
         sampling = find_sampling(self.time_s)
-        windows_s = np.array([(samples.start_s, samples.end_s) for samples in self.rows.windows]).reshape(-1, 2)
+        windows_s = np.array([(window.start_s, window.end_s) for window in self.rows.windows]).reshape(-1, 2)
         expected = np.floor(sampling.count_expected(self.time_s, windows_s[self._kept])).astype(int)
         gaps = [samples[:-1][sampling.missing[samples[:-1]] > 0] for samples in kept]
-        inside = [int(sampling.missing[samples].sum()) for samples in gaps]
+        inside = [int(sampling.missing[before_gaps].sum()) for before_gaps in gaps]
         lost = [
             max(within, wanted - len(samples)) for within, wanted, samples in zip(inside, expected, kept, strict=True)
         ]
