@@ -82,6 +82,6 @@ def _average_rest(stream: Stream, motion: ArmMotion, window: Window, response: A
     if inside.stop - inside.start < MIN_SAMPLES_AT_REST:
         return None
     time_s = stream.time_s[inside]
-    readings = stream.readings_rad_s[inside] - motion.swing_rates(time_s) @ response.T
+    readings = stream.readings_rad_s[inside] - motion.rates_at_samples(time_s) @ response.T
     mean, averaged_window = average_standstill(readings, time_s, still, stream.steps)
     return add_attitude(build_average(stream, inside, averaged_window, mean), motion)

@@ -28,16 +28,19 @@ def build_time_patterns(segments: Segments, jitter_s: float) -> Array:
 def build_reading_patterns(segments: Segments, noise_rad: float) -> Array:
     """Return the patterns (P, N, 3) rad/s of joint angles read with noise at the edges of sweeps and transfers.
 
-    In sweeps, only the joints at rest count; in transfers all joints, because none turns at the ends. At each edge, the
-    joints have as many independent errors as their axes have directions: three at most.
+    In sweeps, only the joints that swing count: the turning one counts as jitter, and those that stand still have no
+    rate. In transfers all joints count, because none turns at the ends. At each edge, the joints have as many
+    independent errors as their axes have directions: three at most.
     """
     lengths = np.diff(segments.times_s)
     patterns = []
     for sweep in np.unique(segments.sweep[(segments.sweep != REST) & (noise_rad > 0)]):
         rows = np.flatnonzero(segments.sweep == sweep)
         first, last = segments.intervals[rows[0]], segments.intervals[rows[-1]]
-        q_rad = first.motion.angles(np.array([first.start_s, last.end_s]))
-        counted = np.abs(q_rad[1] - q_rad[0]) < (STANDS_RAD if sweep > REST else np.inf)
+        counted = np.ones(len(first.motion.names), dtype=np.bool_)
+        if sweep > REST:
+            q_rad = first.motion.angles(np.array([first.start_s, last.end_s]))
+            counted = first.motion.is_moving(first.start_s, last.end_s) & (np.abs(q_rad[1] - q_rad[0]) < STANDS_RAD)
         for share in _edges(segments, sweep):
             interval = segments.intervals[np.flatnonzero(share)[0]]
             at_s = interval.end_s if share[share != 0][0] > 0 else interval.start_s

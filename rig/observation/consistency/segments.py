@@ -200,7 +200,7 @@ def _segment_rest(stream: Stream, motion: ArmMotion, average: Average, count: in
     """Average a rest in segments, without vibrations and the arm's oscillation: see `average_rests`."""
     inside = slice_time(stream, average.start_s, average.end_s)
     division = _divide(stream, average, np.ones(inside.stop - inside.start, dtype=np.bool_), count)
-    readings = division.readings_rad_s - motion.swing_rates(division.time_s) @ response.T
+    readings = division.readings_rad_s - motion.rates_at_samples(division.time_s) @ response.T
     division = replace(division, readings_rad_s=readings)
     fraction = (division.time_s - average.start_s) / average.duration_s
     cycles = find_lines(readings - readings.mean(axis=0), AT_REST, fraction=fraction)

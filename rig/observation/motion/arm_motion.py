@@ -51,7 +51,7 @@ class ArmMotion:
         mount: Array | None = None,
         reading_std_rad: float = 0.0,
     ) -> None:
-        self.kinematics, self._names, self._scatters = kinematics, names, reading_std_rad > 0
+        self.kinematics, self.names, self._scatters = kinematics, names, reading_std_rad > 0
         self.mount: Array = np.eye(3) if mount is None else mount
         states = well_timed(states) if self._scatters else states
         _check_order(states["time_s"])
@@ -129,17 +129,9 @@ class ArmMotion:
             travel_rad = float(np.ptp(remove_oscillation(q_rad), axis=0).max())
         return travel_rad
 
-    def swing_rates(self, time_s: Array) -> Array:
-        """Return the `rates_at_samples` (n, 3) at rising times (n,) if the resting arm oscillates, else zero.
-
-        Without an oscillation the encoders show only noise, which is not added as a rate.
-        """
-        still = np.zeros((len(time_s), 3))
-        q_rad = self._q_rad(Window(float(time_s[0]), float(time_s[-1])))
-        if len(q_rad) < 2 or not self.has_accurate_angles:
-            return still
-        noise_rad = np.sqrt(np.mean(np.diff(q_rad, axis=0) ** 2, axis=0))
-        return self.rates_at_samples(time_s) if (np.ptp(q_rad, axis=0) > SWINGS * noise_rad).any() else still
+    def is_moving(self, start_s: float, end_s: float) -> NDArray[np.bool_]:
+        """Return whether each joint (k,) shows more than its encoder's noise between two times."""
+        return np.isnan(self._standing_rad(start_s, end_s))
 
     def max_distance_rad(self, window: Window, q_rad: Sequence[float]) -> float | None:
         """Return the largest distance of any joint from the pose `q_rad` (k,) in a window, or None without a state."""
@@ -157,17 +149,17 @@ class ArmMotion:
         Rates are differences of joint angles, so an angle's error cancels between adjacent rates, and the mean over
         consecutive samples depends only on the first and the last angle.
         """
-        travel_rad = self.angles(time_s + lasting_s / 2) - self.angles(time_s - lasting_s / 2)
-        rates: Array = flange_rate(self.angles(time_s), travel_rad / lasting_s, self.kinematics) @ self.mount.T
-        return rates
+        return self._mean_rates(time_s, lasting_s, np.full(len(self.names), np.nan))
 
     def rates_at_samples(self, time_s: Array) -> Array:
-        """Return the flange's rate (n, 3), rad/s, around consecutive evenly spaced samples at times (n,).
+        """Return the flange's rate (n, 3), rad/s, around consecutive evenly spaced samples at rising times (n,).
 
-        This is the mean between the half-ways to the previous and the next sample; if samples are far apart, the rate
-        at the sample's time.
+        This is the mean between the half-ways to the previous and the next sample; if samples are far apart, that over
+        `RATE_STEP_S`. Joints that stand still between the first and the last sample have no rate: their encoders' noise
+        would be added to the motion.
         """
-        return self.rate(time_s) if is_sparse(time_s) else self.mean_rates(time_s, float(np.median(np.diff(time_s))))
+        lasting_s = RATE_STEP_S if is_sparse(time_s) else float(np.median(np.diff(time_s)))
+        return self._mean_rates(time_s, lasting_s, self._standing_rad(float(time_s[0]), float(time_s[-1])))
 
     def mean_rate(self, start_s: float, end_s: float) -> Array:
         """Return the flange's mean rate (3,), rad/s, from one time to another."""
@@ -203,9 +195,26 @@ class ArmMotion:
 
     def table(self) -> dict[str, Array]:
         """Return the states as columns (m,) by name: times, and the controller's angles and rates of the joints."""
-        angles = {f"{joint}_rad": self._states["q_rad"][:, i] for i, joint in enumerate(self._names)}
-        rates = {f"{joint}_rad_s": self._states["qd_rad_s"][:, i] for i, joint in enumerate(self._names)}
+        angles = {f"{joint}_rad": self._states["q_rad"][:, i] for i, joint in enumerate(self.names)}
+        rates = {f"{joint}_rad_s": self._states["qd_rad_s"][:, i] for i, joint in enumerate(self.names)}
         return {"time_s": self.time_s, **angles, **rates}
+
+    def _mean_rates(self, time_s: Array, lasting_s: float, standing_rad: Array) -> Array:
+        """Return the `mean_rates` with joints at `standing_rad` (k,), as `_standing_rad` returns it."""
+        before, middle, after = (
+            np.where(np.isnan(standing_rad), self.angles(time_s + shift_s), standing_rad)
+            for shift_s in (-lasting_s / 2, 0.0, lasting_s / 2)
+        )
+        rates: Array = flange_rate(middle, (after - before) / lasting_s, self.kinematics) @ self.mount.T
+        return rates
+
+    def _standing_rad(self, start_s: float, end_s: float) -> Array:
+        """Return the mean angle (k,) of each joint that stands still between two times, NaN for others."""
+        q_rad = self._q_rad(Window(start_s, end_s))
+        if len(q_rad) < 2:
+            return np.full(len(self.names), np.nan)
+        noise_rad = np.sqrt(np.mean(np.diff(q_rad, axis=0) ** 2, axis=0))
+        return np.where(np.ptp(q_rad, axis=0) > SWINGS * noise_rad, np.nan, q_rad.mean(axis=0))
 
     def _q_rad(self, window: Window) -> Array:
         q_rad: Array = self._states["q_rad"][(self.time_s >= window.start_s) & (self.time_s <= window.end_s)]

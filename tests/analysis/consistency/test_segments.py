@@ -86,12 +86,21 @@ def test_a_vibration_slower_than_a_segment_is_in_its_uncertainty(axes: tuple[flo
     assert max(amplification) < 1.5, "nothing is amplified"
 
 
+def swinging(run: RunData) -> RunData:
+    """With all joints swinging by more than an encoder's noise."""
+    states = run.states.copy()
+    states["q_rad"] += 4e-4 * np.sin(2 * np.pi * 0.4 * states["time_s"])[:, None]
+    return replace(run, states=states)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("state_rate_hz", [125.0, 500.0])
 def test_what_the_encoders_noise_makes_of_rates_across_the_swept_axis_is_stated(state_rate_hz: float) -> None:
     """Errors of neighbouring segments have the edge between them in common: over a whole sweep they cancel."""
     noisy = replace(SHAKEN, encoder_noise_rad=NOISE_RAD, state_rate_hz=state_rate_hz)
-    segments, exact = (segments_of(synthetic_run(setup)) for setup in (noisy, replace(noisy, encoder_noise_rad=0.0)))
+    segments, exact = (
+        segments_of(swinging(synthetic_run(setup))) for setup in (noisy, replace(noisy, encoder_noise_rad=0.0))
+    )
     patterns = build_reading_patterns(segments, BY_SPLINE * NOISE_RAD)
     turning = segments.sweep >= 0
     off = (segments.rates_rad_s - exact.rates_rad_s)[turning]
@@ -102,3 +111,12 @@ def test_what_the_encoders_noise_makes_of_rates_across_the_swept_axis_is_stated(
     assert np.mean((sums**2).sum(axis=1)) / np.mean((patterns[:, turning] ** 2).sum(axis=0)) == pytest.approx(
         1, abs=0.2
     )
+
+
+def test_the_encoders_noise_of_joints_that_stand_still_adds_no_rate_across_the_swept_axis() -> None:
+    noisy = replace(SHAKEN, encoder_noise_rad=NOISE_RAD)
+    (recorded,) = observe_recordings([synthetic_run(noisy)])
+    rates = np.array([turn.axis_flange * turn.speed_rad_s for turn in recorded.sensors["gyro"].revolutions])
+    assert np.abs(rates[np.abs(rates) < 0.1]).max() < NOISE_RAD / 5, "by the angles at both ends 6e-6 rad/s in 6 s"
+    segments = segments_of(synthetic_run(noisy))
+    assert build_reading_patterns(segments, NOISE_RAD).size == 0
