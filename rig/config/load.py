@@ -38,6 +38,7 @@ Turners = Mapping[str, type[TurnerSection]] | None  # None: the reader needs onl
 STOCK_TURNERS: Mapping[str, type[TurnerSection]] = {"ur": ArmSection, "hand": HandSection, "servo": ServoSection}
 TURNS = frozenset({"arm", "turner"})  # the sections of the turner, of which a configuration has one
 PROBLEMS_SHOWN = 25
+NOT_A_CONFIGURATION = ("cannot be read: ", "is ")  # how a problem of the whole file begins
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,13 +67,22 @@ class ConfigurationRefused(Refused):
     """A configuration that is not valid; `problems` has one line for each error."""
 
     def __init__(self, source: str, problems: Sequence[str]) -> None:
-        count = "1 error" if len(problems) == 1 else f"{len(problems)} errors"
-        what = "command line" if all(f"{SET} " in problem or f"({SET})" in problem for problem in problems) else "file"
-        remedy = f"Correct the {what} and run again; nothing has moved"
-        super().__init__("configuration", f"{printable(source)} has {count}", remedy)
         self.problems = tuple(printable(problem) for problem in problems)
+        if self._is_unreadable:
+            what, remedy = self.problems[0], "Give a configuration; rig new FILE writes one"
+        else:
+            what = "has 1 error" if len(problems) == 1 else f"has {len(problems)} errors"
+            by_option = all(f"{SET} " in problem or f"({SET})" in problem for problem in problems)
+            remedy = f"Correct the {'command line' if by_option else 'file'} and run again; nothing has moved"
+        super().__init__("configuration", f"{printable(source)} {what}", remedy)
+
+    @property
+    def _is_unreadable(self) -> bool:
+        return len(self.problems) == 1 and self.problems[0].startswith(NOT_A_CONFIGURATION)
 
     def __str__(self) -> str:
+        if self._is_unreadable:
+            return super().__str__()
         more = len(self.problems) - PROBLEMS_SHOWN
         shown = [*self.problems[:PROBLEMS_SHOWN], *([f"and {more} more"] if more > 0 else [])]
         return "\n".join([super().__str__(), *(f"  {problem}" for problem in shown)])

@@ -91,6 +91,14 @@ def test_a_file_of_comments_is_refused_unread(tmp_path: Path) -> None:
     assert f"longer than {SIZE_MAX_BYTES} bytes" in refusal_of(path)
 
 
+def test_a_file_that_is_missing_is_named_in_one_line(tmp_path: Path) -> None:
+    with pytest.raises(ConfigurationRefused) as caught:
+        load(tmp_path / "rig.yaml")
+    assert str(caught.value).endswith(
+        "rig.yaml cannot be read: No such file or directory. Give a configuration; rig new FILE writes one."
+    )
+
+
 @pytest.mark.skipif(os.name != "posix", reason="such files exist on POSIX")
 @pytest.mark.parametrize("kind", ["device", "fifo", "folder", "socket"])
 def test_only_regular_files_are_opened(kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
