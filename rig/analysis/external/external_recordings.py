@@ -12,7 +12,13 @@ from rig.analysis.estimator_names import ESTIMATORS, Estimator, choose_estimator
 from rig.analysis.external.attitudes import InAttitudes, Result, find_method, solve_placed
 from rig.analysis.external.changes_of_sweeps import check_sweeps_steady, widen_by_changes
 from rig.analysis.external.increment_calibration import InIncrements
-from rig.analysis.external.omissions import list_omitted, notes_on_reading, notes_on_speeds, notes_on_turns
+from rig.analysis.external.omissions import (
+    list_omitted,
+    notes_on_changes,
+    notes_on_reading,
+    notes_on_speeds,
+    notes_on_turns,
+)
 from rig.analysis.external.sweeps_agree import add_errors, check_agree, noise_dof, sweep_errors
 from rig.analysis.gyroscope.calibration import (
     ALGORITHM_1,
@@ -174,7 +180,7 @@ def _solve_sweeps(read: ReadElsewhere, samples: Samples, name: str | None, refer
     by_turns = data.turned if isinstance(solution, TurnedSolution) else None
     if polynomials is not None:
         gyroscope, polynomials = add_rate_polynomials(gyroscope, polynomials)
-    notes = tuple(notes_on_speeds(data))
+    notes = (*notes_on_speeds(data), *notes_on_changes(data))
     notes += tuple(notes_on_turns(data, solution)) if chosen in (None, "increments") else ()
     omitted = tuple((RATE, part) for part in data.omitted)
     return OfSensor(read.item, gyroscope, None, {}, {}, by_turns, polynomials=polynomials, omitted=omitted, notes=notes)

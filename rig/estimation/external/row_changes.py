@@ -15,7 +15,7 @@ from rig.estimation.statistics.variance_components import Mixed, MixedModel
 
 OF_RATE = 1e-4  # median of the prior of the rates' relative errors, and of the axes' inclinations in rad
 POSSIBLE, LEAST_EVIDENCE = -2.0, 2.0  # of a change that counts if it is large, and of one that U is to contain
-FEWEST, MOST = 6, 600  # rows: fewer show no change; more would take too long
+FEWEST_ROWS, MOST_ROWS = 6, 600  # fewer show no change; more would take too long
 EITHER_SIDE = 2  # rows at least: a single row that differs is a wrong row
 FEWEST_FOR_ONE = 8  # rows that decide between a wrong first or last row and a bias that changes there
 SMALL = 0.01  # errors without the change, relative to those with it: a few rows may take it for an error
@@ -35,7 +35,7 @@ def find_row_change(
     """
     count = len(means)
     design = np.column_stack([rates_rad_s, np.ones(count)])
-    if not FEWEST <= count <= MOST or np.linalg.matrix_rank(design) < 4:
+    if not FEWEST_ROWS <= count <= MOST_ROWS or np.linalg.matrix_rank(design) < 4:
         return None
     speeds = np.linalg.norm(rates_rad_s, axis=1)
     usual = np.sqrt(variances.mean(axis=1) + (OF_RATE * speeds) ** 2)[:, None]

@@ -1,12 +1,13 @@
 """A gyroscope that changes over a file of sweeps: named if it changes much, within U if less."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from rig.analysis.external.external_recordings import budget_of, solve_swept
-from rig.analysis.external.omissions import notes_on_speeds
+from rig.analysis.external.omissions import notes_on_changes, notes_on_speeds
 from rig.errors import Fault
 from rig.observation.external.csv_import import ExternalData
 from support.external.loggers import Log, swept, turn_slowly, write_rates
@@ -97,3 +98,10 @@ def test_whole_turns_in_degrees_are_told_though_no_speed_is_unusual(tmp_path: Pa
     assert not list(notes_on_speeds(average_files(*write_rates(tmp_path, slow))))
     first, *_ = notes_on_speeds(average_files(*write_rates(tmp_path, in_degrees)))
     assert first.startswith("each sweep turns by a whole multiple of 90 rad") and "if both files are in °/s" in first
+
+
+def test_a_file_too_long_to_be_examined_for_changes_is_noted(tmp_path: Path) -> None:
+    data = average_files(*write_rates(tmp_path, swept(HZ)))
+    assert not list(notes_on_changes(data))
+    (note,) = notes_on_changes(replace(data, sweeps=data.sweeps * 101))
+    assert note.startswith("abrupt changes of the sensor were not looked for in 6")
