@@ -2,6 +2,7 @@
 
 import os
 import time
+from contextlib import suppress
 
 READ_TIMEOUT_S = 0.005  # the delay of every read: bytes come a few at a time, and each would wake the reader
 _READ_SIZE = 65536
@@ -49,12 +50,16 @@ class SerialPort:
             raise OSError(str(error)) from error
 
     def read(self) -> bytes:
-        """Return the data received within `READ_TIMEOUT_S`; if the port closes, first return the data received before.
+        """Return all data received within `READ_TIMEOUT_S`; if the port closes, first return the data received before.
 
         pyserial could wait itself, but loses data that it has read if the port closes during the wait.
         """
         time.sleep(READ_TIMEOUT_S)
-        return bytes(self._serial.read(_READ_SIZE))
+        data = bytearray(self._serial.read(_READ_SIZE))
+        with suppress(OSError):  # of a port that has closed: the next read raises it
+            while self._serial.in_waiting:
+                data += self._serial.read(_READ_SIZE)
+        return bytes(data)
 
     def write(self, data: bytes) -> None:
         """Send data, without confirmation by the far end."""

@@ -149,7 +149,7 @@ class Run:
         with self.report_end(self._advice, moved=moved), connector.open() as rig:
             self.station.event(PhaseStarted(phase.procedure.name, rig.plan, rig.readings()))
             phase.procedure.script(rig)
-            self.station.event(rig.summarize())
+            self.station.event(rig.finish_sampling())
         return path
 
     def _confirm_mounting(self, plan: Plan, number: int) -> None:

@@ -423,8 +423,13 @@ class Rig:
         """Return each sensor's stream, "raw" or "calibrated", by name."""
         return {name: sensor.mode for name, sensor in self.recording.sensors.items()}
 
-    def summarize(self) -> PhaseRecorded:
-        """Return the numbers of recorded and missed samples and states."""
+    def finish_sampling(self) -> PhaseRecorded:
+        """Record the samples that have arrived by now; return the numbers of recorded and missed samples and states.
+
+        On a busy computer, the samples of the last motion may still wait to be read when the arm is at rest.
+        """
+        for source in self.devices.sources:
+            source.catch_up()
         return PhaseRecorded(self.devices.acquisition.samples(), self.devices.turner.missed_states)
 
     @contextmanager

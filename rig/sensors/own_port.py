@@ -11,9 +11,11 @@ from firmware_host.serial_port import SerialPort, explain_closed
 from rig.sensors.errors import SensorError
 from rig.sensors.port_silence import USUAL, Patience, PortSilence
 
+CATCH_UP_S = 60.0  # longest time to read what has arrived, however busy the computer
+
 
 class DevicePort(Protocol):
-    """An open port; `read` returns the data received within `READ_TIMEOUT_S`. All errors are OSErrors."""
+    """An open port; `read` returns all data received within `READ_TIMEOUT_S`. All errors are OSErrors."""
 
     def read(self) -> bytes: ...
     def write(self, data: bytes) -> None: ...
@@ -63,6 +65,7 @@ class OwnPort:
         self.fault: SensorError | None = None
         self._port, self._faults, self._take, self._farewell = port, faults, take, farewell
         self._patience = patience
+        self._reads = 0
         self._most_silent_s: float | None = None  # set while data are streamed
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"reader of {name}", daemon=True)
@@ -101,6 +104,11 @@ class OwnPort:
                 raise self.fault
             return done
 
+    def catch_up(self) -> None:
+        """Wait until all data that have arrived by now are taken. Raise a fault that occurs meanwhile."""
+        enough = self._reads + 2  # the present read may have begun before
+        self.wait(lambda: self._reads >= enough, CATCH_UP_S)
+
     def write(self, data: bytes) -> None:
         """Send data. Raise SensorError if the port has closed."""
         try:
@@ -122,6 +130,9 @@ class OwnPort:
         try:
             while not self._closing.is_set():
                 self._take(self._port.read(), time.monotonic())
+                with self.news:
+                    self._reads += 1
+                    self.news.notify_all()
         except Exception as error:  # a failing consumer must reach the caller, not end in a dead thread
             self.fault = self._faults.complete(error)
         with self.news:

@@ -26,3 +26,7 @@ class SampleSource(Protocol):
     def check(self, clock_s: float | None = None) -> None:
         """Raise errors since the last call; a silence counts only if another clock, now at `clock_s`, confirms it."""
         ...
+
+    def catch_up(self) -> None:
+        """Wait until all samples that have arrived by now are passed on; on a busy computer they wait to be read."""
+        ...

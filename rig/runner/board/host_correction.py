@@ -42,6 +42,10 @@ class HostCorrected:
         """Check the source (see `SampleSource`)."""
         self.source.check(clock_s)
 
+    def catch_up(self) -> None:
+        """Wait for the source's samples (see `SampleSource`)."""
+        self.source.catch_up()
+
 
 def correct_rates(name: str, raw: RecordedSensor, calibration: Calibration, on_samples: OnSamples) -> OnSamples:
     """Return a receiver that passes on M (m + b) for each rate m of the sensor `name`, and other samples unchanged."""

@@ -55,6 +55,10 @@ class BoardSource:
         """Check the board (see `SampleSource`). Raise BoardError."""
         self.board.check(clock_s)
 
+    def catch_up(self) -> None:
+        """Wait for samples before an answer (see `SampleSource`). Raises BoardError."""
+        self.board.status()
+
 
 @contextmanager
 def open_board_source(config: SensorsConfig, on_samples: OnSamples, *, calibrated: bool) -> Iterator[BoardSource]:

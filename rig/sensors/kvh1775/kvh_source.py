@@ -81,6 +81,10 @@ class Kvh1775Source:
         """Raise errors since the last call: SensorErrors of `OwnPort.check`, and `kvh_axis_invalid`."""
         self._driver.own_port.check(clock_s)
 
+    def catch_up(self) -> None:
+        """Wait for what has arrived (see `OwnPort.catch_up`)."""
+        self._driver.own_port.catch_up()
+
     def close(self) -> None:
         """End the thread and close the port."""
         self._driver.close()

@@ -84,6 +84,10 @@ class LinesSource:
         """Raise SensorError `lines_damaged`, `lines_time_jumped`, `temperature_lost`, or as `OwnPort.check` does."""
         self._device.own_port.check(clock_s)
 
+    def catch_up(self) -> None:
+        """Wait for what has arrived (see `OwnPort.catch_up`)."""
+        self._device.own_port.catch_up()
+
     def close(self) -> None:
         """End the thread and close the port."""
         self._device.close()

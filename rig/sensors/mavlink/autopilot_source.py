@@ -155,6 +155,10 @@ class MavlinkSource:
         """Raise errors since the last call: those of `OwnPort.check`, and SensorError `autopilot_armed`."""
         self.link.own_port.check(clock_s)
 
+    def catch_up(self) -> None:
+        """Wait for what has arrived (see `OwnPort.catch_up`)."""
+        self.link.own_port.catch_up()
+
     def close(self) -> None:
         """End the thread and close the port."""
         self.link.close()
