@@ -57,6 +57,7 @@ class Observation:
     - acceleration: the accelerometer's readings in the same turn, if one is to be calibrated.
     - angle_rad: angle of an arc; arc_rad: the joint's angles at its ends, the lower first. None for whole turns.
     - ripple: RMS unevenness of the turn, relative to its rate.
+    - state_gain: noise of the arm's states in the mean rate, relative to that in Δθ/T.
     """
 
     sweep: int
@@ -76,6 +77,7 @@ class Observation:
     arc_rad: tuple[float, float] | None = None
     ripple: float = 0.0
     beats: int = BEATS
+    state_gain: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -221,6 +223,7 @@ def _average_revolution(
         arc_rad=None if turn.closed else sweep.revolution_rad,
         ripple=float(sampled.uneven_rad_s.std()) / turn.speed_rad_s,
         beats=turn.beats,
+        state_gain=1.0 if turn.uneven else motion.state_gain(stream.time_s[inside][covered], weights),
     )
 
 

@@ -10,6 +10,7 @@ The readings' residual after lines and rate is the noise, usually white.
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.mean_weights import mean_weights
@@ -30,6 +31,7 @@ from rig.observation.statistics.spectral_lines import (
 from rig.observation.statistics.vibration_noise import BRIEF, FEWEST, estimate_noise
 
 SLOW = 8.0  # cycles per revolution: slower lines are hard to separate from waves once and twice per revolution
+MOST_GAIN = 3.0  # of the noise of the arm's angles; weights with a larger one do not remove slow lines
 NOT_ENCODED = LineSearch(slowest=5.0)
 ENCODED = LineSearch(slowest=2.5, beats=0, most=5)
 
@@ -82,28 +84,47 @@ def turn_mean(readings: Array, steps: Steps, turn: SampledTurn) -> tuple[Mean, A
     lines = _find_turn_lines(readings, steady, turn)
     vibration = waves(lines.cycles, turn.share, turn.beats)
     weights = mean_weights(ones, np.column_stack([turn.passing, lines.rate, vibration]))
+    without_slow = _weights_without_slow_lines(turn, lines, vibration)
+    change = (weights - without_slow)[0]
+    if _gain(weights) > MOST_GAIN:
+        weights = without_slow
     # The noise is the residual of a fit of all that is not noise.
     columns = unit_columns(np.column_stack([steady, lines.rate, vibration, lines.encoded]))
     coefficients, _, rank, _ = np.linalg.lstsq(columns, readings, rcond=1e-6)
     smooth = columns @ coefficients
     noise = estimate_noise(readings - smooth, int(rank), steps, BRIEF if lines.not_encoded else MEMORIES)
     (mean,) = compute_weighted_means(readings, ones, weights, smooth=smooth, noise=noise, steps=steps)
-    added = _slow_line_variance(readings, turn, lines, vibration, weights)
+    added = _slow_line_variance(readings, turn, lines, vibration, change)
     return replace(mean, variance=mean.variance + added, cycles=lines.cycles), weights[0]
 
 
-def _slow_line_variance(readings: Array, turn: SampledTurn, lines: Lines, vibration: Array, weights: Array) -> Array:
+def _weights_without_slow_lines(turn: SampledTurn, lines: Lines, vibration: Array) -> Array:
+    """Return the weights (1, n) of a mean from which the lines slower than `SLOW` are not removed."""
+    fast = vibration[:, ~_are_slow(lines, turn)]
+    return mean_weights(np.ones((len(turn.share), 1)), np.column_stack([turn.passing, lines.rate, fast]))
+
+
+def _are_slow(lines: Lines, turn: SampledTurn) -> NDArray[np.bool_]:
+    """Return a mask of the columns of lines slower than `SLOW`."""
+    return np.repeat(lines.cycles < SLOW, column_count(turn.beats))
+
+
+def _gain(weights: Array) -> float:
+    """Return how many times more noise of angles is in a mean rate with weights (1, n) than in Δθ/T."""
+    return float(np.linalg.norm(np.diff(weights[0], prepend=0.0, append=0.0)) * weights.size / np.sqrt(2))
+
+
+def _slow_line_variance(readings: Array, turn: SampledTurn, lines: Lines, vibration: Array, change: Array) -> Array:
     """Return the variance (3,) of the mean due to the lines slower than `SLOW`, which are poorly determined.
 
-    Weights that do not remove these lines give another mean. The variance is the square of the difference, or that of
-    the difference by the lines' fitted amplitudes at any phase, whichever is larger.
+    Weights that do not remove these lines, and differ by `change` (n,), give another mean. The variance is the square
+    of the difference, or that of the difference by the lines' fitted amplitudes at any phase, whichever is larger.
     """
-    is_slow = np.repeat(lines.cycles < SLOW, column_count(turn.beats))
+    is_slow = _are_slow(lines, turn)
     if not is_slow.any():
         return np.zeros(3)
     ones = whole(readings)
     nuisance = np.column_stack([turn.passing, lines.rate, vibration[:, ~is_slow]])
-    change = (weights - mean_weights(ones, nuisance))[0]
     without_ripple = _fit_residuals(np.column_stack([ones, turn.uneven_rad_s]), readings)
     residuals = _fit_residuals(np.column_stack([ones, nuisance, lines.encoded]), readings)
     return np.maximum((change @ without_ripple) ** 2, _line_variance(vibration[:, is_slow], change, residuals))

@@ -9,7 +9,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.statistics.rounding import Steps
 from rig.observation.statistics.mean import Mean
 from rig.observation.statistics.spectral_lines import BEATS, harmonics
-from rig.observation.turn_mean import SampledTurn, turn_mean
+from rig.observation.turn_mean import SLOW, SampledTurn, turn_mean
 from support.recordings.drawn_ripple import Ripple, drawn_ripple
 
 AXIS = np.array([0.6, 0.0, 0.8])
@@ -108,3 +108,16 @@ def test_where_nothing_vibrates_unseen_the_mean_rate_is_that_of_a_turn(*, comple
     case = sampled(ripple, 1, complete=complete)
     _, weights = turn_mean(case.readings, Steps(STEP_RAD_S), case.turn)
     assert float(weights @ case.turn.rates_rad_s @ AXIS) == pytest.approx(SPEED_RAD_S, rel=1e-12)
+
+
+def test_weights_that_would_amplify_the_noise_of_the_arms_angles_leave_slow_lines_in_the_mean() -> None:
+    """Lines at 5.7 and 9.6 cycles, with their sidebands, leave weights that rise to thirteen times the mean."""
+    ripple = Ripple(
+        (60,), 0.001, unseen_rad_s=1e-3, unseen_hz=(5.67 * TURN_HZ, 9.64 * TURN_HZ), seen_rad_s=0.0, seen_hz=0.9
+    )
+    for seed in range(4):
+        made = sampled(ripple, seed)
+        found, weights = turn_mean(made.readings, Steps(STEP_RAD_S), made.turn)
+        assert (found.cycles < SLOW).any() and len(found.cycles) >= 2
+        assert np.linalg.norm(np.diff(weights, prepend=0, append=0)) * len(weights) < 3 * np.sqrt(2)
+        assert np.abs(error(found, weights, made.turn)).max() < 3

@@ -89,6 +89,7 @@ def combine_recordings(parts: Sequence[RecordingPart], surroundings: Surrounding
         arms_m=np.concatenate([lever_arms, np.zeros((rests, 3))]),
         noise_dof=dof_by_axis(average.dof for average in averages),
         ripples=np.array([*(turn.ripple for turn in turns), *np.zeros(rests)]),
+        state_gains=np.array([*(turn.state_gain for turn in turns), *np.ones(rests)]),
         roundings_rad_s=np.sqrt(dof_by_axis(average.rounding_rad2_s2 for average in averages)),
     )
 

@@ -241,7 +241,7 @@ def _evaluate_times(
     """Yield the contributors of the times of the arm's states and of the sensor's samples."""
     per_s = np.sqrt(2) / np.diff(inputs.windows_s).T[0]
     per_sweep = np.eye(len(turned))[:, :, None]
-    jitter = per_sweep * (unknown.state_jitter_s * per_s[:, None] * turned)[None]
+    jitter = per_sweep * ((unknown.state_jitter_s * per_s * inputs.state_gains)[:, None] * turned)[None]
     source = "scatter of the joint angles"
     yield evaluate_a(STATES, source, propagate(jitter), unknown.state_jitter_dof)
     if unknown.stamp_std_s:

@@ -173,7 +173,8 @@ def _fit(
     """Fit F, c, G, the arm's errors and the Earth's rate along `directions` (d, 3) of the base, in this order."""
     speeds = np.linalg.norm(inputs.turns_rad_s, axis=1)
     durations = np.diff(inputs.windows_s).T[0]
-    speed_std = np.hypot(inputs.speed_std_rad_s, np.sqrt(2) * prior.state_jitter_s / durations * speeds)
+    by_states = np.sqrt(2) * prior.state_jitter_s * inputs.state_gains / durations * speeds
+    speed_std = np.hypot(inputs.speed_std_rad_s, by_states)
     arm_errors = [
         np.zeros((0, *inputs.means_rad_s.shape)) if inputs.axis_errors_rad_s is None else inputs.axis_errors_rad_s
     ]

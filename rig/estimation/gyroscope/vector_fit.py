@@ -48,6 +48,7 @@ class VectorInputs:
     - sensor: its properties by the data sheet, None if unknown.
     - encoder_errors_rad_s (P, N, 3): effect of encoders at the ends of arcs, None for whole revolutions.
     - ripples (N,): RMS ripple of each rotation as a fraction of its rate.
+    - state_gains (N,): noise of the arm's states in the mean rates, relative to that in Δθ/T.
     - roundings_rad_s (N, 3): standard uncertainty of each mean by rounding.
     """
 
@@ -68,6 +69,7 @@ class VectorInputs:
     sensor: KnownSensor | None = None
     encoder_errors_rad_s: Array | None = None
     ripples: Array | float = 0.0
+    state_gains: Array | float = 1.0
     roundings_rad_s: Array | float = 0.0
 
     @property

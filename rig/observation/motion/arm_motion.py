@@ -158,8 +158,22 @@ class ArmMotion:
         `RATE_STEP_S`. Joints that stand still between the first and the last sample have no rate: their encoders' noise
         would be added to the motion.
         """
-        lasting_s = RATE_STEP_S if is_sparse(time_s) else float(np.median(np.diff(time_s)))
-        return self._mean_rates(time_s, lasting_s, self._standing_rad(float(time_s[0]), float(time_s[-1])))
+        standing_rad = self._standing_rad(float(time_s[0]), float(time_s[-1]))
+        return self._mean_rates(time_s, _averaging_time(time_s), standing_rad)
+
+    def state_gain(self, time_s: Array, weights: Array) -> float:
+        """Return how many times more noise of the states is in a weighted mean of `rates_at_samples` than in Δθ/T.
+
+        `weights` (n,) are those of the mean. Angles between states are interpolated, here linearly.
+        """
+        lasting_s = _averaging_time(time_s)
+        edges_s = np.concatenate([time_s + lasting_s / 2, time_s - lasting_s / 2])
+        sizes = np.concatenate([weights, -weights]) / lasting_s
+        later = np.clip(np.searchsorted(self.time_s, edges_s), 1, len(self.time_s) - 1)
+        fraction = (edges_s - self.time_s[later - 1]) / (self.time_s[later] - self.time_s[later - 1])
+        by_state = np.bincount(later - 1, sizes * (1 - fraction), len(self.time_s))
+        by_state += np.bincount(later, sizes * fraction, len(self.time_s))
+        return float(np.linalg.norm(by_state) * (time_s[-1] - time_s[0] + lasting_s) / np.sqrt(2))
 
     def mean_rate(self, start_s: float, end_s: float) -> Array:
         """Return the flange's mean rate (3,), rad/s, from one time to another."""
@@ -219,6 +233,11 @@ class ArmMotion:
     def _q_rad(self, window: Window) -> Array:
         q_rad: Array = self._states["q_rad"][(self.time_s >= window.start_s) & (self.time_s <= window.end_s)]
         return q_rad
+
+
+def _averaging_time(time_s: Array) -> float:
+    """Return the time, s, over which the arm's rate is averaged around samples at times (n,)."""
+    return RATE_STEP_S if is_sparse(time_s) else float(np.median(np.diff(time_s)))
 
 
 def is_sparse(time_s: Array) -> bool:
