@@ -28,6 +28,7 @@ from rig.observation.statistics.spectral_lines import (
     unit_columns,
     waves,
 )
+from rig.observation.statistics.tapered_weights import MAIN_LOBE
 from rig.observation.statistics.vibration_noise import BRIEF, FEWEST, estimate_noise
 
 SLOW = 8.0  # cycles per revolution: slower lines are hard to separate from waves once and twice per revolution
@@ -179,6 +180,15 @@ def _find_turn_lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines
     residuals = _fit_residuals(np.column_stack([steady, encoded, columns[:, fast]]), readings)
     encoded_lines = ripple[ripple >= SLOW]
     cycles = find_lines(residuals, NOT_ENCODED, encoded_lines, turn.share)
+    kept = cycles > SLOW + MAIN_LOBE
+    kept[: len(encoded_lines)] = True
+    if not kept.all():
+        # Without fast vibrations the fit of the encoders' slow rate was wrong: its noise in the residuals looks like
+        # slow lines. After a fit beside these vibrations only true lines remain.
+        vibration = waves(cycles[kept], turn.share, turn.beats)
+        residuals = _fit_residuals(np.column_stack([steady, encoded, columns[:, fast], vibration]), readings)
+        fewer = find_lines(residuals, NOT_ENCODED, cycles[kept], turn.share)
+        cycles = fewer if len(fewer) < len(cycles) else cycles
     return Lines(cycles, len(cycles) - len(encoded_lines), encoded, late)
 
 
