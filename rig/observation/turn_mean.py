@@ -28,7 +28,7 @@ from rig.observation.statistics.spectral_lines import (
     unit_columns,
     waves,
 )
-from rig.observation.statistics.tapered_weights import MAIN_LOBE
+from rig.observation.statistics.tapered_weights import MAIN_LOBE, apply_window
 from rig.observation.statistics.vibration_noise import BRIEF, FEWEST, estimate_noise
 
 SLOW = 8.0  # cycles per revolution: slower lines are hard to separate from waves once and twice per revolution
@@ -149,6 +149,20 @@ def _fit_residuals(columns: Array, values: Array) -> Array:
     return residuals
 
 
+def _fit_tapered_residuals(columns: Array, values: Array) -> Array:
+    """Return the residuals of values (n, m) after a fit of columns (n, k) that fast lines in the values do not affect.
+
+    Cut off at both ends, fast lines resemble the slow part of the encoders' rate. A fit of these lines would leave the
+    encoders' noise in the residuals, where it looks like slow lines.
+    """
+    unit = unit_columns(columns)
+    tapered = apply_window(np.column_stack([unit, values]))
+    sizes = fit_columns(tapered[:, : unit.shape[1]], tapered[:, unit.shape[1] :])
+    remainder = values - unit @ sizes
+    residuals: Array = remainder - remainder.mean(axis=0)
+    return residuals
+
+
 def _find_turn_lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines:
     """Find the vibrations in readings (n, 3) beyond steady columns (n, k) and the rates that the encoders measure.
 
@@ -183,12 +197,8 @@ def _find_turn_lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines
     kept = cycles > SLOW + MAIN_LOBE
     kept[: len(encoded_lines)] = True
     if not kept.all():
-        # Without fast vibrations the fit of the encoders' slow rate was wrong: its noise in the residuals looks like
-        # slow lines. After a fit beside these vibrations only true lines remain.
-        vibration = waves(cycles[kept], turn.share, turn.beats)
-        residuals = _fit_residuals(np.column_stack([steady, encoded, columns[:, fast], vibration]), readings)
-        fewer = find_lines(residuals, NOT_ENCODED, cycles[kept], turn.share)
-        cycles = fewer if len(fewer) < len(cycles) else cycles
+        residuals = _fit_tapered_residuals(np.column_stack([steady, encoded, columns[:, fast]]), readings)
+        cycles = find_lines(residuals, NOT_ENCODED, cycles[kept], turn.share)
     return Lines(cycles, len(cycles) - len(encoded_lines), encoded, late)
 
 
