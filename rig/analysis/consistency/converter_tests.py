@@ -34,6 +34,7 @@ FEWEST_OF_NOISE = 4 * MEMORY  # the fewest readings of a window from which its n
 # Fraction of the arm's vibration that may remain: the sensor's filter changes it, and the arm's states show it in part.
 VIBRATION_LEFT = 0.1
 HEAP = 10  # the fewest readings at one end of the range that may be clipped
+AROUND = 4  # readings before and after one that show a burst of vibration
 SETTLING = 5  # first readings of a window, during which a low-pass filter may still follow the arm
 LEAST_TO_SKEW = 0.7  # steps: smaller noise takes so few numbers that a mean between two of them makes it skewed
 BETWEEN_COUNTS = 1.5  # counts: readings in larger steps are not those of a converter
@@ -162,7 +163,8 @@ def _find_spikes(windows: Sequence[RawReadings], step_counts: Array) -> tuple[fl
     for window, deviations, noise_of_window in zip(windows, deviations_by_window, noises, strict=True):
         noise = np.maximum(noise_of_window, least)
         deviation = np.maximum(noise, VIBRATION_LEFT * window.vibration_counts)
-        farthest = max(farthest, float(np.max(np.abs(deviations) / deviation)))
+        scatter = np.maximum(deviation, _find_scatter_around(deviations) if window.sweep >= 0 else 0.0)
+        farthest = max(farthest, float(np.max(np.abs(deviations) / scatter)))
         for axis in range(3):
             beyond = np.abs(deviations[:, axis]) > SPIKE * deviation[axis]
             power = np.round(np.log2(np.maximum(np.abs(deviations[beyond, axis]), 1)))
@@ -171,6 +173,14 @@ def _find_spikes(windows: Sequence[RawReadings], step_counts: Array) -> tuple[fl
             )
             sizes[axis].append(np.where(near, power, -1))
     return farthest, sum(_is_one_bit(np.concatenate(powers)) for powers in sizes)
+
+
+def _find_scatter_around(deviations: Array) -> Array:
+    """Return the scatter (n, 3) of the readings around each one: a burst of vibration in a turn is no spike."""
+    sizes = np.pad(np.abs(deviations), ((AROUND, AROUND), (0, 0)), mode="reflect")
+    around = np.lib.stride_tricks.sliding_window_view(sizes, 2 * AROUND + 1, axis=0)
+    scatter: Array = 1.4826 * np.median(around, axis=-1)
+    return scatter
 
 
 def _is_one_bit(powers: Array) -> bool:

@@ -291,3 +291,16 @@ def _noisy(rng: np.random.Generator, readings: int) -> tuple[np.ndarray, np.ndar
     """(n, 3) counts, and what of them is noise: 15 counts."""
     counts = np.round(15 * rng.standard_normal((readings, 3)))
     return counts.astype(np.int64), counts - counts.mean(axis=0)
+
+
+def test_a_burst_of_vibration_in_a_turn_is_no_spike() -> None:
+    """A single reading as large is one."""
+    rng = np.random.default_rng(1)
+    windows = [RawReadings(sweep, *_noisy(rng, 280), np.zeros(3)) for sweep in range(6)]
+    residuals = windows[2].residual_counts
+    scatter = residuals.std()
+    residuals[100:106] += scatter * np.array([-4, 10, -7, 8, 11, -6])[:, None]
+    spikes, limit = judge_readings([window.counts for window in windows], windows, FALSE_ALARMS / 10)["spikes"]
+    assert spikes < limit
+    residuals[200] = 11 * scatter
+    assert judge_readings([window.counts for window in windows], windows, FALSE_ALARMS / 10)["spikes"][0] > limit
