@@ -10,7 +10,6 @@ The readings' residual after lines and rate is the noise, usually white.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.mean_weights import mean_weights
@@ -85,29 +84,21 @@ def turn_mean(readings: Array, steps: Steps, turn: SampledTurn) -> tuple[Mean, A
     lines = _find_turn_lines(readings, steady, turn)
     vibration = waves(lines.cycles, turn.share, turn.beats)
     weights = mean_weights(ones, np.column_stack([turn.passing, lines.rate, vibration]))
-    without_slow = _weights_without_slow_lines(turn, lines, vibration)
-    change = (weights - without_slow)[0]
-    if _gain(weights) > MOST_GAIN:
-        weights = without_slow
+    added = np.zeros(3)
+    is_slow = np.repeat(lines.cycles < SLOW, column_count(turn.beats))
+    if is_slow.any():
+        nuisance = np.column_stack([turn.passing, lines.rate, vibration[:, ~is_slow]])
+        without_slow = mean_weights(ones, nuisance)
+        change, explained = (weights - without_slow)[0], np.column_stack([ones, nuisance, lines.encoded])
+        added = _slow_line_variance(readings, turn, vibration[:, is_slow], change, explained)
+        weights = without_slow if _gain(weights) > MOST_GAIN else weights
     # The noise is the residual of a fit of all that is not noise.
     columns = unit_columns(np.column_stack([steady, lines.rate, vibration, lines.encoded]))
     coefficients, _, rank, _ = np.linalg.lstsq(columns, readings, rcond=1e-6)
     smooth = columns @ coefficients
     noise = estimate_noise(readings - smooth, int(rank), steps, BRIEF if lines.not_encoded else MEMORIES)
     (mean,) = compute_weighted_means(readings, ones, weights, smooth=smooth, noise=noise, steps=steps)
-    added = _slow_line_variance(readings, turn, lines, vibration, change)
     return replace(mean, variance=mean.variance + added, cycles=lines.cycles), weights[0]
-
-
-def _weights_without_slow_lines(turn: SampledTurn, lines: Lines, vibration: Array) -> Array:
-    """Return the weights (1, n) of a mean from which the lines slower than `SLOW` are not removed."""
-    fast = vibration[:, ~_are_slow(lines, turn)]
-    return mean_weights(np.ones((len(turn.share), 1)), np.column_stack([turn.passing, lines.rate, fast]))
-
-
-def _are_slow(lines: Lines, turn: SampledTurn) -> NDArray[np.bool_]:
-    """Return a mask of the columns of lines slower than `SLOW`."""
-    return np.repeat(lines.cycles < SLOW, column_count(turn.beats))
 
 
 def _gain(weights: Array) -> float:
@@ -115,20 +106,16 @@ def _gain(weights: Array) -> float:
     return float(np.linalg.norm(np.diff(weights[0], prepend=0.0, append=0.0)) * weights.size / np.sqrt(2))
 
 
-def _slow_line_variance(readings: Array, turn: SampledTurn, lines: Lines, vibration: Array, change: Array) -> Array:
-    """Return the variance (3,) of the mean due to the lines slower than `SLOW`, which are poorly determined.
+def _slow_line_variance(readings: Array, turn: SampledTurn, slow: Array, change: Array, explained: Array) -> Array:
+    """Return the variance (3,) of the mean due to columns `slow` (n, k) of lines, which are poorly determined.
 
     Weights that do not remove these lines, and differ by `change` (n,), give another mean. The variance is the square
     of the difference, or that of the difference by the lines' fitted amplitudes at any phase, whichever is larger.
+    `explained` (n, m): columns of all else in the readings (n, 3).
     """
-    is_slow = _are_slow(lines, turn)
-    if not is_slow.any():
-        return np.zeros(3)
-    ones = whole(readings)
-    nuisance = np.column_stack([turn.passing, lines.rate, vibration[:, ~is_slow]])
-    without_ripple = _fit_residuals(np.column_stack([ones, turn.uneven_rad_s]), readings)
-    residuals = _fit_residuals(np.column_stack([ones, nuisance, lines.encoded]), readings)
-    return np.maximum((change @ without_ripple) ** 2, _line_variance(vibration[:, is_slow], change, residuals))
+    without_ripple = _fit_residuals(np.column_stack([whole(readings), turn.uneven_rad_s]), readings)
+    residuals = _fit_residuals(explained, readings)
+    return np.maximum((change @ without_ripple) ** 2, _line_variance(slow, change, residuals))
 
 
 def _line_variance(slow: Array, weights: Array, residuals: Array) -> Array:
@@ -191,13 +178,14 @@ def _find_turn_lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines
     smooth = slow_part(slow, turn.share)
     late = _changes(smooth) if turn.closed else none  # over an arc it resembles encoder errors
     encoded = np.column_stack([smooth, late, slow - smooth])
-    residuals = _fit_residuals(np.column_stack([steady, encoded, columns[:, fast]]), readings)
+    explained = np.column_stack([steady, encoded, columns[:, fast]])
+    residuals = _fit_residuals(explained, readings)
     encoded_lines = ripple[ripple >= SLOW]
     cycles = find_lines(residuals, NOT_ENCODED, encoded_lines, turn.share)
     kept = cycles > SLOW + MAIN_LOBE
     kept[: len(encoded_lines)] = True
     if not kept.all():
-        residuals = _fit_tapered_residuals(np.column_stack([steady, encoded, columns[:, fast]]), readings)
+        residuals = _fit_tapered_residuals(explained, readings)
         cycles = find_lines(residuals, NOT_ENCODED, cycles[kept], turn.share)
     return Lines(cycles, len(cycles) - len(encoded_lines), encoded, late)
 
