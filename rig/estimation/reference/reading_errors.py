@@ -21,7 +21,7 @@ from rig.estimation.reference.accelerometer_model import (
     turned,
 )
 from rig.estimation.reference.reference_model import matrix
-from rig.estimation.statistics.bias_process import flicker_covariance, walk_covariance
+from rig.estimation.statistics.bias_process import flicker_covariance, flicker_harmonic_covariance, walk_covariance
 
 ANGLES = 72  # angles of a revolution at which nonlinear functions of the acceleration are averaged
 
@@ -85,7 +85,10 @@ def flickering(movement: Movement) -> Array:
     sensor = movement.sensor_errors
     if sensor is None or not sensor.instability_m_s2:
         return np.zeros((movement.readings().size,) * 2)
-    return sensor.instability_m_s2**2 * _expand_bias(flicker_covariance(sensor.windows_s), movement)
+    covariance = _expand_bias(flicker_covariance(sensor.windows_s), movement)
+    for sweep in movement.segments()[len(movement.dwells.readings_m_s2) :]:
+        covariance[sweep, sweep] += np.kron(flicker_harmonic_covariance(), np.eye(3))
+    return sensor.instability_m_s2**2 * covariance
 
 
 def find_drift_covariance(movement: Movement) -> Array:

@@ -9,6 +9,7 @@ parameters.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,6 +19,7 @@ from rig.estimation.arrays import Array
 STEPS = 25  # grid points of each standard deviation
 PRICE = 1.0  # cost of a parameter in the log-likelihood (Akaike, IEEE Trans. Autom. Control 19 (1974) 716)
 SPAN = 300.0  # ratio of the largest to the smallest standard deviation of the grid
+PARTS = 24  # of a revolution, by the means of which the harmonics of flicker noise are computed, to 1 %
 CHANGED = float(np.sqrt(2))  # change by flicker between adjacent means, relative to its Allan deviation
 
 # Walk and scatter (2,) from pairs of sizes (K, 2) and their log-likelihoods (K,).
@@ -84,16 +86,36 @@ def flicker_covariance(windows_s: ArrayLike) -> Array:
     from the first start to the last end.
     """
     windows = np.asarray(windows_s, dtype=np.float64)
-    span = [windows.min(), windows.max()]
-    start, end = np.vstack([windows, span]).T
+    means = _flicker_means(np.vstack([windows, [windows.min(), windows.max()]]))
+    covariance: Array = means[:-1, :-1] - means[:-1, -1:] - means[-1:, :-1] + means[-1, -1]
+    return covariance
+
+
+@cache
+def flicker_harmonic_covariance() -> Array:
+    """Return the covariance (3, 3) of mean, cosine and sine of a revolution for flicker noise of Allan deviation 1.
+
+    It does not depend on the revolution's duration, except for the mean's variance, which is 0 here: see
+    `flicker_covariance`.
+    """
+    ends = np.linspace(0, 1, PARTS + 1)
+    angle_rad = np.pi * (ends[:-1] + ends[1:])
+    waves = np.stack([np.ones(PARTS), 2 * np.cos(angle_rad), 2 * np.sin(angle_rad)]) / PARTS
+    covariance: Array = waves @ _flicker_means(np.stack([ends[:-1], ends[1:]], axis=1)) @ waves.T
+    covariance[0, 0] = 0.0
+    return covariance
+
+
+def _flicker_means(windows_s: Array) -> Array:
+    """Return the covariance (N, N) of `flicker_covariance`, without the infinite constant."""
+    start, end = windows_s.T
     between = (
         _twice_integrated_logarithm(end[:, None] - start)
         - _twice_integrated_logarithm(start[:, None] - start)
         - _twice_integrated_logarithm(end[:, None] - end)
         + _twice_integrated_logarithm(start[:, None] - end)
     )
-    means = -between / np.outer(end - start, end - start) / (2 * np.log(2))
-    covariance: Array = means[:-1, :-1] - means[:-1, -1:] - means[-1:, :-1] + means[-1, -1]
+    covariance: Array = -between / np.outer(end - start, end - start) / (2 * np.log(2))
     return covariance
 
 

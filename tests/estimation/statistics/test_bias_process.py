@@ -5,7 +5,12 @@ import pytest
 
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.vector_model import VectorSolution, design_matrix, solve_vector_model
-from rig.estimation.statistics.bias_process import BiasProcess, bias_process, walk_covariance
+from rig.estimation.statistics.bias_process import (
+    BiasProcess,
+    bias_process,
+    flicker_harmonic_covariance,
+    walk_covariance,
+)
 
 STEP_S = 0.02
 AXES = np.repeat(np.eye(3), 2, axis=0) * np.tile([1.0, -1.0], 3)[:, None]
@@ -38,6 +43,19 @@ def test_the_covariance_of_a_walk_is_that_of_many_walks() -> None:
     found = np.cov(np.concatenate(means).T)
     expected = walk_covariance(windows_s)
     assert np.abs(found - expected).max() < 0.06 * expected.diagonal().max()
+
+
+def test_flicker_changes_the_harmonics_of_revolutions_as_drawn_flicker_does() -> None:
+    samples, revolution = 2**18, 1024
+    rng = np.random.default_rng(5)
+    spectrum = np.fft.rfft(rng.standard_normal((10, samples)))[:, 1:] / np.sqrt(np.arange(1, samples // 2 + 1))
+    flicker = np.fft.irfft(np.insert(spectrum, 0, 0, axis=1)).reshape(-1, revolution)
+    allan_variance = np.mean(np.diff(flicker.mean(axis=1).reshape(10, -1)) ** 2) / 2
+    angle_rad = 2 * np.pi * (np.arange(revolution) + 0.5) / revolution
+    waves = np.stack([np.ones(revolution), 2 * np.cos(angle_rad), 2 * np.sin(angle_rad)], axis=1) / revolution
+    drawn = np.cov((flicker @ waves).T) / allan_variance
+    drawn[0, 0] = 0.0  # depends on the time between the revolutions
+    assert np.abs(drawn - flicker_harmonic_covariance()).max() < 0.08
 
 
 @pytest.mark.slow
