@@ -22,6 +22,7 @@ from rig.observation.statistics.coloured_noise import correlation_inflation
 # The board's counter runs from its 32768 Hz crystal by way of a PLL, 576 ppm below the nominal rate (docs/board.md).
 NOMINAL_DRIFT = 4e6 / (122 * 32768) - 1
 MIN_SAMPLES = 100
+CHECK_SENSOR = "Check that the sensor is fixed to the flange and read in the right range, then record again"
 COARSE_STEP_S = 0.02  # far shorter than the ramps of a sweep, so that the fine fit converges
 COARSE_REACH_S = 0.15  # largest clock error at either end of the data from which the fine fit converges
 CANDIDATES = 12  # peaks of the correlation that are tried: six equal sweeps make eleven
@@ -112,7 +113,10 @@ def estimate_time_base(board_time_s: Array, readings_rad_s: Array, motion: Known
 
 def _check_samples(board_time_s: Array, readings: Array, motion: KnownMotion) -> None:
     if len(board_time_s) < MIN_SAMPLES:
-        raise _not_found(f"the recording holds {len(board_time_s)} samples")
+        raise _not_found(
+            f"the recording holds {len(board_time_s)} samples, of at least {MIN_SAMPLES} that are needed",
+            "Raise the rate of the samples, or sweep more slowly",
+        )
     check_readings(board_time_s, readings)
     still = np.ptp(readings, axis=0) == 0
     if still.all():
@@ -386,9 +390,5 @@ def _triple(values: Array) -> str:
     return ", ".join(f"{value:.4g}" for value in values)
 
 
-def _not_found(what: str) -> Fault:
-    return Fault(
-        "time_base_not_found",
-        f"{what}, so board and arm cannot be put on one clock",
-        "Check that the sensor is fixed to the flange and read in the right range, then record again",
-    )
+def _not_found(what: str, remedy: str = CHECK_SENSOR) -> Fault:
+    return Fault("time_base_not_found", f"{what}, so board and arm cannot be put on one clock", remedy)

@@ -467,7 +467,10 @@ def gap_in_states(run: RunData) -> RunData:
         (noise_only, "time_base_not_found"),
         (restart, "board_clock_restarted"),
         (doubled, "duplicated_samples"),
-        (lambda run: with_samples(run, lambda samples: samples[:50]), "time_base_not_found"),
+        (
+            lambda run: with_samples(run, lambda samples: samples[:50]),
+            "time_base_not_found: .* 50 samples, of .*Raise the rate",
+        ),
         (halt, "speed_not_constant: in sweep 0"),
         (slow_slider, "speed_slider: .* 80 %"),
         (slowed_by_a_limit, "speed_limited: .* 60 % of the programmed speed with the slider at 100 %"),

@@ -77,7 +77,7 @@ def check_observed(run: RunData, sensors: Iterable[str]) -> None:
             raise Fault(
                 "board_missed_sweep",
                 f"the board could not average, for {sensor}, {'; '.join(missed)}",
-                "Resume the run to repeat these",
+                "Follow what is said there, then resume the run, which repeats these sweeps",
             )
 
 
