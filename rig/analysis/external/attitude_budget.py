@@ -22,6 +22,7 @@ SOURCES: Mapping[str, tuple[Literal["A", "B"], str]] = {
     placement.NOISE: ("A", "scatter of the readings"),
     placement.ATTITUDES: ("A", f"estimated from the residuals, {IN_U}"),
     placement.PLACEMENTS: ("A", f"scatter of the placements beyond their attitudes, {IN_U}"),
+    placement.CHANGE: ("A", "half of a change that the residuals show"),
     increment_solution.DELAY: ("A", f"estimated, with the jitter of the stamps, {IN_U}"),
     increment_solution.EARTHS_RATE: ("B", "its size, whichever way it points"),
     increment_solution.AXES: ("B", f"inclinations that F imitates, {IN_U}"),

@@ -10,6 +10,7 @@ import numpy as np
 from rig.analysis.estimator_names import choose_estimator
 from rig.analysis.external.attitude_budget import budget_by_causes, noise_dof
 from rig.analysis.external.attitude_equations import Equations
+from rig.analysis.external.changes import check_steady
 from rig.analysis.external.increment_calibration import InIncrements, solve_turning
 from rig.analysis.installed_solvers import OfKind
 from rig.analysis.reference.triad import Triad, check_identifiable, check_mounted, field_reference, gravity_reference
@@ -19,6 +20,7 @@ from rig.data.recording.settings import Elsewhere, Site
 from rig.errors import Fault, or_fault
 from rig.errors.attempts import Attempts, attempt_each
 from rig.estimation.external.placement import NOISE, LaidDown, laid_down
+from rig.estimation.external.placement_changes import find_placement_change
 from rig.estimation.external.sole_attitude import find_sole_attitude
 from rig.estimation.gyroscope.budget import Budget
 from rig.estimation.gyroscope.earth_rate import check_earth_seen
@@ -147,12 +149,21 @@ def _solve_rows(equations: Equations, method: Method, *, any_mounting: bool) -> 
 def _solve_placements(
     placements: Placements, quantity: Quantity, equations: Equations, method: Method, *, any_mounting: bool
 ) -> InAttitudes:
-    """Return the calibration from placements, with placement errors if the method models attitude errors."""
+    """Return the calibration from placements, with placement errors if the method models attitude errors.
+
+    Raise Fault `bias_jumped` or `scale_changed` if the sensor changed abruptly by more than U may contain, and as
+    `Equations.solve` does.
+    """
     unplaced, moving = placements.unplaced, placements.left_out
     solution, laid = _solve(equations, method, placements), None
     _check_not_sole(solution, equations, placements, quantity)
     if method == "attitude_weighted":
         laid = laid_down(solution.theta, equations.placed, unplaced.means[quantity], unplaced.variances[quantity])
+        starts_s = np.array([window.start_s for window in placements.read.windows])
+        change = find_placement_change(laid.theta, equations.placed, starts_s)
+        check_steady(change, quantity)
+        if change is not None:
+            laid = laid.add_change(change)
         solution = _replace_parameters(solution, laid)
     if solution.second_order is not None:
         check_identifiable(solution.second_order, np.sqrt(np.diag(solution.covariance)[SECOND]), NOT_IDENTIFIABLE)

@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rig.estimation.arrays import Array
+from rig.estimation.external.abrupt_change import AbruptChange
 from rig.estimation.reference.attitude_error import AttitudeError, Placed, effects
 from rig.estimation.reference.reference_model import BIAS, REFERENCE, F, free_directions, jacobian, predicted
 
@@ -38,8 +39,14 @@ class LaidDown:
     placement_std: float
     placement_uncertainty: float
 
+    def add_change(self, change: AbruptChange) -> "LaidDown":
+        """Return the solution with a covariance that contains the sensor before and after an abrupt change."""
+        more, changed = np.zeros_like(self.covariance), np.r_[F, BIAS]
+        more[np.ix_(changed, changed)] = change.find_covariance(self.theta[F].reshape(3, 3))
+        return replace(self, covariance=self.covariance + more, causes=self.causes | {CHANGE: more})
 
-NOISE, ATTITUDES, PLACEMENTS = "noise", "attitudes", "placements"
+
+NOISE, ATTITUDES, PLACEMENTS, CHANGE = "noise", "attitudes", "placements", "abrupt change"
 
 
 @dataclass(frozen=True, slots=True)

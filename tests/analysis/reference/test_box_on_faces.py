@@ -1,6 +1,8 @@
 """Accelerometers in known attitudes: only rests tell gravity, and a body laid down again is not as it was."""
 
 import json
+import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -111,3 +113,32 @@ def test_too_few_rests_among_many_rows_are_named(tmp_path: Path, capsys: pytest.
     assert main(["solve", *map(str, (files[0], "--attitudes", files[1], "--json"))]) == 1
     error = json.loads(capsys.readouterr().out)["unsolved"]["imu"]["acceleration"]["error"]
     assert error.startswith("too_few_observations") and "left out, because only rests give a reference" in error
+
+
+def shifted(laid: Laid, from_s: float, by_m_s2: float, axis: int) -> Laid:
+    """The session when the bias of an axis changes between two placements."""
+    return replace(
+        laid, readings=laid.readings + np.where(laid.time_s[:, None] >= from_s, by_m_s2 * np.eye(3)[axis], 0)
+    )
+
+
+def test_a_bias_that_jumps_between_placements_is_named_with_its_time_and_axis(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    files = write(tmp_path, shifted(lay_down(Box(rounds=3, named=18), 4), 45.0, -0.12, 1))
+    assert main(["solve", str(files[0]), "--attitudes", str(files[1]), "--gravity-m-s2", str(GRAVITY_M_S2)]) != 0
+    said = " ".join(capsys.readouterr().err.split())
+    assert re.search(r"bias_jumped: from 45\.\d+ s on the accelerometer reads 0\.1\d m/s² less on y", said), said
+
+
+@pytest.mark.parametrize("from_s", [30.0, 45.0, 70.0])
+def test_u_contains_a_small_jump_of_the_bias_between_placements(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], from_s: float
+) -> None:
+    laid = lay_down(Box(rounds=3, named=18), 5)
+    found = solved(capsys, *write(tmp_path, shifted(laid, from_s, 0.04, 0)))
+    both = laid.bias[0] + np.array([0.0, 0.04])
+    assert np.abs(found["bias_m_s2"][0] - both).max() < 1.2 * expanded(found)[3]
+    assert expanded(found)[3] < 0.06
+    steady = solved(capsys, *write(tmp_path, laid))
+    assert expanded(steady)[3] < 0.02
