@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rig.errors import RigError
+from rig.errors import Fault, RigError
 from rig.estimation.arrays import Array
 from rig.estimation.by_hand import HandSolution, SessionConditions, assess_progress, solve_by_hand
 from rig.estimation.sensor_axes import SensorAxes
@@ -123,8 +123,15 @@ def late(recorded: Recorded) -> Recorded:
     return replace(recorded, time_s=np.sort(recorded.time_s + late_s))
 
 
+def jumping_level(recorded: Recorded) -> Recorded:
+    """Half-way the accelerometer's bias changes by a hundredth of gravity."""
+    later = recorded.time_s > np.mean(recorded.time_s[[0, -1]])
+    return replace(recorded, acceleration=recorded.acceleration + 0.1 * np.outer(later, [0.6, 0.0, -0.8]))
+
+
 # What is wrong, by the name that it has to have.
 NAMED: dict[str, Callable[[int], Made]] = {
+    "accelerometer_jumped": read_otherwise(jumping_level),
     "clipping": too_small_a_range,
     "held_not_laid_down": held_each_time,
     "lost_in_move": read_otherwise(ten_lost),
@@ -151,6 +158,16 @@ SMALLER: dict[str, tuple[Callable[[int], Made], set[str]]] = {
     ),
     "late time stamps": (read_otherwise(late), {"lost_in_move"}),
 }
+
+
+@pytest.mark.slow
+def test_moves_that_fit_only_a_much_skewed_box_are_refused() -> None:
+    recorded = handle(TWELVE, 13)
+    later = recorded.time_s > np.median(recorded.time_s)
+    changed = replace(recorded, rates=recorded.rates * np.where(later[:, None], [1.0, 1.0, 1.05], 1.0))
+    with pytest.raises(Fault, match=r"not_flat: .*out of square, where 0\.2° is stated"):
+        solved(changed)
+    solved(recorded)
 
 
 @pytest.mark.slow

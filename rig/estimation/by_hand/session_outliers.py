@@ -15,7 +15,7 @@ import numpy as np
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.by_hand.fit import GraphFit, estimate_stds, replace_stds, solve_step, whiten_rows
-from rig.estimation.by_hand.graph import ACCELERATION, CLOSURE, FLAT, LEANING, MOVE, TABLE, WALK, Factor
+from rig.estimation.by_hand.graph import ACCELERATION, CLOSURE, FLAT, LEANING, MOVE, OFFSET, TABLE, WALK, Factor
 from rig.estimation.by_hand.session_parts import LARGEST, STATED, HandRest, HandStds
 
 A_ROW = 4.0  # decrease of χ² that is expected for each equation left out
@@ -29,8 +29,9 @@ FACTORS_OF = {
 }
 JUMP_RAD_S = 1e-3  # change of the mean reading between two rests: no bias drifts by as much
 OF_ONE, HIDING = 3.0, ("repeat_rad", "closure_rad")  # a ratio, and the standard deviations that one outlier inflates
-HIDDEN = ("not_flat", "table_moved", "turn_not_closed")
+HIDDEN = ("not_flat", "table_moved", "accelerometer_jumped", "turn_not_closed")
 FREE = 1e-9  # redundancy below which the other equations do not check an equation
+UNLIKELY = 1e-5  # probability of faces as far out of square as they seem
 AT_ONCE = 8.0  # the same during the session, in which a move can be repeated: 1 in 10^3
 
 
@@ -48,7 +49,7 @@ def find_contradiction(fit: GraphFit, since: int | None = None) -> Fault | None:
     worst = max(_test_hypotheses(fit, since), key=lambda hypothesis: hypothesis.chi_square_drop, default=None)
     if worst is not None and worst.chi_square_drop > (BY_MUCH if since is None else AT_ONCE):
         return describe_fault(fit, worst)
-    return None if since is not None else _find_excessive_std(fit)
+    return None if since is not None else _find_excessive_std(fit) or _find_unlikely_box(fit)
 
 
 def find_masked_fault(fit: GraphFit) -> Fault | None:
@@ -79,6 +80,7 @@ def _hypotheses(fit: GraphFit, since: int | None) -> Iterator[tuple[str, int]]:
     yield from (("not_flat", index) for index in range(first, count) if faces[index] is not None)
     if fit.session.acceleration is not None:
         yield from (("table_moved", index) for index in range(max(first, 1), count) if faces[index] is not None)
+        yield from (("accelerometer_jumped", index) for index in range(max(first, 1), count))
 
 
 def _test_hypotheses(fit: GraphFit, since: int | None) -> list[FaultHypothesis]:
@@ -127,6 +129,11 @@ def _fault_columns(fit: GraphFit, name: str, index: int) -> Array:
     """Return the columns (R, q) that a fault adds to the design of all R equations."""
     if name == "table_moved":
         return np.concatenate([_tilt_columns(fit, row, index) for row in fit.factors])
+    if name == "accelerometer_jumped":
+        later = [row.kind == ACCELERATION and row.index >= index for row in fit.factors]
+        return np.concatenate(
+            [row.design[:, OFFSET] * is_later for row, is_later in zip(fit.factors, later, strict=True)]
+        )
     out = np.concatenate([np.full(len(row.residual), _matches(row, index, *FACTORS_OF[name])) for row in fit.factors])
     return np.eye(len(out))[:, out]
 
@@ -179,6 +186,12 @@ def describe_fault(fit: GraphFit, hypothesis: FaultHypothesis) -> Fault:
         return Fault(
             "table_moved", f"from {at_s:.1f} s on the table leans otherwise", "Begin again, and leave it alone"
         )
+    if hypothesis.name == "accelerometer_jumped":
+        return Fault(
+            "accelerometer_jumped",
+            f"from {at_s:.1f} s on the accelerometer's bias is another",
+            "Begin again: let it warm up, and handle it gently",
+        )
     return Fault(
         "not_flat",
         f"at {at_s:.1f} s the body did not lie flat on its face as at the other rests",
@@ -219,6 +232,24 @@ def _find_excessive_std(fit: GraphFit) -> Fault | None:
         what = f"the bias changes by {stds.walk_rad_s_sqrt_s:.1g} rad/s within a second"
         return Fault("bias_jumped", what, "Let it warm up, and handle it gently")
     return None
+
+
+def _find_unlikely_box(fit: GraphFit) -> Fault | None:
+    """Return the fault of faces further out of square than stated, by χ² of their normals, or None.
+
+    The moves' angles may take the faces along: a scale factor that changes in mid-session looks like a skewed box.
+    """
+    from scipy.special import chdtri
+
+    skew_rad, stated_rad = fit.state.normals.ravel(), fit.conditions.box_rad
+    if np.sum(np.square(skew_rad / stated_rad)) < chdtri(len(skew_rad), UNLIKELY):
+        return None
+    return Fault(
+        "not_flat",
+        f"the moves fit together only if the faces are up to {np.degrees(np.abs(skew_rad).max()):.2g}° out of square, "
+        f"where {np.degrees(stated_rad):.2g}° is stated",
+        "If the body is no better box, state its squareness_deg (rig solve: --squareness-deg); else begin again",
+    )
 
 
 _REMEDY = "Lay it down on a flat table, each time on a complete face, and check that no reading is lost"

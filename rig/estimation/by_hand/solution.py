@@ -101,8 +101,8 @@ def solve_by_hand(session: HandRecording, conditions: SessionConditions) -> Hand
     """Solve a session by hand.
 
     Raise Fault `too_few_moves`, `clipping`, `lost_in_move`, `held_not_laid_down`, `turn_not_closed`, `not_flat`,
-    `table_moved`, `bias_jumped`, `wrong_face`, `mirrored_axis`, `swapped_axes`, `wrong_unit`, `no_fit`, `zero_reading`,
-    `too_many_moves`; Refused `first_face_unknown`.
+    `table_moved`, `bias_jumped`, `accelerometer_jumped`, `wrong_face`, `mirrored_axis`, `swapped_axes`, `wrong_unit`,
+    `no_fit`, `zero_reading`, `too_many_moves`; Refused `first_face_unknown`.
     """
     _check_session(session)
     fitted: GraphFit | None = None

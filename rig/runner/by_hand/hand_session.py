@@ -48,7 +48,9 @@ HELD_S = 3.0  # time in the hand, after which the operator is reminded to lay it
 MISSED = 3.0  # error of a whole turn's end, in standard deviations
 REFUSED_IN_A_ROW = 10  # after these the session ends, because another error is likely
 NO_REST = frozenset({"held_not_laid_down", "not_flat"})  # the item lies still, but not on a side
-ANEW = frozenset({"bias_jumped", "table_moved"})  # the readings before and after it contradict each other
+ANEW = frozenset(
+    {"bias_jumped", "table_moved", "accelerometer_jumped"}
+)  # the readings before and after it contradict each other
 MENDED_BY_HAND = frozenset({"clipping", "lost_in_move", "no_fit", "turn_not_closed"}) | NO_REST | ANEW
 
 
