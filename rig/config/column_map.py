@@ -77,8 +77,9 @@ class ColumnSection(Section):
 class AxisSection(Section):
     """One axis of the table, with the log's columns of its angle and rate."""
 
-    along: AxisDirection = Field(
-        description="the axis of the item that it is parallel to when all angles are zero, by the right-hand rule"
+    direction: AxisDirection = Field(
+        alias="along",
+        description="the axis of the item that it is parallel to when all angles are zero, by the right-hand rule",
     )
     angle: ColumnSection
     rate: ColumnSection | None = None

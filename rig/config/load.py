@@ -331,7 +331,7 @@ def _keys_at(model: type[BaseModel], location: Location) -> list[str]:
             annotation = [item for item in typing.get_args(annotation) if item is not ...][-1]  # of dict[str, Section]
         if isinstance(annotation, types.UnionType):
             annotation = typing.get_args(annotation)[0]
-    return list(annotation.model_fields)
+    return [field.alias or name for name, field in annotation.model_fields.items()]
 
 
 def _nearest(word: str, allowed: Sequence[str]) -> str:

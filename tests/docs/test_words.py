@@ -15,8 +15,6 @@ REPOSITORY = Path(__file__).parents[2]
 WORDS = tomllib.loads((REPOSITORY / "rig/report/words/words.toml").read_text("utf-8"))
 FIELD_TERMS = {old: term["new"] for term in WORDS["terms"] for old in term["old"]}
 NEVER_BOUND = frozenset(WORDS["never_bound"])
-# Keys of configuration and column files, which are named by their readers.
-PUBLIC_KEYS = {("HistorySection", "off"), ("SiteSection", "place"), ("AxisSection", "along")}
 # The simulated controller has its own modes, as a real one has; a notebook's run is what its reader calls a run.
 SHARED_CLASSES = {"RobotMode", "Run", "RuntimeState", "SafetyMode"}
 # A function's name begins with a verb. So many do not yet; whoever renames one lowers the number, and none is added.
@@ -45,8 +43,8 @@ def test_a_name_says_what_it_is_bound_to() -> None:
     assert [
         f"{file}:{node.lineno}: {name}: {term_for(name)}"
         for file, nodes in modules()
-        for node, name, owner in bindings(nodes)
-        if name.strip("_").lower() in NEVER_BOUND and (owner, name) not in PUBLIC_KEYS
+        for node, name in bindings(nodes)
+        if name.strip("_").lower() in NEVER_BOUND
     ] == []
 
 
@@ -171,21 +169,14 @@ def is_property(function: DOCUMENTED) -> bool:
     return any(getattr(decorator, "id", "") in ("property", "cached_property") for decorator in function.decorator_list)
 
 
-def bindings(nodes: list[ast.AST]) -> Iterator[tuple[ast.stmt | ast.expr | ast.arg, str, str]]:
-    """Yield every name that a module's nodes bind, with its node and the class whose field it is ("" otherwise)."""
-    fields = {
-        item.target: definition.name
-        for definition in nodes
-        if isinstance(definition, ast.ClassDef)
-        for item in definition.body
-        if isinstance(item, ast.AnnAssign)
-    }
+def bindings(nodes: list[ast.AST]) -> Iterator[tuple[ast.stmt | ast.expr | ast.arg, str]]:
+    """Yield every name that a module's nodes bind, each with its node."""
     for node in nodes:
         if isinstance(node, DOCUMENTED):
-            yield node, node.name, ""
+            yield node, node.name
             for argument in (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs):
-                yield argument, argument.arg, ""
+                yield argument, argument.arg
         elif isinstance(node, ast.ClassDef):
-            yield node, node.name, ""
+            yield node, node.name
         elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
-            yield node, node.id, fields.get(node, "")
+            yield node, node.id

@@ -104,7 +104,7 @@ def _find_own(folder: Path, history: str | None) -> "tuple[Loaded | None, Histor
     from rig.history.storage.address import default_history_address
 
     loaded = read_configuration(folder)
-    is_off = history is None and loaded is not None and loaded.config.history.off
+    is_off = history is None and loaded is not None and loaded.config.history.is_off
     return loaded, None if is_off else default_history_address(history)
 
 

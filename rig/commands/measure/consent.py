@@ -58,5 +58,5 @@ def _list_addresses(loaded: Loaded) -> Iterator[tuple[str, str]]:
         for name, section in config.sensors.items():
             if section.own_port is not None:
                 yield f"the sensor {name}", section.own_port[1]
-    if config.history.url is not None and not config.history.off and not os.environ.get(ENVIRONMENT):
+    if config.history.url is not None and not config.history.is_off and not os.environ.get(ENVIRONMENT):
         yield "the history", config.history.url

@@ -16,8 +16,8 @@ def take_text_as_written(model: type[BaseModel], data: Any, prefix: Location, wr
     YAML reads a serial number 0017 as 15, and 2026-11-20 as a date.
     """
     if isinstance(data, dict):
-        for key, field in model.model_fields.items():
-            if key in data:
+        for name, field in model.model_fields.items():
+            if (key := field.alias or name) in data:
                 data[key] = _restore_text(field.annotation, data[key], (*prefix, key), written)
 
 

@@ -24,8 +24,10 @@ class SiteSection(Section):
         description="the laboratory's country, for digital certificates",
         json_schema_extra={"allowed": "two capital letters (ISO 3166-1)"},
     )
-    place: Words | None = Field(
-        default=None, description="location of the arm: site, room; if left out, a certificate does not state it"
+    location: Words | None = Field(
+        alias="place",
+        default=None,
+        description="location of the arm: site, room; if left out, a certificate does not state it",
     )
     time_reference: Words | None = Field(
         default=None,
@@ -155,7 +157,7 @@ class HistorySection(Section):
         description="an SQLite file on a disk of this computer, or `postgresql://user@host/name` of a database that "
         "several rigs share; no password, which belongs in `~/.pgpass`",
     )
-    off: bool = Field(default=False, description="`true`: this run is not entered into the history")
+    is_off: bool = Field(alias="off", default=False, description="`true`: this run is not entered into the history")
     rig: Words | None = Field(
         default=None, description="name of this rig in the history; if left out, the serial number of its arm"
     )

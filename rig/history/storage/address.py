@@ -37,7 +37,7 @@ def choose_history_address(
     Raise Refused `history_address`.
     """
     variable = environment.get(ENVIRONMENT)
-    if variable == SWITCHED_OFF or (section.off and not variable):
+    if variable == SWITCHED_OFF or (section.is_off and not variable):
         return None
     return resolve_address(variable or section.url)
 

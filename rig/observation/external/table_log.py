@@ -55,4 +55,4 @@ def _attitudes(log: Columns, table: TableSection) -> dict[str, Array]:
 
 def _unit_vector(axis: AxisSection) -> Array:
     """Return the unit vector (3,) of an axis in the item's frame, with all angles at zero."""
-    return axis_of(axis.along)
+    return axis_of(axis.direction)

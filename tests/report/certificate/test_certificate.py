@@ -159,7 +159,7 @@ def test_what_was_not_said_reads_so_and_nobody_is_invented() -> None:
 
 def test_nobody_s_place_is_invented_from_an_address() -> None:
     assert LABORATORY.site is not None
-    silent = StatedFacts(LABORATORY.site.model_copy(update={"place": None}), LABORATORY.certificate)
+    silent = StatedFacts(LABORATORY.site.model_copy(update={"location": None}), LABORATORY.certificate)
     assert read(certificate(stated=silent)).under["7.8.2.1c"].endswith("not stated")
     assert "room 2" in read(certificate()).under["7.8.2.1c"]
 
