@@ -187,7 +187,7 @@ class SensorSetup:
 
 @dataclass(frozen=True, slots=True)
 class SensorCounts:
-    """The number of conversions since the start, sent in frames, and dropped."""
+    """The numbers of conversions since the start, of samples sent in frames, and of samples dropped."""
 
     conversions: int
     samples: int

@@ -1,4 +1,4 @@
-"""The crowding of this computer stretches time-outs, so that a starved computer does not look like a lost link."""
+"""The load of this computer extends time-outs, so that an overloaded computer does not look like a lost link."""
 
 import os
 from pathlib import Path
@@ -7,15 +7,15 @@ CROWDED = 5.0  # largest factor on a limit: the number of runnable programs per 
 
 
 def exceeds(delay: float, limit: float) -> bool:
-    """Return whether a delay exceeds a limit times the crowding, which is read only if the limit itself is exceeded."""
+    """Return whether a delay exceeds a limit times the load, which is read only if the delay exceeds the limit."""
     return delay > limit and delay > limit * crowding()
 
 
 def crowding() -> float:
-    """Return the number of programs per processor of this machine, 1 to CROWDED, by which a delay may be stretched.
+    """Return the load, the factor by which a delay may be longer: runnable programs per processor, 1 to CROWDED.
 
     This is the mean of the last minute, or the present number if that is larger: after 15 s the mean shows only a
-    quarter of a new crowd.
+    quarter of a new load.
     """
     if not hasattr(os, "getloadavg"):  # Windows
         return 1.0

@@ -202,7 +202,7 @@ class EmulatedBoard:
         self._asleep = True
 
     def _measure(self, address: int, size: int) -> int | None:
-        """Return the ticks of a new block; None if it has to wait until the engine has paused.
+        """Return the ticks that a new block of code takes; None if the block must not run before the engine has paused.
 
         Raise Violation for floating point before it is enabled.
         """

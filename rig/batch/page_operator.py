@@ -23,7 +23,7 @@ LOOK_S = 0.5  # interval of checking that the page still exists
 
 
 class OnPage:
-    """A voice with questions and answers on a page, which also shows the station's state."""
+    """The `Voice` of an operator who answers on a page; the page also shows the station's state."""
 
     def __init__(self, sections: Sections, control: Control) -> None:
         self._sections, self._control = sections, control

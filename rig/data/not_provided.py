@@ -15,7 +15,7 @@ POSSIBLE_C = (-100.0, 200.0)
 
 @dataclass(frozen=True, slots=True)
 class Absent:
-    """The markers of a field without a value: numbers that are not finite, in `numbers`, or not `within` both ends.
+    """The markers of a missing value: a number that is not finite, is one of `numbers`, or lies outside `within`.
 
     If the message has flags, the field also lacks a value unless all `bits` are set.
     """

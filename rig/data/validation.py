@@ -67,8 +67,8 @@ def read_document(kind: type[Document], file: Path, limit_bytes: int, *, what: s
 def parse_json(content: str | bytes, most: int = MOST_RECORDED) -> Any:
     """Return the value of a JSON text from any source, with its strings made printable.
 
-    Raise ValueError for a number that cannot be measured, a duplicate key, or more than `most` values. Raise
-    RecursionError for values that are nested too deeply.
+    Raise ValueError for a number that no measurement can yield (not finite, or too large), a duplicate key, or more
+    than `most` values. Raise RecursionError for values that are nested too deeply.
     """
     content = content.encode() if isinstance(content, str) else content
     if sum(map(content.count, SEPARATORS)) > most:

@@ -23,8 +23,8 @@ class LogSurvey:
 
     - rests: windows in which the body lay still.
     - turns: the number of turns from rest to rest by axis ("+x"; "other" without an axis).
-    - at_rest: by quantity, the mean norm of readings at rest, of rates minus the bias; largest: the largest norm, by
-      quantity.
+    - at_rest: by quantity, the median over the rests of the norm of the mean reading.
+    - largest: by quantity, the largest absolute reading of any axis.
     - faces: the number of directions of gravity at rest more than 45° apart.
     """
 

@@ -146,7 +146,7 @@ class Usart2:
         self._load()
 
     def _load(self) -> None:
-        """Move the bytes that the wire has requested by now from memory to the wire."""
+        """Move bytes from memory to the wire: those whose sending has begun by now, and one for the data register."""
         if self._dma_start is None:
             return
         now, step = self._timeline.now, self._byte_ticks

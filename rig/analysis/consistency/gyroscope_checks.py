@@ -186,9 +186,9 @@ def _inflate_transfers(segments_only: _Tested, matrix: Array, allowance: ErrorPa
 
 
 def _residual_chi_square(tested: _Tested) -> tuple[float, int]:
-    """Return the residuals' χ² after a fit of model and all possible changes, and the degrees of freedom.
+    """Return the residuals' χ² after a fit of the model and of all tested changes, and its degrees of freedom.
 
-    In sweeps without transfers, changes that differ from the model only by noise of the rates are ignored.
+    Without transfers some changes lie in the model up to the noise of the rates; these are dropped.
     """
     changed = [*changes(tested.segments, tested.axis_rates).values(), quarter_columns(tested.means)]
     columns = [apply_whitener(tested.model.whitener, change) for change in changed if change is not None]

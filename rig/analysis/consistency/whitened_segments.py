@@ -68,7 +68,10 @@ class WhitenedSegments:
         return float(np.max(projections**2)), critical_value(false_alarm_probability / columns.shape[1])(1)
 
     def minimal_detectable_size(self, patterns: Array, alternatives: Iterable[Alternative]) -> float:
-        """Return the smallest fault, of `patterns` (k, N, 3) per unit, that a test detects; columns are (3, N, c)."""
+        """Return the minimal detectable size of a fault with `patterns` (k, N, 3) per unit, tested by `alternatives`.
+
+        An alternative is a pair of columns (3, N, c) and the critical value of their test.
+        """
         whitened = ((apply_whitener(self.whitener, columns), limit) for columns, limit in alternatives)
         return minimal_detectable_size(
             orthonormal_basis(self.model),

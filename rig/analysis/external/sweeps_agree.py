@@ -93,9 +93,10 @@ def sweep_errors(solution: VectorSolution, data: ExternalData) -> SweepErrors | 
     rate_variance, axis_variance = sizes.median_variances
 
     def inflate(to_values: Array, dof: float, noise_dof: float) -> Array:
-        """Return the covariance (q, q), apart from the noise, of values with derivatives `to_values` (q, 12) by F, c.
+        """Return the covariance (q, q), without noise, of values with derivatives `to_values` (q, 12) by F and c.
 
-        It is that of errors of median size, scaled so that with the noise each value has its U over all sizes.
+        It holds for errors of the median size. Each value's part is scaled so that, together with the noise, twice its
+        standard uncertainty is the U over the posterior distribution of the sizes.
         """
         by_noise, of_rate, of_axis, by_wrong = (
             to_values @ effects @ effects.T @ to_values.T for effects in (noise, by_rate, by_axis, wrong)

@@ -1,4 +1,4 @@
-"""`rig lines PORT`: inspect a device that prints lines, and write its section or a complete configuration by hand."""
+"""`rig lines PORT`: inspect a device that prints lines; write its section or a configuration for use by hand."""
 
 import sys
 from argparse import ArgumentParser, Namespace

@@ -34,10 +34,10 @@ def recall_sensors(config: RigConfig, moved: frozenset[str]) -> Memory:
 def find_other_board(
     config: RigConfig, board: str, parts: Collection[str], own_serial_numbers: Collection[str], *, simulated: bool
 ) -> str | None:
-    """Return the serial number, in words, under which the history contains a sensor on this board.
+    """Return, for a message, the other serial number under which the history has a sensor on this board, and its date.
 
-    The newest calibration of one of the `parts` decides. None if its serial number is one of `own_serial_numbers`, or
-    if the history does not answer.
+    It is that of the newest calibration of one of the `parts`. Return None if this is one of `own_serial_numbers`, if
+    there is none, or if the history does not answer.
     """
     from rig.history.storage.address import choose_history_address
 

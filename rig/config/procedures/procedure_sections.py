@@ -203,10 +203,10 @@ class SixObservationSection(SixSweepsSection):
         return self.stages
 
     def problems(self, config: RigConfig) -> Iterator[str]:
-        """Yield the problems of the sweeps, of stages with a target or a verification, and of magnetometers besides.
+        """Yield the problems of sweeps, of stages with a target or verification, of magnetometers with stages or arcs.
 
-        With stages or arcs a magnetometer would be recorded, but not calibrated, which only the end of the run would
-        show.
+        With stages or arcs a magnetometer is recorded, but cannot be calibrated. Without this check only the end of the
+        run would show it.
         """
         yield from SixSweepsSection.problems(self, config)
         if self.stages and (self.target_scale_u or self.target_bias_u_rad_s):

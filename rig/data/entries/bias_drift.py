@@ -44,7 +44,7 @@ class SlopeEntry(Entry):
 class DriftEntry(Entry):
     """One quantity's bias by repeat.
 
-    - unit: of all values without one of their own.
+    - unit: the unit of all values whose names state none.
     - repeats: bias and temperature of each repeat.
     - common_std: standard deviation that all biases share.
     - scatter_ratio: scatter of the readings from repeat to repeat over that within a dwell.

@@ -1,4 +1,4 @@
-"""The messages of a reading process: the parts of a file, and how it ended."""
+"""The messages of a reading process: the parts of the file, and the exit status of the process."""
 
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any, TypeAlias

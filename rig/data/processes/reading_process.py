@@ -209,8 +209,8 @@ def read_apart(reader: str, path: Path, arguments: Mapping[str, Any], limits: Re
 def _wait_for(reading: "subprocess.Popen[bytes] | ForkedReader", idle_s: float) -> bytes:
     """Return the process' output on stderr, once it has ended.
 
-    Raise TimeoutError after `idle_s`, without waits for a processor or the disk: a hanging library may sleep, which
-    uses no processor time.
+    Raise TimeoutError if it has been idle for `idle_s`; time spent waiting for a processor or the disk does not count.
+    Wall time is measured, because a hanging library may sleep and so use no processor time.
     """
     silent = Silence(reading.pid, spared=SPARED)
     while not silent.lasts_over(idle_s / TICK_S):

@@ -28,7 +28,7 @@ QUATERNION = ("qw", "qx", "qy", "qz")
 
 @dataclass(frozen=True, slots=True)
 class Header:
-    """The columns of a file: those `needed`, `one_of` several, and groups of optional ones.
+    """The columns of a file: all `needed` ones, exactly one of `one_of`, and groups of optional ones.
 
     `between`: for a file of `one_row`, the number that a column must exceed, and the largest allowed number.
     """

@@ -1,7 +1,7 @@
-"""The settings by which a recording is judged, stored in it, typed, and with a version of their own.
+"""The typed settings by which a recording is judged: they are stored in the recording and have their own version.
 
-The configuration of a run is stored as text, for people, and its keys may change with the version of the rig. By these
-settings, a recording is judged as in its run, or by the options of `rig solve --set`.
+The configuration of a run is stored too, but as text for people, and its keys may change with the version of the rig.
+These settings judge a recording later exactly as its run did; `rig solve --set` changes them.
 """
 
 import json

@@ -1,4 +1,4 @@
-"""The board's own algorithm for calibration by hand, in double precision: it uses one move after the other, once.
+"""The board's own algorithm for calibration by hand, in double precision: it processes each move once, in order.
 
 The equations are those of `firmware_host/firmware/core/by_hand/hand_solver.c`; only the arithmetic differs. The board
 reports the rests and moves, and their faces.
@@ -7,7 +7,8 @@ reports the rests and moves, and their faces.
 
 Unknowns are C and G (3, 3) row by row, b (3,), and two angles of each of six faces: their deviation from square. The
 state is an information matrix, of which the board keeps the square root (Bierman, Factorization Methods for Discrete
-Sequential Estimation, 1977, chapter V). The equations are linearised about a centre; the board reports when it moves.
+Sequential Estimation, 1977, chapter V). The equations are linearised about a solution; the board reports after which
+moves it updates that one.
 """
 
 from collections.abc import Iterator, Sequence

@@ -49,7 +49,8 @@ class EarthRatePrior:
     - `latitude_rad`: as given, or None.
     - `g_sensitivity`: whether to estimate the sensor's sensitivity to gravity; the latitude then fixes the Earth's rate
       along the vertical.
-    - `repeatability_rad`: standard deviation of the arm's return about each axis across the rotation.
+    - `repeatability_rad`: standard deviation of the orientation to which the arm returns, about each axis perpendicular
+      to the rotation.
     - `state_jitter_s`: standard deviation of the end time of a revolution.
     """
 

@@ -70,11 +70,11 @@ class Gyroscope:
 
 @dataclass(frozen=True, slots=True)
 class TurnedSolution:
-    """A solution with the fields of `vector_model.VectorSolution`; `budget` has the causes of the covariance.
+    """A solution with the fields of `vector_model.VectorSolution`; `budget` divides its covariance by cause.
 
     - `residuals_rad_s` (N, 3): of the means, then of the rotations as mean rates.
     - `widened`: the Birge ratio of the rotations, at least 1, with `widened_dof` degrees of freedom.
-    - `estimator`: its name, which differs if readings in attitudes are used as rotations.
+    - `estimator`: the name of the method, "increments" or "by_hand".
     """
 
     scale: Array

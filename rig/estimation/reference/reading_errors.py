@@ -76,7 +76,7 @@ def scale_warming(theta: Array, movement: Movement) -> Array:
 
 
 def _warmer_k(sensor: AccelerometerErrors, movement: Movement) -> tuple[Array, Array]:
-    """Return each segment's recorded temperature above the mean (K,), and the part (K,) below the recorded steps."""
+    """Return each segment's recorded temperature deviation (K,) from the mean, and its rounding error (K,), kelvins."""
     return repeat_by_segment(sensor.warmer_k, movement), repeat_by_segment(sensor.unseen_k, movement)
 
 

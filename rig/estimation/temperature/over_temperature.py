@@ -155,8 +155,9 @@ def powers_at(difference_k: float) -> Array:
 def fit_over_temperature(readings: RepeatedMeans, reference_c: float, gradient_k: float) -> OverTemperature:
     """Fit the polynomials, with k at the reference by plain least squares (`combine_with_reference` improves it).
 
-    `gradient_k`: half-width of the change, in use, of the temperature difference between thermometer and sensor. Raise
-    Fault `too_few_observations`, `temperature_range_too_small`, `temperature_outside`, `not_finite`.
+    `gradient_k`: half-width of the interval in which the temperature difference between thermometer and sensor may
+    change in use. Raise Fault `too_few_observations`, `temperature_range_too_small`, `temperature_outside`,
+    `not_finite`.
     """
     check_finite(means=readings.means, temperature_c=readings.temperature_c)
     range_c = (float(readings.temperature_c.min()), float(readings.temperature_c.max()))

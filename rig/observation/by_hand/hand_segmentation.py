@@ -135,7 +135,7 @@ class Live:
 
 
 class Segmenter:
-    """A segmentation in progress, equal to that by `segment_session` of the readings so far.
+    """A segmentation in progress. At any time its result equals that of `segment_session` for the readings so far.
 
     A rest is settled after `SETTLED_S`. `range_rad_s` is the range of the gyroscope, None if unknown.
     """

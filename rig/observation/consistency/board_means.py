@@ -42,9 +42,9 @@ def compare_board_means(sensor: str, recordings: Sequence[ObservedRun]) -> dict[
 
 
 def _deviation(recording: ObservedRun, stream: Stream, turn: Observation, observed: BoardObserved) -> float:
-    """Return the board's average minus the computer's of the same turn, largest axis, in standard deviations.
+    """Return the largest deviation of the three axes, board's average minus computer's mean, in standard deviations.
 
-    Before, the rotation between both windows and the effect of spectral lines are removed from the board's average.
+    First the effects of the different windows, rotation and spectral lines, are subtracted from the board's average.
     """
     zero, average, board = stream.clock.zero_rate_rad_s, turn.average, observed.observation
     axis = turn.axis_flange

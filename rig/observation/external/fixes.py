@@ -56,7 +56,7 @@ class Gathered:
 
     @property
     def increments(self) -> int:
-        """Number of increments if none were left out."""
+        """The number of increments between consecutive fixes, including those that were left out."""
         return len(self.fixes.joined)
 
 

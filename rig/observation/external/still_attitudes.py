@@ -1,4 +1,4 @@
-"""The rests of a body by a reference's attitudes: long rows, and consecutive rows without a rotation."""
+"""The rests of a body by a reference's attitudes: a row over a long window, or successive rows with equal attitudes."""
 
 import numpy as np
 

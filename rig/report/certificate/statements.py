@@ -29,7 +29,7 @@ class StatedFacts:
 
     @property
     def where(self) -> SiteSection:
-        """The site; without statements if the configuration is missing."""
+        """The site; all its values are None if the configuration is missing."""
         return self.site or SiteSection()
 
 

@@ -46,7 +46,7 @@ class ParameterNames:
 
     @property
     def needed(self) -> tuple[str, ...]:
-        """The parameters that are required to interpret its readings."""
+        """The parameters that are required to interpret the IMU's readings."""
         required = (*self.gyro_offset, *self.force_offset, *self.force_scale, self.orientation, *self.filters)
         return required if self.identity is None else (*required, self.identity)
 

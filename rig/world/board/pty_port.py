@@ -13,7 +13,7 @@ OUTPUT_SPEED = 5  # index in the list that tcgetattr returns
 
 
 class PtyPort:
-    """A pseudo-terminal on the serial line. Its user sets the host's baud rate."""
+    """A pseudo-terminal as the host's end of the serial line, with the baud rate to which the client sets it."""
 
     def __init__(self, line: SerialLine, selector: selectors.BaseSelector) -> None:
         self._line, self._selector = line, selector

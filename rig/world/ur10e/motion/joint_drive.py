@@ -1,10 +1,9 @@
 """The response of a joint to its target: lag, yielding to acceleration, and the ripple of its harmonic drive.
 
-The joint's angle is u(t − lag) + y + p, with u the target. y is what it yields: a critically damped system of second
-order follows −k times the target's mean acceleration of the last 12 ms, and no more than a bound. p is the ripple,
-locked to the angle, of an amplitude that makes its rate the same at every speed v: p = v/(v² + v₀²) Σ Rₙ/n sin(n u +
-φₙ), so its rate is Rₙ cos(n u + φₙ) for v ≫ v₀, and a joint at rest is exactly on its target. Over a whole turn at
-constant speed p adds nothing.
+The joint's angle is u(t − lag) + y + p. u is the target. y is the yielding: a critically damped system of second order
+follows −k times the target's mean acceleration of the last 12 ms, within a bound. p is the ripple, a function of angle
+and speed v: p = v/(v² + v₀²) Σ Rₙ/n sin(n u + φₙ). For v ≫ v₀ its rate is Σ Rₙ cos(n u + φₙ) at every speed; a joint at
+rest is exactly on its target. Over a whole turn at constant speed p adds nothing.
 """
 
 from collections.abc import Sequence
@@ -28,7 +27,7 @@ Shaken = tuple[int, float, float, float]
 
 
 class Yielding(NamedTuple):
-    """The yielding of one joint during a tick: end + (start + slope s) exp(−s/τ), s after the tick's start; rad, s."""
+    """The yielding of one joint, rad, at a time t (s) after a tick's start: end + (start + slope t) exp(−t/τ)."""
 
     joint: int
     end_rad: float
