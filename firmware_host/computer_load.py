@@ -3,23 +3,23 @@
 import os
 from pathlib import Path
 
-CROWDED = 5.0  # largest factor on a limit: the number of runnable programs per processor
+LARGEST_LOAD_FACTOR = 5.0  # largest factor on a limit: the number of runnable programs per processor
 
 
 def exceeds(delay: float, limit: float) -> bool:
     """Return whether a delay exceeds a limit times the load, which is read only if the delay exceeds the limit."""
-    return delay > limit and delay > limit * crowding()
+    return delay > limit and delay > limit * load_factor()
 
 
-def crowding() -> float:
-    """Return the load, the factor by which a delay may be longer: runnable programs per processor, 1 to CROWDED.
+def load_factor() -> float:
+    """Return the factor by which a delay may be longer: runnable programs per processor, limited to 1 … 5.
 
     This is the mean of the last minute, or the present number if that is larger: after 15 s the mean shows only a
     quarter of a new load.
     """
     if not hasattr(os, "getloadavg"):  # Windows
         return 1.0
-    return min(max(max(os.getloadavg()[0], _runnable()) / (os.cpu_count() or 1), 1.0), CROWDED)
+    return min(max(max(os.getloadavg()[0], _runnable()) / (os.cpu_count() or 1), 1.0), LARGEST_LOAD_FACTOR)
 
 
 def _runnable() -> int:

@@ -113,7 +113,7 @@ class BoardLink:
                 if self.fault is not None:
                     raise self.fault
                 waited += share
-                if waited >= _SHARES * computer_load.crowding():
+                if waited >= _SHARES * computer_load.load_factor():
                     break
         finally:
             del self._requests[sequence]

@@ -126,7 +126,7 @@ def thorough(request: pytest.FixtureRequest) -> bool:
 @pytest.fixture
 def no_crowd(monkeypatch: pytest.MonkeyPatch) -> None:
     """The rig takes this machine for one that nobody else uses, and stretches none of its limits."""
-    monkeypatch.setattr("firmware_host.computer_load.crowding", lambda: 1.0)
+    monkeypatch.setattr("firmware_host.computer_load.load_factor", lambda: 1.0)
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ import h5py
 import numpy as np
 import pytest
 
-from firmware_host.computer_load import crowding
+from firmware_host.computer_load import load_factor
 from rig.analysis.analyses import calibrate
 from rig.data.recording.layout import Contents, lay_out
 from rig.data.recording.layout_keys import SCHEMA, TEXTS
@@ -29,7 +29,7 @@ from support.processes.waiting import PATIENCE_S, alive, wait_for
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("read_by_system")]
 
 RECORDING = RECORDINGS / "six_observation" / "run.h5"
-TIMEOUT_S = 5.0 * crowding()
+TIMEOUT_S = 5.0 * load_factor()
 ALONE_S = 0.8  # reading the recording takes half of that where there is a processor for it
 METADATA_BYTES = 12_000  # where a run file's first structures lie
 DAMAGES = 24

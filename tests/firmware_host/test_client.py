@@ -420,7 +420,7 @@ def test_a_board_that_sends_but_does_not_hear(wire: tuple[BoardOnAWire, str]) ->
 def test_a_board_that_answers_late_is_lost_unless_the_computer_is_crowded(
     monkeypatch: pytest.MonkeyPatch, wire: tuple[BoardOnAWire, str], crowded: float
 ) -> None:
-    monkeypatch.setattr("firmware_host.computer_load.crowding", lambda: crowded)
+    monkeypatch.setattr("firmware_host.computer_load.load_factor", lambda: crowded)
     board = wire[0].board
     receive, heard = board.receive, bytearray()
 
@@ -588,7 +588,7 @@ def test_a_board_that_falls_silent_while_streaming_is_noticed_after_two_seconds(
 def test_a_board_that_falls_silent_while_streaming_is_not_lost_on_a_computer_that_is_crowded_enough(
     monkeypatch: pytest.MonkeyPatch, wire: tuple[BoardOnAWire, str]
 ) -> None:
-    monkeypatch.setattr("firmware_host.computer_load.crowding", lambda: 1e9)
+    monkeypatch.setattr("firmware_host.computer_load.load_factor", lambda: 1e9)
     with Board(wire[1], protocol.BAUD_RATE, ignore, timeout_s=0.1) as board:
         board.configure(0, 238, 245)
         board.start()

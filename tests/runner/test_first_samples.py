@@ -32,5 +32,5 @@ def test_a_world_that_is_held_up_silences_no_sensor() -> None:
 
 
 def test_a_crowded_computer_gets_as_much_longer_as_it_is_crowded(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("firmware_host.computer_load.crowding", lambda: 3.0)
+    monkeypatch.setattr("firmware_host.computer_load.load_factor", lambda: 3.0)
     assert looks_until_refused(clock_rate=1.0) == pytest.approx(3 * LOOKS + 1, abs=1)

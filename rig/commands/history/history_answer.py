@@ -6,7 +6,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
-from firmware_host.computer_load import crowding
+from firmware_host.computer_load import load_factor
 from rig.commands.history.waiting import await_answer
 from rig.errors import RigError
 
@@ -39,7 +39,7 @@ def ask_history(address: "HistoryAddress", work: Callable[[], T], modules: Seque
     with suppress(ImportError):  # the history itself then names the missing extra
         for name in TO_CONNECT["file" if is_file else "server"]:
             import_module(name)
-    within_s = ANSWER_S * (crowding() if is_file else 1.0)
+    within_s = ANSWER_S * (load_factor() if is_file else 1.0)
     try:
         return await_answer(work, within_s)
     except TimeoutError:

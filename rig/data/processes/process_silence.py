@@ -19,7 +19,7 @@ class Silence:
     Ticks are counted, not seconds, because the counting process may itself be delayed. A tick does not count if the
     thread that is expected to answer (`thread`, any if None) mostly waited for a processor; all ticks count if the
     system does not show this (proc(5) of Linux does) or the process was stopped. However busy the machine, a silence
-    lasts at most `spared` times CROWDED times its limit: the arm must not be left alone.
+    lasts at most `spared` times LARGEST_LOAD_FACTOR times its limit: the arm must not be left alone.
     """
 
     def __init__(self, pid: int, *, spared: int, thread: int | None = None) -> None:
@@ -50,11 +50,11 @@ class Silence:
     def lasts_over(self, limit: float) -> bool:
         """Return whether more than `limit` silent ticks count, or more than `spared` × `limit` ticks have passed.
 
-        The `limit` is for a machine with a processor for every program; the machine's crowding extends it.
+        The `limit` is for a machine with a processor for every program; the machine's load extends it.
         """
         if max(self.ticks, self._all_ticks / self._spared) <= limit:
             return False
-        stretched = limit * (1.0 if self._is_stopped() else computer_load.crowding())
+        stretched = limit * (1.0 if self._is_stopped() else computer_load.load_factor())
         return self.ticks > stretched or self._all_ticks > self._spared * stretched
 
     def _is_stopped(self) -> bool:

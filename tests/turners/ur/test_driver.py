@@ -415,7 +415,7 @@ def test_an_arm_elsewhere_that_falls_silent_is_missed_at_once_on_a_crowded_compu
     laboratory: WorldHandle, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """By as crowded a one a controller here would be excused for hours."""
-    monkeypatch.setattr("firmware_host.computer_load.CROWDED", 1e6)
+    monkeypatch.setattr("firmware_host.computer_load.LARGEST_LOAD_FACTOR", 1e6)
     monkeypatch.setattr(os, "getloadavg", lambda: (1e6, 1e6, 1e6))
     with relay(laboratory.host, outside_address()) as wire:
         with Arm(wire.host) as arm:
@@ -528,7 +528,7 @@ def test_a_controller_that_was_silent_before_a_move_has_not_refused_it(
     laboratory: WorldHandle, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        "firmware_host.computer_load.crowding", lambda: 5.0
+        "firmware_host.computer_load.load_factor", lambda: 5.0
     )  # so crowded that 3 s of silence are excused
     with driver(laboratory) as arm:
         arm.take_control(PAYLOAD)
