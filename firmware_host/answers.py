@@ -203,7 +203,7 @@ class BoardStatus:
     - `rx_errors`, `tx_overruns`, `bus_errors`: damaged frames from the host, frames without room, failed sensor reads.
     - `stack_high_water_bytes`: the most stack ever used.
     - `fault_pc`, `reset_cause`: the address of the last processor fault, and the cause of the last start.
-    - `clock_locked`, `streaming`: whether the clock follows the crystal, and whether it streams.
+    - `clock_locked`, `streaming`: whether the clock follows the crystal, and whether the board streams.
     - `sensors`: the counts of conversions by sensor.
     """
 

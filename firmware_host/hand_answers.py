@@ -21,8 +21,8 @@ class HandReport:
     - `angle_rad`: the rotation of that move, there and back.
     - `noise_rad_s`: the standard deviation of a reading at rest, used as its weight.
     - `scale_std`: the largest standard uncertainty of a scale factor.
-    - `rest_us`, `move_us`: the start of the part of the rest before that was used, and of the move.
-    - `after_us`, `end_us`: the start of the rest after, and the end of the part of it that was used.
+    - `rest_us`, `move_us`: the start of the used part of the rest before that move, and of the move.
+    - `after_us`, `end_us`: the start of the rest after the move, and the end of its used part.
     """
 
     sensor: int

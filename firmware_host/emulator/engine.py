@@ -206,7 +206,7 @@ class Engine:
     ) -> Callable[[], None]:
         """Call `ask(address)` before the instruction at `address` if a core register is no multiple of four there.
 
-        `register`: Unicorn's number. After `enough` runs `ask` is called once too. Call the returned function to end
+        `register`: Unicorn's number. After `enough` runs, `ask` is also called once. Call the returned function to end
         the watch. Use between two runs.
         """
 

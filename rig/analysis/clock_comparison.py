@@ -72,7 +72,7 @@ class ClockCheck:
     half_width: float
 
     def differences(self) -> Iterator[ClockDifference]:
-        """Yield the difference of each pair of clocks; in the limit, half-widths of uniform distributions add up."""
+        """Yield the difference of each pair of clocks; its limit adds the half-widths of uniform distributions."""
         clocks = [("controller", 0.0, self.half_width, 0.0)]
         clocks += [
             (SHORT[comparison.by], comparison.error, comparison.half_width, comparison.noise_std)

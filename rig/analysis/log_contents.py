@@ -189,7 +189,7 @@ def find_allan_obstacle(samples: Samples) -> RigError | None:
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """A solution that was tried, for the sensors `only`, all if empty; `obstacle`: why it failed, or None."""
+    """An attempt at a solution, for the sensors `only` (all if empty); `obstacle`: why it failed, or None."""
 
     only: tuple[str, ...] = ()
     obstacle: str | None = None

@@ -51,7 +51,7 @@ class _LimitSet:
         return Check(name_check(self.sensor, self.quantity, what), value, limit, row.unit, means)
 
     def nearest(self, what: str, values: Array, uncertainty: ExpandedUncertainty | None) -> Check:
-        """Return the check of the worst of three axes, whose value is nearest to the limit by the decision rule."""
+        """Return the check of the worst axis: by the decision rule, its value is nearest to the limit or beyond it."""
         check = self.check(what, _largest_magnitude(values))
         if uncertainty is None or check.value is None:
             return check
@@ -96,7 +96,8 @@ def judge(
 ) -> tuple[Check, ...]:
     """Return the checks of every gyroscope by name.
 
-    With a budget, combined uncertainties are judged, and values by the decision rule; without a budget, only the noise.
+    With a budget, combined uncertainties are judged, and values by the decision rule. Without a budget, only the
+    uncertainty due to noise is judged.
     """
     checks: list[Check] = []
     for name, solution in solutions.items():

@@ -14,11 +14,11 @@ from rig.station.questions import COMMAND_WORDS, Kind, Question, Voice, is_agree
 
 @dataclass(frozen=True, slots=True)
 class Operator:
-    """The operator, asked by a `voice`, or a list of serial `numbers`; an empty number ends the batch.
+    """The source of serial numbers and answers: an operator, asked through a `voice`, or a list of `numbers`.
 
-    Without a voice no questions are asked, so a doubt cannot be overridden. A refused number of a list is entered in
-    the table; a refused typed number is typed again. `asking` is open during a question between two runs, with its
-    subject, such as "to mount the part".
+    An empty number ends the batch. Without a voice no questions are asked, so a doubt cannot be overridden. A refused
+    number of a list is entered in the table; a refused typed number is typed again. `asking` is open during a question
+    between two runs, with its subject, such as "to mount the part".
     """
 
     voice: Voice | None
@@ -61,7 +61,7 @@ class Operator:
         return self._agrees("again", f"{part.serial}: again? yes, or no to put it aside:", f"{part.serial}: {error}")
 
     def agrees(self, announcement: Sequence[str], to_do: str) -> bool:
-        """Ask whether the announced run may start; without a voice it may."""
+        """Ask whether the announced run may start. Without a voice, return True."""
         return self.voice is None or is_agreed(self.voice, question_before(announcement, to_do))
 
     def print_outcome(self, part: BatchPart) -> None:

@@ -138,7 +138,7 @@ class ColumnMap(Section):
 
     @model_validator(mode="after")
     def check_combination(self) -> Self:
-        """Refuse a unit that contradicts a column's name, a rate beside a column of times, and motion with a table."""
+        """Refuse a unit that contradicts a column's name, a rate together with times, and motion with a table."""
         for section, rate_hz in ((self.samples, self.samples_rate_hz), (self.motion, self.motion_rate_hz)):
             for name, column in section.items():
                 _fit(name, column, next((what for suffix, what in SUFFIXES if name.endswith(suffix)), NUMBER))

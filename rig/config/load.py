@@ -190,7 +190,7 @@ def _dump(document: Mapping[str, Any]) -> str:
 def _validate_rig(
     document: Mapping[str, Any], sections: Sections, turners: Turners, layered: Layered
 ) -> tuple[RigConfig | None, list[str]]:
-    """Validate all sections but the world's. The procedure's name and the turner's kind select their models."""
+    """Validate all sections except the world's. The procedure's name and the turner's kind select their models."""
     procedure, problems = _validate_procedure(document.get("procedure", {}), sections, layered)
     turner, turner_problems = _validate_turner(document, turners, layered)
     rest = {**document, "procedure": procedure or ProcedureSection(name=""), "turner": turner or TurnerSection()}

@@ -13,8 +13,9 @@ JUDGED_PARAMETERS: tuple[Parameter, Parameter] = ("scale", "bias")
 class Meaning:
     """The subject of a check: conformity of a property of the item, or fitness of the measurement for use.
 
-    `quantity` and `parameter` of the judged `sensor` are None for no single one. `sweep` is the plan's index of a sweep
-    that contradicts the others and that `rig resume` repeats. `what` names the criterion, such as `scale_std`.
+    `quantity` and `parameter` of the judged `sensor` are None if the check is not about a single one. `sweep` is the
+    plan's index of a sweep that contradicts the others and that `rig resume` repeats. `what` names the criterion, such
+    as `scale_std`.
     """
 
     kind: Kind

@@ -1,4 +1,4 @@
-"""Checks of input shared by all estimators, each of which raises `rig.errors.Fault` by name.
+"""Checks of input, shared by all estimators: each raises a named `rig.errors.Fault`.
 
 `condition_of` computes rank and condition number of a design.
 """
@@ -149,7 +149,7 @@ def check_reading_ratio(ratio: float, where: str) -> None:
 
 
 def is_plausible(ratio: ArrayLike) -> NDArray[np.bool_]:
-    """Return which ratios of reading to true value, or of true value to reading, a sensor can have."""
+    """Return a mask of ratios, of reading to true value or the reverse, that a sensor can have."""
     ratios = np.asarray(ratio, dtype=np.float64)
     return (ratios < MAX_SCALE) & (ratios > 1 / MAX_SCALE)
 
@@ -223,7 +223,7 @@ def check_rotations(attitudes: Array) -> None:
 
 
 def check_side(reference: Array, side: Array) -> None:
-    """Raise Fault `sign_unknown` if a direction (3,) is nearly perpendicular to v_ref (3,): its sign is then open."""
+    """Raise Fault `sign_unknown` if a direction (3,) is nearly perpendicular to v_ref (3,), so its sign is open."""
     if abs(reference @ side) < MIN_SIDE * np.linalg.norm(reference) * np.linalg.norm(side):
         raise Fault(
             "sign_unknown",

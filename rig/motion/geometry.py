@@ -170,8 +170,8 @@ def lengths_m(arm: DenavitHartenberg) -> Array:
 def _find_bends(frames: list[Array]) -> tuple[Array, Array, Array]:
     """Return shoulder, elbow and wrist 1, (…, 3) m, each in the plane of the previous one.
 
-    The axes of these three are parallel but for the factory's calibration, so they intersect hundreds of metres away,
-    and the origins of a calibrated arm's frames may be anywhere along them.
+    The axes of these three are parallel except for the factory's calibration, so they intersect hundreds of metres
+    away, and the origins of a calibrated arm's frames may be anywhere along them.
     """
     shoulder = frames[1][..., :3, 3]
     elbow = _nearest_origin(shoulder, frames[1][..., :3, 2], frames[2])

@@ -32,8 +32,8 @@ TOGGLES = 10  # readings between a jump and the one back, of a rate close to the
 def check_possible(readings: Array, rows: NDArray[np.intp], quantity: Quantity, where: str) -> None:
     """Raise Refused `not_a_number` if a few readings (n, 3) are far beyond all others and most parts' range.
 
-    `rows` (n,) are the readings' numbers in the file, from 0; messages call the file `where`. Many such readings are no
-    error here: the unit is wrong.
+    `rows` (n,) are the readings' numbers in the file, from 0; messages call the file `where`. Many such readings raise
+    nothing here: they are due to a wrong unit.
     """
     if quantity.mistaken is None or not len(readings):
         return

@@ -102,7 +102,7 @@ def turn_mean(readings: Array, steps: Steps, turn: SampledTurn) -> tuple[Mean, A
 
 
 def _gain(weights: Array) -> float:
-    """Return how many times more noise of angles is in a mean rate with weights (1, n) than in Δθ/T."""
+    """Return the ratio of the angles' noise in a mean rate with weights (1, n) to their noise in Δθ/T."""
     return float(np.linalg.norm(np.diff(weights[0], prepend=0.0, append=0.0)) * weights.size / np.sqrt(2))
 
 

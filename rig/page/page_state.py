@@ -1,4 +1,4 @@
-"""The state of the page, built from a run's events alone: no threads, no clock, no files but those that events name."""
+"""The state of the page, built from a run's events alone: no threads, no clock, only files that events name."""
 
 from collections.abc import Iterator
 from dataclasses import asdict

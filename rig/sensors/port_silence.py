@@ -23,7 +23,7 @@ USUAL = Patience()
 
 
 class PortSilence:
-    """The time spent reading without data, s, so that a device does not seem silent to a delayed reader.
+    """The time, s, in which a port was read without data; so a delayed reader does not make a device seem silent.
 
     Time in which another instrument's clock stops, as in a simulation, does not count either.
     """

@@ -80,9 +80,9 @@ class PreflightPassed:
 class Prompt:
     """A question to the operator.
 
-    After the `announcement` it asks for agreement `to_do` so; a page also shows a box `to_tick`. A question
-    `for_a_person` cannot be agreed to in advance. Before a stage with a new mounting, `mounts` is the stage's number,
-    from 0.
+    After the `announcement` it asks for agreement to the action `to_do`; a page also shows a box to tick, with the text
+    `to_tick`. A question `for_a_person` cannot be agreed to in advance. Before a stage with a new mounting, `mounts` is
+    the stage's number, from 0.
     """
 
     announcement: tuple[str, ...]

@@ -81,7 +81,7 @@ class Session:
 
 
 def study(settings: Settings) -> StudyReport:
-    """Find the coverage of ± 2 u, and the RMS of error / standard uncertainty, with and without the remedies."""
+    """Find the coverage of ± 2 u, and the RMS of error over standard uncertainty, with and without the remedies."""
     ratios = errors(Effects(), settings)
     rows = [
         {
@@ -97,7 +97,7 @@ def study(settings: Settings) -> StudyReport:
 
 
 def errors(effects: Effects, settings: Settings) -> Array:
-    """Return the errors of scale and bias / standard uncertainty, with and without the remedies, (draws, 2, 6)."""
+    """Return errors of scale and bias over their standard uncertainty, with and without remedies, (draws, 2, 6)."""
     draws = settings.runs or DRAWS
     counts = [draws // BATCHES + (batch < draws % BATCHES) for batch in range(BATCHES)]
     return np.concatenate(run_parallel(partial(_simulate_batch, effects), [n for n in counts if n], settings))
@@ -108,7 +108,7 @@ def _simulate_batch(effects: Effects, rng: np.random.Generator, draws: int) -> A
 
 
 def _simulate_session(effects: Effects, rng: np.random.Generator) -> Array:
-    """Return the errors / standard uncertainty (2, 6) of a session of sweeps and rests with random `effects`."""
+    """Return the errors over their standard uncertainty (2, 6) in a session of sweeps and rests, random `effects`."""
     scale, bias = rng.uniform(0.9, 1.1, 3), rng.uniform(-0.02, 0.02, 3)
     true = _build_session(rng.normal(0, effects.axis_rad, (3, 2)), effects.speed_rad_s)
     nominal = _build_session(np.zeros((3, 2)), effects.speed_rad_s)

@@ -260,7 +260,7 @@ def _test_bias_jump(
         return None
 
     def explain_step(step: Array, nuisance: Array) -> float:
-        """Return the χ² of a step of the bias, with the bias process estimated beside `nuisance`."""
+        """Return the χ² of a step of the bias, with the bias process estimated together with `nuisance`."""
         bias = _estimate_bias_process(segments, axis_rates, nuisance, scatter)
         whitener = build_whitener(segments, scatter, bias)
         readings = apply_whitener(whitener, (segments.means_rad_s - axis_rates).T[:, :, None])[:, 0]
@@ -282,7 +282,7 @@ def _test_bias_jump(
 
 
 def _jump_critical_value(jumps: int, false_alarm_probability: float) -> float:
-    """Return the critical value for a bias jump that may occur at any of `jumps` places."""
+    """Return the critical value for a bias jump that may occur at any of `jumps` instants."""
     from scipy.special import fdtri
 
     return 3 * float(fdtri(3, jumps, 1 - false_alarm_probability / jumps))

@@ -36,7 +36,7 @@ from rig.estimation.reference.shared_errors import decorrelate, information
 
 @dataclass(frozen=True, slots=True)
 class WhitenedReference:
-    """Residuals (n,) and model columns (n, q) of readings with unit noise and decoupled errors.
+    """Residuals (n,) and model columns (n, q) with unit noise, in coordinates in which all errors are independent.
 
     `growth` (n,) is the increase of their variance with δ²: see `rig.estimation.reference.shared_errors`.
     """
@@ -47,7 +47,7 @@ class WhitenedReference:
     growth: Array
 
     def chi_square_of(self, alternatives: Sequence[Array], nuisance: Sequence[Array]) -> list[float]:
-        """Return the χ² of each alternative, as `WhitenedModel` says; δ is estimated beside the most likely one."""
+        """Return the χ² of each alternative, as in `WhitenedModel`; δ is estimated with the most likely one."""
         model = self._extend_model(nuisance)
         rotated = [self.rotation @ columns for columns in alternatives]
         delta_rad = self._estimate_delta(model)
@@ -84,7 +84,7 @@ class WhitenedReference:
     def minimal_detectable_size(
         self, fault_patterns: Array, alternatives: Sequence[Array], false_alarm_probability: float
     ) -> float:
-        """Return the smallest fault, of `fault_patterns` (n, k) per unit, that a test of the alternatives detects."""
+        """Return the minimal detectable size of a fault, `fault_patterns` (n, k) per unit, tested by `alternatives`."""
         model = self._extend_model(())
         delta_rad = self._estimate_delta(model)
         size = np.sqrt(1 + delta_rad**2 * self.growth)[:, None]
@@ -191,7 +191,7 @@ def _detection_limits(
 
 
 def _whiten_readings(readings: ReferenceModel, *, drifting: bool) -> WhitenedReference:
-    """Return the readings and the model of a reference, whitened and decoupled."""
+    """Return residuals and model columns with unit noise, in coordinates in which all errors are independent."""
     theta, movement = readings.theta, readings.movement
     decoupled = decorrelate(
         noise(theta, movement) + readings.error_patterns.T @ readings.error_patterns, effects(theta, movement)

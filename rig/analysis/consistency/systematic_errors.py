@@ -45,7 +45,7 @@ STEPS = 24  # steps of a transfer within which directions count as constant
 
 @dataclass(frozen=True, slots=True)
 class NonlinearityPrior:
-    """A sensor's nonlinearity: standard deviations of its `cube` and `square` at, and relative to, `full_scale_rad_s`.
+    """A sensor's nonlinearity: standard deviations of `cube` and `square` at full scale, relative to full scale.
 
     If `free`, it is unknown, and may have a kink at zero.
     """
@@ -321,7 +321,7 @@ def _speed_patterns(segments: Segments) -> list[Array]:
 
 
 def _mount_patterns(segments: Segments, mount_rad: float) -> list[Array]:
-    """Return the patterns of errors of the item's mount in every stage but the first."""
+    """Return the patterns of errors of the item's mount in every stage except the first."""
     mounts = [interval.motion.mount.tobytes() for interval in segments.intervals]
     errors = mount_rad * np.cross(np.eye(3)[:, None, :], segments.rates_rad_s)
     _, *others = dict.fromkeys(mounts)

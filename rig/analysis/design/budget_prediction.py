@@ -149,7 +149,7 @@ def _plan_recording_part(
 
 
 def _average(timed: Timed[Step], run: PlannedRun, sensor: SensorSection) -> Average:
-    """Return an average of zero with the white noise of the part's data sheet."""
+    """Return the planned average of a step: zero, with the variance due to the white noise of the data sheet."""
     start_s, end_s = timed.window_s
     lasting_s, walk_rad_sqrt_s = end_s - start_s, PARTS[sensor.part].angle_random_walk_rad_sqrt_s
     samples = max(round(lasting_s * sensor.rate_hz), 2)

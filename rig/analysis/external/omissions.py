@@ -48,7 +48,7 @@ def notes_on_reading(read: ReadElsewhere, samples: Samples) -> Iterator[str]:
 
 
 def notes_on_speeds(data: ExternalData) -> Iterator[str]:
-    """Yield a note if speeds look like °/s: nothing but the bias depends on a unit that both files share."""
+    """Yield a note if speeds look like °/s: only the bias depends on a unit that both files share."""
     fastest = max((sweep.speed_rad_s for sweep in data.sweeps), default=0.0)
     remedy = "if both files are in °/s, name that unit with --columns, for the bias depends on it"
     if RATE.mistaken is not None and fastest > RATE.mistaken.unusual:
@@ -72,7 +72,7 @@ def _are_whole(turned: Array, part: float) -> bool:
 
 
 def notes_on_changes(data: ExternalData) -> Iterator[str]:
-    """Yield a note if there are too many rows for an abrupt change of the sensor to be looked for."""
+    """Yield a note if there are too many rows to search for an abrupt change of the sensor."""
     count = len(data.sweeps) + len(data.all_rests)
     if count > MOST_ROWS:
         yield (

@@ -16,8 +16,8 @@ LIMIT = 6.0  # standard deviations of the mean: the two averages share its noise
 def board_averages(sensor: str, recordings: Sequence[ObservedRun]) -> tuple[Check, ...]:
     """Return a check for each sweep whose averages contradict each other, or else one check for all sweeps.
 
-    A check's value is the largest difference of the three axes over the standard deviation of the computer's mean. No
-    checks if the board averaged nothing.
+    A check's value is the largest difference of the three axes over the standard deviation of the computer's mean. If
+    the board averaged nothing, there are no checks.
     """
     deviations = compare_board_means(sensor, recordings)
     if not deviations:

@@ -140,7 +140,7 @@ def _drift(name: str, recordings: Sequence[ObservedRun], settings: RunSettings) 
 
 
 def _solve(solve: Callable[..., TriaxialSolution]) -> TriaxialSolution:
-    """Return the solution. Raise Fault `field_not_uniform` for large residuals, because attitudes are not the cause."""
+    """Return the solution. For large residuals raise Fault `field_not_uniform`: attitudes cannot be their cause."""
     try:
         return solve(method=ESTIMATOR)
     except Fault as fault:

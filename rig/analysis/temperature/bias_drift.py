@@ -43,9 +43,10 @@ class BiasDrift:
     A gyroscope's bias includes the Earth's rate times the scale error, or all of the Earth's rate if none is stated
     (`earth_rate_known`); both are the same in every repeat.
 
-    - `scale_fixed`: with scale, axes and reference of the first repeat (accelerometers), or nominal (gyroscopes).
+    - `scale_fixed`: biases with scale, axes and reference of the first repeat (accelerometers) or nominal ones
+      (gyroscopes).
     - `common_std` (3,): a further standard deviation common to all biases.
-    - `scale_free`: the separate solution of every repeat, by its index.
+    - `scale_free`: the bias by a separate solution of every repeat, by the repeat's index.
     - `time_s`, `temperature_c` (R,): means over every repeat, times since the first repeat.
     - `dof`, `slope_dof` (3,): degrees of freedom of `scale_fixed.std` and of the slope's standard deviation.
     - `faults`: under the name SLOPE, why there is no slope.

@@ -74,7 +74,7 @@ def _is_usual(address: "HistoryAddress") -> bool:
 
 
 def remember_certificate(folder: Path, result: str, certificate: "Issued", history: str | None = None) -> str | None:
-    """Enter the certificate of the run in `folder`, whose result.json is `result`; return why it is not entered.
+    """Enter the certificate of the run in `folder` with result.json `result`; return why it is not entered, or None.
 
     The history is `history`, or if None the user's own, never one that the folder's configuration names, because the
     folder may come from anywhere.

@@ -1,4 +1,4 @@
-"""`rig check`: connect and check. Receives only, so nothing moves and no program on the arm is stopped."""
+"""`rig check`: connect and check. It only receives, so nothing moves and no program on the arm is stopped."""
 
 import json
 import sys

@@ -92,7 +92,7 @@ def _print(
 
 
 def _names_order(reference: "LookedFile") -> bool:
-    """Return whether the file's headings say which number of a quaternion is which."""
+    """Return whether the file's headings identify the four numbers of the quaternion."""
     from rig.data.recording.motion_file import QUATERNION
 
     headings = () if reference.layout is None else reference.layout.headings

@@ -185,7 +185,7 @@ class ObservationSection(ObservationKeys, extra="forbid"):
 
 
 class UncertaintySection(UncertaintyKeys[NonNegative | None], extra="forbid"):
-    """Sizes of errors that no recording shows: half-widths, but for `angle_std_deg` and both bias instabilities."""
+    """Sizes of errors that no recording shows: half-widths, except `angle_std_deg` and both bias instabilities."""
 
     _numbers = field_validator("*", mode="before")(classmethod(no_number_is_true))
 

@@ -21,8 +21,8 @@ class Limit:
     """A limit for a sensor's `quantity`: `what` names its check, `unit` is that of the value and the limit.
 
     A "conformity" limit judges a property of the item, a "fitness" limit the measurement's fitness for use. `parameter`
-    is the judged parameter of the calibration, None if it is no parameter. `needed_by` cannot pass without the limit;
-    None if every configuration states the limit.
+    is the judged parameter of the calibration, None if it is no parameter. `needed_by`: the kind of run that cannot
+    pass without the limit; None if every configuration states the limit.
     """
 
     quantity: str

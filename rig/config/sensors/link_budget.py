@@ -12,9 +12,9 @@ MARGIN = 0.1  # fraction of the link that remains free: for replies, and for a c
 
 @dataclass(frozen=True, slots=True)
 class LinkLoad:
-    """The stream of one sensor: samples per second, raw or `calibrated` or both in turn, raw with accelerations.
+    """The stream of one sensor on the link: samples per second, raw or `calibrated`, raw ones also with accelerations.
 
-    `field`: whether they are a magnetometer's.
+    `field`: whether the samples are a magnetometer's.
     """
 
     rate_hz: float

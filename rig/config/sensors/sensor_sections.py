@@ -78,7 +78,7 @@ class OwnPortSection(Section):
 
 
 class MountingSection(Section):
-    """The flange axis along which each sensor axis points, as a right-handed frame. A few degrees off do not matter."""
+    """The flange axis along which each sensor axis points, a right-handed frame. Errors of a few degrees do no harm."""
 
     x: AxisName = Field(default="+x", description="the flange axis along which the sensor's x axis points")
     y: AxisName = Field(default="+y", description="the flange axis along which the sensor's y axis points")

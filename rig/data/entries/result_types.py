@@ -66,8 +66,8 @@ class ConditionsEntry(Entry):
 class PlacementEntry(Entry):
     """The placements of a body in attitudes that a file gives, in the unit of the readings.
 
-    - `placement_std`: standard deviation of a reading from placement to placement besides attitude, by
-      `rests_without_attitude` further rests; null if the method does not estimate it.
+    - `placement_std`: standard deviation of a reading from placement to placement, not due to attitude errors; null if
+      the method does not estimate it. `rests_without_attitude` further rests contributed to it.
     - `rows_omitted`: number of rows left out because the body moved.
     - `covariance`: of all estimates, in `covariance_order`.
     """

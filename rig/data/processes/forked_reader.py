@@ -1,4 +1,4 @@
-"""A reading process forked from this one, which saves the tenth of a second to load modules.
+"""A reading process forked from this one, which saves the tenth of a second that loading modules takes.
 
 Only a process of one thread is forked: another thread's lock would stay locked in the child for ever.
 """

@@ -54,7 +54,7 @@ class ReadingLimits:
     """The resources of a process that reads a file.
 
     - `memory_bytes`: address space.
-    - `processor_s`: time on a processor; `idle_s`: all time but waits for a processor or the disk.
+    - `processor_s`: time on a processor; `idle_s`: all time except waits for a processor or the disk.
     - `written_bytes`: of each file that it writes, for its results and for unpacking.
     """
 

@@ -1,6 +1,6 @@
 """Extraction of a run file, in a process of its own (`rig.data.processes.reading_process`).
 
-Yields a header (schema, texts, descriptions of the sensors), then the arrays: each sensor's samples, the turner's
+It yields a header (schema, texts, descriptions of the sensors), then the arrays: each sensor's samples, the turner's
 states, events, and the tables of external readings. Rows hold plain numbers; the caller checks whether they agree with
 the texts, because few modules are loaded here.
 """

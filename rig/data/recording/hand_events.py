@@ -31,7 +31,7 @@ class HandRested:
 
 @dataclass(frozen=True, slots=True)
 class HandMoveAccepted:
-    """A move between two rests that counts: a flip, or whole turns on a face."""
+    """An accepted move between two rests: a flip, or whole turns on a face."""
 
     begin_us: Microseconds
     end_us: Microseconds
@@ -43,7 +43,7 @@ class HandMoveAccepted:
 
 @dataclass(frozen=True, slots=True)
 class HandMoveRefused:
-    """A move between two rests that does not count, by the error's name `again`; both rests count."""
+    """A refused move between two valid rests; `again` is the error's name."""
 
     begin_us: Microseconds
     end_us: Microseconds
@@ -52,7 +52,7 @@ class HandMoveRefused:
 
 @dataclass(frozen=True, slots=True)
 class HandRestRefused:
-    """A rest that does not count, by the error's name `again`: it is a pause of a move."""
+    """A refused rest, which becomes a pause of a move; `again` is the error's name."""
 
     begin_us: Microseconds
     end_us: Microseconds
@@ -61,7 +61,7 @@ class HandRestRefused:
 
 @dataclass(frozen=True, slots=True)
 class HandBegunAnew:
-    """A restart of the session: nothing before `begin_us` counts.
+    """A restart of the session: everything before `begin_us` is discarded.
 
     `again` is the error's name: for another table, or another sensor.
     """

@@ -44,7 +44,7 @@ Vector3 = tuple[Finite, Finite, Finite]
 class ObservationThresholds(ObservationKeys):
     """Conditions on an averaged revolution.
 
-    - `max_lost_fraction`: of the samples may be missing.
+    - `max_lost_fraction`: largest fraction of missing samples.
     - `max_speed_deviation`: largest deviation of the joint's smoothed rate from its mean, as a fraction.
     - `max_axis_deviation_deg`: largest angle between the reading and the axis of rotation.
     """
@@ -91,9 +91,9 @@ class Site:
 class Uncertainty(UncertaintyKeys[dict[str, NonNegative]]):
     """Half-widths of errors that no recording shows: all values within are equally likely.
 
-    `angle_std_deg` is the standard deviation of a joint's angle by its encoder, None if not stated. Those of sensors
-    are keyed by name. `decision_rule` compares a limit with the value alone ("simple") or with the value and its
-    expanded uncertainty ("guard_band").
+    `angle_std_deg` is the standard deviation of a joint's angle by its encoder, None if not stated. Errors of sensors
+    are keyed by the sensor's name. `decision_rule` compares a limit with the value alone ("simple") or with the value
+    and its expanded uncertainty ("guard_band").
     """
 
     @model_validator(mode="before")
@@ -130,7 +130,8 @@ class Elsewhere:
 
     - `any_mounting`: whether the sensor may have any mounting on the body.
     - `find_clock`: whether the attitudes have a clock of their own; `exact_rates`: whether their rates are exact, as of
-      a rate table; `window_s`: for averages of attitudes in a gyroscope's increments, None for a suitable one.
+      a rate table; `window_s`: duration over which attitudes are averaged for a gyroscope's increments, None for an
+      automatic choice.
     - `estimator`: None for the one that suits each quantity.
     - `only`: the kinds of sensors to calibrate; empty for all that are recorded.
     """

@@ -1,7 +1,7 @@
-"""Rests in which the body crept, that is, turned slowly while it lay.
+"""Rests in which the body crept, that is, turned slowly while it lay on a face.
 
-The reading of such a rest differs from its neighbours'. In the graph this is a bias that jumps there and back, which
-inflates the bias' random walk; no move contains the rotation within the rest.
+The reading of such a rest differs from its neighbours'. In the graph this looks like a bias that jumps and returns,
+which inflates the bias' random walk; no move contains the rotation within the rest.
 """
 
 from collections.abc import Sequence

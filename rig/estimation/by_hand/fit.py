@@ -45,7 +45,7 @@ NEVER_LESS = ("of_angle", "walk_rad_s_sqrt_s")
 
 @dataclass(frozen=True, slots=True)
 class GraphFit:
-    """The converged graph; `covariance` (p, p), `chi_square` of all factors but the priors with `dof`."""
+    """The converged graph; `covariance` (p, p), `chi_square` of all factors except the priors, with `dof`."""
 
     session: HandRecording
     conditions: SessionConditions
@@ -185,7 +185,7 @@ def replace_stds(rows: Sequence[Factor], now: HandStds, new: HandStds) -> list[F
 
 
 def sum_squares(rows: Sequence[Factor], covariance: Array) -> tuple[float, float]:
-    """Return the chi square of all rows but the priors, and its degrees of freedom."""
+    """Return the chi square of all rows except the priors, and its degrees of freedom."""
     design, residual = whiten_rows([row for row in rows if row.kind != PRIOR])
     return float(residual @ residual), len(design) - float(_leverages(design, covariance).sum())
 

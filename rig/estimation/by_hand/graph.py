@@ -157,7 +157,8 @@ class Graph:
     def stamp_std_s(self) -> float:
         """The standard deviation of time stamps, from their second differences.
 
-        The largest differences are omitted, because gaps cause them. Irregular sampling counts as wrong stamps.
+        The largest differences are omitted, because gaps cause them. Irregular sampling is included, because it looks
+        like wrong stamps.
         """
         differences = np.sort(np.abs(np.diff(self.session.time_s, 2)))
         return float(np.sqrt(np.mean(np.square(differences[: round(BUT_GAPS * len(differences))])) / 6))

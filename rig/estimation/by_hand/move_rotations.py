@@ -25,7 +25,7 @@ class MoveIntegrals:
     - `swept_rad` (k, 3): the integral of the reading minus offset, g-sensitivity and nonlinearity.
     - `durations_s` (k,), `paths_rad` (k,): the total angle, there and back.
     - `changes_rad_s` (k,): the root sum of squares of the rate's changes from sample to sample. Multiplied by the
-      standard deviation of the time stamps, it is that of the rotation.
+      standard deviation of the time stamps, it gives the standard deviation of the rotation due to them.
     """
 
     rotations: Array

@@ -110,7 +110,7 @@ def _vertical_on_face(centre: Array, face: int) -> tuple[Array, Array]:
 
 
 def _rest_equations(centre: Array, rest: BoardRest, noise_rad_s: float) -> Iterator[Equation]:
-    """Yield the equations of a rest, linear in a step from `centre` (33,): it reads the bias, and gravity's effect."""
+    """Yield the equations of a rest, linear in a step from `centre` (33,): readings are bias plus gravity's effect."""
     up, _ = _vertical_on_face(centre, rest.face)
     sensitivity = centre[GRAVITY].reshape(3, 3)
     for axis in range(3):

@@ -32,7 +32,7 @@ class HandRest:
 
 @dataclass(frozen=True, slots=True)
 class Move:
-    """A move, from inside the rest before it to inside the rest after; `peak_rad_s` is its largest reading of an axis.
+    """A move, from inside the rest before it to inside the rest after; `peak_rad_s` is the largest reading.
 
     The rotation is unknown if readings are missing (`lost`), the gyroscope was at the end of its range (`clipped`), or
     the operator withdrew the move (`left_out`).
@@ -73,7 +73,7 @@ class SessionConditions:
 
     - `clock_ppm`: half-width of the clock's error; `clock_source` states where it comes from.
     - `box_rad`: standard deviation of the faces from a rectangular box.
-    - `closure`: whether turns on a face were against an edge, and so end where they began.
+    - `closure`: whether the body was turned against an edge, so that whole turns end where they began.
     - `first_face`: the axis of the body that first pointed upwards; needed without an accelerometer.
     """
 
@@ -89,7 +89,7 @@ class SessionConditions:
 class HandStds:
     """Standard deviations of a hand's errors, and of a sensor's errors outside the model.
 
-    - `repeat_rad`: a face that is laid down again; `closure_rad`: the heading after a whole turn.
+    - `repeat_rad`: of the attitude when a face is laid down again; `closure_rad`: of the heading after a whole turn.
     - `of_angle`: of the angle of a quarter turn, about each axis; `walk_rad_s_sqrt_s`: of the bias from rest to rest.
     - `acceleration_m_s2`: of an accelerometer's reading at rest, across the vertical.
     """

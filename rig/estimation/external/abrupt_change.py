@@ -37,7 +37,7 @@ class AbruptChange:
     evidence: float
 
     def find_covariance(self, matrix: Array) -> Array:
-        """Return the covariance (12, 12) of F (3, 3), row by row, and the bias that contains both states of the sensor.
+        """Return the covariance (12, 12) of F (3, 3), row by row, and bias whose U covers both states of the sensor.
 
         A solution lies between both states. Half of the change is the standard uncertainty, so U is all of it.
         """

@@ -27,7 +27,7 @@ class Inclinations:
     """Inclinations of a reference's axes of motion.
 
     - `response` (m, r): of the m components of all increments to r independent inclinations of 1 rad.
-    - `prior_median_rad`: of their standard deviation.
+    - `prior_median_rad`: the prior median of their standard deviation.
     """
 
     response: Array
@@ -36,9 +36,9 @@ class Inclinations:
     def widen(self, model: MixedModel, std: Array, fit: MixedFit, wanted: Array, variances: Array) -> Array:
         """Return the covariance (q, q) that inclinations add to `wanted` (q, p) combinations of θ.
 
-        Only inclinations that the residuals do not show count. `variances` (q,) are due to the model's other errors,
-        with standard deviations `std` (k,), which contain the visible inclinations. With both, 2 u is the half-width of
-        the 95.45 % interval.
+        Only inclinations that the residuals do not show are added. `variances` (q,) are due to the model's other
+        errors, with standard deviations `std` (k,), which contain the visible inclinations. With both, 2 u is the
+        half-width of the 95.45 % interval.
         """
         from scipy.linalg import cho_factor, cho_solve
 

@@ -87,13 +87,14 @@ class KnownIncrements:
     - covariance (15, 15): of F row by row, ω_E, b.
     - causes: parts (15, 15) of the covariance, by name.
     - earth: the Earth's rate from the increments, or the fault.
-    - clock_s, clock_std_s: τ; the reference's attitude stamped t is that of t + τ.
+    - clock_s, clock_std_s: τ; the reference's attitude with the time stamp t belongs to the readings' time t + τ.
     - fix_std_rad: error of a fix about each axis.
     - random_walk_rad_sqrt_s: random walk of the gyroscope's angle.
     - matrix_scatter, bias_scatter_rad_s: standard deviation of each element between intervals of the recording.
     - residuals_rad (n, 3): of the increments.
     - aside_s (k,): start of each omitted outlier.
-    - reset: when all later attitudes are turned against those before, and the angle, as by a new home; None if never.
+    - reset: the time from which all attitudes are rotated relative to the earlier ones, as after a new origin, and the
+      angle; None if there is none.
     - condition: of the scaled design.
     - iterations: number of Gauss-Newton steps.
     - change: an abrupt change, on the attitudes' clock; U contains both states of the gyroscope. None without one.

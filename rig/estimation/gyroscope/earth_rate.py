@@ -101,7 +101,7 @@ class EarthRate:
 
     @property
     def heading_rad(self) -> float | None:
-        """The direction of the base's x axis, from north over east; None if it is vertical."""
+        """The heading of the base's x axis, clockwise from north; None if the axis is vertical."""
         level = self._level()
         if level is None:
             return None

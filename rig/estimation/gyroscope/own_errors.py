@@ -24,10 +24,11 @@ NEGLIGIBLE = 1e-3  # fraction of a mean's variance below which a common rounding
 class KnownSensor:
     """Half-widths of errors by the data sheet, and the temperature of N averages.
 
-    - `nonlinearity`: largest distance from the best straight line by either part, as a fraction of `full_scale_rad_s`.
+    - `nonlinearity`: largest distance from the best straight line by the odd or the even part, as a fraction of
+      `full_scale_rad_s`.
     - `bias_rad_s_per_k`, `scale_per_k`: changes with temperature.
     - `temperature_c` (N,): recorded in steps of `temperature_step_k`, NaN if not recorded.
-    - `temperature_words`: source of the temperature, if no thermometer.
+    - `temperature_words`: source of the temperature, if it is not a thermometer.
     - `instability_rad_s`: the least Allan deviation of the bias.
     """
 

@@ -27,7 +27,8 @@ ATTITUDES = "arm's attitudes"
 class Spread:
     """The uncertainty of scale and bias, kx ky kz bx by bz, from n readings.
 
-    - `scale` (3,); `covariance` (6, 6): by noise and attitudes; `response` (6, n): to the readings.
+    - `scale` (3,); `covariance` (6, 6): by noise and attitudes; `response` (6, n): derivative with respect to the
+      readings.
     - `noise` (n, n): covariance of the readings' own noise.
     - `attitude_error`: the error of the attitudes.
     - `chi_square` of the residuals, and its `dof`.
@@ -59,7 +60,7 @@ class Spread:
 class KnownSize:
     """The uncertainty of the reference's norm: expanded (k = 2) if `stated`, else a half-width.
 
-    `relative` is the uncertainty divided by the norm; multiplied by `per_unit`, in `unit`.
+    `relative` is the uncertainty divided by the norm; `relative` × `per_unit` is the uncertainty in `unit`.
     """
 
     name: str

@@ -82,8 +82,8 @@ def flicker_covariance(windows_s: ArrayLike) -> Array:
     """Return the covariance (N, N) of the means of flicker noise of Allan deviation 1 over windows (N, 2) [start, end].
 
     Noise of power B²/(2π f) has the Allan deviation B √(2 ln 2/π) (IEEE Std 952-1997, C.1.3), so values a time τ apart
-    have the covariance −ln(τ)/(2 ln 2), plus an infinite constant. It cancels relative to the mean over the whole time
-    from the first start to the last end.
+    have the covariance −ln(τ)/(2 ln 2), plus an infinite constant. The constant cancels if values are taken relative to
+    the mean over the whole time from the first start to the last end.
     """
     windows = np.asarray(windows_s, dtype=np.float64)
     means = _flicker_means(np.vstack([windows, [windows.min(), windows.max()]]))
@@ -180,7 +180,7 @@ def bias_process(
     `variances_rad2_s2` (N, 3) are the variances of the noise, `windows_s` (N, 2) the averaging windows. The three axes
     have one process, since few averages determine it. `shared_rad2_s2` (3, N, N) are covariances between the averages
     besides their noise, `instability_rad_s` is the data sheet's bias instability, zero if unknown. `chosen` selects
-    walk and scatter.
+    walk and scatter by their likelihood.
     """
     z, means, variances = (np.asarray(a, dtype=np.float64) for a in (design, means_rad_s, variances_rad2_s2))
     dof = 3 * (len(z) - z.shape[1])

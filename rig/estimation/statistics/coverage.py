@@ -72,7 +72,7 @@ def joint_factors(values: int, dof: ArrayLike, probability: float) -> Array:
 
 
 def find_ellipsoid_factor(values: int, dof: ArrayLike) -> float:
-    """Return the factor of the 95 % ellipsoid for `values` values jointly, at the smallest of `dof`.
+    """Return the factor of the joint 95 % ellipsoid of `values` values, at the smallest of `dof`.
 
     For p values with a multivariate t distribution the factor is √(p F), with the quantile of F for p and ν degrees of
     freedom; for a normal distribution √χ² (JCGM 102, 6.5).

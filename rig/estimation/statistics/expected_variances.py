@@ -41,7 +41,7 @@ class ResidualInputs:
 
 @dataclass(frozen=True, slots=True)
 class ErrorSizes:
-    """The bias random walk in a second, δ, and the fraction of δ² that is independent in each dwell."""
+    """The bias random walk in one second, δ, and the fraction of δ² that is independent in each dwell."""
 
     walk: float
     std_rad: float

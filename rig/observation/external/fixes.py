@@ -1,7 +1,7 @@
 """Attitude fixes from a reference's rows, between which a gyroscope is integrated, and the omitted intervals.
 
-Rows that follow each other while the body moves are gathered over windows; a row holds for its middle. If the gyroscope
-shows that the body lay still during a row, both ends of the row are fixes, which share the row's error.
+Rows that follow each other while the body moves are gathered over windows; a row is valid for its middle. If the
+gyroscope shows that the body lay still during a row, both ends of the row are fixes, which share the row's error.
 
 A gyroscope cannot be integrated over missing or saturated samples, or if it turns too far between two readings.
 """

@@ -29,7 +29,7 @@ EXPLAINED = 0.5  # least fraction of the readings' variance that F explains
 
 @dataclass(frozen=True, slots=True)
 class RobustStart:
-    """Initial values, and the fraction of the readings' rotation that they do not explain: 1 without any."""
+    """Initial values, and the fraction of the readings' rotation that they do not explain: 1 without suitable rows."""
 
     state: DriftState
     unexplained: float

@@ -21,7 +21,7 @@ UNEVEN, EVEN_S = 0.2, 0.05
 
 
 class TableMotion:
-    """A `KnownMotion` from rows that follow each other closely; a row holds for its middle.
+    """A `KnownMotion` from rows that follow each other closely; a row is valid for its middle.
 
     `middles_s` (n,) in any order, on the table's clock; `attitudes` (n, 3, 3) transform body to table coordinates;
     `rates_rad_s` (n, 3) in body coordinates, None if only the attitudes are known. Raise Fault `time_base_not_found`.
@@ -64,8 +64,8 @@ class TableMotion:
 def check_rates_agree(middles_s: Array, attitudes: Array, rates_rad_s: Array) -> None:
     """Raise Fault `wrong_unit` if a table's rates (N, 3) differ by a factor from those of its attitudes (N, 3, 3).
 
-    Rows hold for their middles (N,). If the readings have the same wrong unit, a solution by rates alone does not show
-    it.
+    Rows are valid for their middles (N,). If the readings have the same wrong unit, a solution by rates alone does not
+    show it.
     """
     order = np.argsort(middles_s)
     time_s, rates = middles_s[order], rates_rad_s[order]

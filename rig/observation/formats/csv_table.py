@@ -110,8 +110,8 @@ def csv_parts(
 ) -> Iterator[Part]:
     """Yield the parts that `read_table` reads; `names` are fields of a header, `mapped` fields of a column map.
 
-    The rows come in blocks, with the line number as an additional column, and last `origin_s`, and whether times are
-    times of day.
+    The rows come in blocks, with the line number as an additional column. The last part states `origin_s`, and whether
+    times are times of day.
     """
     return _parts(path, Header(*names), largest_mb, None if mapped is None else Mapped(**mapped), origin_s)
 

@@ -1,8 +1,8 @@
 """Readings from PX4's log (`.ulg`), by `pyulog`: the sensors' readings before the autopilot corrects them.
 
-`sensor_gyro` and `sensor_accel` of one instance each, in rad/s and m/s²; `timestamp_sample` is the autopilot's time of
-the sample in µs. An accelerometer with other sample times is interpolated to the gyroscope's times; in one part their
-times are equal.
+They come from one instance of `sensor_gyro` and one of `sensor_accel`, in rad/s and m/s²; `timestamp_sample` is the
+autopilot's time of the sample in µs. An accelerometer with other sample times is interpolated to the gyroscope's times;
+in one part their times are equal.
 
 PX4's default profile logs these once a second or not at all. Then `sensor_combined`, at about 200 Hz, is read, with a
 note about what it lacks. The reader runs in a process of its own (`rig.observation.formats.sample_files`).

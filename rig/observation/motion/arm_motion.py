@@ -154,15 +154,15 @@ class ArmMotion:
     def rates_at_samples(self, time_s: Array) -> Array:
         """Return the flange's rate (n, 3), rad/s, around consecutive evenly spaced samples at rising times (n,).
 
-        This is the mean between the half-ways to the previous and the next sample; if samples are far apart, that over
-        `RATE_STEP_S`. Joints that stand still between the first and the last sample have no rate: their encoders' noise
-        would be added to the motion.
+        It is the mean rate from half-way after the previous sample to half-way before the next; if samples are far
+        apart, the mean over `RATE_STEP_S`. Joints that stand still between the first and the last sample get the rate
+        zero, so that their encoders' noise is not added to the motion.
         """
         standing_rad = self._standing_rad(float(time_s[0]), float(time_s[-1]))
         return self._mean_rates(time_s, _averaging_time(time_s), standing_rad)
 
     def state_gain(self, time_s: Array, weights: Array) -> float:
-        """Return how many times more noise of the states is in a weighted mean of `rates_at_samples` than in Δθ/T.
+        """Return the ratio of the states' noise in a weighted mean of `rates_at_samples` to their noise in Δθ/T.
 
         `weights` (n,) are those of the mean. Angles between states are interpolated, here linearly.
         """

@@ -89,7 +89,7 @@ def find_even_turn(states: NDArray[Any], sweep: Sweep, settings: ObservationThre
 
 
 def _check_speed(time_s: Array, travelled: Array, where: str, settings: ObservationThresholds) -> None:
-    """Raise Fault `speed_not_constant` if the smoothed rate strays from its mean, as by a halt, not by a ripple."""
+    """Raise Fault `speed_not_constant` if the smoothed rate strays from its mean: by a halt, but not by a ripple."""
     rates = fit_lines(time_s, travelled[:, None])[2][:, 0]
     deviation = float(np.max(np.abs(rates / rates.mean() - 1)))
     if deviation > settings.max_speed_deviation:

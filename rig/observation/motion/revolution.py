@@ -181,7 +181,7 @@ def _check_slider(turning: NDArray[Any], where: str) -> None:
 
 
 def _check_speed(time_s: Array, travelled: Array, where: str, settings: ObservationThresholds) -> None:
-    """Raise Fault `speed_not_constant` if the smoothed rate strays from its mean, as by a halt, not by vibration."""
+    """Raise Fault `speed_not_constant` if the smoothed rate strays from its mean: by a halt, but not by vibration."""
     middles = np.arange(time_s[0] + SMOOTHING_S / 2, time_s[-1] - SMOOTHING_S / 2, SMOOTHING_S / 5)
     ahead = np.interp(middles + SMOOTHING_S / 2, time_s, travelled)
     behind = np.interp(middles - SMOOTHING_S / 2, time_s, travelled)

@@ -36,8 +36,8 @@ def turn_speed(time_s: NDArray[np.float64], q_rad: NDArray[np.float64]) -> TurnS
     `time_s` (n,): rising; `q_rad` (n,): the encoder's readings between the ramps, turns counted. T is the mean time
     between readings one turn apart. A quarter of a turn more, read at 100 Hz at 60°/s by a 12-bit encoder with a noise
     of 0.06°, determines T to 2e-5. Its standard deviation follows from the scatter of these differences and their
-    correlation, for white noise of the single readings. Raise Fault `turn_too_short` for less than a turn and
-    `FEWEST_PAIRS` readings more, or a shaft that stands still.
+    correlation, for white noise of the single readings. Raise Fault `turn_too_short` unless readings cover a turn and
+    `FEWEST_PAIRS` readings more, or if the shaft stands still.
     """
     far_rad = abs(float(q_rad[-1] - q_rad[0])) if len(q_rad) > FEWEST_PAIRS else 0.0
     if far_rad <= TURN_RAD:

@@ -284,5 +284,5 @@ def _separate_equal(log: _UnorderedLog) -> _UnorderedLog:
 
 
 def _estimate_usual_delay_s(late_s: Array, interval_s: float) -> float:
-    """Return the delay, s, beyond the shortest of the next readings, that only readings in a buffer exceed."""
+    """Return the delay, s, behind the least late of the following readings, that only buffered readings exceed."""
     return USUAL * float(np.median(late_s - find_least_ahead(late_s, LONG[-1]))) + ON_TIME * interval_s

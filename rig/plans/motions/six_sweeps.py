@@ -36,7 +36,7 @@ WRIST_1, WRIST_2, WRIST_3 = (JOINT_NAMES.index(name) for name in ("wrist_1", "wr
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """The `stations` in order, each swept in the `directions`, reversed in every second one if it `alternates`."""
+    """A sweep order: every station in turn, in the `directions`, reversed at every second one if it `alternates`."""
 
     stations: tuple[SweepPose, ...]
     directions: tuple[tuple[Direction, ...], ...]

@@ -102,7 +102,7 @@ class Standard:
 
 @dataclass(frozen=True, slots=True)
 class ResultKind(Generic[EntryT]):
-    """A kind of result, by its outlets or the reasons why it has none.
+    """A kind of result: for each outlet the function that serves it, or the reason why it has no such outlet.
 
     - name: its name for people.
     - key: its key in result.json.

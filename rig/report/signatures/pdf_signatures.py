@@ -52,7 +52,7 @@ def inspect_pdf(name: str, content: bytes, trust: Trust) -> FileInspection:
 
 
 def _status(signature: Any, trust: Trust) -> Any:
-    """Return pyHanko's status of a signature, trusting no signers but the time servers of `trust`."""
+    """Return pyHanko's status of a signature, trusting as signers only the time servers of `trust`."""
     no_signers = ValidationContext(trust_roots=[], allow_fetching=False)
     roots = list(map(Certificate.load, trust.certificates))
     servers = ValidationContext(trust_roots=roots, allow_fetching=False)

@@ -206,7 +206,7 @@ class HandSession:
         self.note(HandMoveAccepted(*self._board_us(move), kind, before, face, self._accepted[-1].turns))
 
     def _refuse_move(self, wrong: Fault, move: Move | None, rest: HandRest) -> bool:
-        """Omit the move, the rest, or everything before, by the fault. Return whether the rest counts.
+        """Omit the move, the rest, or everything before, depending on the fault. Return whether the rest is kept.
 
         If the bias has changed at one rest, the item may have crept, and the rest is omitted; if at the next rest too,
         the bias itself has changed. Raise a fault that no move can correct.

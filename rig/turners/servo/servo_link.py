@@ -31,7 +31,7 @@ class JobCancelled(BusError):
 
 
 class ServoLink:
-    """A poller of `bus` every `period_s`. `on_state` and `on_problem` run on its thread, even after a problem."""
+    """A thread that polls `bus` every `period_s` and calls `on_state` and `on_problem`, even after a problem."""
 
     def __init__(
         self,

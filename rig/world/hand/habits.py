@@ -33,11 +33,14 @@ class Mistake:
     """A mistake of magnitude `size`; None takes the usual magnitude of its kind (`USUAL`).
 
     - `short`: the turn ends this many degrees early, as if the edge had slipped.
-    - `two_turns` in place of one; a turn the `other_way`; the `wrong_face`; `skipped`: no action.
+    - `two_turns`: two turns in place of one; `other_way`: a turn in the other direction; `wrong_face`: another face up;
+      `skipped`: no action.
     - `crumb`: the face is tilted by this many mrad; `table_pushed`: the table's tilt changes by this many mrad.
-    - `held`: in the air for this many seconds in place of a rest; `lifted`: by this many degrees during a rest.
-    - `dropped`: biases jump; `cable_pulled`: for this many seconds; `left`: idle for this many seconds before.
-    - `too_fast`: by this factor.
+    - `held`: the body is held in the air for this many seconds in place of a rest; `lifted`: it is lifted by this many
+      degrees during a rest.
+    - `dropped`: the body falls and its biases jump by this many °/s; `cable_pulled`: readings are lost for this many
+      seconds; `left`: the hand waits for this many seconds before the action.
+    - `too_fast`: the peak rate is higher by this factor.
     """
 
     kind: MistakeKind
@@ -80,8 +83,8 @@ Action = FlipAction | TurnAction | WaitAction
 class Habits:
     """How a hand moves and lays down a body. Values that are drawn for every action are standard deviations.
 
-    `tilt_mrad`: repeatability of a face put down again; `closure_mrad`, `heading_mrad`: by how much a turn against an
-    edge and a flip miss; `faces_mrad`: the box' deviation from squareness; `table_mrad`: the table's tilt;
+    `tilt_mrad`: repeatability of a face put down again; `closure_mrad`, `heading_mrad`: heading errors after a turn
+    against an edge, and after a flip; `faces_mrad`: the box' deviation from squareness; `table_mrad`: the table's tilt;
     `lever_arm_m`: the sensor's position from the point of rotation.
     """
 

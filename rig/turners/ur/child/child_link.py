@@ -29,7 +29,7 @@ PATIENT_TICKS = 240  # 12 s while a client's constructor holds the child's inter
 
 
 class ChildLink:
-    """One child process. The reader thread calls `on_message`, reader or guard `on_lost`; its first call counts."""
+    """One child process. The reader thread calls `on_message`; `on_lost` is called once, by the reader or the guard."""
 
     def __init__(
         self,
@@ -67,7 +67,7 @@ class ChildLink:
         )
 
     def start(self) -> None:
-        """Start the child process; it answers `on_message` with `Connected` or `RequestFailed`.
+        """Start the child process, whose first message is `Connected` or `RequestFailed`.
 
         Watch for silence of the child and, if local, of the controller.
         """
@@ -197,7 +197,7 @@ def _writable(pipe: "Connection[Request, Message]") -> bool:
 
 @contextmanager
 def _block_interrupts() -> Iterator[None]:
-    """Hold back Ctrl-C in the block: the parent receives it afterwards, a child started there never."""
+    """Hold back Ctrl-C in the block: the parent receives it afterwards, a child started in the block never does."""
     if not hasattr(signal, "pthread_sigmask"):  # Windows: the child ignores Ctrl-C once it runs
         yield
         return

@@ -2,7 +2,7 @@
 
 (Client interface description of the maker: a robot message holds a time stamp, a source and its kind. An error code,
 kind 6, continues with code, argument, level, a type and a value; a runtime exception, kind 10, with line and column; a
-key message, kind 7, with code, argument and a title. A text ends each.)
+key message, kind 7, with code, argument and a title. Each ends with a text.)
 """
 
 import struct

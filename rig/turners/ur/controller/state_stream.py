@@ -58,7 +58,7 @@ class StatePacket:
 
 
 class NotSupported(ConnectionError):
-    """The error of a controller that answers without support for the item `what`; `version`: of its software."""
+    """The error of a controller that answers but does not support `what`; `version` is that of its software."""
 
     def __init__(self, what: str, version: tuple[int, ...]) -> None:
         super().__init__(f"it does not know {what}")

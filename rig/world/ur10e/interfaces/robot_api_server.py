@@ -102,7 +102,7 @@ def has_robot_api(robot: Robot) -> bool:
 
 @dataclass(slots=True)
 class _Carrying:
-    """An order that is being carried out, and when its patience ends."""
+    """An order that is being carried out, and the tick at which the wait for its end is given up."""
 
     done: Done
     until_tick: int

@@ -73,9 +73,9 @@ class JointDrive:
         return shaken
 
     def advance(self, yielding: Sequence[Yielding], change_rad_s: Sequence[float]) -> tuple[Yielding, ...]:
-        """Return by how much the joints yield in the next tick, if their targets' rates change by `change_rad_s`.
+        """Return the yielding of the joints in the next tick, if their targets' rates change by `change_rad_s`.
 
-        `yielding` is by how much they yielded in the last tick.
+        `yielding` is their yielding in the last tick.
         """
         if not self.yield_s2 or not (yielding or any(change_rad_s)):
             return ()
@@ -89,7 +89,7 @@ class JointDrive:
         return tuple(joints)
 
     def yield_at(self, yielding: Yielding, elapsed_s: float) -> Derivatives:
-        """Return by how much a joint yields `elapsed_s` after the start of the tick, and the derivatives."""
+        """Return a joint's yielding `elapsed_s` after the start of the tick, and its derivatives."""
         per_s = 1.0 / self.yield_time_s
         decay = exp(-elapsed_s * per_s)
         remainder = (yielding.start_rad + yielding.slope_rad_s * elapsed_s) * decay

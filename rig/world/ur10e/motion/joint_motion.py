@@ -244,7 +244,7 @@ class JointMotion:
         self._encoders.step()
 
     def _yield(self, standing: bool) -> tuple[Yielding, ...]:
-        """Return by how much the joints yield in the tick just simulated."""
+        """Return the yielding of the joints in the tick just simulated."""
         before, last, changes = self.smooth_qd_rad_s, self._ticks[-1].yielding, self._changes
         if standing and before is ZERO:
             changes.append(ZERO)

@@ -12,7 +12,7 @@ ZERO6 = (0.0,) * 6
 
 @dataclass(frozen=True, slots=True)
 class ArmLink:
-    """A link: rotation by joint angle plus `theta_rad` about z, offsets d along z, a along x, rotation alpha on x."""
+    """A link: rotation by joint angle plus `theta_rad` about z, offsets d on z and a on x, rotation alpha about x."""
 
     theta_rad: float
     a_m: float
