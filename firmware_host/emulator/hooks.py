@@ -46,7 +46,7 @@ class BlockTicks:
 
     @property
     def fields(self) -> tuple[int, int, int]:
-        """The last fields of a `Meter`."""
+        """The values of the last three fields of a `Meter`."""
         return self._first_address, self._halfwords, ctypes.addressof(self._ticks)
 
     def __getitem__(self, address: int) -> int:

@@ -62,7 +62,7 @@ class _RecordedPart:
 
 
 def so_far(runs: Sequence[RunData]) -> SoFar:
-    """Return the partial results of raw readings. The last one of a repeated sweep or dwell counts."""
+    """Return the partial results of raw readings. Of a repeated sweep or dwell the last one is used."""
     sweeps: dict[str, Attempts[int, Observation]] = {}
     rests: dict[str, list[Average]] = {}
     at_rest: Attempts[QuantityInDwell, ReadAtRest] = Attempts()

@@ -133,7 +133,7 @@ def verification_checks(sensor: str, verification: "Verification | None", limits
 def clock_checks(clocks: Sequence[ClockCheck]) -> tuple[Check, ...]:
     """Return the checks that a run's clocks agree within their stated and measured uncertainty.
 
-    For each pair, the recording with the largest difference counts.
+    For each pair, the recording with the largest difference is used.
     """
     means = Meaning("fitness", what=CLOCKS)
     return tuple(

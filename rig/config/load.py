@@ -153,7 +153,7 @@ def parse(
     sections: Sections = STOCK_SECTIONS,
     turners: Turners = None,
 ) -> Loaded:
-    """Validate the configuration in a text, which is not based on a file, as `load` does."""
+    """Validate the configuration in a text, as `load` does for a file; the text has no base file."""
     try:
         layered = merge_layers(text, None, overrides)
     except Unreadable as error:

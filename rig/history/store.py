@@ -44,7 +44,7 @@ class Selection:
 class Past:
     """A calibration of the history. `id` is its number, `run_id` the number of its run.
 
-    `voided` is the reason why it does not count, or None.
+    `voided` is the reason why it is void, or None.
     """
 
     id: int

@@ -121,7 +121,7 @@ def _slow_line_variance(readings: Array, turn: SampledTurn, slow: Array, change:
 def _line_variance(slow: Array, weights: Array, residuals: Array) -> Array:
     """Return the variance (3,) of a mean with weights (n,) due to slow columns (n, k) fitted to residuals (n, 3).
 
-    Only their amplitude counts, because with some phases even a large line hardly changes the mean.
+    Only their amplitude is used, because with some phases even a large line hardly changes the mean.
     """
     powers = (fit_columns(slow, residuals) ** 2).reshape(-1, 2, 3).sum(axis=1)
     kept = ((weights @ slow) ** 2).reshape(-1, 2).sum(axis=1)

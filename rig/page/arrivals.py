@@ -8,7 +8,7 @@ ARM, READINGS = "arm", "readings"
 class Arrivals:
     """The arrival of the newest state of the arm and of the newest readings, for any turner and sensor.
 
-    An event that repeats a state, or a number of samples, does not count.
+    An event that repeats a state, or a number of samples, is ignored.
     """
 
     def __init__(self) -> None:
@@ -37,7 +37,7 @@ class Arrivals:
         return {name: round(now_s - arrived_s, 1) for name, arrived_s in self._arrived_s.items()}
 
     def _take_state(self, q_rad: tuple[float, ...], time_s: float, now_s: float) -> bool:
-        """Note a state's arrival; a state without joints does not count."""
+        """Note a state's arrival; a state without joints is ignored."""
         if not q_rad or time_s == self._state_s:
             return False
         self._state_s = time_s

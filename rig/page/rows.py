@@ -86,7 +86,7 @@ def look_of(partial: SoFar) -> Look:
 
 
 def parameter_rows(result: ResultDocument) -> list[Row]:
-    """Return the rows of a run's result, kind by kind, with U, or without a budget twice the noise."""
+    """Return the rows of a run's result, kind by kind, with U; without a budget, with twice the noise."""
     return [_row(row) for row in shown(result)]
 
 

@@ -84,7 +84,7 @@ class Run:
         return self._write(outcome)
 
     def has_refused_sweeps(self, phase: Phase) -> bool:
-        """Return whether a phase has sweeps or dwells that do not count, which another run repeats."""
+        """Return whether a phase has refused sweeps or dwells, which another run repeats."""
         if phase.procedure.reads_corrected:
             return False
         plan = phase.plan()

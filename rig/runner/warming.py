@@ -34,7 +34,7 @@ KEEPS_AWAY_K = 2.0  # distance from the heater's own limit
 class Warming:
     """The supervision of a calibration over temperature.
 
-    - `names`: the sensors whose thermometers count.
+    - `names`: the sensors whose thermometers are used.
     - `heater`: the board with the heater, None if the operator changes the temperature.
     - `set_s`: the duration of a set, planned or the longest so far.
     """

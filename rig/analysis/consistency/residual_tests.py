@@ -136,8 +136,8 @@ def minimal_detectable_size(model_basis: Array, patterns: Array, alternatives: I
 
     Minimal detectable bias (Baarda 1968): under the fault a test's statistic is non-central χ². All arguments are
     whitened. `model_basis` (n, p): orthonormal columns of the model. `patterns` (n, k): readings per unit fault, one
-    column for each form in which it may occur; the worst counts. `alternatives`: the columns of each test, and its
-    critical value as a function of their number.
+    column for each form in which it may occur; the worst one is decisive. `alternatives`: the columns of each test, and
+    its critical value as a function of their number.
     """
     from scipy.special import chndtrinc
 

@@ -1,7 +1,7 @@
 """The errors of the arm's states in the segments of a recording: of their times and of their joint angles.
 
 A mean rate is a difference of two angles, so an error at the edge between two segments of a sweep increases one rate
-and decreases the next. The encoder noise of the turning joint counts as jitter of the times.
+and decreases the next. The encoder noise of the turning joint is part of the jitter of the times.
 """
 
 from collections.abc import Iterator

@@ -40,9 +40,9 @@ def noise_dof(solution: TriaxialSolution, equations: Equations) -> float:
 def budget_by_causes(matrix: Array, causes: Mapping[str, Array], noise_dof: float | None = None) -> Budget:
     """Return the budget by the contribution of each cause to a reference model's covariance (p, p), F (3, 3) first.
 
-    Degrees of freedom are infinite, also those of the noise unless `noise_dof` is given: a solution that integrates
-    over the likelihood of its variance components, or inflates by Student's t, has their uncertainty in u (JCGM 101,
-    6.4.9).
+    All degrees of freedom are infinite, except those of the noise if `noise_dof` is given. The u of a solution that
+    integrates over the likelihood of its variance components, or inflates by Student's t, includes the components'
+    uncertainty (JCGM 101, 6.4.9).
     """
     scale = scale_of(matrix)
     lines = []

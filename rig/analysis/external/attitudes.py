@@ -232,5 +232,5 @@ def _replace_parameters(solution: TriaxialSolution, laid: LaidDown) -> TriaxialS
 
 
 def _check_earth_rate(solution: TriaxialSolution) -> Fault | None:
-    """Return the Fault of an estimated reference that is not the Earth's rate, determined to a tenth, or None."""
+    """Return the Fault if the estimated reference is not the Earth's rate, or has a u above a tenth of it; else None."""
     return or_fault(partial(check_earth_seen, solution.reference, solution.covariance[REFERENCE, REFERENCE]))

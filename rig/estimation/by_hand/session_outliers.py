@@ -84,7 +84,7 @@ def _hypotheses(fit: GraphFit, since: int | None) -> Iterator[tuple[str, int]]:
 
 
 def _test_hypotheses(fit: GraphFit, since: int | None) -> list[FaultHypothesis]:
-    """Return each hypothesis with its decrease of χ², minus that of as many equations left out at random.
+    """Return each hypothesis with its decrease of χ², corrected for the number of columns.
 
     The fault's columns are made orthogonal to the model's, so the graph need not be solved for each hypothesis.
     """

@@ -42,7 +42,7 @@ def find_reset(
 
     A reference that is given a new origin rotates them, by all consecutive outliers together; after a single wrong
     attitude the next ones are as before. `aside` (N − 1,) is a mask of the increments between `fixes` that are
-    outliers; a `change` that the other increments show counts as well.
+    outliers; a `change` that the other increments show is considered too.
     """
     turned: tuple[float, float] | None = None
     if change is not None and change.what == "attitude" and np.linalg.norm(change.sizes) > LEAST_RESET_RAD:

@@ -123,8 +123,8 @@ class Unknown:
     - earth_rate: whether the Earth's rate is unknown.
     - earth_covariance_rad2_s2 (3, 3): in the base frame, None if it was not estimated.
     - clock_dof, state_jitter_dof, earth_dof: degrees of freedom of the estimated ones.
-    - clock_half_width: that of a clock with stated limits, else None.
-    - repeatability_rad: half-width of the return to an angle.
+    - clock_half_width: half-width of the error of a clock with stated limits, else None.
+    - repeatability_rad: half-width of the error of a joint that returns to an angle.
     - angle_std_rad: error of a joint's encoder at the ends of arcs.
     - mount_rad: half-width of a mounted item's tilt about each axis.
     """

@@ -74,7 +74,7 @@ class VectorInputs:
 
     @property
     def speeds_rad_s(self) -> tuple[float, ...]:
-        """The distinct speeds of the sweeps, slowest first; differences due to the arm's timing alone do not count."""
+        """The distinct speeds of the sweeps, slowest first; differences due to the arm's timing alone are ignored."""
         speeds = np.linalg.norm(self.turns_rad_s, axis=1)
         return distinct_speeds(speeds[speeds > 0])
 

@@ -2,8 +2,8 @@
 
 A recording is divided into blocks of a quarter of a second. A block is at rest if its readings scatter at most a few
 times as much as in the quietest tenth of all blocks, and if a gyroscope reads its bias: the most frequent reading of
-quiet blocks. A steady turn is as quiet as a rest, so the smallest of several nearly equally frequent readings counts.
-Adjacent blocks with equal readings form one rest, which a few missing readings do not end.
+quiet blocks. A steady turn is as quiet as a rest, so of several nearly equally frequent readings the smallest is taken
+as the bias. Adjacent blocks with equal readings form one rest, which a few missing readings do not end.
 
 A gyroscope decides alone: it measures every turn, and hardly a knock against the table. Without a gyroscope, a few
 readings due to a knock do not count.

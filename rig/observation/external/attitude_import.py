@@ -254,7 +254,7 @@ def _rows(time_s: Array, rate: Array, fixes: _ReferenceRows) -> Rows:
 def _find_complete(rows: _ReferenceRows, counts: NDArray[np.intp], expected: Array) -> NDArray[np.intp]:
     """Return the rows whose samples are complete.
 
-    Raise Fault `lost_samples` if no row is complete, or if most long rows lack samples. Short rows do not count,
+    Raise Fault `lost_samples` if no row is complete, or if most long rows lack samples. Short rows are not considered,
     because any gap may cover one.
     """
     whole = np.array([is_complete(*pair, least=1) for pair in zip(counts.tolist(), expected.tolist(), strict=True)])

@@ -197,7 +197,7 @@ def _find_time(
 ) -> int | None:
     """Return the index of the time column: by its name or unit, or else the first column that increases, or None.
 
-    A column with a time's name counts only if its values rise.
+    A column with a time's name is accepted only if its values rise.
     """
     rising = [index for index in times if _rises(columns[index])]
     for index in rising:

@@ -55,7 +55,7 @@ class Door:
     pass_to_look: str = field(default_factory=new_token)
 
     def may_act(self, headers: Mapping[str, str]) -> bool:
-        """Return whether a request has the token. A cookie does not count, because browsers send it unasked."""
+        """Return whether a request has the token. A cookie is not accepted, because browsers send it unasked."""
         scheme, _, token = headers.get("authorization", "").partition(" ")
         return scheme == "Bearer" and _are_equal(token, self.token)
 

@@ -1,8 +1,8 @@
 """The temperatures that a calibration over temperature still lacks. Pure.
 
-The sensors go from one end of the range to the other, and back if both directions are wanted. A set of sweeps counts at
-the mean of its temperatures. Neighbouring sets may be `max_step_k` apart, the outermost a quarter of that from the ends
-of the range.
+The sensors go from one end of the range to the other, and back if both directions are wanted. The temperature of a set
+of sweeps is the mean of its temperatures. Neighbouring sets may be at most `max_step_k` apart, and the outermost ones
+at most a quarter of that from the ends of the range.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence

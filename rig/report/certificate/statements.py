@@ -36,8 +36,8 @@ class StatedFacts:
 def folder_statements(folder: Path, overrides: Sequence[str] = ()) -> StatedFacts:
     """Return the statements in the configuration of a run folder, with `overrides` applied.
 
-    If the folder has no configuration, the overrides alone count. Raise Refused `unknown_setting` for an override of a
-    measured quantity, and the errors of `load`.
+    If the folder has no configuration, only the overrides are used. Raise Refused `unknown_setting` for an override of
+    a measured quantity, and the errors of `load`.
     """
     for override in overrides:
         section, _, key = override.partition("=")[0].strip().partition(".")

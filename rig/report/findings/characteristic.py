@@ -35,7 +35,7 @@ class Units:
 
 @dataclass(frozen=True, slots=True)
 class Series:
-    """A characteristic's names in a history: `prefix` and label; `words` describe them, with the label in the text.
+    """A characteristic's names in a history, `prefix` + label for each number, and the `words` that describe them.
 
     `drawn`: whether the history draws it. `opposite`: whether its sign there is opposite to that in certificates.
     """

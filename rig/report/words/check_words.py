@@ -40,7 +40,7 @@ def words_of(check: CheckEntry) -> CheckWords | None:
 def words_of_name(name: str) -> CheckWords | None:
     """Return the words of a check by its name, with or without sensor, quantity and sweep; None for another name.
 
-    A sensor may have the name of a check, so the last part that names a check counts.
+    A sensor may have the name of a check, so the last part that names a check is decisive.
     """
     prefixes = ["", *(f"{quantity}_" for quantity in _quantities())]
     candidates = (part.removeprefix(prefix) for part in reversed(name.split(".")) for prefix in prefixes)

@@ -1,6 +1,6 @@
 """The uncertainty budget in print, for one axis, with lines that add up to U.
 
-Terminal and certificate print the same budget; all six are in `result.json`.
+Terminal and certificate print the same budget; `result.json` has the budgets of all six values.
 """
 
 import math

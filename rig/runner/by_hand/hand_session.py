@@ -59,7 +59,7 @@ class HandSession:
     """A session of `settings`, judged by the sensor `name`.
 
     - `conditions`: the other inputs of the solution.
-    - `earlier`: the recordings before an interruption; their rests and moves count.
+    - `earlier`: the recordings before an interruption; their rests and moves are included.
     - `wait`: waits a number of seconds between two checks of the samples.
     """
 

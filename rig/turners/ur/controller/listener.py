@@ -1,4 +1,4 @@
-"""The process of this machine that listens at an address: a simulated controller, which shares the processors."""
+"""The search for the process of this machine that listens at an address, as a simulated controller does."""
 
 import socket
 from collections.abc import Iterator
