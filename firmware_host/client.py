@@ -86,8 +86,7 @@ class Board:
     def configure(self, sensor: int, rate_hz: float, range_deg_s: float, range_g: float = 0.0) -> SensorSetup:
         """Set a gyroscope to the nearest data rate and the next range up.
 
-        With a `range_g` other than 0, accelerations are sent too, in the next range up, unless the stream is
-        calibrated.
+        With `range_g` other than 0, accelerations are sent too, in the next range up, unless the stream is calibrated.
         """
         return self._configure(sensor, rate_hz, range_deg_s=range_deg_s, range_g=range_g)
 
@@ -180,8 +179,7 @@ class Board:
     def check(self, clock_s: float | None = None) -> None:
         """Raise errors since the last call: the board's own error, or board_link_lost (closed, or silent in a stream).
 
-        `clock_s` is the present time of another instrument's clock, if any: a silence must be as long on that clock
-        too.
+        `clock_s`: the present time of another instrument's clock, if any: a silence must be as long on that clock too.
         """
         if self._link.fault is not None:
             raise self._link.fault
@@ -253,6 +251,7 @@ class Board:
         )
 
     def _ask(self, name: str, values: dict[str, Any] | None = None, timeout_s: float | None = None) -> Frame:
+        """Return the board's answer to a request; raise its refusal as BoardError."""
         answer = self._link.ask(name, values, timeout_s or self._timeout_s)
         if answer.name == "error":
             refusal = self._refusal(answer)

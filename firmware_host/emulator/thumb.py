@@ -36,6 +36,7 @@ def word_accesses(code: bytes, address: int) -> Iterator[tuple[int, int]]:
 
 
 def _base(instruction: int) -> int | None:
+    """Return the base register of an LDM, STM, LDRD, STRD or floating-point load or store; else None."""
     if instruction <= 0xFFFF:
         return instruction >> 8 & 7 if instruction >> 12 == 0b1100 else None  # LDM, STM
     first = instruction >> 16

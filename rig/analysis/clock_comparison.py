@@ -29,8 +29,8 @@ SHORT = {BY_COMPUTER: "computer", BY_CRYSTAL: "crystal"}
 class ClockComparison:
     """The relative error of the controller's clock according to another clock, and its standard uncertainty.
 
-    `half_width`: of the other clock's error, as stated; `noise_std`: uncertainty by the recording, with `dof` degrees
-    of freedom.
+    `half_width`: of the other clock's stated error; `noise_std`: uncertainty by the recording, with `dof` degrees of
+    freedom.
     """
 
     by: str

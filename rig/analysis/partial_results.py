@@ -97,6 +97,7 @@ def _solve_gyroscope(sweeps: Attempts[int, Observation], rests: Sequence[Average
 
 
 def _observe(run: RunData, name: str, motion: ArmMotion) -> _RecordedPart:
+    """Return the sensor's sweeps, dwells and rests so far, with the faults of those that cannot be used."""
     sensor = run.sensors[name]
     try:
         stream = synchronize_stream(run.samples[name], sensor, motion)
@@ -108,6 +109,7 @@ def _observe(run: RunData, name: str, motion: ArmMotion) -> _RecordedPart:
 
 
 def _accelerations(run: RunData, recorded: Mapping[str, _RecordedPart]) -> Attempts[QuantityInDwell, ReadAtRest]:
+    """Return the mean acceleration in each dwell of each sensor, or the Fault of the dwell."""
     gravity_m_s2 = run.settings.site.gravity_m_s2
     results, faults = dict[QuantityInDwell, ReadAtRest](), dict[QuantityInDwell, Fault]()
     for name, sensor in recorded.items():

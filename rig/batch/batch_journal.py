@@ -100,6 +100,7 @@ def _entries(text: bytes) -> Iterator[Entry]:
 
 
 def _append(path: Path, entry: Entry) -> None:
+    """Append the entry as a line of JSON, and wait until it is on the disk."""
     line = json.dumps({"entry": _NAMES[type(entry)], **asdict(entry)}, ensure_ascii=False) + "\n"
     try:
         with os.fdopen(open_to_append(path), "ab") as file:

@@ -107,6 +107,7 @@ class Work:
         return None
 
     def _carry_out(self, part: BatchPart) -> None:
+        """Measure the part, again after each error if the operator agrees; raise a Fault if no operator attends."""
         while True:
             try:
                 if not self.operator.is_mounted(part):

@@ -37,8 +37,7 @@ def store_calibrations(
 ) -> Iterator[tuple[str, StoredCalibration]]:
     """Store the solution of every sensor to calibrate on the board; yield its name and its record.
 
-    Raise BoardError if the board refuses, or `not_stored` if another record is read back; Refused as `find_sensor`
-    does.
+    Raise BoardError if the board refuses, or `not_stored` if another record is read back; Refused as `find_sensor`.
     """
     if not config.on_board:
         return

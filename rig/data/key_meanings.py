@@ -21,8 +21,7 @@ def meanings() -> Mapping[str, str]:
 def meaning_of(entry: str, key: str) -> str:
     """Return the meaning of a key in an entry, named without its ending `Entry`.
 
-    Names of standard uncertainties and degrees of freedom state their meaning. Raise KeyError for another key without
-    one.
+    Names of standard uncertainties and degrees of freedom state their meaning. Raise KeyError for an unknown key.
     """
     table = meanings()
     if (meaning := table.get(f"{entry}.{key}", table.get(key))) is not None:

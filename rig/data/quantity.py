@@ -117,8 +117,7 @@ class Quantity:
 class Scalar:
     """One quantity without axes, which is recorded, shown and exported, and never calibrated.
 
-    `sensor` is the kind of sensor, `unit` the unit of its values, `suffix` that unit in names, `reading` the unit on a
-    screen.
+    `sensor`: the kind of sensor; `unit`: the unit of its values; `suffix`: that unit in names; `reading`: on a screen.
     """
 
     name: str

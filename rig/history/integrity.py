@@ -96,6 +96,7 @@ def _files_by_folder(history: History) -> Mapping[str, set[tuple[str, str]]]:
 def _files(
     run: Kept, folder: Path | None, this_computer: str, entered: Mapping[str, set[tuple[str, str]]]
 ) -> Iterator[EntryState]:
+    """Yield the state of each recording and document of the run."""
     if not run.recordings and not run.documents:
         return
     if folder is None:

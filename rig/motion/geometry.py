@@ -221,7 +221,7 @@ def flange_axes(q_rad: ArrayLike, arm: DenavitHartenberg = NOMINAL) -> Array:
 def flange_arm(q_rad: ArrayLike, joint: int, arm: DenavitHartenberg = NOMINAL) -> Array:
     """Return the lever arm (…, 3), m, from a joint's axis to the flange's origin, in the flange's frame.
 
-    The joint angles are `q_rad` (…, n). The lever arm begins at the joint's origin, so its part along the axis is
+    The joint angles are `q_rad` (…, n). The lever arm begins at the joint's origin; its part along the axis is
     arbitrary.
     """
     frames = _frames(q_rad, arm)

@@ -151,8 +151,7 @@ class Stage:
 class Plan:
     """All steps in order. `home_q_rad`: the pose at the plan's end; `start_q_rad`: the expected pose at its start.
 
-    Without `stages` the item's mounting does not change; otherwise it is remounted for each stage, with the arm at
-    home.
+    Without `stages` the item's mounting does not change; else it is remounted for each stage, with the arm at home.
     """
 
     steps: tuple[Step, ...]

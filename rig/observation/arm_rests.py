@@ -24,7 +24,7 @@ def average_rests(
 ) -> tuple[Average, ...]:
     """Average all sufficiently long rests of the arm, except those next to a step in `superseded`.
 
-    The means are corrected for the resting arm's oscillation: `response` (3, 3) converts it from the encoders to
+    The means are corrected for the resting arm's oscillation, which `response` (3, 3) converts from encoders to
     readings.
     """
     rests = (_average_rest(stream, motion, window, response) for window in iterate_rests(run, superseded))

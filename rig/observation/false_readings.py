@@ -67,7 +67,7 @@ def check_temperatures(temperature_c: Array, rows: NDArray[np.intp], where: str)
 def check_unwrapped(time_s: Array, readings: Array, rows: NDArray[np.intp], quantity: Quantity, where: str) -> None:
     """Raise Refused `readings_overflow` if an axis of readings (n, 3) jumps from one end of its span to the other.
 
-    A number of too few bits overflows, a signed one of 16 bits after 32767. Arguments as in `check_possible`; times
+    A number of too few bits overflows, a signed one of 16 bits after 32767. Arguments: see `check_possible`; times
     (n,).
     """
     if quantity not in NARROWEST or len(readings) < 2:

@@ -37,7 +37,7 @@ def find_dwelling_companion(run: RunData, name: str, sensors: Iterable[str]) -> 
 def field_readings(recording: ObservedRun, name: str, thresholds: ObservationThresholds) -> tuple[StaticReading, ...]:
     """Average a magnetometer's readings in the dwells in which an accelerometer on its clock was read.
 
-    The gyroscope's time base serves both, because a delay does not affect a mean at rest. Raise Fault `lost_samples` or
+    The gyroscope's time base serves both: a delay does not affect a mean at rest. Raise Fault `lost_samples`,
     `saturation`.
     """
     other = find_companion(recording, name)

@@ -104,6 +104,7 @@ def another_script(what: str) -> Refused:
 
 
 def _execute(path: Path, name: str, text: str) -> ScriptFile:
+    """Execute the script as a module that cannot be imported, and return its PROCEDURE."""
     # Not in `sys.path`: only the script's text is kept in the run folder, so it cannot import adjacent files.
     spec = ModuleSpec("rig_script", None, origin=str(path))
     module = module_from_spec(spec)

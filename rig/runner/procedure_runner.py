@@ -77,8 +77,7 @@ SAME_POSE_RAD = radians(1)  # largest difference to the pose for which the opera
 class Devices:
     """The connected devices.
 
-    - `turner`: turns the sensors; `kind`: its kind; `section`: its configuration; `report`: its state when it was
-      connected.
+    - `turner`: turns the sensors; `kind`: its kind; `section`: its configuration; `report`: its state when connected.
     - `sources`: deliver the samples.
     - `mounted`: the sensors with their earlier calibrations.
     """

@@ -29,8 +29,7 @@ class Station(Protocol):
 class Stations:
     """A station of several listeners and one answer; if not `attended`, everything is agreed to in advance.
 
-    `mount` mounts the item for a stage after agreement, in a simulated laboratory. `confirm` confirms the part of a
-    batch.
+    `mount` mounts the item for a stage after agreement, in a simulated laboratory. `confirm` confirms a batch's part.
     """
 
     listeners: Sequence[Listener]

@@ -57,8 +57,7 @@ class TurnerKind(Generic[SectionT, ReportT]):
     - section: the model of the section `turner:`.
     - connect: returns a context manager of the turner, which is stopped at its end. The function passed gets every
       state, in order; the file takes the output of a maker's client. Raise Refused if no turner answers.
-    - look: reads the turner's report about itself; nothing moves and no program is stopped. Raise Refused as
-      `connect`.
+    - look: reads the turner's report about itself; nothing moves, no program is stopped. Raise Refused as `connect`.
     - stance: describes its pose in a line of text.
     - problems: lists all reasons not to execute the last of the plans, before anything moves; without a report, only
       those due to the plans. Pure.

@@ -175,6 +175,7 @@ class ControlSession:
         return b"".join(self._answer(bytes(line)) for line in lines if line.strip())
 
     def _answer(self, line: bytes) -> bytes:
+        """Carry out one request, a line of JSON, and return the line that answers it."""
         try:
             request = json.loads(line)
             name = request.pop("do")

@@ -65,6 +65,7 @@ class FlightRecorder:
         self._write(f"a step is {late_s:.2f} s late; waited for: {self._waits_for()}", stacks=True)
 
     def _account(self, late_s: float) -> None:
+        """Write how much of the delay the process ran, waited for a processor, or did neither."""
         ran_s, starved_s = read_processor_times()
         ran_s, starved_s = ran_s - self._ran_s, starved_s - self._starved_s
         other_s = max(0.0, late_s - ran_s - starved_s)

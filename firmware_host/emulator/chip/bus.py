@@ -128,6 +128,7 @@ class RegisterBus:
         register(value)
 
     def _refusal(self, verb: str, offset: int, size: int, value: int | None = None) -> Violation:
+        """Return why the access is not allowed: the register is not modelled, lacks this access, or has no clock."""
         written = "" if value is None else f" of 0x{value:X}"
         entry = self._modelled.get(_key(offset, size))
         if entry is None:

@@ -155,6 +155,7 @@ class Rcc:
                 self._on_gate(peripheral, bool(self._enabled[offset].value >> bit & 1))
 
     def _retune(self) -> None:
+        """Set the clocks of the core and the buses from the registers."""
         core_hz = self._source_hz()
         ahb = self._configuration.value >> 4 & 0xF
         core_hz >>= 0 if ahb < 8 else (1, 2, 3, 4, 6, 7, 8, 9)[ahb - 8]
@@ -174,6 +175,7 @@ class Rcc:
         return 1000 * _MSI_KHZ[(control & _MSIRANGE) >> 4] if control & _MSIRGSEL else 4_000_000
 
     def _source_hz(self) -> int:
+        """Return the frequency of the selected clock before the AHB prescaler."""
         control, pll = self._control.value, self._pll.value
         source = self._configuration.value & 3
         if source == 0 and control & _MSION:

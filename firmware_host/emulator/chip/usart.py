@@ -1,6 +1,4 @@
-"""USART2 (RM0394, chapter 38): eight data bits, no parity, one stop bit, with the duration of every byte on the
-wire.
-"""
+"""USART2 (RM0394, chapter 38): eight data bits, no parity, one stop bit, with each byte's duration on the wire."""
 
 from collections import deque
 from collections.abc import Callable, Sequence

@@ -24,8 +24,7 @@ if TYPE_CHECKING:
 class DetectionLimit:
     """The `size` of a fault, in `unit`, that its check detects in 95 of 100 recordings, or infinity.
 
-    `off_by_expanded`: the largest error of scale factor or bias by a fault just below `size`, in units of the U then
-    stated.
+    `off_by_expanded`: the largest error of scale factor or bias by a fault just below `size`, in units of the stated U.
     """
 
     what: str

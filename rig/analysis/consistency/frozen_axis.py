@@ -16,8 +16,7 @@ MOVED_STEPS, MOVED_RAD_S = 10.0, 0.02  # the least change of the rate about the 
 def find_longest_frozen(recording: ObservedRun, name: str) -> int:
     """Return the longest run of equal readings of a gyroscope's axis while the true rate changed.
 
-    The nominal mounting is accurate enough: a tilted axis, or a wrong scale factor, alters a change of rate by a small
-    fraction.
+    The nominal mounting is accurate enough: a tilted axis or a wrong scale factor hardly alters a change of rate.
     """
     stream = recording.stream(name)
     counts = stream.sensor.channel(RATE).counts(stream.raw)

@@ -226,8 +226,7 @@ def _angle_patterns(segments: Segments, known_errors: KnownErrors) -> Array:
 def _encoder_patterns(segments: Segments, encoder_rad: float) -> Array:
     """Return the patterns of encoder errors at each angle where arcs begin or end.
 
-    Angles closer together than a quarter of an arc count as one encoder mark, because a sweep back passes the same
-    marks.
+    Angles closer than a quarter of an arc are one encoder mark, because a sweep back passes the same marks.
     """
     marks: list[tuple[int, float]] = []
     patterns_by_mark: list[Array] = []

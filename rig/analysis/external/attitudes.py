@@ -219,6 +219,7 @@ def _solve(equations: Equations, method: Method, placements: Placements) -> Tria
 
 
 def _replace_parameters(solution: TriaxialSolution, laid: LaidDown) -> TriaxialSolution:
+    """Return the solution with the parameters, covariance and attitude error of the fit with placement errors."""
     theta = laid.theta
     return replace(
         solution,
@@ -232,5 +233,5 @@ def _replace_parameters(solution: TriaxialSolution, laid: LaidDown) -> TriaxialS
 
 
 def _check_earth_rate(solution: TriaxialSolution) -> Fault | None:
-    """Return the Fault if the estimated reference is not the Earth's rate, or has a u above a tenth of it; else None."""
+    """Return the Fault if the estimated reference is not the Earth's rate or its u exceeds a tenth of it; else None."""
     return or_fault(partial(check_earth_seen, solution.reference, solution.covariance[REFERENCE, REFERENCE]))

@@ -79,8 +79,7 @@ def _estimate_mounts(recordings: Sequence[ObservedRun], settings: RunSettings) -
 def _rotation_in_stage(fit: Explained, index: int) -> tuple[Array, Array]:
     """Return the item's rotation (3,) in a stage relative to the first, and its standard deviations.
 
-    Both are in units of the stated standard deviation. A rotation of the item rotates all sensed rates in the opposite
-    direction.
+    Both are in units of the stated standard deviation. A rotation of the item rotates all sensed rates oppositely.
     """
     size = len(fit.mounts)
     pick = np.zeros((3, size))

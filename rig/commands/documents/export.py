@@ -100,8 +100,8 @@ def _read_recordings(run: Path, columns: Path | None) -> "Sequence[RunData]":
 def _make_folder(folder: Path, *, named_by_user: bool) -> None:
     """Make the folder unless a link leads out of it.
 
-    Raise Refused and OSError. Links among its contents are refused. The folder itself may be a link only if the user
-    named it.
+    Raise Refused and OSError. Links among its contents are refused. The folder itself may be a link if the user named
+    it.
     """
     from rig.data.run_folder import refuse_links
 

@@ -20,8 +20,7 @@ NOT_HERE = ("missing_extra", "another_script", "no_script", "not_a_script", "scr
 class Task:
     """Recordings to solve again, with the program's version, estimator (None: the procedure's own) and settings.
 
-    `key` names the result to compare with; `places` are pairs of computer and folder; `recordings` are those in the
-    history.
+    `key` names the result to compare with; `places` are pairs of computer and folder; `recordings`: the entered ones.
     """
 
     key: str

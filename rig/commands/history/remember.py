@@ -48,6 +48,7 @@ def remember_own(folder: Path, named: str | None) -> tuple[RunEvent | None, tupl
 def _enter_run(
     folder: Path, choose_address: Callable[[], "HistoryAddress | None"]
 ) -> tuple[RunEvent | None, tuple[CalibrationComparison, ...]]:
+    """Enter a finished run into the history; return the event and the comparisons. No error is raised."""
     label = "the history"
     try:
         from rig.history.entered.finished_run import read_finished_run

@@ -65,6 +65,7 @@ def claim_sensor(name: str, port: str) -> AbstractContextManager[None]:
 
 @contextmanager
 def _claim(name: str, device: str, description: str) -> Iterator[None]:
+    """Claim the device for this process on Linux; raise Refused if another process has claimed it."""
     if sys.platform != "linux":
         yield
         return

@@ -21,8 +21,8 @@ CONTROL_TIMEOUT_S = 30.0
 def run_simulated_laboratory(config_text: str, late: Path | None = None, truth: Path | None = None) -> Iterator[str]:
     """Run the world of a configuration text during the block; yield the address of its control channel.
 
-    The world writes the causes of late steps to the file `late`, or if None to stderr, and the truth on request to the
-    file `truth`.
+    The world writes the causes of late steps to the file `late`, or if None to stderr, and the truth on request to
+    `truth`.
 
     The world ends when its standard input closes, so it cannot outlive this process. Raise Refused: `only_on_linux`,
     the world's own refusal, or `world_not_ready` if it ends without one.
@@ -61,8 +61,7 @@ def run_simulated_laboratory(config_text: str, late: Path | None = None, truth: 
 def make_mounter(control: str) -> Callable[[int], None]:
     """Return the function with which the simulated operator mounts the item for a stage, counted from 0.
 
-    `control` is the laboratory's control channel. The function raises OSError or ValueError if the laboratory has
-    ended.
+    `control`: the laboratory's control channel. The function raises OSError or ValueError if the laboratory has ended.
     """
 
     def mount(stage: int) -> None:

@@ -40,8 +40,7 @@ def carry_out(
 ) -> int:
     """Carry out the phases in a run folder, or continue them; also on a `page` if requested.
 
-    Return 0 if passed, 1 if failed. `moved` are serial numbers of sensors that are declared to be on another board than
-    before.
+    Return 0 if passed, 1 if failed. `moved` are serial numbers of sensors that are declared to have changed boards.
     """
     with serve_operators_page(page, folder, lambda: _describe_run(folder, configured, page)) as page_of_run:
         # In a laboratory that this process simulates no person can be hurt, so no operator is asked.

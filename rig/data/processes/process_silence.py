@@ -39,8 +39,8 @@ class Silence:
     def tick(self, unheard: bool = False) -> None:
         """Count one more interval without a sign of life.
 
-        Call this at even intervals. `unheard`: whether an answer has arrived that was not read yet, so the process was
-        not silent.
+        Call this at even intervals. `unheard`: whether an answer has arrived that is still unread: the process was not
+        silent.
         """
         self._all_ticks += 1
         # The first tick of a silence means nothing yet; from the second on the process' threads are examined.
@@ -64,8 +64,8 @@ class Silence:
     def _is_starved(self, has_previous: bool) -> bool:
         """Return whether the process waited for a processor since the last call; False at the first call.
 
-        The system's waiting time excludes a thread that is still waiting, so a ready thread that has not run counts
-        too.
+        The system's waiting time excludes a thread that is still waiting, so a ready thread that has not run is
+        included.
         """
         now_s = time.monotonic()
         elapsed_s, before = now_s - self._looked_s, self._times
@@ -79,6 +79,7 @@ class Silence:
 
 
 def _times(tasks: Path) -> _Times:
+    """Return how long each thread ran and waited for a processor, s; empty if the system does not say."""
     times: _Times = {}
     try:
         for task in tasks.iterdir():

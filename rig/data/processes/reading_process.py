@@ -99,6 +99,7 @@ def stored_bytes(path: Path) -> int:
 
 
 def _file_size_on_disk(path: Path, name: str = "it") -> int:
+    """Return the stored bytes without holes; raise UnfitFile if the file is too large for them."""
     try:
         with open_regular_file(path, RECORDING_MAX_BYTES) as file:
             size, stored = os.fstat(file.fileno()).st_size, size_without_holes(file)

@@ -56,7 +56,7 @@ class Channel:
     def steps(self, readings: Array, *, trusts_counts: bool = False) -> Steps:
         """Return the resolution steps of readings (n, 3): as stated, or larger if the readings show larger steps.
 
-        `trusts_counts`: whether the recorded numbers are the converter's own counts, so readings are not searched for
+        `trusts_counts`: whether the recorded numbers are the converter's counts, so readings are not searched for
         steps.
         """
         if self.step is not None:

@@ -12,7 +12,7 @@ import numpy as np
 from rig.estimation.arrays import Array
 
 FREE_PER_RAD_S = 1.0  # prior far above any sensor's nonlinearity, so that only the sweeps determine it
-CUBE_MISSED, SQUARE_MISSED = 0.25, 0.5
+CUBE_MISSED, SQUARE_MISSED = 0.25, 0.5  # largest distance of x³ and x² from their best line for |x| ≤ 1
 DISTINCT = 1.05  # ratio from which on two speeds count as different
 
 

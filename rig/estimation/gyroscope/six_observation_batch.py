@@ -26,8 +26,7 @@ class BatchSolution:
 def newton_batch(means_rad_s: ArrayLike, speeds_rad_s: ArrayLike) -> BatchSolution:
     """Solve every run by the closed form, followed by Newton steps on γ if speeds differ, as `solve_by_newton` does.
 
-    The linear solution β = p − γ q depends on the unknown γ = Σ k² b². `means_rad_s` (R, N, 3); `speeds_rad_s` (N,) or
-    (R, N).
+    The linear solution β = p − γ q depends on the unknown γ = Σ k² b². Means (R, N, 3); speeds (N,) or (R, N).
     """
     means = np.asarray(means_rad_s, dtype=np.float64)
     centre = means.mean(axis=1)

@@ -58,7 +58,7 @@ class Sweeps:
 
     - `harmonics_m_s2` (M, 3, 3): mean, cosine and sine over the joint's angle (rows) of the axes x y z.
     - `covariances_m2_s4` (M, 9, 9): of these nine, row by row, by `rig.estimation.reference.sweep_harmonics`.
-    - `axes_flange` (M, 3): unit vector of a rotation with increasing angle; `speeds_rad_s` (M,): negative if the angle
+    - `axes_flange` (M, 3): unit vector of a rotation with increasing angle; `speeds_rad_s` (M,): negative if it
       decreases.
     - `attitudes` (M, 3, 3): flange to base at the angle zero.
     - `arms_m` (M, 3): p, from the axis to the flange's origin, in flange coordinates.

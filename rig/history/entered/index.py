@@ -60,6 +60,7 @@ def unlike(document: ResultDocument, recomputed: Sequence[HistoryRecord]) -> Ite
 
 
 def _differences(stated: HistoryRecord, recomputed: HistoryRecord) -> Iterator[str]:
+    """Yield the properties and parameters in which the two records differ."""
     for name in ("part", "serial_number", "estimator"):
         if getattr(stated, name) != getattr(recomputed, name):
             yield f"{name} of {stated.sensor}: {getattr(recomputed, name)}, stated {getattr(stated, name)}"

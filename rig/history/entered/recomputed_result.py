@@ -65,6 +65,7 @@ def _numbers_of(document: ResultDocument) -> dict[str, object]:
 
 
 def _differences(claimed: object, recomputed: object, where: str, scale: float = 0.0) -> Iterator[str]:
+    """Yield the paths at which the claimed document differs from the recomputed one by more than rounding."""
     if isinstance(claimed, Mapping) and isinstance(recomputed, Mapping):
         for name, item in claimed.items():
             if name not in recomputed:

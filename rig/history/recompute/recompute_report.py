@@ -170,6 +170,7 @@ def _most_moved(compared: Compared, past: Past | None) -> ParameterMove | None:
 
 
 def _rows(compared: Compared) -> Iterator[dict[str, Any]]:
+    """Yield a row for each calibration of the run, or one row if it has none."""
     answer = compared.answer
     columns: dict[str, Any] = {
         "run": compared.stated.run_id,

@@ -57,8 +57,7 @@ def share_engine(file: Path, label: str) -> Iterator[Engine]:
 def sqlite_engine(file: Path, label: str, *, new: bool = False) -> Engine:
     """Return an engine of a history's file, or of a `new` one.
 
-    Each use of a connection raises Refused `history_gone` or `history_exchanged` if the file is missing or has been
-    replaced.
+    Each use of a connection raises Refused `history_gone` or `history_exchanged` if the file is missing or replaced.
     """
     may_write = new or (os.access(file, os.W_OK) and os.access(file.parent, os.W_OK))
     identity = file_identity(file)
@@ -101,7 +100,7 @@ def _connect_to_write(file: Path, *, new: bool) -> sqlite3.Connection:
 def _connect_to_read(file: Path) -> sqlite3.Connection:
     """Open a file for reading only, in a folder in which the user cannot create files.
 
-    A writer would keep a log in that folder. Without a log the file does not change while it is read, so no lock is
+    A writer would keep a log in that folder. Without a log the file does not change while it is read; no lock is
     needed.
     """
     log = file.with_name(f"{file.name}-wal")

@@ -22,8 +22,7 @@ class RawReadings:
 
     - sweep: index among the sensor's revolutions, −1 for a rest.
     - counts (n, 3): the readings as recorded.
-    - residual_counts (m, 3): readings minus the mean of their segment and the vibration, for samples with recorded
-      motion.
+    - residual_counts (m, 3): readings minus their segment's mean and the vibration, for samples with recorded motion.
     - vibration_counts (3,): RMS of the arm's vibration.
     - swing_rad2 (3,): mean square difference of the vibration's angle between two times in a rest.
     """

@@ -117,8 +117,7 @@ def read_attitudes(
 def _drop_other_rows(path: Path, table: CsvTable) -> dict[str, Array]:
     """Return the rows that hold a quaternion.
 
-    Loggers with several rates leave the quaternion blank in the other rows. Raise Refused `not_a_number` for any other
-    blank cell.
+    Loggers with several rates leave the quaternion blank in other rows. Raise Refused `not_a_number` for other blanks.
     """
     kept = ~np.isnan([table.columns[name] for name in QUATERNION]).all(axis=0)
     for name, column in table.columns.items():

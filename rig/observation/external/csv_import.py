@@ -67,7 +67,7 @@ class ExternalData:
 
     - `at_reference`: whether readings are corrected to one temperature by polynomials that include contradictions of
       repeats.
-    - `by_mean`: numbers of the rows with an angle that are solved by their mean speed, because the body moved before or
+    - `by_mean`: numbers of the rows with an angle that are solved by mean speed, because the body moved before or
       after.
     - `omitted`: rows left out for missing readings, and the readings missing in the others.
     - `change`: an abrupt change of the gyroscope that the rows show.

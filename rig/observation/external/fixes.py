@@ -188,6 +188,7 @@ def _find_unknown_steps(turning: Turning) -> Iterator[tuple[str, NDArray[np.intp
 
 
 def _all_lost(count: int, total: int, left_out: tuple[LeftOut, ...]) -> Fault:
+    """Return the Fault of too few increments, which names the commonest cause."""
     if not left_out:
         return _too_few(f"{count} increments between attitudes are left")
     most = max(left_out, key=lambda cause: cause.count)

@@ -64,8 +64,7 @@ class TableMotion:
 def check_rates_agree(middles_s: Array, attitudes: Array, rates_rad_s: Array) -> None:
     """Raise Fault `wrong_unit` if a table's rates (N, 3) differ by a factor from those of its attitudes (N, 3, 3).
 
-    Rows are valid for their middles (N,). If the readings have the same wrong unit, a solution by rates alone does not
-    show it.
+    Rows are valid for their middles (N,). A solution by rates alone does not show the same wrong unit in the readings.
     """
     order = np.argsort(middles_s)
     time_s, rates = middles_s[order], rates_rad_s[order]

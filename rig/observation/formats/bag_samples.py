@@ -163,7 +163,7 @@ def _list_topics(reader: Any, types: Sequence[str]) -> list[tuple[str, str]]:
 def _read_messages(reader: Any, connections: Any) -> Iterator[tuple[float, Any]]:
     """Yield each message with the time in its header, in seconds from the beginning of the bag.
 
-    All topics share one beginning. A float of the seconds since 1970 would lose the microseconds. Raise Refused
+    All topics share one beginning. A float of seconds since 1970 would lose the microseconds. Raise Refused
     `bag_topic`.
     """
     from rosbags.typesys import Stores, get_typestore

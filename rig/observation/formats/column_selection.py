@@ -103,6 +103,7 @@ def select_columns(
 
 
 def _select_mapped(path: Path, headings: Sequence[str], width: int, header: Header, mapped: Mapped) -> dict[int, str]:
+    """Return the name of each column by its index, as the column map says."""
     indices = {name: _find_column(path, headings, width, name, column) for name, (column, _) in mapped.columns.items()}
     if len(set(indices.values())) < len(indices):
         names = [name for name, index in indices.items() if [*indices.values()].count(index) > 1]

@@ -110,6 +110,7 @@ def _read_classic(path: Path, objects: list[str]) -> Iterator[tuple[str, Array]]
 
 
 def _find_matrices(name: str, value: Any, objects: list[str], depth: int = 0) -> Iterator[tuple[str, Array]]:
+    """Yield the numeric matrices in a variable by name; add the names of unreadable objects to `objects`."""
     fields = value.dtype.names if isinstance(value, np.ndarray) else None
     if fields is None:
         if isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and value.ndim == 2 and value.size > 1:
@@ -130,6 +131,7 @@ def _read_hdf5(path: Path, objects: list[str]) -> Iterator[tuple[str, Array]]:
 
 
 def _walk_group(group: Any, prefix: str, objects: list[str], depth: int = 0) -> Iterator[tuple[str, Array]]:
+    """Yield the numeric matrices in an HDF5 group by name; add the names of unreadable objects to `objects`."""
     import h5py
 
     for name in group:

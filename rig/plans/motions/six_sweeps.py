@@ -126,8 +126,7 @@ def _order_sweeps(arm: ArmSection, procedure: SixSweepsSection) -> tuple[Sweep, 
 def _stations(home: Joints, procedure: SixSweepsSection, order: Sequence[str]) -> tuple[SweepPose, ...]:
     """Return the sweep poses in the order of the wrists.
 
-    Wrist 1 has further poses, with the other wrists turned: wrist 2 by 45°, so that the flange moves away from the
-    forearm.
+    Wrist 1 has further poses with the other wrists turned: wrist 2 by 45°, to move the flange away from the forearm.
     """
     tilt_rad = math.radians(-45 if math.sin(home[WRIST_2]) > 0 else 45)
     offsets = ((tilt_rad, 0.0), (tilt_rad, math.pi / 2), (0.0, math.pi / 4)) if procedure.axes == 6 else ()

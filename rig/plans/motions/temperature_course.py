@@ -74,6 +74,7 @@ class TemperatureCourse:
         return next(self._missing(directions), None)
 
     def _missing(self, directions: Iterable[tuple[bool | None, str]]) -> Iterator[str]:
+        """Yield a sentence for each direction without sets of sweeps, and for each gap in temperature."""
         for direction, words in directions:
             sets = self._sets_in(direction)
             if not sets:

@@ -1,7 +1,6 @@
 """A calibration's biases at another temperature, by the slopes of a run of `bias_drift`. Pure.
 
-A slope is valid only in the range in which it was measured: the calibration's temperature and the requested one must be
-inside.
+A slope is valid only in its measured range: the calibration's temperature and the requested one must be inside.
 """
 
 from dataclasses import replace

@@ -63,8 +63,7 @@ class Parameter:
 class HistoryRecord:
     """The parameters of one sensor's result in a run, under the name of a `quantity`.
 
-    `full_scale` is in the unit of its biases, 0 if the result does not state it. Characteristics join the `parameters`
-    of the kind.
+    `full_scale`: in the unit of its biases, 0 if the result does not state it. Characteristics join `parameters`.
     """
 
     sensor: str

@@ -55,6 +55,7 @@ def _certificates(content: Any) -> list[Certificate]:
 
 
 def _find_uncovered(content: Any, der: bytes, version: str) -> Iterator[str]:
+    """Yield what the container of the signature has beyond what is signed."""
     container = content["content"]
     (info,) = container["signer_infos"]
     if _rebuild(container, info, extract_certificate_info(container).signer_cert, version).dump() != der:
@@ -68,6 +69,7 @@ def _find_uncovered(content: Any, der: bytes, version: str) -> Iterator[str]:
 
 
 def _rebuild(container: Any, info: Any, signer: Any, version: str) -> Any:
+    """Return a container of only what the signature covers; the original must equal it byte for byte."""
     digest = info["digest_algorithm"]
     digests = [one for one in container["digest_algorithms"] if one["algorithm"].native == digest["algorithm"].native]
     who = {"issuer": signer.issuer, "serial_number": signer.serial_number}

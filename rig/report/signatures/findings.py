@@ -14,8 +14,7 @@ class SignatureReport:
     """One signature: `signer` is the name in its certificate, `certificate_sha256` the certificate's fingerprint.
 
     `when` is the time by the clock of `time_server`, or without one the signer's. `trusted` is None if no trusted
-    certificate was given. `long_term`: whether revocation lists in the file show that the certificate was not revoked
-    then.
+    certificate was given. `long_term`: whether revocation lists in the file show that it was not revoked then.
     """
 
     signer: str

@@ -48,6 +48,7 @@ def why_untrusted(
 
 
 def _no_path(chain: Sequence[bytes], trust: Trust, moment: datetime, lists: "Sequence[CertificateList]") -> str:
+    """Return why the certificate does not lead to a trusted one at the moment; empty if it does."""
     from asn1crypto.x509 import Certificate
     from pyhanko_certvalidator import CertificateValidator, ValidationContext
     from pyhanko_certvalidator.errors import PathError, ValidationError
@@ -112,8 +113,8 @@ def _other_name(certificate: "Certificate", expected: str | None) -> str:
 def find_unvouched(chain: "Sequence[Certificate]", trust: Trust) -> list["Certificate"]:
     """Return the certificates in a signer's `chain`, besides the first, whose content nothing verifies.
 
-    The signature itself identifies the first. The others must be trusted, or issued by a trusted certificate or one of
-    the chain.
+    The signature itself identifies the first. The others must be trusted, or issued by a trusted one or one of the
+    chain.
     """
     from cryptography.hazmat.primitives.serialization import Encoding
     from cryptography.x509 import load_der_x509_certificate

@@ -141,6 +141,7 @@ def _row(name: str, text: str) -> str:
 
 
 def _spell(*entries: Mapping[str, Any]) -> str:
+    """Return the names and the unit of the columns of one quantity."""
     names = " ".join(str(entry["column"]) for entry in entries)
     entry = entries[0]
     unit = str(entry.get("unit", "date and time" if len(entries) == 1 else ""))

@@ -108,6 +108,7 @@ class BoardCalibration:
         return self.board.observe(index, self._count(name), start_us, end_us, speed_rad_s), speed_rad_s
 
     def _revolution(self, name: str, sweep: Sweep) -> Revolution:
+        """Return the sweep's revolution, computed from the board's samples and the turner's states."""
         _, sensor = self.sensors[name]
         samples, states, new = self.acquisition.collect_kept(name)
         turned = np.array([state.to_record() for state in states], self.turner.dtype)

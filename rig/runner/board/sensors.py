@@ -64,8 +64,7 @@ class BoardSource:
 def open_board_source(config: SensorsConfig, on_samples: OnSamples, *, calibrated: bool) -> Iterator[BoardSource]:
     """Connect the board and set its sensors up for the block.
 
-    Raise BoardError as `Board` does, Refused as `require_board_section`, `refuse_other_firmware` and `set_up_sensors`
-    do.
+    Raise BoardError as `Board`, Refused as `require_board_section`, `refuse_other_firmware` and `set_up_sensors`.
     """
     section = require_board_section(config)
     names: dict[int, str] = {}

@@ -107,7 +107,7 @@ class HandSession:
     def carry_out(self, check: Callable[[], None]) -> None:
         """Request the moves of the list until all are made or U reaches the target.
 
-        `check` is called many times a second. Raise Fault for an error that no move can correct, and for ten errors in
+        `check` is called many times a second. Raise Fault for an error that no move can correct, or after ten errors in
         a row.
         """
         heard = self.acquisition.hear()

@@ -187,6 +187,7 @@ class Kvh1775:
 
     # -- the reader's thread ---------------------------------------------------------------------------------------
     def _take(self, data: bytes, host_time_s: float) -> None:
+        """Decode received bytes: keep answers and tests, and pass the messages on with numbers and times."""
         decoded = self._messages.feed(data)
         with self.own_port.news:
             silent_s = self.own_port.silence.lasts_s

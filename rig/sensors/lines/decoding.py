@@ -248,6 +248,7 @@ def _markers(keys: tuple[str, ...]) -> Mapping[bytes, bytes]:
 
 
 def _classes(separator: bytes, *, keyed: bool) -> NDArray[np.uint8]:
+    """Return the class of each of the 256 bytes."""
     classes = np.full(256, _OTHER, np.uint8)
     classes[np.frombuffer(b"0123456789+-.eE", np.uint8)] = _NUMBER
     classes[np.frombuffer(b" \t", np.uint8)] = _SPACE

@@ -207,6 +207,7 @@ class LinesDevice:
 
     # -- the reader's thread ---------------------------------------------------------------------------------------
     def _take(self, data: bytes, host_time_s: float) -> None:
+        """Decode received bytes, count their lines, and pass the samples on with numbers and times."""
         decoded = self._lines.feed(data)
         with self.own_port.news:
             self.own_port.silence.note(len(decoded.values))

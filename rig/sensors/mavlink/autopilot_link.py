@@ -177,6 +177,7 @@ class AutopilotLink:
         return self.identity.system, self.identity.component
 
     def _find(self) -> None:
+        """Wait for an autopilot's message; raise SensorError if none comes, or if the autopilot is armed."""
         if not self.own_port.wait(lambda: self.autopilot is not None, self._patience.first_s):
             if self._other_count:
                 raise SensorError(
@@ -234,6 +235,7 @@ class AutopilotLink:
             self._send(self._mavlink.MAVLink_heartbeat_message(GROUND_STATION, NO_AUTOPILOT, 0, 0, 4, 3))
 
     def _take(self, data: bytes, host_time_s: float) -> None:
+        """Parse received bytes, note the autopilot's state, and pass the wanted messages on."""
         self._beat()
         wanted_messages: list[tuple[Any, bool]] = []
         with self.own_port.news:

@@ -200,6 +200,7 @@ class ServoLink:
             self._fail(problems.watchdog_tripped())
 
     def _count_lost(self, damaged: bool) -> None:
+        """Count a lost or damaged reply; report a problem if the servo has been silent too long."""
         self._lost += 1
         self._damaged += damaged
         silent_s = self._clock.now_s() - self._heard_s

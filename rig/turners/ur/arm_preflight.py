@@ -106,8 +106,7 @@ def _tool_problems(plan: Plan, report: ArmReport) -> list[Problem]:
 def kinematics_problems(arm: ArmSection, report: ArmReport) -> list[Problem]:
     """Return the problems of the controller's description of its arm, if the configuration uses it.
 
-    These are a missing description, and wrists whose axes in the flange's frame at the home pose differ from the
-    drawing's.
+    These are a missing description, and wrists whose axes in the flange's frame at home differ from the drawing's.
     """
     if arm.kinematics == "nominal":
         return []

@@ -33,8 +33,7 @@ ControlMode = Remote | Literal["gone"]
 class ControlWatch:
     """A thread that calls `on_problem` once, if the arm at `host` can no longer be stopped through its ports.
 
-    `newest_s()` returns the monotonic time of the newest state; without states the link is lost, which the link
-    reports.
+    `newest_s()` returns the monotonic time of the newest state; the link itself reports that states do not come.
     """
 
     def __init__(

@@ -18,8 +18,7 @@ DROP_M_S2 = 160.0  # peak specific force of a drop
 class HandMotion:
     """The motion sensed on the body at times (n,), in body axes.
 
-    Rates and specific forces (n, 3), attitudes (n, 3, 3) body to room, bias jumps after falls (n, 3), lost readings
-    (n,).
+    Rates, specific forces (n, 3), attitudes (n, 3, 3) body to room, bias jumps after falls (n, 3), lost readings (n,).
     """
 
     rate_rad_s: Array

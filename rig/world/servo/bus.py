@@ -68,6 +68,7 @@ class SimulatedBus:
         return arrived
 
     def _answer(self, packet: ServoPacket, time_s: float) -> None:
+        """Queue the answers of all servos to the packet; bytes that coincide on the wire are combined by AND."""
         byte_s = BITS / (self.baud_rate or 1e6)
         answers: list[tuple[int, bytes]] = []  # the first byte's slot on the wire, counted from now, and the bytes
         free = 0  # the first free slot after the earlier answers to a sync read

@@ -175,6 +175,7 @@ class SimulatedServo:
         return 0, b""
 
     def _sync(self, packet: ServoPacket, time_s: float) -> bytes | None:
+        """Return the servo's answer to a sync read, or carry out its part of a sync write."""
         head, rest = packet.parameters[:4], packet.parameters[4:]
         if packet.servo_id != BROADCAST or not rest:
             return None

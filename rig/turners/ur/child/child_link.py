@@ -148,6 +148,7 @@ class ChildLink:
                 self._lose(name, f"the process that talks to the arm at {self._host} ended (exit status {status})")
 
     def _guard(self) -> None:
+        """Exchange heartbeats with the process; end it when it hangs or when no new state arrives."""
         while not self._ended.wait(TICK_S):
             self._say_alive()
             self._silent.tick(unheard=_readable(self._pipe))

@@ -309,8 +309,7 @@ class _Child:
     def abandon(self) -> NoReturn:
         """Stop the arm, which is no longer supervised, and exit.
 
-        The program is stopped over the controller's ports. If no path confirms the stop, the RTDE client brakes the
-        arm.
+        The program is stopped over the controller's ports. If no path confirms it, the RTDE client brakes the arm.
         """
         if self._holds_arm:
             # The client's stop may wait forever for a controller that is gone; the system's alarm ends that.

@@ -27,7 +27,7 @@ OWNERS = (
 def find_free_half(host: str, version: tuple[int, ...], timeout_s: float) -> int | None:
     """Return the half of the registers, `LOWER` or `UPPER`, that is free at the controller `host`, or None.
 
-    `version` is the controller's software. Nothing remains reserved. Raise `OSError` if no answer comes within
+    `version`: the controller's software. Nothing remains reserved. Raise `OSError` if no answer comes within
     `timeout_s`.
     """
     with socket.create_connection((host, PORT), timeout_s) as connection:

@@ -174,7 +174,7 @@ class StateStream:
     def _missed_s(self) -> float:
         """The longest time, s of the controller's clock, for which states may have been lost in recent silences.
 
-        A local controller's connection loses no states, unless it was silent for `SILENT_S`; then any number may be
+        A local controller's connection loses no states unless it was silent for `SILENT_S`; then any number may be
         lost.
         """
         if self._is_remote:

@@ -22,8 +22,7 @@ BRAKE_RAD_S2 = 5.0
 class StopOrder:
     """The order to end the program, given to the controller on all `paths` at once, each in its own thread.
 
-    A path that hangs does not delay the others. Each path then polls for at most `timeout_s` whether the program has
-    ended.
+    A path that hangs does not delay the others. Each path then polls at most `timeout_s` whether the program has ended.
     """
 
     def __init__(self, paths: Sequence[StopPath], timeout_s: float) -> None:
@@ -73,6 +72,7 @@ class StopOrder:
         return self._deadline_s - time.monotonic()
 
     def _give(self, path: StopPath) -> None:
+        """Stop the program by this path, and note and ask whether the controller has done so."""
         try:
             # At any time, however late: ending a program needlessly is better than an arm that goes on.
             with closing(path.open(max(LATE_S, min(PATH_S, self._remaining_s)))) as connection:

@@ -35,8 +35,7 @@ class StoredPrograms:
     def store(self, form: bytes, *, replace: bool) -> str:
         """Store the document that a client sends, and return its name.
 
-        Raise ValueError if the form contains no document, or if one of its name is stored already and must not be
-        replaced.
+        Raise ValueError if the form contains no document, or if one of its name is stored and must not be replaced.
         """
         text = form[form.find(b"{") : form.rfind(b"}") + 1].decode()
         try:

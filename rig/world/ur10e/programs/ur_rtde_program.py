@@ -77,6 +77,7 @@ class ControlProgram:
         return not self._threads.any and self._idle_code is not None and self._registers.integer(0) == self._idle_code
 
     def _loop(self) -> Steps:
+        """Run the main loop of ur_rtde's program: take a code from register 0, carry it out, report its end."""
         self._signal_async(-1)
         self._registers.write_integer(0, READY)
         executing = False

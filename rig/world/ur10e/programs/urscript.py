@@ -249,6 +249,8 @@ def _tcp(robot: Robot, value: Arguments) -> None:
 
 
 def _digital_out(first: int) -> Callable[[Robot, Arguments], None]:
+    """Return the statement that sets an output, the outputs being numbered from bit `first`."""
+
     def put(robot: Robot, value: Arguments) -> None:
         number = int(value("0", "n"))
         if not 0 <= number < 8:
