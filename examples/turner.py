@@ -1,4 +1,4 @@
-"""A turner: a turntable on a bearing, which a hand turns: a hand but for its name and what documents say of it.
+"""A turner: a turntable on a bearing, turned by hand; only its name and the documents' words differ from `hand`.
 
 A package brings it by an entry point, in its pyproject.toml:
 

@@ -1,9 +1,9 @@
-"""Verify gyroscopes that are calibrated: the movement of the calibration again, as in SIX, Section IV-B.
+"""Verify calibrated gyroscopes by repeating the movement of the calibration, as in SIX, Section IV-B.
 
     python procedures/verify.py configs/lsm9ds1_adis16465.yaml
 
-Before you start: as for procedures/six_observation.py. The board has a calibration stored for each gyroscope
-(`rig board calibration read CONFIG` shows it), and a reference gyroscope with known errors sits beside them.
+Before you start: as for procedures/six_observation.py. The board has a calibration stored for each gyroscope (`rig
+board calibration read CONFIG` shows it), and a reference gyroscope with known errors sits beside them.
 
 What happens: the board corrects its readings by what it has stored and streams rates; the arm repeats the six sweeps;
 the rates are compared with the reference's. `rig run` does this by itself after a calibration when the configuration

@@ -3,7 +3,7 @@
 python benchmarks/solving/peers.py          # needs the extra `bench`
 
 The session is imucal's: six still holds with ±x, ±y, ±z upwards, and one turn of −360° about each axis, 6 × 1000 and 3
-× 600 samples at 100 Hz. The sensor is mounted 3° askew, its accelerometer is ideal but for noise. imucal's reading =
+× 600 samples at 100 Hz. The sensor is mounted 3° askew, its accelerometer is ideal except for noise. imucal's reading =
 K_g R_g ω + b_g + K_ga a is the vector model with g-sensitivity; its 1/K_g is our scale, −b_g our bias.
 """
 

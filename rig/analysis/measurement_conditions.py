@@ -80,7 +80,7 @@ def accelerometer_conditions(recordings: Sequence[ObservedRun], name: str, dwell
 def magnetometer_conditions(recordings: Sequence[ObservedRun], name: str, dwells: Iterable[int]) -> When:
     """Return the conditions of a magnetometer's readings, without temperature, in the dwells with these indices.
 
-    Of a repeated dwell the last one is used.
+    If a dwell was repeated, only its last execution is used.
     """
     wanted = frozenset(dwells)
     times_s = {

@@ -62,7 +62,7 @@ class _RecordedPart:
 
 
 def so_far(runs: Sequence[RunData]) -> SoFar:
-    """Return the partial results of raw readings. Of a repeated sweep or dwell the last one is used."""
+    """Return the partial results of raw readings. If a sweep or dwell was repeated, only its last execution is used."""
     sweeps: dict[str, Attempts[int, Observation]] = {}
     rests: dict[str, list[Average]] = {}
     at_rest: Attempts[QuantityInDwell, ReadAtRest] = Attempts()

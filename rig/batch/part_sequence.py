@@ -64,7 +64,7 @@ class Desk:
         self.work.refuse_same_chip(self.part, chip)
 
     def agrees(self, announcement: Sequence[str], to_do: str) -> bool:
-        """Return whether the run may do `to_do`."""
+        """Return whether the operator agrees to `to_do` after the announcement."""
         return self.work.operator.agrees(announcement, to_do)
 
 

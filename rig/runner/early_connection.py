@@ -47,7 +47,7 @@ class Ahead:
 
 
 class _Connection:
-    """A connected turner, from the thread that connects it to the run that uses it."""
+    """A turner that a thread connects and passes to the run."""
 
     def __init__(self, connect: Connecting, log: Path) -> None:
         self._on_state: OnState = _forget

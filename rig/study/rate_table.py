@@ -48,7 +48,7 @@ def draw_attitudes(count: int) -> Array:
 def simulate_oscillation(duration_s: float) -> tuple[Array, Array]:
     """Return attitudes (N, 3, 3) and body rates (N, 3), rad/s, of oscillations by ±60° about all three axes.
 
-    TRIAX shows its motion only in a figure; essential is that every axis turns and tilts.
+    TRIAX shows its motion only in a figure; what matters is that every axis turns and tilts.
     """
     from scipy.spatial.transform import Rotation
 

@@ -20,7 +20,7 @@ MASKS = (
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """The input after `prompt`, and the texts that must follow, in order. Without a prompt: texts of a running one."""
+    """The input after `prompt`, and the texts that must follow, in order; without a prompt, of a running command."""
 
     prompt: str
     typed: str

@@ -149,7 +149,7 @@ class _AlignedRecording:
 
 
 def _align_recording(recording: ObservedRun, sensor: str, reference: Reference, rotation: Array) -> _AlignedRecording:
-    """Return both sensors' samples during movement, on the tested one's times. Raise Fault `no_overlap`."""
+    """Return both sensors' samples during movement, at the tested sensor's times. Raise Fault `no_overlap`."""
     delay = _find_delay(recording, sensor, reference.name)
     tested, reference_stream = recording.stream(sensor), recording.stream(reference.name)
     movement = mask_movement(recording.run, tested.time_s)
@@ -185,7 +185,7 @@ def _find_delay(recording: ObservedRun, sensor: str, reference: str) -> Delay | 
 
 
 def _mask_covered(time_s: Array, by_s: Array) -> NDArray[np.bool_]:
-    """Return a mask of the times (n,) that lie between two times of `by_s` (m,), both close by."""
+    """Return a mask of the times (n,) that do not lie in a gap of the times `by_s` (m,) or beyond them."""
     after = np.searchsorted(by_s, time_s)
     gaps = np.diff(by_s, prepend=-np.inf, append=np.inf)
     close: NDArray[np.bool_] = gaps[after] <= MAX_GAP * np.median(gaps)

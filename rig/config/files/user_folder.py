@@ -1,4 +1,4 @@
-"""The user's folder of the rig, for texts to recognise later, a history, and old parameters."""
+"""The user's folder of the rig: hashes of texts that the user has run, a history, and autopilots' old parameters."""
 
 from pathlib import Path
 

@@ -129,7 +129,7 @@ def _measure_walk(turning: Turning, rests_s: Array) -> tuple[float, float]:
 
 
 def _drop_thin(fixes: Fixes) -> Fixes:
-    """Return the fixes without windows that hold hardly any rows."""
+    """Return the fixes, except for moving ones made of far fewer rows than usual."""
     counts = np.bincount(fixes.fix)
     moving = fixes.placement >= 0
     kept = ~moving | (counts >= THIN * np.median(counts[moving] if moving.any() else counts))
@@ -148,7 +148,7 @@ def _drop_thin(fixes: Fixes) -> Fixes:
 def _find_joined(
     turning: Turning, fixes: Fixes, clock_s: float
 ) -> tuple[NDArray[np.bool_], Array, tuple[LeftOut, ...]]:
-    """Return a mask (N − 1,) of fixes joined to the next, the std of rotation in gaps, rad, and what is left out."""
+    """Return which fixes are joined to the next (N − 1,), the std of rotation in gaps, rad, and omitted increments."""
     count = len(fixes.placement)
     first_s = clock_s + fixes.at_s[np.searchsorted(fixes.fix, np.arange(count))]
     last_s = clock_s + fixes.at_s[np.searchsorted(fixes.fix, np.arange(count), side="right") - 1]

@@ -34,8 +34,8 @@ def is_mat(path: Path) -> bool:
 def read_mat_rows(path: Path, header: Header, mapped: Mapped | None) -> Iterator[list[str]]:
     """Yield the names of all columns of a file, then its rows, in which cells of unneeded columns are blank.
 
-    Columns in the map, or with the rig's names, are needed. Raise Refused `wrong_columns` if they differ in length, and
-    any error of the parser for a damaged file.
+    The needed columns are those in the map or with the rig's names. Raise Refused `wrong_columns` if they differ in
+    length, and any error of the parser for a damaged file.
     """
     columns = read_mat_columns(path)
     names = [*columns]

@@ -18,7 +18,7 @@ from rig.observation.statistics.vibration_noise import fit_inflation, line_colum
 
 @dataclass(frozen=True, slots=True)
 class SweptAcceleration:
-    """An accelerometer's first harmonic in the plan's sweep `sweep`; the joint's angle counts from the sweep's start.
+    """An accelerometer's first harmonic in the sweep `sweep` of the plan, by the joint's angle from the sweep's start.
 
     At the start, `attitude` (3, 3) transforms a vector from the arm's base frame to the flange's. `axis_flange` (3,):
     unit vector of a growing angle, `arm_m` (3,): from the axis to the flange's origin, both in the flange's frame.

@@ -33,9 +33,9 @@ OF_EACH = 40  # sound frames of each message
 class Sent:
     """Counts of what was sent, by a receiver written from the protocol's description.
 
-    Of all `blocks` between two delimiters, `valid` ones are intact with a correct CRC: `as_sent` ones, those `made` so
-    on purpose around nonsense, and those that damage made so by `chance`. `answers` counts the board's frames, `errors`
-    the refusals among these.
+    `blocks`: all between two delimiters; `valid`: those with a correct CRC. Valid are the frames that arrived
+    `as_sent`, nonsense `made` with a correct CRC on purpose, and damage with a correct CRC by `chance`. `answers`
+    counts the board's frames, `errors` the refusals among these.
     """
 
     frames: int

@@ -27,7 +27,7 @@ MAGNETIC = MagnetometerTruth((1.02, 0.97, 1.01), (12e-6, -30e-6, 8e-6))
 
 
 def magnetometer(motion_at: Callable[[float], Sequence[float]], *_truth: Any, seed: int, **_others: Any) -> SpiDevice:
-    """Return a magnetometer in a constant field, whose conversions are counted as those of the gyroscopes."""
+    """Return a magnetometer in a constant field; its conversions are counted like those of the gyroscopes."""
 
     def field_at(time_s: float) -> Sequence[float]:
         motion_at(time_s)

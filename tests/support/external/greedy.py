@@ -34,7 +34,7 @@ def output(path: Path) -> Iterator[Part]:
 
 
 def room(path: Path) -> Iterator[Part]:
-    """Write to the disk without end, beside the parts sent."""
+    """Write to the disk without end, in addition to the parts sent."""
     with Path(os.environ["TMPDIR"], "unpacked").open("wb") as file:
         while True:
             file.write(ZEROS.tobytes())

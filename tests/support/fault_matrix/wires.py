@@ -17,7 +17,7 @@ Damage = Callable[[bytes], bytes]
 
 
 class Wire:
-    """One port of the far end, passed on from `host`. Bytes that come from the far end can be delayed or damaged."""
+    """A relay from a port at `host` to one of the far end, whose bytes can be delayed or damaged."""
 
     def __init__(self, host: str, port: int, far: tuple[str, int]) -> None:
         self._far = far

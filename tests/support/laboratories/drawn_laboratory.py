@@ -90,7 +90,7 @@ def _arm(rng: np.random.Generator) -> dict[str, Any]:
 
 
 def draw_visible_vibration(rng: np.random.Generator) -> dict[str, float]:
-    """Draw a vibration that the encoders see, beside the one that they do not; later draws remain the same."""
+    """Draw a vibration that the encoders see, in addition to one that they do not; later draws remain the same."""
     separate_sensor_errors = rng.spawn(1)[0]
     return {
         "vibration_measured_rms_rad_s": float(separate_sensor_errors.uniform(0, 0.002)),

@@ -24,9 +24,9 @@ class Asked:
 def require(values: int) -> Asked:
     """Return the bounds for these values; few values get wider bounds, so that one test of a hundred fails by chance.
 
-    Each world counts as one value: χ² with a degree of freedom per world for the RMS, a binomial count of worlds for
-    the fraction. If a world's axes have little in common, this is wider than necessary. Twenty worlds bound an RMS to
-    0.52 and 1.63, and a fraction to 75 %; they cannot distinguish 95 % from 100 %.
+    Each world is one value: χ² with a degree of freedom per world for the RMS, a binomial count of worlds for the
+    fraction. If a world's axes have little in common, this is wider than necessary. With twenty worlds the RMS is
+    bounded by 0.52 and 1.63, the fraction by 75 %; they cannot distinguish 95 % from 100 %.
     """
     from scipy.special import chdtri
     from scipy.stats import binom

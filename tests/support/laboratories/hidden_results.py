@@ -93,8 +93,8 @@ def true_accelerometer(document: Mapping[str, Any], name: str, result: Accelerom
     """Return (6,) the scale of the readings at 1 g up and down, and the bias, by the reading at 0 g.
 
     Neither depends on φ, because an even term is the same up and down, and zero at 0 g. The scale is that at the mean
-    temperature of dwells and sweeps, the bias its mean over the run, as docs/uncertainty.md defines it: drift during
-    sweeps and between the dwells counts as well.
+    temperature of dwells and sweeps, the bias its mean over the run, as docs/uncertainty.md defines it: it includes the
+    drift during sweeps and between the dwells.
     """
     sensor = read_world_section(parse(yaml.safe_dump(dict(document)))).sensors[name]
     drawn = sensor.accelerometer
@@ -109,7 +109,7 @@ def true_accelerometer(document: Mapping[str, Any], name: str, result: Accelerom
 
 
 def _warmer_k(sensor: SimulatedSensorSection, time_s: float) -> float:
-    """Return by how much a part, powered at time zero, is warmer than `temperature_c`, where its errors hold."""
+    """Return the temperature of a part, powered at time zero, above `temperature_c`, where its errors are valid, K."""
     if sensor.start_temperature_c is None:
         return 0.0
     return float((sensor.start_temperature_c - sensor.temperature_c) * np.exp(-time_s / sensor.warm_up_s))

@@ -34,7 +34,7 @@ def plan(
 
 
 def read_late(rig: Verbs) -> None:
-    """Let the threads that read come to it only after the last motion."""
+    """Let the threads that read sensors read only after the last motion."""
     usual_s = serial_port.READ_TIMEOUT_S
     rig.preflight()
     rig.start_sampling()

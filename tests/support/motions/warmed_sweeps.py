@@ -31,9 +31,9 @@ DATA_SHEET_BIAS_K, DATA_SHEET_SCALE_K = np.radians(0.03), 3e-4  # rad/s and a sh
 class Drawn:
     """A gyroscope: k(T) = k₀ (1 + s₁ d + s₂ d²), the addition to a reading c(T) = c₀ + c₁ d + c₂ d², d = T − 25 °C.
 
-    `hysteresis` (3,): how much more it reads half-way during warming; `lag_s`: the thermometer's lag; `gradient_k`: by
-    how much it exceeds its thermometer's reading in use more than in the run: at the middle of the range, and
-    additionally at its upper end. `leaning` (P, 3): the addition of each place, such as an arm's leaning axis.
+    `hysteresis` (3,): the addition half-way during warming; `lag_s`: the thermometer's lag; `gradient_k`: the excess of
+    the sensor's temperature over its thermometer's in use, compared with the run: at the middle of the range, and in
+    addition at its upper end. `leaning` (P, 3): the addition in each pose, such as by an arm's leaning axis.
     """
 
     scale: Array

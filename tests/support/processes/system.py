@@ -25,6 +25,7 @@ def descendant(process: int, word: str) -> int:
 def grown(memory_kb: list[int]) -> float:
     """Return the fraction by which memory has grown over consecutive parts.
 
-    The largest of a few parts counts, because connections ahead vary, and a part with repeated sweeps needs more.
+    The largest of a few parts is compared, because connections made in advance vary, and a part with repeated sweeps
+    needs more.
     """
     return max(memory_kb[-4:]) / max(memory_kb[1:5]) - 1.0

@@ -80,7 +80,7 @@ FAULTS: tuple[Fault, ...] = (_flip, _flip, _cut, _lose, _double, _overwrite, _in
 
 @contextmanager
 def ending_by_name(bad: bytes) -> Iterator[None]:
-    """Attach to an exception raised here the bytes that caused it; likewise to an alarm if nothing ends."""
+    """Attach to an exception raised here the bytes that caused it; raise AssertionError if the block does not end."""
 
     def hung(*_: object) -> None:
         raise AssertionError("it hangs")

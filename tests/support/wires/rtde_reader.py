@@ -1,4 +1,4 @@
-"""A plain RTDE client that keeps only the newest packet, as many do, and may be slow at that."""
+"""A plain RTDE client that keeps only the newest packet, like many clients, and may be slow."""
 
 import select
 import socket
