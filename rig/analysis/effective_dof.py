@@ -108,7 +108,7 @@ def _reading_parts(noise: Array, walk: Array, explained: Explained) -> dict[str,
 
 
 def _split(whole: Array, parts: dict[str, Array], budget: Budget) -> Array:
-    """Return the degrees of freedom (…) of variances (…) by contributor (`parts`); the remainder is exact.
+    """Return the degrees of freedom (…) of variances (…): those of their `parts`, infinite for the remainder.
 
     Raise KeyError if the budget has no such contributor.
     """

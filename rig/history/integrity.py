@@ -34,7 +34,7 @@ class EntryState:
 
 
 def examine_history(history: History) -> Iterator[EntryState]:
-    """Yield the state of triggers, numbers and rows, of each run by its result, and of files by their hashes.
+    """Yield the state of triggers, journal's numbers and rows, of each run compared with its result, and of files.
 
     Files are read at their last known location. A file of another computer that is not accessible here is `elsewhere`;
     a file in a run's folder that was not entered is `unknown`.

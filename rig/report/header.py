@@ -44,9 +44,9 @@ def calibration_header(document: ResultDocument, g_sensitivity: Mapping[str, Arr
     """Return C source text for the sensors of a result.
 
     A calibrated gyroscope gets its scale factors, its biases (rad/s), the matrix M of the board's correction g = M (m +
-    b), and a function for it; with a known `g_sensitivity` (3, 3), rad/s per m/s², also this and a function that
-    subtracts its effect first. An accelerometer and a magnetometer get bias, matrix and function. C names are the
-    sensors' names with `_` for every character that C does not allow.
+    b), and a function for this correction. If `g_sensitivity` (3, 3), rad/s per m/s², is known, it is included, with a
+    function that first subtracts its effect. An accelerometer and a magnetometer get bias, matrix and function. C names
+    are the sensors' names with `_` for every character that C does not allow.
     """
     lines = [
         "/* Calibrations. Of gyroscopes g = M (m + b): rate_rad_s = matrix * (reading_rad_s + bias_rad_s), where",

@@ -1,8 +1,8 @@
 """The checks of readings in a constant reference against themselves: dwells and sweeps against one model.
 
-The calibration (`rig.estimation.reference.accelerometer_model`) must explain the readings of an accelerometer, or of a
-magnetometer, which has dwells only, within their noise, the arm's attitude error δ and stated errors. δ is re-estimated
-with every alternative, so that a fault does not mask itself: a likelihood-ratio test.
+The calibration (`rig.estimation.reference.accelerometer_model`) must explain the readings within their noise, the arm's
+attitude error δ and stated errors. A magnetometer has dwells only. Every alternative is a likelihood-ratio test, in
+which δ is re-estimated, so that a fault does not mask itself.
 """
 
 from collections.abc import Sequence

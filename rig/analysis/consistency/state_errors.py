@@ -1,4 +1,4 @@
-"""The errors of the arm's states in the segments of a recording: of their times and of their joint angles.
+"""The errors of the times and joint angles of the arm's states, in the segments of a recording.
 
 A mean rate is a difference of two angles, so an error at the edge between two segments of a sweep increases one rate
 and decreases the next. The encoder noise of the turning joint is part of the jitter of the times.

@@ -65,8 +65,8 @@ def _counts(change: AbruptChange) -> bool:
 def _is_certain(data: ExternalData, change: AbruptChange) -> bool:
     """Return whether a step of the bias is certain, not an error of the stated motion.
 
-    With rests before and after it, they must show at least half of the step; otherwise it must exceed the effect of
-    plausible errors of all stated rates. Single first or last rows are never certain: they may be wrong.
+    If there are rests before and after the step, they must show at least half of it; otherwise the step must exceed the
+    effect of plausible errors of all stated rates. Single first or last rows are never certain: they may be wrong.
     """
     axis = int(np.argmax(np.abs(change.sizes)))
     size_rad_s = float(change.sizes[axis])

@@ -27,7 +27,7 @@ def check_agree(data: ExternalData) -> None:
     """Check that every sweep agrees with the solution of all others (leave-one-out residuals).
 
     Raise Refused `bad_sweep` for the sweep that disagrees most, for example half a turn stated as a whole one, or a
-    wrong axis; of an axis with only two sweeps both are named. Too few rows for a solution are not checked.
+    wrong axis. If an axis has only two sweeps, both are named. Too few rows for a solution are not checked.
     """
     means, variances, design = _equations(data)
     redundancy = _redundancy_numbers(design)

@@ -16,10 +16,10 @@ _Times = dict[str, tuple[float, float]]  # by thread: seconds on a processor, se
 class Silence:
     """A counter of the ticks without a sign of life from the process `pid`.
 
-    Ticks are counted, not seconds, because the counting process may itself be delayed. A tick does not count if the
-    thread that is expected to answer (`thread`, any if None) mostly waited for a processor; all ticks count if the
-    system does not show this (proc(5) of Linux does) or the process was stopped. However busy the machine, a silence
-    lasts at most `spared` times LARGEST_LOAD_FACTOR times its limit: the arm must not be left alone.
+    Ticks are counted, not seconds, because the counting process may itself be delayed. A tick is ignored if the thread
+    that is expected to answer (`thread`, any if None) mostly waited for a processor, unless the process was stopped.
+    Linux shows this (proc(5)); on other systems no tick is ignored. However busy the machine, a silence lasts at most
+    `spared` times LARGEST_LOAD_FACTOR times its limit: the arm must not be left alone.
     """
 
     def __init__(self, pid: int, *, spared: int, thread: int | None = None) -> None:
@@ -48,7 +48,7 @@ class Silence:
         self.ticks += not (starved or unheard)
 
     def lasts_over(self, limit: float) -> bool:
-        """Return whether more than `limit` silent ticks count, or more than `spared` × `limit` ticks have passed.
+        """Return whether there were more than `limit` silent ticks, or more than `spared` × `limit` ticks in all.
 
         The `limit` is for a machine with a processor for every program; the machine's load extends it.
         """
@@ -64,8 +64,7 @@ class Silence:
     def _is_starved(self, has_previous: bool) -> bool:
         """Return whether the process waited for a processor since the last call; False at the first call.
 
-        The system's waiting time excludes a thread that is still waiting, so a ready thread that has not run is
-        included.
+        The system counts a wait only when it has ended, so a ready thread that has not run is taken for a waiting one.
         """
         now_s = time.monotonic()
         elapsed_s, before = now_s - self._looked_s, self._times

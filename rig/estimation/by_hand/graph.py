@@ -216,7 +216,7 @@ def _rest_columns(row: int) -> tuple[slice, slice]:
 
 
 def _move(graph: Graph, row: int) -> Factor:
-    """Return the factor of a move: its integrated rates take the attitude before it into the attitude after it."""
+    """Return the factor of a move: its integrated rates must rotate the attitude before it to the attitude after it."""
     integrals, stds = graph.integrals, graph.stds
     design = np.zeros((3, graph.width))
     (first, first_bias), (second, second_bias) = _rest_columns(row), _rest_columns(row + 1)

@@ -122,7 +122,7 @@ def _rest_equations(centre: Array, rest: BoardRest, noise_rad_s: float) -> Itera
 
 
 def _move_equations(centre: Array, move: BoardMove) -> Iterator[Equation]:
-    """Yield the equations of a move: its integrated rotation takes the vertical of one rest into that of the next."""
+    """Yield the equations of a move: its integrated rotation must turn the vertical of one rest to that of the next."""
     matrix, sensitivity = centre[MATRIX].reshape(3, 3), centre[GRAVITY].reshape(3, 3)
     (up, up_axes), (after, after_axes) = (
         _vertical_on_face(centre, move.before.face),

@@ -1,11 +1,11 @@
 """Optimality of a set of sweep directions: G-optimality, SIX section II-B, and c-optimality.
 
-The variance of the fitted model's prediction at a point x, N f(x)ᵀ (XᵀX)⁻¹ f(x) in units of one observation's
-variance, is never below p, the number of parameters, at its worst point: the mean over the design's own points is
-exactly p. A design whose worst point on the sphere has p is G-optimal, and then also D-optimal (Kiefer and Wolfowitz).
+The variance of the fitted model's prediction at a point x is N f(x)ᵀ (XᵀX)⁻¹ f(x), in units of one observation's
+variance. Its mean over the design's own points is exactly p, the number of parameters, so its largest value is at least
+p. A design whose largest value on the sphere is p is G-optimal, and then also D-optimal (Kiefer and Wolfowitz).
 
-Two models: "squared" is Eq. (4), f = [x² y² z² x y z], p = 6, with β0 given by the others; "vector" is f = [x y z 1],
-p = 4, for each axis. Directions are unit vectors; a zero row is a rest, which only the vector model can use.
+Two models: "squared" is Eq. (4), f = [x² y² z² x y z], p = 6, with β0 given by the others; "vector" is f = [x y z 1], p
+= 4, for each axis. Directions are unit vectors; a zero row is a rest, which only the vector model can use.
 """
 
 from collections.abc import Mapping

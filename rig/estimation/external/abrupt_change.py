@@ -1,10 +1,10 @@
 """An abrupt change of a sensor within a recording, by the ratio of marginal likelihoods.
 
-Before one of the rows, or increments, of a mixed model the sensor's bias or the scale factors of its axes change by δ ~
-N(0, size² 1), or the coordinates of a reference's attitudes turn by δ. The ratio of the likelihoods with and without
-such a term is the Bayes factor (Kass and Raftery, J. Am. Stat. Assoc. 90 (1995) 773). It is first computed for every
-row, with the other errors' standard deviations fixed. For the most probable row these are then estimated together with
-the change, as they would otherwise include it.
+A change happens before one of the rows, or increments, of a mixed model: the sensor's bias or the scale factors of its
+axes change by δ ~ N(0, size² 1), or the coordinates of a reference's attitudes turn by δ. The ratio of the likelihoods
+with and without such a term is the Bayes factor (Kass and Raftery, J. Am. Stat. Assoc. 90 (1995) 773). It is first
+computed for every row, with the other errors' standard deviations fixed. For the most probable row these are then
+estimated together with the change; otherwise they would include it.
 """
 
 from collections.abc import Sequence

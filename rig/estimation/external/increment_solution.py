@@ -1,7 +1,8 @@
 """A gyroscope's matrix and bias from its rotations between attitudes of a reference: cameras, a table.
 
 The reference's rates are not used: noise in the regressors would bias the scale (errors in variables). The rotation
-between fixes is used (`attitude_drift`), whose noise by the gyroscope grows only with the root of time.
+between fixes (measured attitudes) is used (`attitude_drift`); its noise by the gyroscope grows only with the root of
+time.
 
 The variances of the errors of fixes and gyroscope are estimated from the residuals (`variance_components`), together
 with those of the changes of matrix and bias between intervals of the recording: nonlinearity, g-sensitivity,

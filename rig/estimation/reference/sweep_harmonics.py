@@ -34,8 +34,9 @@ class FirstHarmonic:
     - `speed_rad_s`: 2π over the time of a revolution, negative if the angle falls.
     - `noise_m_s2` (3,): std of one sample, with `dof` degrees of freedom; `residuals_m_s2` (n, 3).
     - `vibration_m_s2` (3,): RMS of the removed vibration of servo and arm.
-    - `turning_rad2_s2` (6, 3): mean, cosine and sine, by the same weights, of ω² and α; and, for the filter's lag, of
-      their derivatives per radian of the mean rotation and of ω₀ (ω − ω₀) cos θ and sin θ, with the mean rate ω₀.
+    - `turning_rad2_s2` (6, 3): mean, cosine and sine, by the same weights, of ω² and α. For the filter's lag the
+      further rows are those of their derivatives per radian of the mean rotation, and of ω₀ (ω − ω₀) cos θ and sin θ,
+      with the mean rate ω₀.
     """
 
     harmonic_m_s2: Array

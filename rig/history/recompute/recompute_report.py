@@ -88,7 +88,7 @@ def recompute_page(outcome: RecomputeOutcome, question: RecomputeQuestion, histo
 
 
 def counts(outcome: RecomputeOutcome) -> Iterator[str]:
-    """Yield lines with the numbers of results, of changes, and of certificates to withdraw or that are unconfirmed."""
+    """Yield lines with the numbers of results, of changes, and of certificates to withdraw or left unconfirmed."""
     unsolved = [f"{count} {STATE_WORDS[state]}" for state, count in sorted(outcome.unsolved.items())]
     unsolved += [f"{outcome.unreached} not reached"] if outcome.unreached else []
     yield f"{len(outcome.compared)} results: {', '.join([f'{outcome.solved} solved', *unsolved])}"

@@ -58,7 +58,7 @@ def chart(values: Array, std: Array) -> Chart:
 
 
 def merge_charts(deviations: Array) -> Chart:
-    """Return the chart of standardised deviations (n,): of all check standards of one rig, in the order of time."""
+    """Return the chart of standardised deviations (n,) of all check standards of one rig, in the order of time."""
     ewma, limit, alarm = np.empty_like(deviations), np.empty_like(deviations), np.zeros(deviations.shape, dtype=bool)
     average = np.zeros(())
     for i, deviation in enumerate(deviations):

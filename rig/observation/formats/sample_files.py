@@ -125,7 +125,7 @@ def rows_around(time_s: Array, path: Path) -> dict[str, Array]:
 
 
 def entry_of(path: Path) -> FileEntry:
-    """Return a file's name and checksum; of a folder, the checksum of its files in the order of their names."""
+    """Return a file's name and checksum; for a folder, the checksum of its files in the order of their names."""
     source = whole(path)
     files = sorted(file for file in source.iterdir() if file.is_file()) if source.is_dir() else [source]
     digest = hashlib.sha256()

@@ -161,7 +161,7 @@ def _find_ends(time_s: Array, travelled: Array, first: int, last: int, turn_rad:
 
 
 def _check_slider(turning: NDArray[Any], where: str) -> None:
-    """Raise Fault `speed_slider` or `speed_limited` if the arm recorded either; other turners do not."""
+    """Raise Fault `speed_slider` or `speed_limited` if an arm's states show it; other turners have no such states."""
     if not {"target_speed_fraction", "speed_scaling"} <= {*(turning.dtype.names or ())}:
         return
     slider, scaling = (float(turning[name].min()) for name in ("target_speed_fraction", "speed_scaling"))

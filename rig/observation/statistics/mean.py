@@ -42,8 +42,8 @@ class Mean:
 class MeanNoise:
     """Noise of single readings in any unit, by axis.
 
-    `scatter` (3,) is the variance of one reading, `in_a_mean` (3,) the part of it that remains in a long mean, with
-    `dof` (3,) degrees of freedom.
+    `scatter` (3,) is the variance of one reading; `in_a_mean` (3,) is its part that remains in a long mean, with `dof`
+    (3,) degrees of freedom.
     """
 
     scatter: Array

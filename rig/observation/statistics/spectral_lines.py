@@ -95,7 +95,7 @@ def waves(cycles: Array, fraction: Array, beats: int = BEATS) -> Array:
     """Return cosine and sine columns (n, w k) of k lines at elapsed fractions (n,) of the time, w = `column_count`.
 
     A line also has two linearly growing columns, for a vibration that begins or ends, and sidebands up to `beats`
-    cycles away: one cycle away a vibration of the room in a rotating sensor, others as in
+    cycles away: at one cycle, a vibration of the room in a rotating sensor; for others see
     `rig.observation.motion.revolution.Revolution`.
     """
     line, turn = (np.exp(2j * np.pi * np.outer(cycles_each, fraction)) for cycles_each in (cycles, range(1, beats + 1)))

@@ -1,8 +1,8 @@
 """The time stamps of a log in order: the readings of the recording, and the time at which each was taken.
 
 Loggers write rows that are not readings (NaN, zeros before the first conversion), the same row twice, rows in another
-order, counters that wrap, and readings that had waited in a buffer: at the start of a recording stale ones, which come
-faster than they were taken, and after a stall of the link those taken during it. A stall loses no readings. So a long
+order, counters that wrap, and readings that waited in a buffer. At the start of a recording, old readings come faster
+than they were taken; after a stall of the link, those taken during the stall do. A stall loses no readings. So a long
 step between two stamps is compared with the number of readings that follow until a reading is on time again.
 
 Each kind is counted, with its first row and time. The remaining readings have the times of

@@ -31,8 +31,8 @@ class PlannedAverage:
 def drift_effect(steps: Sequence[Step]) -> float:
     """Return the change of the calibration, rad/s, for a bias that rises by 1 rad/s from first sweep to last step.
 
-    The vector model m = F ω + c, and with rests G a (`rig.estimation.gyroscope.vector_model`), is fitted to that ramp
-    about its middle: the changes of the scale, at the mean speed of the sweeps, and of the bias are added in
+    The vector model m = F ω + c, with rests also + G a (`rig.estimation.gyroscope.vector_model`), is fitted to that
+    ramp about its middle. The change of the scale, at the mean speed of the sweeps, and that of the bias are added in
     quadrature. The base is upright; weights are for white noise.
     """
     looks = list(_list_averages(steps))

@@ -1,7 +1,7 @@
 """Kalibr's YAML: noise for its option --imu, and intrinsics in the form of its results.
 
 Kalibr (IccSensors.py, "scale-misalignment"): m_a = M_a a + b_a, m_g = M_g C_g ω + A_g C_g a + b_g with lower triangular
-M, in the frame of the accelerometer's axes, or without an accelerometer of the gyroscope's.
+M, in the frame of the accelerometer's axes, or, without an accelerometer, of the gyroscope's axes.
 """
 
 from collections.abc import Mapping

@@ -49,7 +49,7 @@ class DisplayRow:
     - combined: whether U includes all contributors; otherwise it is two standard deviations of the noise.
     - scale: the scale factors with U.
     - held_at: the conditions of validity at the end of a run ("at ±60.0 °/s").
-    - model: the model of correction or reading ("g = K (m + b)"), of which the end of a run shows the first equation.
+    - model: the model of correction or reading ("g = K (m + b)"); the end of a run shows only its first equation.
     - noun: the name of numbers without scale factors.
     - labels: the labels of the numbers.
     """

@@ -146,7 +146,7 @@ def _list_others(layout: TableLayout, entries: Sequence[ColumnEntry]) -> list[st
 
 
 def _name_once(names: list[str]) -> list[str]:
-    """Return the names with repeated ones blanked, because the first of two sensors of one name is read."""
+    """Return the names, blank where one is repeated: of two sensors with the same names, only the first is read."""
     return [name if name not in names[:index] else "" for index, name in enumerate(names)]
 
 
@@ -218,8 +218,8 @@ def _group_columns(
 ) -> Iterator[_ColumnGroup]:
     """Yield the columns that vary, in groups with values in the same rows: one group for each rate of the logger.
 
-    Left out are columns of a reference: next to a quaternion its positions too, which look like readings; and the
-    numbers of the rows, to which pandas gives no heading.
+    Columns of a reference are left out (next to a quaternion also positions, which look like readings), and so are row
+    numbers, which pandas writes without a heading.
     """
     names = _name_once([_plain_name(layout, index) for index in range(len(layout.headings))])
     used = {layout.time, *quaternion.values(), *(i for i, name in enumerate(layout.headings) if name in REFERENCE)}

@@ -144,7 +144,7 @@ def refusals(sensor: str, names: ParameterNames, parameters: Mapping[str, float]
 
 
 def read_correction(names: ParameterNames, parameters: Mapping[str, float]) -> OnboardCorrection:
-    """Return the correction to undo, from parameters without `refusals`.
+    """Return the correction to undo, from parameters that `refusals` does not refuse.
 
     Raise ValueError for an orientation that is refused.
     """

@@ -1,8 +1,8 @@
 """The supervision of the rig's ability to stop an arm under control without the client.
 
 Local control disables every independent stop, and neither the states nor the client report it. The dashboard reports it
-if polled (from 5.6 on), as do the Robot API of a PolyScope X (from 10.12 on), and the primary interface, whose
-connections the controller closes at that moment (the maker's client library, and issue 459 of its ROS driver). A
+if polled (from 5.6 on), as does the Robot API of a PolyScope X (from 10.12 on). At that moment the controller also
+closes the connections of the primary interface (the maker's client library, and issue 459 of its ROS driver). A
 controller of the CB3 series has no local control.
 """
 

@@ -2,7 +2,7 @@
 
 All limits depend on the model: the clearance between wrist and forearm, joint speeds, payload. Controllers report the
 type as a number (the maker's client library, `RobotType`), which later models share with earlier ones of the same
-construction, so the lengths, and the series by the software's version, decide as well.
+construction. So the lengths are compared too, and the series by the software's version.
 """
 
 from collections.abc import Mapping

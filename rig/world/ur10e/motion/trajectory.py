@@ -101,7 +101,7 @@ def plan_joint_move(
 def plan_soft_joint_move(
     start_rad: Joints, end_rad: Joints, speed_rad_s: float, acceleration_rad_s2: float, limits_rad_s: Joints
 ) -> Trajectory:
-    """Plan a moveJ that a controller plays as a program of its own: it starts gently, and stops as any other.
+    """Plan a moveJ that a controller plays as a program of its own: it starts gently, and stops like any other.
 
     In logs of a UR3 and of the maker's simulator the acceleration grows with the square of time in 19 steps of 8 ms, to
     1.38 times the requested acceleration; then it has the requested value. A move that is too slow or too short for
