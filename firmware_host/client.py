@@ -131,7 +131,8 @@ class Board:
     def begin_by_hand(self, sensor: int, moves: int, scale_std: float) -> None:
         """Have the board calibrate a sensor that a hand turns while it streams, set up with accelerations.
 
-        It ends after at least `moves` (1 to 255), once the scale's standard uncertainty is at most `scale_std`.
+        The session ends after at least `moves` (1 to 255), once the scale's standard uncertainty is at most
+        `scale_std`.
         """
         self._ask("by_hand", {"sensor": sensor, "moves": moves, "scale_std": scale_std})
 

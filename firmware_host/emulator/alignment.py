@@ -13,9 +13,9 @@ _ENOUGH = 1_000  # aligned runs after which an instruction is trusted
 
 
 class AlignmentWatch:
-    """The check of the base register of every such instruction before it runs, from its block's first run on.
+    """The check of the base register of every word access before it runs, from the first run of its block on.
 
-    It watches only instructions in use: Unicorn goes through the whole list of hooks at each hooked instruction.
+    Only accesses in use are checked: Unicorn goes through the whole list of hooks at each hooked instruction.
     """
 
     def __init__(self, engine: Engine) -> None:

@@ -186,7 +186,7 @@ def _add_polynomials(
     add: Callable[[ResultT, "OverTemperature"], tuple[ResultT, "OverTemperature"]],
     polynomials: "Polynomials",
 ) -> tuple[dict[str, ResultT], "Polynomials"]:
-    """Return a quantity's results and its polynomials; the uncertainty of each is added to that of the other."""
+    """Return a quantity's results and its polynomials, both with the combined uncertainty of the two."""
     settled = {name: add(results[name], fits[quantity]) for name, fits in polynomials.items() if quantity in fits}
     added = {name: result for name, (result, _) in settled.items()}
     combined = {name: {**polynomials[name], quantity: fit} for name, (_, fit) in settled.items()}

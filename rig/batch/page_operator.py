@@ -90,7 +90,7 @@ class OnPage:
 def open_page(present: Present, address: PageAddress) -> Iterator[tuple[OnPage, str]]:
     """Open the page that shows `present` during the block; yield the page and its URL.
 
-    Its last state shows how the station ended. Raise Refused `page_address`.
+    The page's last state shows how the station ended. Raise Refused `page_address`.
     """
     sections, control = Sections(), Control(may_answer=False)
     voice = OnPage(sections, control)

@@ -59,7 +59,8 @@ def add_attitude(average: Average, motion: ArmMotion) -> Average:
 def estimate_bias_drift(rests: Sequence[Average]) -> Array:
     """Return the variance (3,) of the bias between rests, (rad/s)², in excess of the noise of a rest.
 
-    It is zero unless χ² over all axes is significant at 0.999, so noise does not inflate a steady sensor's variance.
+    The variance is zero unless χ² over all axes is significant at 0.999, so noise does not inflate a steady sensor's
+    variance.
     """
     from scipy.special import chdtri
 

@@ -37,7 +37,7 @@ def live_section(event: HandSeen) -> Section:
 
 
 def step(event: HandSeen) -> Section:
-    """Return the progress through the list; the remaining time is unknown."""
+    """Return the progress of the session's moves; the remaining time is unknown."""
     count = event.accepted + len(event.pairs) + len(event.turns)
     return {
         "number": event.accepted,

@@ -30,7 +30,7 @@ def plan_by_hand(
 
 @dataclass(frozen=True, slots=True)
 class WantedMoves:
-    """The list of a session: the numbers of flips between faces and of whole turns."""
+    """The moves wanted in a session: the numbers of flips between faces and of whole turns."""
 
     flips: int
     turns: int

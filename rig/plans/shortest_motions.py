@@ -46,7 +46,7 @@ def vary_attitudes(config: RigConfig) -> Iterator[Motion]:
 
 
 def vary_imu(config: RigConfig) -> Iterator[Motion]:
-    """Yield sweeps with attitudes; sweeps are single turns at one speed, one period of an accelerometer's wave."""
+    """Yield sweeps with attitudes; all sweeps are single turns, one period of gravity's wave, at one speed."""
     turns = [motion for motion in vary_arm(config) if motion[1] == TURNS_DEG[0] and not motion[2].get("speeds_deg_s")]
     for (family, turned, keys), (attitudes, _, stood) in product(turns, vary_attitudes(config)):
         yield (*family, *attitudes), turned, {**keys, **stood}

@@ -47,7 +47,8 @@ class Memory:
 class MountedSensor:
     """A sensor of this run: its name, its part, and its board (None: a port of its own).
 
-    `last` is the last calibration of its serial number, `other_board` the last one on a board if that was another.
+    `last`: the last calibration of its serial number; `other_board`: the last one on a board, if that was another
+    board.
     """
 
     name: str

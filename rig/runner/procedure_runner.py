@@ -413,7 +413,7 @@ class Rig:
     def solve_on_board(self) -> None:
         """Let the board compute its own calibration from its averages, for comparison with the host's.
 
-        It does so only after the last stage, from the sweeps of all stages, by their speeds alone.
+        The board does so only after the last stage, from the sweeps of all stages, by their speeds alone.
         """
         if self.onboard is not None and self.last:
             self.onboard.solve()

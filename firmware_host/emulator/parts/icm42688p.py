@@ -70,8 +70,8 @@ class Icm42688P:
     its instant, and noise is drawn per conversion. `acceleration`: see `Accelerometer`. `oscillator_ppm`: the error of
     the part's own oscillator, and so of its data rate; the data sheet allows a percent (section 4.10).
 
-    It converts while both sensors are in low-noise mode at one data rate and the data-ready interrupt is routed to
-    INT1; otherwise it does not convert, and reading its outputs fails the run. The data sheet does not state that
+    The part converts while both sensors are in low-noise mode at one data rate and the data-ready interrupt is routed
+    to INT1; otherwise it does not convert, and reading its outputs fails the run. The data sheet does not state that
     outputs are frozen during a read: here a conversion during a read changes the rest of it. The motion ramps up
     linearly while the gyroscope starts.
     """

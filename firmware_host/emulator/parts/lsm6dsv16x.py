@@ -70,9 +70,9 @@ class Lsm6dsv16x:
     its instant, and noise is drawn per conversion. `acceleration`: see `Accelerometer`. `oscillator_ppm`: the error of
     the part's own oscillator, and so of its data rate; within a percent in the high-accuracy mode (table 3).
 
-    It converts while both sensors are in that mode at one data rate; other modes fail the run. A read of a high byte of
-    a sensor's outputs clears its flag. The interrupt line follows the flag unless it is pulsed. The motion ramps up
-    linearly while the gyroscope starts.
+    The part converts while both sensors are in that mode at one data rate; other modes fail the run. A read of a high
+    byte of a sensor's outputs clears its flag. The interrupt line follows the flag unless it is pulsed. The motion
+    ramps up linearly while the gyroscope starts.
     """
 
     name = "LSM6DSV16X"

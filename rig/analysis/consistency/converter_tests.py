@@ -176,7 +176,7 @@ def _find_spikes(windows: Sequence[RawReadings], step_counts: Array) -> tuple[fl
 
 
 def _find_scatter_around(deviations: Array) -> Array:
-    """Return the scatter (n, 3) of the readings around each one: a burst of vibration in a turn is no spike."""
+    """Return the scatter (n, 3) of the readings near each reading; within a burst of vibration it is large."""
     sizes = np.pad(np.abs(deviations), ((AROUND, AROUND), (0, 0)), mode="reflect")
     around = np.lib.stride_tricks.sliding_window_view(sizes, 2 * AROUND + 1, axis=0)
     scatter: Array = 1.4826 * np.median(around, axis=-1)

@@ -32,7 +32,8 @@ def check_sweeps_steady(data: ExternalData) -> None:
 def estimate_changes(data: ExternalData, matrix: Array) -> Array:
     """Return the covariance (12, 12) of F `matrix` (3, 3), row by row, and the bias due to changes over the rows.
 
-    It covers an abrupt change, and changes of the bias from rest to rest. It is zero if the rows show no change.
+    The covariance includes an abrupt change, and changes of the bias from rest to rest; it is zero if the rows show no
+    change.
     """
     change = data.change
     abrupt = change.find_covariance(matrix) if change is not None and _counts(change) else np.zeros((12, 12))

@@ -73,7 +73,7 @@ def _critical_value(dof: float) -> float:
 def _motion_std_rad_s(turned_rad_s: Array) -> float:
     """Return the standard deviation, about any axis, of the body's undetected motion averaged over all rests.
 
-    It is estimated from the scatter of the reference's rates (k, 3), and inflated by Student's t for few rests.
+    The estimate is from the scatter of the reference's rates (k, 3), and inflated by Student's t for few rests.
     """
     count = len(turned_rad_s)
     scatter = float(np.sqrt(np.var(turned_rad_s, axis=0, ddof=1).mean()))

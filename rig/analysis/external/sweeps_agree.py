@@ -95,8 +95,8 @@ def sweep_errors(solution: VectorSolution, data: ExternalData) -> SweepErrors | 
     def inflate(to_values: Array, dof: float, noise_dof: float) -> Array:
         """Return the covariance (q, q), without noise, of values with derivatives `to_values` (q, 12) by F and c.
 
-        It holds for errors of the median size. Each value's part is scaled so that, together with the noise, twice its
-        standard uncertainty is the U over the posterior distribution of the sizes.
+        The covariance is for errors of the median size. Each value's part is scaled so that, together with the noise,
+        twice its standard uncertainty is the U over the posterior distribution of the sizes.
         """
         by_noise, of_rate, of_axis, by_wrong = (
             to_values @ effects @ effects.T @ to_values.T for effects in (noise, by_rate, by_axis, wrong)

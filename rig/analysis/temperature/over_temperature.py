@@ -90,7 +90,7 @@ def correct_files(data: ExternalData, reference_c: float) -> tuple[ExternalData,
 
 
 def add_rate_polynomials(result: SensorResult, polynomials: OverTemperature) -> tuple[SensorResult, OverTemperature]:
-    """Return a gyroscope's calibration and polynomials; the uncertainty of each is added to that of the other."""
+    """Return a gyroscope's calibration and polynomials, both with the combined uncertainty of the two."""
     parameters = np.r_[result.scale, result.bias_rad_s]
     if result.uncertainty is None:
         return result, combine_with_reference(polynomials, np.diag(RATE.parameter_signs) @ parameters, ())
@@ -101,7 +101,7 @@ def add_rate_polynomials(result: SensorResult, polynomials: OverTemperature) -> 
 def add_acceleration_polynomials(
     result: AccelerometerResult, polynomials: OverTemperature
 ) -> tuple[AccelerometerResult, OverTemperature]:
-    """Return an accelerometer's calibration and polynomials; the uncertainty of each is added to that of the other."""
+    """Return an accelerometer's calibration and polynomials, both with the combined uncertainty of the two."""
     budget, combined = _combine(ACCELERATION, polynomials, np.r_[result.triad.scale, result.bias_m_s2], result.budget)
     return replace(result, budget=budget), combined
 

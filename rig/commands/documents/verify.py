@@ -158,7 +158,7 @@ def find_signed_holder(
 ) -> tuple[str | None, tuple[Refused, ...]]:
     """Return the signed file that contains an unsigned file, or None, and the problems of its signer.
 
-    It is attached under its name, or else under another name.
+    The unsigned file may be attached under its own or under another name.
     """
     from rig.report.signatures.findings import not_as_signed, not_attached
 

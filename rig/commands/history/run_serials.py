@@ -36,8 +36,8 @@ def find_other_board(
 ) -> str | None:
     """Return, for a message, the other serial number under which the history has a sensor on this board, and its date.
 
-    It is that of the newest calibration of one of the `parts`. Return None if this is one of `own_serial_numbers`, if
-    there is none, or if the history does not answer.
+    The number is that of the newest calibration of one of the `parts`. Return None if this is one of
+    `own_serial_numbers`, if there is none, or if the history does not answer.
     """
     from rig.history.storage.address import choose_history_address
 

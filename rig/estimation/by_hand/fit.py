@@ -162,7 +162,7 @@ def _leverages(design: Array, covariance: Array) -> Array:
 def estimate_stds(rows: Sequence[Factor], now: HandStds, trusted: int | None = None) -> tuple[list[Factor], HandStds]:
     """Return the rows with re-estimated standard deviations, and these standard deviations.
 
-    They come from the residuals of the first `trusted` rests, by default of all; `now` holds the current ones.
+    They are from the residuals of the first `trusted` rests, by default of all; `now` contains the previous values.
     """
     rows = list(rows)
     for _ in range(SIZED):

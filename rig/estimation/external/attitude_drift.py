@@ -303,9 +303,9 @@ def _find_matrix_changes(sensitivities: Array, nearby: Array) -> Array:
 
 
 def _weigh_bias(averaged: FixedAttitudes, fixes: Fixes) -> Array:
-    """Return the weights (n,) of the increments in the mean bias, that of the rests: their durations.
+    """Return the weights (n,) of the increments in the mean bias: the durations of those at rest.
 
-    A gyroscope's bias is its reading at rest. Without rests it is the mean over the whole recording.
+    A gyroscope's bias is its reading at rest. Without rests all increments have their durations as weights.
     """
     joined = np.flatnonzero(fixes.joined)
     lasts_s = np.diff(averaged.middles_s)[joined]

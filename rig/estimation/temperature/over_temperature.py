@@ -375,7 +375,7 @@ class _ParameterFits:
     def _fit(
         self, orders: tuple[int, int], values: Array, covariance: Array, fixed: Array, aicc: float
     ) -> _TemperatureFit:
-        """Return the fit of `orders` with `values` (p,): by axis those of scale, bias and loop, and last the lag."""
+        """Return the fit of `orders` from its `values` (p,): scale, bias and loop of each axis, then the lag."""
         of_scale, of_bias = orders
         per_axis = (len(values) - 1) // 3
         by_axis = values[:-1].reshape(3, per_axis)

@@ -95,7 +95,7 @@ def _find_dense_rests(turning: Turning, clock_s: float) -> list[tuple[float, flo
 def _find_rate_rad_s(attitudes: Array, times_s: Array) -> float:
     """Return the size of the body's mean rate over attitudes (k, 3, 3) at times (k,).
 
-    It is that between the mean attitudes of the first and the second half.
+    The rate is that between the mean attitudes of the first and the second half.
     """
     half = len(times_s) // 2
     if not half:

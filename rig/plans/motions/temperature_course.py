@@ -108,7 +108,7 @@ class TemperatureCourse:
 class Ramp:
     """The setpoint that a heater follows, and the power for it: 0 to `most_power`.
 
-    It changes at `rate_k_s` and waits for a sensor that cannot follow.
+    The setpoint changes at `rate_k_s`, and waits for a sensor that cannot follow.
     """
 
     rate_k_s: float

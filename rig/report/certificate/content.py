@@ -342,7 +342,7 @@ def _traceable(result: ResultDocument, stated: StatedFacts) -> bool:
 def _find_held_still(result: ResultDocument, stated: StatedFacts) -> Iterator[HeldStill]:
     """Yield the sensors measured at rest, kind by kind.
 
-    They are traceable if the standard was measured, and its uncertainty and origin are stated.
+    A sensor is traceable if its standard was measured, and the standard's uncertainty and origin are stated.
     """
     for kind in kinds():
         entries = tuple(finding.entry for finding in kind.find(result))

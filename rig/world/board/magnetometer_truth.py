@@ -16,7 +16,8 @@ from rig.world.site import Vector
 class MountedMagnetometer:
     """A magnetometer mounted on the flange; `truth` holds its errors.
 
-    It sits as `mounting` states, rotated by the vector `mounting_error_deg`, `offset_mm` from the flange's centre.
+    The magnetometer is mounted as `mounting` states, rotated by the vector `mounting_error_deg`, `offset_mm` from the
+    flange's centre.
     """
 
     def __init__(

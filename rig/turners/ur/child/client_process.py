@@ -170,7 +170,7 @@ class _Child:
     def watch_parent(self) -> None:
         """Stop the arm if the parent is silent for too long, so that nothing supervises the arm.
 
-        This needs a thread of its own, because sending states to a parent that does not read them finally blocks.
+        The watch needs a thread of its own, because sending states to a parent that does not read them finally blocks.
         """
         while True:
             time.sleep(TICK_S)
@@ -182,7 +182,7 @@ class _Child:
     def watch_move(self) -> NoReturn:
         """Report the end of a move.
 
-        This needs a thread of its own, because the client may take long to answer, and heartbeats cannot wait.
+        The watch needs a thread of its own, because the client may take long to answer, and heartbeats cannot wait.
         """
         while True:
             time.sleep(MOVE_POLL_S)
