@@ -48,7 +48,7 @@ class Bench(Protocol):
         ...
 
     def run(self, part: BatchPart, folder: Path, desk: "Desk") -> PartEnded:
-        """Run the part, or continue the run in its folder. Raise Refused if nothing has moved, Fault."""
+        """Run the part, or continue the run in its folder. Raise Refused if nothing has moved, otherwise Fault."""
         ...
 
 

@@ -28,5 +28,5 @@ def is_own(sha256: str) -> bool:
 
 
 def _folder() -> Path:
-    """Return the folder of the notes. Raise as `rig_folder` does."""
+    """Return the folder of the files named by hashes. Raise as `rig_folder` does."""
     return rig_folder() / "own"

@@ -109,9 +109,9 @@ def _gain(weights: Array) -> float:
 def _slow_line_variance(readings: Array, turn: SampledTurn, slow: Array, change: Array, explained: Array) -> Array:
     """Return the variance (3,) of the mean due to columns `slow` (n, k) of lines, which are poorly determined.
 
-    Weights that do not remove these lines, and differ by `change` (n,), give another mean. The variance is the square
-    of the difference, or that of the difference by the lines' fitted amplitudes at any phase, whichever is larger.
-    `explained` (n, m): columns of all else in the readings (n, 3).
+    Weights that do not remove these lines differ by `change` (n,) and give another mean. The variance is the larger of
+    two: the square of the difference, and its variance for the lines' fitted amplitudes at random phases. `explained`
+    (n, m): columns of everything else in the readings (n, 3).
     """
     without_ripple = _fit_residuals(np.column_stack([whole(readings), turn.uneven_rad_s]), readings)
     residuals = _fit_residuals(explained, readings)

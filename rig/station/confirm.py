@@ -12,7 +12,7 @@ NOT_AGREED = "Run again and agree, or agree in advance: --yes, in Python yes=Tru
 
 
 def ask_operator(announcement: Sequence[str], to_do: str = "start") -> bool:
-    """Show what will be done and ask until the operator agrees or not; return False without a terminal.
+    """Show what will be done and ask until the operator agrees or declines; return False without a terminal.
 
     Input typed before the question is ignored.
     """

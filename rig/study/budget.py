@@ -40,7 +40,7 @@ WARM_UP_S, STEP_K = 300.0, 1 / 16  # warm-up, and the resolution of the thermome
 
 @dataclass(frozen=True, slots=True)
 class Effects:
-    """Magnitudes of the effects: standard deviations, but half-widths of clock, offset, nonlinearity and warming.
+    """Magnitudes of the effects: standard deviations; for clock, offset, nonlinearity and warming half-widths.
 
     - `g_sensitivity_rad_s_g`: of every element; `axis_rad`: twist of each wrist's axis; `jitter_s`: of states' times.
     - `clock`, `clock_known`: error of the controller's clock, and standard uncertainty of its correction.

@@ -170,7 +170,7 @@ def _earth(surroundings: Surroundings, name: str, earth_rate: "EarthRate | None"
 
 
 def unknown_earth_rate(*, is_known: bool) -> Array:
-    """Return the Earth's rate as an unknown (3, k), rad/s, as in `KnownErrors`: k = 0 if the site states the rate."""
+    """Return the columns (3, k) of an unknown Earth's rate, rad/s, for `KnownErrors`; k = 0 if the rate is known."""
     return np.asarray(EARTH_RATE_RAD_S / np.sqrt(3) * np.eye(3)[:, : 0 if is_known else 3], dtype=np.float64)
 
 
@@ -295,7 +295,7 @@ def _wave_indices(motion: ArmMotion) -> dict[int, int]:
 
 
 def _end_patterns(interval: MotionInterval) -> list[Array]:
-    """Return a transfer's rate errors (3,), rad/s per radian of one moved joint's angle error at its start or end."""
+    """Return the rate errors (3,), rad/s per rad, of a transfer by angle errors of its moved joints at either end."""
     q_rad = interval.motion.angles(np.array([interval.start_s, interval.end_s]))
     axes = interval.motion.axes(q_rad) / (interval.end_s - interval.start_s)
     moved = [joint for joint in _wave_indices(interval.motion) if np.ptp(q_rad[:, joint]) >= STANDS_RAD]

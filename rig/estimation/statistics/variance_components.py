@@ -99,9 +99,9 @@ class MixedModel:
     def find_maxima(self, start: Array | None = None) -> Array:
         """Return the standard deviations (n, k) at the maxima of the posterior, the most probable first.
 
-        Few residuals may have several maxima, in which different causes explain the largest. Without a `start` the
-        search begins at the priors' medians and at points where one cause exceeds all others. Maxima less probable than
-        the first by more than `NEGLIGIBLE` are left out.
+        With few residuals there may be several maxima, at which different causes explain the largest residuals. Without
+        a `start` the search begins at the priors' medians and at points where one cause exceeds all others. Maxima less
+        probable than the first by more than `NEGLIGIBLE` are left out.
         """
         if start is not None:
             return np.exp([self._climb(np.log(start)).x])

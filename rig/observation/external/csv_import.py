@@ -271,7 +271,7 @@ def _observation(row: int, mean: Average, speed_rad_s: float, axis: Array) -> Ob
 
 
 def _check_noisy(mean: Average, row: int) -> None:
-    """Raise Fault `stuck_sensor` if an axis has one value throughout a row, so its mean is unknown within a step."""
+    """Raise Fault `stuck_sensor` if an axis has one value throughout a row, so that its mean is uncertain by a step."""
     quiet = np.flatnonzero(mean.noise_rad_s <= ROUNDING * np.abs(mean.mean_rad_s))
     if len(quiet):
         axis = int(quiet[0])

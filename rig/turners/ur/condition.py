@@ -88,7 +88,7 @@ def readiness(state: ArmState) -> Problem | None:
 
 
 def local_control_during_run(what: str) -> Problem:
-    """Describe a pendant that was switched to local control during a run; `what` shows it."""
+    """Describe a pendant that was switched to local control during a run; `what` states how that showed."""
     return Problem(
         "switched_to_local_control",
         what,

@@ -59,7 +59,7 @@ class Supervision:
 
     @property
     def interruption(self) -> Problem | None:
-        """The interruption of the program, even if its explanation may still come."""
+        """The interruption of the program, even while a later message may still explain it."""
         return None if self._interruption is None else self._interruption[0]
 
     def _limit(self, state: ArmState) -> Problem | None:
