@@ -244,7 +244,8 @@ class BoardStatus:
 class BoardObservation:
     """An average by the board of its stored readings, from `start_us` up to, not including, `end_us`.
 
-    The times are the board's, in microseconds; `mean_rad_s` is uncalibrated; `index` counts the sensor's observations.
+    The times are the board's, in microseconds; `mean_rad_s` is uncalibrated; `index`: the number of the sensor's
+    earlier observations.
     """
 
     index: int
@@ -372,7 +373,7 @@ class Calibration:
 class StoredCalibration:
     """A calibration in the board's flash, with the part and the range it was stored for.
 
-    `sequence` counts the calibrations ever stored for the sensor, from 1.
+    `sequence`: the number of calibrations ever stored for the sensor, including this one.
     """
 
     sequence: int

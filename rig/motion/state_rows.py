@@ -13,7 +13,7 @@ Scalar = Literal["f4", "f8", "i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8"]  # 
 
 @dataclass(frozen=True, slots=True)
 class StateField:
-    """A field of a turner's states besides times and joints: its name, which contains the unit, and type."""
+    """A field of a turner's states other than times and joints: its name, which contains the unit, and its type."""
 
     name: str
     type: Scalar

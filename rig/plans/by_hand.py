@@ -49,7 +49,7 @@ class WantedMoves:
 
 @dataclass(frozen=True, slots=True)
 class Open:
-    """The remainder of a list; `flips_done` counts the flips that were made."""
+    """The remainder of a list; `flips_done`: the number of flips that were made."""
 
     pairs: tuple[Pair, ...]
     turns: tuple[tuple[str, int], ...]

@@ -32,7 +32,7 @@ SectionT_contra = TypeVar("SectionT_contra", bound=ProcedureSection, contravaria
 class Planner(Protocol[SectionT_contra]):
     """A pure function that plans the steps from the turner's pose `start_q_rad` (home if None) without those in `done`.
 
-    The `index` of sweeps and dwells, by which `done` names them, counts through the whole procedure. Raise Refused if
+    The `index` of a sweep or dwell, by which `done` names it, is its number in the whole procedure. Raise Refused if
     the movement is impossible.
     """
 

@@ -122,7 +122,7 @@ def read_accelerometer(
 def read_magnetometer(
     name: str, recordings: Sequence[ObservedRun], result: "MagnetometerResult", uncertainty: Uncertainty
 ) -> ReferenceReadings:
-    """Return a magnetometer's readings in a run, which has no sweeps."""
+    """Return a magnetometer's readings in the dwells of a run; its sweeps are not used."""
     solution, movement = result.solution, Movement(result.measurements, NO_SWEEPS)
     channel = result.sensor.channel(FIELD)
     dwells = [dwell for recording in recordings for dwell in raw_field_dwells(name, recording)]

@@ -121,7 +121,7 @@ class Item:
 class ReadElsewhere:
     """The `readings` (n,) of an item, and the rows (N,) of sweeps or of attitudes of its `motion`, by column.
 
-    For "turns" by hand the readings show the motion, and one row has the user's declarations. Times count from
+    For "turns" by hand the readings show the motion, and one row has the user's declarations. Times are relative to
     `origin_s` of the files' clock. `other_rows` is the number of rows with readings of other sensors only. `note`
     states what the file's format does not specify about its readings, "" if nothing.
     """

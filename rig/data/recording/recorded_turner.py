@@ -28,7 +28,7 @@ class RecordedTurner:
     """A turner: its `kind`, by which it is registered, its maker and its model (None if unknown).
 
     `joints`: the names of its n joints, 0 to `MAX_JOINTS`, from the ground on; `geometry`: that of the chain of joints;
-    `fields`: those of its states besides times and joints; `reading_std_rad`: as in `TurnerIdentity`.
+    `fields`: those of its states other than times and joints; `reading_std_rad`: as in `TurnerIdentity`.
     """
 
     kind: Kind

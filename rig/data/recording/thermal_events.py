@@ -1,4 +1,4 @@
-"""The events of a calibration over temperature in its recording, besides its sweeps and dwells."""
+"""The events of a calibration over temperature in its recording, other than those of sweeps and dwells."""
 
 from dataclasses import dataclass
 from typing import Annotated

@@ -1,4 +1,4 @@
-"""The errors of readings besides the arm's attitudes: noise, the arm's repeatability, the sensor's own errors.
+"""The errors of readings other than the arm's attitude errors: noise, repeatability, the sensor's own errors.
 
 All are zero on average with prior variances, so they are part of the readings' covariance: they are predicted together
 with θ, whose uncertainty includes their undetermined part (Henderson, Biometrics 31 (1975) 423).

@@ -144,7 +144,7 @@ def session_of(runs: Sequence[RunData], name: str) -> HandRecording:
 
 
 def collect_inputs(settings: RunSettings, provenance: Provenance, sensor: RecordedSensor) -> SessionConditions:
-    """Return the inputs of a session's solution besides a sensor's readings.
+    """Return the inputs of a session's solution other than a sensor's readings.
 
     Without an accelerometer, the first face is the one requested first. Raise Refused `clock_unknown` if the error of
     the clock that stamps the readings is not stated.

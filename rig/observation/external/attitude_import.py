@@ -98,8 +98,8 @@ def read_attitudes(
 ) -> dict[str, Array]:
     """Return the columns (N,) of a file of attitudes in any format; `mapped` if its columns have other names.
 
-    Times of a text table count from `origin_s`. A row with `time_s` in place of `start_s` and `end_s` is valid at one
-    instant. `inverse` quaternions take table to body coordinates. Raise as `attitudes_in`; Refused `no_file`,
+    Times of a text table are relative to `origin_s`. A row with `time_s` in place of `start_s` and `end_s` is valid at
+    one instant. `inverse` quaternions take table to body coordinates. Raise as `attitudes_in`; Refused `no_file`,
     `wrong_columns`, `wrong_unit`, `not_a_number`.
     """
     in_format = attitudes_in(path)

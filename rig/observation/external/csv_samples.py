@@ -36,7 +36,7 @@ SPIKES = "spikes: each stands alone, far from those before and after, as no body
 
 @dataclass(frozen=True, slots=True)
 class SampleTable:
-    """The columns (n,) of a file of readings by name, without blanks; times count from `origin_s`.
+    """The columns (n,) of a file of readings by name, without blanks; times are relative to `origin_s`.
 
     `others`: number of rows without the wanted readings. `note`: what the readings lack, "" if nothing.
     """

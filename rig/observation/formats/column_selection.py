@@ -174,7 +174,7 @@ def _check_columns(path: Path, names: Sequence[str], header: Header) -> None:
 
 
 def _check_unit(path: Path, name: str, names: Sequence[str], header: Header) -> None:
-    """Raise Refused `wrong_unit` for an unknown name with the quantity of a missing column."""
+    """Raise Refused `wrong_unit` for an unknown name that differs from a missing column's name only in the unit."""
     own_names = header.names
     if name in own_names or "_" not in name or name.startswith("axis"):
         return

@@ -40,7 +40,7 @@ LINE = "line"  # an additional column: the number of each row's line
 class CsvTable:
     """A file's `columns` (n,) by name, NaN for a blank cell, and the `lines` (n,) of its rows.
 
-    Times count from `origin_s`, whole seconds: 0, except in files whose clock counts from 1970 or so.
+    Times are relative to `origin_s`, whole seconds: 0, except in files whose clock began in 1970 or so.
     """
 
     columns: dict[str, Array]
@@ -53,7 +53,7 @@ def read_columns(
 ) -> dict[str, Array]:
     """Return the columns of a file as `read_table` does; no cell may be blank.
 
-    Times count from `origin_s`. Raise Refused as `read_table` does, and `not_a_number` for a blank cell.
+    Times are relative to `origin_s`. Raise Refused as `read_table` does, and `not_a_number` for a blank cell.
     """
     table = read_table(path, header, largest_mb, mapped, origin_s)
     for name, column in table.columns.items():

@@ -147,7 +147,7 @@ def _sampling_step(fraction: Array) -> float:
 
 
 def _find_strongest(residuals: Array, previous: Array, fraction: Array, search: LineSearch) -> float | None:
-    """Return the cycles of the strongest line in residuals (n, axes) besides `previous` lines, or None."""
+    """Return the cycles of the strongest line in residuals (n, axes) other than `previous` lines, or None."""
     from scipy.ndimage import median_filter
 
     powers = np.abs(np.fft.rfft(apply_window(residuals).T)) ** 2

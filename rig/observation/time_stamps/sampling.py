@@ -74,7 +74,7 @@ class Sampling:
     def gaps(self, time_s: Array, fewest: int = 1) -> NDArray[np.bool_]:
         """Return a mask (n − 1,) of steps between readings at times (n,) with at least `fewest` readings missing.
 
-        With bad stamps, these are the steps of that length, and those from or to a late reading.
+        With bad stamps, these are the steps as long as such a gap, and those from or to a late reading.
         """
         if self.late is None:
             return np.asarray(self.missing >= fewest)

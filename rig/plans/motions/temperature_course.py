@@ -40,7 +40,7 @@ class TemperatureCourse:
             self._turn_round(self.sets[-1])
 
     def add_set(self, step: SetMeasured) -> None:
-        """Count a set, and reverse the direction if the set was at the end of the range."""
+        """Add a measured set, and reverse the direction if the set was at the end of the range."""
         self.sets.append(step)
         self._turn_round(step)
 

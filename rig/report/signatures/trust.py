@@ -111,7 +111,7 @@ def _other_name(certificate: "Certificate", expected: str | None) -> str:
 
 
 def find_unvouched(chain: "Sequence[Certificate]", trust: Trust) -> list["Certificate"]:
-    """Return the certificates in a signer's `chain`, besides the first, whose content nothing verifies.
+    """Return those certificates of a signer's `chain` whose content nothing verifies, apart from the first.
 
     The signature itself identifies the first. The others must be trusted, or issued by a trusted one or one of the
     chain.

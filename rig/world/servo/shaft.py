@@ -12,7 +12,7 @@ ITERATIONS = 12  # enough to invert the encoder's error to 1e-15 of a revolution
 
 
 class Shaft:
-    """The shaft's angle and rate at any time, past and planned; a ccw turn, seen on the horn, counts up.
+    """The shaft's angle and rate at any time, past and planned; a counterclockwise turn, seen on the horn, is positive.
 
     The loop is closed over the encoder, so the drive follows an angle as the encoder reads it, and the shaft's true
     angle contains the encoder's error: it turns unevenly if the readings are even.

@@ -316,7 +316,7 @@ class Robot:
             self.safety_mode = SafetyMode.NORMAL
 
     def release(self) -> None:
-        """Release the emergency stop button, still without power, or reset the safeguard; a program remains paused."""
+        """Release the emergency stop button (the power stays off) or reset the safeguard; a program remains paused."""
         if self.safety_mode in (SafetyMode.ROBOT_EMERGENCY_STOP, SafetyMode.SAFEGUARD_STOP):
             self.safety_mode = SafetyMode.NORMAL
 
