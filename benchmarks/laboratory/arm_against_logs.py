@@ -1,8 +1,8 @@
 """Compare the simulated arm's joints with logs of real ones: `python benchmarks/laboratory/arm_against_logs.py LOG...`.
 
 A LOG is a CSV file: as the maker's RTDE recorder writes it (a heading, spaces between), or one without a heading from
-`jointwise_motion` of github.com/shamilmamedov/dynamic_calibration (time, angles, rates, …), in which the joint that its
-name ends with swings. Prints the same figures for each log and for the simulated arm, by the functions of
+`jointwise_motion` of github.com/shamilmamedov/dynamic_calibration (time, angles, rates, …), whose name ends with the
+number of the joint that swings. Prints the same figures for each log and for the simulated arm, by the functions of
 tests/support/motions/joint_figures.py, with which tests/world/ur10e/test_measured_joints.py tests the arm.
 docs/simulated-arm.md lists the logs and the results.
 """

@@ -1,9 +1,9 @@
 """Errors and stated uncertainties in new laboratories: `python benchmarks/laboratory/hidden_worlds.py FOLDER`.
 
-Draws laboratories (tests/support/laboratories/hidden_worlds.py): 60 with a quiet LSM9DS1, 40 with a noisy one, 20 with
-an ADIS16465 beside a quiet one, 20 of `imu` with three parts, 10 with a KVH 1775, 6 with a quiet LSM9DS1 on each of
-four other arms, 6 with an autopilot, and 100 pairs and 40 of `imu` on arms that ripple by any order of the turn.
-Runs `rig run` in each, and keeps its recording in FOLDER/family/seed; existing ones are not repeated.
+Draws laboratories (tests/support/laboratories/hidden_worlds.py). On a UR10e: 60 with a quiet LSM9DS1, 40 with a noisy
+one, 20 with a quiet one and an ADIS16465, 20 `imu` with three parts, 10 with a KVH 1775, 6 with an autopilot. On each
+of four other arms: 6 with a quiet LSM9DS1. On arms that ripple by any order of the turn: 100 pairs and 40 `imu`. Runs
+`rig run` in each, and keeps its recording in FOLDER/family/seed; existing ones are not repeated.
 
 Then all are solved. A table states for each family, part and parameter: RMS of error over u, the share within U, the
 largest error over U, the spread of u, and the undamaged runs that were refused, with the reason. `--solve-only` runs

@@ -1,8 +1,8 @@
 """The processor time of a history: `python benchmarks/laboratory/history.py [--calibrations N]`.
 
-Prints, each pair measured in one run: the time to look up one serial number among N calibrations and among a hundredth
-of them, and the ratio; the time that certificate and entry add to the end of a run, in a new process with a run's
-modules loaded; and the time of `rig --help` and of a Python that imports nothing.
+Prints three times, each measured together with its comparison: to look up one serial number among N calibrations,
+compared with a hundredth of them; what certificate and entry add to the end of a run, in a new process with a run's
+modules loaded; and `rig --help`, compared with a Python that imports nothing.
 """
 
 import argparse

@@ -3,8 +3,8 @@
 One world and one board that is never reset; three runs of four in one rig process, the fourth in a process of its own;
 every tenth calibration is stored on the board. After the second run the laboratory waits for an hour of its own time,
 so that the board's counter of microseconds wraps in the middle of the third. Prints one line a run, then memory, open
-files, and the course of each parameter; fails if memory has grown by more than 5 % after the first tenth, if a file, a
-thread or a process remains, if a parameter drifts by more than three standard uncertainties of its slope, or if its
+files, and the course of each parameter. It fails if memory has grown by more than 5 % after the first tenth, if a file,
+a thread or a process remains, if a parameter drifts by more than three standard uncertainties of its slope, or if its
 scatter contradicts the stated uncertainty.
 """
 

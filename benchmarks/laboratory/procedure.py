@@ -1,7 +1,7 @@
 """The duration of a whole procedure: `python benchmarks/laboratory/procedure.py [CONFIG]`.
 
-Runs the configuration twice, at its own time scale and in real time, and prints the wall time of each command and the
-ratio of the arm's time (first motion to last, by the controller's clock) to that of the planned motions and rests.
+Runs the configuration twice, at its own time scale and in real time. Prints the wall time of each command, and the
+arm's time (first motion to last, by the controller's clock) relative to that of the planned motions and rests.
 """
 
 import subprocess

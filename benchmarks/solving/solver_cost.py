@@ -6,8 +6,8 @@ The firmware's own solver.c and a Levenberg–Marquardt in C (benchmarks/solving
 the firmware's compiler and flags and called with the same observations. Counts are instructions, not time.
 
 Both must be equally accurate: every answer is compared with the same observations solved in double precision.
-Levenberg–Marquardt stops after a step below its tolerance, which is the largest power of ten with which its
-root-mean-square differences, in scale and in bias, are within twice those of the closed form, as far as single
+Levenberg–Marquardt stops after a step below its tolerance. This is the largest power of ten with which its
+root-mean-square differences, in scale and in bias, are at most twice those of the closed form, as far as single
 precision permits. It must work for any number of observations; the last row is for six only, with every loop written
 out as the closed form's are.
 """

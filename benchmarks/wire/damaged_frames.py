@@ -8,8 +8,8 @@ same, block by block, and the board must continue to answer; the host's must rec
 blocks alone. A hundred thousand damaged messages each of RTDE, dashboard and primary interface to the rig's readers and
 to the simulated controller's: no crash, no hang, a named end.
 
-The expected number of wrong frames: damage that leaves a block of sound COBS passes a CRC of 32 bits with a chance of
-2⁻³².
+The expected number of wrong frames: a damaged block that is still valid COBS passes a CRC of 32 bits with a probability
+of 2⁻³².
 """
 
 import argparse

@@ -3,8 +3,8 @@
 Prints, for lines of several qualities, the numbers of damaged, accepted and lost frames. Fails if the host's receiver
 or the firmware's accepts a frame that was not sent, misses an intact one, or counts a loss wrong.
 
-The expected number of wrong frames: damage that leaves a block of sound COBS is as good as random to the CRC, so a
-damaged block passes one of 32 bits with a probability of at most 2⁻³², and would pass one of 16 bits with 2⁻¹⁶.
+The expected number of wrong frames: a damaged block that is still valid COBS is random to the CRC, so it passes a CRC
+of 32 bits with a probability of at most 2⁻³²; it would pass one of 16 bits with 2⁻¹⁶.
 """
 
 import sys

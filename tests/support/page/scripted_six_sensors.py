@@ -31,7 +31,7 @@ def six_moving(until_s: float) -> Iterator[RunEvent]:
 
 
 def six_found() -> ResultDocument:
-    """Return the result of a recording of one of them, for all of them."""
+    """Return a result for all six, copied from the recording of one sensor."""
     one = read_result(IMU)
     checks = tuple(
         check.model_copy(update={"name": check.name.replace("gyro", name), "sensor": check.sensor and name})

@@ -1,7 +1,7 @@
 """The ripple and vibration of an arm's speed, drawn over all orders: 1 to 400 times a turn, 0 to 10 % of the rate.
 
-Several lines, lines near each other, near a harmonic of the turn and near either end of the band in which lines are
-looked for; so small that no check detects them, and so large that every check does.
+Several lines are drawn: near each other, near a harmonic of the turn, or near an end of the searched band; from so
+small that no check detects them to so large that every check does.
 """
 
 from collections.abc import Sequence

@@ -239,8 +239,9 @@ SESSIONS: Mapping[str, Callable[[Robot], ClientSession]] = {
 def carry_to_world(name: str, count: int, seed: int) -> Counter[str]:
     """Send `count` damaged messages to the simulated controller's sessions of a protocol, a tick after each.
 
-    Return the counts of its reactions. A session gets undamaged messages between the damaged ones, and is replaced when
-    it closes or after some messages, because one that waits for the rest of a message reads none of the following ones.
+    Return the counts of its reactions. A session gets undamaged messages between the damaged ones. It is replaced when
+    it closes, or after some messages, because it may be waiting for the rest of a message and read none of the
+    following ones.
     """
     random, ends, laboratory = Random(f"{name} {seed}"), Counter[str](), _laboratory()
     session: ClientSession | None = None
