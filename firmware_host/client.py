@@ -129,7 +129,7 @@ class Board:
         return BoardSolution.decode(self._ask("solve", {"sensor": sensor, "method": protocol.METHODS.index(method)}))
 
     def begin_by_hand(self, sensor: int, moves: int, scale_std: float) -> None:
-        """Have the board calibrate a sensor that a hand turns while it streams, set up with accelerations.
+        """Have the board calibrate a streaming sensor, set up with accelerations, while a hand turns it.
 
         The session ends after at least `moves` (1 to 255), once the scale's standard uncertainty is at most
         `scale_std`.

@@ -30,7 +30,7 @@ def describe_ports() -> str:
 
 
 def find_ports() -> dict[str, str]:
-    """Return this computer's serial ports with a device, by name, each in words. Raise ImportError without pyserial."""
+    """Return a description of each serial port with a device, by its name. Raise ImportError without pyserial."""
     from serial.tools.list_ports import comports
 
     ports = [port for port in sorted(comports()) if port.hwid != "n/a"]  # else a name without a device behind it

@@ -14,9 +14,9 @@ from rig.station.questions import COMMAND_WORDS, Kind, Question, Voice, is_agree
 
 @dataclass(frozen=True, slots=True)
 class Operator:
-    """The source of serial numbers and answers: an operator, asked through a `voice`, or a list of `numbers`.
+    """The source of serial numbers and answers: an operator at a terminal or page (`voice`), or a list of `numbers`.
 
-    An empty number ends the batch. Without a voice no questions are asked, so a doubt cannot be overridden. A refused
+    An empty number ends the batch. Without a `voice` no questions are asked, so a doubt cannot be overridden. A refused
     number of a list is entered in the table; a refused typed number is typed again. `asking` is open during a question
     between two runs, with its subject, such as "to mount the part".
     """

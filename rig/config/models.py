@@ -241,7 +241,7 @@ class SensorsConfig(Section):
     @field_validator("sensors")
     @classmethod
     def match_sensors(cls, sensors: dict[str, SensorSection]) -> dict[str, SensorSection]:
-        """Refuse sensors of one part, port, IMU or name, an overloaded port, and a second or a sole reference."""
+        """Refuse two sensors of one part, port, IMU or name, an overloaded port, two references, or only references."""
         sensor_at: dict[str, str] = {}
         for name, sensor in sensors.items():
             if sensor.mavlink is not None:

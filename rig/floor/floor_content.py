@@ -22,10 +22,11 @@ UNITS_OF_AGE = ((86_400, "days"), (3600, "h"), (60, "min"), (1, "s"))
 
 
 def rigs(stations: Iterable[StationState], more: int = 0) -> dict[str, Any]:
-    """Return the rigs' present states in sections "rig 0", "rig 1" …; "rigs" counts them, and how many `more` exist.
+    """Return the rigs' present states in sections "rig 0", "rig 1" …; "rigs" has their number, and `more`.
 
     The states have separate sections because only changed sections are sent. A section without a rig is None. A rig
-    that has become silent without a last state is dead. A state that this version cannot read is `unread`.
+    that has become silent without a last state is dead. A state that this version cannot read is `unread`. `more`: the
+    number of rigs that are not shown.
     """
     cards = [_card(station) for station in stations]
     sections = {f"rig {i}": cards[i] if i < len(cards) else None for i in range(MOST_RIGS)}

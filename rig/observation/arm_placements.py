@@ -22,7 +22,7 @@ NO_REST = Rested({}, {}, {}, (), ())
 def placements_on_arm(
     recordings: Sequence[ObservedRun], name: str, quantity: Quantity, thresholds: ObservationThresholds
 ) -> Placements:
-    """Average a sensor's readings in all dwells; of a repeated dwell the last recording is used.
+    """Average a sensor's readings in all dwells; if a dwell was repeated, only its last recording is used.
 
     Raise Fault `no_attitudes`, `lost_samples` or `saturation`.
     """

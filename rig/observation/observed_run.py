@@ -108,7 +108,7 @@ def observe_run(
 
 
 def observe_runs(runs: Sequence[RunData], corrections: Mapping[int, Array] = AS_STATED) -> tuple[ObservedRun, ...]:
-    """Observe each recording of a run with a finished sweep or dwell; of repeated steps the last is used.
+    """Observe each recording of a run with a finished sweep or dwell; if a step was repeated, the last is used.
 
     The first recording's thresholds apply to all. `corrections`: by the procedure's stage, as in `observe_run`. Raise
     as `turner_of` does, and Fault as `observe_run` does.

@@ -1,4 +1,4 @@
-"""The list of moves in a calibration by hand, and the next move to request. Pure.
+"""The wanted moves of a calibration by hand, and the next move to request. Pure.
 
 Twelve flips over all six faces determine scale factors and angles between axes best in a given time; whole turns are a
 check that needs no flat table. The order does not matter: the next request follows from the item's face and its past
@@ -49,7 +49,7 @@ class WantedMoves:
 
 @dataclass(frozen=True, slots=True)
 class Open:
-    """The remainder of a list; `flips_done`: the number of flips that were made."""
+    """The wanted moves that remain in a session; `flips_done`: the number of flips that were made."""
 
     pairs: tuple[Pair, ...]
     turns: tuple[tuple[str, int], ...]
@@ -64,7 +64,7 @@ class Open:
 
 
 def still_open(wanted: WantedMoves, moves: Sequence[HandMove], faces_up: Sequence[Face]) -> Open:
-    """Return the moves of a list that remain; `faces_up` are the faces that were up at rest."""
+    """Return the `wanted` moves that remain after `moves`; `faces_up` are the faces that were up at rest."""
     pairs, turns, flips = list(wanted.pairs), list(wanted.about), wanted.flips
     for move in moves:
         if move.kind == "flip":

@@ -277,7 +277,7 @@ class ControlSession:
         self._world.line.silent = bool(on)
 
     def _host_baud(self, baud: float | None) -> None:
-        """Set the baud rate of the host's end, which TCP does not transmit, other than the board's."""
+        """Set a baud rate of the host's end that differs from the board's, because TCP transmits none."""
         self._world.line.host_baud = baud
 
 

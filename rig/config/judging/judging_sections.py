@@ -108,7 +108,7 @@ class SiteSection(Section):
 
     @model_validator(mode="after")
     def require_latitude_of_heading(self) -> Self:
-        """Refuse a heading without a latitude, because the Earth's rate needs both, or of a vertical x axis."""
+        """Refuse a heading without a latitude (the Earth's rate needs both), and the heading of a vertical x axis."""
         if self.heading_deg is not None and self.latitude_deg is None:
             raise ValueError("needs latitude_deg and heading_deg, or neither")
         if self.heading_deg is not None and np.linalg.norm(np.cross(self.up, (1, 0, 0))) < MIN_LEVEL:

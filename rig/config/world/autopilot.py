@@ -9,7 +9,7 @@ from rig.config.section import RATIO, Section
 
 
 class SimulatedAutopilotSection(Section):
-    """The simulated autopilot around its IMUs: its firmware, its clock, its parameters."""
+    """The simulated autopilot apart from its IMUs: its firmware, its clock, its parameters."""
 
     firmware: Literal["ardupilot", "px4"] = Field(default="ardupilot", description="the firmware that it simulates")
     uid: str = Field(

@@ -358,7 +358,7 @@ class SimulatedAccelerometerSection(Section):
 
 
 class SimulatedKvhSection(Section):
-    """The simulated KVH 1775 around its gyroscope: its clock, and the settings that its last user stored."""
+    """The simulated KVH 1775 apart from its gyroscope: its clock, and the settings that its last user stored."""
 
     serial_number: str | None = Field(
         default=None,

@@ -9,7 +9,7 @@ from rig.config.sensors.lines_section import LinesSection
 
 
 class SimulatedLinesSection(Section):
-    """The simulated device that prints lines around its gyroscope. It prints as `sensors.<name>.lines` says."""
+    """The simulated device that prints lines, apart from its gyroscope. It prints as `sensors.<name>.lines` says."""
 
     oscillator_ppm: float = Field(default=40.0, ge=-20_000, le=20_000, description="how much too fast its clock runs")
     uptime_s: float = Field(

@@ -87,7 +87,7 @@ class BoardNotObserved:
 
 @dataclass(frozen=True, slots=True)
 class BoardRecalled:
-    """The return to the board of its average of the sweep, after the run was interrupted."""
+    """The board's average of a sweep, which was returned to the board after the run was interrupted."""
 
     sensor: str
     sweep: int

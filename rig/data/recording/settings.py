@@ -69,7 +69,7 @@ class KnownReference:
 class Site:
     """The site of the arm, in its base frame: `up` (unit vector), gravity, and the Earth's rate, if known.
 
-    Of the magnetic field only the norm may be known, and whether it points upwards. Without a heading, the latitude may
+    At most the norm of the magnetic field is known, and whether it points upwards. Without a heading, the latitude may
     be known without the Earth's rate. `…_expanded_…` are expanded uncertainties (k = 2), None if not stated.
     """
 

@@ -208,7 +208,7 @@ def fit_over_temperature(readings: RepeatedMeans, reference_c: float, gradient_k
 def combine_with_reference(
     polynomials: OverTemperature, values: Array, lines: tuple[TemperatureLine, ...]
 ) -> OverTemperature:
-    """Return the polynomials with k and c (6,) at the reference temperature replaced by `values`, solved at it.
+    """Return the polynomials with k and c (6,) at the reference temperature replaced by `values`, a solution there.
 
     `lines`: contributors to `values`, with the covariance (6, 6) of their means over all temperatures.
     """

@@ -199,7 +199,7 @@ def _describe_floor(shortest: Shortest) -> str:
 
 
 def _efficiencies(directions: "Array") -> dict[str, dict[str, float]]:
-    """Return the efficiencies of the design, and of the six directions of SIX for comparison."""
+    """Return the efficiencies of the design, and, for comparison, of SIX with its six directions."""
     return {
         name: dict(_design_efficiencies(axes)) for name, axes in (("plan", directions), ("six", list_designs()["six"]))
     }

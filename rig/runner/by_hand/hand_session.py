@@ -105,7 +105,7 @@ class HandSession:
                 self._lay = []
 
     def carry_out(self, check: Callable[[], None]) -> None:
-        """Request the moves of the list until all are made or U reaches the target.
+        """Request the wanted moves until all are made or U reaches the target.
 
         `check` is called many times a second. Raise Fault for an error that no move can correct, or after ten errors in
         a row.

@@ -105,7 +105,7 @@ class FollowedSession:
         self.tell(HandRested(report.after_us, report.end_us, self._lay[-1]))
 
     def _ask(self, wrong: Fault | None) -> None:
-        """Request the next move of the list, which is repeated until the board has enough moves."""
+        """Request the next flip of `ROUND`, which is repeated until the board has enough moves."""
         flips = self.moves
         while (remaining := still_open(WantedMoves(flips, 0), self._accepted, self._lay)).done:
             flips += len(ROUND)
