@@ -73,7 +73,7 @@ def field_angle_dof(result: "MagnetometerResult") -> Array:
 def reversal_dof(reversal: "MagnetometerReversal") -> tuple[Array, Array]:
     """Return the degrees of freedom of the mean scale factors (3,), and of bias and arm's field (6,).
 
-    Those of bias and field are the fewest of any run's bias, a lower bound for a sum of independent parts.
+    For bias and field they are the lowest of any run's bias, a lower bound for a sum of independent parts.
     """
     budgets = [run.result.budget for run in reversal.runs]
     # (Σ u_i²)² / ν of one run is Σ u_i⁴ / ν_i: errors common to the runs have infinite ν and add nothing.

@@ -157,7 +157,7 @@ def distance_to_upper_arm(
 
 
 def lengths_m(arm: DenavitHartenberg) -> Array:
-    """Return the measurable lengths `LENGTHS` (6,), m, of an arm, whatever the parametrisation."""
+    """Return the measurable lengths `LENGTHS` (6,), m, of an arm, regardless of the parametrisation."""
     frames = _frames(np.zeros(6), arm)
     base, wrist_2, wrist_3, flange = (frames[joint][:3, 3] for joint in (0, 4, 5, 6))
     shoulder, elbow, wrist_1 = _find_bends(frames)

@@ -59,7 +59,7 @@ def _find_sound_steps_of(
 
 
 def _has_spike(stream: Stream, window: Window) -> bool:
-    """Return whether a window of a sweep or dwell has a spike, which fails the verdict whatever the mean."""
+    """Return whether a window of a sweep or dwell has a spike, which fails the verdict even if the mean is right."""
     inside = slice_time(stream, window.start_s, window.end_s)
     counts = stream.sensor.channel(RATE).counts(stream.raw)[inside].astype(np.float64)
     if not len(counts):

@@ -78,7 +78,7 @@ class Lines:
 
 
 def turn_mean(readings: Array, steps: Steps, turn: SampledTurn) -> tuple[Mean, Array]:
-    """Return the mean of readings (n, 3) with resolution `steps`, and its weights (n,), also for the arm's rate."""
+    """Return the mean of readings (n, 3) with resolution `steps`, and the weights (n,), also of the arm's mean rate."""
     ones = whole(readings)
     steady = np.column_stack([ones, turn.passing])
     lines = _find_turn_lines(readings, steady, turn)
@@ -151,9 +151,10 @@ def _fit_tapered_residuals(columns: Array, values: Array) -> Array:
 
 
 def _find_turn_lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines:
-    """Find the vibrations in readings (n, 3) beyond steady columns (n, k) and the rates that the encoders measure.
+    """Find the vibrations in readings (n, 3) apart from steady columns (n, k) and the rates that the encoders measure.
 
-    Fast lines of the arm's rate appear in the readings at the same frequency. The residuals show the others.
+    Fast spectral lines of the arm's rate appear in the readings at the same frequency. The residuals show the other
+    lines.
     """
     uneven = turn.uneven_rad_s[:, None]
     none = uneven[:, :0]

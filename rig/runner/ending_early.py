@@ -59,7 +59,7 @@ class EndingEarly:
             and remaining == [*range(remaining[0], self.sweeps)]
         )
         if self.earlier and whole:
-            self._stands_at(self.plan.start_q_rad, len(remaining))
+            self._note_repeat_end(self.plan.start_q_rad, len(remaining))
 
     def note_sweep(self, sweep: Sweep) -> None:
         """Note a recorded sweep; mark an assessment as due if it completes a repeat."""
@@ -67,7 +67,7 @@ class EndingEarly:
         remaining = [motion.index for motion in self.plan.motions[self._motions :] if isinstance(motion, Sweep)]
         self._due = False
         if remaining and remaining[0] // self._per_repeat > sweep.index // self._per_repeat:
-            self._stands_at(sweep.end_q_rad, len(remaining))
+            self._note_repeat_end(sweep.end_q_rad, len(remaining))
 
     def due(self) -> bool:
         """Return whether a repeat was completed whose uncertainty is not assessed yet."""
@@ -108,7 +108,7 @@ class EndingEarly:
         """The number of sweeps in one repeat."""
         return self.sweeps // self.repeats
 
-    def _stands_at(self, pose: Joints, sweeps_left: int) -> None:
+    def _note_repeat_end(self, pose: Joints, sweeps_left: int) -> None:
         """Mark an assessment as due if the remaining plan contains a motion home from the present pose."""
         self._repeats_left = -(-sweeps_left // self._per_repeat)
         self._home = next(

@@ -59,7 +59,7 @@ class Lsm9ds1:
 
     Motion and truth are in right-handed axes, those of the part's magnetometer: in the registers of both triads x has
     the opposite sign (figure 1). The accelerometer runs only with the gyroscope: writing its control register selects
-    it alone (section 3.1), which has no model, so that conversions stop until CTRL_REG1_G is written.
+    it alone (section 3.1). This mode has no model, so conversions stop until CTRL_REG1_G is written.
 
     The data-ready line stays high until the high byte of the z rate is read: the next conversion replaces an unread one
     without a new edge. The data sheet states the number of conversions to discard after a start, not their error: here

@@ -182,7 +182,7 @@ class ReadingTask:
 
 
 def _start(request: BinaryIO, out: BinaryIO, environment: Mapping[str, str]) -> "subprocess.Popen[bytes]":
-    """Start a process that reads the file, and return it."""
+    """Start a process that reads the file of the `request`, and return it."""
     # Not from the working folder, where any file could pass for a module, but by this process' own search path.
     command = [sys.executable, "-P", "-m", "rig.data.processes.reading_child"]
     environment = {**os.environ, **environment, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}

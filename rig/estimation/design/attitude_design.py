@@ -144,7 +144,7 @@ def _ideal(reference: Array, order: Order) -> Array:
 
 
 def _equations(attitudes: Array, up: Array, order: Order) -> Array:
-    """Return the design (3 N, 14 or 17) of readings in g for the free parameters, with equal weights."""
+    """Return the design matrix (3 N, 14 or 17) of readings in g for the free parameters, with equal weights."""
     theta, v_bar = _ideal(up, order), np.zeros((len(attitudes), 3))
     return weighted_jacobian(theta, attitudes, v_bar, whitening(np.ones((len(attitudes), 3))), norm_known=True)
 

@@ -39,7 +39,7 @@ class AbruptChange:
     def find_covariance(self, matrix: Array) -> Array:
         """Return the covariance (12, 12) of F (3, 3), row by row, and bias whose U covers both states of the sensor.
 
-        A solution lies between both states. Half of the change is the standard uncertainty, so U is all of it.
+        A solution lies between both states. Half of the change is the standard uncertainty, so U is the whole change.
         """
         half = np.zeros((12, 3))
         if self.what == "bias":

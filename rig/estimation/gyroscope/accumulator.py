@@ -49,10 +49,10 @@ class Accumulator:
 
     With x̃ = [x 1], a mean reading m, its variance v, the speed ω and a weight w:
 
-    - `geometry` (7, 7) = Σ x̃ᵀx̃: the geometry of the sweeps, whatever their noise.
+    - `geometry` (7, 7) = Σ x̃ᵀx̃: the geometry of the sweeps, regardless of their noise.
     - `normal` (7, 7) = Σ w x̃ᵀx̃, `right` (7,) = Σ w ω² x̃.
-    - `moments` (3, 3, 7, 7) = Σ w² v_j m_j^a x̃ᵀx̃ for axis j and a = 0, 1, 2. The variance of ω² − ‖K(m + b)‖² is
-      Σ_j 4 k_j⁴ (m_j + b_j)² v_j, and k and b are known only after the solution.
+    - `moments` (3, 3, 7, 7) = Σ w² v_j m_j^a x̃ᵀx̃ for axis j and a = 0, 1, 2. The variance of ω² − ‖K(m + b)‖² is Σ_j
+      4 k_j⁴ (m_j + b_j)² v_j, and k and b are known only after the solution.
     - `speed_noise` (7, 7) = Σ w² (2 ω σ_ω)² x̃ᵀx̃.
     """
 

@@ -40,7 +40,7 @@ def measurement_sha256(document: ResultDocument) -> str:
 
 
 def fit(document: ResultDocument) -> bool:
-    """Return whether the measurement passed its checks of fitness, whatever the sensor's conformity."""
+    """Return whether the measurement passed its checks of fitness, regardless of the sensor's conformity."""
     return all(check.passed for check in document.checks if check.means.kind == "fitness")
 
 

@@ -65,8 +65,8 @@ SWEEPS_MB = 1  # some ten thousand sweeps
 class ExternalData:
     """The contents of the two files: averaged sweeps and rests, in the order of the rows, and turns by angle.
 
-    - `at_reference`: whether readings are corrected to one temperature by polynomials that include contradictions of
-      repeats.
+    - `at_reference`: whether means are corrected to one temperature by polynomials, which include the repeats'
+      contradictions.
     - `by_mean`: numbers of the rows with an angle that are solved by mean speed, because the body moved before or
       after.
     - `omitted`: rows left out for missing readings, and the readings missing in the others.

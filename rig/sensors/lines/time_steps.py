@@ -11,7 +11,7 @@ GROWS = 2.0  # factor by which the step of a single-precision number grows if th
 def find_time_step_s(printed: Array, decimals: int, unit: str) -> float:
     """Return the step, s, of printed times (n,) with `decimals` digits, also for later times of the same device.
 
-    A time in single precision, with 24 bits, has the step of its last bit, whatever the number of printed digits.
+    A time in single precision, with 24 bits, has the step of its last bit, regardless of the number of printed digits.
     """
     last_digit = 10.0**-decimals
     single = np.float32(printed)
