@@ -192,7 +192,7 @@ def _find_turn_lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines
 
 
 def lag_columns(rate: Array, columns: Array, share: Array) -> Array:
-    """Return columns (n, 2) of a sensor's lag behind the slow part of a rate (n,), free of columns (n, k)."""
+    """Return columns (n, 2) of a lag behind the slow part of a rate (n,) that columns (n, k) do not explain."""
     residuals = rate[:, None] - columns @ fit_columns(columns, rate[:, None])
     return _changes(slow_part(residuals, share))
 

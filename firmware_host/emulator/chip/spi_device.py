@@ -64,7 +64,7 @@ class SpiDevice(Protocol):
         """
 
     def deselect(self, time_s: float) -> None:
-        """Handle the rise of chip select, with the same restriction."""
+        """Handle the rise of chip select, which changes neither the interrupt line nor `next_event_s`."""
 
 
 # The MSI locked to the 32768 Hz crystal runs at 122 times its frequency, not at the nominal 4 MHz

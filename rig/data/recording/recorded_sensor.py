@@ -131,8 +131,8 @@ def range_m_s2(section: AccelerationSection) -> float:
 def sensor_of(document: Mapping[str, Any]) -> RecordedSensor:
     """Return the sensor of a description in plain values.
 
-    Raise ValueError naming the error: a value, an unknown or duplicate quantity, columns of one name, a mounting that
-    is not a rotation, a gyroscope without range.
+    Raise ValueError naming the error: a wrong value, an unknown or duplicate quantity, columns with the same name, a
+    mounting that is not a rotation, a gyroscope without range.
     """
     sensor = validate(RecordedSensor, document, "sensor")
     quantities = [channel.quantity for channel in sensor.channels]

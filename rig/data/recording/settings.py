@@ -330,7 +330,7 @@ def settings_of(config: "RigConfig", plan: "Plan") -> RunSettings:
 
 
 def _limits(config: "RigConfig") -> Limits:
-    """Return the limits in the file, with the targets at which its procedure ends."""
+    """Return the limits of a configuration, with the targets at which its procedure ends."""
     from rig.config.procedures.procedure_sections import SixObservationSection
 
     limits, section = config.limits.model_dump(), config.procedure

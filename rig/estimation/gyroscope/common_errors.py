@@ -118,8 +118,8 @@ def _add_covariances(
 ) -> VectorSolution:
     """Return the solution with the covariances and the response of F, c, G and the errors estimated together.
 
-    `gain` (3, p, 3, N) maps readings to the coefficients; `rest` (3, p, P) is the coefficients' error by the unresolved
-    part of the common errors. `noise` (3, N, N) excludes `speed_noise` (N, 3), which the three axes share.
+    `gain` (3, p, 3, N) maps readings to the coefficients; `rest` (3, p, P) is the coefficients' error due to the
+    unresolved part of the common errors. `noise` (3, N, N) excludes `speed_noise` (N, 3), which the three axes share.
     """
     columns = gain.shape[1]
     of_speed = np.einsum("ipjn,nj->ipn", gain, speed_noise).reshape(3 * columns, -1)

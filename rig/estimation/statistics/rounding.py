@@ -31,8 +31,8 @@ class Steps:
     """The steps of rounded numbers: `unit` (3,) of each axis, or one of all.
 
     A number truncated (`cut`) toward zero is shifted to the middle of its interval. Zero then represents all values
-    within one unit in either direction, so its neighbours are a unit and a half away. `zero` (3,) is the value of a
-    former zero, in units modulo whole ones, NaN if it is unknown.
+    within one unit in either direction, so its neighbours are a unit and a half away. `zero` (3,): the present value of
+    readings that were zero at truncation, in units modulo 1; NaN if unknown.
     """
 
     unit: Array | float

@@ -146,7 +146,7 @@ def stack_rows(sweeps: Sequence[Observation], rests: Sequence[Average]) -> tuple
 
 
 def _list_hiding(by_angle: TurnedData, data: ExternalData) -> Iterator[Omitted]:
-    """Yield an entry for the turns left out because missing readings may hide a part, if any."""
+    """Yield an entry for the turns, if any, that are left out because missing readings may hide a part of them."""
     if by_angle.hiding:
         first = next(sweep for sweep in data.sweeps if sweep.sweep in by_angle.hiding)
         where = f"row {first.sweep}, from {first.average.start_s:.10g} s"
