@@ -143,7 +143,7 @@ class BoardIdentity:
 class Heating:
     """The heater's state: its `power`, 0 to 1, and the `cause` for being off, of `protocol.HEATER_CAUSES`.
 
-    `temperature_c` is the temperature of the hottest part at the board's last look.
+    `temperature_c` is the temperature of the hottest part at the board's last check.
     """
 
     power: float

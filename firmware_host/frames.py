@@ -100,7 +100,7 @@ _LAYOUTS = {code: _Layout.make(message) for code, message in MESSAGE_BY_CODE.ite
 def decode(block: bytes) -> Frame | None:
     """Decode one COBS block (without its delimiter); return None if it is damaged, unknown or of invalid values.
 
-    An identity of another protocol version is returned with only the two fields of every version.
+    An identity of another protocol version is returned with only the two fields that every version has.
     """
     body = unstuff(block) if len(block) <= _BLOCK_MAX else None
     if body is None or len(body) < OVERHEAD or crc32(body) != _CRC_OF_INTACT or body[0] not in _LAYOUTS:

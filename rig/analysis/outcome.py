@@ -41,7 +41,7 @@ class Origin:
 
 
 def origin_of(runs: "Sequence[RunData]") -> Origin:
-    """Return equipment and times of a run's recordings, at least one; the solution's time is now.
+    """Return equipment and times of the recordings of a run, at least one; the solution's time is now.
 
     `resumed_utc` does not list recordings that begin a new stage, in which the item was remounted.
     """

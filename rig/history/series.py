@@ -185,7 +185,7 @@ def changes_in(pairs: Sequence[tuple[Parameters, Parameters]]) -> tuple[tuple[Ch
 def changes_between(before: Sequence[Past], now: Sequence[Past]) -> dict[Subject, tuple[Change, ...]]:
     """Return the changes of all subjects common to two runs, as one comparison.
 
-    `before` and `now` are the calibrations of one run each; of a subject the last one is used.
+    `before` and `now` are the calibrations of one run each; if there are several of a subject, the last one is used.
     """
     earlier, later = ({past.subject: past for past in pasts} for pasts in (before, now))
     both = [subject for subject in later if subject in earlier]

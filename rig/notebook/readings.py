@@ -137,7 +137,7 @@ class Readings:
     def to_frame(self, sweep: int | None = None) -> "DataFrame":
         """Return all quantities as a pandas table over `time_s`, SI units in the names, optionally of one `sweep`.
 
-        Sweeps are numbered as in `result.json`; of a repeated sweep the last recording is used. Raise Refused
+        Sweeps are numbered as in `result.json`; if a sweep was repeated, its last recording is used. Raise Refused
         `missing_extra`, `no_such_sweep`; Fault as `on_arm_clock` does.
         """
         columns: dict[str, Array] = {}

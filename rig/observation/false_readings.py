@@ -1,6 +1,6 @@
 """Checks for numbers in a log that are no readings.
 
-Such are a logger's mark of a missing value, a frozen axis, and the end of a sensor's range.
+Examples are a logger's mark of a missing value, a frozen axis, and the end of a sensor's range.
 """
 
 import numpy as np

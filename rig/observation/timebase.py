@@ -250,7 +250,7 @@ def _coarse_offset(
 
 
 def _fast_length(least: int) -> int:
-    """Return the next number without prime factors above 5: a fast length of a Fourier transform."""
+    """Return the next number without prime factors above 5: a length for which a Fourier transform is fast."""
     threes = (3**power for power in range(least.bit_length()))
     odd = (three * 5**power for three in threes for power in range(least.bit_length()) if three * 5**power < 2 * least)
     length: int = min(number << (-(-least // number) - 1).bit_length() for number in odd)
@@ -304,8 +304,8 @@ def _fit_clock(clock: TimeBase, board_time_s: Array, readings: Array, motion: Kn
     """Return the clock with the best fit of readings and motion, first by their slow parts.
 
     A ripple is the same after a period, and a fast ripple differs between readings and states because of their filters.
-    If the finest fit has no optimum therefore, the clock of the slow parts remains, with its own uncertainty. Raise
-    Fault `time_base_not_found`.
+    If the finest fit has no optimum for this reason, the clock of the slow parts remains, with its own uncertainty.
+    Raise Fault `time_base_not_found`.
     """
     first, *finer = _list_stages(clock, board_time_s, readings, motion)
     clock = _iterate_clock(clock, *first)

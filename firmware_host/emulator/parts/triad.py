@@ -56,7 +56,8 @@ class TriadErrors:
 class Triad:
     """Three elements with `TriadErrors`, of a part whose temperature is one number or a function of time.
 
-    `read` makes a reading of the vector that `sense` returns, plus other sensed quantities; `readings`: many at once.
+    `read` makes a reading of the vector that `sense` returns, to which a part may add other effects; `readings` makes
+    many.
     """
 
     def __init__(self, errors: TriadErrors, seed: Seed, temperature_c: float | Temperature) -> None:

@@ -112,9 +112,9 @@ def contradictions(
 def _non_orthogonality_deg(solution: VectorSolution, stated_deg: float, false_alarm_probability: float) -> Statistic:
     """Return the largest non-orthogonality relative to the stated one, and its limit, in degrees.
 
-    `stated_deg` is a half-width. The limit adds the angle's uncertainty at this false-alarm probability. Sweeps about
-    three axes cannot separate a wrist's zero error from a tilted sensor axis: no residual shows the error, and scale
-    factors of an askew sensor are wrong.
+    `stated_deg` is a half-width. The limit includes the angle's uncertainty at this false-alarm probability. Sweeps
+    about three axes cannot separate a wrist's zero error from a tilted sensor axis: no residual shows the error, and
+    scale factors of an askew sensor are wrong.
     """
     from scipy.special import ndtri
 

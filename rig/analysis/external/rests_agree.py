@@ -24,7 +24,7 @@ MOST_RAD_S = 2 * RATE.steady
 
 
 def check_rests_agree(turning: Turning, solution: KnownIncrements) -> None:
-    """Raise Fault `bias_contradicts_rests` if the bias is not what the gyroscope reads at rest, or `bias_jumped`.
+    """Raise Fault `bias_contradicts_rests` if the bias differs from the readings at rest, `bias_jumped` if these jump.
 
     A rest is used only if both the readings and the rows' attitudes show it. Rests may differ by their scatter, by
     motion that the reference does not show, and by the effect of gravity on a gyroscope.

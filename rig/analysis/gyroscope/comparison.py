@@ -85,7 +85,7 @@ class Comparison:
     """A sensor's readings and the reference's over the whole movement: sweeps, rests and transfers.
 
     - `time_s` (n,): controller time; `reading_rad_s`, `reference_rad_s` (n, 3): in the sensor's frame.
-    - `movement`: over all n samples; `sweeps`: over the samples of the sweeps with their ramps.
+    - `movement`: the deviation over all n samples; `sweeps`: that over the sweeps with their ramps.
     - `noise_rad_s` (3,): standard deviation of the difference at rest, from both sensors' noise: the RMS of a perfect
       calibration; None without rests.
     - `revolutions`: the errors of each.

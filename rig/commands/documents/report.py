@@ -66,9 +66,9 @@ def run(options: Namespace) -> int:
 
 
 def write_documents(options: Namespace) -> tuple[list[Path], list[Refused]]:
-    """Write the certificate of a run folder or its result.json into `--out`: HTML, with `--dcc` and `--pdf` also these.
+    """Write the certificate of a run folder or its result.json into `--out`: HTML, and XML and PDF on request.
 
-    `--sign` is the key that signs these two, `--time-server` the server that dates the signature. `--reversal` is the
+    `--sign` is the key that signs XML and PDF, `--time-server` the server that dates the signature. `--reversal` is the
     file by `rig reversal` for its magnetometers. `--history` is the history in which the certificate is entered, by
     default the user's own, never one that the folder names. Return the files, and why requested forms could not be
     made. Raise Refused `report_folder`, `bad_option`, and as `read_result`, `read_reversal`, `refuse_links`,

@@ -23,7 +23,8 @@ def find_own_address(config: SensorsConfig, laboratory: str | None) -> Iterator[
     """Yield the overrides that give a configuration's laboratory an address of its own during the block.
 
     `laboratory` is the file with all defaults if it simulates a laboratory, else None. There are no overrides if the
-    address is free, the laboratory is real, or no candidate is free, which the device at the address then reports.
+    address is free, the laboratory is real, or no candidate is free; in the last case a later claim of the address
+    fails.
     """
     if laboratory is None or not isinstance(config, RigConfig):
         yield []

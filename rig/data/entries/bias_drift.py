@@ -51,7 +51,7 @@ class DriftEntry(Entry):
     - steps: jumps of the bias.
     - false_alarm_probability: probability that a steady bias shows steps.
     - largest_change: between any two repeats.
-    - temperature_slope: of the bias, or the error.
+    - temperature_slope: the slope of the bias, or why there is none.
     - earth_rate_known: whether the Earth's rate was subtracted.
     - degrees_of_freedom: those of the standard deviations with the scale fixed, null if infinite.
     - part, serial_number, full_scale: properties of the sensor.

@@ -8,7 +8,7 @@ reports the rests and moves, and their faces.
 Unknowns are C and G (3, 3) row by row, b (3,), and two angles of each of six faces: their deviation from square. The
 state is an information matrix, of which the board keeps the square root (Bierman, Factorization Methods for Discrete
 Sequential Estimation, 1977, chapter V). The equations are linearised about a solution; the board reports after which
-moves it updates that one.
+moves it updates this solution.
 """
 
 from collections.abc import Iterator, Sequence

@@ -1,4 +1,4 @@
-"""Errors of repeated placements: what a placement adds to a reading besides noise and tilt.
+"""Errors of repeated placements: what a placement adds to a reading in addition to noise and tilt.
 
     v_m = F (s + φ s²) + b + E ε + η,   ε ~ N(0, δ² 1),   η ~ N(0, ζ² 1)
 

@@ -11,7 +11,7 @@ determines nᵀ F n alone; the mean reading determines the components across, as
 
     m̄ = F n α/T + c                                                      across F n
 
-Rests determine c; of sweeps at a constant speed the mean is used, as in `rig.estimation.gyroscope.vector_model`.
+Rests determine c; for sweeps at a constant speed, the mean is used, as in `rig.estimation.gyroscope.vector_model`.
 """
 
 from collections.abc import Sequence

@@ -249,8 +249,8 @@ def effects(theta: Array, movement: Movement) -> Array:
     """Return the effect (3 K, P) of each of the arm's errors on the readings, per radian; P = 3 N + 10 per station.
 
     Each dwell has three errors. The sweeps of a station share ten: small rotations of flange and base, and waves of the
-    joint's angle, A cos θ + B sin θ + C cos 2θ + D sin 2θ. Errors of the wrists that are given by kind come last and
-    are common to all stations.
+    joint's angle, A cos θ + B sin θ + C cos 2θ + D sin 2θ. The wrists' constant errors (`Movement.arm_turns`), if
+    known, come last and are common to all stations.
     """
     return combine_effects(*split_effects(theta, movement), movement.own_share)
 

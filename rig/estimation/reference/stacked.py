@@ -5,8 +5,8 @@ F⁻¹ v_m − Rᵀ v_ref − b* − φ s² = v̄ with b* = F⁻¹ b is linear i
     X β = V̄,   X = [D(v_m)  −Rᵀ  −I  −diag(s²)]
 
 v̄ ≠ 0: linear least squares, Eq. (6). v̄ = 0: the last right singular vector, Eq. (5), scaled to the given ‖v_ref‖ and
-sign. It depends on the units of the columns, which TRIAX does not state; here every block of columns is scaled to unit
-RMS first.
+sign. This vector depends on the units of the columns, which TRIAX does not state; here every block of columns is scaled
+to unit RMS first.
 
 All functions broadcast over runs: readings (…, N, 3). θ is as in `reference_model`: F itself and b, not their inverses.
 """

@@ -179,8 +179,8 @@ def bias_process(
 
     `variances_rad2_s2` (N, 3) are the variances of the noise, `windows_s` (N, 2) the averaging windows. The three axes
     have one process, since few averages determine it. `shared_rad2_s2` (3, N, N) are covariances between the averages
-    besides their noise, `instability_rad_s` is the data sheet's bias instability, zero if unknown. `chosen` selects
-    walk and scatter by their likelihood.
+    in addition to their noise, `instability_rad_s` is the data sheet's bias instability, zero if unknown. `chosen`
+    selects walk and scatter by their likelihood.
     """
     z, means, variances = (np.asarray(a, dtype=np.float64) for a in (design, means_rad_s, variances_rad2_s2))
     dof = 3 * (len(z) - z.shape[1])

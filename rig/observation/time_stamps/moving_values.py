@@ -8,7 +8,7 @@ from rig.estimation.arrays import Array
 def find_least_around(values: Array, width: int) -> Array:
     """Return for each value the larger of two minima (n,): of the values ahead, and of the values behind.
 
-    At the ends, where one is missing, it is the other.
+    At the ends, where one of the minima is missing, the other is returned.
     """
     ahead, behind = find_least_ahead(values, width), find_least_behind(values, width)
     least = np.maximum(ahead, behind)

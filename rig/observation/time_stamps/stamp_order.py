@@ -125,7 +125,7 @@ def _drop_empty(log: _UnorderedLog) -> _UnorderedLog:
 
 
 def _drop_zeros(log: _UnorderedLog) -> _UnorderedLog:
-    """Return the log without rows of zeros at its start: a register before the first conversion."""
+    """Return the log without rows of zeros at its start, which a register holds before the first conversion."""
     zero = (log.readings == 0).all(axis=1)
     first = int(np.argmin(zero)) if not zero.all() else 0
     kept = np.ones(len(zero), dtype=np.bool_)

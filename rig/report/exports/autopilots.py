@@ -3,7 +3,7 @@
 PX4 (src/lib/sensor_calibration): gyroscopes data − offset, accelerometers (data − offset) scale, magnetometers S (data
 − offset), S symmetric, in gauss. ArduPilot (AP_InertialSensor_Backend, AP_Compass): the same, except that offsets of a
 compass are added and in milligauss. ArduPilot replaces offsets of gyroscopes, INS_GYROFFS_X, …, at each boot unless
-INS_GYR_CAL is 0. Neither has a scale factor of a gyroscope.
+INS_GYR_CAL is 0. Neither autopilot has a scale factor of a gyroscope.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping

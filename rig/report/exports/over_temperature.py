@@ -6,7 +6,7 @@ to TMIN … TMAX. The offset at TREF is that of CAL_…, so X0 is 0.
 ArduPilot (AP_InertialSensor_tempcal, AP_InertialSensor_Backend): data − P(T − 35 °C) + P(CALTEMP − 35 °C) − offset,
 P(u) = 10⁻⁶ (c₁ u + c₂ u² + c₃ u³), both temperatures limited to TMIN … TMAX. Its 35 °C are fixed.
 
-A gyroscope's bias b is added, g = K (m + b), so an offset is −b. Neither has a scale factor over temperature.
+A gyroscope's bias b is added, g = K (m + b), so an offset is −b. Neither autopilot has a scale factor over temperature.
 """
 
 from collections.abc import Iterator, Mapping

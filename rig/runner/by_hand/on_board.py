@@ -1,6 +1,6 @@
 """A gyroscope's calibration by hand, made by the board: the host instructs, follows, and checks the result.
 
-The board detects rests and moves and solves without the host, which instructs by the board's reports.
+The board detects rests and moves and solves without the host, which instructs the operator by the board's reports.
 """
 
 import time

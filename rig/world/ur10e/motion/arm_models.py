@@ -1,6 +1,6 @@
 """The arms that the simulated controller can be.
 
-This table is independent of that in `rig/motion/models/`, so that each finds a wrong row in the other
+This table is independent of that in `rig/motion/models/`, so that their comparison shows a wrong row
 (tests/motion/test_models.py). Drawings, speeds, masses and their centres: the maker's ROS 2 description
 (`default_kinematics.yaml`, `joint_limits.yaml`, `physical_parameters.yaml` of each model) and article 45257; types and
 names: the maker's client library.
