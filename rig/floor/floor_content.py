@@ -82,7 +82,7 @@ def standards(pasts: Sequence[Past]) -> list[dict[str, Any]]:
 
 
 def recalls(pasts: Sequence[Past], today: date) -> list[dict[str, Any]]:
-    """Return sensors that are due within a month or overdue, by the parameter that reaches its limit first."""
+    """Return sensors due for calibration within a month, or overdue, by the parameter that reaches its limit first."""
     rows = []
     for (part, serial, quantity, _, simulated), series in subjects(pasts).items():
         due = [(trend.recall, name) for name, trend in trends(series).items() if trend.recall is not None]

@@ -159,7 +159,7 @@ class Readings:
         return self.signal(self.quantities[0]).plot()
 
     def row(self) -> tuple[str, ...]:
-        """Return the sensor in words, under `HEADINGS`."""
+        """Return the sensor in words, for the columns `HEADINGS`."""
         sensor, measures = self.sensor, ", ".join(self.quantities)
         rate = f"{sensor.rate_hz:g}"
         return self.name, sensor.part, sensor.serial_number, measures, rate, str(len(self.samples)), sensor.mode

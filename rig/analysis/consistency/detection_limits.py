@@ -73,7 +73,7 @@ def _means_of_solve(explained: Explained) -> Means:
 
 
 def _error_over_expanded(patterns: Array, explained: Explained, mounting: Array, inputs: Unknown) -> float | None:
-    """Return a result's error over U from the fault with the worst of `patterns` (k, N, 3); None without a solution.
+    """Return a result's error over U due to the fault with the worst of `patterns` (k, N, 3); None without a solution.
 
     The means are solved again with the fault, which may also look like bias drift and increase U.
     """

@@ -83,9 +83,9 @@ class PlacementEntry(Entry):
 class DetectionLimitEntry(Entry):
     """The smallest `size` of a `fault` that the `check` detects in 95 of 100 recordings; null if it detects none.
 
-    This is the minimal detectable bias (Baarda 1968); of a change half-way, the complete change. `error_over_expanded`
-    is the largest error of scale factor or bias just below that size, in multiples of its expanded uncertainty; null if
-    not computed.
+    This is the minimal detectable bias (Baarda 1968); for a change half-way it is the complete change.
+    `error_over_expanded` is the largest error of scale factor or bias just below that size, in multiples of its
+    expanded uncertainty; null if not computed.
     """
 
     fault: str

@@ -18,9 +18,9 @@ def mean_weights(groups: Array, nuisance: Array) -> Array:
     """Return the weights (p, n) of the means of p groups of n samples that are free of nuisance columns.
 
     groups (n, p): one if a sample belongs to a group, zero otherwise; a sample belongs to at most one. nuisance (n, k):
-    the columns. Parts that are collinear with groups or other columns are not removed. Of all such weights these have
-    the least sum of squares, which is the variance of a mean of white noise of variance one. A group without samples
-    has no weights.
+    the columns. Parts that are collinear with groups or other columns are not removed. Among all such weights, these
+    have the least sum of squares, which is the variance of a mean of white noise of variance one. A group without
+    samples has no weights.
     """
     averages = groups.T / np.maximum(groups.sum(axis=0), 1.0)[:, None]
     means = averages @ nuisance

@@ -146,7 +146,7 @@ def _list_others(layout: TableLayout, entries: Sequence[ColumnEntry]) -> list[st
 
 
 def _name_once(names: list[str]) -> list[str]:
-    """Return the names, blank where one is repeated: of two sensors with the same names, only the first is read."""
+    """Return the names, blank where one is repeated: if two sensors have the same names, the first is read."""
     return [name if name not in names[:index] else "" for index, name in enumerate(names)]
 
 

@@ -149,7 +149,7 @@ class ScriptProgram:
         return next(self._main, StopIteration) is not StopIteration
 
     def _play_move(self, call: Call) -> Steps:
-        """Play the one movej of a program, which starts gently."""
+        """Play the only movej of a program, which starts gently."""
         try:
             yield from self._threads.move("main", replace(read_move("movej", Arguments(call.text)), is_soft=True))
         except OutOfReach:
