@@ -44,7 +44,7 @@ def budget_table(budget: BudgetEntry, scale: Sequence[float], bias: DisplayUnit)
     for line in printed.lines:
         cells = (cell for part in line.parts for cell in part)
         table.add_row(plain(_label(line)), line.kind, line.dof, *cells, end_section=line is printed.lines[-1])
-    table.add_row("combined u", "", "", k.combined, f"ν {k.dof}", b.combined, f"ν {b.dof}")
+    table.add_row("combined u", "", "", k.combined, f"ν\u00a0{k.dof}", b.combined, f"ν\u00a0{b.dof}")
     table.add_row("expanded U", "", "", k.expanded, f"× {k.factor}", b.expanded, f"× {b.factor}")
     return table
 

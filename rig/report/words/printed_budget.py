@@ -127,7 +127,7 @@ def _explain_missing_dof(line: ContributorEntry) -> str:
     """Return the words for degrees of freedom that have no number: infinite, included in u, or unknown."""
     if line.kind == "B":
         return "∞"
-    return "in u" if line.source.endswith(IN_U) else "–"
+    return "in\u00a0u" if line.source.endswith(IN_U) else "–"
 
 
 def _parts(
