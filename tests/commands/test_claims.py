@@ -19,9 +19,10 @@ from rig.commands.laboratory.own_address import find_own_address
 from rig.config.load import load
 from rig.data.run_folder import ScriptIdentity, new_folder
 from rig.errors import Refused
+from rig.turners.turner_registry import sections
 from support.laboratories.commands import rig
 from support.laboratories.worlds import World, fresh_host, hardware
-from support.paths import DEMO, ROOT
+from support.paths import CONFIGS, DEMO, ROOT
 from support.processes.warm import start_module
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="claims are names of Linux' kernel")
@@ -85,6 +86,17 @@ def test_a_second_simulated_laboratory_moves_to_an_address_of_its_own() -> None:
         assert moved_away != []
     with find_own_address(here, text) as again:
         assert again == [], "what has ended takes no address"
+
+
+@pytest.mark.slow
+def test_a_laboratory_without_an_arm_is_at_the_address_of_its_sensors(capsys: pytest.CaptureFixture[str]) -> None:
+    host, lines = fresh_host(), CONFIGS / "by_hand_lines.yaml"
+    here = load(lines, [f"sensors.imu.serial.port=socket://{host}:7341"], turners=sections()).config
+    with find_own_address(here, lines.read_text("utf-8")) as first:
+        assert first == []
+        with find_own_address(here, lines.read_text("utf-8")) as second:
+            assert [override.split("=")[0] for override in second] == ["sensors.imu.serial.port"]
+    assert f"another one is at {host}, so this one is at 127." in capsys.readouterr().err
 
 
 @pytest.mark.slow

@@ -29,7 +29,7 @@ def find_own_address(config: SensorsConfig, laboratory: str | None) -> Iterator[
     if laboratory is None or not isinstance(config, RigConfig):
         yield []
         return
-    host = config.turner.simulated_at or _board_host(config)
+    host = config.turner.simulated_at or _first_port_host(config)
     with ExitStack() as stack:
         free = next(
             (candidate for candidate in (host, *_candidate_addresses()) if _take_if_free(candidate, stack)), host
@@ -69,9 +69,9 @@ def _take_if_free(host: str, stack: ExitStack) -> bool:
     return True
 
 
-def _board_host(config: SensorsConfig) -> str:
-    """Return the address of a simulated board without an arm."""
-    return "" if config.board is None else urlsplit(config.board.port).hostname or ""
+def _first_port_host(config: SensorsConfig) -> str:
+    """Return the address of a laboratory without an arm: that of its board's port, else of its first sensor's."""
+    return next((host for port in config.ports.values() if (host := urlsplit(port).hostname)), "")
 
 
 def _move_turner(config: RigConfig, text: str, host: str) -> Iterator[str]:

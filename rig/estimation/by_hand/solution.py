@@ -25,6 +25,7 @@ MOST_RESTS = 300  # their equations fill a gigabyte; a session has some twenty r
 ENOUGH = 0.02  # U (k = 2) of the scale factor, above which there is no result
 # Standard uncertainty of the scale factor: recordings of real hands differ by as much between their parts.
 REAL_HANDS = 5e-4
+MOVES_LEFT_OUT = "moves left out"  # begins a warning of moves without a rotation
 CLOCK, RECORDED_HANDS = "clock", "recordings of real hands"
 LINES: dict[str, tuple[Literal["A", "B"], tuple[str, ...], str]] = {
     "noise": ("A", ("noise", "acceleration noise", "stamps"), "scatter at rest, and of the time stamps"),
@@ -218,7 +219,7 @@ def insufficient_session(session: HandRecording, expanded: Array | None) -> Faul
             + (f", and {len(session.held_in_air_s) - 1} times more" if len(session.held_in_air_s) > 1 else ""),
             "Lay it down and let go, for a second, after every move",
         )
-    so_far = "" if expanded is None else f"; the scale is known to {100 * expanded.max():.1g} %"
+    so_far = "" if expanded is None else f"; the scale is known to {float(f'{100 * expanded.max():.2g}'):g} %"
     if creeping_s := session.creeping_s:
         so_far += f"; {len(creeping_s)} more are left out, as the body crept from {creeping_s[0][0]:.1f} s on"
     return Fault(
@@ -310,5 +311,5 @@ def _warnings(fit: GraphFit) -> tuple[str, ...]:
     for words, fault in (("at the end of its range", "clipped"), ("with readings missing", "lost")):
         if starts := [move.start_s for move in fit.session.moves if getattr(move, fault)]:
             at_s = ", ".join(f"{start_s:.1f}" for start_s in starts)
-            warnings.append(f"moves left out, the gyroscope {words}: from {at_s} s")
+            warnings.append(f"{MOVES_LEFT_OUT}, the gyroscope {words}: from {at_s} s")
     return tuple(warnings)

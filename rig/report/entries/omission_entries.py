@@ -70,13 +70,16 @@ def _rests(solution: "HandSolution") -> Iterator[OmittedEntry]:
 
 
 def _moves(solution: "HandSolution") -> Iterator[OmittedEntry]:
+    from rig.estimation.by_hand.solution import MOVES_LEFT_OUT
+
     omissions = [number for number, move in enumerate(solution.moves, 1) if move.kind == LEFT_OUT]
+    reasons = [warning for warning in solution.turned.warnings if warning.startswith(MOVES_LEFT_OUT)]
     if omissions:
         yield OmittedEntry(
             quantity=None,
             what="moves",
             count=len(omissions),
             total=len(solution.moves),
-            reason="; ".join(solution.turned.warnings) or ("too long" if solution.creeping_s else "taken back"),
+            reason="; ".join(reasons) or ("too long" if solution.creeping_s else "not accepted"),
             first=f"move {omissions[0]}",
         )

@@ -26,6 +26,7 @@ from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.run_data import RunData
 from rig.data.recording.settings import HandSettings
 from rig.errors import Fault
+from rig.errors.remedies_by_method import remedies_by_method
 from rig.estimation.by_hand.progress import SessionProgress, assess_progress
 from rig.estimation.by_hand.session_parts import HandRest, Move, SessionConditions
 from rig.motion.by_hand import FACES, Face, HandMove, Instruction
@@ -248,7 +249,7 @@ class HandSession:
         """Ask the operator for a move; None announces the end of the session."""
         self._request = None
         if instruction is not None:
-            again, why = (None, "") if wrong is None else (wrong.name, f"{wrong.what}. {wrong.remedy}"[:500])
+            again, why = (None, "") if wrong is None else (wrong.name, _explain(wrong)[:500])
             self._request = HandAsked(instruction, again, why)
             self.note(self._request)
 
@@ -282,3 +283,8 @@ def drain(heard: "SimpleQueue[tuple[str, NDArray[Any]]]") -> Iterator[tuple[str,
     """Yield the samples that have arrived, without waiting for more."""
     while not heard.empty():
         yield heard.get()
+
+
+def _explain(wrong: Fault) -> str:
+    """Return what was wrong, and what to do about it by hand."""
+    return f"{wrong.what}. {remedies_by_method(wrong.name).get('hand', wrong.remedy).rstrip('.')}."

@@ -1,6 +1,7 @@
 """Whole runs by hand through the real wire: the emulated board on its cable, turned by the simulated operator."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +45,7 @@ def test_a_run_with_mistakes_asks_again_and_passes_and_solves_again_to_the_same(
     assert done.returncode == 0, done.stderr + done.stdout
     assert "again: " in done.stderr
     assert "not accepted: turn_not_closed" in done.stderr
+    assert re.search(r"left out: \d of \d+ moves, not accepted; the first move \d", " ".join(done.stdout.split()))
     held(out)
     again = rig_here("solve", out, "--json")
     first, second = json.loads((out / "result.json").read_text()), json.loads(again.stdout)

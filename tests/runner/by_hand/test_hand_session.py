@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rig.data.recording.hand_events import HandBegunAnew
+from rig.data.recording.hand_events import HandAsked, HandBegunAnew
 from rig.errors import Fault
 from support.laboratories.hand_session_laboratory import LIST, TRUE_SCALE, Table
 
@@ -68,6 +68,9 @@ def test_a_mistake_is_asked_again_by_its_name_and_mended(mistakes: Mapping[str, 
     table.sit()
     assert table.operator.state["mistakes"]
     assert names <= set(table.again)
+    why = " ".join(event.why for event in table.events if isinstance(event, HandAsked))
+    assert "touches the rule." in why or "the move is asked for again." in why
+    assert "--no-closure" not in why
     held(table)
 
 
