@@ -150,6 +150,7 @@ class ColumnMap(Section):
 
 
 AS_NAMED = ColumnMap()  # every column has the rig's name
+GIVE_MAP = "Give a map of the columns; rig look LOG --write FILE writes one"
 
 
 def _fit(name: str, column: ColumnSection, wanted: str) -> None:

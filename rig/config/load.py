@@ -38,6 +38,7 @@ Turners = Mapping[str, type[TurnerSection]] | None  # None: the reader needs onl
 STOCK_TURNERS: Mapping[str, type[TurnerSection]] = {"ur": ArmSection, "hand": HandSection, "servo": ServoSection}
 TURNS = frozenset({"arm", "turner"})  # the sections of the turner, of which a configuration has one
 PROBLEMS_SHOWN = 25
+GIVE_CONFIGURATION = "Give a configuration; rig new FILE writes one"
 NOT_A_CONFIGURATION = ("cannot be read: ", "is ")  # how a problem of the whole file begins
 
 
@@ -63,12 +64,15 @@ class Loaded:
 
 
 class ConfigurationRefused(Refused):
-    """A configuration that is not valid; `problems` has one line for each error."""
+    """A configuration that is not valid; `problems` has one line for each error.
 
-    def __init__(self, source: str, problems: Sequence[str]) -> None:
+    `give` is what to do where the file cannot be read.
+    """
+
+    def __init__(self, source: str, problems: Sequence[str], give: str = GIVE_CONFIGURATION) -> None:
         self.problems = tuple(printable(problem) for problem in problems)
         if self._is_unreadable:
-            what, remedy = self.problems[0], "Give a configuration; rig new FILE writes one"
+            what, remedy = self.problems[0], give
         else:
             what = "has 1 error" if len(problems) == 1 else f"has {len(problems)} errors"
             by_option = all(f"{SET} " in problem or f"({SET})" in problem for problem in problems)
@@ -129,20 +133,23 @@ def load_statement(overrides: Sequence[str]) -> StatementConfig:
     return config
 
 
-def load_as(model: type[Model], path: str | Path) -> Model:
-    """Read a file that holds one section, of this `model`. Raise `ConfigurationRefused` as `load` does."""
-    layered = _read(path, ())
+def load_as(model: type[Model], path: str | Path, give: str = GIVE_CONFIGURATION) -> Model:
+    """Read a file that holds one section, of this `model`. Raise `ConfigurationRefused` as `load` does.
+
+    `give` is what to do where the file cannot be read.
+    """
+    layered = _read(path, (), give)
     section, problems = _validate(model, layered.document, (), layered)
     if layered.problems or section is None:
         raise ConfigurationRefused(str(path), [*layered.problems, *problems])
     return section
 
 
-def _read(path: str | Path, overrides: Sequence[str]) -> Layered:
+def _read(path: str | Path, overrides: Sequence[str], give: str = GIVE_CONFIGURATION) -> Layered:
     try:
         return read_layers(Path(path), overrides)
     except Unreadable as error:
-        raise ConfigurationRefused(str(path), [str(error)]) from None
+        raise ConfigurationRefused(str(path), [str(error)], give) from None
 
 
 def parse(
@@ -197,7 +204,7 @@ def _validate_rig(
     config, rest_problems = _validate(RigConfig, rest, (), layered)
     if procedure is None or turner is None or config is None:
         return None, turner_problems + rest_problems + problems
-    problems = [f"(file): {problem}" for problem in procedure.problems(config)]
+    problems = [*procedure.problems(config)]
     return (None if problems else config), problems
 
 
@@ -295,7 +302,8 @@ def _explain(model: type[BaseModel], item: Any, prefix: Location, layered: Layer
         return f"{where}: {quote(value)}: must be a section, with the keys {', '.join(_keys_at(model, location))}"
     message = item["msg"].removeprefix("Value error, ")
     shown = "" if isinstance(value, dict) else f"{quote(value)}: "
-    return f"{where}: {shown}{message[0].lower()}{message[1:]}"
+    place = f"{where}: " if (*prefix, *location) else ""  # what concerns the whole file has no place in it
+    return f"{place}{shown}{message[0].lower()}{message[1:]}"
 
 
 def _hint_at_override(section: Location, layered: Layered) -> str:

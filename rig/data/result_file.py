@@ -484,7 +484,7 @@ def write_result(document: ResultDocument, folder: Path) -> None:
 
 def read_result(path: Path) -> ResultDocument:
     """Return the `result.json` of a run folder, or at `path` itself. Raise Refused `no_result`, `not_a_result`."""
-    remedy = "Give a run folder or its result.json"
+    remedy = "Give a run folder, its result.json, or latest"
     if (path / CONFIG).is_file() and not (path / RESULT).exists():
         remedy = "The run was not finished: go on with rig resume RUN, or solve what was recorded with rig solve RUN"
     return read_document(ResultDocument, _file(path), SIZE_MAX_BYTES, what="a run", remedy=remedy)

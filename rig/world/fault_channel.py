@@ -108,18 +108,23 @@ class ControlSession:
             **{f"{kind}_fault": partial(self._instrument_fault, kind) for kind in KINDS},
             **{f"{kind}_power": partial(self._instrument_power, kind) for kind in KINDS},
             "mount": lambda stage: world.laboratory.mount(int(stage)),
-            "fit": lambda part: world.fit_part(str(part)),
             "air": self._air,
             "heater": self._heater,
-            "unplug_board": world.unplug_board,
-            "plug_in_board": world.plug_in_board,
+            "write_truth": world.write_truth,
+            **(self._board_orders() if world.laboratory.has_board else {}),
+            **self._motion_orders(),
+        }
+
+    def _board_orders(self) -> dict[str, Callable[..., Reply | None]]:
+        return {
+            "fit": lambda part: self._world.fit_part(str(part)),
+            "unplug_board": self._world.unplug_board,
+            "plug_in_board": self._world.plug_in_board,
             "reset_board": self._reset_board,
             "power_dip": self._power_dip,
             "sensor_fault": self._sensor_fault,
             "silence_board": self._silence_board,
             "host_baud": self._host_baud,
-            "write_truth": world.write_truth,
-            **self._motion_orders(),
         }
 
     def _motion_orders(self) -> dict[str, Callable[..., Reply | None]]:

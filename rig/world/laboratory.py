@@ -65,6 +65,11 @@ class Laboratory:
         self.instruments[name].switch_on(self._build_motion, self._build_field, self._time_s)
 
     @property
+    def has_board(self) -> bool:
+        """Whether a board belongs to the laboratory, powered or not."""
+        return self._config.board is not None
+
+    @property
     def on_arm(self) -> OnArm:
         """The arm that turns the sensors. Raise TypeError if something else turns them."""
         if not isinstance(self.motion_source, OnArm):
@@ -89,7 +94,7 @@ class Laboratory:
 
     def plug_in(self) -> None:
         """Power the board, if there is one and it has no power."""
-        if self.board is None and self._config.board is not None:
+        if self.board is None and self.has_board:
             time_s = self._time_s
             self._elements = {}
             self._sensors = {

@@ -267,3 +267,21 @@ def test_the_rigs_linear_algebra_runs_on_one_thread_unless_told_otherwise() -> N
     assert threads("rig.cli") == threads("procedures.six_observation") == "1\n"
     assert threads("rig") != "1\n"  # a notebook's own business
     assert threads("rig.cli", told="OPENBLAS_NUM_THREADS=2") == "2\n"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("typed", "offered"),
+    [
+        ("rig ex", {"explain", "export"}),
+        ("rig explain turn_", {"turn_not_closed", "turn_too_short"}),
+        ("rig show la", {"latest"}),
+        ("rig export --format mat", {"mat"}),
+    ],
+)
+def test_the_tab_key_completes_commands_names_runs_and_choices(typed: str, offered: set[str], tmp_path: Path) -> None:
+    answer = tmp_path / "answer"
+    asked = {"_ARGCOMPLETE": "1", "_ARGCOMPLETE_STDOUT_FILENAME": str(answer), "_ARGCOMPLETE_IFS": "|"}
+    asked |= {"COMP_LINE": typed, "COMP_POINT": str(len(typed)), "COMP_TYPE": "9"}
+    shell(f"cd {tmp_path}; {sys.executable} -m rig", **asked)
+    assert {word.strip() for word in answer.read_text(encoding="utf-8").split("|")} == offered

@@ -1,5 +1,6 @@
 """The page `practise-a-fault`, done as it says: each word typed, each answer compared, in one laboratory for all."""
 
+import re
 import subprocess
 import threading
 from collections.abc import Iterator
@@ -9,7 +10,7 @@ from queue import Queue
 import pytest
 
 from rig.commands.laboratory.laboratory_process import run_simulated_laboratory, send_request
-from rig.commands.laboratory.practice import HELP, INCIDENTS, find_incident, practise
+from rig.commands.laboratory.practice import INCIDENTS, find_incident, opening_text, practise
 from rig.config.load import load
 from rig.errors import Fault
 from support.laboratories.worlds import fresh_host
@@ -27,6 +28,8 @@ PACE = 4  # of a run that a fault is to hit, on a busy computer too
 QUICKLY = 30  # where nothing happens until the end
 SECTIONS = exercises()
 TITLES = [title for title in SECTIONS if title[:1].isdigit()]
+BY_HAND = {words for words, incident in INCIDENTS.items() if incident.request["do"] == "instruct"}
+AT_AN_ARM = INCIDENTS.keys() - BY_HAND
 
 
 class Terminals:
@@ -44,7 +47,7 @@ class Terminals:
         self._shown: Queue[str] = Queue()
         self._reader = threading.Thread(target=self._read)
         self._reader.start()
-        self.shown_first = [self._shown.get(timeout=PATIENCE_S) for _ in range(len(HELP.splitlines()) + 1)]
+        self.shown_first = [self._shown.get(timeout=PATIENCE_S) for _ in range(2 + len(AT_AN_ARM))]
 
     def _start(self, command: str, *more: str) -> "subprocess.Popen[str]":
         name, *words = [str(ROOT / word) if word.startswith("configs/") else word for word in command.split()]
@@ -162,6 +165,11 @@ def test_what_a_laboratory_does_not_have_cannot_happen_in_it() -> None:
     with run_simulated_laboratory(by_hand.text) as control:
         assert practise(control, "slider 50") == "this cannot happen in this laboratory"
         assert practise(control, "Unplug") == INCIDENTS["unplug"].text
+        assert {*re.findall(r"^  (\S.*?)  ", opening_text(control), re.MULTILINE)} == BY_HAND | {
+            "unplug",
+            "plug in",
+            "power dip",
+        }
     with pytest.raises(Fault, match="world_ended"):
         practise(control, "unplug")
 
@@ -169,7 +177,7 @@ def test_what_a_laboratory_does_not_have_cannot_happen_in_it() -> None:
 def test_the_page_has_six_exercises_with_every_word_that_can_be_typed() -> None:
     assert len(TITLES) == 6
     typed = {step.typed for steps in SECTIONS.values() for step in steps if step.prompt == LABORATORY}
-    assert typed >= set(INCIDENTS)
+    assert typed >= AT_AN_ARM
 
 
 @pytest.mark.parametrize(
@@ -178,3 +186,15 @@ def test_the_page_has_six_exercises_with_every_word_that_can_be_typed() -> None:
 def test_the_slider_goes_to_any_percentage(words: str, fraction: float | None) -> None:
     incident = find_incident(words)
     assert (None if incident is None else incident.request["fraction"]) == fraction
+
+
+@pytest.mark.slow
+def test_a_hand_moves_a_device_that_prints_lines_as_is_typed() -> None:
+    at = f"sensors.imu.serial.port=socket://{fresh_host()}:7341"
+    lines = load(CONFIGS / "by_hand_lines.yaml", [at, "world.hand.mistakes={}"], sections=None)
+    with run_simulated_laboratory(lines.text) as control:
+        assert practise(control, "unplug") == "this cannot happen in this laboratory"
+        for acts, words in enumerate(("lay +x", "turn", "Lay  -y"), 1):
+            assert practise(control, words) == INCIDENTS[" ".join(words.lower().split())].text
+            wait_for(lambda: send_request(control, {"do": "state"})["acts"] == acts, words)  # noqa: B023
+        assert send_request(control, {"do": "state"})["face"] == "-y"

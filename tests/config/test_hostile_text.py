@@ -160,7 +160,7 @@ def test_an_override_that_cannot_be_read_is_refused_by_name(override: str, why: 
         ('arm: {host: "a\\u0007b"}\n', r"arm.host (line 1): holds the control character \x07"),
         ('"ar\\e[0m": 1\n', r"ar\x1b[0m (line 1): holds the control character \x1b"),
         ("arm: !!set {a}\n", "line 1: tag:yaml.org,2002:set: tags are not used in a configuration"),
-        ("3: 1\n", "(file) (line 1): the key '3' is no word; put it in quotes"),
+        ("3: 1\n", "the file (line 1): the key '3' is no word; put it in quotes"),
         ("? [1, 2]\n: 1\n", "found unhashable key"),
         ("a: 1\n---\nb: 1\n", "expected a single document"),
         ("\ufffe: 1", "unacceptable character"),

@@ -231,7 +231,7 @@ def test_a_sensor_must_stand_in_the_world_too() -> None:
         ("procedure.order=[wrist_3, wrist_3, wrist_2]", "procedure"),
         ("procedure.directions=[cw]", "procedure"),
         ("sensors.gyro.mounting.x=-x", "sensors.gyro.mounting"),
-        ("procedure.speed_deg_s=170", "(file)"),
+        ("procedure.speed_deg_s=170", "procedure.speed_deg_s 170 is too fast"),
         ("procedure.speed_deg_s=0.2", "procedure.speed_deg_s"),
         ("arm.host=[]", "arm.host"),
     ],

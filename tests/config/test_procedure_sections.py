@@ -94,7 +94,7 @@ def test_a_section_judges_the_rest_of_the_file() -> None:
     found = problems_of(
         "procedure={name: nod, nods: 1}", "sensors={gyro: {part: mpu9250, serial_number: a}}", "world.seed=2"
     )
-    assert found == ("(file): a nod needs an lsm9ds1",)
+    assert found == ("a nod needs an lsm9ds1",)
 
 
 def test_a_verification_says_everything_it_lacks() -> None:

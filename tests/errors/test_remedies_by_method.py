@@ -73,3 +73,10 @@ def test_a_name_that_is_like_several_is_offered_once_each(capsys: pytest.Capture
     assert main(["explain", "condtion"]) == 2
     offered = capsys.readouterr().err.partition("Did you mean ")[2].strip().rstrip("?").split(" or ")
     assert "condition" in offered and len(offered) == len(set(offered))
+
+
+def test_a_part_of_a_word_leads_to_the_word_and_a_verdict_is_one(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["explain", "scale"]) == 2
+    assert "Did you mean scale factor?" in capsys.readouterr().err
+    assert main(["explain", "PASS"]) == 0
+    assert "every check is passed" in capsys.readouterr().out

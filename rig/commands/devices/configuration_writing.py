@@ -47,9 +47,10 @@ def write_checked(path: Path, answers: "Answers") -> int:
         say(f"then: rig check {path}")
         return 1
     say("checked: it is complete; every line can be changed")
-    say(f"next: rig plan {path}     what will be done, and how long it takes; connects to nothing")
-    say(f"      rig check {path}    connects and looks; nothing moves")
-    say(f"      rig run {path}      calibrates")
+    say("next:")
+    say(f"  rig plan {path}     every motion; connects to nothing")
+    say(f"  rig check {path}    connects and looks; nothing moves")
+    say(f"  rig run {path}      calibrates")
     return 0
 
 

@@ -23,7 +23,8 @@ METHODS: "dict[CalibrationMethod, str]" = {
 def add(parser: ArgumentParser) -> None:
     """Add the arguments of `rig explain`."""
     what = "a check (gyro.scale_changed), an error (wrong_axis), a limit, or a word (E_n, sweep, scale factor)"
-    parser.add_argument("name", nargs="+", metavar="NAME", help=what)
+    action = parser.add_argument("name", nargs="+", metavar="NAME", help=what)
+    action.completer = lambda **_: _list_names()  # pyrefly: ignore[missing-attribute]  # as argcomplete asks for it
 
 
 def run(options: Namespace) -> int:
@@ -31,7 +32,9 @@ def run(options: Namespace) -> int:
     name = " ".join(options.name).strip()
     lines = [*_explain_check(name), *_explain_limit(name), *_explain_error(name), *_explain_word(name)]
     if not lines:
-        alike = get_close_matches(name, {*_list_names()}, cutoff=0.5)
+        names = {*_list_names()}
+        containing = sorted(word for word in names if name.casefold() in word.casefold().split())
+        alike = containing or get_close_matches(name, names, cutoff=0.5)
         remedy = f"Did you mean {' or '.join(alike)}?" if alike else "Give the name exactly as it was printed"
         raise Refused("nothing_known", f"there is no check, error, limit or word called {shorten(name)}", remedy)
     for line in lines:

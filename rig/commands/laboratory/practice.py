@@ -1,7 +1,7 @@
-"""Incidents (faults and remedies) that a person causes by typed words to practise in a running laboratory."""
+"""Incidents (faults, remedies, moves by hand) that a person causes by typed words in a running laboratory."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
@@ -29,6 +29,10 @@ def _slider(percent: int) -> Incident:
     return _incident(f"the speed slider on the pendant is at {percent} %", "speed_slider", fraction=percent / 100)
 
 
+def _lay(side: str) -> Incident:
+    return _incident(f"the hand lays it down with the side {side} up", "instruct", say="lay", face=side)
+
+
 INCIDENTS: Mapping[str, Incident] = MappingProxyType(
     {
         "unplug": _incident("the board's cable is pulled out", "unplug_board"),
@@ -44,14 +48,26 @@ INCIDENTS: Mapping[str, Incident] = MappingProxyType(
             "a gripper's program takes the input registers", "registers_in_use", first=0, last=47
         ),
         "other client gone": _incident("the gripper's program gives the input registers back", "registers_free"),
+        **{f"lay {side}": _lay(side) for side in ("+x", "-x", "+y", "-y", "+z", "-z")},
+        "turn": _incident(
+            "the hand turns it once round on the table, counterclockwise", "instruct", say="turn", face="+z", turns=1
+        ),
     }
 )
-HELP = "\n".join(["What can happen here:", *(f"  {words:18}{item.text}" for words, item in INCIDENTS.items())])
 
 
-def opening_text() -> str:
-    """Return the greeting of a laboratory for a person who practises in it."""
-    return f"The laboratory is ready. {HELP}\nAn empty line shows this again; Ctrl-D ends the laboratory."
+def opening_text(control: str) -> str:
+    """Return the greeting of a laboratory for a person who practises in it. Raise Fault `world_ended`."""
+    requests = _send(control, {"do": "help"})["known"]
+    return (
+        f"The laboratory is ready. {help_text(requests)}\nAn empty line shows this again; Ctrl-D ends the laboratory."
+    )
+
+
+def help_text(requests: Collection[str]) -> str:
+    """Return the list of incidents of a laboratory whose control channel has these `requests`."""
+    possible = ((words, item) for words, item in INCIDENTS.items() if item.request["do"] in requests)
+    return "\n".join(["What can happen here:", *(f"  {words:18}{item.text}" for words, item in possible)])
 
 
 def find_incident(words: str) -> Incident | None:
@@ -69,14 +85,20 @@ def practise(control: str, words: str) -> str:
     """
     incident = find_incident(words)
     if incident is None:
-        return HELP if words.strip() in ("", "help", "?") else f"{words.strip()!r} is unknown. {HELP}"
-    try:
-        reply = send_request(control, incident.request)
-    except (OSError, ValueError) as error:
-        raise Fault("world_ended", f"the simulated laboratory has ended ({error})", "Start it again") from error
+        unknown = "" if words.strip() in ("", "help", "?") else f"{words.strip()!r} is unknown. "
+        return unknown + help_text(_send(control, {"do": "help"})["known"])
+    reply = _send(control, incident.request)
     if "known" in reply:  # the requests that it knows
         return "this cannot happen in this laboratory"
     if not reply["ok"]:
         reason = str(reply["error"]).removeprefix(f"{incident.request['do']}: ")
         return f"not now: {reason}"
     return incident.text
+
+
+def _send(control: str, request: Request) -> Request:
+    """Send a request to the laboratory, and return the reply. Raise Fault `world_ended` if none comes."""
+    try:
+        return send_request(control, request)
+    except (OSError, ValueError) as error:
+        raise Fault("world_ended", f"the simulated laboratory has ended ({error})", "Start it again") from error

@@ -15,7 +15,7 @@ def add(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--faults",
         action="store_true",
-        help="as fast as a real one, with the faults that are typed in this terminal: unplug, slider 50, …",
+        help="as fast as a real one, with what is typed in this terminal: unplug, slider 50, lay +x, …",
     )
 
 
@@ -42,7 +42,7 @@ def _practise(control: str) -> int:
     from rig.station.plain_text import say
 
     send_request(control, {"do": "pace", "time_scale": 1.0})  # a servo runs in real time only
-    print(opening_text(), flush=True)
+    print(opening_text(control), flush=True)
     while True:
         try:
             words = input("laboratory> ")

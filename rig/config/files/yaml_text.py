@@ -192,8 +192,8 @@ def _visible(node: yaml.ScalarNode, location: Location) -> Iterator[str]:
 
 
 def format_path(location: Location) -> str:
-    """Return a location in the form `sensors.gyro.rate_hz`; the whole file is `(file)`."""
-    return ".".join(shorten(str(part)) for part in location) or "(file)"
+    """Return a location in the form `sensors.gyro.rate_hz`; `the file` for the whole of it."""
+    return ".".join(shorten(str(part)) for part in location) or "the file"
 
 
 def _shorten_words(text: str) -> str:

@@ -172,7 +172,7 @@ def describe_fault(fit: GraphFit, hypothesis: FaultHypothesis) -> Fault:
             "turn_not_closed",
             f"the turn from {move.start_s:.1f} to {move.end_s:.1f} s ended {abs(np.degrees(residual)):.1f}° from where "
             "it began",
-            "Turn against a straight edge, so that it ends where it began. If whole turns in a file ended at none: --no-closure",
+            "Turn against a straight edge, so that it ends where it began. Of a file without one: --no-closure",
         )
     if hypothesis.name == "lost_in_move":
         move = moves[hypothesis.index]
@@ -225,7 +225,7 @@ def _find_excessive_std(fit: GraphFit) -> Fault | None:
         return Fault("not_flat", what, _REMEDY)
     if stds.closure_rad >= NEARLY * LARGEST.closure_rad:
         what = f"the turns do not end where they began, by {1e3 * stds.closure_rad:.0f} mrad or more"
-        return Fault("turn_not_closed", what, "Turn against a straight edge. If whole turns in a file ended at none: --no-closure")
+        return Fault("turn_not_closed", what, "Turn against a straight edge. Of a file without one: --no-closure")
     if stds.of_angle >= NEARLY * LARGEST.of_angle:
         what = f"the moves contradict each other by {100 * stds.of_angle:.2f} % of a quarter turn or more"
         return Fault("lost_in_move", what, _REMEDY)

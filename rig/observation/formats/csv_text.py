@@ -58,7 +58,8 @@ def _raise_no_file(path: Path) -> Iterator[None]:
     try:
         yield
     except (UnfitFile, OSError, EOFError, zlib.error, ValueError, csv.Error) as error:
-        raise Refused("no_file", f"{path} cannot be read: {error}", "Give a CSV file") from error
+        why = getattr(error, "strerror", None) or error
+        raise Refused("no_file", f"{path} cannot be read: {why}", "Give a CSV file") from error
 
 
 def _text(file: BinaryIO | GzipFile) -> TextIOWrapper:

@@ -84,6 +84,12 @@ def test_a_log_in_its_own_words_gives_what_the_files_of_the_rig_give(tmp_path: P
         assert found[name] == pytest.approx(values, abs=1e-6)
 
 
+def test_a_map_that_is_not_there_is_written_by_rig_look(tmp_path: Path) -> None:
+    done = rig_here("solve", DOCS / "examples" / "samples.csv", "--turns", "--columns", tmp_path / "columns.yaml")
+    assert done.returncode == 2
+    assert "rig look LOG --write FILE writes one" in done.stderr
+
+
 def test_a_table_that_counts_the_other_way_turns_the_other_way(tmp_path: Path) -> None:
     log = written(
         tmp_path / "log",
