@@ -69,6 +69,10 @@ def test_the_site_is_built_without_a_warning(site: Path) -> None:
 def test_the_search_answers_questions_and_finds_names(site: Path) -> None:
     answers = {
         "how do I stop the arm": "docs/how-to/at-the-rig/operators-page.html#stop-the-arm-stop-the-run",
+        "stop the arm": "docs/how-to/at-the-rig/operators-page.html#stop-the-arm-stop-the-run",
+        "no hardware": "docs/how-to/start/ten-minutes.html",
+        "export to matlab": "docs/how-to/finished-runs/export.html",
+        "tab completion": "docs/commands.html#completion-by-the-tab-key",
         "calibrate by hand": "docs/how-to/without-an-arm/by-hand.html",
         "resume an interrupted run": "docs/how-to/at-the-rig/resume-and-repeat.html",
         "arm_moved": "docs/errors.html#error-arm-moved",

@@ -5,17 +5,22 @@ const FIRST = ["docs/how-to/", "docs/errors", "docs/checks", "docs/commands", "d
 const LAST = ["docs/decisions/", "docs/names", "CHANGELOG", "CONTRIBUTING", "docs/protocol", "docs/results", "firmware_host/"];
 const HEADING = 12; // for each of the words that stands in a heading
 const OWN_TITLE = 8; // more, if that is the page's title
+const ANOTHER_NAME = -45; // for a name of the program that the query does not write in full: "stop" is no world.arm.fieldbus.stop
+const SHORT_HEADING = 3; // more, the larger the share of these words in the heading
+const SAYS = ["no", "not", "without"]; // of the words that a search leaves out
+const PREFIX = 4; // letters, from which on the beginning of a word is enough: "servo" finds the servomotor
 
 var Scorer = {
   score: (result) => {
     const [page, title, , , score] = result;
+    if (result[6] === "object" && !isNamed(title)) return score + ANOTHER_NAME;
     const rank = FIRST.some((start) => page.startsWith(start)) ? 6 : LAST.some((start) => page.startsWith(start)) ? -6 : 0;
-    const { count, heading, anchor } = bestHeading(page, title);
+    const { count, share, heading, anchor } = bestHeading(page, title);
     if (count && result[6] === "text") {
       if (anchor) [result[1], result[2]] = [`${title} > ${heading}`, `#${anchor}`];
-      return score + rank + HEADING * count + (anchor ? 0 : OWN_TITLE);
+      return score + rank + HEADING * count + SHORT_HEADING * share + (anchor ? 0 : OWN_TITLE);
     }
-    return score + rank;
+    return score + rank + (page === "docs/checks" ? 1 : 0); // before an error of the same name
   },
   objNameMatch: 60, // the name of an error, a check, a key or a command, written in full
   objPartialMatch: 6,
@@ -35,21 +40,30 @@ function wantedStems() {
 
 function stemsOf(text) {
   const stemmer = new Stemmer();
-  const words = text.toLowerCase().split(/[^\p{L}\p{N}_]+/u).filter((word) => word && !stopwords.has(word));
+  const words = text.toLowerCase().split(/[^\p{L}\p{N}_]+/u).filter((word) => word && (SAYS.includes(word) || !stopwords.has(word)));
   return new Set(words.map((word) => stemmer.stemWord(word)));
 }
 
-/** Return the heading of a page with most of the words: their count, the heading, and its anchor (null for the page's own). */
+/** Return whether the query is this name: all its words, or a word that only a name can be, as payload_kg. */
+function isNamed(name) {
+  const [wanted, own] = [wantedStems(), stemsOf(name)];
+  const named = [...wanted].filter((stem) => own.has(stem));
+  return named.some((stem) => stem.includes("_")) || (named.length === wanted.size && wanted.size === own.size);
+}
+
+/** Return the heading of a page with most of the words: their count and share, the heading, and its anchor (null for the page's own). */
 function bestHeading(page, title) {
   const number = Search._index.docnames.indexOf(page);
   const wanted = wantedStems();
-  let best = { count: 0, heading: title, anchor: null };
+  let best = { count: 0, share: 0, heading: title, anchor: null };
   for (const [heading, places] of Object.entries(Search._index.alltitles))
     for (const [file, anchor] of places) {
       if (file !== number) continue;
       const stems = stemsOf(heading);
-      const count = [...wanted].filter((stem) => stems.has(stem)).length;
-      if (count > best.count || (count === best.count && count && anchor === null)) best = { count, heading, anchor };
+      const begins = (stem) => stem.length >= PREFIX && [...stems].some((whole) => whole.startsWith(stem));
+      const count = [...wanted].filter((stem) => stems.has(stem) || begins(stem)).length;
+      if (count > best.count || (count === best.count && count && anchor === null))
+        best = { count, share: count / stems.size, heading, anchor };
     }
   return best;
 }
