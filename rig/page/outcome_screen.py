@@ -38,6 +38,7 @@ def outcome_rows(result: ResultDocument, parts: Mapping[str, str], true_rows: Se
                 "part": parts.get(row.sensor, ""),
                 "labels": list(row.labels),
                 "unit": row.unit.name,
+                "model": f"{row.quantity.sensor}: {row.model.partition(',')[0]}" if row.model else "",
                 "scale": None if row.scale is None else _numbers(row.scale, 1.0, scale),
                 "bias": _numbers(row.numbers, 0.0, None if bias is None else bias / row.unit.size),
                 "truth": _truth(true_by_name.get(row.name)),

@@ -21,6 +21,10 @@ def test_each_thing_found_has_a_row_with_its_serial_number_and_its_limits() -> N
     assert [row["name"] for row in rows] == [*PARTS, *(f"{name}, accelerometer" for name in PARTS)]
     assert [row["part"] for row in rows] == [*PARTS.values()] * 2
     assert rows[0]["scale"]["limit"] == 0.3 and rows[0]["bias"]["limit"] is not None
+    assert [*dict.fromkeys(row["model"] for row in rows)] == [
+        "gyroscope: g = K (m + b)",
+        "accelerometer: m = F (s + φ s²) + b",
+    ]
     for row in rows:
         for found in (row["scale"], row["bias"]):
             decimals = [len(text.partition(".")[2]) for text in (*found["texts"], *found["u"])]

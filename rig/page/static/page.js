@@ -112,6 +112,8 @@ function showFailedChecks(checks) {
 
 function showResults() {
   showOutcome($("found"), shown.outcome ?? [], shown.since);
+  const models = [...new Set(shown.outcome?.map((row) => row.model).filter(Boolean))];
+  $("models").textContent = models.length ? `${models.join("; ")}.` : "";
   $("key").hidden = !shown.outcome?.length;
 }
 
