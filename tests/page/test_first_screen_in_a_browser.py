@@ -1,5 +1,6 @@
 """What matters is in the first screen, with one sensor and with six; nothing is wider than a telephone."""
 
+import json
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -8,7 +9,7 @@ from selenium.webdriver import Chrome
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 
-from rig.data.run_folder import RESULT
+from rig.data.run_folder import RESULT, TRUTH
 from rig.errors import Fault
 from rig.station.events import DocumentWritten, Failed, Prompt
 from support.page.browser import TABLET, kind, legible, needs_browser, picture, screen, set_theme, text
@@ -119,6 +120,22 @@ def test_what_was_found_is_in_print_as_the_certificate_has_it(driver: Chrome, tm
     wait_for(lambda: driver.find_element(By.CSS_SELECTOR, "#found table").is_displayed(), "the rest")
     cells = [td.text for td in driver.find_elements(By.CSS_SELECTOR, "#found tbody tr:nth-child(3) td")]
     assert cells[3] == "2.4" and len(driver.find_elements(By.CSS_SELECTOR, "#found details:first-child td svg")) == 6
+
+
+def test_no_column_of_a_result_is_hidden_beside_its_previous_one_and_the_simulated_truth(
+    driver: Chrome, tmp_path: Path, six: Telling
+) -> None:
+    true = {"scale": [1.17, 1.16, 1.14], "bias_rad_s": [0.008, -0.01, -0.005]}
+    document = {"schema": "rig.truth/1", "simulated": True, "gyroscopes": {"lsm9ds1": true}, "accelerometers": {}}
+    (tmp_path / TRUTH).write_text(json.dumps(document), encoding="utf-8")
+    six(*six_judged(tmp_path), DocumentWritten(tmp_path / TRUTH))
+    wait_for(lambda: "E_n" in text(driver, "found"), "the comparison")
+    driver.find_element(By.CSS_SELECTOR, "#found summary").send_keys(Keys.ENTER)
+    wait_for(lambda: "simulated truth" in text(driver, "found"), "the truth")
+    for size in (*SIZES, TELEPHONE):
+        with screen(driver, *size):
+            picture(driver, f"truth-{size[0]}")
+            assert wide(driver) == [] and driver.execute_script(SCROLLING) == [], size
 
 
 def test_a_run_that_failed_says_what_failed_and_what_to_do(driver: Chrome, tmp_path: Path, six: Telling) -> None:

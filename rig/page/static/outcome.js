@@ -17,7 +17,7 @@ export function showOutcome(box, rows, since) {
   const wasOpen = new Map([...box.children].map((details) => [details.dataset.name, details.open]));
   box.replaceChildren(...rows.map((row) => {
     const past = since?.[row.name];
-    const details = make("details", { open: wasOpen.get(row.name) ?? rows.length <= 2 }, makeSummary(row, past, since), makeTable(row, past));
+    const details = make("details", { open: wasOpen.get(row.name) ?? rows.length <= 2 }, makeSummary(row, past, since), makeTables(row, past));
     details.dataset.name = row.name;
     return details;
   }));
@@ -51,21 +51,24 @@ function makeTriad(name, result, unit, past, kind) {
   return [words, make("span", { className: `picture ${kind}` }, drawPicture(result, past, result.values.map((_, i) => i)))];
 }
 
-function makeTable(row, past) {
-  const makeHeadings = (key, unit) => (row[key] ? [`${key === "scale" ? "scale factor" : row.scale ? "bias" : "value"} ± U${unit}`, "", ...(past?.[key] ? ["before", "E_n"] : []), ...(row.truth?.[key] ? ["simulated truth", "(result − truth)/U"] : [])] : []);
-  const makeCells = (key, i) => {
-    const [result, previous, truth] = [row[key], past?.[key], row.truth?.[key]];
-    if (!result) return [];
-    return [make("td", { textContent: `${result.texts[i]} ± ${result.u[i]}` }), make("td", {}, drawPicture(result, previous, [i])),
-      ...(previous ? [make("td", { textContent: previous.values[i].toFixed(countDecimals(result.texts[i])).replace("-", "−") }),
-        make("td", { textContent: previous.normalised_error[i].toFixed(1), className: previous.changed[i] ? "bad" : "" })] : []),
-      ...(truth ? [make("td", { textContent: truth.texts[i] }), make("td", { textContent: formatSigned(truth.deviations[i]) })] : [])];
-  };
-  const head = ["axis", ...makeHeadings("scale", ""), ...makeHeadings("bias", `, ${row.unit}`)].map((text) => make("th", { scope: "col", textContent: text }));
-  const body = row.bias.values.map((_, i) => make("tr", {}, make("th", { scope: "row", textContent: row.labels[i] }), ...makeCells("scale", i), ...makeCells("bias", i)));
+/** Make the tables of scale factors and of biases: side by side, or below one another where the screen is narrow. */
+function makeTables(row, past) {
+  return make("div", { className: "wide" }, ...["scale", "bias"].filter((key) => row[key]).map((key) => makeTable(row, past, key)));
+}
+
+function makeTable(row, past, key) {
+  const [result, previous, truth] = [row[key], past?.[key], row.truth?.[key]];
+  const name = key === "scale" ? "scale factor ± U" : `${row.scale ? "bias" : "value"} ± U, ${row.unit}`;
+  const headings = ["axis", name, "", ...(previous ? ["before", "E_n"] : []), ...(truth ? ["simulated truth", "(result − truth)/U"] : [])];
+  const makeCells = (i) => [make("td", { textContent: `${result.texts[i]} ± ${result.u[i]}` }), make("td", {}, drawPicture(result, previous, [i])),
+    ...(previous ? [make("td", { textContent: previous.values[i].toFixed(countDecimals(result.texts[i])).replace("-", "−") }),
+      make("td", { textContent: previous.normalised_error[i].toFixed(1), className: previous.changed[i] ? "bad" : "" })] : []),
+    ...(truth ? [make("td", { textContent: truth.texts[i] }), make("td", { textContent: formatSigned(truth.deviations[i]) })] : [])];
+  const head = headings.map((text) => make("th", { scope: "col", textContent: text }));
+  const body = row.labels.map((label, i) => make("tr", {}, make("th", { scope: "row", textContent: label }), ...makeCells(i)));
   const table = make("table", {}, make("thead", {}, make("tr", {}, ...head)), make("tbody", {}, ...body));
   labelCells(table);
-  return make("div", { className: "wide" }, table);
+  return table;
 }
 
 const formatSigned = (number) => `${number < 0 ? "−" : "+"}${Math.abs(number).toFixed(2)}`;
