@@ -128,7 +128,7 @@ def check_serial_number(value: str) -> str:
     if value == GAP:
         raise ValueError("write the number of this specimen here; it is on the device or its certificate")
     if not (value.isascii() and value.isprintable() and 0 < len(value) <= SERIAL_NUMBER_MAX):
-        raise ValueError(f"must be 1 to {SERIAL_NUMBER_MAX} plain ASCII characters; the board can store no others")
+        raise ValueError(f"must be 1 to {SERIAL_NUMBER_MAX} plain ASCII characters: a board can store no others")
     return value
 
 
