@@ -126,7 +126,12 @@ def test_no_column_of_a_result_is_hidden_beside_its_previous_one_and_the_simulat
     driver: Chrome, tmp_path: Path, six: Telling
 ) -> None:
     true = {"scale": [1.17, 1.16, 1.14], "bias_rad_s": [0.008, -0.01, -0.005]}
-    document = {"schema": "rig.truth/1", "simulated": True, "gyroscopes": {"lsm9ds1": true}, "accelerometers": {}}
+    document: dict[str, object] = {
+        "schema": "rig.truth/1",
+        "simulated": True,
+        "gyroscopes": {"lsm9ds1": true},
+        "accelerometers": {},
+    }
     (tmp_path / TRUTH).write_text(json.dumps(document), encoding="utf-8")
     six(*six_judged(tmp_path), DocumentWritten(tmp_path / TRUTH))
     wait_for(lambda: "E_n" in text(driver, "found"), "the comparison")
