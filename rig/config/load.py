@@ -302,8 +302,8 @@ def _explain(model: type[BaseModel], item: Any, prefix: Location, layered: Layer
         return f"{where}: {quote(value)}: must be a section, with the keys {', '.join(_keys_at(model, location))}"
     message = item["msg"].removeprefix("Value error, ")
     shown = "" if isinstance(value, dict) else f"{quote(value)}: "
-    place = f"{where}: " if (*prefix, *location) else ""  # what concerns the whole file has no place in it
-    return f"{place}{shown}{message[0].lower()}{message[1:]}"
+    words = f"{shown}{message[0].lower()}{message[1:]}"
+    return f"{where}: {words}" if (*prefix, *location) else words  # what concerns the whole file has no place in it
 
 
 def _hint_at_override(section: Location, layered: Layered) -> str:

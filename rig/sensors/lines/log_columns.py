@@ -27,10 +27,12 @@ BLOCK_S, QUIETEST, AS_QUIET = 0.25, 0.1, 3.0
 # Larger than the readings of a gyroscope in rad/s, and than its scatter at rest.
 LARGEST_RAD_S, NOISIEST_RAD_S = 40.0, 0.02
 NORM_TOLERANCE = 2e-3
+FEWEST_STEPS, MOST_RISE = 10, 0.9  # of a column that counts: its steps, and the share of those that rise
 AXES = ("x", "y", "z")
 REFERENCE = {name for group in MOTIONS["attitudes"].optional for name in group} | {"start_s", "end_s"}
 QUATERNION_NAME = re.compile(r"(?:.*_)?(?:q|quat|quaternion|orientation|rot|rotation|attitude)_?([wxyz0-3])")
 POSITION_NAME = re.compile(r"(?:(?:p|t|pos|position|trans|translation)_?)?[xyz](?: \[.*\])?")
+KIND_OF = {UNITS["rad/s"].quantity: ("gyro",), UNITS["m/s2"].quantity: ("acc",), UNITS["T"].quantity: ("mag",)}
 DIGITS = {"0": "qw", "1": "qx", "2": "qy", "3": "qz"}
 GRAVITY = {"m/s2": STANDARD_GRAVITY_M_S2, "g": 1.0, "mg": 1000.0}
 ANGLE_WORDS = {"yaw", "pitch", "roll", "heading", "azimuth", "phi", "theta", "psi", "euler"}
@@ -115,8 +117,8 @@ def _guess_samples(
 
 
 def _may_be_gyroscope(names: Sequence[str], guessed: Guess) -> bool:
-    """Return whether three columns without names or units can be a gyroscope, not an accelerometer."""
-    is_nameless = not any(names) or not guessed.units
+    """Return whether three columns without names, but for the axes, or units can be a gyroscope."""
+    is_nameless = not any(names) or all(map(_is_axis, names)) or not guessed.units
     return is_nameless and len(names) == 3 and set(guessed.units) <= {"m"}
 
 
@@ -182,6 +184,8 @@ def _plain_name(layout: TableLayout, index: int) -> str:
         kind = next((word for word in words[:-1] if word[:3] in KINDS or word in KINDS), None)
         words = [KINDS.get(kind, KINDS.get(kind[:3], "")), words[-1]] if kind is not None else words
     unit = layout.units[index]
+    if len(words) == 1 and words[0] in AXES and unit in UNITS:  # x [°/s]
+        words = [*KIND_OF.get(UNITS[unit].quantity, ()), *words]
     return "_".join(words) + (f" [{unit}]" if unit else "")
 
 
@@ -218,8 +222,8 @@ def _group_columns(
 ) -> Iterator[_ColumnGroup]:
     """Yield the columns that vary, in groups with values in the same rows: one group for each rate of the logger.
 
-    Columns of a reference are left out (next to a quaternion also positions, which look like readings), and so are row
-    numbers, which pandas writes without a heading.
+    Left out are columns of a reference: next to a quaternion its positions too, which look like readings; and counters,
+    such as the numbers of the rows and a second clock.
     """
     names = _name_once([_plain_name(layout, index) for index in range(len(layout.headings))])
     used = {layout.time, *quaternion.values(), *(i for i, name in enumerate(layout.headings) if name in REFERENCE)}
@@ -228,22 +232,33 @@ def _group_columns(
         used |= {index for index, name in enumerate(names) if not name or POSITION_NAME.fullmatch(name)}
     groups: dict[bytes, list[int]] = {}
     for index in layout.numbers:
-        if index not in used and not _is_constant(values[:, index]) and not _counts_rows(layout, values, index):
+        if index not in used and not _is_constant(values[:, index]) and not _is_counter(values[:, index]):
             groups.setdefault(np.isfinite(values[:, index]).tobytes(), []).append(index)
-    for indices in groups.values():
+    for group in groups.values():
+        indices = _order_axes(group, names)
         part = values[np.isfinite(values[:, indices[0]])][:, indices]
         still = find_still(part, rate_hz * len(part) / max(len(values), 1))
         yield _ColumnGroup(indices, tuple(names[index] for index in indices), part, still)
+
+
+def _order_axes(indices: Sequence[int], names: Sequence[str]) -> list[int]:
+    """Return the columns, those whose names are x, y and z alone in this order: some loggers write z first."""
+    axes = iter(sorted((index for index in indices if _is_axis(names[index])), key=lambda index: names[index]))
+    return [next(axes) if _is_axis(names[index]) else index for index in indices]
+
+
+def _is_axis(name: str) -> bool:
+    return name.partition(" ")[0] in AXES
 
 
 def _is_constant(column: Array) -> bool:
     return bool(np.nanmin(column) == np.nanmax(column))
 
 
-def _counts_rows(layout: TableLayout, values: Array, index: int) -> bool:
-    """Return whether a column without a heading has the numbers of the rows, in a file that has headings."""
-    has_no_name = layout.has_heading and layout.headings[index] in ("", "Unnamed: 0")
-    return has_no_name and bool((np.diff(values[:, index]) == 1).all())
+def _is_counter(column: Array) -> bool:
+    """Return whether a column rises from row to row, as the numbers of the rows or a second clock do."""
+    steps = np.diff(column[np.isfinite(column)])
+    return len(steps) > FEWEST_STEPS and bool((steps >= 0).all() and (steps > 0).mean() > MOST_RISE)
 
 
 def _list_angles(layout: TableLayout) -> list[int]:

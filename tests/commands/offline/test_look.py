@@ -52,7 +52,13 @@ def units_below(folder: Path) -> Path:
     return write(folder / "log.csv", "t;Gx;Gy;Gz\ns;°/s;°/s;°/s", [TIME_S, *RATES_DEG_S.T], ";")
 
 
-@pytest.mark.parametrize("make", [spaces, two_imus, counter, matlab, units_below])
+def telephone(folder: Path) -> Path:
+    """A second clock behind the first one, and the axes from last to first, as an app for telephones writes them."""
+    heading = "time,seconds_elapsed,z [°/s],y [°/s],x [°/s]"
+    return write(folder / "log.csv", heading, [TIME_S, TIME_S - TIME_S[0], *RATES_DEG_S.T[::-1]])
+
+
+@pytest.mark.parametrize("make", [spaces, two_imus, counter, matlab, units_below, telephone])
 def test_the_map_that_it_writes_solves_the_file(make: Callable[[Path], Path], tmp_path: Path) -> None:
     log, columns = make(tmp_path), tmp_path / "columns.yaml"
     looked = rig_here("look", log, "--write", columns)
