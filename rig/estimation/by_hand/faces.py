@@ -44,7 +44,7 @@ def _track_verticals(conditions: SessionConditions, integrals: MoveIntegrals) ->
     if conditions.first_face is None:
         raise Refused(
             "first_face_unknown",
-            "there are no accelerometer's readings, and the body's first face is not given",
+            "no accelerometer was read, and the face that was up at first is not stated (--first-face)",
             "Say which of its axes pointed upwards: --first-face +z; or record the accelerometer too",
         )
     up = [axis_of(conditions.first_face)]
