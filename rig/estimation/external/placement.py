@@ -17,12 +17,14 @@ import numpy as np
 
 from rig.estimation.arrays import Array
 from rig.estimation.external.abrupt_change import AbruptChange
+from rig.estimation.external.placement_model import USUAL, build_placement_model
 from rig.estimation.reference.attitude_error import AttitudeError, Placed, effects
 from rig.estimation.reference.reference_model import BIAS, REFERENCE, F, free_directions, jacobian, predicted
+from rig.estimation.statistics.coverage import COVERAGE_FACTOR
 
 SMALLEST_RAD, LARGEST_RAD, GRID = 1e-6, 0.1, 24  # grid of δ, and of ζ relative to the reference
-USUAL = 1e-3  # median repeatability of a placement, relative to the reference (a milli-g)
 ANY_RAD = 1.0  # standard deviation of an unknown attitude
+MOST = 300  # placements; the errors of more are taken for independent, as the time grows with the cube of their number
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +130,7 @@ def laid_down(theta: Array, placed: Placed, unplaced: Array, unplaced_variances:
         averaged[REFERENCE] *= size / np.linalg.norm(averaged[REFERENCE])
     delta, zeta = weights @ grid
     stds = np.sqrt(weights @ (grid - weights @ grid) ** 2)
-    return LaidDown(
+    laid = LaidDown(
         theta=averaged,
         covariance=np.sum(list(causes.values()), axis=0),
         causes=causes,
@@ -136,6 +138,30 @@ def laid_down(theta: Array, placed: Placed, unplaced: Array, unplaced_variances:
         placement_std=float(zeta),
         placement_uncertainty=float(stds[1]),
     )
+    return laid if len(all_rests.readings) > MOST else _relate_errors(laid, all_rests, len(placed.readings))
+
+
+def _relate_errors(laid: LaidDown, all_rests: Placed, stated: int) -> LaidDown:
+    """Return the solution if the errors of the first `stated` attitudes may be a smooth function of the attitude.
+
+    The covariance at the most probable standard deviations is inflated to the 95 % intervals that integrate over them.
+    """
+    model, theta = build_placement_model(laid.theta, all_rests, stated), laid.theta.copy()
+    maxima = model.find_maxima()
+    fit, free = model.solve(maxima[0]), free_directions(theta, norm_known=all_rests.norm_known)
+    covariance = free @ fit.covariance @ free.T
+    known = np.flatnonzero(np.diag(covariance) > 0)
+    ratio = np.ones(len(theta))
+    ratio[known] = model.expand(maxima, free[known]) / (COVERAGE_FACTOR * np.sqrt(np.diag(covariance)[known]))
+    weights = np.linalg.solve(model.covariance(maxima[0]), model.mixed.design) @ fit.covariance @ free.T * ratio
+    tilts, related, changed = np.square(maxima[0])[:, None, None] * model.mixed.components
+    noise = np.diag(all_rests.variances.ravel())
+    parts = {NOISE: noise, ATTITUDES: model.mixed.fixed - noise + tilts + related, PLACEMENTS: changed}
+    causes = {name: np.asarray(weights.T @ part @ weights, dtype=np.float64) for name, part in parts.items()}
+    theta += free @ fit.theta
+    if all_rests.norm_known:
+        theta[REFERENCE] *= np.linalg.norm(laid.theta[REFERENCE]) / np.linalg.norm(theta[REFERENCE])
+    return replace(laid, theta=theta, covariance=np.sum(list(causes.values()), axis=0), causes=causes)
 
 
 def _find_log_prior(grid: Array, size: float) -> Array:

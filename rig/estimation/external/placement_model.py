@@ -1,0 +1,69 @@
+"""The errors of readings in known attitudes as variance components, of which one is alike in similar attitudes.
+
+    v_m = F (s + φ s²) + b + E_m (ε_m + R_mᵀ γ(R_m)) + η_m + noise
+
+ε, independent, and η are the errors of `rig.estimation.external.placement`. γ is a smooth function of the attitude: a
+Gaussian process over the angle between attitudes with Matérn's correlation, ν = 3/2. A robot with wrong joint zeros or
+a wrong tool frame has such errors, or a box that is out of square. They may look like a bias or like other scale
+factors, so more placements reduce their effect less than that of ε.
+"""
+
+import numpy as np
+
+from rig.estimation.arrays import Array
+from rig.estimation.external.attitude_drift import correlate_effects, matern
+from rig.estimation.reference.attitude_error import Placed, effects
+from rig.estimation.reference.reference_model import REFERENCE, free_directions, jacobian, predicted
+from rig.estimation.statistics.variance_components import Mixed, MixedModel
+
+REACH_RAD = 1.5  # correlation length of γ: errors of joints are sines of their angles
+USUAL_RAD = 3e-3  # median of the prior of ε and γ
+USUAL = 1e-3  # median of η, relative to the reference (a milli-g)
+
+
+def build_placement_model(theta: Array, placed: Placed, stated: int) -> MixedModel:
+    """Return the model of N placements, linear in the free directions of `theta` (p,).
+
+    Only the first `stated` placements have an attitude that somebody measured, and with it γ. The components are ε, γ
+    and η.
+    """
+    attitudes, count = placed.attitudes, len(placed.readings)
+    tilts = effects(theta, attitudes, placed.v_bar)
+    by_table = np.where((np.arange(count) < stated)[:, None, None], tilts @ np.swapaxes(attitudes, -1, -2), 0.0)
+    cosine = (np.einsum("nij,mij->nm", attitudes, attitudes) - 1) / 2
+    alike = matern(np.arccos(np.clip(cosine, -1, 1)), REACH_RAD)
+    size = float(np.linalg.norm(theta[REFERENCE]))
+    return MixedModel(
+        Mixed(
+            observed=(placed.readings - predicted(theta, attitudes, placed.v_bar)).ravel(),
+            design=_list_slopes(theta, placed),
+            fixed=np.diag(placed.variances.ravel()) + _join_tilts(tilts, placed.attitude_std_rad),
+            components=np.array(
+                [
+                    _join_tilts(tilts, np.where(np.arange(count) < stated, 1.0, 0.0)),
+                    correlate_effects(by_table, alike),
+                    np.eye(3 * count),
+                ]
+            ),
+            precision=np.zeros(free_directions(theta, norm_known=placed.norm_known).shape[1]),
+            scales=np.array([USUAL_RAD, USUAL_RAD, USUAL * size]),
+            alone=np.zeros((3, 2)),
+        )
+    )
+
+
+def _list_slopes(theta: Array, placed: Placed) -> Array:
+    """Return the derivative (3N, q) of the readings with respect to the free directions of θ."""
+    free = free_directions(theta, norm_known=placed.norm_known)
+    slopes: Array = jacobian(theta, placed.attitudes, placed.v_bar) @ free
+    return slopes.reshape(-1, free.shape[1])
+
+
+def _join_tilts(tilts: Array, std_rad: Array) -> Array:
+    """Return the covariance (3N, 3N) of independent tilts of standard deviations (N,) with the effects (N, 3, 3)."""
+    count = len(tilts)
+    scaled = tilts * std_rad[:, None, None]
+    covariance = np.zeros((count, 3, count, 3))
+    index = np.arange(count)
+    covariance[index, :, index, :] = scaled @ np.swapaxes(scaled, -1, -2)
+    return covariance.reshape(3 * count, 3 * count)
