@@ -150,9 +150,9 @@ def _relate_errors(laid: LaidDown, all_rests: Placed, stated: int) -> LaidDown:
     maxima = model.find_maxima()
     fit, free = model.solve(maxima[0]), free_directions(theta, norm_known=all_rests.norm_known)
     covariance = free @ fit.covariance @ free.T
-    known = np.flatnonzero(np.diag(covariance) > 0)
+    varying = np.flatnonzero(np.diag(covariance) > 0)
     ratio = np.ones(len(theta))
-    ratio[known] = model.expand(maxima, free[known]) / (COVERAGE_FACTOR * np.sqrt(np.diag(covariance)[known]))
+    ratio[varying] = model.expand(maxima, free[varying]) / (COVERAGE_FACTOR * np.sqrt(np.diag(covariance)[varying]))
     weights = np.linalg.solve(model.covariance(maxima[0]), model.mixed.design) @ fit.covariance @ free.T * ratio
     tilts, related, changed = np.square(maxima[0])[:, None, None] * model.mixed.components
     noise = np.diag(all_rests.variances.ravel())
