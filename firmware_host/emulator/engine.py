@@ -76,7 +76,7 @@ class EngineFault(Exception):
 class QuickAccess:
     """Registers with access in machine code, see `hooks.ll`: those of `counter` and `bus`.
 
-    `exchange(pair)` returns the answer to two bytes put on the bus; the first one is the low byte of both.
+    `exchange(pair)` puts the two bytes of a 16-bit number on the bus, the low byte first, and returns their answers.
     """
 
     timeline: Timeline

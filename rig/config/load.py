@@ -209,7 +209,7 @@ def _validate_rig(
 
 
 def _validate_procedure(data: Any, sections: Sections, layered: Layered) -> tuple[ProcedureSection | None, list[str]]:
-    """Validate the procedure's section. If the name is unknown, compare its keys with the nearest one's."""
+    """Validate the procedure's section; if its name is unknown, by the keys of the procedure with the nearest name."""
     name = data.get("name", DEFAULT_PROCEDURE) if isinstance(data, dict) else DEFAULT_PROCEDURE
     if sections is None:
         return ProcedureSection(name=str(name)), []

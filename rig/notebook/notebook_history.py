@@ -145,8 +145,8 @@ def changes(before: Run | Result, now: Run | Result) -> Changes:
     """Return the changes from a run to a later one, sensor by sensor, as `rig history compare` prints them.
 
     Sensors are the same if part, serial number, quantity and range are equal. A run is solved by its usual estimator;
-    give results to compare those of other estimators. Raise Refused `not_comparable` if the runs have no sensor in
-    common.
+    for another estimator, pass a result instead of the run. Raise Refused `not_comparable` if the runs have no sensor
+    in common.
     """
     first, second = ({_subject(record): record for record in _records(source)} for source in (before, now))
     by_sensor = {}

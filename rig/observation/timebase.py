@@ -134,7 +134,7 @@ def _check_samples(board_time_s: Array, readings: Array, motion: KnownMotion) ->
 
 
 def _turns_every_axis(motion: KnownMotion) -> bool:
-    """Return whether the motion turns every sensor axis in any mounting; otherwise an axis may repeat its reading."""
+    """Return whether every sensor axis turns, however it is mounted; one that does not may repeat its reading."""
     rates = motion.rate(motion.time_s[motion.covered(motion.time_s)])
     return bool(np.linalg.eigvalsh(rates.T @ rates).min() > TURNED_RAD_S**2 * len(rates))
 

@@ -58,8 +58,8 @@ def open_run(
 ) -> RecordedRun:
     """Return the recordings in a run folder, or a run file; `script`, if given, is executed.
 
-    `only` selects recordings of a folder by name; by default all are included, even later ones. Raise Refused `no_run`,
-    and as `read_run` and `load_script` do.
+    `only` selects recordings of a folder by name; by default all are included, also those added to the folder later.
+    Raise Refused `no_run`, and as `read_run` and `load_script` do.
     """
     named = None if script is None else load_script(script)
     if not path.is_dir():

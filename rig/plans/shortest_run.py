@@ -182,9 +182,9 @@ def _longest(candidates: Sequence[Candidate], family: tuple[object, ...], at_mos
 
 @dataclass(frozen=True, slots=True)
 class _TurnerSearch:
-    """Runs of a turner with joints, with sweeps or attitudes.
+    """The search among runs of a turner with joints, by sweeps or attitudes.
 
-    - `motions`: each motion's family, its angle, and its keys of the procedure.
+    - `motions`: yields the family and the angle of each motion, and the keys of the procedure that state it.
     - `waits`: the keys of the times at standstill, after a sweep or in an attitude.
     """
 

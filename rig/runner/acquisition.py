@@ -90,8 +90,8 @@ class _Thinning:
 class Acquisition:
     """The data from the reader threads of the sources and the arm, read by the script's thread.
 
-    `counts` is by sensor name. Data that arrive before there is a `recorder` are not recorded. From the first `keep`
-    on, data since its last `KEPT_PARTS` calls are also in memory.
+    `counts` is by sensor name. Data that arrive before there is a `recorder` are not recorded. After the
+    first call of `keep`, the data received since the last `KEPT_PARTS` calls of `keep` also stay in memory.
     """
 
     counts: dict[str, SensorCount] = field(default_factory=dict)

@@ -70,7 +70,7 @@ class Port:
         self._levels = self._levels & ~(1 << pin) | high << pin
 
     def is_input(self, pin: int) -> bool:
-        """Return whether a pin is an input; an analog one, as after a reset, ignores its level."""
+        """Return whether a pin is a digital input; a pin in analog mode, as after a reset, is none."""
         return bool(self._input_pins >> pin & 1)
 
     def _read_levels(self) -> int:

@@ -1,7 +1,7 @@
 """The detection of attitudes in another convention, by solving with their inverses.
 
-Quaternions that are read in the order w x y z and were written as x y z w are inverse rotations too, of a body and a
-room in other axes: the permutation is improper. So both explanations fit, and the axes of the sensor tell them apart.
+Quaternions that were written as x y z w but are read as w x y z also look like inverse rotations, of a body and a room
+with other axes, because that permutation is improper. Both explanations fit; the axes of the sensor decide.
 """
 
 from collections.abc import Callable, Collection

@@ -1,4 +1,4 @@
-"""Consent to the addresses in a run folder from anywhere: the rig connects only to addresses of the user's own runs."""
+"""Consent to the addresses in a run folder of unknown origin; by default only those of the user's own runs are used."""
 
 import hashlib
 import os

@@ -38,7 +38,7 @@ _LOCK_METHODS = ("__enter__", "__exit__", "_acquire_restore", "_release_save")
 
 
 class Interrupts:
-    """The handler that raises KeyboardInterrupt in the main thread for a signal, but never while it takes a lock.
+    """The signal handler that raises KeyboardInterrupt in the main thread, except while that thread takes a lock.
 
     An exception while `threading` takes or releases a lock would leave it taken, and stopping the arm needs the same
     locks. After the exception, an interrupted wait takes its lock again, so a second exception must not follow too

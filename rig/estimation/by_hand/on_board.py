@@ -37,7 +37,7 @@ class BoardRest:
 
 @dataclass(frozen=True, slots=True)
 class BoardMove:
-    """A move from the rest `before` to the rest `after`: readings (n, 3) over the steps `steps_s` (n,) before them.
+    """A move from the rest `before` to `after`: `rates` (n, 3), each with the time step `steps_s` (n,) that ends at it.
 
     - `whole`: a whole turn, which ends where it began.
     - `follows`: the previous move ended in the rest `before`.

@@ -64,8 +64,8 @@ class Inclinations:
 def _weigh_sizes(sizes_rad: Array, values: Array, scores: Array) -> Array:
     """Return the probabilities (j,) of the inclinations' standard deviations: prior times restricted likelihood.
 
-    In the eigenvectors of the information Hᵀ P H on the inclinations the likelihood is a product over the eigenvalues
-    `values` (r,) and the residuals' `scores` (r,). All other errors keep their sizes.
+    The information about the inclinations is Hᵀ P H. In its eigenvectors the likelihood is a product with one factor
+    for each of the eigenvalues `values` (r,) and their `scores` (r,). All other errors keep their sizes.
     """
     variances = np.square(sizes_rad)[:, None]
     ratio = 1 + variances * values

@@ -49,7 +49,7 @@ def solve_by_newton(p: Array, q: Array, square_rad2_s2: float) -> tuple[Array, i
     """Return β (6,) and the number of Newton steps on γ = Γ(p − γ q).
 
     The first iterate is the closed form for the mean squared speed (rad²/s²), which is exact if all speeds are equal.
-    It converges for any bias. Raise Fault `negative_square`.
+    From there the iteration converges for any bias. Raise Fault `negative_square`.
     """
     ps, qs = p.tolist(), q.tolist()
     gamma = _gamma_at_one_speed(qs, square_rad2_s2)

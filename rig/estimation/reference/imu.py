@@ -113,8 +113,9 @@ def solve_imu(
 ) -> ImuSolution:
     """Calibrate from dwells, sweeps or both.
 
-    `gravity_m_s2` is the size of v_ref; `up` (3,) determines its sign: the half-space of the base into which it points.
-    `repeatability_rad`, `sensor_errors`, `arm_turns`: see `Movement`; the readings decide between `own_shares`.
+    `gravity_m_s2` is the length of v_ref, which points into the half-space of the base frame around `up` (3,).
+    `repeatability_rad`, `sensor_errors`, `arm_turns`: see `Movement`. `own_shares`: possible values of its `own_share`,
+    of which the readings show the most likely one.
 
     Raise Fault `too_few_observations`, `not_finite`, `bad_variance`, `bad_speed`, `zero_reading`,
     `duplicated_observation`, `bad_attitude`, `rank_deficient`, `ill_conditioned`, `sign_unknown`, `wrong_unit`,

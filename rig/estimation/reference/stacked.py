@@ -108,10 +108,11 @@ def _solve(x: Array, sizes: Array, prior: ReferencePrior) -> Array:
 def compute_published_covariance(
     theta: Array, readings: Array, attitudes: Array, prior: ReferencePrior, variances: Array
 ) -> Array:
-    """Return the covariance (p, p) of a published θ, to first order in errors of `variances` (N, 3).
+    """Return the covariance (p, p) of θ by the published method, to first order in errors of `variances` (N, 3).
 
-    An error e of a reading enters equation k as F⁻¹ e_k, because the readings are in X: δβ = −X⁺ F⁻¹ e, projected to
-    the normalisation. With second-order terms the change of s² with v_ref is included. F and b follow from β.
+    An error e of a reading also changes the matrix X of the equations, so it enters equation k as F⁻¹ e_k: δβ = −X⁺ F⁻¹
+    e, projected to the normalisation. With second-order terms the change of s² with v_ref is included. F and b follow
+    from β.
     """
     second_order = len(theta) > 15
     norm_known = isinstance(prior, KnownNorm)

@@ -76,8 +76,8 @@ def read_sample_table(
 ) -> SampleTable:
     """Return the columns of a file in any format, which must hold the quantities `needed`.
 
-    `mapped` is for a table whose columns have other names. Rows of a table are left out if a quantity of the sensors
-    `only` is blank in them, by default any quantity. Raise Refused `no_file`, `wrong_columns`, `wrong_unit`,
+    `mapped` is for a table whose columns have other names. Rows of a table with a blank cell are left out; if `only`
+    names sensors, blank cells of other sensors do not matter. Raise Refused `no_file`, `wrong_columns`, `wrong_unit`,
     `not_a_number`, `blank_cells`, and as `readings_in` does.
     """
     readings = readings_in(path)

@@ -83,7 +83,7 @@ def _autoregression(products: Array, count: int, memory: int) -> tuple[float, fl
 
 
 def _products(residuals: Array, memory: int) -> Array:
-    """Return sums (memory + 1, memory + 1) of products among each residual (n,) and its predecessors, nearest last."""
+    """Return sums (memory + 1, memory + 1) of products among residuals (n,) and their predecessors, oldest first."""
     lagged = np.array([residuals[lag : len(residuals) - memory + lag] for lag in range(memory + 1)])
     products: Array = lagged @ lagged.T
     return products

@@ -113,7 +113,7 @@ def harmonics(angle_rad: Array, most: int) -> Array:
 def unit_columns(columns: Array) -> Array:
     """Return columns (n, k), of any units, scaled to unit length; columns of mere rounding errors become zero.
 
-    Otherwise rounding errors, which differ between processors, would become large columns.
+    Scaled up, rounding errors, which differ between processors, would look like real columns.
     """
     sizes = np.linalg.norm(columns, axis=0)
     return columns / np.where(sizes > ROUNDING * sizes.max(initial=0.0), sizes, np.inf)

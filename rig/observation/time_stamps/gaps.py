@@ -51,7 +51,7 @@ def _hidden_rad(time_s: Array, readings: Array, turned: Array, gap: int) -> floa
 
 
 def _bridge(time_s: Array, readings: Array, turned: Array, lasts_s: float) -> tuple[float, float] | None:
-    """Return the RMS error of interpolating steps of some length, and the largest change of the rate over one.
+    """Return the RMS error of interpolating over `lasts_s`, and the largest change of the rate during that time.
 
     Return None for too few readings.
     """

@@ -109,7 +109,7 @@ def check_row(check: CheckEntry) -> CheckRow:
 
 
 def verification_rows(entry: VerificationEntry) -> Iterator[tuple[str, ...]]:
-    """Yield a verification's axes: RMS, and largest mean over a revolution, before and after, rad/s."""
+    """Yield a row for each axis: RMS and largest mean over a revolution, rad/s, before and after calibration."""
     for i, axis in enumerate(AXES):
         yield (
             axis,

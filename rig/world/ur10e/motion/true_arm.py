@@ -100,7 +100,7 @@ class TrueArm:
         return now
 
     def frames_at(self, time_s: float) -> list[tuple[Rotation, Vector]]:
-        """Return rotation (rows) and position (m) in the base frame of the base and of each link, the flange last."""
+        """Return rotation (rows) and position (m) of the base and of each link, the flange last, in the base frame."""
         q, _, _ = self._joints_at(time_s * self._speed)
         return list(frames(q, self._links))
 
