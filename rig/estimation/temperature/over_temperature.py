@@ -210,7 +210,8 @@ def combine_with_reference(
 ) -> OverTemperature:
     """Return the polynomials with k and c (6,) at the reference temperature replaced by `values`.
 
-    `values` are another solution, at that temperature; `lines`: contributors to `values`, with the covariance (6, 6) of their means over all temperatures.
+    `values` are another solution, at that temperature; `lines`: contributors to `values`, with the covariance (6, 6) of
+    their means over all temperatures.
     """
     scale, bias = polynomials.scale * values[:3] / polynomials.scale[0], polynomials.bias.copy()
     bias[0] = values[3:]
