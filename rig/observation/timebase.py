@@ -26,6 +26,7 @@ CHECK_SENSOR = "Check that the sensor is fixed to the flange and read in the rig
 COARSE_STEP_S = 0.02  # far shorter than the ramps of a sweep, so that the fine fit converges
 COARSE_REACH_S = 0.15  # largest clock error at either end of the data from which the fine fit converges
 CANDIDATES = 12  # peaks of the correlation that are tried: six equal sweeps make eleven
+CONTRADICTION = 6.0  # standard deviations between two fits of a clock
 MIN_EXPLAINED = 0.5  # fraction of the readings' variance that the arm's motion must explain
 LONG_RUN_S = 1800.0  # the part of a recording that the coarse search uses first; it takes more only if that fails
 MAX_DRIFT = 0.03  # an oscillator without a crystal is within 2 %
@@ -311,8 +312,23 @@ def _fit_clock(clock: TimeBase, board_time_s: Array, readings: Array, motion: Kn
     clock = _iterate_clock(clock, *first)
     with suppress(Fault):
         for stage in finer:
-            clock = _iterate_clock(clock, *stage)
+            refined = _iterate_clock(clock, *stage)
+            if _is_contradiction(clock, refined):
+                break
+            clock = refined
     return clock
+
+
+def _is_contradiction(clock: TimeBase, refined: TimeBase) -> bool:
+    """Return whether a finer fit is less certain than the one before it, and contradicts it.
+
+    It has then found another optimum: readings without a filter show fast ripples at other frequencies (aliasing).
+    """
+    return refined.offset_std_s > clock.offset_std_s and (
+        abs(refined.offset_s - clock.offset_s)
+        > CONTRADICTION * float(np.hypot(refined.offset_std_s, clock.offset_std_s))
+        or abs(refined.drift - clock.drift) > CONTRADICTION * float(np.hypot(refined.drift_std, clock.drift_std))
+    )
 
 
 def _list_stages(
