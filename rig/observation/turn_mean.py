@@ -42,7 +42,7 @@ class SampledTurn:
 
     - `share` (n,): elapsed fraction of its time.
     - `rates_rad_s` (n, 3): the flange's mean rate around each sample, by the encoders.
-    - `uneven_rad_s` (n,): that rate along the axis, minus its mean over the turn by the angles at both ends.
+    - `uneven_rad_s` (n,): that rate along the axis minus the turn's mean rate, which the angles at its ends determine.
     - `passing` (n, k): columns of the turn's harmonics; for an arc minus their means.
     - `beats`: number of sidebands of spectral lines, see `Revolution`.
     - `encoders_true`: whether the encoders are right within a turn, not only over whole turns.

@@ -214,7 +214,7 @@ class ObservationMade:
 
 @dataclass(frozen=True, slots=True)
 class AttitudeRead:
-    """The host has averaged a dwell of a sensor, or after the verdict all dwells."""
+    """The host has averaged one dwell of a sensor or, after the verdict, all its dwells."""
 
     read: ReadAtRest
 

@@ -1,7 +1,7 @@
 """SIX, Table I: passes of Algorithm 1, and the bias at which it stops converging.
 
-Without noise the first pass omits β0: k₁² = k² / (1 − β0/ω²), and b₁ = b already. So the first lines of Table I's
-examples imply the speed, which SIX does not state. Each further pass shrinks the error by Γ = β0 / (ω² − β0),
+Without noise the first pass omits β0: k₁² = k² / (1 − β0/ω²), and b₁ = b already. So the first line of each example in
+Table I determines the speed, which SIX does not state. Each further pass shrinks the error by Γ = β0 / (ω² − β0),
 alternating: k_n ≈ k (1 ± Γⁿ/2). So Algorithm 1 needs β0 < ω²/2 (at 1 rad/s this is SIX's "β0 < 0.5"). Table I counts
 passes until its four decimals stop changing, long before Σ|Δβ| ≤ 1e-6.
 """

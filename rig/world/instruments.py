@@ -18,7 +18,7 @@ FieldOf = Callable[[MountedMagnetometer], MotionAt]
 
 
 class SimulatedInstrument(Device, Protocol):
-    """An instrument that has power."""
+    """A simulated instrument while it has power."""
 
     def advance(self, time_s: float) -> None:
         """Simulate until the virtual time `time_s`, which lies in the laboratory's last tick."""

@@ -99,7 +99,7 @@ class WhitenedReference:
         return minimal_detectable_size(orthonormal_basis(model / size), self.rotation @ fault_patterns / size, whitened)
 
     def _limit(self, model: Array, new: Array, delta_rad: float, false_alarm_probability: float) -> float:
-        """Return the critical value of orthonormal columns that the model does not contain."""
+        """Return the critical value of the test for the orthonormal columns `new`, which the model does not contain."""
         from scipy.special import chdtri, fdtri
 
         count = new.shape[1]

@@ -91,8 +91,9 @@ def collect_known_errors(
 ) -> KnownErrors:
     """Return the standard uncertainties of gyroscope and arm, from the configuration and the recording.
 
-    A solution at several speeds estimates the nonlinearity, which is then free. A solution at one speed states one
-    scale factor for both directions, so only the stated even part is used. `stamp_std_s` is as in `RecordedSensor`.
+    A solution at several speeds estimates the nonlinearity, so its stated value is not used. A solution at one speed
+    has one scale factor for both directions, so only the part that is even in the rate is used. `stamp_std_s` is as in
+    `RecordedSensor`.
     """
     sensor, explained = result.sensor, result.explained
     return build_known_errors(

@@ -48,7 +48,7 @@ def notes_on_reading(read: ReadElsewhere, samples: Samples) -> Iterator[str]:
 
 
 def notes_on_speeds(data: ExternalData) -> Iterator[str]:
-    """Yield a note if speeds look like °/s: only the bias depends on a unit that both files share."""
+    """Yield a note if speeds look like °/s; a wrong unit that both files share falsifies only the bias."""
     fastest = max((sweep.speed_rad_s for sweep in data.sweeps), default=0.0)
     remedy = "if both files are in °/s, name that unit with --columns, for the bias depends on it"
     if RATE.mistaken is not None and fastest > RATE.mistaken.unusual:

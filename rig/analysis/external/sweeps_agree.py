@@ -118,9 +118,9 @@ def sweep_errors(solution: VectorSolution, data: ExternalData) -> SweepErrors | 
 
 
 def count_redundant_rows(data: ExternalData) -> int:
-    """Return the number of rows in excess of those a solution needs: the degrees of freedom of contradictions.
+    """Return the number of rows beyond those that a solution needs: so many rows can contradict each other.
 
-    A row has three equations but counts once, because a wrong rate or end affects all three.
+    A row has three equations but counts once, because a wrong rate or a wrong end time affects all three.
     """
     return len(data.sweeps) + len(data.rests) - 4
 

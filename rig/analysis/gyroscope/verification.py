@@ -20,7 +20,7 @@ from rig.observation.observed_run import ObservedRun
 
 @dataclass(frozen=True, slots=True)
 class Verification:
-    """The comparison with a reference of the uncalibrated (`before`, None if not recorded) and calibrated readings.
+    """How uncalibrated readings (`before`, None if not recorded) and calibrated ones compare with a reference.
 
     `reference_error_rad_s`: the reference's largest error in the norm of its mean rate, 2π/T by the arm over a
     revolution and zero over a rest.

@@ -63,7 +63,7 @@ class HandRestRefused:
 class HandBegunAnew:
     """A restart of the session: everything before `begin_us` is discarded.
 
-    `again` is the error's name: for another table, or another sensor.
+    `again` names the error that caused it, such as a table that moved.
     """
 
     begin_us: Microseconds

@@ -43,7 +43,7 @@ LINES: dict[str, tuple[Literal["A", "B"], tuple[str, ...], str]] = {
 
 @dataclass(frozen=True, slots=True)
 class RestSummary:
-    """A rest on a `face` or on None; `normalised_residual` is its largest residual over its standard deviation."""
+    """A rest on a `face`, or on none; `normalised_residual`: its largest residual over the standard deviation."""
 
     face: str | None
     normalised_residual: float

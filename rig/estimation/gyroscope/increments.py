@@ -61,8 +61,8 @@ class Increments:
     """The body's rotation between w pairs of instants.
 
     - `rotations` (w, 3, 3): body coordinates at the end to those at the start.
-    - `jacobian` (w, 3, 12): J, rotation with F (row by row) and b in body coordinates at the start: exp(J δθ) ×
-      rotation.
+    - `jacobian` (w, 3, 12): J, by which a change δθ of F (row by row) and b makes the rotation exp(J δθ) × rotation, in
+      body coordinates at the start.
     """
 
     rotations: Array

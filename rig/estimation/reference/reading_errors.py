@@ -37,7 +37,7 @@ def noise(theta: Array, movement: Movement) -> Array:
 
 
 def bending(theta: Array, movement: Movement) -> Array:
-    """Return the patterns (P, 3 K) of one standard uncertainty of the nonlinearity, φ and χ, of each axis."""
+    """Return the patterns (P, 3 K) of one standard uncertainty of φ and χ, the nonlinearity, of each axis."""
     sensor = movement.sensor_errors
     if sensor is None:
         return np.zeros((0, movement.readings().size))

@@ -41,7 +41,11 @@ class ResidualInputs:
 
 @dataclass(frozen=True, slots=True)
 class ErrorSizes:
-    """The bias random walk in one second, δ, and the fraction of δ² that is independent in each dwell."""
+    """The sizes of errors.
+
+    `walk`: the bias random walk in one second; `std_rad`: δ; `own_share`: the fraction of δ² that is independent in
+    each dwell.
+    """
 
     walk: float
     std_rad: float

@@ -152,7 +152,7 @@ def is_complete(count: int, expected: float, least: int = MIN_SAMPLES) -> bool:
 
 
 def check_scattered(sampling: Sampling) -> None:
-    """Raise Fault `lost_samples` if many readings are missing, and bad stamps do not show where."""
+    """Raise Fault `lost_samples` if many readings are missing and the stamps are too poor to show where."""
     if sampling.scattered > MAX_LOST_FRACTION:
         raise Fault(
             "lost_samples",

@@ -22,7 +22,7 @@ class Mean:
 
     - `mean` (3,), its `variance` (3,), the `noise` (3,) of one reading, and the number of `samples`.
     - `dof` (3,): degrees of freedom of the variance, fewer than samples if these are not independent.
-    - `cycles` (k,): cycles in the window of the spectral lines that were removed from the mean.
+    - `cycles` (k,): of each spectral line that was removed from the mean, its number of cycles in the window.
     - `rounding` (3,): the part of the variance by rounding to steps.
     - `weights` (n,): weights of the readings, for averaging other data of the same samples; empty if they are not
       stored.

@@ -64,7 +64,7 @@ class Door:
         return not self.looking_needs_token or self.may_act(headers)
 
     def may_open(self, headers: Mapping[str, str], cookies: Mapping[str, str]) -> bool:
-        """Return whether a request may read the certificate; the browser opens it without the token, with a cookie."""
+        """Return whether a request may read the certificate, which the browser opens with a cookie, not the token."""
         return self.may_look(headers) or _are_equal(cookies.get(COOKIE, ""), self.pass_to_look)
 
     def refusal(self, path: str, headers: Mapping[bytes, bytes]) -> tuple[int, str] | None:

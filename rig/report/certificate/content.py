@@ -60,7 +60,7 @@ class HeldStill:
 
     @property
     def whose(self) -> str:
-        """The name of the sensor's scale, in words."""
+        """Whose scale the values refer to, with its article: "a gyroscope's scale"."""
         return f"{'an' if self.kind[0] in 'aeiou' else 'a'} {self.kind}'s scale"
 
 

@@ -1,4 +1,4 @@
-"""The supervision of the rig's ability to stop an arm under control without the client.
+"""Watches whether the rig could stop an arm that it controls by a way that does not need the client.
 
 Local control disables every independent stop, and neither the states nor the client report it. The dashboard reports it
 if polled (from 5.6 on), as does the Robot API of a PolyScope X (from 10.12 on). At that moment the controller also
