@@ -26,7 +26,7 @@ CHECK_SENSOR = "Check that the sensor is fixed to the flange and read in the rig
 COARSE_STEP_S = 0.02  # far shorter than the ramps of a sweep, so that the fine fit converges
 COARSE_REACH_S = 0.15  # largest clock error at either end of the data from which the fine fit converges
 CANDIDATES = 12  # peaks of the correlation that are tried: six equal sweeps make eleven
-CONTRADICTION = 6.0  # standard deviations between two fits of a clock
+CONTRADICTION = 6.0  # standard deviations between the drifts of two fits
 MIN_EXPLAINED = 0.5  # fraction of the readings' variance that the arm's motion must explain
 LONG_RUN_S = 1800.0  # the part of a recording that the coarse search uses first; it takes more only if that fails
 MAX_DRIFT = 0.03  # an oscillator without a crystal is within 2 %
@@ -320,15 +320,13 @@ def _fit_clock(clock: TimeBase, board_time_s: Array, readings: Array, motion: Kn
 
 
 def _is_contradiction(clock: TimeBase, refined: TimeBase) -> bool:
-    """Return whether a finer fit is less certain than the one before it, and contradicts it.
+    """Return whether the drift of a finer fit is less certain than that of the one before it, and contradicts it.
 
-    It has then found another optimum: readings without a filter show fast ripples at other frequencies (aliasing).
+    It has then found another optimum: readings without a filter show fast ripples at other frequencies (aliasing). The
+    offsets may differ, as filters delay slow and fast parts differently.
     """
-    return refined.offset_std_s > clock.offset_std_s and (
-        abs(refined.offset_s - clock.offset_s)
-        > CONTRADICTION * float(np.hypot(refined.offset_std_s, clock.offset_std_s))
-        or abs(refined.drift - clock.drift) > CONTRADICTION * float(np.hypot(refined.drift_std, clock.drift_std))
-    )
+    difference, std = abs(refined.drift - clock.drift), float(np.hypot(refined.drift_std, clock.drift_std))
+    return refined.drift_std > clock.drift_std and difference > CONTRADICTION * std
 
 
 def _list_stages(
