@@ -17,14 +17,13 @@ import numpy as np
 
 from rig.estimation.arrays import Array
 from rig.estimation.external.abrupt_change import AbruptChange
-from rig.estimation.external.placement_model import USUAL, build_placement_model
+from rig.estimation.external.placement_model import MOST, USUAL, build_placement_model
 from rig.estimation.reference.attitude_error import AttitudeError, Placed, effects
 from rig.estimation.reference.reference_model import BIAS, REFERENCE, F, free_directions, jacobian, predicted
 from rig.estimation.statistics.coverage import COVERAGE_FACTOR
 
 SMALLEST_RAD, LARGEST_RAD, GRID = 1e-6, 0.1, 24  # grid of δ, and of ζ relative to the reference
 ANY_RAD = 1.0  # standard deviation of an unknown attitude
-MOST = 300  # placements; the errors of more are taken for independent, as the time grows with the cube of their number
 
 
 @dataclass(frozen=True, slots=True)

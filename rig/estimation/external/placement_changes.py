@@ -9,7 +9,7 @@ import numpy as np
 
 from rig.estimation.arrays import Array
 from rig.estimation.external.abrupt_change import OF_SCALE, AbruptChange, PossibleChanges, find_change
-from rig.estimation.external.placement_model import build_placement_model
+from rig.estimation.external.placement_model import MOST, build_placement_model
 from rig.estimation.reference.attitude_error import Placed
 from rig.estimation.reference.reference_model import BIAS, REFERENCE, predicted
 
@@ -26,7 +26,7 @@ def find_placement_change(theta: Array, placed: Placed, starts_s: Array) -> Abru
     `theta` (p,) is the solution without a change; the placements begin at `starts_s` (N,).
     """
     count = len(starts_s)
-    if count < FEWEST:
+    if not FEWEST <= count <= MOST:
         return None
     model = build_placement_model(theta, placed, count)
     std = model.find_maxima()[0]

@@ -18,6 +18,7 @@ from rig.estimation.statistics.variance_components import Mixed, MixedModel
 
 REACH_RAD = 1.5  # correlation length of γ: errors of joints are sines of their angles
 USUAL_RAD = 3e-3  # median of the prior of ε and γ
+MOST = 200  # placements; more are taken for independent, and not searched for a change, as this would take too long
 USUAL = 1e-3  # median of η, relative to the reference (a milli-g)
 
 
