@@ -1,7 +1,7 @@
 """Incidents (faults, remedies, moves by hand) that a person causes by typed words in a running laboratory."""
 
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
@@ -58,16 +58,9 @@ INCIDENTS: Mapping[str, Incident] = MappingProxyType(
 
 def opening_text(control: str) -> str:
     """Return the greeting of a laboratory for a person who practises in it. Raise Fault `world_ended`."""
-    requests = _send(control, {"do": "help"})["known"]
     return (
-        f"The laboratory is ready. {help_text(requests)}\nAn empty line shows this again; Ctrl-D ends the laboratory."
+        f"The laboratory is ready. {_help_text(control)}\nAn empty line shows this again; Ctrl-D ends the laboratory."
     )
-
-
-def help_text(requests: Collection[str]) -> str:
-    """Return the list of incidents of a laboratory whose control channel has these `requests`."""
-    possible = ((words, item) for words, item in INCIDENTS.items() if item.request["do"] in requests)
-    return "\n".join(["What can happen here:", *(f"  {words:18}{item.text}" for words, item in possible)])
 
 
 def find_incident(words: str) -> Incident | None:
@@ -86,7 +79,7 @@ def practise(control: str, words: str) -> str:
     incident = find_incident(words)
     if incident is None:
         unknown = "" if words.strip() in ("", "help", "?") else f"{words.strip()!r} is unknown. "
-        return unknown + help_text(_send(control, {"do": "help"})["known"])
+        return unknown + _help_text(control)
     reply = _send(control, incident.request)
     if "known" in reply:  # the requests that it knows
         return "this cannot happen in this laboratory"
@@ -94,6 +87,13 @@ def practise(control: str, words: str) -> str:
         reason = str(reply["error"]).removeprefix(f"{incident.request['do']}: ")
         return f"not now: {reason}"
     return incident.text
+
+
+def _help_text(control: str) -> str:
+    """Return the list of the incidents that the laboratory's control channel can cause. Raise Fault `world_ended`."""
+    requests = _send(control, {"do": "help"})["known"]
+    possible = ((words, item) for words, item in INCIDENTS.items() if item.request["do"] in requests)
+    return "\n".join(["What can happen here:", *(f"  {words:18}{item.text}" for words, item in possible)])
 
 
 def _send(control: str, request: Request) -> Request:

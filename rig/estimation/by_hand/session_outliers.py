@@ -131,9 +131,8 @@ def _fault_columns(fit: GraphFit, name: str, index: int) -> Array:
     if name == "table_moved":
         return np.concatenate([_tilt_columns(fit, row, index) for row in fit.factors])
     if name == "accelerometer_jumped":
-        later = [row.kind == ACCELERATION and row.index >= index for row in fit.factors]
         return np.concatenate(
-            [row.design[:, OFFSET] * is_later for row, is_later in zip(fit.factors, later, strict=True)]
+            [row.design[:, OFFSET] * (row.kind == ACCELERATION and row.index >= index) for row in fit.factors]
         )
     out = np.concatenate([np.full(len(row.residual), _matches(row, index, *FACTORS_OF[name])) for row in fit.factors])
     return np.eye(len(out))[:, out]

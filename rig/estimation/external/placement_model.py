@@ -29,42 +29,28 @@ def build_placement_model(theta: Array, placed: Placed, stated: int) -> MixedMod
     and η.
     """
     attitudes, count = placed.attitudes, len(placed.readings)
+    free, alone = free_directions(theta, norm_known=placed.norm_known), np.eye(count)
+    is_stated = (np.arange(count) < stated)[:, None, None]
     tilts = effects(theta, attitudes, placed.v_bar)
-    by_table = np.where((np.arange(count) < stated)[:, None, None], tilts @ np.swapaxes(attitudes, -1, -2), 0.0)
+    measured = np.where(is_stated, tilts, 0.0)
     cosine = (np.einsum("nij,mij->nm", attitudes, attitudes) - 1) / 2
     alike = matern(np.arccos(np.clip(cosine, -1, 1)), REACH_RAD)
     size = float(np.linalg.norm(theta[REFERENCE]))
     return MixedModel(
         Mixed(
             observed=(placed.readings - predicted(theta, attitudes, placed.v_bar)).ravel(),
-            design=_list_slopes(theta, placed),
-            fixed=np.diag(placed.variances.ravel()) + _join_tilts(tilts, placed.attitude_std_rad),
+            design=(jacobian(theta, attitudes, placed.v_bar) @ free).reshape(3 * count, -1),
+            fixed=np.diag(placed.variances.ravel())
+            + correlate_effects(tilts * placed.attitude_std_rad[:, None, None], alone),
             components=np.array(
                 [
-                    _join_tilts(tilts, np.where(np.arange(count) < stated, 1.0, 0.0)),
-                    correlate_effects(by_table, alike),
+                    correlate_effects(measured, alone),
+                    correlate_effects(measured @ np.swapaxes(attitudes, -1, -2), alike),
                     np.eye(3 * count),
                 ]
             ),
-            precision=np.zeros(free_directions(theta, norm_known=placed.norm_known).shape[1]),
+            precision=np.zeros(free.shape[1]),
             scales=np.array([USUAL_RAD, USUAL_RAD, USUAL * size]),
             alone=np.zeros((3, 2)),
         )
     )
-
-
-def _list_slopes(theta: Array, placed: Placed) -> Array:
-    """Return the derivative (3N, q) of the readings with respect to the free directions of θ."""
-    free = free_directions(theta, norm_known=placed.norm_known)
-    slopes: Array = jacobian(theta, placed.attitudes, placed.v_bar) @ free
-    return slopes.reshape(-1, free.shape[1])
-
-
-def _join_tilts(tilts: Array, std_rad: Array) -> Array:
-    """Return the covariance (3N, 3N) of independent tilts of standard deviations (N,) with the effects (N, 3, 3)."""
-    count = len(tilts)
-    scaled = tilts * std_rad[:, None, None]
-    covariance = np.zeros((count, 3, count, 3))
-    index = np.arange(count)
-    covariance[index, :, index, :] = scaled @ np.swapaxes(scaled, -1, -2)
-    return covariance.reshape(3 * count, 3 * count)

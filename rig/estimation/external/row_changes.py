@@ -11,6 +11,7 @@ import numpy as np
 
 from rig.estimation.arrays import Array, perpendicular_unit_vectors
 from rig.estimation.external.abrupt_change import OF_SCALE, AbruptChange, PossibleChanges, find_change
+from rig.estimation.external.attitude_drift import correlate_effects
 from rig.estimation.statistics.variance_components import Mixed, MixedModel
 
 OF_RATE = 1e-4  # median of the prior of the rates' relative errors, and of the axes' inclinations in rad
@@ -41,7 +42,7 @@ def find_row_change(
     usual = np.sqrt(variances.mean(axis=1) + (OF_RATE * speeds) ** 2)[:, None]
     fitted = np.linalg.lstsq(design / usual, means / usual, rcond=None)[0]
     read = rates_rad_s @ fitted[:3]
-    across = np.zeros((2, count, 3))
+    across, alone = np.zeros((2, count, 3)), np.eye(count)
     for row in np.flatnonzero(speeds):
         across[:, row] = speeds[row] * perpendicular_unit_vectors(rates_rad_s[row] / speeds[row])
     across = across @ fitted[:3]
@@ -49,7 +50,9 @@ def find_row_change(
         observed=(means - design @ fitted).ravel(),
         design=np.asarray(np.kron(design, np.eye(3)), dtype=np.float64),
         fixed=np.diag(variances.ravel()),
-        components=np.array([_combine_patterns(read[None]), _combine_patterns(across)]),
+        components=np.array(
+            [correlate_effects(read[..., None], alone), correlate_effects(np.moveaxis(across, 0, -1), alone)]
+        ),
         precision=np.zeros(12),
         scales=np.array([OF_RATE, OF_RATE]),
         alone=np.zeros((2, 2)),
@@ -73,12 +76,3 @@ def find_row_change(
         starts_s,
         POSSIBLE,
     )
-
-
-def _combine_patterns(patterns: Array) -> Array:
-    """Return the covariance (3N, 3N) of independent errors of N rows, by their patterns (p, N, 3)."""
-    count = patterns.shape[1]
-    covariance = np.zeros((count, 3, count, 3))
-    rows = np.arange(count)
-    covariance[rows, :, rows, :] = np.einsum("pni,pnj->nij", patterns, patterns)
-    return covariance.reshape(3 * count, 3 * count)
