@@ -11,9 +11,9 @@ from itertools import combinations
 import numpy as np
 
 from rig.data.recording.settings import Uncertainty
+from rig.observation.clocks.time_base import NOMINAL_DRIFT
 from rig.observation.consistency.arm_clock import compare_with_computer
 from rig.observation.observed_run import ObservedRun
-from rig.observation.timebase import NOMINAL_DRIFT
 
 # Largest relative difference between a simulated controller's clock and another one. Such a controller runs as fast as
 # it can: if its pace differs by more, the other clock does not count its seconds.

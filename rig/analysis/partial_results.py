@@ -17,6 +17,7 @@ from rig.errors.attempts import Attempts, all_failed, attempt_each
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.vector_model import VectorSolution
 from rig.observation.average import Average, Stream, synchronize_stream
+from rig.observation.clocks.time_base import TimeBase
 from rig.observation.field_means import field_mean, find_dwelling_companion
 from rig.observation.finished_steps import complete_dwells, complete_sweeps
 from rig.observation.motion.arm_motion import ArmMotion, motion_of
@@ -24,7 +25,6 @@ from rig.observation.observe import Observation, observe_each_sweep, observe_sen
 from rig.observation.observed_run import times_s
 from rig.observation.reference.dwell_acceleration import DwellReading, read_each_dwell
 from rig.observation.statistics.mean import QuantityInDwell, ReadAtRest
-from rig.observation.timebase import TimeBase
 
 NO_SWEEP_YET = Fault("too_few_observations", "no sweep is averaged yet", "Wait for the first one")
 

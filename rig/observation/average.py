@@ -12,9 +12,10 @@ from rig.data.quantity import RATE, TEMPERATURE, Quantity
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.rounding import Steps
+from rig.observation.clocks.clock_estimate import estimate_time_base
+from rig.observation.clocks.time_base import TimeBase
 from rig.observation.motion.reference_motion import KnownMotion
 from rig.observation.statistics.mean import Mean
-from rig.observation.timebase import TimeBase, estimate_time_base
 from rig.observation.windows import Window
 
 if TYPE_CHECKING:

@@ -24,6 +24,7 @@ from rig.estimation.refusals import check_reading_ratio
 from rig.motion.steps import Sweep
 from rig.observation.arm_rests import add_attitude, average_rests, estimate_bias_drift
 from rig.observation.average import Average, Stream, build_average, slice_time, synchronize_stream
+from rig.observation.clocks.time_base import TimeBase
 from rig.observation.lost_samples import lost_samples
 from rig.observation.motion.arm_motion import ArmMotion, is_sparse
 from rig.observation.motion.revolution import Revolution, arm_states_lost, describe
@@ -31,7 +32,6 @@ from rig.observation.reference.dwell_acceleration import DwellReading, dwell_rea
 from rig.observation.reference.swept_acceleration import SweptAcceleration, swept_acceleration
 from rig.observation.statistics.spectral_lines import BEATS, harmonics
 from rig.observation.stuck_check import check_dwells, check_other_direction, check_rests
-from rig.observation.timebase import TimeBase
 from rig.observation.turn_mean import SampledTurn, turn_mean
 from rig.observation.windows import FinishedSweep, Window, swept
 

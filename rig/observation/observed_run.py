@@ -14,10 +14,10 @@ from rig.data.recording.run_data import RunData
 from rig.data.recording.settings import ObservationThresholds
 from rig.estimation.arrays import Array
 from rig.observation.average import Stream, convert_stream
+from rig.observation.clocks.time_base import TimeBase
 from rig.observation.finished_steps import complete_dwells, complete_sweeps
 from rig.observation.motion.arm_motion import ArmMotion, motion_of, turner_of
 from rig.observation.observe import SensorObservations, observe_sensor
-from rig.observation.timebase import TimeBase
 
 if TYPE_CHECKING:
     from rig.estimation.temperature.over_temperature import OverTemperature

@@ -18,7 +18,7 @@ from rig.config.models import SensorsConfig
 from rig.data.quantity import select_displayed
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.errors import Refused
-from rig.observation.timebase import NOMINAL_DRIFT
+from rig.observation.clocks.time_base import NOMINAL_DRIFT
 from rig.runner.acquisition import SensorCount
 from rig.runner.board.sensors import BoardSource, open_board_source
 from rig.runner.first_samples import FirstSamples

@@ -13,9 +13,9 @@ from rig.analysis.clock_comparison import check_clock
 from rig.analysis.verdict import clock_checks
 from rig.data.recording.run_data import RunData
 from rig.data.recording.settings import Uncertainty
+from rig.observation.clocks.time_base import NOMINAL_DRIFT
 from rig.observation.consistency.arm_clock import find_encoder_noise_rad, state_jitter
 from rig.observation.observed_run import ObservedRun, observe_runs
-from rig.observation.timebase import NOMINAL_DRIFT
 from support.recordings.synthetic_run import Setup, synthetic_run
 
 PPM = 1e-6

@@ -14,9 +14,9 @@ from rig.analysis.analyses import calibrate, verify_calibration, verify_stored_c
 from rig.data.recording.run_data import RunData
 from rig.data.recording.run_file import read_run
 from rig.errors import Fault, Refused
+from rig.observation.clocks.clock_estimate import estimate_time_base
 from rig.observation.motion.arm_motion import ArmMotion
 from rig.observation.observe import observe_sensor
-from rig.observation.timebase import estimate_time_base
 from support.paths import RECORDINGS
 
 

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from rig.estimation.arrays import Array
-from rig.observation.timebase import estimate_time_base
+from rig.observation.clocks.clock_estimate import estimate_time_base
 
 HOURS_S = 3 * 3600.0
 TURN_S, EVERY_S = 4.0, 300.0  # how long a turn lasts, and how often there is one

@@ -15,11 +15,12 @@ from rig.data.recording.settings import ObservationThresholds
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
 from rig.motion.state_rows import ARM_STATE_DTYPE
+from rig.observation.clocks.clock_estimate import estimate_time_base
+from rig.observation.clocks.time_base import TimeBase
 from rig.observation.motion.arm_motion import ArmMotion
 from rig.observation.observe import SensorObservations
 from rig.observation.observed_run import observe_run
 from rig.observation.statistics.coloured_noise import correlation_inflation, fit_noise_factor
-from rig.observation.timebase import TimeBase, estimate_time_base
 from rig.observation.windows import swept
 from rig.report.entries.gyroscope import sensor_entry
 from support.recordings.recorded import change_channel

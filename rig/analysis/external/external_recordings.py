@@ -49,13 +49,13 @@ from rig.estimation.reference.reference_model import F
 from rig.estimation.reference.triaxial import UNTRUSTWORTHY_RAD
 from rig.estimation.sensor_axes import SensorAxes
 from rig.estimation.temperature.over_temperature import OverTemperature
+from rig.observation.clocks.time_base import TimeBase
 from rig.observation.external.attitude_import import average_placements
 from rig.observation.external.csv_import import ExternalData, average_sweeps
 from rig.observation.external.csv_samples import Samples, samples_in
 from rig.observation.external.omission import Omitted
 from rig.observation.external.turns import TurnedData
 from rig.observation.statistics.mean import dof_by_axis
-from rig.observation.timebase import TimeBase
 
 BySweeps = Estimator | Literal["increments"]
 BY_SWEEPS: tuple[BySweeps, ...] = (*ESTIMATORS, "increments")

@@ -26,10 +26,10 @@ from rig.estimation.gyroscope.vector_fit import Explained, VectorInputs, explain
 from rig.estimation.gyroscope.vector_model import VectorSolution, solve_vector_model
 from rig.estimation.refusals import check_duplicates
 from rig.observation.average import Average
+from rig.observation.clocks.time_base import TimeBase
 from rig.observation.finished_steps import complete_sweeps
 from rig.observation.observe import Observation
 from rig.observation.observed_run import AS_STATED, ObservedRun, observe_runs
-from rig.observation.timebase import TimeBase
 
 if TYPE_CHECKING:
     from rig.estimation.by_hand import HandSolution

@@ -26,7 +26,8 @@ from rig.estimation.by_hand.session_parts import (
 )
 from rig.motion.by_hand import FACES, Face
 from rig.observation.by_hand.hand_segmentation import Segmenter
-from rig.observation.timebase import NOMINAL_DRIFT, check_readings
+from rig.observation.clocks.clock_estimate import check_readings
+from rig.observation.clocks.time_base import NOMINAL_DRIFT
 
 BETWEEN_S = 10.0  # assumed pause between two recordings of a session, which the boards' clocks do not show
 MICROSECOND_S = 1e-6 * (1 + NOMINAL_DRIFT)  # of the board's counter, by its crystal

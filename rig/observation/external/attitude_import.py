@@ -11,7 +11,7 @@ Accelerometers and magnetometers use only the rows in which the body is at rest 
 Columns may have any order; the first row holds their names.
 
 If the table has a clock of its own, the rotation that both files show determines its offset, as on the arm
-(`rig.observation.timebase`).
+(`rig.observation.clocks`).
 """
 
 from collections.abc import Iterator, Mapping
@@ -25,6 +25,7 @@ from rig.data.quantity import RATE, Quantity
 from rig.data.recording.motion_file import MOTIONS, QUATERNION, TIME, Header
 from rig.errors import Fault, Refused, or_fault
 from rig.estimation.arrays import Array
+from rig.observation.clocks.time_base import TimeBase
 from rig.observation.external.csv_samples import Samples
 from rig.observation.external.csv_windows import (
     MIN_SAMPLES,
@@ -45,7 +46,6 @@ from rig.observation.formats.column_selection import Mapped
 from rig.observation.formats.csv_table import CsvTable, blank_cell, read_table
 from rig.observation.formats.sample_files import attitudes_in, rows_around
 from rig.observation.time_stamps.sampling import find_sampling
-from rig.observation.timebase import TimeBase
 from rig.observation.windows import Window, inside
 
 RATE_COLUMNS = ("rate_x_rad_s", "rate_y_rad_s", "rate_z_rad_s")

@@ -1,7 +1,7 @@
 """The offset of a reference's clock relative to the readings' clock, from the rotation that both show.
 
 The rates of densely written, evenly stamped rows determine offset and drift to a fraction of a millisecond
-(`rig.observation.timebase`). Rows that come slowly, or are stamped on arrival, have no such rates, and a fitted drift
+(`rig.observation.clocks`). Rows that come slowly, or are stamped on arrival, have no such rates, and a fitted drift
 would be a time-stamp error. Their offset, without drift, minimises the absolute deviations between the rotations from
 row to row (`robust_start`).
 """
@@ -14,10 +14,12 @@ import numpy as np
 from rig.errors import Fault, or_fault
 from rig.estimation.arrays import Array
 from rig.estimation.refusals import report_inverted
+from rig.observation.clocks.clock_estimate import estimate_time_base
+from rig.observation.clocks.coarse_search import estimate_coarse_offset
+from rig.observation.clocks.time_base import TimeBase
 from rig.observation.external.reference_rows import Turning, select_covered
 from rig.observation.external.robust_start import COARSE_S, find_start
 from rig.observation.external.table_motion import TableMotion
-from rig.observation.timebase import TimeBase, estimate_coarse_offset, estimate_time_base
 
 CLEARER = 0.9  # largest ratio of the unexplained part with drift to that without, for a drift
 CRYSTALS = 1e-4  # standard deviation of the drift between two crystals

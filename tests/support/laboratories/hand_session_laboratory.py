@@ -23,7 +23,7 @@ from rig.estimation.by_hand import HandSolution, SessionConditions, solve_by_han
 from rig.estimation.by_hand.session_parts import HandRecording
 from rig.observation.by_hand.hand_segmentation import Segmenter
 from rig.observation.by_hand.rests_and_moves import NotCounted, range_of, readings_of
-from rig.observation.timebase import NOMINAL_DRIFT
+from rig.observation.clocks.time_base import NOMINAL_DRIFT
 from rig.runner.acquisition import Acquisition
 from rig.runner.by_hand.hand_session import HandSession
 from rig.world.operator import SimulatedOperator

@@ -1,0 +1,149 @@
+"""The weighted least-squares fit of vector readings to the flange's rate, which refines a clock."""
+
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+
+from rig.errors import Fault
+from rig.estimation.arrays import Array
+from rig.estimation.cubic_spline import CubicSpline
+from rig.observation.clocks.time_base import TimeBase, time_base_not_found
+from rig.observation.motion.reference_motion import KnownMotion
+from rig.observation.statistics.coloured_noise import correlation_inflation
+
+MIN_SAMPLES = 100
+CONTRADICTION = 6.0  # standard deviations between the drifts of two fits
+# Ratio to the square of the fastest axis: a body that turns about one axis shows only rounding about others.
+NO_TURNING = 1e-12
+# Steps in standard deviations; an offset may turn around with a small step while the drift still changes.
+SETTLED, UNDERWAY = 1e-3, 0.1
+FINE_STEPS = 400  # many: if the arm vibrates and hardly turns, a step may be nearly as long as the one before
+# Steps after which weights are kept: noise that seems correlated only at every second step would never settle.
+WEIGHED_STEPS = 60
+SLOW_S, FINE_S = 0.1, 0.02  # times over which rates are averaged, first and second
+AVERAGED, EVERY = 10, 2  # rates in one average; stride of the averages in the spline
+LEAST_GAP = 0.5  # in intervals between samples
+# Step from which on, and interval at which, the fit extrapolates; largest number of steps it skips.
+SLOW_STEPS, LEAP_STEPS, FARTHEST = 300, 20, 100.0
+
+
+class _SlowMotion:
+    """A `KnownMotion` between two times, with its rate averaged over `over_s`."""
+
+    def __init__(self, motion: KnownMotion, over_s: float, start_s: float, end_s: float) -> None:
+        self.time_s, self.covered = motion.time_s, motion.covered
+        step_s = over_s / AVERAGED
+        times_s = np.arange(max(start_s, self.time_s[0]), min(end_s, self.time_s[-1]), step_s)
+        rates = np.cumsum(motion.rate(times_s), axis=0)
+        means = (rates[AVERAGED:] - rates[:-AVERAGED]) / AVERAGED
+        self.rate = CubicSpline(times_s[AVERAGED::EVERY] - (AVERAGED - 1) / 2 * step_s, means[::EVERY])
+
+
+def _average_samples(time_s: Array, readings: Array, count: int) -> tuple[Array, Array]:
+    """Return times (m,) and readings (m, 3) averaged over `count` samples that follow each other without a gap."""
+    starts = np.arange(0, len(time_s) - count + 1, count)
+    lasting_s = time_s[starts + count - 1] - time_s[starts]
+    starts = starts[lasting_s <= (count - 1 + LEAST_GAP) * float(np.median(np.diff(time_s)))]
+    inside = starts[:, None] + np.arange(count)
+    return time_s[inside].mean(axis=1), readings[inside].mean(axis=1)
+
+
+def fit_clock(clock: TimeBase, board_time_s: Array, readings: Array, motion: KnownMotion) -> TimeBase:
+    """Return the clock with the best fit of readings and motion, first by their slow parts.
+
+    A ripple is the same after a period, and a fast ripple differs between readings and states because of their filters.
+    If the finest fit has no optimum for this reason, the clock of the slow parts remains, with its own uncertainty.
+    Raise Fault `time_base_not_found`.
+    """
+    first, *finer = _list_stages(clock, board_time_s, readings, motion)
+    clock = _iterate_clock(clock, *first)
+    with suppress(Fault):
+        for stage in finer:
+            refined = _iterate_clock(clock, *stage)
+            if _is_contradiction(clock, refined):
+                break
+            clock = refined
+    return clock
+
+
+def _is_contradiction(clock: TimeBase, refined: TimeBase) -> bool:
+    """Return whether the drift of a finer fit is less certain than that of the one before it, and contradicts it.
+
+    It has then found another optimum: readings without a filter show fast ripples at other frequencies (aliasing). The
+    offsets may differ, as filters delay slow and fast parts differently.
+    """
+    difference, std = abs(refined.drift - clock.drift), float(np.hypot(refined.drift_std, clock.drift_std))
+    return refined.drift_std > clock.drift_std and difference > CONTRADICTION * std
+
+
+def _list_stages(
+    clock: TimeBase, board_time_s: Array, readings: Array, motion: KnownMotion
+) -> Iterator[tuple[Array, Array, KnownMotion]]:
+    """Yield times, readings and motion for each fit: averaged over long times, over short times, and not averaged."""
+    start_s, end_s = clock.controller_time_s(board_time_s[[0, -1]]).tolist()
+    step_s = float(np.median(np.diff(board_time_s)))
+    for over_s in (SLOW_S, FINE_S):
+        count = round(over_s / step_s)
+        if count < 2 or len(board_time_s) < MIN_SAMPLES * count:
+            continue
+        slow = _SlowMotion(motion, count * step_s, start_s - 1.0, end_s + 1.0)
+        yield *_average_samples(board_time_s, readings, count), slow
+        if over_s == FINE_S:
+            return
+    yield board_time_s, readings, motion
+
+
+def _iterate_clock(clock: TimeBase, board_time_s: Array, readings: Array, motion: KnownMotion) -> TimeBase:
+    """Refine the clock until it settles, with leaps if steps shrink slowly. Raise Fault `time_base_not_found`."""
+    moved, inflation = np.zeros(2), None
+    for number in range(1, FINE_STEPS + 1):
+        before, last = clock, moved
+        settled = inflation if number > WEIGHED_STEPS else None
+        clock, inflation = _refine_clock(clock, board_time_s, readings, motion, settled)
+        moved = np.array([clock.offset_s - before.offset_s, clock.drift - before.drift])
+        if abs(moved[0]) < SETTLED * clock.offset_std_s and abs(moved[1]) < UNDERWAY * clock.drift_std:
+            return clock
+        if number >= SLOW_STEPS and number % LEAP_STEPS == 0:
+            further = moved * _remaining_steps(float(moved[0] / last[0]))
+            clock = replace(clock, offset_s=clock.offset_s + further[0], drift=clock.drift + further[1])
+    raise time_base_not_found("the fit of the board's clock does not settle")
+
+
+def _remaining_steps(ratio: float) -> float:
+    """Return the sum of all further steps as a multiple of the last step, if steps shrink by `ratio` (Aitken's Δ²)."""
+    return min(ratio / (1 - ratio), FARTHEST) if 0 < ratio < 1 else 0.0
+
+
+def _refine_clock(
+    clock: TimeBase, board_time_s: Array, readings: Array, motion: KnownMotion, inflation: Array | None = None
+) -> tuple[TimeBase, Array]:
+    """Return the clock after one Gauss–Newton step, and the inflation (3,) of each axis' variance due to correlation.
+
+    Model: m = A r(t) + c + noise, r the flange's rate at controller time t; A (3, 3) and c (3,) are also fitted.
+    Without `inflation`, estimate it from the residuals.
+    """
+    t, since = clock.controller_time_s(board_time_s), board_time_s - clock.reference_s
+    columns = np.column_stack([motion.rate(t), np.ones(len(t))])
+    inverse = np.linalg.pinv(columns.T @ columns, rcond=NO_TURNING, hermitian=True) @ columns.T
+    fitted = inverse @ readings
+    residual = readings - columns @ fitted
+    by_offset = motion.rate(t, 1) @ fitted[:3]
+    by_clock = np.hstack([by_offset, by_offset * since[:, None]])
+    by_clock -= columns @ (inverse @ by_clock)
+    if inflation is None:
+        inflation = np.array([correlation_inflation(noise) for noise in residual.T])
+    weights = 1 / (np.einsum("na,na->a", residual, residual) / len(t) * inflation + np.finfo(np.float64).tiny)
+    normal = np.einsum("iaja,a->ij", (by_clock.T @ by_clock).reshape(2, 3, 2, 3), weights)
+    right = np.einsum("iaa,a->i", (by_clock.T @ residual).reshape(2, 3, 3), weights)
+    covariance = np.asarray(np.linalg.pinv(normal, hermitian=True), dtype=np.float64)
+    step = covariance @ right
+    refined = TimeBase(
+        clock.offset_s + float(step[0]),
+        clock.drift + float(step[1]),
+        clock.reference_s,
+        covariance,
+        np.asarray(fitted[3], dtype=np.float64),
+    )
+    return refined, inflation
