@@ -28,9 +28,11 @@ from rig.observation.statistics.spectral_lines import (
     waves,
 )
 from rig.observation.statistics.tapered_weights import MAIN_LOBE, apply_window
-from rig.observation.statistics.vibration_noise import BRIEF, FEWEST, estimate_noise
+from rig.observation.statistics.vibration_noise import BRIEF, estimate_noise
 
+FEWEST_READINGS = 48  # of a turn in which lines are sought: enough for two
 SLOW = 8.0  # cycles per revolution: slower lines are hard to separate from waves once and twice per revolution
+SHOWN = 50.0  # power of a slow ripple relative to the median of the encoders' noise, which by chance reaches 15
 MOST_GAIN = 3.0  # of the noise of the arm's angles; weights with a larger one do not remove slow lines
 NOT_ENCODED = LineSearch(slowest=5.0)
 ENCODED = LineSearch(slowest=2.5, beats=0, most=5)
@@ -136,20 +138,6 @@ def _fit_residuals(columns: Array, values: Array) -> Array:
     return residuals
 
 
-def _fit_tapered_residuals(columns: Array, values: Array) -> Array:
-    """Return the residuals of values (n, m) after a fit of columns (n, k) that fast lines in the values do not affect.
-
-    Cut off at both ends, fast lines resemble the slow part of the encoders' rate. A fit of these lines would leave the
-    encoders' noise in the residuals, where it looks like slow lines.
-    """
-    unit = unit_columns(columns)
-    tapered = apply_window(np.column_stack([unit, values]))
-    sizes = fit_columns(tapered[:, : unit.shape[1]], tapered[:, unit.shape[1] :])
-    remainder = values - unit @ sizes
-    residuals: Array = remainder - remainder.mean(axis=0)
-    return residuals
-
-
 def _find_turn_lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines:
     """Find the vibrations in readings (n, 3) apart from steady columns (n, k) and the rates that the encoders measure.
 
@@ -158,7 +146,7 @@ def _find_turn_lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines
     """
     uneven = turn.uneven_rad_s[:, None]
     none = uneven[:, :0]
-    if len(readings) < FEWEST:
+    if len(readings) < FEWEST_READINGS:
         return Lines(NONE, 0, none, uneven)
     if not turn.complete:
         fixed = np.column_stack([steady, uneven])
@@ -176,38 +164,44 @@ def _find_turn_lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines
     sizes = fit_columns(columns, ripple_rate)
     fast = np.repeat(ripple >= SLOW, column_count(ENCODED.beats))
     slow = ripple_rate - columns[:, fast] @ sizes[fast]
-    smooth = slow_part(slow, turn.share)
+    smooth = find_slow_ripple(slow, turn.share)
     late = _changes(smooth) if turn.closed else none  # over an arc it resembles encoder errors
-    encoded = np.column_stack([smooth, late, slow - smooth])
+    encoded = np.column_stack([smooth, late, slow - _fit_slow_part(slow, turn.share)])
     explained = np.column_stack([steady, encoded, columns[:, fast]])
     residuals = _fit_residuals(explained, readings)
     encoded_lines = ripple[ripple >= SLOW]
     cycles = find_lines(residuals, NOT_ENCODED, encoded_lines, turn.share)
-    kept = cycles > SLOW + MAIN_LOBE
-    kept[: len(encoded_lines)] = True
-    if not kept.all():
-        residuals = _fit_tapered_residuals(explained, readings)
-        cycles = find_lines(residuals, NOT_ENCODED, cycles[kept], turn.share)
     return Lines(cycles, len(cycles) - len(encoded_lines), encoded, late)
 
 
 def lag_columns(rate: Array, columns: Array, share: Array) -> Array:
-    """Return columns (n, 2) of a lag behind the slow part of a rate (n,) that columns (n, k) do not explain."""
+    """Return columns (n, 0 or 2) of a lag behind the slow ripple of a rate (n,) that columns (n, k) do not explain."""
     residuals = rate[:, None] - columns @ fit_columns(columns, rate[:, None])
-    return _changes(slow_part(residuals, share))
+    return _changes(find_slow_ripple(residuals, share))
 
 
 def _changes(slow: Array) -> Array:
-    """Return the first and second differences (n, 2) of a rate (n, 1), the effects of a lag and a filter."""
+    """Return the first and second differences of a rate (n, 1), the effects of a lag and a filter; none of none."""
     change = np.gradient(slow, axis=0)
     return np.column_stack([change, np.gradient(change, axis=0)])
 
 
-def slow_part(rates: Array, share: Array) -> Array:
-    """Return the part of rates (n, m) with less than `SLOW` cycles per turn; `share` (n,) is elapsed time.
+def find_slow_ripple(rate: Array, share: Array) -> Array:
+    """Return the part (n, 1) of a rate (n, 1) with less than `SLOW` cycles per turn, or no column if it is noise.
 
-    Waves of half a turn describe it, because a vibration is not periodic in the turn.
+    `share` (n,) is elapsed time. The encoders' noise is white in the angle, the sum of the rate.
+    """
+    powers = np.abs(np.fft.rfft(apply_window(np.cumsum(rate, axis=0))[:, 0])) ** 2
+    slowest = int(SLOW) + MAIN_LOBE
+    noise = np.median(powers[slowest:])
+    return _fit_slow_part(rate, share) if powers[1:slowest].max() > SHOWN * noise else rate[:, :0]
+
+
+def _fit_slow_part(rate: Array, share: Array) -> Array:
+    """Return the part of a rate (n, 1) with less than `SLOW` cycles per turn, by waves of half a turn.
+
+    A vibration is not periodic in the turn.
     """
     halves = harmonics(np.pi * share, int(2 * SLOW))
-    slow: Array = halves @ fit_columns(halves, rates)
+    slow: Array = halves @ fit_columns(halves, rate)
     return slow
