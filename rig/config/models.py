@@ -15,7 +15,6 @@ from rig.config.judging.station_section import StationSection
 from rig.config.judging.verdict_limits import LimitsSection
 from rig.config.ranges import PAYLOAD_RANGE_KG, SPEED_RANGE_DEG_S, ModelName
 from rig.config.section import (
-    RATIO,
     AccelerometerOrder,
     JointAngle,
     Offset,
@@ -23,6 +22,7 @@ from rig.config.section import (
     Section,
     SensorName,
     Vector3,
+    WholeNumber,
     check_host,
 )
 from rig.config.sensors.link_budget import LinkLoad, over_budget
@@ -98,12 +98,11 @@ class ArmSection(TurnerSection):
         le=500,
         description="how many states the arm sends per second; a `ur10_cb3` sends 125 at most",
     )
-    robot_api_port: int = Field(
+    robot_api_port: WholeNumber = Field(
         default=80,
         ge=1,
         le=65535,
         description="TCP port of a PolyScope X's Robot API; a simulator may have it at another one",
-        json_schema_extra=RATIO,
     )
     kinematics: Literal["controller", "nominal"] = Field(
         default="controller",
@@ -151,9 +150,7 @@ class BoardSection(Section):
         max_length=255,
         description="serial port, such as `/dev/ttyACM0` or `COM3`, or `socket://host:port`",
     )
-    baud: Literal[115200, 230400, 460800, 921600] = Field(
-        default=921600, description="speed of the serial line", json_schema_extra={"unit": "Bd"}
-    )
+    baud: Literal[115200, 230400, 460800, 921600] = Field(default=921600, description="speed of the serial line")
 
 
 class ProcedureSection(Section):

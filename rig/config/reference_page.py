@@ -15,22 +15,56 @@ from rig.config.world.laboratory import WorldSection
 
 Schema = Mapping[str, Any]
 
-# A key ends in its unit. The longer endings come first.
+# A key ends in its unit. Of several endings that fit, the longest one is meant.
 UNITS = {
     "_deg_s2": "°/s²",
     "_m_s2": "m/s²",
     "_deg_s": "°/s",
+    "_deg_h": "°/h",
     "_rad_s": "rad/s",
     "_deg": "°",
     "_rad": "rad",
+    "_mrad": "mrad",
     "_per_turn": "1/turn",
     "_mm": "mm",
     "_kg": "kg",
-    "_ut": "µT",
     "_hz": "Hz",
     "_ppm": "ppm",
+    "_percent": "%",
     "_c": "°C",
+    "_k": "K",
     "_s": "s",
+    "_s2": "s²",
+    "_ms": "ms",
+    "_min": "min",
+    "_g": "g",
+    "_ug": "µg",
+    "_w": "W",
+    "_ut": "µT",
+    "_gauss": "gauss",
+    "_a_m2": "A m²",
+    "baud": "Bd",
+    "_ut_m": "µT/m",
+    "_ut_min": "µT/min",
+    "_k_per_min": "K/min",
+    "_k_w": "K/W",
+    "_w_k": "W/K",
+    "_j_k": "J/K",
+    "_ppm_k": "ppm/K",
+    "_mg_k": "mg/K",
+    "_deg_s_k": "°/s/K",
+    "_deg_s_g": "°/s/g",
+    "_per_k": "1/K",
+    "_per_k2": "1/K²",
+    "_m_s2_per_k": "m/s²/K",
+    "_m_s2_per_k2": "m/s²/K²",
+    "_rad_s_per_k": "rad/s/K",
+    "_rad_s_per_k2": "rad/s/K²",
+    "_rad_s_per_g": "rad/s/g",
+    "_rad_s_per_sqrt_s": "rad/s/√s",
+    "_per_rad_s": "1/(rad/s)",
+    "_s2_m": "s²/m",
+    "": "",  # words, booleans, and numbers whose model states the unit
 }
 
 REPEAT = """\
@@ -214,8 +248,9 @@ def _row(key: str, schema: Schema, required: bool) -> tuple[str, ...]:
 
 
 def unit_of(key: str, schema: Schema) -> str:
-    """Return the unit of a key's value, by its name or its model; "" for words and booleans."""
-    return schema.get("unit") or next((unit for ending, unit in UNITS.items() if key.endswith(ending)), "")
+    """Return the unit of a key's value, by its model or its name; "" for words and booleans."""
+    stated = (variant["unit"] for variant in (schema, *schema.get("anyOf", ())) if "unit" in variant)
+    return next(stated, None) or UNITS[max((end for end in UNITS if key.endswith(end)), key=len, default="")]
 
 
 def _describe_values(schema: Schema) -> str:

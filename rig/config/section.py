@@ -21,7 +21,9 @@ Offset = Annotated[float, Field(ge=-1000, le=1000)]
 # A name becomes that of a dataset, of files and of C arrays.
 SensorName = Annotated[str, Field(pattern=r"^\w[\w -]*$", max_length=40)]
 DEFAULT_REST_S = 3.0  # duration of a rest after a sweep, and in an attitude (SIX, section IV)
-RATIO: dict[str, Any] = {"unit": "1"}  # a number without a unit, if the key cannot show this
+RATIO: dict[str, Any] = {"unit": "1"}  # numbers without a unit: a key shows by its ending only which unit it has
+Ratio = Annotated[float, Field(json_schema_extra=RATIO)]
+WholeNumber = Annotated[int, Field(json_schema_extra=RATIO)]
 
 
 def no_number_is_true(cls: type[BaseModel], value: Any, info: ValidationInfo) -> Any:

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Generic, Literal, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
-from rig.config.section import RATIO, Positive, no_number_is_true
+from rig.config.section import Positive, Ratio, no_number_is_true
 
 JUDGES = ConfigDict(frozen=True, allow_inf_nan=False, defer_build=True)
 NonNegative = Annotated[float, Field(ge=0)]
@@ -31,10 +31,9 @@ OF_SENSORS: tuple[OfSensor, ...] = get_args(OfSensor)
 OfSensors = TypeVar("OfSensors")
 
 
-def _part_default_key(what: str, unit: str | None = None) -> Any:
+def _part_default_key(what: str) -> Any:
     """Return the field of a key whose default is the catalogue's value for the sensor's part."""
-    extra: dict[str, Any] | None = None if unit is None else {"unit": unit}
-    return Field(default=None, description=f"{what}; if left out, the part's value", json_schema_extra=extra)
+    return Field(default=None, description=f"{what}; if left out, the part's value")
 
 
 class ObservationKeys(BaseModel):
@@ -42,20 +41,15 @@ class ObservationKeys(BaseModel):
 
     model_config = JUDGES
 
-    max_lost_fraction: float = Field(
-        default=0.001,
-        ge=0,
-        lt=1,
-        description="fraction of a sweep's samples that may be missing",
-        json_schema_extra=RATIO,
+    max_lost_fraction: Ratio = Field(
+        default=0.001, ge=0, lt=1, description="fraction of a sweep's samples that may be missing"
     )
-    max_speed_deviation: float = Field(
+    max_speed_deviation: Ratio = Field(
         default=0.25,
         gt=0,
         lt=1,
         description="how much the joint's rate, smoothed over 50 ms, may differ from its mean, as a fraction of "
         "the mean",
-        json_schema_extra=RATIO,
     )
     max_axis_deviation_deg: float = Field(
         default=20.0,
@@ -103,7 +97,6 @@ class UncertaintyKeys(BaseModel, Generic[OfSensors]):
         le=20,
         description="of a calibration over temperature: by how much the difference between the part's "
         "thermometer and its sensor may change from the run to the use; a typical value, as no data sheet states it",
-        json_schema_extra={"unit": "K"},
     )
     angle_std_deg: float | None = Field(
         default=None,
@@ -131,45 +124,38 @@ class UncertaintyKeys(BaseModel, Generic[OfSensors]):
         le=100,
         description="delay of an accelerometer's own filter, at most; it makes the wave of a sweep smaller by "
         "half the square of the angle (in rad) that the arm turns in this time",
-        json_schema_extra={"unit": "ms"},
     )
     g_sensitivity_deg_s_g: OfSensors = _part_default_key(
-        "change of a reading for 1 g, if attitudes do not determine it", "°/s/g"
+        "change of a reading for 1 g, if attitudes do not determine it"
     )
     nonlinearity_percent: OfSensors = _part_default_key(
         "largest distance of a gyroscope's curve from the best straight line, in per cent of full scale, for the "
-        "odd part of the curve and for the even part; used if there is only one speed",
-        "%",
+        "odd part of the curve and for the even part; used if there is only one speed"
     )
     asymmetry_percent: OfSensors = _part_default_key(
         "even part of a gyroscope's curve, in per cent of full scale, that is allowed although one scale factor is"
-        " stated for both directions; more of it fails the check `cw_against_ccw`",
-        "%",
+        " stated for both directions; more of it fails the check `cw_against_ccw`"
     )
-    bias_deg_s_k: OfSensors = _part_default_key("change of a gyroscope's bias for 1 K", "°/s/K")
-    scale_ppm_k: OfSensors = _part_default_key("change of a gyroscope's scale factor for 1 K", "ppm/K")
+    bias_deg_s_k: OfSensors = _part_default_key("change of a gyroscope's bias for 1 K")
+    scale_ppm_k: OfSensors = _part_default_key("change of a gyroscope's scale factor for 1 K")
     bias_instability_deg_h: OfSensors = _part_default_key(
         "smallest Allan deviation of a gyroscope at rest (in-run bias stability): how much its bias drifts, even "
-        "with the longest average",
-        "°/h",
+        "with the longest average"
     )
     non_orthogonality_deg: OfSensors = _part_default_key(
         "how much the angle between two axes of a gyroscope may differ from 90°"
     )
     acceleration_nonlinearity_percent: OfSensors = _part_default_key(
         "largest distance of an accelerometer's curve from the best straight line, in per cent of "
-        "`acceleration_nonlinear_over_g`",
-        "%",
+        "`acceleration_nonlinear_over_g`"
     )
     acceleration_nonlinear_over_g: OfSensors = _part_default_key(
-        "acceleration in either direction for which this nonlinearity is stated; 0 means the range that is set", "g"
+        "acceleration in either direction for which this nonlinearity is stated; 0 means the range that is set"
     )
-    acceleration_bias_mg_k: OfSensors = _part_default_key("change of an accelerometer's bias for 1 K", "mg/K")
-    acceleration_scale_ppm_k: OfSensors = _part_default_key(
-        "change of an accelerometer's scale factor for 1 K", "ppm/K"
-    )
+    acceleration_bias_mg_k: OfSensors = _part_default_key("change of an accelerometer's bias for 1 K")
+    acceleration_scale_ppm_k: OfSensors = _part_default_key("change of an accelerometer's scale factor for 1 K")
     acceleration_bias_instability_ug: OfSensors = _part_default_key(
-        "smallest Allan deviation of an accelerometer at rest", "µg"
+        "smallest Allan deviation of an accelerometer at rest"
     )
     decision_rule: DecisionRule = Field(
         default="simple",

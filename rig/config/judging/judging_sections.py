@@ -38,11 +38,7 @@ class SiteSection(Section):
         default=None, ge=-50, le=100, description="temperature of the air, as you measured it"
     )
     ambient_humidity_percent: float | None = Field(
-        default=None,
-        ge=0,
-        le=100,
-        description="relative humidity of the air, as you measured it",
-        json_schema_extra={"unit": "%"},
+        default=None, ge=0, le=100, description="relative humidity of the air, as you measured it"
     )
     latitude_deg: float | None = Field(
         default=None,
@@ -57,16 +53,13 @@ class SiteSection(Section):
         le=360,
         description="direction of the x axis of the arm's base: 0 north, 90 east; give it together with latitude_deg",
     )
-    gravity_m_s2: float = Field(
-        default=9.80665, gt=9.7, lt=9.9, description="acceleration of free fall", json_schema_extra={"unit": "m/s²"}
-    )
+    gravity_m_s2: float = Field(default=9.80665, gt=9.7, lt=9.9, description="acceleration of free fall")
     gravity_uncertainty_m_s2: float | None = Field(
         default=None,
         gt=0,
         le=0.1,
         description="expanded uncertainty (k = 2) of gravity_m_s2; if left out, a half-width of 0.0005 is used, "
         "or of 0.03 if gravity_m_s2 is the standard value",
-        json_schema_extra={"unit": "m/s²"},
     )
     magnetic_field_ut: float | None = Field(
         default=None,

@@ -4,7 +4,7 @@ import re
 
 from pydantic import Field, field_validator
 
-from rig.config.section import RATIO, Section, SensorName, Words
+from rig.config.section import Section, SensorName, WholeNumber, Words
 
 
 class StationSection(Section):
@@ -32,12 +32,8 @@ class StationSection(Section):
         description="whether each part brings its own board, so that the same board twice is the same part twice; "
         "`false`: one board stays at the rig, and the parts on it are changed",
     )
-    repeats: int = Field(
-        default=1,
-        ge=0,
-        le=5,
-        description="how often refused sweeps are repeated at once before the verdict is final",
-        json_schema_extra=RATIO,
+    repeats: WholeNumber = Field(
+        default=1, ge=0, le=5, description="how often refused sweeps are repeated at once before the verdict is final"
     )
 
     @field_validator("serial_pattern")

@@ -5,11 +5,12 @@ The sections of a configuration, the recorded settings, and the checks of the ve
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import BaseModel, ConfigDict, Field, GetJsonSchemaHandler, field_validator
+from pydantic_core import CoreSchema
 
-from rig.config.section import RATIO, Positive, no_number_is_true
+from rig.config.section import Positive, no_number_is_true
 
 Kind = Literal["conformity", "fitness"]
 Parameter = Literal["scale", "bias", "bias_drift"]
@@ -32,6 +33,10 @@ class Limit:
     parameter: Parameter | None = None
     needed_by: Need | None = None
 
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """Return the schema of the limit's key, with the unit."""
+        return {**handler(schema), "unit": self.unit}
+
 
 class Limits(BaseModel):
     """The verdict's limits, None for those not needed."""
@@ -40,10 +45,10 @@ class Limits(BaseModel):
     model_config = ConfigDict(frozen=True, allow_inf_nan=False, defer_build=True)
 
     scale_deviation: Annotated[Positive, Limit("rate", "scale_deviation", "1", "conformity", "scale")] = Field(
-        description="largest difference of a scale factor from 1, |k − 1|", json_schema_extra=RATIO
+        description="largest difference of a scale factor from 1, |k − 1|"
     )
     scale_std: Annotated[Positive, Limit("rate", "scale_std", "1", "fitness", "scale")] = Field(
-        description="largest standard uncertainty of a scale factor", json_schema_extra=RATIO
+        description="largest standard uncertainty of a scale factor"
     )
     bias_rad_s: Annotated[Positive, Limit("rate", "bias", "rad/s", "conformity", "bias")] = Field(
         description="largest magnitude of a bias"
@@ -55,7 +60,6 @@ class Limits(BaseModel):
         default=None,
         description="largest expanded uncertainty of a scale factor; if it is left out, `procedure.target_scale_u` of "
         "six_observation, where that is given",
-        json_schema_extra=RATIO,
     )
     bias_u_rad_s: Annotated[Positive | None, Limit("rate", "bias_u", "rad/s", "fitness", "bias")] = Field(
         default=None,
@@ -63,9 +67,7 @@ class Limits(BaseModel):
         "that is given",
     )
     condition: Annotated[Positive, Limit("rate", "condition", "1", "fitness")] = Field(
-        description="largest condition number of the equations: how well the sweeps separate the parameters (1 is "
-        "best)",
-        json_schema_extra=RATIO,
+        description="largest condition number of the equations: how well the sweeps separate the parameters (1 is best)"
     )
     verification_rms_rad_s: Annotated[
         Positive | None, Limit("rate", "verification_rms", "rad/s", "conformity", needed_by="verification")
@@ -87,15 +89,10 @@ class Limits(BaseModel):
         default=None,
         description="largest difference of an accelerometer's scale factor from 1; the calibration of an "
         "accelerometer needs this limit",
-        json_schema_extra=RATIO,
     )
     acceleration_scale_std: Annotated[
         Positive | None, Limit("acceleration", "scale_std", "1", "fitness", "scale", "accelerometer")
-    ] = Field(
-        default=None,
-        description="largest standard uncertainty of an accelerometer's scale factor; needed too",
-        json_schema_extra=RATIO,
-    )
+    ] = Field(default=None, description="largest standard uncertainty of an accelerometer's scale factor; needed too")
     acceleration_bias_m_s2: Annotated[
         Positive | None, Limit("acceleration", "bias", "m/s²", "conformity", "bias", "accelerometer")
     ] = Field(default=None, description="largest magnitude of an accelerometer's bias; needed too")

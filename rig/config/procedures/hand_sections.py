@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from pydantic import Field
 
 from rig.config.models import ProcedureSection, RigConfig, TurnerSection
-from rig.config.section import RATIO
+from rig.config.section import Ratio, WholeNumber
 
 LEAST_RATE_HZ = 50.0  # lowest rate of readings that follow a hand, whose tremor is at 6 to 12 Hz
 STAMPED_THERE = ("lines", "mavlink")  # parts with a port of their own, whose device states the time of a sample
@@ -18,19 +18,17 @@ class HandSection(TurnerSection):
 class ByHandSection(ProcedureSection):
     """An item is laid on its faces and turned by hand, as requested by a line of text and a drawing."""
 
-    flips: int = Field(
+    flips: WholeNumber = Field(
         default=12,
         ge=8,
         le=96,
         description="how many moves from one face to another are asked for; twelve go over all six faces",
-        json_schema_extra=RATIO,
     )
-    turns: int = Field(
+    turns: WholeNumber = Field(
         default=3,
         ge=0,
         le=24,
         description="how many whole turns on the table are asked for, about one axis after the other",
-        json_schema_extra=RATIO,
     )
     rest_s: float = Field(
         default=1.0, ge=1.0, le=60, description="how long the item has to lie at rest before the next move is asked for"
@@ -48,13 +46,12 @@ class ByHandSection(ProcedureSection):
         description="how well a whole turn ends where it began, a standard deviation; one that misses by more than "
         "three of these is asked for again",
     )
-    target_scale_u: float | None = Field(
+    target_scale_u: Ratio | None = Field(
         default=None,
         gt=0,
         lt=0.1,
         description="expanded uncertainty (k = 2) of the scale factors at which the session ends; without it, it ends "
         "when all moves are made",
-        json_schema_extra=RATIO,
     )
 
     def problems(self, config: RigConfig) -> Iterator[str]:

@@ -13,7 +13,16 @@ from rig.config.procedures.hand_sections import ByHandSection
 from rig.config.procedures.servo_procedure import SPEED_TO_RANGE, ServoSixObservationSection
 from rig.config.procedures.stage_section import StageSection, Wrist
 from rig.config.ranges import ACCELERATION_RANGE_DEG_S2, SPEED_RANGE_DEG_S
-from rig.config.section import DEFAULT_REST_S, RATIO, AccelerometerOrder, Direction, JointAngle, Vector3
+from rig.config.section import (
+    DEFAULT_REST_S,
+    RATIO,
+    AccelerometerOrder,
+    Direction,
+    JointAngle,
+    Ratio,
+    Vector3,
+    WholeNumber,
+)
 
 __all__ = [
     "DEFAULT_PROCEDURE",
@@ -61,9 +70,7 @@ class SixSweepsSection(ProcedureSection):
         description="direction in which each wrist turns first, and then second; if left out, the directions in "
         "which a steady drift of the bias causes the smallest error",
     )
-    repeats: int = Field(
-        default=1, ge=1, le=100, description="how many times the whole procedure is done", json_schema_extra=RATIO
-    )
+    repeats: WholeNumber = Field(default=1, ge=1, le=100, description="how many times the whole procedure is done")
     speed_deg_s: Speed = Field(
         default=60.0,
         description=f"constant speed of a sweep; every sensor's range must be at least {SPEED_TO_RANGE} times as large",
@@ -176,14 +183,13 @@ class SixObservationSection(SixSweepsSection):
     stages: tuple[StageSection, ...] = Field(
         default=(), max_length=12, description="mountings of the item, one after the other"
     )
-    target_scale_u: float | None = Field(
+    target_scale_u: Ratio | None = Field(
         default=None,
         gt=0,
         lt=0.1,
         description="expanded uncertainty of the scale factors at which the run ends: after a repeat, with the arm at "
         "home; without it and `target_bias_u_rad_s`, it ends when all repeats are made; a run that does not come to it "
         "fails the check `scale_u`",
-        json_schema_extra=RATIO,
     )
     target_bias_u_rad_s: float | None = Field(
         default=None,
@@ -294,9 +300,7 @@ class AttitudesSection(ProcedureSection):
         description="time of standing still at home before the attitudes and after them, which shows whether the "
         "magnetic field drifted; `0`: no such test",
     )
-    repeats: int = Field(
-        default=1, ge=1, le=100, description="how many times the whole procedure is done", json_schema_extra=RATIO
-    )
+    repeats: WholeNumber = Field(default=1, ge=1, le=100, description="how many times the whole procedure is done")
     acceleration_deg_s2: float = Field(
         default=240.0, ge=0.1, le=ACCELERATION_RANGE_DEG_S2, description="acceleration of every motion"
     )
@@ -340,9 +344,7 @@ class BiasDriftSection(AttitudesSection):
 
     name: Literal["bias_drift"] = Field(default="bias_drift", description="this procedure")
     dwell_s: float = Field(default=200.0, ge=0.1, le=3600, description="time of standing still in each attitude")
-    repeats: int = Field(
-        default=10, ge=2, le=100, description="how many times the arm visits all attitudes", json_schema_extra=RATIO
-    )
+    repeats: WholeNumber = Field(default=10, ge=2, le=100, description="how many times the arm visits all attitudes")
 
     def problems(self, config: RigConfig) -> Iterator[str]:
         """Yield what is missing for the calibration of an accelerometer, and for limits of the drift."""
@@ -381,26 +383,22 @@ class ThermalSection(SixSweepsSection, AttitudesSection):
         ge=-40, le=85, description="lower end of the range of temperatures, by the part's thermometer"
     )
     to_c: float = Field(ge=-40, le=85, description="upper end of the range")
-    max_step_k: float = Field(
-        default=5.0, gt=0, le=50, description="how far neighbouring sets may be apart", json_schema_extra={"unit": "K"}
-    )
+    max_step_k: float = Field(default=5.0, gt=0, le=50, description="how far neighbouring sets may be apart")
     max_rate_k_per_min: float = Field(
         default=2.0,
         gt=0,
         le=100,
         description="how fast the temperature may change; if it changes faster, the run ends (`too_fast`)",
-        json_schema_extra={"unit": "K/min"},
     )
     reference_c: float = Field(
         default=25.0, ge=-40, le=85, description="temperature at which scale factors and biases are stated"
     )
-    heater_power: float = Field(
+    heater_power: Ratio = Field(
         default=0.0,
         ge=0,
         le=1,
         description="most power of the heater on the board's pin, as a part of all it has; `0`: the operator, or "
         "the board's own warm-up, changes the temperature",
-        json_schema_extra=RATIO,
     )
     both_directions: bool = Field(
         default=True,
@@ -422,15 +420,13 @@ class ThermalSection(SixSweepsSection, AttitudesSection):
         gt=0,
         le=1000,
         description="longest wait for the next temperature; after it the run ends (`range_not_reached`)",
-        json_schema_extra={"unit": "min"},
     )
-    repeats: int = Field(
+    repeats: WholeNumber = Field(
         default=40,
         ge=2,
         le=100,
         description="how many sets are made at most; if the range is not covered then, the run ends "
         "(`range_not_reached`)",
-        json_schema_extra=RATIO,
     )
 
     @model_validator(mode="after")

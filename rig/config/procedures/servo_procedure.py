@@ -10,7 +10,7 @@ from rig.config.models import ProcedureSection, RigConfig
 from rig.config.procedures.servo_section import FASTEST_DEG_S
 from rig.config.procedures.stage_section import Instruction, StageMountSection, mount_matrix
 from rig.config.ranges import ACCELERATION_RANGE_DEG_S2
-from rig.config.section import DEFAULT_REST_S, RATIO, Direction, Section
+from rig.config.section import DEFAULT_REST_S, Direction, Section, WholeNumber
 
 SPEED_TO_RANGE = 1.5  # ratio of speed to range: scale error, bias, ripple and noise add to a sweep's speed
 AXES_SPAN = 0.5  # least singular value of the directions of the sweeps; 1 if they are orthogonal
@@ -57,12 +57,8 @@ class ServoSixObservationSection(ProcedureSection):
     directions: tuple[Direction, Direction] = Field(
         default=("ccw", "cw"), description="direction of the first turn and of the second; ccw as seen on the horn"
     )
-    repeats: int = Field(
-        default=1,
-        ge=1,
-        le=100,
-        description="how many times both turns are made in each mounting",
-        json_schema_extra=RATIO,
+    repeats: WholeNumber = Field(
+        default=1, ge=1, le=100, description="how many times both turns are made in each mounting"
     )
     speed_deg_s: float = Field(
         default=60.0,

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from rig.config.models import TurnerSection
 from rig.config.ranges import PAYLOAD_RANGE_KG
-from rig.config.section import RATIO, JointAngle, Offset, Port
+from rig.config.section import JointAngle, Offset, Port, WholeNumber
 
 ServoName = Literal["xl430_w250", "xm430_w350", "xm430_w210"]
 FASTEST_DEG_S = 460.0  # speed of the fastest servo without load
@@ -22,10 +22,10 @@ class ServoSection(TurnerSection):
         max_length=255,
         description="serial port of the servo's adapter, such as `/dev/ttyUSB0` or `COM4`, or `socket://host:port`",
     )
-    id: int = Field(default=1, ge=0, le=252, description="the servo's ID on its bus", json_schema_extra=RATIO)
+    id: WholeNumber = Field(default=1, ge=0, le=252, description="the servo's ID on its bus")
     model: ServoName = Field(description="which servo it is; the servo must say the same")
     baud: Literal[57600, 115200, 1_000_000, 2_000_000, 3_000_000, 4_000_000] = Field(
-        default=1_000_000, description="speed of its serial line, as set in the servo", json_schema_extra={"unit": "Bd"}
+        default=1_000_000, description="speed of its serial line, as set in the servo"
     )
     payload_kg: float = Field(
         ge=0, le=PAYLOAD_RANGE_KG, description="mass of all that the shaft carries: adapter, board, cable"

@@ -5,7 +5,7 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from rig.config.section import RATIO, Section
+from rig.config.section import Ratio, Section
 
 SHORTEST = "shortest"
 CARRIED_OUT = "six_observation"
@@ -21,12 +21,8 @@ OTHERS: Mapping[str, tuple[str, str]] = {
 class TargetUncertaintySection(Section):
     """The expanded uncertainties at which the run ends; at least one of them."""
 
-    scale: float | None = Field(
-        default=None,
-        gt=0,
-        lt=0.1,
-        description="of the scale factors, as `target_scale_u` of six_observation",
-        json_schema_extra=RATIO,
+    scale: Ratio | None = Field(
+        default=None, gt=0, lt=0.1, description="of the scale factors, as `target_scale_u` of six_observation"
     )
     bias: float | None = Field(
         default=None,

@@ -103,10 +103,7 @@ class LineTemperatureSection(Section):
         "20 K of change",
     )
     stated_within_k: Positive = Field(
-        default=5.0,
-        le=60,
-        description="… and by how much that may change in the course of a run",
-        json_schema_extra={"unit": "K"},
+        default=5.0, le=60, description="… and by how much that may change in the course of a run"
     )
 
     @property
@@ -186,7 +183,6 @@ class LinesSection(Section):
         default=20.0,
         le=1000,
         description="with `clock: arrival`, how much later than usual a line may arrive: half of the width",
-        json_schema_extra={"unit": "ms"},
     )
     rate: LineRateSection = Field(description="the gyroscope's columns")
     acceleration: LineAccelerationSection | None = Field(default=None, description="the accelerometer's columns")

@@ -32,9 +32,7 @@ class MavlinkSection(Section):
         "or `udp:host:port`, an address of this computer to which the autopilot sends",
     )
     baud: Literal[57600, 115200, 230400, 460800, 921600, 1500000] = Field(
-        default=115200,
-        description="speed of the line, as the autopilot has it; over USB any will do",
-        json_schema_extra={"unit": "Bd"},
+        default=115200, description="speed of the line, as the autopilot has it; over USB any will do"
     )
     imu: ImuMessage = Field(
         default="HIGHRES_IMU",

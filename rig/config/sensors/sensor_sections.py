@@ -60,9 +60,7 @@ class OwnPortSection(Section):
         description="serial port, such as `/dev/ttyUSB0` or `COM4`, or `socket://host:port`",
     )
     baud: Baud = Field(
-        default=921600,
-        description="speed to which the sensor is set; the rig does not change it in the sensor",
-        json_schema_extra={"unit": "Bd"},
+        default=921600, description="speed to which the sensor is set; the rig does not change it in the sensor"
     )
     message: Literal["A", "B", "C"] = Field(
         default="B",

@@ -10,8 +10,5 @@ class StatedTemperatureSection(Section):
 
     stated_c: float = Field(ge=-40, le=85, description="how warm the sensor is")
     stated_within_k: Positive = Field(
-        default=5.0,
-        le=60,
-        description="… and by how much that may change in the course of a run",
-        json_schema_extra={"unit": "K"},
+        default=5.0, le=60, description="… and by how much that may change in the course of a run"
     )

@@ -29,8 +29,5 @@ class SimulatedPoseLogSection(Section):
         ge=-1000,
         le=1000,
         description="how much later than its attitude a row's time is, in the mean; negative: earlier",
-        json_schema_extra=MILLISECONDS,
     )
-    jitter_ms: float = Field(
-        default=2.5, ge=0, le=100, description="standard deviation of that delay", json_schema_extra=MILLISECONDS
-    )
+    jitter_ms: float = Field(default=2.5, ge=0, le=100, description="standard deviation of that delay")

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from rig.config.section import RATIO, Section
+from rig.config.section import Ratio, Section
 
 JointsKind = Literal["measured", "rough", "ideal"]
 Cycles = Annotated[int, Field(ge=1, le=600)]
@@ -47,7 +47,6 @@ class SimulatedDriveSection(Section):
         le=0.01,
         description="lag of a joint per acceleration of its target. When a move ends with 1 rad/s², the joint recovers "
         "with 11 mrad/s; 10 to 13 were measured",
-        json_schema_extra=SECOND_SQUARED,
     )
     yield_time_s: float = Field(
         default=3.5e-3,
@@ -55,13 +54,12 @@ class SimulatedDriveSection(Section):
         le=0.1,
         description="time constant of the recovery, critically damped; it was complete after 24 to 32 ms",
     )
-    crosstalk: float = Field(
+    crosstalk: Ratio = Field(
         default=0.08,
         ge=0,
         le=1,
         description="fraction of its ripple by which a joint shakes its neighbours whose axes are parallel to its own; "
         "0.25 mrad/s RMS was measured in an elbow while wrist 1 turned, nothing in joints with other axes",
-        json_schema_extra=RATIO,
     )
 
 

@@ -5,7 +5,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from rig.config.section import RATIO, Section
+from rig.config.section import RATIO, Ratio, Section
 
 
 class SimulatedAutopilotSection(Section):
@@ -35,18 +35,10 @@ class SimulatedAutopilotSection(Section):
         default=None,
         description="file that keeps the parameters from one run to the next; without it, they are the factory's",
     )
-    lost: float = Field(
-        default=0.0, ge=0, lt=1, description="fraction of messages that get lost", json_schema_extra=RATIO
-    )
-    doubled: float = Field(
-        default=0.0, ge=0, lt=1, description="fraction of messages that come twice", json_schema_extra=RATIO
-    )
-    stolen: float = Field(
-        default=0.0,
-        ge=0,
-        lt=1,
-        description="fraction of its bytes that another program with the same port reads",
-        json_schema_extra=RATIO,
+    lost: Ratio = Field(default=0.0, ge=0, lt=1, description="fraction of messages that get lost")
+    doubled: Ratio = Field(default=0.0, ge=0, lt=1, description="fraction of messages that come twice")
+    stolen: Ratio = Field(
+        default=0.0, ge=0, lt=1, description="fraction of its bytes that another program with the same port reads"
     )
     provides_temperature: bool = Field(
         default=True, description="whether its messages contain a temperature, or state that there is none"
@@ -56,18 +48,10 @@ class SimulatedAutopilotSection(Section):
         description="version of the protocol that it sends; version 1 has no temperature of an IMU",
         json_schema_extra=RATIO,
     )
-    slowest: float = Field(
-        default=1.0,
-        gt=0,
-        le=1,
-        description="fraction of the messages asked for that it has time to send",
-        json_schema_extra=RATIO,
+    slowest: Ratio = Field(
+        default=1.0, gt=0, le=1, description="fraction of the messages asked for that it has time to send"
     )
     baud: int | None = Field(
-        default=None,
-        ge=1200,
-        le=3_000_000,
-        description="speed of its port; if left out, the configured one",
-        json_schema_extra={"unit": "Bd"},
+        default=None, ge=1200, le=3_000_000, description="speed of its port; if left out, the configured one"
     )
     pty: bool = Field(default=False, description="also offer its port as a pseudo-terminal (POSIX)")

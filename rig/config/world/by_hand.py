@@ -25,25 +25,10 @@ class SimulatedHandSection(Section):
         ge=0,
         le=20,
         description="how much the attitude on a face varies from one time to the next; 2 for a bare board",
-        json_schema_extra={"unit": "mrad"},
     )
-    closure_mrad: float = Field(
-        default=3.0,
-        ge=0,
-        le=50,
-        description="by how much a whole turn misses the rule",
-        json_schema_extra={"unit": "mrad"},
-    )
-    faces_mrad: float = Field(
-        default=2.0,
-        ge=0,
-        le=50,
-        description="by how much the item's faces are off right angles",
-        json_schema_extra={"unit": "mrad"},
-    )
-    table_mrad: float = Field(
-        default=5.0, ge=0, le=50, description="by how much the table leans", json_schema_extra={"unit": "mrad"}
-    )
+    closure_mrad: float = Field(default=3.0, ge=0, le=50, description="by how much a whole turn misses the rule")
+    faces_mrad: float = Field(default=2.0, ge=0, le=50, description="by how much the item's faces are off right angles")
+    table_mrad: float = Field(default=5.0, ge=0, le=50, description="by how much the table leans")
     reaction_time_s: tuple[Seconds, Seconds] = Field(
         default=(0.5, 2.0), description="how long, at least and at most, from an instruction to the first touch"
     )

@@ -4,7 +4,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from rig.config.section import RATIO, Section
+from rig.config.section import Ratio, Section, WholeNumber
 
 
 class SimulatedFaultySection(Section):
@@ -14,13 +14,7 @@ class SimulatedFaultySection(Section):
         default=None, description="axis whose rate freezes at its last value; none if left out"
     )
     frozen_from_s: float = Field(default=0.0, ge=0, le=1e6, description="time of the world at which it freezes")
-    repeated: float = Field(
-        default=0.0,
-        ge=0,
-        lt=1,
-        description="share of the samples that hold rates which were sent before",
-        json_schema_extra=RATIO,
+    repeated: Ratio = Field(
+        default=0.0, ge=0, lt=1, description="share of the samples that hold rates which were sent before"
     )
-    repeated_length: int = Field(
-        default=1, ge=1, le=1000, description="how many samples come again in a row", json_schema_extra=RATIO
-    )
+    repeated_length: WholeNumber = Field(default=1, ge=1, le=1000, description="how many samples come again in a row")

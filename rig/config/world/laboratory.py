@@ -11,7 +11,7 @@ from rig.config.procedures.hand_sections import HandSection
 from rig.config.procedures.servo_section import ServoSection
 from rig.config.procedures.stage_section import StageMountSection
 from rig.config.ranges import ModelName
-from rig.config.section import RATIO, JointAngle, Section, SensorName, Vector3
+from rig.config.section import RATIO, JointAngle, Ratio, Section, SensorName, Vector3, WholeNumber
 from rig.config.world.arm_clients import SimulatedFieldbusSection, SimulatedPoseLogSection
 from rig.config.world.arm_joints import Cycles, JointsKind, SimulatedDriveSection, fill_in_joints
 from rig.config.world.autopilot import SimulatedAutopilotSection
@@ -60,9 +60,7 @@ class WorldSiteSection(Section):
     base_tilt_deg: tuple[Tilt, Tilt] = Field(
         default=(0.0, 0.0), description="how the base is tilted: about its x axis, then about its y axis"
     )
-    gravity_m_s2: float = Field(
-        default=9.80665, ge=0, le=20, description="acceleration of free fall", json_schema_extra={"unit": "m/s²"}
-    )
+    gravity_m_s2: float = Field(default=9.80665, ge=0, le=20, description="acceleration of free fall")
     magnetic_field_ut: float = Field(
         default=48.0,
         ge=0,
@@ -82,12 +80,9 @@ class WorldSiteSection(Section):
         default=(0.0, 0.0, 0.0, 0.0, 0.0),
         description="how the field changes with place, in the base's axes: ∂Bx/∂x, ∂Bx/∂y, ∂Bx/∂z, ∂By/∂y, "
         "∂By/∂z; the others follow from these if no current flows",
-        json_schema_extra={"unit": "µT/m"},
     )
     magnetic_drift_ut_min: tuple[Gradient, Gradient, Gradient] = Field(
-        default=(0.0, 0.0, 0.0),
-        description="how the field changes with time, along the base's axes",
-        json_schema_extra={"unit": "µT/min"},
+        default=(0.0, 0.0, 0.0), description="how the field changes with time, along the base's axes"
     )
 
 
@@ -180,9 +175,7 @@ class SimulatedArmSection(Section):
         json_schema_extra={"usual": "as `arm.home_deg`"},
     )
     remote_control: bool = Field(default=True, description="whether the pendant is switched to remote control")
-    speed_slider: float = Field(
-        default=1.0, gt=0, le=1, description="the pendant's speed slider, as a fraction", json_schema_extra=RATIO
-    )
+    speed_slider: Ratio = Field(default=1.0, gt=0, le=1, description="the pendant's speed slider, as a fraction")
     tcp_rotation_deg: tuple[Turn, Turn, Turn] = Field(
         default=(0.0, 0.0, 0.0),
         description="rotation of the tool's frame relative to the flange's, as a rotation vector",
@@ -334,19 +327,13 @@ class SimulatedAccelerometerSection(Section):
     non_orthogonality_deg: Vector3 = Field(
         default=NO_ROW, description="by how much the angles between its axes x y, x z, y z are off 90°"
     )
-    second_order_s2_m: Vector3 = Field(default=NO_ROW, description="φ of each axis", json_schema_extra={"unit": "s²/m"})
+    second_order_s2_m: Vector3 = Field(default=NO_ROW, description="φ of each axis")
     bandwidth_hz: Bandwidth = None
     delay_ms: Delay = 0.0
-    bias_m_s2_per_k: Vector3 = Field(
-        default=NO_ROW,
-        description="by how much b of each axis grows with temperature",
-        json_schema_extra={"unit": "m/s²/K"},
-    )
+    bias_m_s2_per_k: Vector3 = Field(default=NO_ROW, description="by how much b of each axis grows with temperature")
     scale_per_k: ScalePerK = NO_ROW
     bias_m_s2_per_k2: Vector3 = Field(
-        default=NO_ROW,
-        description="by how much b of each axis grows with the square of the temperature",
-        json_schema_extra={"unit": "m/s²/K²"},
+        default=NO_ROW, description="by how much b of each axis grows with the square of the temperature"
     )
     scale_per_k2: ScalePerK2 = NO_ROW
     bias_hysteresis_m_s2: Vector3 = Field(
@@ -406,14 +393,10 @@ class SimulatedSensorSection(Section):
         description="reading of its thermometer when it is switched on; without it, the sensor is warm at once",
     )
     warm_up_s: float = Field(default=300.0, ge=1, le=100_000, description="time constant of its warming up")
-    bias_rad_s_per_k: Vector3 = Field(
-        default=NO_ROW, description="by how much b of each axis grows with temperature", json_schema_extra=RATE_PER_K
-    )
+    bias_rad_s_per_k: Vector3 = Field(default=NO_ROW, description="by how much b of each axis grows with temperature")
     scale_per_k: ScalePerK = NO_ROW
     bias_rad_s_per_k2: Vector3 = Field(
-        default=NO_ROW,
-        description="by how much b of each axis grows with the square of the temperature",
-        json_schema_extra={"unit": "rad/s/K²"},
+        default=NO_ROW, description="by how much b of each axis grows with the square of the temperature"
     )
     scale_per_k2: ScalePerK2 = NO_ROW
     bias_hysteresis_rad_s: Vector3 = Field(
@@ -431,7 +414,6 @@ class SimulatedSensorSection(Section):
         ge=0,
         le=0.1,
         description="random walk of the bias: the standard deviation of its change in one second",
-        json_schema_extra={"unit": "rad/s/√s"},
     )
     g_sensitivity_rad_s_per_g: tuple[SensitivityRow, SensitivityRow, SensitivityRow] = Field(
         default=(NO_ROW, NO_ROW, NO_ROW),
@@ -444,18 +426,10 @@ class SimulatedSensorSection(Section):
         "end of `arm.extension_mm`",
     )
     nonlinearity_even_per_rad_s: float = Field(
-        default=0.0,
-        ge=-0.1,
-        le=0.1,
-        description="relative growth of a reading with its rate",
-        json_schema_extra=PER_RATE,
+        default=0.0, ge=-0.1, le=0.1, description="relative growth of a reading with its rate"
     )
     nonlinearity_odd_per_rad_s: float = Field(
-        default=0.0,
-        ge=-0.1,
-        le=0.1,
-        description="relative growth of a reading with the magnitude of its rate",
-        json_schema_extra=PER_RATE,
+        default=0.0, ge=-0.1, le=0.1, description="relative growth of a reading with the magnitude of its rate"
     )
     bandwidth_hz: Bandwidth = None
     delay_ms: Delay = 0.0
@@ -498,21 +472,13 @@ class SimulatedPartSection(Section):
 class WorldSection(Section):
     """The simulated laboratory."""
 
-    seed: int = Field(
-        default=1,
-        ge=0,
-        description="seed of all random numbers: the same seed gives the same run",
-        json_schema_extra=RATIO,
+    seed: WholeNumber = Field(
+        default=1, ge=0, description="seed of all random numbers: the same seed gives the same run"
     )
-    time_scale: float = Field(
-        default=1.0,
-        gt=0,
-        description="how many simulated seconds may pass in one real second, at most",
-        json_schema_extra=RATIO,
+    time_scale: Ratio = Field(
+        default=1.0, gt=0, description="how many simulated seconds may pass in one real second, at most"
     )
-    control_port: int = Field(
-        default=7322, ge=1, le=65535, description="TCP port on which tests cause faults", json_schema_extra=RATIO
-    )
+    control_port: WholeNumber = Field(default=7322, ge=1, le=65535, description="TCP port on which tests cause faults")
     site: WorldSiteSection = WorldSiteSection()
     arm: SimulatedArmSection = SimulatedArmSection()
     hand: SimulatedHandSection = Field(

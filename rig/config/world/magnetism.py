@@ -19,7 +19,7 @@ class IronSection(Section):
     position_mm: Vector3 = Field(
         default=NOTHING, description="place in the frame of that link (Denavit and Hartenberg)"
     )
-    moment_a_m2: Vector3 = Field(description="magnetic moment, in that frame", json_schema_extra={"unit": "A m²"})
+    moment_a_m2: Vector3 = Field(description="magnetic moment, in that frame")
 
 
 class SimulatedFieldSection(Section):

@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from rig.config.section import RATIO, Section
+from rig.config.section import Ratio, Section, WholeNumber
 from rig.config.sensors.lines_section import LinesSection
 
 
@@ -21,25 +21,14 @@ class SimulatedLinesSection(Section):
         description="lines that it prints when it is switched on",
         json_schema_extra={"usual": "three lines", "allowed": "at most 20 lines"},
     )
-    comment_every: int = Field(
-        default=0,
-        ge=0,
-        description="number of samples after which it prints a comment; `0`: never",
-        json_schema_extra=RATIO,
+    comment_every: WholeNumber = Field(
+        default=0, ge=0, description="number of samples after which it prints a comment; `0`: never"
     )
-    lost_fraction: float = Field(
-        default=0.0, ge=0, le=0.5, description="share of the samples that it does not print", json_schema_extra=RATIO
+    lost_fraction: Ratio = Field(default=0.0, ge=0, le=0.5, description="share of the samples that it does not print")
+    stolen: Ratio = Field(
+        default=0.0, ge=0, lt=1, description="fraction of its bytes that another program with the same port reads"
     )
-    stolen: float = Field(
-        default=0.0,
-        ge=0,
-        lt=1,
-        description="fraction of its bytes that another program with the same port reads",
-        json_schema_extra=RATIO,
-    )
-    bit_error_rate: float = Field(
-        default=0.0, ge=0, le=0.01, description="share of wrong bits on the line", json_schema_extra=RATIO
-    )
+    bit_error_rate: Ratio = Field(default=0.0, ge=0, le=0.01, description="share of wrong bits on the line")
     scalars: dict[str, float] = Field(
         default=dict[str, float](),
         description="the number that it prints in a column of `lines.scalars`, by its name; left out, 0",
@@ -59,8 +48,8 @@ class SimulatedLinesSection(Section):
         description="what it prints for its temperature, such as `nan` or `-127.00`; left out, its temperature",
         json_schema_extra={"usual": "its temperature", "allowed": "at most 20 characters"},
     )
-    time_decimals: int = Field(
-        default=6, ge=0, le=9, description="decimals of its time, where that is in seconds", json_schema_extra=RATIO
+    time_decimals: WholeNumber = Field(
+        default=6, ge=0, le=9, description="decimals of its time, where that is in seconds"
     )
     time_in_single: bool = Field(default=False, description="whether its time is a number in single precision")
     prints: LinesSection | None = Field(

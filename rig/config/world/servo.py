@@ -5,7 +5,7 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from rig.config.procedures.servo_section import ServoName
-from rig.config.section import RATIO, Section
+from rig.config.section import Ratio, Section, WholeNumber
 
 MILLISECONDS: dict[str, Any] = {"unit": "ms"}
 Error = Annotated[float, Field(ge=0, le=10)]
@@ -19,7 +19,7 @@ class SimulatedServoSection(Section):
         description="which servo it is; another one than `turner.model` is for tests of the refusal",
         json_schema_extra={"usual": "as `turner.model`"},
     )
-    firmware: int = Field(default=48, ge=1, le=255, description="version of its firmware", json_schema_extra=RATIO)
+    firmware: WholeNumber = Field(default=48, ge=1, le=255, description="version of its firmware")
     start_deg: float = Field(default=150.0, ge=0, lt=360, description="initial angle of its shaft")
     encoder_once_deg: Error = Field(
         default=1.0, description="amplitude of the encoder's error with one period per turn"
@@ -29,23 +29,15 @@ class SimulatedServoSection(Section):
     )
     encoder_noise_deg: Error = Field(default=0.06, description="standard deviation of one reading")
     backlash_deg: Error = Field(default=0.25, description="play of the gear")
-    ripple_fraction: float = Field(
-        default=0.07, ge=0, lt=0.5, description="amplitude of the gear's ripple over the rate", json_schema_extra=RATIO
+    ripple_fraction: Ratio = Field(
+        default=0.07, ge=0, lt=0.5, description="amplitude of the gear's ripple over the rate"
     )
-    ripple_per_turn: int = Field(
-        default=20, ge=1, le=200, description="periods of the ripple in one turn", json_schema_extra=RATIO
-    )
-    lag_ms: float = Field(
-        default=15.0, ge=0, le=200, description="how late the shaft follows", json_schema_extra=MILLISECONDS
-    )
+    ripple_per_turn: WholeNumber = Field(default=20, ge=1, le=200, description="periods of the ripple in one turn")
+    lag_ms: float = Field(default=15.0, ge=0, le=200, description="how late the shaft follows")
     tick_ppm: float = Field(default=3000.0, ge=-20_000, le=20_000, description="how much too fast its own clock runs")
     fall_deg_s: float = Field(
         default=0.0, ge=-360, le=360, description="how fast the shaft falls with torque off; 0 if it is balanced"
     )
     latency_ms: float = Field(
-        default=0.0,
-        ge=0,
-        le=50,
-        description="the adapter hands on what came this often; 0: at once",
-        json_schema_extra=MILLISECONDS,
+        default=0.0, ge=0, le=50, description="the adapter hands on what came this often; 0: at once"
     )

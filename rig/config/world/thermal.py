@@ -22,30 +22,14 @@ class SimulatedThermalSection(Section):
         "a heat gun, an ice pack or a chamber does in the operator's hand",
         json_schema_extra={"unit": "s, °C", "allowed": "pairs of 2 numbers, times rising", "usual": "`[[0, 22]]`"},
     )
-    capacity_j_k: float = Field(
-        default=20.0,
-        gt=0,
-        le=1e5,
-        description="heat that warms the body by one kelvin",
-        json_schema_extra={"unit": "J/K"},
-    )
+    capacity_j_k: float = Field(default=20.0, gt=0, le=1e5, description="heat that warms the body by one kelvin")
     loss_w_k: float = Field(
-        default=0.05,
-        gt=0,
-        le=1e3,
-        description="power lost to the air per kelvin between body and air",
-        json_schema_extra={"unit": "W/K"},
+        default=0.05, gt=0, le=1e3, description="power lost to the air per kelvin between body and air"
     )
     own_w: float = Field(
-        default=0.1,
-        ge=0,
-        le=1e3,
-        description="power of the board itself while it has its supply: its own warm-up",
-        json_schema_extra={"unit": "W"},
+        default=0.1, ge=0, le=1e3, description="power of the board itself while it has its supply: its own warm-up"
     )
-    heater_w: float = Field(
-        default=0.0, ge=0, le=1e4, description="power of the heater at its pin", json_schema_extra={"unit": "W"}
-    )
+    heater_w: float = Field(default=0.0, ge=0, le=1e4, description="power of the heater at its pin")
     thermometer_lag_s: float = Field(
         default=0.5, gt=0, le=1e4, description="time constant of a part's thermometer behind the body"
     )
@@ -57,14 +41,12 @@ class SimulatedThermalSection(Section):
         ge=-100,
         le=100,
         description="how much warmer what moves in a part is than its thermometer, for each watt of the heater",
-        json_schema_extra={"unit": "K/W"},
     )
     hysteresis_k: float = Field(
         default=2.0,
         gt=0,
         le=100,
         description="how far a part must cool after it was warmed until all of its hysteresis has turned round",
-        json_schema_extra={"unit": "K"},
     )
 
     @field_validator("air_c")
