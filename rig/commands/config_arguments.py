@@ -69,11 +69,11 @@ def add_columns(parser: _ActionsContainer) -> None:
 
 
 def read_column_map(path: Path | None) -> "ColumnMap":
-    """Return the map that `--columns` names; an empty map without the option. Raise Refused as `load_as` does."""
-    from rig.config.column_map import AS_NAMED, GIVE_MAP, ColumnMap
-    from rig.config.load import load_as
+    """Return the map that `--columns` names; an empty one without the option. Raise as `load_column_map` does."""
+    from rig.config.column_map import AS_NAMED
+    from rig.config.load import load_column_map
 
-    return AS_NAMED if path is None else load_as(ColumnMap, path, GIVE_MAP)
+    return AS_NAMED if path is None else load_column_map(path)
 
 
 def find_logs(path: Path) -> list[Path]:

@@ -5,6 +5,7 @@ import ipaddress
 import types
 import typing
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
@@ -13,6 +14,7 @@ from urllib.parse import urlsplit
 import yaml
 from pydantic import BaseModel, ValidationError
 
+from rig.config.column_map import GIVE_MAP, ColumnMap
 from rig.config.files.layers import BASE, SET, Layered, Places, merge_layers, read_layers
 from rig.config.files.verbatim_text import take_text_as_written
 from rig.config.files.yaml_text import Location, Unreadable, format_path
@@ -100,7 +102,9 @@ def load(
     their `procedure:` section; `turners` are the kinds of turners, with their models. Raise `ConfigurationRefused`
     listing every error with its path, line, value, what is allowed and, for a misspelling, the nearest valid spelling.
     """
-    return _validate_all(_read(path, overrides), str(path), sections, turners)
+    with _refusing_unreadable(str(path)):
+        layered = read_layers(Path(path), overrides)
+    return _validate_all(layered, str(path), sections, turners)
 
 
 def load_sensors(path: str | Path, overrides: Sequence[str] = ()) -> tuple[SensorsConfig, str | None]:
@@ -108,48 +112,29 @@ def load_sensors(path: str | Path, overrides: Sequence[str] = ()) -> tuple[Senso
 
     A file with this section must be complete, because the laboratory simulates all of it. Raise `ConfigurationRefused`.
     """
-    layered = _read(path, overrides)
+    with _refusing_unreadable(str(path)):
+        layered = read_layers(Path(path), overrides)
     if "world" in layered.document:
         loaded = _validate_all(layered, str(path), None, None)
         return loaded.config, loaded.text
     rest = {key: value for key, value in layered.document.items() if key not in TURNS}
     turner_keys = TURNS & layered.document.keys()
     _, turner_problems = _validate_turner(layered.document, None, layered) if turner_keys else (None, [])
-    config, problems = _validate(SensorsConfig, rest, (), layered)
-    if layered.problems or turner_problems or config is None:
-        raise ConfigurationRefused(str(path), [*layered.problems, *turner_problems, *problems])
-    return config, None
+    return _require(SensorsConfig, rest, layered, str(path), turner_problems), None
 
 
 def load_statement(overrides: Sequence[str]) -> StatementConfig:
     """Parse overrides of site and certificate without a file. Raise `ConfigurationRefused` as `load` does."""
-    try:
+    with _refusing_unreadable(SET):
         layered = merge_layers("{}", None, overrides)
-    except Unreadable as error:
-        raise ConfigurationRefused("--set", [str(error)]) from None
-    config, problems = _validate(StatementConfig, layered.document, (), layered)
-    if layered.problems or config is None:
-        raise ConfigurationRefused("--set", [*layered.problems, *problems])
-    return config
+    return _require(StatementConfig, layered.document, layered, SET)
 
 
-def load_as(model: type[Model], path: str | Path, give: str = GIVE_CONFIGURATION) -> Model:
-    """Read a file that holds one section, of this `model`. Raise `ConfigurationRefused` as `load` does.
-
-    `give` is what to do where the file cannot be read.
-    """
-    layered = _read(path, (), give)
-    section, problems = _validate(model, layered.document, (), layered)
-    if layered.problems or section is None:
-        raise ConfigurationRefused(str(path), [*layered.problems, *problems])
-    return section
-
-
-def _read(path: str | Path, overrides: Sequence[str], give: str = GIVE_CONFIGURATION) -> Layered:
-    try:
-        return read_layers(Path(path), overrides)
-    except Unreadable as error:
-        raise ConfigurationRefused(str(path), [str(error)], give) from None
+def load_column_map(path: str | Path) -> ColumnMap:
+    """Read the map of the columns of a file of another program. Raise `ConfigurationRefused` as `load` does."""
+    with _refusing_unreadable(str(path), GIVE_MAP):
+        layered = read_layers(Path(path))
+    return _require(ColumnMap, layered.document, layered, str(path))
 
 
 def parse(
@@ -160,11 +145,26 @@ def parse(
     turners: Turners = None,
 ) -> Loaded:
     """Validate the configuration in a text, as `load` does for a file; the text has no base file."""
-    try:
+    with _refusing_unreadable(source):
         layered = merge_layers(text, None, overrides)
-    except Unreadable as error:
-        raise ConfigurationRefused(source, [str(error)]) from None
     return _validate_all(layered, source, sections, turners)
+
+
+@contextmanager
+def _refusing_unreadable(source: str, give: str = GIVE_CONFIGURATION) -> Iterator[None]:
+    """Raise `ConfigurationRefused` for a text that cannot be read at all; `give` is then what to do."""
+    try:
+        yield
+    except Unreadable as error:
+        raise ConfigurationRefused(source, [str(error)], give) from None
+
+
+def _require(model: type[Model], data: Any, layered: Layered, source: str, more: Sequence[str] = ()) -> Model:
+    """Return `data` as a `model`. Raise `ConfigurationRefused` listing every problem, and those given as `more`."""
+    section, problems = _validate(model, data, (), layered)
+    if layered.problems or more or section is None:
+        raise ConfigurationRefused(source, [*layered.problems, *more, *problems])
+    return section
 
 
 def _validate_all(layered: Layered, source: str, sections: Sections, turners: Turners) -> Loaded:
