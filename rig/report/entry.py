@@ -1,12 +1,17 @@
 """Builds entries of `result.json` from results of the analysis, by the table of `rig/report/entry_sources.py`."""
 
 from collections.abc import Mapping
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from pydantic import BaseModel
 
+from rig.data.entries.result_types import ConditionsEntry, ErrorEntry
+from rig.errors import Fault
 from rig.estimation.arrays import Array
+
+if TYPE_CHECKING:
+    from rig.analysis.measurement_conditions import When
 
 EntryT = TypeVar("EntryT", bound=BaseModel)
 
@@ -24,6 +29,22 @@ def entry(kind: type[EntryT], /, *sources: object, **more: Any) -> EntryT:
     for source in reversed(sources):
         fields |= {field: getattr(source, attribute) for field, attribute in _attributes(kind, source).items()}
     return kind.model_validate({name: _plain_value(value) for name, value in {**fields, **more}.items()})
+
+
+def error_entry(fault: Fault) -> ErrorEntry:
+    """Return the entry of a Fault that ended an attempt."""
+    return ErrorEntry(error=str(fault))
+
+
+def when_entry(when: "When") -> ConditionsEntry:
+    """Return time and temperature of a value, times to the second."""
+    times = {name: getattr(when, name).isoformat(timespec="seconds") for name in ("from_utc", "to_utc", "mean_utc")}
+    return entry(ConditionsEntry, when, **times)
+
+
+def finite_or_none(number: float) -> float | None:
+    """Return the number, or None for one that is not finite: infinite degrees of freedom, an unknown temperature."""
+    return number if np.isfinite(number) else None
 
 
 def dof_or_none(dof: Array | None) -> list[Any] | None:

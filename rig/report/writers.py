@@ -1,8 +1,8 @@
 """Writes the documents of a finished run. A new document is a file with its writer, and its line in `WRITERS`."""
 
-import importlib
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Protocol
 
 from rig.analysis.outcome import Outcome
@@ -41,13 +41,8 @@ def write_outcome(folder: Path, outcome: Outcome) -> Iterator[RunEvent]:
     events: list[RunEvent] = []
     with replace_together():
         for name in (*pictures, *WRITERS):
-            events += _writer(name)(outcome, document, folder)
+            write: Writer = resolve_name(name)
+            events += write(outcome, document, folder)
         write_result(document, folder)
     yield from events
     yield DocumentWritten(folder / RESULT)
-
-
-def _writer(name: str) -> Writer:
-    module, function = name.split(":")
-    writer: Writer = getattr(importlib.import_module(module), function)
-    return writer

@@ -1,8 +1,8 @@
 """The studies by name. Each is a module with `study(settings) -> Report`, imported only if it is requested."""
 
-import importlib
 from collections.abc import Callable
 from dataclasses import dataclass
+from pkgutil import resolve_name
 
 from rig.errors import Refused
 from rig.study.study_report import Settings, StudyReport
@@ -25,8 +25,7 @@ class StudyEntry:
 
     def run(self, settings: Settings) -> StudyReport:
         """Compute the study."""
-        module, name = self.function.split(":")
-        study: Callable[[Settings], StudyReport] = getattr(importlib.import_module(f"rig.study.{module}"), name)
+        study: Callable[[Settings], StudyReport] = resolve_name(f"rig.study.{self.function}")
         return study(settings)
 
 

@@ -128,12 +128,12 @@ def _read_values(
     from rig.board.identify import refuse_other_sensor
     from rig.data.quantity import RATE
     from rig.report.exports.autopilots import ARDUPILOT as ARDUPILOTS
-    from rig.report.exports.autopilots import IMU, PX4
+    from rig.report.exports.autopilots import IMU, PX4, sensor_parameters
     from rig.report.exports.exported_corrections import calibrations
     from rig.sensors.mavlink.autopilot_source import mavlink_section
     from rig.sensors.mavlink.dialect import ARDUPILOT
 
-    parameters_of = ARDUPILOTS if firmware == ARDUPILOT else PX4
+    autopilot = ARDUPILOTS if firmware == ARDUPILOT else PX4
     values: dict[str, float] = {}
     for calibration in calibrations(result).sensors:
         section = sections.get(calibration.sensor)
@@ -142,7 +142,7 @@ def _read_values(
         part_and_number = calibration.part, calibration.serial_number
         range_deg_s = degrees(calibration.full_scale or 0.0) if calibration.quantity == RATE else section.range_deg_s
         refuse_other_sensor(f"{path}: the calibration of {calibration.sensor}", *part_and_number, range_deg_s, section)
-        values |= dict(parameters_of[calibration.quantity](mavlink_section(section).instance, calibration))
+        values |= dict(sensor_parameters(autopilot, mavlink_section(section).instance, calibration))
         if calibration.quantity == RATE and firmware == ARDUPILOT:
             values["INS_GYR_CAL"] = 0.0  # otherwise it estimates offsets of its own at each boot
     if not values:

@@ -10,9 +10,9 @@ import json
 import os
 import signal
 import sys
-from collections.abc import Iterator, Mapping
-from importlib import import_module
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Any, BinaryIO, NoReturn
 
 import numpy as np
@@ -33,7 +33,8 @@ def read_and_end(request: Mapping[str, Any]) -> NoReturn:
     written_bytes = _limit(limits)
     try:
         with _output() as out:
-            for part in _read(request):
+            read: Callable[..., Iterator[Part]] = resolve_name(request["reader"])
+            for part in read(Path(request["path"]), **request["arguments"]):
                 out.write(_encode(part))
     except Refused as refused:
         _exit_at_once(Status.REFUSED, json.dumps(refused.problem))
@@ -55,12 +56,6 @@ def _output() -> BinaryIO:
     with Path(os.devnull).open("wb") as nowhere:
         os.dup2(nowhere.fileno(), 1)
     return out
-
-
-def _read(request: Mapping[str, Any]) -> Iterator[Part]:
-    module, _, function = request["reader"].partition(":")
-    parts: Iterator[Part] = getattr(import_module(module), function)(Path(request["path"]), **request["arguments"])
-    return parts
 
 
 def _encode(part: Part) -> bytes:

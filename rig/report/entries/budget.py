@@ -7,7 +7,7 @@ from rig.data.entries.budget import BiasProcessEntry, BudgetEntry, ClockComparis
 from rig.estimation.gyroscope.budget import Budget
 from rig.estimation.gyroscope.vector_fit import Explained
 from rig.estimation.statistics.coverage import coverage_probability
-from rig.report.entry import entry
+from rig.report.entry import entry, finite_or_none, list_dof
 
 HOUR_S = 3600.0
 
@@ -15,8 +15,8 @@ HOUR_S = 3600.0
 def budget_entry(budget: Budget) -> BudgetEntry:
     """Return the combined uncertainty and its contributors."""
     lines = [
-        entry(ContributorEntry, contributor, variance_fraction=fraction, degrees_of_freedom=_finite(contributor.dof))
-        for contributor, fraction in zip(budget.contributors, budget.shares, strict=True)
+        entry(ContributorEntry, line, variance_fraction=fraction, degrees_of_freedom=finite_or_none(line.dof))
+        for line, fraction in zip(budget.contributors, budget.shares, strict=True)
     ]
     factors = budget.coverage_factors
     return entry(
@@ -24,7 +24,7 @@ def budget_entry(budget: Budget) -> BudgetEntry:
         budget,
         contributors=lines,
         coverage_factor=float(factors.max()),
-        degrees_of_freedom=[_finite(dof) for dof in budget.dof.tolist()],
+        degrees_of_freedom=list_dof(budget.dof),
         coverage_probabilities=coverage_probability(factors, budget.dof),
     )
 
@@ -44,7 +44,3 @@ def clock_entry(check: ClockCheck) -> ClockEntry:
     return entry(
         ClockEntry, check, comparisons=[entry(ClockComparisonEntry, comparison) for comparison in check.comparisons]
     )
-
-
-def _finite(dof: float) -> float | None:
-    return dof if np.isfinite(dof) else None

@@ -8,7 +8,7 @@ import numpy as np
 from rig.data.entries.earth_rate import EarthRateEntry
 from rig.data.entries.result_types import ErrorEntry
 from rig.estimation.earth import DEG_H, EARTH_RATE_RAD_S
-from rig.report.entry import entry
+from rig.report.entry import entry, finite_or_none
 from rig.report.words.expanded_uncertainty import expanded, factor_words
 
 if TYPE_CHECKING:
@@ -17,8 +17,7 @@ if TYPE_CHECKING:
 
 def earth_rate_entry(earth_rate: "EarthRate") -> EarthRateEntry:
     """Return the entry of the Earth's rate; infinite degrees of freedom are null."""
-    dof = earth_rate.dof if np.isfinite(earth_rate.dof) else None
-    return entry(EarthRateEntry, earth_rate, degrees_of_freedom=dof)
+    return entry(EarthRateEntry, earth_rate, degrees_of_freedom=finite_or_none(earth_rate.dof))
 
 
 def earth_rate_lines(earth: EarthRateEntry | ErrorEntry | None) -> Iterator[str]:

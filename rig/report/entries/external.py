@@ -27,9 +27,8 @@ from rig.estimation.external.increment_solution import EarthSeen
 from rig.estimation.reference import accelerometer, magnetometer
 from rig.estimation.reference.reference_model import REFERENCE, SECOND
 from rig.estimation.reference.triaxial import TriaxialSolution
-from rig.report.entries.error import error_entry
 from rig.report.entries.triad import OF_ACCELEROMETERS, OF_MAGNETOMETERS, attitudes_entry
-from rig.report.entry import entry
+from rig.report.entry import entry, error_entry
 
 ORDER = (
     *(f"f{i}{j}" for i in "xyz" for j in "xyz"),

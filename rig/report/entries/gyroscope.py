@@ -24,12 +24,10 @@ from rig.estimation.gyroscope import vector_model
 from rig.estimation.gyroscope.estimate import Estimate
 from rig.estimation.gyroscope.six_observation import MODEL, PARAMETERS
 from rig.estimation.residuals import residual_std_rad_s
-from rig.observation.average import Average
 from rig.report.entries.budget import bias_process_entry, budget_entry
 from rig.report.entries.by_hand import hand_entry
 from rig.report.entries.earth_rate import earth_rate_entry
-from rig.report.entries.error import error_entry
-from rig.report.entry import dof_or_none, entry
+from rig.report.entry import dof_or_none, entry, error_entry, finite_or_none
 
 if TYPE_CHECKING:
     from rig.analysis.gyroscope.onboard_check import Agreement
@@ -53,10 +51,10 @@ def sensor_entry(
         covariance_order=PARAMETERS,
         covariance_units=RATE.parameter_units,
         observations=[
-            entry(ObservationEntry, turn, turn.average, temperature_c=_temperature(turn.average))
+            entry(ObservationEntry, turn, turn.average, temperature_c=finite_or_none(turn.average.temperature_c))
             for turn in turns
         ],
-        rests=[entry(AverageEntry, rest, temperature_c=_temperature(rest)) for rest in result.rests],
+        rests=[entry(AverageEntry, rest, temperature_c=finite_or_none(rest.temperature_c)) for rest in result.rests],
         time_bases=[entry(TimeBaseEntry, time_base) for time_base in result.time_bases],
         vector_model=_vector_or_error(result),
         six_observation=_estimate_or_error(result.six_observation, result.faults.get(NEWTON)),
@@ -66,11 +64,6 @@ def sensor_entry(
         **_uncertainty_fields(result),
         **more,
     )  # fmt: skip
-
-
-def _temperature(average: Average) -> float | None:
-    """Return the mean temperature, °C, or None if no thermometer was read."""
-    return None if np.isnan(average.temperature_c) else average.temperature_c
 
 
 def _uncertainty_fields(result: SensorResult) -> dict[str, Any]:
@@ -92,14 +85,9 @@ def _uncertainty_fields(result: SensorResult) -> dict[str, Any]:
     return fields
 
 
-def estimate_entry(solution: Estimate) -> EstimateEntry:
-    """Return the fields that all estimators' solutions have in common."""
-    return entry(EstimateEntry, solution)
-
-
 def _estimate_or_error(solution: Estimate | None, fault: Fault | None) -> EstimateEntry | ErrorEntry:
     """Return the entry of a solution, or of the error that prevented it."""
-    return ErrorEntry(error=str(fault)) if solution is None else estimate_entry(solution)
+    return ErrorEntry(error=str(fault)) if solution is None else entry(EstimateEntry, solution)
 
 
 def _vector_or_error(result: SensorResult) -> VectorEntry | ErrorEntry:

@@ -7,7 +7,7 @@ from rig.data.quantity import Quantity
 from rig.data.recording.motion_file import Item
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.estimation.temperature.over_temperature import COEFFICIENTS, OverTemperature, powers_at
-from rig.report.entry import entry, list_dof
+from rig.report.entry import entry, finite_or_none
 
 ROWS = 17  # rows of the table; a certificate shows every fourth
 
@@ -29,7 +29,7 @@ def temperature_entry(
         covariance=np.outer(of_coefficients, of_coefficients) * polynomials.covariance,
         contributors=[
             entry(TemperatureContributorEntry, line,
-                  degrees_of_freedom=list_dof(np.array([line.dof]))[0],
+                  degrees_of_freedom=finite_or_none(line.dof),
                   std=np.sqrt(np.diag(powers @ line.covariance @ powers.T).clip(min=0.0)))
             for line in polynomials.lines
         ],

@@ -23,8 +23,7 @@ from rig.estimation.residuals import attitude_residual_std
 from rig.observation.reference.dwell_acceleration import DwellReading
 from rig.observation.statistics.mean import StaticReading
 from rig.report.entries.budget import budget_entry
-from rig.report.entries.error import error_entry
-from rig.report.entry import EntryT, entry
+from rig.report.entry import EntryT, entry, error_entry, finite_or_none
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,8 +79,10 @@ def _attitude_error(error: AttitudeError | None) -> dict[str, float | None]:
     """Return the estimated error of the attitudes and its uncertainty, rad about each axis; None if not estimated."""
     if error is None:
         return {"attitude_error_rad": None, "attitude_error_std_rad": None}
-    uncertainty_rad = error.uncertainty_rad if np.isfinite(error.uncertainty_rad) else None
-    return {"attitude_error_rad": error.std_rad, "attitude_error_std_rad": uncertainty_rad}
+    return {
+        "attitude_error_rad": error.std_rad,
+        "attitude_error_std_rad": finite_or_none(error.uncertainty_rad),
+    }
 
 
 def _other_entry(models: Models[Any], other: TriaxialSolution) -> Entry:

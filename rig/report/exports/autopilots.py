@@ -6,7 +6,7 @@ compass are added and in milligauss. ArduPilot replaces offsets of gyroscopes, I
 INS_GYR_CAL is 0. Neither autopilot has a scale factor of a gyroscope.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -35,11 +35,8 @@ OF_ARDUPILOT = (
 )
 AXES = "XYZ"
 IMU = (RATE, ACCELERATION)
-Parameters = Iterator[tuple[str, float]]
-
-
-# Returns the parameters for the autopilot's sensor of this number, from 0.
-Autopilot = Mapping[Quantity, Callable[[int, Corrected], Parameters]]
+# For each quantity the names of the parameters, and the values of the axes, or a single value.
+Autopilot = Mapping[Quantity, Mapping[str, Callable[[Corrected], Iterable[float]]]]
 
 
 def px4_files(calibrations: ExportedCalibrations) -> Mapping[str, str]:
@@ -86,12 +83,12 @@ def _lines(
     if not any(sensor.quantity in autopilot for sensor in calibrations.sensors):
         raise Refused("nothing_to_export", "the run calibrated no sensor", "Give a run that calibrates one")
     for sensor in calibrations.sensors:
-        if (parameters_of := autopilot.get(sensor.quantity)) is None:
+        if sensor.quantity not in autopilot:
             yield f"# Lost: {printable(sensor.name)}: there is no parameter for it"
             continue
         yield from (f"# {line}" for line in calibrations.origin(sensor))
         number = fields.index(sensor.sensor) if sensor.quantity == FIELD else numbers[sensor.sensor]
-        yield from (form(name, value) for name, value in parameters_of(number, sensor))
+        yield from (form(name, value) for name, value in sensor_parameters(autopilot, number, sensor))
     yield from (f"# Lost: {name}: there is no parameter for it" for name in calibrations.further_terms)
     yield from (f"# {printable(line)}" for kind in kinds() for line in kind.unsolved(calibrations.result))
 
@@ -109,59 +106,51 @@ def symmetric(matrix: Array) -> Array:
     return root
 
 
-def _axis_parameters(form: str, values: Iterable[float]) -> Parameters:
-    """Yield a parameter for each axis; the axis's letter replaces `{}` in the name."""
-    for axis, value in zip(AXES, values, strict=True):
-        yield form.format(axis), float(value)
+def _diagonal(magnetometer: Corrected) -> Array:
+    """Return the diagonal (3,) of a magnetometer's symmetric correction."""
+    return np.diag(symmetric(np.asarray(np.linalg.inv(magnetometer.matrix), dtype=np.float64)))
 
 
-def _ellipsoid(magnetometer: Corrected) -> tuple[Array, Array]:
-    """Return the diagonal (3,) and the off-diagonal elements (3,) xy, xz, yz of a magnetometer's correction."""
+def _off_diagonal(magnetometer: Corrected) -> Array:
+    """Return the off-diagonal elements (3,) xy, xz, yz of a magnetometer's symmetric correction."""
     matrix = symmetric(np.asarray(np.linalg.inv(magnetometer.matrix), dtype=np.float64))
-    return np.diag(matrix), matrix[[0, 0, 1], [1, 2, 2]]
+    return matrix[[0, 0, 1], [1, 2, 2]]
 
 
-def _px4_gyroscope(number: int, gyroscope: Corrected) -> Parameters:
-    yield from _axis_parameters(f"CAL_GYRO{number}_{{}}OFF", gyroscope.offset)
+def _temperature_c(gyroscope: Corrected) -> Sequence[float]:
+    return () if gyroscope.temperature_c is None else [gyroscope.temperature_c]
 
 
-def _px4_accelerometer(number: int, accelerometer: Corrected) -> Parameters:
-    yield from _axis_parameters(f"CAL_ACC{number}_{{}}OFF", accelerometer.offset)
-    yield from _axis_parameters(f"CAL_ACC{number}_{{}}SCALE", accelerometer.scale)
-
-
-def _px4_magnetometer(number: int, magnetometer: Corrected) -> Parameters:
-    diagonal, off_diagonal = _ellipsoid(magnetometer)
-    yield from _axis_parameters(f"CAL_MAG{number}_{{}}OFF", magnetometer.offset / GAUSS_T)
-    yield from _axis_parameters(f"CAL_MAG{number}_{{}}SCALE", diagonal)
-    yield from _axis_parameters(f"CAL_MAG{number}_{{}}ODIAG", off_diagonal)
-
-
-def _ardupilot_gyroscope(number: int, gyroscope: Corrected) -> Parameters:
-    name = f"INS_GYR{number + 1}OFFS" if number else "INS_GYROFFS"
-    yield from _axis_parameters(f"{name}_{{}}", gyroscope.offset)
-    if gyroscope.temperature_c is not None:
-        yield f"INS_GYR{number + 1}_CALTEMP", gyroscope.temperature_c
-
-
-def _ardupilot_accelerometer(number: int, accelerometer: Corrected) -> Parameters:
-    yield from _axis_parameters(f"INS_ACC{_instance_suffix(number)}OFFS_{{}}", accelerometer.offset)
-    yield from _axis_parameters(f"INS_ACC{_instance_suffix(number)}SCAL_{{}}", accelerometer.scale)
-
-
-def _ardupilot_magnetometer(number: int, magnetometer: Corrected) -> Parameters:
-    diagonal, off_diagonal = _ellipsoid(magnetometer)
-    yield from _axis_parameters(f"COMPASS_OFS{_instance_suffix(number)}_{{}}", -magnetometer.offset / MILLIGAUSS_T)
-    yield from _axis_parameters(f"COMPASS_DIA{_instance_suffix(number)}_{{}}", diagonal)
-    yield from _axis_parameters(f"COMPASS_ODI{_instance_suffix(number)}_{{}}", off_diagonal)
-
-
-def _instance_suffix(number: int) -> str:
-    """Return the sensor's number in a parameter's name; empty for the first sensor."""
-    return str(number + 1) if number else ""
-
-
-PX4: Autopilot = {RATE: _px4_gyroscope, ACCELERATION: _px4_accelerometer, FIELD: _px4_magnetometer}
+# In a name, {index} is the sensor's number from 0, {number} that from 1, {later} that from 1 of all but the first.
+PX4: Autopilot = {
+    RATE: {"CAL_GYRO{index}_{axis}OFF": lambda sensor: sensor.offset},
+    ACCELERATION: {
+        "CAL_ACC{index}_{axis}OFF": lambda sensor: sensor.offset,
+        "CAL_ACC{index}_{axis}SCALE": lambda sensor: sensor.scale,
+    },
+    FIELD: {
+        "CAL_MAG{index}_{axis}OFF": lambda sensor: sensor.offset / GAUSS_T,
+        "CAL_MAG{index}_{axis}SCALE": _diagonal,
+        "CAL_MAG{index}_{axis}ODIAG": _off_diagonal,
+    },
+}
 ARDUPILOT: Autopilot = {
-    RATE: _ardupilot_gyroscope, ACCELERATION: _ardupilot_accelerometer, FIELD: _ardupilot_magnetometer,
-}  # fmt: skip
+    RATE: {"INS_GYR{later}OFFS_{axis}": lambda sensor: sensor.offset, "INS_GYR{number}_CALTEMP": _temperature_c},
+    ACCELERATION: {
+        "INS_ACC{later}OFFS_{axis}": lambda sensor: sensor.offset,
+        "INS_ACC{later}SCAL_{axis}": lambda sensor: sensor.scale,
+    },
+    FIELD: {
+        "COMPASS_OFS{later}_{axis}": lambda sensor: -sensor.offset / MILLIGAUSS_T,
+        "COMPASS_DIA{later}_{axis}": _diagonal,
+        "COMPASS_ODI{later}_{axis}": _off_diagonal,
+    },
+}
+
+
+def sensor_parameters(autopilot: Autopilot, index: int, sensor: Corrected) -> Iterator[tuple[str, float]]:
+    """Yield the parameters of an autopilot for its sensor of this number, from 0; none for a quantity that it lacks."""
+    numbers = {"index": index, "number": index + 1, "later": index + 1 if index else ""}
+    for name, values_of in autopilot.get(sensor.quantity, {}).items():
+        for axis, value in zip(AXES, values_of(sensor), strict=False):
+            yield name.format(axis=axis, **numbers), float(value)

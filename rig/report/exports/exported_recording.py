@@ -6,7 +6,7 @@ stamped them, and the motion that a file states.
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Final, Protocol
+from typing import Final
 
 import numpy as np
 
@@ -30,39 +30,9 @@ MOTION: Final[Mapping[MotionKind, str]] = {
 }
 
 
-class Exported(Protocol):
-    """One recording with the clock of its times."""
-
-    @property
-    def run(self) -> RunData:
-        """The recording."""
-        ...
-
-    @property
-    def clock(self) -> str:
-        """The name of the clock of the times, in words."""
-        ...
-
-    def time_s(self, sensor: str) -> Array:
-        """Return the times (n,) of all samples of a sensor, s."""
-        ...
-
-    def since_s(self, sensor: str) -> Array:
-        """Return the times (n,) of all samples of a sensor since the recording began, s."""
-        ...
-
-    def noise(self, sensor: str, quantity: Quantity) -> Sequence[Array]:
-        """Return the noise (3,) of one sample, for each interval in which the sensor was at rest."""
-        ...
-
-    def tables(self) -> Iterator[ExportTable]:
-        """Yield all tables of the recording."""
-        ...
-
-
 @dataclass(frozen=True, slots=True)
 class WithMotion:
-    """An `Exported` recording of a turner with joints, after its observation."""
+    """The recording of a turner with joints, after its observation, with the clock of its times."""
 
     observed: ObservedRun
     clock: str = "the arm controller's clock"
@@ -116,7 +86,7 @@ class WithMotion:
 
 @dataclass(frozen=True, slots=True)
 class ReadingsAlone:
-    """An `Exported` recording of readings without a recorded motion: by hand, or from files."""
+    """Readings without a recorded motion, by hand or from files, with the clock of their times."""
 
     run: RunData
 
@@ -154,6 +124,9 @@ class ReadingsAlone:
             yield ExportTable(
                 f"{external.item.name}_{external.tells}", external.motion, f"{MOTION[external.tells]} {remark}"
             )
+
+
+Exported = WithMotion | ReadingsAlone
 
 
 def export_recordings(runs: Sequence[RunData]) -> tuple[Exported, ...]:

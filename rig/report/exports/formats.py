@@ -1,8 +1,9 @@
 """The formats and their writers. A new format is a file with its writer, and a line here."""
 
-import importlib
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, Final
+from importlib import import_module
+from pkgutil import resolve_name
+from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:  # the command line asks for the names alone
     from collections.abc import Sequence
@@ -40,18 +41,12 @@ def writer_of_readings(name: str) -> "ReadingsWriter":
 
         library, extra = EXTRAS[name]
         with requiring(extra):
-            importlib.import_module(library)
-    writer: ReadingsWriter = _load(OF_READINGS[name])
+            import_module(library)
+    writer: ReadingsWriter = resolve_name(OF_READINGS[name])
     return writer
 
 
 def texts_of_calibrations(name: str) -> "CalibrationTexts":
     """Load and return the function that builds the texts of a format of calibrations."""
-    builder: CalibrationTexts = _load(OF_CALIBRATIONS[name])
+    builder: CalibrationTexts = resolve_name(OF_CALIBRATIONS[name])
     return builder
-
-
-def _load(path: str) -> Callable[..., Any]:
-    module, function = path.split(":")
-    loaded: Callable[..., Any] = getattr(importlib.import_module(module), function)
-    return loaded

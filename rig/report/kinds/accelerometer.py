@@ -40,8 +40,8 @@ def _entry(outcome: Outcome, name: str, result: "AccelerometerResult") -> Accele
     from rig.estimation.reference.accelerometer_model import DELAY, SECOND
     from rig.estimation.reference.imu import MODEL
     from rig.estimation.residuals import dwell_residual_std_m_s2
-    from rig.report.entries.conditions_entry import when_entry
     from rig.report.entries.triad import OF_ACCELEROMETERS, triad_entry
+    from rig.report.entry import when_entry
 
     solution = result.solution
     std = np.sqrt(np.diag(solution.covariance))

@@ -13,8 +13,7 @@ from rig.data.installed_kinds import quantities
 from rig.data.quantity import RATE, Quantity
 from rig.data.result_file import ResultDocument
 from rig.estimation.arrays import Array
-from rig.report.entries.error import error_entry
-from rig.report.entry import list_dof
+from rig.report.entry import error_entry, finite_or_none, list_dof
 from rig.report.findings.characteristics import DRIFT_SLOPE, DRIFTS, LARGEST_CHANGE
 from rig.report.findings.finding import Finding
 from rig.report.findings.history_records import HistoryRecord
@@ -54,7 +53,7 @@ def drift_entry(quantity: Quantity, drift: "BiasDrift", sensor: "RecordedSensor"
         repeats=tuple(
             RepeatEntry(
                 time_s=float(drift.time_s[repeat]),
-                temperature_c=_nan_to_none(float(drift.temperature_c[repeat])),
+                temperature_c=finite_or_none(float(drift.temperature_c[repeat])),
                 scale_fixed=BiasEntry(bias=_vector(scale_fixed.bias[repeat]), std=_vector(scale_fixed.std[repeat])),
                 scale_free=scale_free[repeat],
             )
@@ -86,10 +85,6 @@ def drift_entry(quantity: Quantity, drift: "BiasDrift", sensor: "RecordedSensor"
         full_scale=full_scale,
         temperature_stated=sensor.temperature_stated,
     )
-
-
-def _nan_to_none(temperature_c: float) -> float | None:
-    return None if np.isnan(temperature_c) else temperature_c
 
 
 def _bias_entry(free: "ScaleFreeBias") -> BiasEntry:

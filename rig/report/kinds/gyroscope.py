@@ -32,8 +32,8 @@ from rig.report.words.validity_words import load_words, speed_words, warmth, whe
 def _entries(outcome: Outcome) -> dict[str, GyroscopeEntry]:
     """Return the entries of all gyroscopes, if any."""
     from rig.analysis.measurement_conditions import gyroscope_conditions
-    from rig.report.entries.conditions_entry import when_entry
     from rig.report.entries.gyroscope import sensor_entry
+    from rig.report.entry import when_entry
 
     entries = {}
     for name, result in outcome.results.items():
@@ -74,7 +74,7 @@ def _render(finding: Finding[GyroscopeEntry]) -> Iterator[Table | str]:
 def _build_row(finding: Finding[GyroscopeEntry]) -> DisplayRow:
     speeds = speed_words(finding.entry)
     held_at = f"at {speeds} °/s" if speeds else ""
-    return replace(shown_of(finding), held_at=held_at)
+    return replace(shown_of(finding), held_at=held_at, model=finding.entry.model)
 
 
 def _describe_item(finding: Finding[GyroscopeEntry], _: object) -> CertifiedItem | None:

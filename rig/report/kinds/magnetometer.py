@@ -10,8 +10,7 @@ from rig.data.entries.magnetometer import FieldDriftEntry, MagnetometerEntry, Un
 from rig.data.entries.result_types import ErrorEntry
 from rig.data.quantity import FIELD
 from rig.report.c_code.c_functions import magnetometer_lines
-from rig.report.entries.error import error_entry
-from rig.report.entry import dof_or_none, entry
+from rig.report.entry import dof_or_none, entry, error_entry
 from rig.report.findings.characteristics import MAGNETOMETERS
 from rig.report.findings.finding import Finding
 from rig.report.findings.result_kind import Standard
@@ -44,8 +43,8 @@ def _entry(outcome: Outcome, name: str, result: "MagnetometerResult") -> Magneto
     from rig.analysis.effective_dof import field_angle_dof
     from rig.analysis.measurement_conditions import magnetometer_conditions
     from rig.estimation.reference.magnetometer import MODEL, hard_iron
-    from rig.report.entries.conditions_entry import when_entry
     from rig.report.entries.triad import OF_MAGNETOMETERS, attitudes_entry
+    from rig.report.entry import when_entry
 
     return attitudes_entry(
         OF_MAGNETOMETERS, result, result.sensor,

@@ -1,7 +1,7 @@
 """The common parts of three-axis sensors in a result: scale factors, biases and axes, by one uncertainty budget."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 from xml.etree.ElementTree import Element
 
@@ -58,8 +58,7 @@ def shown_of(finding: Finding[Any]) -> DisplayRow:
     )
     scale, combined = AxisValues(entry.scale, expanded[:count]), entry.budget is not None
     name, unit = quantity.label(finding.sensor), quantity.bias
-    model: str = getattr(entry, "model", "")  # a kind from an installed package may have none
-    return DisplayRow(finding.sensor, quantity, name, unit, bias, combined, scale, labels=quantity.axes, model=model)
+    return DisplayRow(finding.sensor, quantity, name, unit, bias, combined, scale, labels=quantity.axes)
 
 
 def history_record(finding: Finding[Any], document: ResultDocument) -> HistoryRecord:
@@ -189,7 +188,7 @@ def triad_kind(
         find=find,
         unsolved=explain_unsolved,
         printed=render,
-        shown=shown_of,
+        shown=lambda finding: replace(shown_of(finding), model=finding.entry.model),
         followed=history_record,
         header=header,
         figures="rig.report.figures.attitudes:write_attitude_figures",

@@ -68,13 +68,21 @@ def not_as_signed(name: str, why: str) -> Refused:
     )
 
 
-def signer_not_trusted(name: str, signer: str, why: str) -> Refused:
-    """Return the problem of an unaltered file with an unexpected signer."""
-    return Refused(
-        "signer_not_trusted",
-        f"{name} is signed by {signer}, who is not trusted: {why}",
-        "Compare the certificate's SHA-256 with the one that the laboratory publishes; give the right one by --trust",
+def doubts_of_signer(name: str, report: SignatureReport, why: str) -> list[Refused]:
+    """Return the problem of an unaltered file whose signer is unknown, or not trusted: `why`, empty if trusted."""
+    if report.trusted is None:
+        return [
+            Refused(
+                "signer_unknown",
+                f"{name} is signed by {report.signer}, but anyone can create a key with that name",
+                "Give the certificate of the laboratory's key, or of the authority that issued it, with --trust",
+            )
+        ]
+    what = f"{name} is signed by {report.signer}, who is not trusted: {why}"
+    remedy = (
+        "Compare the certificate's SHA-256 with the one that the laboratory publishes; give the right one by --trust"
     )
+    return [Refused("signer_not_trusted", what, remedy)] if why else []
 
 
 def stamp_not_trusted(name: str, server: str) -> Refused:
@@ -92,13 +100,4 @@ def authority_not_trusted(name: str, authority: str) -> Refused:
         "signer_not_trusted",
         f"{name} contains a certificate of {authority} that no trusted authority has issued",
         "Give the certificate of this authority, or of the one above it, with --trust too",
-    )
-
-
-def signer_unknown(name: str, signer: str) -> Refused:
-    """Return the problem of an unaltered file if no trusted certificate was given."""
-    return Refused(
-        "signer_unknown",
-        f"{name} is signed by {signer}, but anyone can create a key with that name",
-        "Give the certificate of the laboratory's key, or of the authority that issued it, with --trust",
     )

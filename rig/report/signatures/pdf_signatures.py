@@ -22,10 +22,9 @@ from rig.report.signatures.findings import (
     FileInspection,
     SignatureReport,
     authority_not_trusted,
+    doubts_of_signer,
     not_as_signed,
     not_signed,
-    signer_not_trusted,
-    signer_unknown,
     stamp_not_trusted,
 )
 from rig.report.signatures.reason import Reason
@@ -106,10 +105,8 @@ def _inspect_signature(
         # A certificate that is itself trusted is not looked up in lists.
         long_term=bool(lists and trust.certificates) and not why and chain[0] not in trust.certificates,
     )
-    if not trust.certificates:
-        return report, [signer_unknown(name, report.signer)]
-    doubts = [signer_not_trusted(name, report.signer, why)] if why else []
-    if is_intact and not stamped:
+    doubts = doubts_of_signer(name, report, why)
+    if trust.certificates and is_intact and not stamped:
         doubts.append(stamp_not_trusted(name, _name(stamp.signing_cert.dump())))
     return report, doubts
 

@@ -16,10 +16,9 @@ from signxml.xades.xades import XAdESSignatureConfiguration, XAdESVerifier
 from rig.report.signatures.findings import (
     FileInspection,
     SignatureReport,
+    doubts_of_signer,
     not_as_signed,
     not_signed,
-    signer_not_trusted,
-    signer_unknown,
 )
 from rig.report.signatures.reason import Reason
 from rig.report.signatures.trust import Trust, why_untrusted
@@ -89,6 +88,4 @@ def _inspect(name: str, chain: Sequence[Certificate], properties: Any, trust: Tr
         reason=Reason(properties.findtext(".//xades:DataObjectFormat/xades:Description", "", NAMES)),
         trusted=not why if trust.certificates else None,
     )
-    if not trust.certificates:
-        return report, (signer_unknown(name, report.signer),)
-    return report, (signer_not_trusted(name, report.signer, why),) if why else ()
+    return report, tuple(doubts_of_signer(name, report, why))

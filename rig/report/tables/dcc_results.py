@@ -85,14 +85,13 @@ def _reversal(entry: ReversalEntry) -> Iterator[Element]:
     yield _wide_result(
         "own bias", statement, AXES, (entry.bias_t, entry.bias_std_t, entry.bias_degrees_of_freedom), FIELD.d_si
     )
-    names = ("bx", "by", "bz", "arm x", "arm y", "arm z")
     values = [*entry.bias_t, *entry.arm_field_t]
     counted = [*entry.bias_degrees_of_freedom, *entry.arm_field_degrees_of_freedom]
     yield _result(
         "own bias and the arm's field in the axes of the first run with their covariance",
         f"{statement} The ellipsoid holds all six values at once with a probability of 95 %.",
         real_list(
-            [name.replace(" ", "_") for name in names],
+            ("bx", "by", "bz", "arm_x", "arm_y", "arm_z"),
             values,
             [FIELD.d_si],
             region=(entry.covariance, _ellipsoid_factor(counted)),
