@@ -3,13 +3,15 @@
 import os
 import re
 import sys
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 from rig.errors.quoting import printable
 
 if TYPE_CHECKING:
-    from rich.text import Text
+    from collections.abc import Collection, Iterable
 
+    from rich.table import Table
+    from rich.text import Text
 
 LONG_S = 600.0  # longer durations are shown in minutes
 NARROWEST, USUAL = 30, 80  # columns of a terminal: the least for breaking lines, and the default
@@ -62,6 +64,18 @@ def plain(text: str, style: str = "") -> "Text":
     from rich.text import Text
 
     return Text(printable(text), style)
+
+
+def table_of_numbers(
+    headings: "Iterable[str]", title: str = "", left: "Collection[str]" = ("axis",), **style: Any
+) -> "Table":
+    """Return a table without rows; only the columns of the headings in `left` are aligned at their left sides."""
+    from rich.table import Table
+
+    table = Table(title=plain(title, "table.title") if title else None, title_justify="left", **style)
+    for heading in headings:
+        table.add_column(heading, justify="left" if heading in left else "right")
+    return table
 
 
 def duration_words(duration_s: float) -> str:

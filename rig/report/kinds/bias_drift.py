@@ -22,7 +22,7 @@ from rig.report.findings.unexplained import find_repeat_residuals
 from rig.report.tables import dcc_results
 from rig.report.tables.budget import heading_of
 from rig.report.words.expanded_uncertainty import expanded, factor_words
-from rig.station.plain_text import plain
+from rig.station.plain_text import table_of_numbers
 
 if TYPE_CHECKING:
     from rig.analysis.temperature.bias_drift import BiasDrift, ScaleFreeBias
@@ -136,18 +136,12 @@ def drift_table(name: str, quantity: Quantity, entry: DriftEntry) -> Table:
     """Return a table of the bias in each repeat, with scale and axes fixed, and the largest U; changes are marked."""
     unit, size = quantity.drift.name, quantity.drift.size
     expansion = expanded((1.0, 1.0, 1.0), entry.degrees_of_freedom)
-    table = Table(title=plain(f"{name}, {quantity.sensor}: bias by repeat, scale and axes fixed", "table.title"))
-    table.title_justify = "left"
+    biases = (f"{axis} {unit}" for axis in "xyz")
+    table = table_of_numbers(
+        ("repeat", "hours", "°C", *biases, heading_of(expansion.factors), "changed"),
+        f"{name}, {quantity.sensor}: bias by repeat, scale and axes fixed",
+    )
     changed_axes = {move.repeat: move.axis for move in entry.steps}
-    for heading in (
-        "repeat",
-        "hours",
-        "°C",
-        *(f"{axis} {unit}" for axis in "xyz"),
-        heading_of(expansion.factors),
-        "changed",
-    ):
-        table.add_column(heading, justify="right")
     for number, repeat in enumerate(entry.repeats, 1):
         table.add_row(
             str(number),

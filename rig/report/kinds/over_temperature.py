@@ -17,7 +17,7 @@ from rig.report.findings.result_kind import CertifiedItem, DisplayRow, NoOutlet,
 from rig.report.tables import dcc_results
 from rig.report.words.printed_values import plus_minus
 from rig.report.words.temperature_words import about_lines, coverage_words, shown_rows
-from rig.station.plain_text import plain
+from rig.station.plain_text import table_of_numbers
 
 if TYPE_CHECKING:
     from rig.data.recording.motion_file import Item
@@ -50,10 +50,8 @@ def _find(document: ResultDocument) -> Iterator[Finding[OverTemperatureEntry]]:
 def _render(finding: Finding[OverTemperatureEntry]) -> Iterator[Table | str]:
     entry, unit = finding.entry, finding.quantity.bias
     title = f"{finding.quantity.full_label(finding.sensor)}: over temperature, ± U ({coverage_words(entry)})"
-    table = Table(title=plain(title, "table.title"))
-    table.title_justify = "left"
-    for heading in ("°C", *(f"k{axis}" for axis in "xyz"), *(f"b{axis} {unit.name}" for axis in "xyz")):
-        table.add_column(heading, justify="right")
+    headings = ("°C", *(f"k{axis}" for axis in "xyz"), *(f"b{axis} {unit.name}" for axis in "xyz"))
+    table = table_of_numbers(headings, title)
     for row in shown_rows(entry):
         scales = map(plus_minus, row.scale, row.expanded_scale)
         biases = (plus_minus(b / unit.size, u / unit.size) for b, u in zip(row.bias, row.expanded_bias, strict=True))

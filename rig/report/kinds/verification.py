@@ -20,7 +20,7 @@ from rig.report.entry import entry
 from rig.report.findings.finding import Finding
 from rig.report.findings.result_kind import CertifiedItem, NoOutlet, ResultKind
 from rig.report.tables import dcc_results
-from rig.station.plain_text import plain
+from rig.station.plain_text import table_of_numbers
 
 if TYPE_CHECKING:
     from rig.analysis.gyroscope.comparison import Comparison
@@ -65,11 +65,10 @@ def _render(finding: Finding[VerificationEntry]) -> Iterator[Table | str]:
 
 def verification_table(name: str, entry: VerificationEntry) -> Table:
     """Return a table of the errors of each axis before and after; a dash without readings from before."""
-    table = Table(
-        title=plain(f"{name} against {entry.reference}, sweeps and rests", "table.title"), title_justify="left"
+    table = table_of_numbers(
+        ("axis", "RMS before rad/s", "RMS after rad/s", "of that noise", "MSE before (rad/s)²", "MSE after"),
+        f"{name} against {entry.reference}, sweeps and rests",
     )
-    for heading in ("axis", "RMS before rad/s", "RMS after rad/s", "of that noise", "MSE before (rad/s)²", "MSE after"):
-        table.add_column(heading, justify="left" if heading == "axis" else "right")
     before, after = entry.before, entry.after
     for i, axis in enumerate("xyz"):
         table.add_row(

@@ -6,11 +6,10 @@ from typing import Any
 
 from rich.box import SIMPLE
 from rich.console import Console
-from rich.table import Table
 
 from rig.analysis.design.attitude_information import AttitudeAccount
 from rig.estimation.earth import MICRO_G_M_S2
-from rig.station.plain_text import plain
+from rig.station.plain_text import plain, table_of_numbers
 
 
 def account_document(account: AttitudeAccount) -> dict[str, Any]:
@@ -41,11 +40,9 @@ def print_account(console: Console, account: AttitudeAccount) -> None:
     )
     arm_mrad = 1e3 * account.attitude_std_rad
     console.print(f"Expected standard deviations of accelerometers, if the attitudes' is {arm_mrad:.2g} mrad:")
-    table = Table(box=SIMPLE)
-    table.add_column("sensor")
-    headings = ["scale ppm", "non-orthogonality mrad", "bias µg", *(["φ 1e-6 s²/m"] if account.order == 2 else [])]
-    for heading in headings:
-        table.add_column(heading, justify="right")
+    second_order = ["φ 1e-6 s²/m"] if account.order == 2 else []
+    headings = ("sensor", "scale ppm", "non-orthogonality mrad", "bias µg", *second_order)
+    table = table_of_numbers(headings, left=("sensor",), box=SIMPLE)
     for name, expected in account.sensors.items():
         values = [
             1e6 * expected.scale_std,

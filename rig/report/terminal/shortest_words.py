@@ -22,7 +22,7 @@ from rig.config.models import ProcedureSection
 from rig.config.procedures.attitude_sets import SETS
 from rig.config.procedures.procedure_sections import AttitudesSection
 from rig.estimation.design.optimality import c_efficiency, g_efficiency, list_designs
-from rig.station.plain_text import plain
+from rig.station.plain_text import plain, table_of_numbers
 
 if TYPE_CHECKING:
     from rig.estimation.arrays import Array
@@ -132,9 +132,8 @@ def wish_words(wanted: TargetUncertainty) -> str:
 
 def _tabulate_plans(shortest: Shortest, shown: Planned, section: ProcedureSection) -> Table:
     """Return a table that compares the shortest plan with the file's plan."""
-    table = Table(box=SIMPLE)
-    for heading in ("", "as in the file", "shortest" if shortest.best else "nearest"):
-        table.add_column(heading, justify="right" if heading else "left")
+    headings = ("", "as in the file", "shortest" if shortest.best else "nearest")
+    table = table_of_numbers(headings, left=("",), box=SIMPLE)
     before = shortest.before
     old = _values(section)
     for key, value in list_key_changes(section, shown.candidate.procedure).items():
@@ -156,9 +155,8 @@ def _shown(value: object) -> str:
 
 
 def _limits(title: str, budgets: Budgets) -> Table:
-    table = Table(title=title, title_justify="left", box=SIMPLE)
-    for heading in ("sensor", "contributor", "of the scale factors", "of the biases"):
-        table.add_column(heading, justify="right" if heading.startswith("of") else "left")
+    headings = ("sensor", "contributor", "of the scale factors", "of the biases")
+    table = table_of_numbers(headings, title, left=headings[:2], box=SIMPLE)
     for name, lines in _main_contributors(budgets).items():
         for contributor, scale, bias in lines:
             table.add_row(plain(name), contributor, f"{100 * scale:.0f} %", f"{100 * bias:.0f} %")
@@ -213,12 +211,9 @@ def _design_efficiencies(directions: "Array") -> Iterator[tuple[str, float]]:
 
 
 def _optimality(directions: "Array") -> Table:
-    table = Table(title="Efficiency of the directions of the sweeps (1: the optimum):", box=SIMPLE)
-    table.title_justify = "left"
     names = {"g": "G", "g_squared": "G, speeds alone", "c_scale": "c, scale", "c_bias": "c, bias"}
-    table.add_column("")
-    for heading in names.values():
-        table.add_column(heading, justify="right")
+    title = "Efficiency of the directions of the sweeps (1: the optimum):"
+    table = table_of_numbers(("", *names.values()), title, left=("",), box=SIMPLE)
     words = {"plan": "this plan", "six": "the paper's six"}
     for name, values in _efficiencies(directions).items():
         table.add_row(words[name], *(f"{values[key]:.2f}" for key in names))

@@ -6,7 +6,7 @@ from rich.table import Table
 
 from rig.report.simulated_truth import TrueValues, TruthRow
 from rig.report.words.printed_values import format_signed, format_with_u
-from rig.station.plain_text import plain
+from rig.station.plain_text import table_of_numbers
 
 
 def truth_tables(rows: Sequence[TruthRow], sensor: str | None = None) -> Iterator[Table]:
@@ -14,14 +14,13 @@ def truth_tables(rows: Sequence[TruthRow], sensor: str | None = None) -> Iterato
     for row in rows:
         if sensor not in (None, row.row.sensor):
             continue
+        columns = {f"{row.row.noun} {row.row.unit.name}": row.bias}
+        if row.scale is not None:
+            columns = {"scale factor": row.scale, **columns}
+        headings = (heading for name in columns for heading in (name, "truth", "d"))
         title = f"{row.row.name} with its simulated truth, d = (result − truth)/U"
-        table = Table(title=plain(title, "table.title"), title_justify="left")
-        columns = [("scale factor", row.scale), (f"{row.row.noun} {row.row.unit.name}", row.bias)]
-        table.add_column("axis")
-        for name, values in columns:
-            for heading in () if values is None else (name, "truth", "d"):
-                table.add_column(heading, justify="right")
-        cells = zip(*(cell for _, values in columns if values is not None for cell in _cells(values)), strict=True)
+        table = table_of_numbers(("axis", *headings), title)
+        cells = zip(*(cell for values in columns.values() for cell in _cells(values)), strict=True)
         for label, numbers in zip(row.row.labels, cells, strict=True):
             table.add_row(label, *numbers)
         yield table
