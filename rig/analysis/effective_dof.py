@@ -11,7 +11,7 @@ import numpy as np
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.budget import BIAS_DRIFT, NOISE, Budget
 from rig.estimation.gyroscope.vector_fit import Explained
-from rig.estimation.gyroscope.vector_model import VectorSolution, design_matrix, regress
+from rig.estimation.gyroscope.vector_model import design_matrix, regress
 from rig.estimation.sensor_axes import SensorAxes
 from rig.estimation.statistics.coverage import effective_dof
 
@@ -29,7 +29,8 @@ def angle_dof(result: "SensorResult") -> Array | None:
         return None
     solution = explained.solution
     derivative = _angle_derivatives(solution.matrix)
-    readings = np.einsum("aij,ijkl,akl->a", derivative, _matrix_covariance(solution), derivative)
+    covariance = solution.matrix_covariance[:9, :9].reshape(3, 3, 3, 3)  # of F due to the readings
+    readings = np.einsum("aij,ijkl,akl->a", derivative, covariance, derivative)
     walk = np.einsum("aij,ijl,ail->a", derivative, _drift_covariance(explained)[:, :3, :3], derivative)
     return _split(np.diag(solution.angles_covariance_rad2), _reading_parts(readings - walk, walk, explained), budget)
 
@@ -122,11 +123,6 @@ def _split(whole: Array, parts: dict[str, Array], budget: Budget) -> Array:
 def _angle_derivatives(matrix: Array) -> Array:
     """Return the derivative (6, 3, 3) of the angles between the axes, and of their mounting, with respect to F."""
     return SensorAxes.from_matrix(matrix).to_angles.reshape(6, 3, 3)
-
-
-def _matrix_covariance(solution: VectorSolution) -> Array:
-    """Return the covariance (3, 3, 3, 3) of F due to the readings."""
-    return solution.matrix_covariance[:9, :9].reshape(3, 3, 3, 3)
 
 
 def _drift_covariance(explained: Explained) -> Array:

@@ -83,12 +83,9 @@ def find_logs(path: Path) -> list[Path]:
     if is_in_format(path):
         return [path]
     if path.is_dir():
-        return [] if any(path.glob("*.h5")) else sorted(file for file in path.iterdir() if _is_table(file))
+        tables = (file for file in path.iterdir() if file.name.lower().endswith(TABLE_SUFFIXES))
+        return [] if any(path.glob("*.h5")) else sorted(tables)
     return [path] if whole(path).is_file() and path.suffix.lower() not in RUN_SUFFIXES else []
-
-
-def _is_table(path: Path) -> bool:
-    return path.name.lower().endswith(TABLE_SUFFIXES)
 
 
 def add_json(parser: _ActionsContainer) -> None:

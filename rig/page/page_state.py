@@ -187,7 +187,14 @@ class PageState:
                 self.put("arm", {**sections["arm"], **turner_section(report)})
             case PhaseStarted(procedure, plan, sensors):
                 self._modes = sensors
-                self._turns = {sweep.index: _turn(sweep) for sweep in plan.sweeps}
+                self._turns = {
+                    sweep.index: {
+                        "joint": sweep.joint_name,
+                        "direction": sweep.direction,
+                        "along": projection(sweep.axis_flange),
+                    }
+                    for sweep in plan.sweeps
+                }
                 self.history.clear()
                 self._samples = ()
                 self.put("sensors", [])
@@ -315,10 +322,6 @@ def _row(event: ObservationMade | AttitudeRead) -> dict[str, Any]:
     if isinstance(event, ObservationMade):
         return observation_row(event.sensor, event.observation)
     return dwell_row(event.read)
-
-
-def _turn(sweep: Sweep) -> dict[str, Any]:
-    return {"joint": sweep.joint_name, "direction": sweep.direction, "along": projection(sweep.axis_flange)}
 
 
 def _kind(step: Step) -> str:

@@ -142,7 +142,7 @@ def _solve_rows(equations: Equations, method: Method, *, any_mounting: bool) -> 
         other_methods,
         budget,
         equations.measurements,
-        _check_earth_rate(solution),
+        or_fault(partial(check_earth_seen, solution.reference, solution.covariance[REFERENCE, REFERENCE])),
     )
 
 
@@ -230,8 +230,3 @@ def _replace_parameters(solution: TriaxialSolution, laid: LaidDown) -> TriaxialS
         covariance=laid.covariance,
         attitude_error=laid.attitude_error,
     )
-
-
-def _check_earth_rate(solution: TriaxialSolution) -> Fault | None:
-    """Return the Fault if the estimated reference is not the Earth's rate or its u exceeds a tenth of it; else None."""
-    return or_fault(partial(check_earth_seen, solution.reference, solution.covariance[REFERENCE, REFERENCE]))

@@ -14,7 +14,7 @@ from rig.estimation.arrays import Array, scale_of
 from rig.estimation.external.increment_solution import KnownIncrements, solve_known_increments
 from rig.estimation.gyroscope.budget import Budget
 from rig.estimation.refusals import check_axes, check_unit
-from rig.observation.external.fixes import Gathered, LeftOut, gather
+from rig.observation.external.fixes import LeftOut, gather
 from rig.observation.external.omission import Omitted
 from rig.observation.external.reference_rows import Turning, select_covered
 from rig.observation.external.robust_start import find_start
@@ -94,12 +94,8 @@ def _solve(turning: Turning, window_s: float | None) -> InIncrements:
     for _ in range(PASSES):
         solution = solve_known_increments(turning.time_s, turning.readings_rad_s, gathered.fixes, start)
         regathered = gather(turning, window_s, solution.clock_s)
-        if _are_equal(gathered, regathered):
+        if np.array_equal(gathered.fixes.joined, regathered.fixes.joined):
             break
         gathered = regathered
     left_out, increments = gathered.left_out, gathered.increments
     return InIncrements(solution, gathered.window_s, left_out, increments)  # pyrefly: ignore[unbound-name]  # PASSES > 0
-
-
-def _are_equal(one: Gathered, other: Gathered) -> bool:
-    return bool(np.array_equal(one.fixes.joined, other.fixes.joined))

@@ -30,7 +30,6 @@ from rig.observation.average import Average
 from rig.observation.external.csv_import import ExternalData, stack_rows
 from rig.observation.observe import Observation, SensorObservations
 from rig.observation.observed_run import ObservedRun
-from rig.observation.reference.dwell_acceleration import DwellReading
 
 CONTRIBUTOR = "polynomials over temperature"
 ASSUMED_GRADIENT_K = 0.1  # a half-width, if no configuration states it
@@ -179,7 +178,13 @@ def _correct_accelerations(
     )
     polynomials = fit_over_temperature(repeated, reference_c, surroundings.uncertainty.thermometer_gradient_k)
     corrected = iter(polynomials.correct_to_reference(repeated.means, temperature_c))
-    dwelt = [tuple(_correct_dwell(dwell, next(corrected), reference_c) for dwell in part.dwells) for part in parts]
+    dwelt = [
+        tuple(
+            replace(dwell, reading=replace(dwell.reading, mean=next(corrected)), temperature_c=reference_c)
+            for dwell in part.dwells
+        )
+        for part in parts
+    ]
     turns = [tuple(_correct_wave(turn, polynomials) for turn in part.revolutions) for part in parts]
     return _exchange(recordings, name, [
         replace(part, dwells=still, revolutions=swept) for part, still, swept in zip(parts, dwelt, turns, strict=True)
@@ -210,7 +215,3 @@ def _correct_wave(turn: Observation, polynomials: OverTemperature) -> Observatio
     mean, fraction = polynomials.correct_to_reference(wave.harmonic_m_s2[:1], warm), polynomials.changes(warm)[0]
     harmonic = np.vstack([mean, fraction * wave.harmonic_m_s2[1:]])
     return replace(turn, acceleration=replace(turn.acceleration, harmonic=replace(wave, harmonic_m_s2=harmonic)))
-
-
-def _correct_dwell(dwell: DwellReading, mean: Array, reference_c: float) -> DwellReading:
-    return replace(dwell, reading=replace(dwell.reading, mean=mean), temperature_c=reference_c)

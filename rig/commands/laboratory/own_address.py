@@ -29,7 +29,8 @@ def find_own_address(config: SensorsConfig, laboratory: str | None) -> Iterator[
     if laboratory is None or not isinstance(config, RigConfig):
         yield []
         return
-    host = config.turner.simulated_at or _first_port_host(config)
+    hosts = (urlsplit(port).hostname for port in config.ports.values())  # the board's first, for one without an arm
+    host = config.turner.simulated_at or next(filter(None, hosts), "")
     with ExitStack() as stack:
         free = next(
             (candidate for candidate in (host, *_candidate_addresses()) if _take_if_free(candidate, stack)), host
@@ -67,11 +68,6 @@ def _take_if_free(host: str, stack: ExitStack) -> bool:
             return False
         stack.push(claims.pop_all())
     return True
-
-
-def _first_port_host(config: SensorsConfig) -> str:
-    """Return the address of a laboratory without an arm: that of its board's port, else of its first sensor's."""
-    return next((host for port in config.ports.values() if (host := urlsplit(port).hostname)), "")
 
 
 def _move_turner(config: RigConfig, text: str, host: str) -> Iterator[str]:

@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from rig.estimation.arrays import Array
 from rig.history.statistics.random_effects import Fitted
 
 HORIZON_DAYS = 3653  # ten years: a drift cannot be extrapolated further
@@ -15,11 +14,7 @@ def days_to_limit(line: Fitted, last_days: float, expanded: float, max_deviation
     uncertainty at that time, the scatter between runs, and the `expanded` uncertainty of the last result.
     """
     ahead = np.arange(HORIZON_DAYS + 1.0)
-    value, std = line.predict(_line(last_days + ahead))
+    value, std = line.predict(np.stack([np.ones_like(ahead), last_days + ahead], axis=-1))
     line_expanded = line.coverage_factor * np.hypot(std, line.between_std)
     reached = np.abs(value - nominal) + np.hypot(line_expanded, expanded) >= max_deviation
     return int(np.argmax(reached)) if reached.any() else None
-
-
-def _line(days: Array) -> Array:
-    return np.stack([np.ones_like(days), days], axis=-1)

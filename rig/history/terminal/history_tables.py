@@ -84,12 +84,13 @@ def changes_table(title: str, changes: Sequence[Change]) -> FittingTable:
         return TableColumn(f"{heading} ± U", texts, rank, number=True, shorter=short)
 
     differences = [add_sign(change.now.value - change.before.value) for change in changes]
+    errors = [f"{'changed ' * change.has_changed}{change.normalised_error:.2f}" for change in changes]
     columns = (
         TableColumn("parameter", [_add_unit(change.name, change.unit) for change in changes]),
         values("before", [change.before for change in changes], 3, 1),
         values("now", [change.now for change in changes], 2, 0),
         TableColumn("difference", differences, rank=2, number=True, shorter=TableColumn("Δ", differences, number=True)),
-        TableColumn("E_n", [_format_normalised_error(change) for change in changes], number=True),
+        TableColumn("E_n", errors, number=True),
     )
     return FittingTable(title, columns)
 
@@ -168,10 +169,6 @@ def value_text(parameter: Parameter) -> str:
 def rig_in_words(past: Past) -> str:
     """Return the rig's name, or the source of readings without a rig."""
     return "readings from files" if past.rig == NO_ARM else past.rig
-
-
-def _format_normalised_error(change: Change) -> str:
-    return f"{'changed ' * change.has_changed}{change.normalised_error:.2f}"
 
 
 def _add_unit(name: str, unit: str) -> str:

@@ -26,6 +26,7 @@ from rig.report.words.validity_words import label_source
 DCC: Final = "certificate.xml"
 SCHEMA_VERSION = "3.2.1"
 DESCRIBED = "docs/method.md and docs/uncertainty.md of calibration-rig"
+NO_TRACEABILITY = "No metrological traceability is claimed."
 # PTB's rules require a condition for each quantity.
 UNKNOWN_AIR = dcc(
     "influenceConditions",
@@ -157,13 +158,14 @@ def _statements(c: Certificate) -> Iterator[Element]:
     for mark in c.marks:
         yield dcc("statement", text("name", "validity"), text("declaration", f"{mark}."), words("valid", "false"))
     time = c.stated.where.time_reference
-    chain = f"The unit of time is traceable to {time}." if c.traceable else "No metrological traceability is claimed."
+    chain = f"The unit of time is traceable to {time}." if c.traceable else NO_TRACEABILITY
     if c.gyroscopes:
         angles = "as a file states them" if c.external else _angles(c)
         yield _chain("gyroscopes", f"{chain} Angles are {angles}.", c.traceable)
     for sensors in c.held_still:
         origin = f"{sensors.standard.size} is stated by the laboratory, its origin: {sensors.origin or UNSAID}."
-        yield _chain(f"{sensors.kind}s", f"{origin} {_claim(sensors.traceable)}", sensors.traceable)
+        claim = "Its uncertainty was stated too." if sensors.traceable else NO_TRACEABILITY
+        yield _chain(f"{sensors.kind}s", f"{origin} {claim}", sensors.traceable)
     relates = "The results relate only to the items calibrated. Not issued under an accreditation."
     yield dcc("statement", text("name", "scope"), text("declaration", " ".join([relates, *c.deviations])))
     rule = "guard band w = U (ILAC-G8:09/2019, 4.2.2)" if c.guarded else "simple acceptance (ILAC-G8:09/2019, 4.2.1)"
@@ -175,10 +177,6 @@ def _angles(c: Certificate) -> str:
     if c.arcs:
         return f"{' and '.join(c.arcs)} by the turner's encoders, whose error is in the uncertainty budget"
     return "whole turns, 2π by closure of the circle"
-
-
-def _claim(traceable: bool) -> str:
-    return "Its uncertainty was stated too." if traceable else "No metrological traceability is claimed."
 
 
 def _chain(sensors: str, statement: str, traceable: bool) -> Element:

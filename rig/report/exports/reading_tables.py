@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 
 from rig.config.files.safe_writing import new_file, write_new
-from rig.estimation.arrays import Array
 from rig.report.exports.columns import ExportTable
 from rig.report.exports.exported_recording import Exported
 from rig.report.exports.names import plain_names
@@ -60,12 +59,12 @@ def write_mat(recordings: Sequence[Exported], folder: Path) -> list[Path]:
 
     tables = tuple(tables_of(recordings))
     names = plain_names(table.name for table in tables)
-    structs = {names[table.name]: {**_columns(table), "convention": table.meaning} for table in tables}
+    structs = {
+        names[table.name]: {name: column[:, None] for name, column in table.columns.items()}
+        | {"convention": table.meaning}
+        for table in tables
+    }
     path = folder / "run.mat"
     with new_file(path) as file:
         savemat(file, structs, do_compression=True, long_field_names=True)  # pyrefly: ignore[bad-argument-type]  # of scipy-stubs
     return [path]
-
-
-def _columns(table: ExportTable) -> dict[str, Array]:
-    return {name: column[:, None] for name, column in table.columns.items()}

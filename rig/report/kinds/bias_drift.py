@@ -17,7 +17,7 @@ from rig.report.entry import error_entry, finite_or_none, list_dof
 from rig.report.findings.characteristics import DRIFT_SLOPE, DRIFTS, LARGEST_CHANGE
 from rig.report.findings.finding import Finding
 from rig.report.findings.history_records import HistoryRecord
-from rig.report.findings.result_kind import CertifiedItem, DisplayRow, NoOutlet, ResultKind, row_of
+from rig.report.findings.result_kind import CertifiedItem, NoOutlet, ResultKind, row_of
 from rig.report.findings.unexplained import find_repeat_residuals
 from rig.report.tables import dcc_results
 from rig.report.tables.budget import heading_of
@@ -104,11 +104,6 @@ def _find(document: ResultDocument) -> Iterator[Finding[DriftEntry]]:
 def _render(finding: Finding[DriftEntry]) -> Iterator[Table | str]:
     yield drift_table(finding.sensor, finding.quantity, finding.entry)
     yield from _lines(finding)
-
-
-def _build_row(finding: Finding[DriftEntry]) -> DisplayRow:
-    """Return the row of the bias's largest change."""
-    return row_of(LARGEST_CHANGE.term_of(finding), finding.quantity.full_label(finding.sensor))
 
 
 def _build_record(finding: Finding[DriftEntry], document: ResultDocument) -> HistoryRecord:
@@ -198,7 +193,7 @@ BIAS_DRIFT = ResultKind(
     entries=_entries,
     find=_find,
     printed=_render,
-    shown=_build_row,
+    shown=lambda finding: row_of(LARGEST_CHANGE.term_of(finding), finding.quantity.full_label(finding.sensor)),
     followed=_build_record,
     header=NoOutlet("firmware corrects by one bias; `rig export` computes it for a temperature"),
     figures="rig.report.figures.bias_drift:write_drift_figures",

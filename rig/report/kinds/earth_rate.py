@@ -8,7 +8,7 @@ from rig.data.result_file import GyroscopeEntry, ResultDocument
 from rig.report.findings.characteristics import EARTH_RATE, EARTHS_RATES
 from rig.report.findings.finding import Finding
 from rig.report.findings.history_records import HistoryRecord
-from rig.report.findings.result_kind import CertifiedItem, DisplayRow, NoOutlet, ResultKind, row_of
+from rig.report.findings.result_kind import CertifiedItem, NoOutlet, ResultKind, row_of
 from rig.report.kinds.gyroscope import temperatures_c
 from rig.report.tables import dcc_results
 
@@ -25,11 +25,6 @@ def _rate_of(finding: Finding[GyroscopeEntry]) -> EarthRateEntry:
     if not isinstance(rate, EarthRateEntry):
         raise TypeError(f"{finding.sensor} has not found the Earth's rate")
     return rate
-
-
-def _build_row(finding: Finding[GyroscopeEntry]) -> DisplayRow:
-    """Return the row of the Earth's rate in the axes of the arm's base."""
-    return row_of(EARTH_RATE.term_of(finding))
 
 
 def _build_record(finding: Finding[GyroscopeEntry], _: object) -> HistoryRecord:
@@ -65,7 +60,7 @@ EARTHS_RATE = ResultKind(
     entries=NoOutlet("it is part of its gyroscope's entry"),
     find=_find,
     printed=AMONG,
-    shown=_build_row,
+    shown=lambda finding: row_of(EARTH_RATE.term_of(finding)),
     followed=_build_record,
     header=NoOutlet("it is a property of the site, not of the sensor"),
     figures="rig.report.figures.earth_rate:write_earth_rate_figures",

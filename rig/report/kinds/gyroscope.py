@@ -11,7 +11,7 @@ from rig.data.entries.budget import expand_uncertainties
 from rig.data.entries.external import AttitudesEntry
 from rig.data.entries.result_types import ErrorEntry, Role
 from rig.data.quantity import RATE
-from rig.data.result_file import BoardEntry, EstimateEntry, GyroscopeEntry, ResultDocument, TimeBaseEntry, VectorEntry
+from rig.data.result_file import BoardEntry, EstimateEntry, GyroscopeEntry, TimeBaseEntry, VectorEntry
 from rig.estimation.arrays import divide_or_infinity
 from rig.estimation.gyroscope.six_observation import PARAMETERS
 from rig.report.c_code.c_functions import gyroscope_lines
@@ -58,10 +58,6 @@ def _entries(outcome: Outcome) -> dict[str, GyroscopeEntry]:
             **detection_limit_field(outcome.detection_limits.get(name, ())),
         )
     return entries
-
-
-def _find(document: ResultDocument) -> Iterator[Finding[GyroscopeEntry]]:
-    return (Finding(name, RATE, entry) for name, entry in document.gyroscopes.items())
 
 
 def _render(finding: Finding[GyroscopeEntry]) -> Iterator[Table | str]:
@@ -254,7 +250,7 @@ GYROSCOPE = ResultKind(
     name="gyroscope",
     key="gyroscopes",
     entries=_entries,
-    find=_find,
+    find=lambda document: (Finding(name, RATE, entry) for name, entry in document.gyroscopes.items()),
     printed=_render,
     shown=_build_row,
     followed=history_record,

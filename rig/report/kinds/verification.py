@@ -6,12 +6,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from rich.table import Table
 
-from rig.analysis.outcome import Outcome
 from rig.data.quantity import RATE
 from rig.data.result_file import (
     ComparisonEntry,
     DeviationEntry,
-    ResultDocument,
     RevolutionErrorEntry,
     RotationEntry,
     VerificationEntry,
@@ -25,10 +23,6 @@ from rig.station.plain_text import table_of_numbers
 if TYPE_CHECKING:
     from rig.analysis.gyroscope.comparison import Comparison
     from rig.analysis.gyroscope.verification import Verification
-
-
-def _entries(outcome: Outcome) -> dict[str, VerificationEntry]:
-    return {name: verification_entry(verification) for name, verification in outcome.verifications.items()}
 
 
 def verification_entry(verification: "Verification") -> VerificationEntry:
@@ -52,10 +46,6 @@ def _comparison(comparison: "Comparison") -> ComparisonEntry:
         sweeps=entry(DeviationEntry, comparison.sweeps),
         revolutions=[entry(RevolutionErrorEntry, turn) for turn in comparison.revolutions],
     )  # fmt: skip
-
-
-def _find(document: ResultDocument) -> Iterator[Finding[VerificationEntry]]:
-    return (Finding(name, RATE, entry) for name, entry in document.verification.items())
 
 
 def _render(finding: Finding[VerificationEntry]) -> Iterator[Table | str]:
@@ -115,8 +105,8 @@ NO_PARAMETER = NoOutlet("an error of readings is not a parameter and has no unce
 VERIFICATION = ResultKind(
     name="verification",
     key="verification",
-    entries=_entries,
-    find=_find,
+    entries=lambda outcome: {name: verification_entry(found) for name, found in outcome.verifications.items()},
+    find=lambda document: (Finding(name, RATE, entry) for name, entry in document.verification.items()),
     printed=_render,
     shown=NO_PARAMETER,
     followed=NO_PARAMETER,

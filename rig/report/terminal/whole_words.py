@@ -13,7 +13,10 @@ def fit_words(table: Table, width: int) -> Table:
     """Return the table with columns that fit `width` cells of a terminal; no column is narrower than its words."""
     texts = [[str(column.header), *map(str, column.cells), str(column.footer)] for column in table.columns]
     lines = [max(cell_len(line) for text in column for line in text.split("\n")) for column in texts]
-    words = [max((cell_len(word) for text in column for word in _words(text)), default=0) for column in texts]
+    words = [
+        max((cell_len(word) for text in column for word in text.replace("\n", " ").split(" ")), default=0)
+        for column in texts
+    ]
     room = width - FRAMED * len(lines) - STROKE
     if sum(lines) <= room:
         return table
@@ -24,8 +27,3 @@ def fit_words(table: Table, width: int) -> Table:
     for column, word, wish in zip(table.columns, words, wished, strict=True):
         column.width = word + (min(wish, spare * wish // sum(wished)) if sum(wished) else 0)
     return table
-
-
-def _words(text: str) -> list[str]:
-    """Return the words between which a line may break; a number stays with its unit."""
-    return text.replace("\n", " ").split(" ")
