@@ -33,7 +33,7 @@ import rig.commands.measure.carry_out
 from rig.commands.history.remember import remember
 from rig.config.judging.judging_sections import HistorySection
 from rig.data.result_file import read_result
-from rig.report.certificate.writer import write_certificate
+from rig.report.certificate.certificate_page import write_certificate
 
 folder = Path(sys.argv[1])
 document = read_result(folder)

@@ -1,5 +1,6 @@
 """Arguments of several commands: the configuration, changes of its values, a script in place of its procedure."""
 
+import argparse
 from argparse import ArgumentParser, ArgumentTypeError, _ActionsContainer
 from collections.abc import Iterator
 from pathlib import Path
@@ -69,11 +70,11 @@ def add_columns(parser: _ActionsContainer) -> None:
 
 
 def read_column_map(path: Path | None) -> "ColumnMap":
-    """Return the map that `--columns` names; an empty one without the option. Raise as `load_column_map` does."""
-    from rig.config.column_map import AS_NAMED
-    from rig.config.load import load_column_map
+    """Return the map that `--columns` names; an empty one without the option. Raise as `load_as` does."""
+    from rig.config.column_map import AS_NAMED, GIVE_MAP, ColumnMap
+    from rig.config.load import load_as
 
-    return AS_NAMED if path is None else load_column_map(path)
+    return AS_NAMED if path is None else load_as(ColumnMap, path, GIVE_MAP)
 
 
 def find_logs(path: Path) -> list[Path]:
@@ -91,3 +92,22 @@ def find_logs(path: Path) -> list[Path]:
 def add_json(parser: _ActionsContainer) -> None:
     """Add the argument `--json`."""
     parser.add_argument("--json", action="store_true", help="print JSON")
+
+
+def add_history(parser: argparse._ActionsContainer) -> None:
+    """Add the argument `--history`."""
+    parser.add_argument(
+        "--history",
+        metavar="PLACE",
+        help="an SQLite file, a postgresql:// URL, or a configuration file that names one (default: RIG_HISTORY, "
+        "else the user's own)",
+    )
+
+
+def read_history_name(name_or_file: str | None) -> str | None:
+    """Return the file or URL of the named history; None if none is named. Raise Refused as `load` does."""
+    if name_or_file is None or not name_or_file.endswith((".yaml", ".yml")):
+        return name_or_file
+    from rig.config.load import load
+
+    return load(Path(name_or_file), sections=None).config.history.url

@@ -14,7 +14,6 @@ from urllib.parse import urlsplit
 import yaml
 from pydantic import BaseModel, ValidationError
 
-from rig.config.column_map import GIVE_MAP, ColumnMap
 from rig.config.files.layers import BASE, SET, Layered, Places, merge_layers, read_layers
 from rig.config.files.verbatim_text import take_text_as_written
 from rig.config.files.yaml_text import Location, Unreadable, format_path
@@ -130,11 +129,14 @@ def load_statement(overrides: Sequence[str]) -> StatementConfig:
     return _require(StatementConfig, layered.document, layered, SET)
 
 
-def load_column_map(path: str | Path) -> ColumnMap:
-    """Read the map of the columns of a file of another program. Raise `ConfigurationRefused` as `load` does."""
-    with _refusing_unreadable(str(path), GIVE_MAP):
+def load_as(model: type[Model], path: str | Path, give: str) -> Model:
+    """Read a file that holds one section, of this `model`. Raise `ConfigurationRefused` as `load` does.
+
+    `give` is what to do where the file cannot be read.
+    """
+    with _refusing_unreadable(str(path), give):
         layered = read_layers(Path(path))
-    return _require(ColumnMap, layered.document, layered, str(path))
+    return _require(model, layered.document, layered, str(path))
 
 
 def parse(

@@ -14,10 +14,11 @@ from rig.estimation.arrays import Array
 from rig.estimation.statistics.coverage import effective_dof, joint_factors
 from rig.history.statistics.charts import FEWEST, Chart, chart, merge_charts
 from rig.history.statistics.random_effects import CONFIDENCE, Fitted, fit
-from rig.history.statistics.recall import days_to_limit
 from rig.history.statistics.rig_effects import RigEffect, rig_effects
 from rig.history.store import Past
 from rig.report.findings.history_records import Parameter, is_scale, nominal
+
+HORIZON_DAYS = 3653  # ten years: a drift cannot be extrapolated further
 
 YEAR_DAYS = 365.25
 # The probability that no change is reported for an unchanged sensor. The comparisons of a part's calibrations share
@@ -239,3 +240,16 @@ def effects(pasts: Sequence[Past]) -> dict[str, tuple[RigEffect, ...]]:
 def time_of(past: Past) -> datetime:
     """Return the time at which a calibration's run started."""
     return datetime.fromisoformat(past.started_utc).astimezone(UTC)
+
+
+def days_to_limit(line: Fitted, last_days: float, expanded: float, max_deviation: float, nominal: float) -> int | None:
+    """Return the days after the last result until |value − nominal| + U reaches `max_deviation`, or None.
+
+    None means more than ten years. `line` is value = c₀ + c₁ t, t in days like `last_days`. U combines the line's
+    uncertainty at that time, the scatter between runs, and the `expanded` uncertainty of the last result.
+    """
+    ahead = np.arange(HORIZON_DAYS + 1.0)
+    value, std = line.predict(np.stack([np.ones_like(ahead), last_days + ahead], axis=-1))
+    line_expanded = line.coverage_factor * np.hypot(std, line.between_std)
+    reached = np.abs(value - nominal) + np.hypot(line_expanded, expanded) >= max_deviation
+    return int(np.argmax(reached)) if reached.any() else None

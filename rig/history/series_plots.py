@@ -10,7 +10,7 @@ import numpy as np
 from rig.history.series import Change, Subject, Trend
 from rig.history.statistics.charts import SHEWHART_LIMIT
 from rig.history.terminal.history_tables import title_of
-from rig.report.exports.names import plain_names
+from rig.report.exports.columns import plain_names
 from rig.report.figures.verification import save
 from rig.report.findings.characteristics import every_characteristic
 from rig.report.findings.history_records import BIASES, SCALES

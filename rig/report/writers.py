@@ -17,7 +17,7 @@ from rig.station.events import DocumentWritten, RunEvent
 # `module:function`, imported when a run has ended.
 WRITERS: Sequence[str] = (
     "rig.report.header:write_header",
-    "rig.report.certificate.writer:write_certificate",
+    "rig.report.certificate.certificate_page:write_certificate",
 )
 
 

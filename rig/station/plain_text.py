@@ -66,15 +66,15 @@ def plain(text: str, style: str = "") -> "Text":
     return Text(printable(text), style)
 
 
-def table_of_numbers(
-    headings: "Iterable[str]", title: str = "", left: "Collection[str]" = ("axis",), **style: Any
+def build_number_table(
+    headings: "Iterable[str]", title: str = "", texts: "Collection[str]" = ("axis",), **style: Any
 ) -> "Table":
-    """Return a table without rows; only the columns of the headings in `left` are aligned at their left sides."""
+    """Return a table without rows; the columns of the headings in `texts` begin at the left."""
     from rich.table import Table
 
     table = Table(title=plain(title, "table.title") if title else None, title_justify="left", **style)
     for heading in headings:
-        table.add_column(heading, justify="left" if heading in left else "right")
+        table.add_column(heading, justify="left" if heading in texts else "right")
     return table
 
 

@@ -5,10 +5,9 @@ import pytest
 from scipy import stats
 
 from rig.estimation.arrays import Array
-from rig.history.series import Change
+from rig.history.series import Change, days_to_limit
 from rig.history.statistics.charts import FEWEST, Chart, chart
 from rig.history.statistics.random_effects import fit
-from rig.history.statistics.recall import days_to_limit
 from rig.history.statistics.rig_effects import RigEffect, rig_effects
 from rig.report.findings.history_records import Parameter
 

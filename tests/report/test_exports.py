@@ -23,12 +23,12 @@ from rig.estimation.arrays import Array
 from rig.observation.observed_run import ObservedRun, observe_runs
 from rig.plans.recorded_run import open_run
 from rig.report.exports.autopilots import ardupilot_files, px4_files
+from rig.report.exports.columns import plain_names
 from rig.report.exports.exported_corrections import calibrations
 from rig.report.exports.exported_recording import WithMotion, export_recordings
 from rig.report.exports.formats import FORMATS, OF_CALIBRATIONS, texts_of_calibrations, writer_of_readings
 from rig.report.exports.imucal import imucal_files
 from rig.report.exports.kalibr import kalibr_files, triangular
-from rig.report.exports.names import plain_names
 from support.documents.certified import accelerometer, everything, result
 from support.paths import RECORDINGS
 

@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rig.commands.config_arguments import add_run, add_set
-from rig.commands.history.named_history import add_history, read_history_name
+from rig.commands.config_arguments import add_history, add_run, add_set, read_history_name
 from rig.commands.report_folder import refuse_unwritable
 from rig.config.files.safe_writing import replace_together, write_new
 from rig.errors import Refused

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rig.commands.config_arguments import add_json
-from rig.commands.history.named_history import read_history_name
+from rig.commands.config_arguments import add_json, read_history_name
 from rig.errors import Refused
 from rig.station.plain_text import say
 
@@ -106,7 +105,7 @@ def _look_up(
     named: str, contents: Mapping[Path, bytes], looks: "Mapping[Path, FileInspection]"
 ) -> "dict[Path, FileEntries]":
     """Return the history's entry of each file. Raise Refused `history_unreachable`, and as `open_history` does."""
-    from rig.commands.history.waiting import await_answer
+    from rig.commands.history.history_answer import await_answer
     from rig.history.entered_file import find_file_entries
     from rig.history.storage.address import resolve_address
     from rig.history.storage.continuity import is_there

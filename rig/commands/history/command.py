@@ -5,9 +5,8 @@ from collections.abc import Callable, Sequence
 from datetime import date
 from pathlib import Path
 
-from rig.commands.config_arguments import add_json, add_run, add_set
-from rig.commands.history.named_history import add_history
-from rig.commands.history.waiting import await_answer
+from rig.commands.config_arguments import add_history, add_json, add_run, add_set
+from rig.commands.history.history_answer import await_answer
 
 LIST = "list"
 RECOMPUTE = "recompute"

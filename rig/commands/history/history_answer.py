@@ -4,10 +4,10 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
+from threading import Thread
 from typing import TYPE_CHECKING, TypeVar
 
 from firmware_host.computer_load import load_factor
-from rig.commands.history.waiting import await_answer
 from rig.errors import RigError
 
 if TYPE_CHECKING:
@@ -53,3 +53,23 @@ def explain_failure(error: Exception) -> str:
     if isinstance(error, TimeoutError):
         return str(error)
     return f"{type(error).__name__}: {error}"
+
+
+def await_answer(work: Callable[[], T], within_s: float | None = None) -> T:
+    """Return the result of `work`, from a thread of its own; pass on its exception.
+
+    Raise TimeoutError if it takes longer than `within_s`, s. Ctrl-C takes effect immediately. A late thread is
+    abandoned and ends with the process, because a library that waits for its server cannot be interrupted.
+    """
+    from concurrent.futures import Future  # here, as `rig --help` does not need it
+
+    answer: Future[T] = Future()
+
+    def carry_out() -> None:
+        try:
+            answer.set_result(work())
+        except BaseException as error:
+            answer.set_exception(error)
+
+    Thread(target=carry_out, daemon=True).start()
+    return answer.result(within_s)

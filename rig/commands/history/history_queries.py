@@ -9,7 +9,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from rig.commands.history.named_history import read_history_name
+from rig.commands.config_arguments import read_history_name
 from rig.commands.report_folder import draw_into
 from rig.config.files.regular_file import UnfitFile
 from rig.data.run_folder import RESULT, recordings

@@ -8,9 +8,9 @@ from pathlib import Path
 
 from rich.console import Console
 
+from rig.commands.history.history_answer import await_answer
 from rig.commands.history.history_queries import open_named_history
 from rig.commands.history.recompute_worker import Task, solve_task
-from rig.commands.history.waiting import await_answer
 from rig.commands.history.worker_pools import Cluster, Processes, Solve, SolvedTask, distribute, solve_one_by_one
 from rig.commands.report_folder import refuse_unwritable
 from rig.config.files.safe_writing import write_new
@@ -116,7 +116,7 @@ def _solve_by_workers(tasks: Sequence[Task], options: Namespace, solve: Solve) -
         if not tasks:
             yield ()
         elif options.dask is not None:
-            from rig.commands.history.cluster import connect_client
+            from rig.commands.history.worker_pools import connect_client
 
             cluster = Cluster(stack.enter_context(connect_client(options.dask)))
             for worker, threads in cluster.threads().items():

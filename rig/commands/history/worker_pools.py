@@ -3,19 +3,20 @@
 If a worker dies, only the recording that it was solving is lost.
 """
 
+import logging
 import signal
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import AbstractContextManager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from multiprocessing import get_context
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any, Protocol
 
 from rig.commands.history.recompute_worker import Task
-from rig.errors import Fault
+from rig.errors import Fault, Refused
 from rig.history.recompute.result_comparison import Answer, Unsolved
 
 if TYPE_CHECKING:
@@ -186,3 +187,22 @@ def _cluster_lost(what: str) -> Fault:
 def _ignore_interrupts() -> None:
     """Ignore Ctrl-C in a worker, so that the parent stops only after the recording is finished."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+@contextmanager
+def connect_client(address: str) -> Iterator["Client"]:
+    """Connect to the scheduler at `address` during the block. Raise Refused `missing_extra`, `no_cluster`."""
+    from rig.errors.extras import requiring
+
+    with requiring("dask"):
+        from distributed import Client
+    try:
+        client = Client(address, timeout="5s")
+    except (OSError, ValueError) as error:
+        raise Refused(
+            "no_cluster", f"no Dask scheduler answers at {address} ({error})", "Start one with `dask scheduler`"
+        ) from error
+    for name in ("distributed", "distributed.client", "tornado.application"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # the fault `cluster_lost` says it in one line
+    with client:
+        yield client

@@ -11,6 +11,7 @@ from rig.config.load import Loaded
 from rig.data.run_folder import CONFIG, resuming
 from rig.data.user_texts import is_own
 from rig.errors import Refused
+from rig.errors.quoting import quote
 from rig.history.storage.address import ENVIRONMENT
 
 CONFIG_MAX_BYTES = 10_000_000
@@ -60,3 +61,26 @@ def _list_addresses(loaded: Loaded) -> Iterator[tuple[str, str]]:
                 yield f"the sensor {name}", section.own_port[1]
     if config.history.url is not None and not config.history.is_off and not os.environ.get(ENVIRONMENT):
         yield "the history", config.history.url
+
+
+def address_keys(loaded: Loaded) -> list[str]:
+    """Return the keys of the addresses in a configuration: of the turner, the board, sensors with own ports."""
+    import yaml
+
+    turner = "turner" if "turner" in yaml.safe_load(loaded.text) else "arm"
+    key = loaded.config.turner.address_key
+    return [*([f"{turner}.{key}"] if key else []), *loaded.config.ports]
+
+
+def refuse_other_changes(loaded: Loaded, overrides: Sequence[str]) -> list[str]:
+    """Return the addresses that `overrides` give. Raise Refused `no_address` for any other key."""
+    keys = address_keys(loaded)
+    for override in overrides:
+        key = override.partition("=")[0]
+        if key not in keys:
+            raise Refused(
+                "no_address",
+                f"--set {quote(key)} is not an address of the run, and nothing else may change",
+                f"Give a new address to {', '.join(keys) or 'nothing: it has none'}, or start a new run with `rig run`",
+            )
+    return [override.partition("=")[2] for override in overrides]

@@ -36,8 +36,7 @@ def run(options: Namespace) -> int:
     page = read_page_wish(options)
     from rig.commands.configured import open_configured
     from rig.commands.measure.carry_out import carry_out
-    from rig.commands.measure.consent import refuse_foreign_addresses
-    from rig.commands.measure.moved_addresses import refuse_other_changes
+    from rig.commands.measure.consent import refuse_foreign_addresses, refuse_other_changes
     from rig.config.load import load
     from rig.data.latest_run import note_run
     from rig.data.result_file import read_result

@@ -6,8 +6,7 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rig.commands.config_arguments import add_columns, read_column_map
-from rig.commands.history.named_history import add_history, read_history_name
+from rig.commands.config_arguments import add_columns, add_history, read_column_map, read_history_name
 from rig.errors import Refused, raise_as
 from rig.errors.quoting import shorten
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2

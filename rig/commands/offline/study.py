@@ -102,7 +102,7 @@ def _compute_on_cluster(address: str) -> Iterator[None]:
     """Make joblib compute on the Dask scheduler at `address` during the block."""
     from joblib import parallel_config
 
-    from rig.commands.history.cluster import connect_client
+    from rig.commands.history.worker_pools import connect_client
 
     with connect_client(address) as client, parallel_config(backend="dask", client=client):
         yield

@@ -3,7 +3,7 @@
 import sys
 from argparse import ArgumentParser, Namespace
 
-from rig.commands.history.named_history import add_history, read_history_name
+from rig.commands.config_arguments import add_history, read_history_name
 from rig.commands.page_arguments import PageWish, add_page_address, read_page_token, wait_for_interrupt
 from rig.errors import Refused
 from rig.station.plain_text import say

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from rig.config.models import RigConfig
     from rig.station.questions import Voice
 
+M_ARENA_MAX = -8  # malloc.h
+
 
 def add(parser: ArgumentParser) -> None:
     """Add the arguments of `rig station`."""
@@ -58,7 +60,6 @@ def run(options: Namespace) -> int:
     from rig.batch.part_list import numbers_in
     from rig.batch.status import Now, Present
     from rig.commands.configured import open_configured
-    from rig.commands.station.one_arena import keep_to_one_arena
     from rig.station.questions import Terminal
 
     keep_to_one_arena()
@@ -150,3 +151,13 @@ def resume_command(options: Namespace, folder: Path) -> str:
     flags += [] if options.page_token_file is None else ["--page-token-file", str(options.page_token_file)]
     words = ["rig", "station", str(options.config), *changes, *script, "--out", str(folder), *series, *flags]
     return shlex.join(words)
+
+
+def keep_to_one_arena() -> None:
+    """Make all threads of this process share freed memory, if the C library is glibc."""
+    if sys.platform == "linux":
+        import ctypes
+
+        mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
+        if mallopt is not None:
+            mallopt(M_ARENA_MAX, 1)

@@ -3,12 +3,17 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
 from rich.cells import cell_len
 from rich.console import Console, ConsoleOptions, JustifyMethod, RenderResult
 from rich.table import Table
 
-from rig.history.terminal.spark import PLAIN
+from rig.history.series import Trend
 from rig.station.plain_text import plain
+
+BLOCKS = "▁▂▃▄▅▆▇█"
+PLAIN = str.maketrans(BLOCKS, "__..--''")  # for a terminal without blocks
+MOST = 16  # number of the newest results
 
 STROKES, ROUND_A_CELL = 1, 3  # width of the frame: one stroke, and for each cell two spaces and a stroke
 
@@ -74,3 +79,18 @@ class FittingTable:
 
 def _total_width(columns: Sequence[TableColumn]) -> int:
     return sum(column.width + ROUND_A_CELL for column in columns) + STROKES
+
+
+def picture(trend: Trend) -> str:
+    """Return a block for each of the newest results, whose height shows the value.
+
+    The lowest block is the lowest value − U, the highest block the highest value + U, so values with equal blocks
+    differ by less than U. Empty for a single result.
+    """
+    newest = trend.parameters[-MOST:]
+    if len(newest) < 2:
+        return ""
+    values, widths = (np.array([getattr(parameter, name) for parameter in newest]) for name in ("value", "expanded"))
+    low, high = (values - widths).min(), (values + widths).max()
+    heights = (values - low) / (high - low)
+    return "".join(BLOCKS[min(int(height * len(BLOCKS)), len(BLOCKS) - 1)] for height in heights)

@@ -9,8 +9,7 @@ from rig.history.statistics.charts import FEWEST, Chart
 from rig.history.statistics.rig_effects import RigEffect
 from rig.history.store import Kept, Past
 from rig.history.terminal.change_words import add_sign
-from rig.history.terminal.fitting_table import FittingTable, TableColumn
-from rig.history.terminal.spark import picture
+from rig.history.terminal.fitting_table import FittingTable, TableColumn, picture
 from rig.report.findings.history_records import BIASES, SCALES, Parameter, is_scale
 from rig.report.words.printed_values import figures, format_signed, plus_minus
 

@@ -106,12 +106,12 @@ def symmetric(matrix: Array) -> Array:
     return root
 
 
-def _diagonal(magnetometer: Corrected) -> Array:
+def _find_diagonal(magnetometer: Corrected) -> Array:
     """Return the diagonal (3,) of a magnetometer's symmetric correction."""
     return np.diag(symmetric(np.asarray(np.linalg.inv(magnetometer.matrix), dtype=np.float64)))
 
 
-def _off_diagonal(magnetometer: Corrected) -> Array:
+def _find_off_diagonal(magnetometer: Corrected) -> Array:
     """Return the off-diagonal elements (3,) xy, xz, yz of a magnetometer's symmetric correction."""
     matrix = symmetric(np.asarray(np.linalg.inv(magnetometer.matrix), dtype=np.float64))
     return matrix[[0, 0, 1], [1, 2, 2]]
@@ -130,8 +130,8 @@ PX4: Autopilot = {
     },
     FIELD: {
         "CAL_MAG{index}_{axis}OFF": lambda sensor: sensor.offset / GAUSS_T,
-        "CAL_MAG{index}_{axis}SCALE": _diagonal,
-        "CAL_MAG{index}_{axis}ODIAG": _off_diagonal,
+        "CAL_MAG{index}_{axis}SCALE": _find_diagonal,
+        "CAL_MAG{index}_{axis}ODIAG": _find_off_diagonal,
     },
 }
 ARDUPILOT: Autopilot = {
@@ -142,8 +142,8 @@ ARDUPILOT: Autopilot = {
     },
     FIELD: {
         "COMPASS_OFS{later}_{axis}": lambda sensor: -sensor.offset / MILLIGAUSS_T,
-        "COMPASS_DIA{later}_{axis}": _diagonal,
-        "COMPASS_ODI{later}_{axis}": _off_diagonal,
+        "COMPASS_DIA{later}_{axis}": _find_diagonal,
+        "COMPASS_ODI{later}_{axis}": _find_off_diagonal,
     },
 }
 

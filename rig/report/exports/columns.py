@@ -1,6 +1,6 @@
 """Tables of columns for exports."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from rig.data.recording.channel import Channel
@@ -32,3 +32,16 @@ def readings_table(run: RunData, sensor: str, channels: Sequence[Channel], time_
 def split(names: Sequence[str], columns: Array) -> dict[str, Array]:
     """Return the columns of an array (n, k) by name."""
     return {name: columns[:, i] for i, name in enumerate(names)}
+
+
+def plain_names(names: Iterable[str]) -> dict[str, str]:
+    """Return a unique plain name, beginning with a letter, for each name."""
+    plain_by_name: dict[str, str] = {}
+    for name in names:
+        plain = "".join(c if c.isascii() and c.isalnum() else "_" for c in name)
+        if not plain[0].isalpha():
+            plain = f"s_{plain}"
+        while plain in plain_by_name.values():  # two names that differ in replaced characters
+            plain += "_"
+        plain_by_name[name] = plain
+    return plain_by_name

@@ -10,8 +10,8 @@ import numpy as np
 import yaml
 
 from rig.estimation.arrays import Array
+from rig.report.exports.columns import plain_names
 from rig.report.exports.exported_corrections import ExportedCalibrations, Imu
-from rig.report.exports.names import plain_names
 
 
 def kalibr_files(calibrations: ExportedCalibrations) -> Mapping[str, str]:

@@ -10,9 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from rig.config.files.safe_writing import new_file, write_new
-from rig.report.exports.columns import ExportTable
+from rig.report.exports.columns import ExportTable, plain_names
 from rig.report.exports.exported_recording import Exported
-from rig.report.exports.names import plain_names
 
 
 def tables_of(recordings: Sequence[Exported]) -> Iterator[ExportTable]:

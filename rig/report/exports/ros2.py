@@ -12,8 +12,8 @@ import numpy as np
 from rig.data.quantity import ACCELERATION, RATE
 from rig.errors import Refused
 from rig.estimation.arrays import Array
+from rig.report.exports.columns import plain_names
 from rig.report.exports.exported_recording import Exported
-from rig.report.exports.names import plain_names
 
 BAG = "bag"
 FORMAT: Final = 9  # version in ROS 2 Jazzy and later

@@ -14,7 +14,7 @@ from rig.data.quantity import Quantity
 from rig.errors import Fault
 from rig.estimation.statistics.allan import FLICKER, AllanReading
 from rig.report.figures.verification import save
-from rig.station.plain_text import plain, table_of_numbers
+from rig.station.plain_text import build_number_table, plain
 from rig.study.style import use_style
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ def _title(name: str, at_rest: SensorAtRest) -> str:
 def _table(title: str, quantity: Quantity, result: AtRest) -> Table:
     walk, bias = quantity.walk_unit, quantity.drift
     headings = ("axis", f"{quantity.walk} {walk.name}", "± U", f"bias instability {bias.name}", "± U", "at s")
-    table = table_of_numbers(headings, title)
+    table = build_number_table(headings, title)
     for axis, figures in zip("xyz", result.axes, strict=True):
         floor = figures.bias_instability
         tau_s = f"{floor.tau_s:.3g}" if isinstance(floor, AllanReading) else ""

@@ -22,7 +22,7 @@ from rig.report.findings.unexplained import find_repeat_residuals
 from rig.report.tables import dcc_results
 from rig.report.tables.budget import heading_of
 from rig.report.words.expanded_uncertainty import expanded, factor_words
-from rig.station.plain_text import table_of_numbers
+from rig.station.plain_text import build_number_table
 
 if TYPE_CHECKING:
     from rig.analysis.temperature.bias_drift import BiasDrift, ScaleFreeBias
@@ -132,7 +132,7 @@ def drift_table(name: str, quantity: Quantity, entry: DriftEntry) -> Table:
     unit, size = quantity.drift.name, quantity.drift.size
     expansion = expanded((1.0, 1.0, 1.0), entry.degrees_of_freedom)
     biases = (f"{axis} {unit}" for axis in "xyz")
-    table = table_of_numbers(
+    table = build_number_table(
         ("repeat", "hours", "°C", *biases, heading_of(expansion.factors), "changed"),
         f"{name}, {quantity.sensor}: bias by repeat, scale and axes fixed",
     )

@@ -9,7 +9,7 @@ from rig.analysis.outcome import Outcome
 from rig.data.entries.temperature import OverTemperatureEntry
 from rig.data.installed_kinds import quantities
 from rig.data.result_file import ResultDocument
-from rig.report.c_code.temperature import temperature_lines
+from rig.report.c_code.c_functions import temperature_lines
 from rig.report.findings.characteristics import BIAS_SLOPE_AT_REFERENCE, POLYNOMIALS
 from rig.report.findings.finding import Finding
 from rig.report.findings.history_records import HistoryRecord
@@ -17,7 +17,7 @@ from rig.report.findings.result_kind import CertifiedItem, DisplayRow, NoOutlet,
 from rig.report.tables import dcc_results
 from rig.report.words.printed_values import plus_minus
 from rig.report.words.temperature_words import about_lines, coverage_words, shown_rows
-from rig.station.plain_text import table_of_numbers
+from rig.station.plain_text import build_number_table
 
 if TYPE_CHECKING:
     from rig.data.recording.motion_file import Item
@@ -51,7 +51,7 @@ def _render(finding: Finding[OverTemperatureEntry]) -> Iterator[Table | str]:
     entry, unit = finding.entry, finding.quantity.bias
     title = f"{finding.quantity.full_label(finding.sensor)}: over temperature, ± U ({coverage_words(entry)})"
     headings = ("°C", *(f"k{axis}" for axis in "xyz"), *(f"b{axis} {unit.name}" for axis in "xyz"))
-    table = table_of_numbers(headings, title)
+    table = build_number_table(headings, title)
     for row in shown_rows(entry):
         scales = map(plus_minus, row.scale, row.expanded_scale)
         biases = (plus_minus(b / unit.size, u / unit.size) for b, u in zip(row.bias, row.expanded_bias, strict=True))

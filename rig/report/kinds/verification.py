@@ -18,7 +18,7 @@ from rig.report.entry import entry
 from rig.report.findings.finding import Finding
 from rig.report.findings.result_kind import CertifiedItem, NoOutlet, ResultKind
 from rig.report.tables import dcc_results
-from rig.station.plain_text import table_of_numbers
+from rig.station.plain_text import build_number_table
 
 if TYPE_CHECKING:
     from rig.analysis.gyroscope.comparison import Comparison
@@ -55,7 +55,7 @@ def _render(finding: Finding[VerificationEntry]) -> Iterator[Table | str]:
 
 def verification_table(name: str, entry: VerificationEntry) -> Table:
     """Return a table of the errors of each axis before and after; a dash without readings from before."""
-    table = table_of_numbers(
+    table = build_number_table(
         ("axis", "RMS before rad/s", "RMS after rad/s", "of that noise", "MSE before (rad/s)²", "MSE after"),
         f"{name} against {entry.reference}, sweeps and rests",
     )
@@ -105,7 +105,9 @@ NO_PARAMETER = NoOutlet("an error of readings is not a parameter and has no unce
 VERIFICATION = ResultKind(
     name="verification",
     key="verification",
-    entries=lambda outcome: {name: verification_entry(found) for name, found in outcome.verifications.items()},
+    entries=lambda outcome: {
+        name: verification_entry(verification) for name, verification in outcome.verifications.items()
+    },
     find=lambda document: (Finding(name, RATE, entry) for name, entry in document.verification.items()),
     printed=_render,
     shown=NO_PARAMETER,

@@ -68,7 +68,7 @@ def not_as_signed(name: str, why: str) -> Refused:
     )
 
 
-def doubts_of_signer(name: str, report: SignatureReport, why: str) -> list[Refused]:
+def list_signer_doubts(name: str, report: SignatureReport, why: str) -> list[Refused]:
     """Return the problem of an unaltered file whose signer is unknown, or not trusted: `why`, empty if trusted."""
     if report.trusted is None:
         return [

@@ -22,7 +22,7 @@ from rig.report.signatures.findings import (
     FileInspection,
     SignatureReport,
     authority_not_trusted,
-    doubts_of_signer,
+    list_signer_doubts,
     not_as_signed,
     not_signed,
     stamp_not_trusted,
@@ -105,7 +105,7 @@ def _inspect_signature(
         # A certificate that is itself trusted is not looked up in lists.
         long_term=bool(lists and trust.certificates) and not why and chain[0] not in trust.certificates,
     )
-    doubts = doubts_of_signer(name, report, why)
+    doubts = list_signer_doubts(name, report, why)
     if trust.certificates and is_intact and not stamped:
         doubts.append(stamp_not_trusted(name, _name(stamp.signing_cert.dump())))
     return report, doubts

@@ -16,7 +16,7 @@ from signxml.xades.xades import XAdESSignatureConfiguration, XAdESVerifier
 from rig.report.signatures.findings import (
     FileInspection,
     SignatureReport,
-    doubts_of_signer,
+    list_signer_doubts,
     not_as_signed,
     not_signed,
 )
@@ -88,4 +88,4 @@ def _inspect(name: str, chain: Sequence[Certificate], properties: Any, trust: Tr
         reason=Reason(properties.findtext(".//xades:DataObjectFormat/xades:Description", "", NAMES)),
         trusted=not why if trust.certificates else None,
     )
-    return report, tuple(doubts_of_signer(name, report, why))
+    return report, tuple(list_signer_doubts(name, report, why))

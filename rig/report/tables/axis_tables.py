@@ -11,7 +11,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.sensor_axes import SensorAxes
 from rig.report.findings.characteristic import Term
 from rig.report.words.expanded_uncertainty import factor_words
-from rig.station.plain_text import table_of_numbers
+from rig.station.plain_text import build_number_table
 
 FEWEST_DECIMALS = 5
 
@@ -35,7 +35,7 @@ def scale_and_bias_table(
     The number of decimals follows from the smallest uncertainty.
     """
     unit, size, axes = quantity.bias.name, quantity.bias.size, len(scale)
-    table = table_of_numbers(("axis", "scale factor", heading, f"bias {unit}", f"± U {unit}"), title)
+    table = build_number_table(("axis", "scale factor", heading, f"bias {unit}", f"± U {unit}"), title)
     biases, widths = ([float(value) / size for value in values] for values in (bias, expanded[axes:]))
     scale_decimals, bias_decimals = decimals(expanded[:axes]), decimals(widths, quantity.decimals)
     for i, axis in enumerate(quantity.axes):

@@ -8,7 +8,7 @@ from rig.data.entries.budget import BudgetEntry
 from rig.data.quantity import DisplayUnit
 from rig.estimation.statistics.coverage import COVERAGE_FACTOR
 from rig.report.words.printed_budget import Line, lay_out_budget
-from rig.station.plain_text import plain, table_of_numbers
+from rig.station.plain_text import build_number_table, plain
 
 
 def heading_for(budget: BudgetEntry | None) -> str:
@@ -38,7 +38,7 @@ def budget_table(budget: BudgetEntry, scale: Sequence[float], bias: DisplayUnit)
     title = f"uncertainty budget of the scale factor of {k.axis} and of the bias of {b.axis}, which have the largest U"
     small = "; ".join(line.name for line in printed.lines if not line.kind)
     headings = ("contributor", "type", "ν", f"u(k{k.axis}) {k.unit}", "share", f"u(b{b.axis}) {b.unit}", "share")
-    table = table_of_numbers(headings, title, left=headings[:2], caption=small or None, caption_justify="left")
+    table = build_number_table(headings, title, texts=headings[:2], caption=small or None, caption_justify="left")
     for line in printed.lines:
         cells = (cell for part in line.parts for cell in part)
         table.add_row(plain(_label(line)), line.kind, line.dof, *cells, end_section=line is printed.lines[-1])

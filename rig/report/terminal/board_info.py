@@ -18,7 +18,7 @@ from firmware_host.answers import (
     StoredPolynomials,
 )
 from firmware_host.protocol import FIRMWARE_VERSION
-from rig.station.plain_text import plain, table_of_numbers
+from rig.station.plain_text import build_number_table, plain
 
 NO_ANSWER = (0x00, 0xFF, 0xFFFF)  # readings of a bus that does not answer, of one byte and of two
 
@@ -142,7 +142,7 @@ def _print_stored(stored: Mapping[str, StoredCalibration | None]) -> None:
         )
         has_matrix = calibration.model == "matrix_times_m_plus_b"
         matrix = ("matrix", "", "") if has_matrix else ()
-        table = table_of_numbers(("axis", "scale factor", "bias rad/s", *matrix), box=SIMPLE)
+        table = build_number_table(("axis", "scale factor", "bias rad/s", *matrix), box=SIMPLE)
         rows = zip("xyz", calibration.scale, calibration.bias_rad_s, calibration.matrix, strict=True)
         for axis, scale, bias, row in rows:
             elements = (f"{element:+.6f}" for element in row) if has_matrix else ()
@@ -157,7 +157,7 @@ def _print_polynomials(console: Console, polynomials: StoredPolynomials) -> None
     words = "for each power of kelvins, as a fraction of the scale, and rad/s"
     console.print(f"corrected by temperature from {low:.1f} to {high:.1f} °C; {words}:", soft_wrap=True)
     headings = ("power", "scale x", "scale y", "scale z", "bias x", "bias y", "bias z")
-    table = table_of_numbers(headings, box=SIMPLE)
+    table = build_number_table(headings, box=SIMPLE)
     for power, rows in enumerate(zip(polynomials.scale_change, polynomials.bias_change_rad_s, strict=True), start=1):
         table.add_row(str(power), *(f"{value:+.2e}" for row in rows for value in row))
     console.print(table)

@@ -22,7 +22,7 @@ from rig.config.models import ProcedureSection
 from rig.config.procedures.attitude_sets import SETS
 from rig.config.procedures.procedure_sections import AttitudesSection
 from rig.estimation.design.optimality import c_efficiency, g_efficiency, list_designs
-from rig.station.plain_text import plain, table_of_numbers
+from rig.station.plain_text import build_number_table, plain
 
 if TYPE_CHECKING:
     from rig.estimation.arrays import Array
@@ -133,7 +133,7 @@ def wish_words(wanted: TargetUncertainty) -> str:
 def _tabulate_plans(shortest: Shortest, shown: Planned, section: ProcedureSection) -> Table:
     """Return a table that compares the shortest plan with the file's plan."""
     headings = ("", "as in the file", "shortest" if shortest.best else "nearest")
-    table = table_of_numbers(headings, left=("",), box=SIMPLE)
+    table = build_number_table(headings, texts=("",), box=SIMPLE)
     before = shortest.before
     old = _values(section)
     for key, value in list_key_changes(section, shown.candidate.procedure).items():
@@ -156,7 +156,7 @@ def _shown(value: object) -> str:
 
 def _limits(title: str, budgets: Budgets) -> Table:
     headings = ("sensor", "contributor", "of the scale factors", "of the biases")
-    table = table_of_numbers(headings, title, left=headings[:2], box=SIMPLE)
+    table = build_number_table(headings, title, texts=headings[:2], box=SIMPLE)
     for name, lines in _main_contributors(budgets).items():
         for contributor, scale, bias in lines:
             table.add_row(plain(name), contributor, f"{100 * scale:.0f} %", f"{100 * bias:.0f} %")
@@ -213,7 +213,7 @@ def _design_efficiencies(directions: "Array") -> Iterator[tuple[str, float]]:
 def _optimality(directions: "Array") -> Table:
     names = {"g": "G", "g_squared": "G, speeds alone", "c_scale": "c, scale", "c_bias": "c, bias"}
     title = "Efficiency of the directions of the sweeps (1: the optimum):"
-    table = table_of_numbers(("", *names.values()), title, left=("",), box=SIMPLE)
+    table = build_number_table(("", *names.values()), title, texts=("",), box=SIMPLE)
     words = {"plan": "this plan", "six": "the paper's six"}
     for name, values in _efficiencies(directions).items():
         table.add_row(words[name], *(f"{values[key]:.2f}" for key in names))

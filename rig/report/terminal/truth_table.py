@@ -6,7 +6,7 @@ from rich.table import Table
 
 from rig.report.simulated_truth import TrueValues, TruthRow
 from rig.report.words.printed_values import format_signed, format_with_u
-from rig.station.plain_text import table_of_numbers
+from rig.station.plain_text import build_number_table
 
 
 def truth_tables(rows: Sequence[TruthRow], sensor: str | None = None) -> Iterator[Table]:
@@ -19,7 +19,7 @@ def truth_tables(rows: Sequence[TruthRow], sensor: str | None = None) -> Iterato
             columns = {"scale factor": row.scale, **columns}
         headings = (heading for name in columns for heading in (name, "truth", "d"))
         title = f"{row.row.name} with its simulated truth, d = (result − truth)/U"
-        table = table_of_numbers(("axis", *headings), title)
+        table = build_number_table(("axis", *headings), title)
         cells = zip(*(cell for values in columns.values() for cell in _cells(values)), strict=True)
         for label, numbers in zip(row.row.labels, cells, strict=True):
             table.add_row(label, *numbers)

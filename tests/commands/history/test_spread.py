@@ -5,8 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from rig.commands.history.cluster import connect_client
-from rig.commands.history.worker_pools import Cluster, Processes, distribute, solve_one_by_one
+from rig.commands.history.worker_pools import Cluster, Processes, connect_client, distribute, solve_one_by_one
 from rig.data.run_folder import RESULT
 from rig.errors import Fault
 from rig.history.recompute.result_comparison import RecomputedResult, Unsolved

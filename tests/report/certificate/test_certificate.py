@@ -20,10 +20,10 @@ from rig.estimation.gyroscope.budget import Budget, Contributor
 from rig.report.certificate.certificate_page import certificate_page
 from rig.report.certificate.content import is_simulated
 from rig.report.certificate.statements import StatedFacts, configuration_statements, folder_statements
-from rig.report.certificate.validity import list_omitted_rates
 from rig.report.entries.budget import budget_entry
 from rig.report.tables.coverage_statements import coverage_sentence
 from rig.report.words.printed_values import round_to_u
+from rig.report.words.validity_words import list_omitted_rates
 from support.documents.certified import (
     LABORATORY,
     add_accelerometer,
