@@ -55,12 +55,7 @@ def study(settings: Settings) -> StudyReport:
             "largest error of the bias", float(np.abs(estimates[0, 12:15] - TRUTH[12:15]).max() / rt.MG), "mg"
         ),
         StudyFinding("norm of gravity", float(np.linalg.norm(estimates[0, 9:12])), "m/s²", rt.GRAVITY_M_S2),
-        StudyFinding(
-            "RMS error of the drifting bias, F and reference fixed", rt.rms_drift_error(drift, "held", "mg"), "mg"
-        ),
-        StudyFinding(
-            "RMS error of the drifting bias, all parameters estimated", rt.rms_drift_error(drift, "free", "mg"), "mg"
-        ),
+        *rt.find_drift_errors(drift, "mg", "mg"),
     )
     return StudyReport(table(rows), findings, partial(_draw, rows, drift), (12.0, 5.0))
 

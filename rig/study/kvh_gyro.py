@@ -61,16 +61,7 @@ def study(settings: Settings) -> StudyReport:
         [
             StudyFinding("printed Earth rate against 7.2921159e-5 rad/s", 100 * (printed / true_norm - 1), "%", 2.69),
             StudyFinding("printed Earth rate against 15 deg/h", 100 * (printed / 15 - 1), "%", 2.69),
-            StudyFinding(
-                "RMS error of the drifting bias, F and reference fixed",
-                rt.rms_drift_error(drift, "held", "deg_h"),
-                "deg/h",
-            ),
-            StudyFinding(
-                "RMS error of the drifting bias, all parameters estimated",
-                rt.rms_drift_error(drift, "free", "deg_h"),
-                "deg/h",
-            ),
+            *rt.find_drift_errors(drift, "deg_h", "deg/h"),
         ]
     )
     return StudyReport(table(rows), tuple(findings), partial(_draw, rows, drift), (12.0, 5.0))

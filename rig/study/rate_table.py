@@ -1,6 +1,6 @@
 """A simulated three-axis rate table with a KVH 1775 on it: the numbers of TRIAX, and its motions."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -9,7 +9,7 @@ import numpy as np
 from rig.estimation.arrays import Array
 from rig.estimation.reference.reference_model import KnownNorm
 from rig.estimation.reference.triaxial import solve_triaxial
-from rig.study.study_report import table
+from rig.study.study_report import StudyFinding, table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -146,10 +146,13 @@ def draw_drift(panel: "Axes", rows: list[dict[str, Any]], unit_name: str, limit:
     panel.legend(fontsize=7, ncols=2)
 
 
-def rms_drift_error(rows: list[dict[str, Any]], kind: str, unit_name: str) -> float:
-    """Return the RMS error of the bias over repeats and axes."""
-    errors = [row[f"{kind}_bias_{a}_{unit_name}"] - row[f"true_bias_{a}_{unit_name}"] for row in rows for a in "xyz"]
-    return float(np.sqrt(np.mean(np.square(errors))))
+def find_drift_errors(rows: list[dict[str, Any]], column_unit: str, unit: str) -> Iterator[StudyFinding]:
+    """Yield the RMS error of the bias over repeats and axes, with the other parameters fixed and with all estimated."""
+    for kind, words in (("held", "F and reference fixed"), ("free", "all parameters estimated")):
+        axes = [f"bias_{axis}_{column_unit}" for axis in "xyz"]
+        errors = [row[f"{kind}_{axis}"] - row[f"true_{axis}"] for row in rows for axis in axes]
+        rms = float(np.sqrt(np.mean(np.square(errors))))
+        yield StudyFinding(f"RMS error of the drifting bias, {words}", rms, unit)
 
 
 def build_parameter_rows(

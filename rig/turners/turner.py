@@ -8,6 +8,10 @@ from rig.motion.steps import Motion
 from rig.motion.turner_state import Report, State
 
 
+def watch_nothing() -> None:
+    """Do nothing: the default for `watch`."""
+
+
 class Turner(Protocol):
     """A connected turner, at rest until `take_control`, and stopped again at the end of its `with` block.
 

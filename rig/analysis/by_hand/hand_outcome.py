@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 
 from rig.analysis.by_hand.gyroscope import build_hand_result
+from rig.analysis.gyroscope.calibration import refuse_different_sensors
 from rig.analysis.gyroscope.correction import diagonal_correction, matrix_correction
 from rig.analysis.outcome import Outcome, origin_of
 from rig.analysis.verdict import judge
 from rig.data.recording.run_data import RunData
-from rig.errors import Refused
 from rig.estimation.by_hand import solve_by_hand
 from rig.observation.by_hand.rests_and_moves import collect_inputs, session_of
 
@@ -15,12 +15,7 @@ from rig.observation.by_hand.rests_and_moves import collect_inputs, session_of
 def calibrate_by_hand(runs: Sequence[RunData]) -> Outcome:
     """Return the outcome, as `rig.analysis.analyses.calibrate_by_hand` describes it."""
     settings = runs[0].settings
-    if any(run.sensors != runs[0].sensors for run in runs):
-        raise Refused(
-            "different_sensors",
-            "the recordings do not describe the same sensors with the same settings",
-            "Solve them one by one",
-        )
+    refuse_different_sensors(runs)
     results = {}
     for name in settings.to_calibrate:
         conditions = collect_inputs(settings, runs[0].provenance, runs[0].sensors[name])

@@ -114,14 +114,19 @@ def observe_recordings(runs: Sequence[RunData], rotations: Mapping[int, Array] =
     The first recording's thresholds apply to all; `rotations` are the `corrections` of `observe_runs`. Raise Refused
     `different_sensors`; Fault `duplicated_observation` and those of `observe_run`.
     """
+    refuse_different_sensors(runs)
+    _check_recordings(runs)
+    return observe_runs(runs, rotations)
+
+
+def refuse_different_sensors(runs: Sequence[RunData]) -> None:
+    """Raise Refused `different_sensors` unless all recordings describe the same sensors with the same settings."""
     if any(run.sensors != runs[0].sensors for run in runs):
         raise Refused(
             "different_sensors",
             "the recordings do not describe the same sensors with the same settings",
             "Solve them one by one",
         )
-    _check_recordings(runs)
-    return observe_runs(runs, rotations)
 
 
 def solve_observed(

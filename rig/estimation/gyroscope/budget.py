@@ -266,7 +266,8 @@ def evaluate_a(name: str, source: str, covariance: Array, dof: float = np.inf) -
 
 def _evaluate_readings(explained: Explained) -> Iterator[Contributor]:
     """Yield the contributors of the readings: their noise, and the drift of the bias."""
-    bias, (flicker, drift) = explained.bias, _split_bias_covariance(explained)
+    bias, response = explained.bias, explained.solution.response
+    flicker, drift = split_bias_covariance(bias, response, explained.inputs.windows_s)
     noise = explained.solution.covariance - flicker - drift
     yield evaluate_a(NOISE, "scatter of the readings", noise, _find_noise_dof(explained))
     if bias.is_drifting:
@@ -277,9 +278,11 @@ def _evaluate_readings(explained: Explained) -> Iterator[Contributor]:
         yield Contributor(FLICKER, "B", "normal", None, "", source, np.inf, flicker)
 
 
-def _split_bias_covariance(explained: Explained) -> tuple[Array, Array]:
-    """Return the covariances (6, 6) due to the bias' flicker, and due to the rest of its drift."""
-    bias, response, windows_s = explained.bias, explained.solution.response, explained.inputs.windows_s
+def split_bias_covariance(bias: BiasProcess, response: Array, windows_s: Array) -> tuple[Array, Array]:
+    """Return the covariances (6, 6) due to the bias' flicker, and due to the rest of its drift.
+
+    `response` (6, N, 3) is the derivative of scale and bias with respect to the readings' means over windows (N, 2).
+    """
 
     def propagate(part: BiasProcess) -> Array:
         covariance: Array = np.einsum("pni,nm,qmi->pq", response, part.covariance(windows_s), response)

@@ -10,10 +10,18 @@ import numpy as np
 
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.accumulator import Solution
-from rig.estimation.gyroscope.budget import AXES, MOUNTS, REPEATABILITY, Budget, Contributor, Unknown, budget
+from rig.estimation.gyroscope.budget import (
+    AXES,
+    MOUNTS,
+    REPEATABILITY,
+    Budget,
+    Contributor,
+    Unknown,
+    budget,
+    split_bias_covariance,
+)
 from rig.estimation.gyroscope.six_observation import design
 from rig.estimation.gyroscope.vector_fit import Explained, VectorInputs
-from rig.estimation.statistics.bias_process import BiasProcess
 
 NOT_SQUARE = "angles between the axes"
 
@@ -26,13 +34,13 @@ def six_observation_budget(explained: Explained, six: Solution, unknown: Unknown
     inputs, solution = explained.inputs, explained.solution
     response = response_of(six, inputs)
     by_speed = np.einsum("qni,ni->qn", response, _propagate_speeds(inputs, solution.matrix))
-    drift = _propagate_drift(explained.bias, response, inputs.windows_s)
+    flicker, other_drift = split_bias_covariance(explained.bias, response, inputs.windows_s)
     noise = np.einsum("qni,ni,pni->qp", response, inputs.variances_rad2_s2, response)
     six_solution = replace(
         solution,
         scale=six.scale,
         bias_rad_s=six.bias_rad_s,
-        covariance=noise + by_speed @ by_speed.T + drift,
+        covariance=noise + by_speed @ by_speed.T + (flicker + other_drift),
         response=response,
         g_sensitivity=None,
         g_sensitivity_covariance=None,
@@ -81,17 +89,6 @@ def _propagate_speeds(inputs: VectorInputs, matrix: Array) -> Array:
     directions = np.divide(inputs.turns_rad_s, size, out=np.zeros(inputs.turns_rad_s.shape), where=size > 0)
     added: Array = inputs.speed_std_rad_s[:, None] * directions @ matrix.T
     return added
-
-
-def _propagate_drift(bias: BiasProcess, response: Array, windows_s: Array) -> Array:
-    """Return the covariance (6, 6) due to the drift of the bias."""
-    flicker = replace(bias, walk_rad_s_sqrt_s=0.0, scatter_rad_s=0.0)
-    drift = replace(bias, instability_rad_s=0.0)
-    covariance: Array = np.sum(
-        [np.einsum("pni,nm,qmi->pq", response, part.covariance(windows_s), response) for part in (flicker, drift)],
-        axis=0,
-    )
-    return covariance
 
 
 def _tilt_axes(sensed: Array, scale: Array, angle_rad: float) -> Array:

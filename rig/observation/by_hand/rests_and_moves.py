@@ -152,11 +152,7 @@ def collect_inputs(settings: RunSettings, provenance: Provenance, sensor: Record
     """
     by_hand, uncertainty = settings.by_hand, settings.uncertainty
     if by_hand is None or uncertainty is None or (sensor.on_board and not provenance.board_follows_crystal):
-        raise Refused(
-            "clock_unknown",
-            "the board's clock does not follow its crystal, so it may be 1 % off, which a session by hand cannot show",
-            "Look at the board's crystal (`rig board info`); a bridge on the Nucleo connects it",
-        )
+        raise clock_unknown()
     first = None if sensor.measures(ACCELERATION) else rotate_face(FACES[0], np.array(sensor.mounting))
     return SessionConditions(
         clock_ppm=uncertainty.crystal_ppm,
@@ -164,6 +160,15 @@ def collect_inputs(settings: RunSettings, provenance: Provenance, sensor: Record
         box_rad=by_hand.box_rad,
         first_face=first,
         gravity_m_s2=settings.site.gravity_m_s2,
+    )
+
+
+def clock_unknown() -> Refused:
+    """Return the error where a board's clock does not follow its crystal."""
+    return Refused(
+        "clock_unknown",
+        "the board's clock does not follow its crystal, so it may be 1 % off, which a session by hand cannot show",
+        "Look at the board's crystal (`rig board info`); a bridge on the Nucleo connects it",
     )
 
 

@@ -15,7 +15,7 @@ from rig.data.recording.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.motion.steps import TURN_RAD, Sweep
-from rig.observation.motion.revolution import MAX_STATE_GAP_S, Ends, arm_states_lost, describe, not_constant
+from rig.observation.motion.revolution import MAX_STATE_GAP_S, Ends, arm_states_lost, check_constant, describe
 from rig.observation.motion.turn_speed import FEWEST_PAIRS, turn_speed
 
 SMOOTHED_S = 0.12  # window in which a straight line fits the angle: shorter than the gear's ripple
@@ -80,17 +80,10 @@ def find_even_turn(states: NDArray[Any], sweep: Sweep, settings: ObservationThre
         or np.sum(travelled > travelled[0] + TURN_RAD) < FEWEST_PAIRS
     ):
         raise arm_states_lost(where, "where the turn begins or where it ends")
-    _check_speed(time_s, travelled, where, settings)
+    rates = fit_lines(time_s, travelled[:, None])[2][:, 0]
+    check_constant(rates / rates.mean(), where, settings)
     speed = turn_speed(time_s, travelled)
     start_s = float(time_s[0] + time_s[-1] - speed.period_s) / 2
     end_s = start_s + speed.period_s
     within = time_s[(time_s >= start_s) & (time_s <= end_s)]
     return Ends(start_s, end_s, speed.speed_std_rad_s / speed.speed_rad_s * speed.period_s, within)
-
-
-def _check_speed(time_s: Array, travelled: Array, where: str, settings: ObservationThresholds) -> None:
-    """Raise Fault `speed_not_constant` if the smoothed rate strays from its mean: by a halt, but not by a ripple."""
-    rates = fit_lines(time_s, travelled[:, None])[2][:, 0]
-    deviation = float(np.max(np.abs(rates / rates.mean() - 1)))
-    if deviation > settings.max_speed_deviation:
-        raise not_constant(where, deviation, settings)

@@ -186,19 +186,19 @@ def _check_speed(time_s: Array, travelled: Array, where: str, settings: Observat
     ahead = np.interp(middles + SMOOTHING_S / 2, time_s, travelled)
     behind = np.interp(middles - SMOOTHING_S / 2, time_s, travelled)
     mean = (travelled[-1] - travelled[0]) / (time_s[-1] - time_s[0])
-    deviation = float(np.max(np.abs((ahead - behind) / SMOOTHING_S / mean - 1), initial=0.0))
+    check_constant((ahead - behind) / SMOOTHING_S / mean, where, settings)
+
+
+def check_constant(relative_speeds: Array, where: str, settings: ObservationThresholds) -> None:
+    """Raise Fault `speed_not_constant` if smoothed speeds (n,), relative to their mean, stray from it: by a halt."""
+    deviation = float(np.max(np.abs(relative_speeds - 1), initial=0.0))
     if deviation > settings.max_speed_deviation:
-        raise not_constant(where, deviation, settings)
-
-
-def not_constant(where: str, deviation: float, settings: ObservationThresholds) -> Fault:
-    """Return the error for a sweep whose speed strayed from its mean by the fraction `deviation`."""
-    return Fault(
-        "speed_not_constant",
-        f"in {where} the joint's speed differed by {100 * deviation:.0f} % from its mean, "
-        f"{100 * settings.max_speed_deviation:.0f} % is allowed",
-        "Repeat the sweep without pausing it; if it happens again check payload and acceleration",
-    )
+        raise Fault(
+            "speed_not_constant",
+            f"in {where} the joint's speed differed by {100 * deviation:.0f} % from its mean, "
+            f"{100 * settings.max_speed_deviation:.0f} % is allowed",
+            "Repeat the sweep without pausing it; if it happens again check payload and acceleration",
+        )
 
 
 def _check_other_joints(turning: NDArray[Any], joint: int, where: str) -> None:

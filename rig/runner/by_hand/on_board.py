@@ -24,7 +24,7 @@ from rig.data.recording.hand_events import HandAsked, HandMoveAccepted, HandMove
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.errors import Fault, Refused
 from rig.motion.by_hand import Face, HandMove
-from rig.observation.by_hand.rests_and_moves import MICROSECOND_S, rotate_face
+from rig.observation.by_hand.rests_and_moves import MICROSECOND_S, clock_unknown, rotate_face
 from rig.plans.by_hand import ROUND, WantedMoves, next_instruction, still_open
 from rig.runner.board.sensors import BoardSource, open_board_source
 from rig.runner.by_hand.hand_session import drain
@@ -177,11 +177,7 @@ def _check(name: str, sensor: RecordedSensor, board: Board) -> None:
             f"Add acceleration: {{}} to sensors.{name}",
         )
     if not follows_crystal(board):
-        raise Refused(
-            "clock_unknown",
-            "the board's clock does not follow its crystal, so it may be 1 % off, which a session by hand cannot show",
-            "Look at the board's crystal (`rig board info`); a bridge on the Nucleo connects it",
-        )
+        raise clock_unknown()
 
 
 def _follow(source: BoardSource, session: FollowedSession) -> None:

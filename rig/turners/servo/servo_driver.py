@@ -24,6 +24,7 @@ from rig.turners.servo.servo_registers import TRIPPED, WATCHDOG, WATCHDOG_MOST, 
 from rig.turners.servo.servo_state import ServoReport, ServoState, stands
 from rig.turners.servo.stopping import SURE, ShaftStop
 from rig.turners.stop_once import StopOnce, StopOutcome, stopping_on_error, tell_of_stop
+from rig.turners.turner import watch_nothing
 
 WATCH_S = 0.02  # the caller's watch is called at least this often
 ARRIVAL_RAD = 15 * PULSE_RAD  # 1.3°: the position error at rest of a servo without an integral gain
@@ -35,10 +36,6 @@ HUNG_S = 1.0  # the link's thread repeats its loop at least this often
 KEPT_S = 1.0  # duration of the buffered states that distinguish rest from motion
 NOT_CONTROLLED = StopOutcome(True, "the rig has not moved the servo")
 NOT_ENDED = StopOutcome(False, "the stop has not ended", f"Look at the shaft: {SURE}")
-
-
-def _watch_nothing() -> None:
-    """Do nothing: the default for `watch`."""
 
 
 class Servo:
@@ -152,7 +149,7 @@ class Servo:
             self._call(lambda bus: make_ready(bus, self._watchdog))
             self._linked.supervising = True
 
-    def move(self, motion: Motion, watch: Callable[[], None] = _watch_nothing) -> None:
+    def move(self, motion: Motion, watch: Callable[[], None] = watch_nothing) -> None:
         """Make one movement and return when the shaft has arrived and is at rest.
 
         `watch` is called first and then at least every 20 ms; its exception stops the shaft and is passed to the
@@ -184,7 +181,7 @@ class Servo:
             finally:
                 self._moving = False
 
-    def rest(self, duration_s: float, watch: Callable[[], None] = _watch_nothing) -> None:
+    def rest(self, duration_s: float, watch: Callable[[], None] = watch_nothing) -> None:
         """Stand still for `duration_s` of the states' clock; `watch` is called as in `move`."""
         with stopping_on_error(self.stop):
             self._doing = "a rest"
@@ -256,7 +253,7 @@ class Servo:
                 return problems.watchdog_tripped()
         return problems.refuses(error)
 
-    def _wait(self, done: Callable[[], bool], watch: Callable[[], None] = _watch_nothing) -> None:
+    def _wait(self, done: Callable[[], bool], watch: Callable[[], None] = watch_nothing) -> None:
         """Block until `done` is true; until then check the servo's faults and call the caller's `watch`."""
         finished = False
         while not finished:

@@ -12,6 +12,7 @@ from rig.motion.carried import FlangeLoad
 from rig.motion.steps import Motion, travel
 from rig.motion.turner_state import ArmState, RuntimeState
 from rig.turners.stop_once import StopOnce, StopOutcome, stopping_on_error, tell_of_stop
+from rig.turners.turner import watch_nothing
 from rig.turners.ur.arm_report import ArmReport
 from rig.turners.ur.child.child_link import ChildLink
 from rig.turners.ur.child.client_problems import link_lost
@@ -52,10 +53,6 @@ OUR_PROGRAM = "rtde_control"  # the client's name for it
 NOT_BEGUN = ("not_in_remote_control", "registers_in_use")  # reasons for which the client could not start a program
 NOT_CONTROLLED = StopOutcome(True, "the rig has not moved the arm")
 NOT_ENDED = StopOutcome(False, "the stop has not ended", "Look at the arm")
-
-
-def _watch_nothing() -> None:
-    """Do nothing: the default for `watch`."""
 
 
 class Arm:
@@ -172,7 +169,7 @@ class Arm:
             self._supervision.stage = ControlStage.CONTROLLED
         self._silent_s = 0.0  # before this there was no client to lose
 
-    def move(self, motion: Motion, watch: Callable[[], None] = _watch_nothing) -> None:
+    def move(self, motion: Motion, watch: Callable[[], None] = watch_nothing) -> None:
         """Make one movement and return when the arm has arrived and is at rest.
 
         `watch` is called first and then at least every 20 ms; its exception stops the arm and is passed to the caller.
@@ -210,7 +207,7 @@ class Arm:
             self._supervision.moving = False
             self._silent_s = 0.0
 
-    def rest(self, duration_s: float, watch: Callable[[], None] = _watch_nothing) -> None:
+    def rest(self, duration_s: float, watch: Callable[[], None] = watch_nothing) -> None:
         """Stand still for `duration_s` of the controller's clock; `watch` is called as in `move`."""
         with stopping_on_error(self.stop):
             self._doing = "a rest"
@@ -327,7 +324,7 @@ class Arm:
         self._answer = None
         self._link.send(request)
 
-    def _wait(self, done: Callable[[], bool], watch: Callable[[], None] = _watch_nothing) -> None:
+    def _wait(self, done: Callable[[], bool], watch: Callable[[], None] = watch_nothing) -> None:
         """Block until `done` is true; until then check the arm's faults and call the caller's `watch`."""
         finished = False
         while not finished:
