@@ -9,7 +9,7 @@ from rig.data.installed_kinds import InstalledKind, installed_kinds
 from rig.data.quantity import Quantity
 from rig.data.recording.motion_file import Item
 from rig.data.recording.recorded_sensor import RecordedSensor
-from rig.data.recording.settings import RunSettings, Site
+from rig.data.recording.settings import RunSettings
 from rig.errors import Fault
 from rig.errors.attempts import attempt
 from rig.observation.arm_placements import placements_on_arm
@@ -40,21 +40,16 @@ class KindFound:
         return () if self.solved is None else self.solved.checks
 
 
-def kinds_on_arm(recordings: Sequence[ObservedRun], settings: RunSettings) -> tuple[KindFound, ...]:
-    """Return every recorded sensor of an installed kind, in the order of the kinds."""
-    return tuple(_solve_kinds(recordings, settings))
-
-
-def _solve_kinds(recordings: Sequence[ObservedRun], settings: RunSettings) -> Iterator[KindFound]:
+def kinds_on_arm(recordings: Sequence[ObservedRun], settings: RunSettings) -> Iterator[KindFound]:
+    """Yield every recorded sensor of an installed kind, in the order of the kinds."""
     for kind in installed_kinds():
         faults = dict[str, Fault]()
         for name, sensor in recordings[0].run.measuring(kind.quantity).items():
-            solve = partial(_solve, kind, name, recordings, settings, settings.site)
+            solve = partial(_solve, kind, name, recordings, settings)
             yield KindFound(name, sensor, kind.quantity, attempt(faults, name, solve), faults.get(name))
 
 
-def _solve(
-    kind: InstalledKind, name: str, recordings: Sequence[ObservedRun], settings: RunSettings, site: Site
-) -> OfKind:
-    solved: OfKind = kind.solve(name, placements_on_arm(recordings, name, kind.quantity, settings.observation), site)
+def _solve(kind: InstalledKind, name: str, recordings: Sequence[ObservedRun], settings: RunSettings) -> OfKind:
+    placements = placements_on_arm(recordings, name, kind.quantity, settings.observation)
+    solved: OfKind = kind.solve(name, placements, settings.site)
     return solved

@@ -66,7 +66,7 @@ def calibrate(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Out
     dwells = _DwellOutcome(polynomials=swept.polynomials)
     if settings.planned_dwells or runs[0].measuring(FIELD):
         dwells = _judge_dwells(recordings, settings, swept, drifting=drifting)
-    installed_kinds = kinds_on_arm(recordings, settings)
+    installed_kinds = tuple(kinds_on_arm(recordings, settings))
     return Outcome(
         recordings=recordings,
         settings=settings,

@@ -12,7 +12,7 @@ from pathlib import Path
 from rig.batch.batch_state import Batch, BatchEnded, Begun, Entry, PartBegun, PartEnded, after, state_of
 from rig.config.files.regular_file import UnfitFile, read_regular_file
 from rig.config.files.safe_writing import open_to_append
-from rig.data.run_folder import empty_folder, folder_of_its_own, refuse_links
+from rig.data.run_folder import empty_folder, folder_of_its_own, refuse_links, refuse_unwritable
 from rig.data.validation import parse_json, validate
 from rig.errors import Refused
 
@@ -57,11 +57,12 @@ def open_journal(out: Path | None, parent: Path, entry: Begun) -> Journal:
             raise _unusable(out, f"it was begun {begun}")
         return journal
     folder = empty_folder(out) if out is not None else folder_of_its_own(parent, "batch")
-    try:
-        _append(folder / JOURNAL, entry)
-    except OSError as error:
-        (folder / JOURNAL).unlink(missing_ok=True)  # an incomplete entry starts no batch, and would prevent one
-        raise Refused("run_folder", f"{folder} cannot be written: {error}", "Choose another with --out") from error
+    with refuse_unwritable(folder):
+        try:
+            _append(folder / JOURNAL, entry)
+        except OSError:
+            (folder / JOURNAL).unlink(missing_ok=True)  # an incomplete entry starts no batch, and would prevent one
+            raise
     return Journal(folder, state_of([entry]))
 
 

@@ -3,6 +3,7 @@
 import csv
 import io
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -16,32 +17,10 @@ from rig.report.findings.history_records import Parameter
 SCHEMA = "rig.history/1"
 FORMULA = ("=", "+", "-", "@")  # first characters of a formula in common spreadsheets, even after white space
 COLUMNS = (
-    "calibration",
-    "run",
-    "started_utc",
-    "rig",
-    "arm_serial_number",
-    "part",
-    "serial_number",
-    "quantity",
-    "full_scale",
-    "estimator",
-    "temperature_c",
-    "verdict",
-    "fit",
-    "simulated",
-    "check_standard",
-    "operator",
-    "note",
-    "voided",
-    "parameter",
-    "value",
-    "std_statistical",
-    "std_combined",
-    "unit",
-    "max_deviation",
-    "coverage_factor",
-)
+    "calibration", "run", "started_utc", "rig", "arm_serial_number", "part", "serial_number", "quantity",
+    "full_scale", "estimator", "temperature_c", "verdict", "fit", "simulated", "check_standard", "operator", "note",
+    "voided", "parameter", "value", "std_statistical", "std_combined", "unit", "max_deviation", "coverage_factor",
+)  # fmt: skip
 
 
 def history_document(
@@ -175,14 +154,7 @@ def chart_entry(chart: Chart) -> dict[str, Any]:
 
 
 def _parameter(parameter: Parameter) -> dict[str, Any]:
-    return {
-        "value": parameter.value,
-        "std_statistical": parameter.std_statistical,
-        "std_combined": parameter.std_combined,
-        "unit": parameter.unit,
-        "max_deviation": parameter.max_deviation,
-        "coverage_factor": parameter.coverage_factor,
-    }
+    return {name: value for name, value in asdict(parameter).items() if name != "name"}
 
 
 def cell(value: object) -> object:

@@ -7,14 +7,7 @@ from typing import Any
 from rig.analysis.check import Check
 from rig.data.installed_kinds import channel_contents
 from rig.data.quantity import TEMPERATURE, DisplayUnit, Quantity, Scalar, select_displayed
-from rig.data.recording.hand_events import (
-    HandAsked,
-    HandBegunAnew,
-    HandMoveAccepted,
-    HandMoveRefused,
-    HandRested,
-    HandRestRefused,
-)
+from rig.data.recording.hand_events import HandAsked, OfTheHand
 from rig.data.recording.recorded_events import BoardNotObserved, BoardObserved
 from rig.data.result_file import ResultDocument, read_result
 from rig.data.run_folder import CERTIFICATE, RESULT, TRUTH
@@ -147,14 +140,7 @@ class PageState:
                 self._fresh = False
             case Progress():
                 self._newest[Progress] = event
-            case (
-                HandAsked()
-                | HandRested()
-                | HandMoveAccepted()
-                | HandMoveRefused()
-                | HandRestRefused()
-                | HandBegunAnew()
-            ):
+            case _ if isinstance(event, OfTheHand):
                 self.put("hand", by_hand.update(self.sections["hand"] or {}, event))
                 if isinstance(event, HandAsked):
                     self._state("by_hand", event.instruction.words)

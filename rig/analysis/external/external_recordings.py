@@ -162,14 +162,12 @@ def _solve_sweeps(read: ReadElsewhere, samples: Samples, name: str | None, refer
         sensor=read.item,
         solution=solution,
         vector_model=vector,
-        explained=None,
         uncertainty=budget_of(solution, data),
         # Three sweeps may do for the vector model, not for the six observations.
         six_observation=attempt(faults, NEWTON, lambda: solve_six_observation(data.sweeps, "newton")),
         algorithm_1=attempt(faults, ALGORITHM_1, lambda: solve_six_observation(data.sweeps, "algorithm_1")),
         observations=data.sweeps,
         rests=data.rests,
-        time_bases=(),
         corrected_by=(
             matrix_correction(solution)
             if isinstance(solution, VectorSolution | TurnedSolution)
@@ -275,12 +273,7 @@ def _gyroscope(item: Item, result: Result, clock: TimeBase | None) -> SensorResu
         sensor=item,
         solution=solution,
         vector_model=solution,
-        explained=None,
         uncertainty=solution.budget,
-        six_observation=None,
-        algorithm_1=None,
-        observations=(),
-        rests=(),
         time_bases=() if clock is None else (clock,),
         corrected_by=matrix_correction(solution),
         faults=dict.fromkeys((NEWTON, ALGORITHM_1), NO_SWEEPS),

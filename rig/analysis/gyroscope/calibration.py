@@ -46,14 +46,14 @@ class SensorResult:
     - sensor: the sensor as recorded.
     - solution: the estimate by the chosen estimator.
     - vector_model: the solution of the vector model.
-    - explained: the vector model with gravity and bias drift, None without a solution.
     - uncertainty: the budget; None for other estimators than "vector" and "newton".
+    - corrected_by: the correction for the board and calibration.h.
+    - explained: the vector model with gravity and bias drift, None without a solution.
     - six_observation: the exact solution of SIX.
     - algorithm_1: the iterative solution of SIX.
     - observations: the averages of the sweeps.
     - rests: the averages of the rests.
     - time_bases: one for each recording.
-    - corrected_by: the correction for the board and calibration.h.
     - earth: the Earth's rate, None if it was not estimated.
     - by_hand: the solution if a hand turned the sensor.
     - faults: the reasons of missing parts, by the estimator's name or EARTH_RATE.
@@ -62,14 +62,14 @@ class SensorResult:
     sensor: RecordedSensor | Item
     solution: Estimate
     vector_model: "VectorSolution | TurnedSolution | None"
-    explained: Explained | None
     uncertainty: Budget | None
-    six_observation: Solution | None
-    algorithm_1: Solution | None
-    observations: tuple[Observation, ...]
-    rests: tuple[Average, ...]
-    time_bases: tuple[TimeBase, ...]
     corrected_by: Correction
+    explained: Explained | None = None
+    six_observation: Solution | None = None
+    algorithm_1: Solution | None = None
+    observations: tuple[Observation, ...] = ()
+    rests: tuple[Average, ...] = ()
+    time_bases: tuple[TimeBase, ...] = ()
     earth: EarthRate | None = None
     by_hand: "HandSolution | None" = None
     faults: Mapping[str, Fault] = field(default_factory=dict)

@@ -4,7 +4,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from rig.commands.config_arguments import add_json, add_run
-from rig.errors import Refused
+from rig.commands.report_folder import refuse_unwritable
 
 
 def add(parser: ArgumentParser) -> None:
@@ -32,9 +32,6 @@ def run(options: Namespace) -> int:
     document = reversal_document(reversals([(name, judge_phases(run)) for name, run in opened]))
     print_reversal(document, as_json=options.json)
     if options.out is not None:
-        try:
+        with refuse_unwritable(options.out):
             write_new(options.out, document.text() + "\n")
-        except OSError as error:
-            what = f"{options.out} cannot be written: {error}"
-            raise Refused("report_folder", what, "Choose another with --out") from error
     return 0

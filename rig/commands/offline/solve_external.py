@@ -15,7 +15,7 @@ from rig.station.plain_text import say
 if TYPE_CHECKING:
     from rig.analysis.outcome import Outcome
     from rig.commands.history.remember import CalibrationComparison
-    from rig.data.recording.motion_file import Columns
+    from rig.data.recording.motion_file import Columns, MotionKind
     from rig.data.recording.run_data import RunData
 
 AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
@@ -191,14 +191,10 @@ def _build_recording(options: Namespace) -> "RunData":
         what = f"--recorded is {recorded:%Y-%m-%dT%H:%M} UTC, which is in the future"
         raise Refused("bad_option", what, "Give the time of the readings; correct this computer's clock if it is slow")
     column_map = read_column_map(options.columns)
-    if options.turns:
-        files = Files(options.run, _read_turn_options(options), "turns", item, recorded, column_map)
-    elif options.sweeps is not None:
-        files = Files(options.run, options.sweeps, "sweeps", item, recorded, column_map)
-    else:
-        files = Files(options.run, options.attitudes, "attitudes", item, recorded, column_map)
+    tells: MotionKind = "turns" if options.turns else "attitudes" if options.sweeps is None else "sweeps"
+    motion = _read_turn_options(options) if options.turns else options.sweeps or options.attitudes
     return build_recording(
-        files,
+        Files(options.run, motion, tells, item, recorded, column_map),
         Site(
             up=(x, y, z),
             gravity_m_s2=options.gravity_m_s2,

@@ -13,16 +13,8 @@ def enter(connection: Connection, run_id: int, issued: Issued, now_utc: str) -> 
     number = connection.scalar(select(certificate.c.id).where(certificate.c.number == issued.number))
     if number is None:
         number = next_number(connection, certificate)
-        row = {
-            "id": number,
-            "number": issued.number,
-            "run_id": run_id,
-            "title": issued.title,
-            "issued": issued.issued,
-            "replaces": issued.replaces,
-            "marks": issued.marks,
-            "entered_utc": now_utc,
-        }
+        stated = {name: getattr(issued, name) for name in ("number", "title", "issued", "replaces", "marks")}
+        row = {"id": number, "run_id": run_id, **stated, "entered_utc": now_utc}
         connection.execute(insert(certificate).values(row))
         journal.note(connection, certificate, number)
     files = certificate_file.c

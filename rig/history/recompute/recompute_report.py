@@ -23,32 +23,10 @@ from rig.report.words.printed_values import figures
 
 CSV, PAGE = "recomputed.csv", "recomputed.html"
 COLUMNS = (
-    "run",
-    "calibration",
-    "started_utc",
-    "rig",
-    "part",
-    "serial_number",
-    "quantity",
-    "state",
-    "why",
-    "verdict",
-    "verdict_now",
-    "failed_now",
-    "moved",
-    "parameter",
-    "unit",
-    "before",
-    "before_expanded",
-    "now",
-    "now_expanded",
-    "shift_over_u",
-    "growth_over_u",
-    "certificates_to_withdraw",
-    "certificates_unconfirmed",
-    "omitted",
-    "folder",
-)
+    "run", "calibration", "started_utc", "rig", "part", "serial_number", "quantity", "state", "why", "verdict",
+    "verdict_now", "failed_now", "moved", "parameter", "unit", "before", "before_expanded", "now", "now_expanded",
+    "shift_over_u", "growth_over_u", "certificates_to_withdraw", "certificates_unconfirmed", "omitted", "folder",
+)  # fmt: skip
 STATE_WORDS = {
     "refused": "refused by today's method",
     "unjudged": "without the requested setting or estimator",

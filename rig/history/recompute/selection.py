@@ -3,9 +3,9 @@
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from typing import Any, TypeVar
+from typing import TypeVar
 
-from sqlalchemy import Connection, Row, Select, select
+from sqlalchemy import Connection, select
 
 from rig.history.entered.finished_run import EnteredRecording
 from rig.history.entered.issued_certificate import Issued
@@ -61,29 +61,25 @@ def _recordings(connection: Connection) -> Mapping[int, tuple[EnteredRecording, 
     columns = schema.recording.c
     query = select(columns.run_id, columns.name, columns.bytes, columns.sha256).order_by(columns.name)
     return _group_by_run(
-        (row.run_id, EnteredRecording(row.name, row.bytes, row.sha256)) for row in _rows(connection, query)
+        (row.run_id, EnteredRecording(row.name, row.bytes, row.sha256)) for row in connection.execute(query)
     )
 
 
 def _places(connection: Connection) -> Mapping[int, tuple[tuple[str, str], ...]]:
     columns = schema.location.c
     query = select(columns.run_id, columns.computer, columns.path).order_by(columns.id.desc())
-    return _group_by_run((row.run_id, (row.computer, row.path)) for row in _rows(connection, query))
+    return _group_by_run((row.run_id, (row.computer, row.path)) for row in connection.execute(query))
 
 
 def _certificates(connection: Connection) -> Mapping[int, tuple[Issued, ...]]:
     """Return the certificates in force: without a mark, and not replaced by another of this history."""
-    rows = _rows(connection, select(schema.certificate).order_by(schema.certificate.c.id))
+    rows = connection.execute(select(schema.certificate).order_by(schema.certificate.c.id)).all()
     replaced_numbers = {row.replaces for row in rows if not row.marks}  # an invalid one does not replace a valid one
     return _group_by_run(
         (row.run_id, Issued(row.number, row.title, row.issued, row.replaces, row.marks))
         for row in rows
         if row.number not in replaced_numbers and not row.marks
     )
-
-
-def _rows(connection: Connection, query: Select[*tuple[Any, ...]]) -> list[Row[Any]]:
-    return list(connection.execute(query).all())
 
 
 def _group_by_run(pairs: Iterable[tuple[int, Value]]) -> dict[int, tuple[Value, ...]]:

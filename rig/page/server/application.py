@@ -1,10 +1,9 @@
 """The page's routes: its files, the event stream, the certificate, and two that control the run."""
 
 import json
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable
 from pathlib import Path
 
-from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response, StreamingResponse
@@ -12,21 +11,15 @@ from starlette.routing import Route
 
 from rig.config.files.regular_file import UnfitFile, read_regular_file
 from rig.data.run_folder import CERTIFICATE
-from rig.page.server.connections import Connections
 from rig.page.server.control import Control
 from rig.page.server.feed import Broadcast
-from rig.page.server.guard import CERTIFICATE_POLICY, COOKIE, Door, Guard
+from rig.page.server.guard import CERTIFICATE_POLICY, COOKIE, Door
 
 STATIC = Path(__file__).parents[1] / "static"
 MEDIA = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
 LARGEST_BODY = 1000  # bytes of a request
 LARGEST_CERTIFICATE = 8_000_000
 Handler = Callable[[Request], Awaitable[Response]]
-
-
-def guard_routes(routes: Sequence[Route], door: Door, connections: Connections) -> Guard:
-    """Return the routes behind their guard."""
-    return Guard(Starlette(routes=routes), door, connections)
 
 
 def looking(broadcast: Broadcast, door: Door, home: str) -> list[Route]:

@@ -15,7 +15,7 @@ from rig.errors import Refused
 from rig.page.server.connections import Connections, counting_protocol
 from rig.page.server.control import Control
 from rig.page.server.feed import Broadcast, Source
-from rig.page.server.guard import Door, new_token
+from rig.page.server.guard import Door, Guard, new_token
 from rig.station.plain_text import say
 
 if TYPE_CHECKING:
@@ -122,15 +122,16 @@ def serving(
 
 def _server(broadcast: Broadcast, control: Control, door: Door, folder: Path | None, shown: Page) -> "uvicorn.Server":
     import uvicorn
+    from starlette.applications import Starlette
 
-    from rig.page.server.application import guard_routes, looking, run_routes
+    from rig.page.server.application import looking, run_routes
 
     connections = Connections()
     served = [*looking(broadcast, door, shown.home), *shown.routes(door)]
     if folder is not None:
         served = [*served, *run_routes(broadcast, control, door, folder)]
     config = uvicorn.Config(
-        guard_routes(served, door, connections),
+        Guard(Starlette(routes=served), door, connections),
         http=counting_protocol(connections),
         h11_max_incomplete_event_size=LARGEST_HEADERS,
         backlog=AT_ONCE,
