@@ -75,7 +75,11 @@ def calibrate(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Out
         checks=(
             *swept.checks,
             *(check for average in averages for check in average),
-            *_acceleration_checks(dwells.accelerometers, settings),
+            *(
+                check
+                for name, result in dwells.accelerometers.items()
+                for check in acceleration_checks(name, result, settings.limits, _decision_rule(settings))
+            ),
             *dwells.contradictions.checks,
             *(check for kind in installed_kinds for check in kind.checks),
             *_check_unsolved(dwells.magnetometers, installed_kinds),
@@ -202,13 +206,6 @@ def estimate_bias_drift(runs: Sequence[RunData], estimator: str) -> Outcome:
     drifts, rule = estimate_bias_drifts(outcome.recordings, settings), _decision_rule(settings)
     checks = [check for name, drift in drifts.items() for check in drift_checks(name, drift, settings.limits, rule)]
     return replace(outcome, drifts=drifts, checks=(*outcome.checks, *checks))
-
-
-def _acceleration_checks(results: "Mapping[str, AccelerometerResult]", settings: RunSettings) -> tuple[Check, ...]:
-    rule = _decision_rule(settings)
-    return tuple(
-        check for name, result in results.items() for check in acceleration_checks(name, result, settings.limits, rule)
-    )
 
 
 def _decision_rule(settings: RunSettings) -> DecisionRule:

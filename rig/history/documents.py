@@ -16,6 +16,11 @@ from rig.report.findings.history_records import Parameter
 
 SCHEMA = "rig.history/1"
 FORMULA = ("=", "+", "-", "@")  # first characters of a formula in common spreadsheets, even after white space
+FIELDS = (  # of a calibration, in the order of its document
+    "started_utc", "rig", "arm_serial_number", "board_unique_id", "sensor", "part", "serial_number", "quantity",
+    "full_scale", "simulated", "estimator", "temperature_c", "verdict", "fit", "check_standard", "operator", "note",
+    "voided",
+)  # fmt: skip
 COLUMNS = (
     "calibration", "run", "started_utc", "rig", "arm_serial_number", "part", "serial_number", "quantity",
     "full_scale", "estimator", "temperature_c", "verdict", "fit", "simulated", "check_standard", "operator", "note",
@@ -57,20 +62,7 @@ def calibration_entry(past: Past) -> dict[str, Any]:
     return {
         "calibration": past.id,
         "run": past.run_id,
-        "started_utc": past.started_utc,
-        "rig": past.rig,
-        "arm_serial_number": past.arm_serial_number,
-        "board_unique_id": past.board_unique_id,
-        "sensor": past.sensor,
-        **subject_entry(past.subject),
-        "estimator": past.estimator,
-        "temperature_c": past.temperature_c,
-        "verdict": past.verdict,
-        "fit": past.fit,
-        "check_standard": past.check_standard,
-        "operator": past.operator,
-        "note": past.note,
-        "voided": past.voided,
+        **{name: getattr(past, name) for name in FIELDS},
         "parameters": {name: _parameter(parameter) for name, parameter in past.parameters.items()},
     }
 

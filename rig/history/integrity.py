@@ -3,9 +3,9 @@
 import os
 import platform
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 from pydantic import ValidationError
 
@@ -73,16 +73,8 @@ def _contradictions(run: Kept, pasts: Sequence[Past]) -> Iterator[str]:
 
 
 def _record(past: Past) -> HistoryRecord:
-    return HistoryRecord(
-        past.sensor,
-        past.quantity,
-        past.part,
-        past.serial_number,
-        past.full_scale,
-        past.estimator,
-        past.temperature_c,
-        tuple(past.parameters.values()),
-    )
+    values: dict[str, Any] = {field.name: getattr(past, field.name) for field in fields(HistoryRecord)}
+    return HistoryRecord(**values | {"parameters": tuple(past.parameters.values())})
 
 
 def _files_by_folder(history: History) -> Mapping[str, set[tuple[str, str]]]:

@@ -29,7 +29,7 @@ def draw_trends(subjects: Mapping[Subject, Mapping[str, Trend]], folder: Path) -
     from matplotlib.figure import Figure
 
     names = set[str]()
-    written = []
+    written = list[Path]()
     for subject, trends in subjects.items():
         (name,) = plain_names([f"history_{subject[1]}_{subject[2]}{'_simulated' * subject[4]}"]).values()
         while name in names:  # the same sensor at another range
@@ -49,8 +49,7 @@ def draw_trends(subjects: Mapping[Subject, Mapping[str, Trend]], folder: Path) -
             figure.suptitle(f"{title_of(subject)}; bars are U, the band holds the line with 95 %")
             for axes in rows[-1]:
                 axes.tick_params(axis="x", rotation=30)
-            save(figure, folder, name)
-        written.extend([folder / f"{name}.png", folder / f"{name}.svg"])
+            written += save(figure, folder, name)
     return written
 
 
@@ -75,8 +74,7 @@ def draw_changes(title: str, changes: Sequence[Change], folder: Path, name: str)
         axes.invert_yaxis()
         axes.set_xlabel("(now − before) / U of the difference; grey: what chance explains")
         axes.set_title(title)
-        save(figure, folder, name)
-    return [folder / f"{name}.png", folder / f"{name}.svg"]
+        return save(figure, folder, name)
 
 
 def _drawn_names() -> list[str]:

@@ -7,7 +7,7 @@ with open_history() as history:                    # or open_history("postgresql
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from datetime import date
 from typing import Any
 
@@ -275,26 +275,9 @@ class History:
 
 
 _RUN, _CALIBRATION = schema.run.c, schema.calibration.c
+# The fields of `Past` are columns of a calibration, or else of its run.
 _COLUMNS = (
-    _CALIBRATION.id,
-    _CALIBRATION.run_id,
-    _RUN.started_utc,
-    _RUN.rig,
-    _RUN.arm_serial_number,
-    _RUN.board_unique_id,
-    _RUN.verdict,
-    _RUN.fit,
-    _RUN.simulated,
-    _CALIBRATION.sensor,
-    _CALIBRATION.quantity,
-    _CALIBRATION.part,
-    _CALIBRATION.serial_number,
-    _CALIBRATION.full_scale,
-    _CALIBRATION.estimator,
-    _CALIBRATION.temperature_c,
-    _CALIBRATION.check_standard,
-    _RUN.operator,
-    _RUN.note,
+    *((_CALIBRATION if field.name in _CALIBRATION else _RUN)[field.name] for field in fields(Past)[:-2]),
     schema.voided.c.reason.label("voided"),
 )
 _ROWS = schema.run.join(schema.calibration).outerjoin(schema.voided)

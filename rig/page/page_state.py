@@ -135,9 +135,7 @@ class PageState:
             case ArmSeen(state):
                 self._newest[ArmSeen] = event
                 # When the arm is released, one more state comes, without samples.
-                if self._fresh and self.history.due(state.time_s):
-                    self.history.add(state.time_s, _values(self._samples))
-                self._fresh = False
+                self._add_readings(state.time_s)
             case Progress():
                 self._newest[Progress] = event
             case _ if isinstance(event, OfTheHand):
@@ -147,12 +145,15 @@ class PageState:
                 self._add_line(event)
             case HandSeen(time_s=time_s):
                 self._newest[HandSeen] = event
-                if self._fresh and self.history.due(time_s):
-                    self.history.add(time_s, _values(self._samples))
-                self._fresh = False
+                self._add_readings(time_s)
             case _:
                 self._take_once(event)
                 self._add_line(event)
+
+    def _add_readings(self, time_s: float) -> None:
+        if self._fresh and self.history.due(time_s):
+            self.history.add(time_s, _values(self._samples))
+        self._fresh = False
 
     def _add_line(self, event: RunEvent) -> None:
         if (text := line(event)) is not None:

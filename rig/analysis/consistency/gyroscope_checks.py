@@ -292,16 +292,13 @@ def _estimate_bias_process(
     segments: Segments, axis_rates: Array, steady_columns: Array, scatter: Scatter
 ) -> BiasProcess:
     """Estimate the bias process from the residuals of orthonormal `steady_columns` (N, k)."""
-    common = scatter.common_rad2_s2
-    residuals = segments.means_rad_s - axis_rates
-    instability_rad_s = scatter.instability_rad_s
     return bias_process(
         steady_columns,
-        residuals,
+        segments.means_rad_s - axis_rates,
         scatter.variances_rad2_s2,
         segments.times_s,
-        common,
-        instability_rad_s=instability_rad_s,
+        scatter.common_rad2_s2,
+        instability_rad_s=scatter.instability_rad_s,
         chosen=select_by_akaike,
     )
 

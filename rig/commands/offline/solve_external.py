@@ -158,11 +158,10 @@ def run(options: Namespace) -> int:
 
 
 def _build_recording(options: Namespace) -> "RunData":
-    import numpy as np
-
     from rig.data.recording.motion_file import Item
     from rig.data.recording.settings import Elsewhere, Site
     from rig.data.validation import validate
+    from rig.estimation.arrays import axis_of
     from rig.observation.external.from_files import Files, build_recording
 
     for name in ("gravity_m_s2", "field_t", "window_s"):
@@ -175,8 +174,7 @@ def _build_recording(options: Namespace) -> "RunData":
             "bad_option", "--reference-c is for sweeps that were repeated at several temperatures", "Give --sweeps"
         )
     only = _read_only(options)
-    sign, axis = options.up
-    x, y, z = ((1.0 if sign == "+" else -1.0) * np.eye(3)["xyz".index(axis)]).tolist()
+    x, y, z = axis_of(options.up).tolist()
     named_values = {"name": options.name, "part": options.part, "serial_number": options.serial_number}
     given_item = {key: value for key, value in named_values.items() if value is not None}
     try:

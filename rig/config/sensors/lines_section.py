@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from rig.config.section import Positive, Section
-from rig.config.sensors.stated_temperature import StatedTemperatureSection
+from rig.config.sensors.stated_temperature import StatedTemperatureSection, WithinK
 from rig.errors.quoting import quote
 
 GYROSCOPE, ACCELEROMETER, MAGNETOMETER = ("gx", "gy", "gz"), ("ax", "ay", "az"), ("mx", "my", "mz")
@@ -102,9 +102,7 @@ class LineTemperatureSection(Section):
         description="how warm the sensor is, stated where the device prints no temperature; without it U allows for "
         "20 K of change",
     )
-    stated_within_k: Positive = Field(
-        default=5.0, le=60, description="… and by how much that may change in the course of a run"
-    )
+    stated_within_k: WithinK = 5.0
 
     @property
     def stated(self) -> StatedTemperatureSection | None:

@@ -64,20 +64,9 @@ def _enter_calibration(
     connection: Connection, run_id: int, calibration: "HistoryRecord", *, check_standard: bool
 ) -> None:
     number = next_number(connection, schema.calibration)
-    row = {
-        "id": number,
-        "run_id": run_id,
-        "sensor": calibration.sensor,
-        "quantity": calibration.quantity,
-        "part": calibration.part,
-        "serial_number": calibration.serial_number,
-        "full_scale": calibration.full_scale,
-        "estimator": calibration.estimator,
-        "temperature_c": calibration.temperature_c,
-        "check_standard": check_standard,
-    }
+    stated = schema.select_columns(schema.calibration, calibration)
+    row = {"id": number, "run_id": run_id, **stated, "check_standard": check_standard}
     connection.execute(insert(schema.calibration).values(row))
-    columns = [column.name for column in schema.parameter.c if column.name != "calibration_id"]
-    rows = [{"calibration_id": number, **{name: getattr(p, name) for name in columns}} for p in calibration.parameters]
+    rows = [{"calibration_id": number, **schema.select_columns(schema.parameter, p)} for p in calibration.parameters]
     if rows:
         connection.execute(insert(schema.parameter), rows)

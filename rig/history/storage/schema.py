@@ -4,6 +4,8 @@
 it.
 """
 
+from typing import Any
+
 from sqlalchemy import (
     BigInteger,
     Boolean,
@@ -32,6 +34,11 @@ def number_column() -> Column[int]:
     The database does not assign the numbers, because PostgreSQL's sequences leave a gap after a rollback.
     """
     return Column("id", Integer, primary_key=True, autoincrement=False)
+
+
+def select_columns(table: Table, record: object) -> dict[str, Any]:
+    """Return the attributes of a record that are columns of the table, by name."""
+    return {name: getattr(record, name) for name in table.c.keys() if hasattr(record, name)}  # noqa: SIM118
 
 
 meta = Table("meta", metadata, Column("key", String(40), primary_key=True), Column("value", String(NAME)))

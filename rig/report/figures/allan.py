@@ -60,7 +60,7 @@ def draw_at_rest(sensors: Mapping[str, SensorAtRest], folder: Path) -> list[Path
     """Draw `allan_<sensor>` as PNG and SVG into `folder`, for each sensor with a curve. This needs matplotlib."""
     from matplotlib.figure import Figure
 
-    written = []
+    written = list[Path]()
     for name, sensor in sensors.items():
         curves = sensor.quantities.results
         if not curves:
@@ -70,8 +70,7 @@ def draw_at_rest(sensors: Mapping[str, SensorAtRest], folder: Path) -> list[Path
             for axes, (quantity, result) in zip(np.ravel(figure.subplots(1, len(curves))), curves.items(), strict=True):
                 _draw(axes, quantity, result)
             figure.suptitle(f"{_title(name, sensor)} at rest; bands hold 95 %")
-            save(figure, folder, f"allan_{name}")
-        written.extend([folder / f"allan_{name}.png", folder / f"allan_{name}.svg"])
+            written += save(figure, folder, f"allan_{name}")
     return written
 
 

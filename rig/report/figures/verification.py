@@ -82,11 +82,13 @@ def draw_verifications(verifications: Iterable[Verification], folder: Path) -> t
     return write_pictures(pictures, folder)
 
 
-def save(figure: "Figure", folder: Path, name: str) -> None:
-    """Save a figure as PNG and as SVG."""
-    with new_file(folder / f"{name}.png") as png, new_file(folder / f"{name}.svg") as svg:
+def save(figure: "Figure", folder: Path, name: str) -> list[Path]:
+    """Save a figure as PNG and as SVG; return both paths."""
+    paths = [folder / f"{name}.png", folder / f"{name}.svg"]
+    with new_file(paths[0]) as png, new_file(paths[1]) as svg:
         figure.savefig(png, format="png", dpi=110)
         figure.savefig(svg, format="svg", dpi=110, metadata={"Date": None})
+    return paths
 
 
 def draw_comparison(figure: "Figure", comparison: Comparison, sensor: str, reference: str) -> None:
