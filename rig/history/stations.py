@@ -29,7 +29,7 @@ from sqlalchemy import (
 )
 from sqlalchemy.exc import IntegrityError, ProgrammingError
 
-from rig.history.storage.engine import WRITES
+from rig.history.storage.sqlite_engine import WRITES
 
 LONGEST = 20_000  # characters of a station's state
 NAME = 200

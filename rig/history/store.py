@@ -22,7 +22,8 @@ from rig.history.entered.finished_run import EnteredRecording, FinishedRun
 from rig.history.entered.issued_certificate import Issued
 from rig.history.storage import journal, read_back, row_numbers, schema, triggers
 from rig.history.storage.address import HistoryAddress, resolve_address
-from rig.history.storage.engine import WRITES, connection_apart, engine_of
+from rig.history.storage.engine import connection_apart, engine_of
+from rig.history.storage.sqlite_engine import WRITES
 from rig.report.findings.characteristics import every_characteristic
 from rig.report.findings.history_records import BIASES, SCALES, Parameter
 

@@ -14,7 +14,7 @@ from rig.errors.extras import requiring
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.coverage import COVERAGE_FACTOR
 from rig.observation.windows import Window
-from rig.report.certificate.svg_plots import reach_in
+from rig.report.certificate.svg_plots import UprightAxis
 from rig.report.figures.verification import draw_comparison
 from rig.report.findings.unexplained import Unexplained
 
@@ -66,7 +66,7 @@ def plot_residuals(panels: Sequence[tuple[str, Unexplained]]) -> Plot:
     figure = _figure(10, 3 * len(panels))
     for axes, (name, unexplained) in zip(figure.subplots(len(panels), squeeze=False)[:, 0], panels, strict=True):
         positions, largest = np.arange(len(unexplained.values)), float(np.abs(unexplained.values).max())
-        _, unit = reach_in(largest, unexplained.quantity.residuals)
+        unit = UprightAxis.fit(largest, unexplained.quantity.residuals).unit
         values, bars = unexplained.values / unit.size, COVERAGE_FACTOR * unexplained.stds / unit.size
         for i, axis in enumerate(unexplained.quantity.axes):
             shifted = positions + (i - 1) * 0.15

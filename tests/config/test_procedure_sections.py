@@ -7,13 +7,8 @@ import pytest
 from pydantic import Field
 
 from rig.config.load import ConfigurationRefused, load, parse
-from rig.config.models import RigConfig
-from rig.config.procedures.procedure_sections import (
-    STOCK_SECTIONS,
-    ProcedureSection,
-    SixObservationSection,
-    VerifySection,
-)
+from rig.config.models import ProcedureSection, RigConfig
+from rig.config.procedures.procedure_sections import STOCK_SECTIONS, SixObservationSection, VerifySection
 from support.paths import CONFIGS
 
 DEMO = CONFIGS / "demo.yaml"

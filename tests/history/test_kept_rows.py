@@ -16,8 +16,8 @@ from rig.history.entered.finished_run import content_sha256, read_finished_run
 from rig.history.entered.issued_certificate import Issued
 from rig.history.integrity import WRONG, examine_history
 from rig.history.storage import journal, schema
-from rig.history.storage.engine import WRITES
 from rig.history.storage.journal import Head
+from rig.history.storage.sqlite_engine import WRITES
 from rig.history.storage.triggers import create_triggers
 from rig.history.store import History, open_history
 from rig.report.certificate.certificate_page import certificate_page

@@ -8,7 +8,7 @@ from sqlalchemy import Connection, text
 
 from rig.errors import Refused
 from rig.history.storage import migrations, schema
-from rig.history.storage.engine import WRITES
+from rig.history.storage.sqlite_engine import WRITES
 from rig.history.store import open_history
 from support.history.kept_rows import drop_triggers, forget_histories
 from support.history.past_runs import enter_many, finish_run

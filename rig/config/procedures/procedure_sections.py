@@ -24,23 +24,18 @@ from rig.config.section import (
     WholeNumber,
 )
 
-__all__ = [
-    "DEFAULT_PROCEDURE",
-    "STOCK_SECTIONS",
-    "AttitudesSection",
-    "BiasDriftSection",
-    "ByHandSection",
-    "ImuSection",
-    "ProcedureSection",
-    "SixObservationSection",
-    "SixSweepsSection",
-    "StaticAttitudesSection",
-    "ThermalSection",
-    "VerifySection",
-]
-
 # At a lower speed the board cannot store a sweep's readings.
 Speed = Annotated[float, Field(ge=0.5, le=SPEED_RANGE_DEG_S)]
+SweptAxes = Annotated[
+    Literal[3, 6],
+    Field(
+        description="how many axes are swept: `3`, one for each wrist; `6`, also three more of wrist 1 with "
+        "wrists 2 and 3 turned, which separates the sensor's own angles from the arm's",
+        json_schema_extra=RATIO,
+    ),
+]
+Repeats = Annotated[WholeNumber, Field(ge=1, le=100, description="how many times the whole procedure is done")]
+DwellTime = Annotated[float, Field(ge=0.1, le=3600, description="time of standing still in each attitude")]
 DEFAULT_PROCEDURE = "six_observation"
 LONGEST_SWEEP_S = 720  # one revolution at the lowest speed
 HOTTEST_HEATED_C = 65.0  # below the part's limit, because the heater overshoots the range a little
@@ -52,12 +47,7 @@ MIN_RANGE_C = 10.0
 class SixSweepsSection(ProcedureSection):
     """The movement of SIX, Section III: which wrists, in what order, how fast, how often."""
 
-    axes: Literal[3, 6] = Field(
-        default=3,
-        description="how many axes are swept: `3`, one for each wrist; `6`, also three more of wrist 1 with "
-        "wrists 2 and 3 turned, which separates the sensor's own angles from the arm's",
-        json_schema_extra=RATIO,
-    )
+    axes: SweptAxes = 3
     order: tuple[Wrist, ...] | None = Field(
         default=None,
         min_length=1,
@@ -70,7 +60,7 @@ class SixSweepsSection(ProcedureSection):
         description="direction in which each wrist turns first, and then second; if left out, the directions in "
         "which a steady drift of the bias causes the smallest error",
     )
-    repeats: WholeNumber = Field(default=1, ge=1, le=100, description="how many times the whole procedure is done")
+    repeats: Repeats = 1
     speed_deg_s: Speed = Field(
         default=60.0,
         description=f"constant speed of a sweep; every sensor's range must be at least {SPEED_TO_RANGE} times as large",
@@ -279,9 +269,7 @@ class AttitudesSection(ProcedureSection):
             "usual": "`eighteen`",
         },
     )
-    dwell_s: float = Field(
-        default=DEFAULT_REST_S, ge=0.1, le=3600, description="time of standing still in each attitude"
-    )
+    dwell_s: DwellTime = DEFAULT_REST_S
     settle_s: float = Field(
         default=5.0,
         gt=0,
@@ -300,7 +288,7 @@ class AttitudesSection(ProcedureSection):
         description="time of standing still at home before the attitudes and after them, which shows whether the "
         "magnetic field drifted; `0`: no such test",
     )
-    repeats: WholeNumber = Field(default=1, ge=1, le=100, description="how many times the whole procedure is done")
+    repeats: Repeats = 1
     acceleration_deg_s2: float = Field(
         default=240.0, ge=0.1, le=ACCELERATION_RANGE_DEG_S2, description="acceleration of every motion"
     )
@@ -343,7 +331,7 @@ class BiasDriftSection(AttitudesSection):
     """Repeated visits of the attitudes, which show the drift of the bias; by default for ten hours, as in TRIAX."""
 
     name: Literal["bias_drift"] = Field(default="bias_drift", description="this procedure")
-    dwell_s: float = Field(default=200.0, ge=0.1, le=3600, description="time of standing still in each attitude")
+    dwell_s: DwellTime = 200.0
     repeats: WholeNumber = Field(default=10, ge=2, le=100, description="how many times the arm visits all attitudes")
 
     def problems(self, config: RigConfig) -> Iterator[str]:
@@ -367,12 +355,7 @@ class ImuSection(SixSweepsSection, AttitudesSection):
             )
 
     name: Literal["imu"] = Field(default="imu", description="this procedure")
-    axes: Literal[3, 6] = Field(
-        default=6,
-        description="how many axes are swept: `3`, one for each wrist; `6`, also three more of wrist 1 with "
-        "wrists 2 and 3 turned, which separates the sensor's own angles from the arm's",
-        json_schema_extra=RATIO,
-    )
+    axes: SweptAxes = 6
 
 
 class ThermalSection(SixSweepsSection, AttitudesSection):

@@ -17,7 +17,14 @@ from rig.config.world.arm_joints import Cycles, JointsKind, SimulatedDriveSectio
 from rig.config.world.autopilot import SimulatedAutopilotSection
 from rig.config.world.by_hand import SimulatedHandSection
 from rig.config.world.faulty import SimulatedFaultySection
-from rig.config.world.magnetism import IronSection, SimulatedFieldSection, SimulatedMagnetometerSection
+from rig.config.world.magnetism import (
+    IronSection,
+    MountingError,
+    NonOrthogonality,
+    RowLengths,
+    SimulatedFieldSection,
+    SimulatedMagnetometerSection,
+)
 from rig.config.world.printing_device import SimulatedLinesSection
 from rig.config.world.servo import SimulatedServoSection
 from rig.config.world.thermal import SimulatedThermalSection
@@ -307,41 +314,32 @@ ScalePerK = Annotated[
     Vector3,
     Field(description="relative growth of each axis' scale factor with temperature", json_schema_extra={"unit": "1/K"}),
 ]
-
-
 ScalePerK2 = Annotated[
     Vector3, Field(description="the same with the square of the temperature", json_schema_extra={"unit": "1/K²"})
 ]
+BiasPerK = Annotated[Vector3, Field(description="by how much b of each axis grows with temperature")]
+BiasPerK2 = Annotated[Vector3, Field(description="by how much b of each axis grows with the square of the temperature")]
+Flicker = Annotated[float, Field(ge=0, le=0.1, description="flicker of the bias: the floor of its Allan deviation")]
 
 
 class SimulatedAccelerometerSection(Section):
     """The truth of one accelerometer: a = F (s + φ s²) + b, s the specific force, at the gyroscope's temperature."""
 
-    scale: Vector3 = Field(
-        default=(1.0, 1.0, 1.0),
-        description="scale factor of each axis: 1 divided by the length of a row of F",
-        json_schema_extra=RATIO,
-    )
+    scale: RowLengths = (1.0, 1.0, 1.0)
     bias_m_s2: Vector3 = Field(default=NO_ROW, description="bias b of each axis, part of the reading")
     noise_m_s2: float = Field(default=0.01, ge=0, description="standard deviation of a sample's noise")
-    non_orthogonality_deg: Vector3 = Field(
-        default=NO_ROW, description="by how much the angles between its axes x y, x z, y z are off 90°"
-    )
+    non_orthogonality_deg: NonOrthogonality = NO_ROW
     second_order_s2_m: Vector3 = Field(default=NO_ROW, description="φ of each axis")
     bandwidth_hz: Bandwidth = None
     delay_ms: Delay = 0.0
-    bias_m_s2_per_k: Vector3 = Field(default=NO_ROW, description="by how much b of each axis grows with temperature")
+    bias_m_s2_per_k: BiasPerK = NO_ROW
     scale_per_k: ScalePerK = NO_ROW
-    bias_m_s2_per_k2: Vector3 = Field(
-        default=NO_ROW, description="by how much b of each axis grows with the square of the temperature"
-    )
+    bias_m_s2_per_k2: BiasPerK2 = NO_ROW
     scale_per_k2: ScalePerK2 = NO_ROW
     bias_hysteresis_m_s2: Vector3 = Field(
         default=NO_ROW, description="how much larger b of each axis is after warming, and smaller after cooling"
     )
-    bias_instability_m_s2: float = Field(
-        default=0.0, ge=0, le=0.1, description="flicker of the bias: the floor of its Allan deviation"
-    )
+    bias_instability_m_s2: Flicker = 0.0
 
 
 class SimulatedKvhSection(Section):
@@ -374,12 +372,8 @@ class SimulatedSensorSection(Section):
     scale: Vector3 = Field(description="scale factor of each axis, the diagonal of K", json_schema_extra=RATIO)
     bias_rad_s: Vector3 = Field(description="bias b of each axis")
     noise_rad_s: float = Field(default=0.035, ge=0, description="standard deviation of a sample's noise")
-    mounting_error_deg: Vector3 = Field(
-        default=(0.0, 0.0, 0.0), description="rotation of the sensor from its nominal mounting, as a rotation vector"
-    )
-    non_orthogonality_deg: Vector3 = Field(
-        default=(0.0, 0.0, 0.0), description="by how much the angles between its axes x y, x z, y z are off 90°"
-    )
+    mounting_error_deg: MountingError = NO_ROW
+    non_orthogonality_deg: NonOrthogonality = NO_ROW
     temperature_c: float = Field(
         default=22.0,
         ge=-40,
@@ -393,19 +387,15 @@ class SimulatedSensorSection(Section):
         description="reading of its thermometer when it is switched on; without it, the sensor is warm at once",
     )
     warm_up_s: float = Field(default=300.0, ge=1, le=100_000, description="time constant of its warming up")
-    bias_rad_s_per_k: Vector3 = Field(default=NO_ROW, description="by how much b of each axis grows with temperature")
+    bias_rad_s_per_k: BiasPerK = NO_ROW
     scale_per_k: ScalePerK = NO_ROW
-    bias_rad_s_per_k2: Vector3 = Field(
-        default=NO_ROW, description="by how much b of each axis grows with the square of the temperature"
-    )
+    bias_rad_s_per_k2: BiasPerK2 = NO_ROW
     scale_per_k2: ScalePerK2 = NO_ROW
     bias_hysteresis_rad_s: Vector3 = Field(
         default=NO_ROW,
         description="how much larger b of each axis is after warming, and smaller after cooling, in `world.thermal`",
     )
-    bias_instability_rad_s: float = Field(
-        default=0.0, ge=0, le=0.1, description="flicker of the bias: the floor of its Allan deviation"
-    )
+    bias_instability_rad_s: Flicker = 0.0
     bias_instability_time_s: float = Field(
         default=100.0, ge=10, le=10_000, description="averaging time at which that minimum occurs"
     )

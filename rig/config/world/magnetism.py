@@ -1,6 +1,6 @@
 """Sections of `world:` about magnetism: the arm's iron, and the errors of a simulated magnetometer."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -22,30 +22,37 @@ class IronSection(Section):
     moment_a_m2: Vector3 = Field(description="magnetic moment, in that frame")
 
 
+RowLengths = Annotated[
+    Vector3,
+    Field(
+        description="scale factor of each axis: 1 divided by the length of a row of F",
+        json_schema_extra=RATIO,
+    ),
+]
+NonOrthogonality = Annotated[
+    Vector3, Field(description="by how much the angles between its axes x y, x z, y z are off 90°")
+]
+MountingError = Annotated[
+    Vector3, Field(description="rotation of the sensor from its nominal mounting, as a rotation vector")
+]
+
+
 class SimulatedFieldSection(Section):
     """The truth of one simulated magnetometer: m = F B + b, with the magnetic field B at its position."""
 
-    scale: Vector3 = Field(
-        default=(1.0, 1.0, 1.0),
-        description="scale factor of each axis: 1 divided by the length of a row of F",
-        json_schema_extra=RATIO,
-    )
+    scale: RowLengths = (1.0, 1.0, 1.0)
     bias_ut: Vector3 = Field(
         default=NOTHING,
         description="bias b of each axis, part of the reading: the sensor's own, and that of iron that turns with it",
     )
     noise_ut: float = Field(default=0.3, ge=0, description="standard deviation of a sample's noise")
-    non_orthogonality_deg: Vector3 = Field(
-        default=NOTHING, description="by how much the angles between its axes x y, x z, y z are off 90°"
-    )
+    non_orthogonality_deg: NonOrthogonality = NOTHING
 
 
 class SimulatedMagnetometerSection(SimulatedFieldSection):
     """A simulated magnetometer on the board."""
 
-    mounting_error_deg: Vector3 = Field(
-        default=NOTHING, description="rotation of the sensor from its nominal mounting, as a rotation vector"
-    )
+    mounting_error_deg: MountingError = NOTHING
     offset_mm: Vector3 | None = Field(
         default=None,
         description="place of the sensor, x y z from the flange's centre in the flange's frame; if left out, the "

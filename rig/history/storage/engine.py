@@ -24,8 +24,6 @@ if TYPE_CHECKING:
 CONNECT_S = 5
 SILENCE_S = 5  # time after which an unresponsive connection is closed
 
-__all__ = ["WRITES", "connection_apart", "engine_of"]
-
 
 @contextmanager
 def engine_of(address: HistoryAddress) -> Iterator[Engine]:

@@ -26,6 +26,33 @@ NAMES, ROW, DECADES = 150.0, 13.0, 4
 
 
 @dataclass(frozen=True, slots=True)
+class UprightAxis:
+    """The upright axis of a picture, from −`reach` to `reach` in its `unit`."""
+
+    reach: float
+    unit: DisplayUnit
+
+    @classmethod
+    def fit(cls, largest: float, units: Sequence[DisplayUnit]) -> "UprightAxis":
+        """Return an axis to a round limit above `largest`, in the first unit in which `largest` exceeds 1."""
+        unit = next((unit for unit in units if largest >= unit.size), units[-1])
+        shown = largest / unit.size
+        decade = 10 ** np.floor(np.log10(max(shown, 1e-9)))
+        reach = next(step * decade for step in (1, 2, 3, 4, 5, 6, 8, 10) if step * decade >= shown)
+        return cls(1.1 * float(reach), unit)
+
+    def height(self, value: float) -> float:
+        """Return the height of a value in SI units, in pixels."""
+        return round(TOP + HEIGHT / 2 * (1 - value / self.unit.size / self.reach), 1)
+
+    @property
+    def ticks(self) -> tuple[tuple[float, str], ...]:
+        """The heights of three ticks, and their labels."""
+        values = (-self.reach / 1.1, 0.0, self.reach / 1.1)
+        return tuple((self.height(value * self.unit.size), f"{value:g}".replace("-", "−")) for value in values)
+
+
+@dataclass(frozen=True, slots=True)
 class PlotPoint:
     """A residual and its bar, in pixels."""
 
@@ -85,11 +112,8 @@ def biases_by_repeat(finding: Finding[DriftEntry]) -> Residuals:
 def _draw(unexplained: Unexplained) -> Residuals:
     """Return a plot of values (n, 3) with bars of two standard deviations, in a unit for the largest value."""
     values, bars, split = unexplained.values, 2 * unexplained.stds, unexplained.split
-    reach, unit = reach_in(float((np.abs(values) + bars).max()), unexplained.quantity.residuals)
-    across = (WIDTH - LEFT_MARGIN - RIGHT_MARGIN) / len(values)
-
-    def height(value: float) -> float:
-        return round(TOP + HEIGHT / 2 * (1 - value / unit.size / reach), 1)
+    upright = UprightAxis.fit(float((np.abs(values) + bars).max()), unexplained.quantity.residuals)
+    across, height = (WIDTH - LEFT_MARGIN - RIGHT_MARGIN) / len(values), upright.height
 
     def point(index: int, axis: int) -> PlotPoint:
         value, bar = values[index, axis], bars[index, axis]
@@ -97,21 +121,9 @@ def _draw(unexplained: Unexplained) -> Residuals:
         return PlotPoint(round(x, 1), height(value), height(value - bar), height(value + bar), axis)
 
     points = tuple(point(index, axis) for index in range(len(values)) for axis in range(3))
-    ticks = tuple(
-        (height(value * unit.size), f"{value:g}".replace("-", "−")) for value in (-reach / 1.1, 0.0, reach / 1.1)
-    )
     begins = None if split is None else round(LEFT_MARGIN + across * split, 1)
-    within = int((np.abs(values) <= bars).sum())
-    return Residuals(points, ticks, height(0.0), begins, unit.name, within, unexplained.shown, unexplained.expectation)
-
-
-def reach_in(largest: float, units: Sequence[DisplayUnit]) -> tuple[float, DisplayUnit]:
-    """Return a round limit above `largest`, and its unit: the first unit in which `largest` exceeds 1."""
-    unit = next((unit for unit in units if largest >= unit.size), units[-1])
-    shown = largest / unit.size
-    decade = 10 ** np.floor(np.log10(max(shown, 1e-9)))
-    reach = next(step * decade for step in (1, 2, 3, 4, 5, 6, 8, 10) if step * decade >= shown)
-    return 1.1 * float(reach), unit
+    within, words = int((np.abs(values) <= bars).sum()), (unexplained.shown, unexplained.expectation)
+    return Residuals(points, upright.ticks, height(0.0), begins, upright.unit.name, within, *words)
 
 
 def contributions(budget: BudgetEntry, scale: Sequence[float]) -> Contributions:

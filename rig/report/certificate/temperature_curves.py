@@ -8,7 +8,7 @@ import numpy as np
 from rig.data.entries.temperature import OverTemperatureEntry
 from rig.data.quantity import DisplayUnit, Quantity
 from rig.estimation.arrays import Array
-from rig.report.certificate.svg_plots import HEIGHT, LEFT_MARGIN, RIGHT_MARGIN, TOP, WIDTH, reach_in
+from rig.report.certificate.svg_plots import LEFT_MARGIN, RIGHT_MARGIN, WIDTH, UprightAxis
 from rig.report.tables.certificate import Pair, pair
 from rig.report.words.temperature_words import shown_rows
 
@@ -62,12 +62,12 @@ def bias_curves(entry: OverTemperatureEntry, quantity: Quantity) -> Curves:
 
 def _curves(entry: OverTemperatureEntry, values: Array, widths: Array, units: Sequence[DisplayUnit]) -> Curves:
     """Return curves of values (n, 3) ± widths (n, 3) at the temperatures of the entry's table."""
-    reach, unit = reach_in(float((np.abs(values) + widths).max()), units)
+    upright = UprightAxis.fit(float((np.abs(values) + widths).max()), units)
     low, high = entry.range_c
 
     def points(temperatures: Sequence[float], heights: Array) -> str:
         return " ".join(
-            f"{_x_pixel(t, low, high)},{_height(y, unit, reach)}" for t, y in zip(temperatures, heights, strict=True)
+            f"{_x_pixel(t, low, high)},{upright.height(y)}" for t, y in zip(temperatures, heights, strict=True)
         )
 
     warm_c = [row.temperature_c for row in entry.table]
@@ -81,16 +81,9 @@ def _curves(entry: OverTemperatureEntry, values: Array, widths: Array, units: Se
         )
         for i in range(3)
     )
-    ticks = tuple(
-        (_height(y * unit.size, unit, reach), f"{y:g}".replace("-", "−")) for y in (-reach / 1.1, 0.0, reach / 1.1)
-    )
     marks = tuple((_x_pixel(row.temperature_c, low, high), f"{row.temperature_c:.1f} °C") for row in shown_rows(entry))
-    return Curves(axes, ticks, marks, unit.name)
+    return Curves(axes, upright.ticks, marks, upright.unit.name)
 
 
 def _x_pixel(temperature_c: float, low: float, high: float) -> float:
     return round(LEFT_MARGIN + 12 + (WIDTH - LEFT_MARGIN - RIGHT_MARGIN - 30) * (temperature_c - low) / (high - low), 1)
-
-
-def _height(value: float, unit: DisplayUnit, reach: float) -> float:
-    return round(TOP + HEIGHT / 2 * (1 - value / unit.size / reach), 1)
