@@ -4,6 +4,7 @@ One has imported everything; the other, in an environment with the variables in 
 files need. The line on stdout gives by module the address for orders. They end with their standard input.
 """
 
+import atexit
 import gc
 import inspect
 import json
@@ -14,6 +15,7 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 from collections.abc import Callable, Collection
 from contextlib import suppress
 from importlib import import_module
@@ -31,10 +33,21 @@ IMPORTED = (
     ),
     *("rig.procedure", "rig.runner.phases", "rig.report.document", "rig.history.store", "rig.world.world_process"),
     *("rig.turners.ur.ur_kind", "rig.turners.servo.servo_kind", "rig.turners.hand.hand_kind"),
-    *("h5py", "jinja2", "scipy.interpolate", "scipy.ndimage"),
+    *("rig.turners.ur.arm_driver", "rig.turners.ur.arm_preflight", "rig.turners.servo.servo_driver"),
+    *("rig.commands.measure.check_devices", "rig.commands.devices.board_commands", "rig.commands.station.station"),
+    *("rig.analysis.judging", "rig.report.entry_sources", "rig.report.certificate.writer"),
+    *("procedures.six_observation", "procedures.imu", "procedures.verify", "procedures.by_hand"),
+    *("firmware_host.emulator.parts.lsm9ds1", "firmware_host.emulator.parts.adis16465"),
+    *("h5py", "jinja2", "scipy.interpolate", "scipy.ndimage", "serial.urlhandler.protocol_socket", "encodings.idna"),
 )
-# A reader of foreign files is allowed little memory, and imports little.
-READS = ("h5py", "rig.data.recording.layout_keys", "rig.data.processes.reading_process")
+# A reader of foreign files is allowed little memory, and imports little: only what reads them.
+READS = (
+    *("rig.data.processes.reading_process", "rig.data.recording.run_reading", "rig.data.recording.extract"),
+    *("rig.observation.formats.csv_table", "rig.observation.formats.table_layout"),
+    *("rig.observation.formats.bag_samples", "rig.observation.formats.ulog_samples"),
+    *("h5py", "numpy.typing", "rosbags.rosbag2", "rosbags.typesys", "pyulog.core"),
+)
+DEMO = Path(__file__).parents[3] / "configs" / "demo.yaml"
 LABORATORY, READER = "rig.world", "rig.data.processes.reading_child"
 
 Order = dict[str, Any]
@@ -211,12 +224,36 @@ def _serve() -> None:
         import_module(module)
     if not reads:
         import_module("firmware_host.emulator.hooks").address_of("block")  # translated here, for every laboratory
+        import_module("rig.config.load").load(
+            DEMO
+        )  # builds the models of the sections, which takes longer than to use them
     gc.collect()
     gc.freeze()  # objects that are never scanned are shared, not copied
     if order := serve_orders(reading if reads else everything):
         fork_modules((LABORATORY, READER), addresses.__getitem__)
         sys.argv = ["", *order["words"]]
-        runpy.run_module(order["module"], run_name="__main__", alter_sys=True)
+        _run_and_end(order["module"])
+
+
+def _run_and_end(module: str) -> None:
+    """Run `python -m MODULE` and end as Python does, without clearing its memory.
+
+    Most of that is shared with the other processes, and would be copied first, which takes a fifth of a second. What
+    ends otherwise than by an exit status, or cannot write its last lines, is ended by Python.
+    """
+    status: object = None
+    try:
+        runpy.run_module(module, run_name="__main__", alter_sys=True)
+    except SystemExit as ended:
+        status = ended.code
+    if status is None or isinstance(status, int):
+        threading._shutdown()  # pyrefly: ignore[missing-attribute]  # of CPython itself
+        atexit._run_exitfuncs()
+        with suppress(OSError, ValueError, AttributeError):
+            sys.stdout.flush()
+            sys.stderr.flush()
+            os._exit(int(status or 0) & 0xFF)
+    sys.exit(status)  # pyrefly: ignore[bad-argument-type]  # as it was given
 
 
 if __name__ == "__main__":
