@@ -3,6 +3,7 @@
 import atexit
 import gc
 import os
+import re
 import signal
 import sys
 import tempfile
@@ -34,6 +35,9 @@ settings.load_profile("test")
 # leaves a processor idle: their files alternate with those that compute, of which there are some left for the end.
 WAITING = {"runner", "world", "turners", "page", "batch", "floor", "sensors"}
 WAITING_UNTIL = 0.75  # of the files
+
+# A file with this line has slow tests only.
+ALL_SLOW = re.compile(r"^pytestmark = \[?\s*pytest\.mark\.slow\b", re.MULTILINE)
 
 NURSERY = "rig's nursery"  # of what xdist hands to the processes that run tests
 
@@ -69,6 +73,12 @@ def pytest_configure_node(node: Any) -> None:
     if not nursery.closed:
         nursery.addresses = nursery.addresses or nursery.begin()
         node.workerinput[NURSERY] = nursery.addresses
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Where slow tests are left out, files that have no others are not imported, with all that they stand on."""
+    is_file = config.option.markexpr == "not slow" and collection_path.match("test_*.py")
+    return True if is_file and ALL_SLOW.search(collection_path.read_text(encoding="utf-8")) else None
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
