@@ -18,6 +18,8 @@ from rig.observation.consistency.arm_clock import find_encoder_noise_rad, state_
 from rig.observation.observed_run import ObservedRun, observe_runs
 from support.recordings.synthetic_run import Setup, synthetic_run
 
+pytestmark = pytest.mark.slow
+
 PPM = 1e-6
 SIMULATED, REAL = "URSoftware 5.14.0.0 (simulated)", "URSoftware 5.14.0.0"
 FAST = Setup(speed_deg_s=120, noise_rad_s=0.002)
@@ -73,7 +75,6 @@ def named(checks: Sequence[Check]) -> dict[str, Check]:
     return {check.name.removeprefix(begins): check for check in checks if check.name.startswith(begins)}
 
 
-@pytest.mark.slow
 def test_a_clock_that_runs_too_fast_is_found_by_the_computers() -> None:
     seen = observed(FAST, 1 - 40 * PPM)
     check = check_clock(seen, find_stated())
@@ -84,7 +85,6 @@ def test_a_clock_that_runs_too_fast_is_found_by_the_computers() -> None:
     assert 0.5 * PPM < check.std < 1 * PPM
 
 
-@pytest.mark.slow
 def test_where_the_computers_clock_says_nothing_the_crystal_does() -> None:
     seen = observed(with_crystal(40, crystal_ppm=5), 0.2)
     check = check_clock(seen, find_stated())
@@ -93,14 +93,12 @@ def test_where_the_computers_clock_says_nothing_the_crystal_does() -> None:
     assert check.std == pytest.approx(10.7 * PPM, rel=0.02)  # 20 ppm / √3, and that it is within 50 ppm anyway
 
 
-@pytest.mark.slow
 def test_without_another_clock_nothing_is_corrected() -> None:
     check = check_clock(observed(Setup(speed_deg_s=120), 0.2), find_stated())
     assert check.comparisons == () and check.error == 0.0
     assert check.std == pytest.approx(50 * PPM / np.sqrt(3))
 
 
-@pytest.mark.slow
 def test_the_jitter_of_the_states_is_measured() -> None:
     run = synthetic_run(Setup(speed_deg_s=120, encoder_noise_rad=0.0))  # which would count as jitter
     arm = run.states.copy()
@@ -114,7 +112,6 @@ def test_the_jitter_of_the_states_is_measured() -> None:
     assert state_jitter([seen, *exact]).std_s == pytest.approx(1e-4 / np.sqrt(2), rel=0.1)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("state_rate_hz", [125.0, 500.0])
 def test_the_noise_of_the_encoders_is_measured_at_the_joints_that_stand(state_rate_hz: float) -> None:
     for noise_rad in (0.0, 2.4e-5):
@@ -122,14 +119,12 @@ def test_the_noise_of_the_encoders_is_measured_at_the_joints_that_stand(state_ra
         assert find_encoder_noise_rad(seen) == pytest.approx(noise_rad, rel=0.05, abs=2e-6)
 
 
-@pytest.mark.slow
 def test_clocks_that_agree_pass_and_are_named_in_pairs() -> None:
     checks = of_clocks(with_crystal(40, crystal_ppm=-15), 1 - 40 * PPM)
     assert set(checks) == {"controller_and_computer", "controller_and_crystal", "computer_and_crystal"}
     assert all(check.passed and check.unit == "ppm" for check in checks.values())
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("controller_ppm", [-146, 500, 20_000])
 def test_a_controllers_clock_beyond_what_is_stated_fails_by_how_far_it_is_off(controller_ppm: float) -> None:
     check = of_clocks(with_crystal(controller_ppm))["controller_and_crystal"]
@@ -138,7 +133,6 @@ def test_a_controllers_clock_beyond_what_is_stated_fails_by_how_far_it_is_off(co
     assert check.limit == pytest.approx(70, abs=15)  # 50 of the controller's, 20 of the crystal's
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("computer", [-9e-3, 1e-3])
 def test_a_computers_clock_that_contradicts_both_fails_with_both(computer: float) -> None:
     checks = of_clocks(with_crystal(10), 1 + computer)
@@ -146,21 +140,18 @@ def test_a_computers_clock_that_contradicts_both_fails_with_both(computer: float
     assert failed == {"controller_and_computer", "computer_and_crystal"}
 
 
-@pytest.mark.slow
 def test_two_others_that_agree_name_the_controller() -> None:
     checks = of_clocks(with_crystal(300), 1 - 300 * PPM)
     assert checks["computer_and_crystal"].passed
     assert not checks["controller_and_computer"].passed and not checks["controller_and_crystal"].passed
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("pace", [0.98, 1.02, 8.0])
 def test_a_laboratory_that_is_simulated_at_a_pace_of_its_own_is_held_against_no_computer(pace: float) -> None:
     checks = of_clocks(with_crystal(10), 1 / pace)
     assert set(checks) == {"controller_and_crystal"} and checks["controller_and_crystal"].passed
 
 
-@pytest.mark.slow
 def test_the_computer_of_a_controller_that_is_real_is_a_clock_however_far_off_it_is() -> None:
     """Without a board, as of an instrument with a port of its own, nothing else tells."""
     checks = of_clocks(FAST, 1 / 1.02, REAL)
@@ -168,7 +159,6 @@ def test_the_computer_of_a_controller_that_is_real_is_a_clock_however_far_off_it
     assert checks["controller_and_computer"].value == pytest.approx(2e4, rel=0.01)
 
 
-@pytest.mark.slow
 def test_every_recording_of_a_run_is_compared_with_its_computer_and_the_worst_is_reported() -> None:
     whole = recorded(FAST, 1.0, REAL)
     assert named(calibrate([whole]).checks)["controller_and_computer"].passed
@@ -178,13 +168,11 @@ def test_every_recording_of_a_run_is_compared_with_its_computer_and_the_worst_is
     assert both.clock is not None and abs(both.clock.error) < 5 * PPM  # speeds go by the longest
 
 
-@pytest.mark.slow
 def test_a_board_that_says_it_follows_no_crystal_is_compared_with_nothing_however_near_it_runs() -> None:
     assert of_clocks(replace(with_crystal(40), follows_crystal=False)) == {}
     assert set(of_clocks(replace(with_crystal(40), follows_crystal=None))) == {"controller_and_crystal"}
 
 
-@pytest.mark.slow
 def test_clocks_are_in_the_verdict() -> None:
     found = calibrate([recorded(with_crystal(500), 0.2)])
     checks = named(found.checks)

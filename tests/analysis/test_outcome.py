@@ -19,6 +19,8 @@ from rig.observation.motion.arm_motion import ArmMotion
 from rig.observation.observe import observe_sensor
 from support.paths import RECORDINGS
 
+pytestmark = pytest.mark.slow
+
 
 def recorded(name: str) -> RunData:
     return read_run(RECORDINGS / "verified" / name)
@@ -42,7 +44,6 @@ def calls(*functions: Callable[..., Any]) -> Iterator[Counter[str]]:
         sys.setprofile(before)
 
 
-@pytest.mark.slow
 def test_two_recordings_of_two_sensors_are_four_observations() -> None:
     runs, repeated = [recorded("run.h5")], [recorded("verify.h5")]
     with calls(ArmMotion.__init__, estimate_time_base, observe_sensor) as counted:
@@ -57,7 +58,6 @@ def test_two_recordings_of_two_sensors_are_four_observations() -> None:
     assert outcome.results is calibration.results
 
 
-@pytest.mark.slow
 def test_the_delay_between_two_sensors_is_that_between_their_clock_fits() -> None:
     (recording,) = calibrate([recorded("run.h5")]).recordings
     late, none = recording.delay("gyro", behind="reference"), recording.delay("gyro", behind="gyro")
@@ -66,20 +66,17 @@ def test_the_delay_between_two_sensors_is_that_between_their_clock_fits() -> Non
     assert none.delay_s == 0.0
 
 
-@pytest.mark.slow
 def test_a_recording_without_sweeps_is_refused_by_name() -> None:
     with pytest.raises(Fault, match="too_few_observations: no finished sweep"):
         calibrate([replace(recorded("run.h5"), events=())])
 
 
-@pytest.mark.slow
 def test_an_estimator_nobody_knows_is_refused_before_anything_is_observed() -> None:
     with calls(observe_sensor) as counted, pytest.raises(Refused, match="unknown_estimator"):
         calibrate([recorded("run.h5")], estimator="newtun")
     assert not counted
 
 
-@pytest.mark.slow
 def test_stored_calibrations_are_verified_alone() -> None:
     repeated = [recorded("verify.h5")]
     outcome = verify_stored_calibrations(repeated)
@@ -88,7 +85,6 @@ def test_stored_calibrations_are_verified_alone() -> None:
     assert outcome.provenance.verified_utc == (repeated[0].provenance.started_utc,)
 
 
-@pytest.mark.slow
 def test_a_verification_that_was_not_recorded_has_not_passed() -> None:
     outcome = verify_calibration(calibrate([recorded("run.h5")]), [])
     assert not outcome.passed and not outcome.verifications

@@ -11,10 +11,11 @@ from rig.data.recording.run_data import RunData
 from rig.data.recording.run_file import read_run
 from support.paths import RECORDINGS
 
+pytestmark = pytest.mark.slow
+
 RECORDING = RECORDINGS / "six_observation" / "run.h5"
 
 
-@pytest.mark.slow
 def test_keys_the_configuration_no_longer_has_do_not_matter(tmp_path: Path) -> None:
     changed = Path(shutil.copy(RECORDING, tmp_path))
     with h5py.File(changed, "r+") as file:
@@ -22,7 +23,6 @@ def test_keys_the_configuration_no_longer_has_do_not_matter(tmp_path: Path) -> N
     assert calibrate([read_run(changed)]).checks == calibrate([read_run(RECORDING)]).checks
 
 
-@pytest.mark.slow
 def test_another_limit_gives_another_verdict() -> None:
     run: RunData = read_run(RECORDING)
     assert calibrate([run]).passed

@@ -27,6 +27,8 @@ from support.recordings.synthetic_run import (
     true_rate,
 )
 
+pytestmark = pytest.mark.slow
+
 REFERENCE_C = 25.0
 SETUP = Setup(repeats=6, noise_rad_s=0.002, mounting_error_rad=(0.0, 0.0, 0.0))
 SLOPE, SHARE = np.array([4e-4, -3e-4, 1e-4]), np.array([2e-4, -1e-4, 3e-4])  # rad/s/K, of a reading; 1/K of k
@@ -52,7 +54,6 @@ def outcome(warmed: RunData) -> Outcome:
     return calibrate([warmed])
 
 
-@pytest.mark.slow
 def test_the_calibration_is_that_of_the_reference_temperature(outcome: Outcome) -> None:
     result, budget = outcome.results["gyro"], outcome.results["gyro"].uncertainty
     assert budget is not None
@@ -64,7 +65,6 @@ def test_the_calibration_is_that_of_the_reference_temperature(outcome: Outcome) 
     assert failed == {"gyro.board_scale", "gyro.board_bias"}  # no board has solved these
 
 
-@pytest.mark.slow
 def test_the_polynomials_are_those_of_the_sensor(outcome: Outcome) -> None:
     found = outcome.polynomials["gyro"][RATE]
     stds = np.sqrt(np.diag(found.covariance))
@@ -77,7 +77,6 @@ def test_the_polynomials_are_those_of_the_sensor(outcome: Outcome) -> None:
     )
 
 
-@pytest.mark.slow
 def test_u_at_the_reference_is_that_of_the_budget(outcome: Outcome) -> None:
     budget = outcome.results["gyro"].uncertainty
     assert budget is not None
@@ -87,12 +86,10 @@ def test_u_at_the_reference_is_that_of_the_budget(outcome: Outcome) -> None:
     assert {line.name for line in entry.contributors} > {"noise", "controller clock", "temperature gradient"}
 
 
-@pytest.mark.slow
 def test_the_settings_keep_the_reference(warmed: RunData) -> None:
     assert settings_from_json(warmed.settings.to_json()).reference_c == REFERENCE_C
 
 
-@pytest.mark.slow
 def test_an_accelerometer_in_dwells_is_taken_there_as_well() -> None:
     """A real recording's dwells, gone through at six temperatures."""
     runs = open_run(RECORDINGS / "bias_drift").movement

@@ -26,6 +26,8 @@ from support.documents.certified import LABORATORY, read
 from support.paths import RECORDINGS
 from support.recordings.synthetic_run import Setup, synthetic_run
 
+pytestmark = pytest.mark.slow
+
 COUNTS_PER_K = 16
 PER_MINUTE_K = 3.0
 
@@ -38,7 +40,6 @@ def warming(run: RunData) -> RunData:
     return replace(run, samples={"gyro": samples})
 
 
-@pytest.mark.slow
 def test_a_sensor_that_warms_up_has_its_scale_and_its_bias_conditions_the_temperatures_of_their_own_readings() -> None:
     run = warming(synthetic_run(Setup()))
     recordings = observe_recordings([run])
@@ -57,7 +58,6 @@ def test_a_sensor_that_warms_up_has_its_scale_and_its_bias_conditions_the_temper
     assert held.scale.temperature_c != held.bias.temperature_c
 
 
-@pytest.mark.slow
 def test_a_result_keeps_its_temperature_and_says_both_beside_it() -> None:
     document = document_of(calibrate([warming(synthetic_run(Setup()))]))
     sensor = document.gyroscopes["gyro"]
@@ -83,7 +83,6 @@ def parsed_attributes(sensor: RecordedSensor) -> dict[str, Any]:
     return {**attributes, "channels": json.loads(attributes["channels"])}
 
 
-@pytest.mark.slow
 def test_a_sensor_without_thermometer_is_certified_at_the_temperature_that_was_stated() -> None:
     document = document_of(calibrate([without_thermometer(synthetic_run(Setup(stated_kinematics=NOMINAL)))]))
     sensor = document.gyroscopes["gyro"]
@@ -101,7 +100,6 @@ def test_a_sensor_without_thermometer_is_certified_at_the_temperature_that_was_s
     assert "temperature of the item at the biases, as stated" in conditions and "own thermometer" not in conditions
 
 
-@pytest.mark.slow
 def test_an_accelerometer_s_scale_and_bias_refer_to_the_stated_temperature() -> None:
     run = open_run(RECORDINGS / "imu").movement[0]
     result = calibrate([warming(run)])
@@ -113,7 +111,6 @@ def test_an_accelerometer_s_scale_and_bias_refer_to_the_stated_temperature() -> 
     np.testing.assert_allclose(own.warmer_k[: len(dwells_c)], np.subtract(dwells_c, entry.temperature_c))
 
 
-@pytest.mark.slow
 def test_what_was_recorded_again_was_read_when_it_was_recorded_last() -> None:
     first, again = (synthetic_run(Setup(seed=seed)) for seed in (1, 2))
     later = datetime.fromisoformat(first.provenance.started_utc) + timedelta(hours=2)
@@ -122,7 +119,6 @@ def test_what_was_recorded_again_was_read_when_it_was_recorded_last() -> None:
     assert later < held.bias.from_utc < held.bias.to_utc < later + timedelta(minutes=3)
 
 
-@pytest.mark.slow
 def test_axes_that_lean_are_loaded_with_less_than_the_speed_of_the_sweeps() -> None:
     lean = np.radians(12)
     result = calibrate([synthetic_run(Setup(noise_rad_s=0.002, mounting_error_rad=(float(lean), 0.0, 0.0)))])
@@ -135,7 +131,6 @@ def test_axes_that_lean_are_loaded_with_less_than_the_speed_of_the_sweeps() -> N
     assert load_words(document_of(result).gyroscopes["gyro"]) == "x 60.0, y 58.7, z 58.7"
 
 
-@pytest.mark.slow
 def test_aligned_axes_have_the_speed_of_the_sweeps_and_no_rates_of_their_own_are_stated() -> None:
     result = calibrate([synthetic_run(Setup(mounting_error_rad=(0.0, 0.0, 0.0)))])
     assert load_words(document_of(result).gyroscopes["gyro"]) is None

@@ -12,6 +12,8 @@ from rig.config.load import load
 from support.laboratories.commands import CI, rig_here
 from support.laboratories.worlds import fresh_host
 
+pytestmark = pytest.mark.slow
+
 BOARD_PORT, HISTORY_PORT = 7321, 5432
 
 
@@ -40,7 +42,6 @@ def nobody_calls(host: str) -> Iterator[None]:
                 server.accept()
 
 
-@pytest.mark.slow
 def test_a_run_of_somebody_else_connects_to_what_the_user_names(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -58,7 +59,6 @@ def test_a_run_of_somebody_else_connects_to_what_the_user_names(
     assert "rig: no_port: " in rig_here("resume", folder, "--yes", *named).stderr
 
 
-@pytest.mark.slow
 def test_a_run_is_gone_on_with_where_its_devices_answer_now_and_nothing_else_changes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -77,7 +77,6 @@ def test_a_run_is_gone_on_with_where_its_devices_answer_now_and_nothing_else_cha
     assert all(f"--connect {each}" in asked.stderr for each in (arm, kept))
 
 
-@pytest.mark.slow
 def test_a_configuration_that_was_changed_since_is_not_one_s_own(tmp_path: Path) -> None:
     folder, (host, *_) = interrupted_run(tmp_path)
     config = folder / "config.yaml"

@@ -12,9 +12,10 @@ from support.laboratories.commands import rig
 from support.laboratories.worlds import World
 from support.paths import DEMO
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.thorough
-@pytest.mark.slow
 def test_a_laboratory_whose_port_is_taken_is_refused_by_the_worlds_own_words_and_a_command_moves_its_own(
     world: World,
 ) -> None:
@@ -30,7 +31,6 @@ def test_a_laboratory_whose_port_is_taken_is_refused_by_the_worlds_own_words_and
     assert running.host not in done.stdout
 
 
-@pytest.mark.slow
 def test_a_laboratory_that_breaks_before_it_is_ready_says_how_it_ended(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -13,6 +13,8 @@ from rig.history.store import open_history
 from support.history.past_runs import finish_run
 from support.paths import DEMO, RECORDINGS
 
+pytestmark = pytest.mark.slow
+
 # What takes long to load: the recordings' library, the solver's, the arm's client, plots, the page's server.
 SLOW = ("h5py", "scipy", "rtde_control", "rtde_receive", "rtde_io", "matplotlib", "uvicorn", "distributed", "joblib")
 COMMAND = """
@@ -57,33 +59,28 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("words", [(), ("list", "--csv"), ("G-0",), ("show", "1")])
 def test_what_the_history_knows_is_told_without_them(words: tuple[str, ...], place: Path) -> None:
     assert loaded("history", *words) == ([], [])
 
 
 @pytest.mark.thorough
-@pytest.mark.slow
 def test_a_comparison_loads_no_more_than_its_limit_needs(place: Path) -> None:
     assert {library for libraries in loaded("history", "compare", "1", "3") for library in libraries} <= {"scipy"}
 
 
 @pytest.mark.thorough
-@pytest.mark.slow
 def test_a_report_is_written_without_them(place: Path) -> None:
     run = shutil.copytree(RECORDINGS / "six_observation", place / "run")
     assert {library for libraries in loaded("report", run) for library in libraries} <= {"scipy"}  # for Student's t
 
 
 @pytest.mark.thorough
-@pytest.mark.slow
 def test_the_steps_of_a_plan_are_told_before_what_takes_longer_to_find() -> None:
     first, last = loaded("plan", DEMO)
     assert first == [] and set(last) <= {"scipy"}  # for how small a disturbance its checks can notice
 
 
-@pytest.mark.slow
 def test_the_process_that_the_arms_client_lives_in_waits_for_no_library() -> None:
     libraries = ("numpy", "pydantic", "yaml", "scipy")
     command = f"import rig.turners.ur.child.client_process, sys; print([n for n in {libraries} if n in sys.modules])"
@@ -91,7 +88,6 @@ def test_the_process_that_the_arms_client_lives_in_waits_for_no_library() -> Non
     assert done.stdout.strip() == "[]"
 
 
-@pytest.mark.slow
 def test_a_plan_reads_no_recording_and_a_result_is_shown_without_the_analysis() -> None:
     unused: tuple[str, ...] = ("rig.data.recording.run_file", "rig.data.recording.provenance", "rig.data.result_file")
     assert loaded("plan", DEMO, among=unused) == ([], [])

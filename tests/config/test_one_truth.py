@@ -9,6 +9,8 @@ from rig.config.load import load
 from rig.world.world_section import read_world_section
 from support.paths import CONFIGS
 
+pytestmark = pytest.mark.slow
+
 # How a part is mounted, filtered and warmed is another matter in every run.
 OF_THE_RUN = {
     "mounting_error_deg", "offset_mm", "temperature_c", "start_temperature_c", "warm_up_s", "bandwidth_hz", "delay_ms",
@@ -45,7 +47,6 @@ def simulated() -> list[tuple[str, str, dict[str, Any]]]:
     return found
 
 
-@pytest.mark.slow
 def test_a_serial_number_has_one_truth_in_all_configurations() -> None:
     first: dict[str, tuple[str, dict[str, Any]]] = {}
     differs = []

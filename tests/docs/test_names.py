@@ -5,11 +5,12 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 REPOSITORY = Path(__file__).parents[2]
 COULD_BE_ANYTHING = re.compile(r"\bdef (\w+)\((?:[^)]*?,)?\s*(found|each|said|it|thing):")
 
 
-@pytest.mark.slow
 def test_no_parameter_is_called_by_a_word_that_could_mean_anything() -> None:
     modules = [*(REPOSITORY / "rig").rglob("*.py"), *(REPOSITORY / "firmware_host").rglob("*.py")]
     called = [

@@ -7,6 +7,8 @@ from rig.estimation.gyroscope.vector_fit import Explained, VectorInputs, explain
 from rig.estimation.residuals import dwell_residual_std_m_s2, residual_std_rad_s
 from support.recordings import drawn_accelerations
 
+pytestmark = pytest.mark.slow
+
 SPEED_RAD_S, NOISE_RAD_S, SPEED_STD_RAD_S = 1.0, 2e-4, 1.5e-4
 MATRIX = np.array([[1.1, 0.02, 0.0], [0.0, 0.9, 0.01], [0.01, 0.0, 1.05]])
 
@@ -36,7 +38,6 @@ def session(rng: np.random.Generator, walk_rad_s_sqrt_s: float = 0.0) -> Explain
     )
 
 
-@pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.parametrize(("walk_rad_s_sqrt_s", "within"), [(0.0, 0.08), (2e-4, 0.2)])
 def test_residuals_scatter_by_what_is_expected_of_them(walk_rad_s_sqrt_s: float, within: float, thorough: bool) -> None:
@@ -49,7 +50,6 @@ def test_residuals_scatter_by_what_is_expected_of_them(walk_rad_s_sqrt_s: float,
 
 @pytest.mark.thorough
 @pytest.mark.one_in(2)
-@pytest.mark.slow
 @pytest.mark.parametrize("part", ["lsm9ds1", "mpu9250", "adis16465", "kvh1775"])
 def test_sensors_within_their_data_sheets_leave_what_the_solve_expects_of_them(part: str) -> None:
     """Two standard deviations hold nine tenths and more; noise and attitudes alone would make it two to six."""

@@ -7,6 +7,8 @@ from rig.estimation.statistics.coverage import coverage_factors
 from rig.history.series import UNCHANGED, changes_in
 from rig.report.findings.history_records import Parameter
 
+pytestmark = pytest.mark.slow
+
 ALARMS = 1 - UNCHANGED
 PAIRS = 1500
 # How many values a sensor has, and their degrees of freedom.
@@ -38,7 +40,6 @@ def alarms(pairs: list[tuple[dict[str, Parameter], dict[str, Parameter]]]) -> fl
 
 @pytest.mark.thorough
 @pytest.mark.one_in(4)
-@pytest.mark.slow
 @pytest.mark.parametrize("correlation", [0.0, 0.9])
 @pytest.mark.parametrize("sensor", SENSORS)
 def test_an_undamaged_part_has_changed_in_one_of_fifty_comparisons_at_most(sensor: str, correlation: float) -> None:
@@ -52,7 +53,6 @@ def test_an_undamaged_part_has_changed_in_one_of_fifty_comparisons_at_most(senso
 
 
 @pytest.mark.thorough
-@pytest.mark.slow
 def test_all_values_of_a_run_are_one_comparison() -> None:
     random, dof = np.random.default_rng(2), np.full(12, np.inf)
     sensors = [[(drawn(random, dof, 0.0), drawn(random, dof, 0.0)) for _ in range(4)] for _ in range(400)]
@@ -60,7 +60,6 @@ def test_all_values_of_a_run_are_one_comparison() -> None:
     assert share <= ALARMS + 3 * np.sqrt(ALARMS / 400)
 
 
-@pytest.mark.slow
 def test_a_change_of_2_u_in_one_value_of_nineteen_is_reported() -> None:
     """2 U of the change: noise hides it in a quarter of the comparisons, and in none if it is what both results say."""
     random, dof = np.random.default_rng(3), np.full(19, np.inf)

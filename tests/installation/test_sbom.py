@@ -10,8 +10,9 @@ from packaging.utils import canonicalize_name
 
 from support.paths import ROOT
 
+pytestmark = pytest.mark.slow
 
-@pytest.mark.slow
+
 @pytest.mark.proof
 @pytest.mark.thorough
 def test_the_bill_of_materials_lists_all_that_is_locked() -> None:

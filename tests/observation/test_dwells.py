@@ -9,6 +9,8 @@ from rig.observation.statistics.mean import Mean
 from rig.observation.statistics.vibration_noise import average_standstill
 from rig.observation.windows import Window
 
+pytestmark = pytest.mark.slow
+
 NOISE_M_S2, SHAKEN_M_S2, LASTING_S = 0.004, 0.02, 3.0
 
 
@@ -21,7 +23,6 @@ def dwelt(seed: int) -> tuple[Mean, Array]:
     return average_standstill(readings, time_s, Window(0.0, LASTING_S), Steps(1e-5))[0], true
 
 
-@pytest.mark.slow
 def test_a_shaken_dwell_s_noise_is_that_of_all_its_readings() -> None:
     """Were it that of few low frequencies, one dwell would weigh three times as much as another like it."""
     found = [dwelt(seed) for seed in range(60)]

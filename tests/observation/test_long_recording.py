@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 from rig.estimation.arrays import Array
 from rig.observation.clocks.clock_estimate import estimate_time_base
 
+pytestmark = pytest.mark.slow
+
 HOURS_S = 3 * 3600.0
 TURN_S, EVERY_S = 4.0, 300.0  # how long a turn lasts, and how often there is one
 
@@ -37,7 +39,6 @@ class Turns:
 
 
 @pytest.mark.thorough
-@pytest.mark.slow
 @pytest.mark.parametrize("first_s", [100.0, 2500.0], ids=["from the beginning", "after forty minutes at rest"])
 def test_a_clock_of_hours_may_be_off_as_far_as_one_of_minutes(first_s: float) -> None:
     motion, drift, offset_s = Turns(first_s), 2e-3, 1.7

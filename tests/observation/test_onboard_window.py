@@ -8,6 +8,8 @@ from rig.observation.onboard_window import revolution_on_the_board
 from rig.observation.windows import swept
 from support.recordings.synthetic_run import Setup, synthetic_run
 
+pytestmark = pytest.mark.slow
+
 
 def told(run: RunData, setup: Setup, sweep: int) -> tuple[float, float]:
     """The error, s, of the revolution's middle on the board's clock, and its speed in °/s.
@@ -37,7 +39,6 @@ def told(run: RunData, setup: Setup, sweep: int) -> tuple[float, float]:
 
 
 @pytest.mark.one_in(3)
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "setup",
     [Setup(), Setup(speed_deg_s=10.0, rest_s=0.5), Setup(sample_rate_hz=14.9, noise_rad_s=0.005)],

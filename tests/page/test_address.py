@@ -7,8 +7,9 @@ import pytest
 from support.laboratories.commands import rig
 from support.paths import CONFIGS
 
+pytestmark = pytest.mark.slow
 
-@pytest.mark.slow
+
 def test_a_run_that_is_refused_at_once_tells_no_address_of_a_page_that_is_gone(tmp_path: Path) -> None:
     config = CONFIGS / "ur10e_lsm9ds1.yaml"
     refused = rig(

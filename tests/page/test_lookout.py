@@ -16,6 +16,8 @@ from rig.station.events import StepFinished
 from support.page.scripted_runs import moving, plan_demo
 from support.processes.waiting import wait_for
 
+pytestmark = pytest.mark.slow
+
 
 def helper() -> int:
     """The process that looks, a child of this one; zero before there is one."""
@@ -34,7 +36,6 @@ def swept() -> StepFinished:
     return next(event for event in finished if isinstance(event.step, Sweep))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["SIGKILL", "SIGTERM"])
 @pytest.mark.parametrize("asked", ["before", "after"])
 def test_a_helper_that_is_killed_is_told_of_and_harms_nothing(

@@ -16,6 +16,8 @@ from rig.page.rows import Look, look_of
 from rig.station.events import ArmSeen, PhaseStarted, Progress, SamplesTaken, StepFinished, StepStarted
 from support.recordings.synthetic_run import Setup, synthetic_run
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def run() -> RunData:
@@ -32,7 +34,6 @@ def replayed(run: RunData) -> list[Moment]:
     return list(moments(run))
 
 
-@pytest.mark.slow
 def test_steps_come_in_order_and_time_goes_on(replayed: list[Moment]) -> None:
     assert isinstance(replayed[0].event, PhaseStarted)
     assert all(one.at_s <= other.at_s for one, other in pairwise(replayed))
@@ -45,7 +46,6 @@ def test_steps_come_in_order_and_time_goes_on(replayed: list[Moment]) -> None:
     assert progress[-1].remaining_s < 0.2
 
 
-@pytest.mark.slow
 def test_the_arm_and_the_samples_are_those_of_that_moment(run: RunData, replayed: list[Moment]) -> None:
     seen = [moment for moment in replayed if isinstance(moment.event, ArmSeen)]
     for moment in seen[:: len(seen) // 20]:
@@ -58,7 +58,6 @@ def test_the_arm_and_the_samples_are_those_of_that_moment(run: RunData, replayed
     assert last.sensors[0].samples == len(run.samples["gyro"]) and last.sensors[0].lost == 0
 
 
-@pytest.mark.slow
 def test_what_is_shown_at_the_end_is_all_of_it(replayed: list[Moment]) -> None:
     shown = PageState(About("", "", replayed=True, arm={"model": "UR10e or UR12e", "serial_number": "2026"}))
     for moment in replayed:
@@ -71,7 +70,6 @@ def test_what_is_shown_at_the_end_is_all_of_it(replayed: list[Moment]) -> None:
     assert shown.sections["parameters"][0]["scale"][0] == pytest.approx(1.1771, rel=1e-3)
 
 
-@pytest.mark.slow
 def test_a_value_is_rounded_on_the_screen_alone(run: RunData) -> None:
     """Rounded twice, its last digit there would be another than at the terminal."""
     found = so_far([run])

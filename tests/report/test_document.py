@@ -21,13 +21,14 @@ from rig.report.terminal.result_table import print_result
 from support.paths import RECORDINGS
 from support.recordings.synthetic_run import Setup, synthetic_run
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def outcome() -> Outcome:
     return calibrate([read_run(RECORDINGS / "six_observation" / "run.h5")])
 
 
-@pytest.mark.slow
 def test_the_keys_stand_in_the_order_they_always_had(outcome: Outcome) -> None:
     old = json.loads((RECORDINGS / "six_observation" / "result.json").read_text(encoding="utf-8"))
     new = json.loads(document_of(outcome).text())
@@ -36,7 +37,6 @@ def test_the_keys_stand_in_the_order_they_always_had(outcome: Outcome) -> None:
     assert list(new["gyroscopes"]["gyro"]) == list(old["gyroscopes"]["gyro"])
 
 
-@pytest.mark.slow
 def test_a_limit_that_was_not_set_is_not_written_as_a_number(outcome: Outcome) -> None:
     unset = Check("gyro.verification_rms", 0.0, None, "rad/s", Meaning("conformity", "gyro", "rate"))
     document = json.loads(document_of(replace(outcome, checks=(*outcome.checks, unset))).text())
@@ -53,7 +53,6 @@ def test_a_limit_that_was_not_set_is_not_written_as_a_number(outcome: Outcome) -
     assert document["verdict"] == "fail"
 
 
-@pytest.mark.slow
 def test_a_reference_has_no_solution_of_the_board() -> None:
     found = calibrate([read_run(RECORDINGS / "verified" / "run.h5")])
     sensors = json.loads(document_of(found).text())["gyroscopes"]
@@ -61,7 +60,6 @@ def test_a_reference_has_no_solution_of_the_board() -> None:
     assert (sensors["reference"]["role"], "board" in sensors["reference"]) == ("reference", False)
 
 
-@pytest.mark.slow
 def test_a_field_the_document_does_not_have_is_not_written(outcome: Outcome) -> None:
     with pytest.raises(TypeError, match="CheckEntry has no limits"):
         entry(CheckEntry, outcome.checks[0], limits=1.0)
@@ -69,7 +67,6 @@ def test_a_field_the_document_does_not_have_is_not_written(outcome: Outcome) -> 
         entry(CheckEntry, name="gyro.scale", value=None, limit=None, unit="1")
 
 
-@pytest.mark.slow
 def test_the_result_says_which_arm_was_reckoned_with_and_at_what_speed_it_is_valid() -> None:
     document = document_of(calibrate([synthetic_run(Setup(stated_kinematics=NOMINAL))]))
     assert document.provenance.arm_kinematics is not None

@@ -9,9 +9,10 @@ import pytest
 
 from support.paths import RECORDINGS
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.thorough
-@pytest.mark.slow
 def test_a_matplotlibrc_in_the_working_folder_changes_nothing(tmp_path: Path) -> None:
     drawn = []
     for name, settings in (("plain", ""), ("foreign", "text.usetex: True\nfigure.facecolor: red\n")):

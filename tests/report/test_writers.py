@@ -18,13 +18,14 @@ from support.paths import RECORDINGS, ROOT
 from support.processes.full_disk import full_disk
 from support.processes.waiting import PATIENCE_S
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def outcome() -> Outcome:
     return calibrate([read_run(RECORDINGS / "six_observation" / "run.h5")])
 
 
-@pytest.mark.slow
 def test_the_folder_holds_header_certificate_and_result(outcome: Outcome, tmp_path: Path) -> None:
     written = [DocumentWritten(tmp_path / name) for name in ("calibration.h", "certificate.html", "result.json")]
     assert list(writers.write_outcome(tmp_path, outcome)) == written
@@ -36,7 +37,6 @@ def on_a_full_disk(outcome: Outcome, document: ResultDocument, folder: Path) -> 
     raise OSError(28, "No space left on device")
 
 
-@pytest.mark.slow
 def test_a_run_whose_documents_fail_is_not_ended_and_no_document_says_that_it_passed(
     outcome: Outcome, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -46,7 +46,6 @@ def test_a_run_whose_documents_fail_is_not_ended_and_no_document_says_that_it_pa
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("room_bytes", [1000, 4000, 20_000])
 def test_on_a_full_disk_no_document_lies_without_its_result(outcome: Outcome, tmp_path: Path, room_bytes: int) -> None:
     with full_disk(room_bytes), pytest.raises(OSError, match=f"too large: '{tmp_path}"):
@@ -54,7 +53,6 @@ def test_on_a_full_disk_no_document_lies_without_its_result(outcome: Outcome, tm
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.slow
 def test_the_result_takes_its_place_first(outcome: Outcome, tmp_path: Path) -> None:
     """Whatever ends the program between two of them; here a folder lies where the last one belongs."""
     (tmp_path / "calibration.h").mkdir()
@@ -81,7 +79,6 @@ print(*(event.path.name for event in write_outcome(Path(sys.argv[2]), calibrate(
 """
 
 
-@pytest.mark.slow
 def test_a_writer_of_ones_own_is_a_file_and_a_line(tmp_path: Path) -> None:
     house = tmp_path / "house"
     shutil.copytree(ROOT / "rig", house / "rig")  # with what is compiled of it already

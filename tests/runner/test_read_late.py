@@ -12,11 +12,12 @@ from support.laboratories.ideal import ideal_document
 from support.laboratories.worlds import fresh_host, merge
 from support.paths import CONFIGS, ROOT
 
+pytestmark = pytest.mark.slow
+
 SCRIPT = ROOT / "tests" / "support" / "motions" / "read_late.py"
 ONE_SWEEP = {"name": "read_late", "speed_deg_s": 170, "acceleration_deg_s2": 700, "rest_s": 0.5}
 
 
-@pytest.mark.slow
 def test_what_is_read_after_the_last_motion_is_recorded(tmp_path: Path) -> None:
     host, config = fresh_host(), tmp_path / "config.yaml"
     address = {"arm": {"host": host}, "sensors": {"imu1": {"mavlink": {"port": f"socket://{host}:5760"}}}}

@@ -22,6 +22,8 @@ from support.recordings import damaged_accelerations
 from support.recordings.damaged_readings import offset, readings_of, replace_readings
 from support.recordings.synthetic_run import Setup
 
+pytestmark = pytest.mark.slow
+
 SCRIPT = find_installed_script("six_observation")
 SETUP = Setup(noise_rad_s=0.005)
 
@@ -38,14 +40,12 @@ def known_to_the_board(run: RunData) -> RunData:
     )
 
 
-@pytest.mark.slow
 def test_sweeps_that_agree_count() -> None:
     run = known_to_the_board(readings_of(SETUP).recording())
     assert resumption([run], run.settings, SCRIPT).done == set(range(6))
 
 
 @pytest.mark.thorough
-@pytest.mark.slow
 def test_a_sweep_that_contradicts_the_others_is_repeated() -> None:
     """And the one about the same axis the other way, for which of the two was disturbed nobody can tell."""
     damaged = offset(0.02, lambda seen: seen.sweep(4))(readings_of(SETUP))
@@ -54,7 +54,6 @@ def test_a_sweep_that_contradicts_the_others_is_repeated() -> None:
 
 
 @pytest.mark.thorough
-@pytest.mark.slow
 def test_a_sweep_that_only_the_accelerometer_contradicts_is_repeated() -> None:
     sound = damaged_accelerations.readings_of("imu", "gyro")
     damaged = damaged_accelerations.offset(0.02, lambda seen: seen.sweep(4))(sound)
@@ -68,7 +67,6 @@ def by_script(run: RunData, script: ScriptFile) -> RunData:
     return replace(run, provenance=replace(run.provenance, script_sha256=script.sha256))
 
 
-@pytest.mark.slow
 def test_a_sweep_with_a_spike_is_repeated() -> None:
     """One wrong reading of hundreds changes the mean by little, but the verdict would fail by it."""
     seen = readings_of(SETUP)
@@ -83,7 +81,6 @@ def test_a_sweep_with_a_spike_is_repeated() -> None:
     }
 
 
-@pytest.mark.slow
 def test_nothing_counts_of_a_recording_whose_clock_was_set() -> None:
     """None of its sweeps could be put on one clock with the board's readings."""
     run = known_to_the_board(readings_of(SETUP).recording())
@@ -92,7 +89,6 @@ def test_nothing_counts_of_a_recording_whose_clock_was_set() -> None:
     assert resumption([replace(run, states=states)], run.settings, SCRIPT).done == frozenset()
 
 
-@pytest.mark.slow
 def test_what_was_repeated_counts_in_its_place() -> None:
     damaged = known_to_the_board(offset(0.02, lambda seen: seen.sweep(4))(readings_of(SETUP)).recording())
     again = known_to_the_board(readings_of(replace(SETUP, seed=2)).recording())
@@ -100,7 +96,6 @@ def test_what_was_repeated_counts_in_its_place() -> None:
     assert resumption([damaged, again], damaged.settings, SCRIPT).done == set(range(6))
 
 
-@pytest.mark.slow
 def test_what_was_read_at_rest_beside_a_repeated_sweep_does_not_count() -> None:
     """A bad contact in the rest before sweep 4: the run ended there, and went on with sweep 4 when it was mended."""
     seen = readings_of(SETUP)
@@ -124,7 +119,6 @@ def part(run: RunData, from_s: float, to_s: float) -> RunData:
 
 
 @pytest.mark.thorough
-@pytest.mark.slow
 def test_a_finished_run_repeats_the_sweep_that_its_verdict_named(tmp_path: Path) -> None:
     """Something moved the bench during sweep 4: the recording shows it, and the verdict named it."""
     out = tmp_path / "run"

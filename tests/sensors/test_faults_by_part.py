@@ -21,7 +21,7 @@ from support.wires import autopilot_on_a_wire as autopilots
 from support.wires import kvh_on_a_wire as kvhs
 from support.wires.printed_lines import pty_printing, sensor_section
 
-pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")]
 
 ROWS = """
 fault                 lines                  mavlink               kvh1775
@@ -134,7 +134,6 @@ BENCHES = {"lines": of_lines, "mavlink": of_mavlink, "kvh1775": of_kvh}
 
 
 @pytest.mark.one_in(3)
-@pytest.mark.slow
 @pytest.mark.parametrize(("part", "fault", "name"), list(table()))
 def test_a_fault_has_its_parts_name(part: str, fault: str, name: str) -> None:
     patience = Patience(silent_s=0.5) if fault in LATER else Patience(first_s=1.0)

@@ -16,6 +16,8 @@ from rig.sensors.mavlink.autopilot_source import MavlinkSource, look, mavlink
 from support.processes.waiting import wait_for, wait_for_error
 from support.wires.autopilot_on_a_wire import BIAS_RAD_S, UID, AutopilotOnAWire, autopilot_on_a_wire, section
 
+pytestmark = pytest.mark.slow
+
 UNCORRECTED = {
     "ardupilot": {"INS_GYROFFS_X": 0.01, "INS_ACCOFFS_Z": 0.3, "INS_ACCSCAL_Z": 1.05, "AHRS_ORIENTATION": 6},
     "px4": {"CAL_GYRO0_XOFF": 0.01, "CAL_ACC0_ZOFF": 0.3, "CAL_ACC0_ZSCALE": 1.05, "SENS_BOARD_ROT": 6},
@@ -52,7 +54,6 @@ class Listening:
 
 
 @pytest.mark.one_in(3)
-@pytest.mark.slow
 @pytest.mark.parametrize("firmware", ["ardupilot", "px4"])
 @pytest.mark.parametrize("imu", ["HIGHRES_IMU", "SCALED_IMU"])
 def test_readings_are_raw_again_whatever_the_parameters(firmware: Any, imu: str) -> None:
@@ -74,7 +75,6 @@ def test_readings_are_raw_again_whatever_the_parameters(firmware: Any, imu: str)
 
 
 @pytest.mark.one_in(3)
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("imu", "of_it"),
     [
@@ -100,7 +100,6 @@ def test_a_temperature_that_is_not_provided_is_none_or_the_stated_one(imu: str, 
         assert described.channel(TEMPERATURE).values(samples)[-1] == 31.0 and "31 °C is stated" in told
 
 
-@pytest.mark.slow
 def test_px4_reads_its_barometer_now_and_then_and_its_temperature_stands_meanwhile() -> None:
     with autopilot_on_a_wire("px4") as wire, Listening({"imu": section(wire.port, rate_hz=100)}) as heard:
         samples = heard.hear(60)
@@ -108,7 +107,6 @@ def test_px4_reads_its_barometer_now_and_then_and_its_temperature_stands_meanwhi
     assert described.channel(TEMPERATURE).values(samples) == pytest.approx(np.full(len(samples), 25.0))
 
 
-@pytest.mark.slow
 def test_three_imus_at_one_port_are_read_at_once() -> None:
     left = {"INS_GYR2OFFS_Y": 0.5, "INS_GYR3OFFS_Y": -0.5}
     imus = {"a": "SCALED_IMU", "b": "SCALED_IMU2", "c": "SCALED_IMU3"}
@@ -120,7 +118,6 @@ def test_three_imus_at_one_port_are_read_at_once() -> None:
                 assert rates.mean(axis=0) == pytest.approx(np.negative(BIAS_RAD_S), abs=1e-3)
 
 
-@pytest.mark.slow
 def test_lost_messages_are_missing_and_doubled_ones_are_not_there_twice() -> None:
     with autopilot_on_a_wire() as wire, Listening({"imu": section(wire.port)}) as heard:
         wire.faults.doubled = 0.3
@@ -135,7 +132,6 @@ def test_lost_messages_are_missing_and_doubled_ones_are_not_there_twice() -> Non
 
 
 @pytest.mark.thorough
-@pytest.mark.slow
 def test_milliseconds_that_begin_anew_go_on() -> None:
     wrap_us = 2**32 * 1e3
     with (
@@ -149,7 +145,6 @@ def test_milliseconds_that_begin_anew_go_on() -> None:
 
 
 @pytest.mark.one_in(5)
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("firmware", "imu", "left", "name"),
     [
@@ -170,14 +165,12 @@ def test_what_cannot_be_undone_is_refused(firmware: Any, imu: str, left: dict[st
     assert caught.value.problem.name == name
 
 
-@pytest.mark.slow
 def test_px4_readings_that_no_estimator_touches_are_taken_beside_one() -> None:
     with autopilot_on_a_wire("px4", {"EKF2_EN": 1}) as wire:
         Listening({"imu": section(wire.port, "SCALED_IMU")}).__exit__()
 
 
 @pytest.mark.one_in(3)
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("spoil", "changes", "name"),
     [
@@ -196,7 +189,6 @@ def test_what_is_not_ready_is_refused(
     assert caught.value.problem.name == name
 
 
-@pytest.mark.slow
 def test_an_autopilot_that_arms_while_it_streams_ends_it() -> None:
     with autopilot_on_a_wire(uptime_s=100.0) as wire, Listening({"imu": section(wire.port)}) as heard:
         heard.hear(10)
@@ -205,7 +197,6 @@ def test_an_autopilot_that_arms_while_it_streams_ends_it() -> None:
         assert wait_for_error(SensorError, heard.source.check).problem.name == "autopilot_armed"
 
 
-@pytest.mark.slow
 def test_a_look_says_what_is_undone() -> None:
     with autopilot_on_a_wire("ardupilot", {"INS_GYROFFS_X": 0.01}) as wire:
         seen = list(look({"imu": section(wire.port)}))

@@ -6,9 +6,10 @@ import pytest
 from rig.study.budget import Effects, errors, study
 from rig.study.study_report import Settings
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.thorough
-@pytest.mark.slow
 @pytest.mark.one_in(3)
 @pytest.mark.proof
 @pytest.mark.parametrize("noise_rad_s", [0.002, 0.035])
@@ -24,7 +25,6 @@ def test_the_stated_uncertainty_covers_the_truth(speed_deg_s: float, noise_rad_s
 
 
 @pytest.mark.thorough
-@pytest.mark.slow
 @pytest.mark.proof
 def test_without_the_remedies_it_does_not(thorough: bool) -> None:
     coverage = np.array(study(Settings(runs=600 if thorough else 60)).columns["coverage_percent"]).reshape(2, 6)

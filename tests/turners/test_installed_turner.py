@@ -11,6 +11,8 @@ import pytest
 from support.paths import ROOT
 from support.processes.waiting import PATIENCE_S
 
+pytestmark = pytest.mark.slow
+
 ENTRIES = """
 [rig.turners]
 turntable = support.extensions.turntable:KIND
@@ -68,7 +70,6 @@ def ran(environment: dict[str, str], *command: str, status: int = 0) -> str:
 
 
 @pytest.mark.thorough
-@pytest.mark.slow
 def test_its_states_come_back_as_it_told_them(recorded: Path, installed: dict[str, str]) -> None:
     described, shapes = ran(installed, "-c", READ, str(recorded / "run.h5")).splitlines()
     turner = json.loads(described)
@@ -79,7 +80,6 @@ def test_its_states_come_back_as_it_told_them(recorded: Path, installed: dict[st
 
 
 @pytest.mark.thorough
-@pytest.mark.slow
 def test_its_recording_is_solved_shown_and_exported(recorded: Path, installed: dict[str, str], tmp_path: Path) -> None:
     result = json.loads((recorded / "result.json").read_text(encoding="utf-8"))
     assert result["verdict"] == "pass" and [check["name"] for check in result["checks"]] == ["gyro.speed"]
@@ -96,7 +96,6 @@ def test_its_recording_is_solved_shown_and_exported(recorded: Path, installed: d
 
 
 @pytest.mark.thorough
-@pytest.mark.slow
 def test_it_is_planned_and_looked_at_by_its_configuration(recorded: Path, installed: dict[str, str]) -> None:
     config = str(recorded / "config.yaml")
     plan = ran(installed, "-m", "rig", "plan", config)

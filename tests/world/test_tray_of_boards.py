@@ -10,9 +10,10 @@ from rig.config.load import load
 from rig.world.world_process import World
 from support.laboratories.commands import configuration
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.thorough
-@pytest.mark.slow
 def test_of_a_tray_of_boards_only_the_one_that_is_laid_in_takes_memory(tmp_path: Path) -> None:
     world = World(load(configuration(tmp_path)))
     boards = []

@@ -14,6 +14,8 @@ from support.recordings.checked_runs import check_run, kind_of, list_failed
 from support.recordings.drawn_recording import KINDS, Drawn, add_readings, drawn
 from support.recordings.synthetic_run import Setup, synthetic_run
 
+pytestmark = pytest.mark.slow
+
 DIRECTION = np.array([1.0, -0.7, 0.5])
 
 
@@ -53,7 +55,6 @@ GOOD = {"ADIS16465": 0, "quiet LSM9DS1": 1}
 
 @pytest.mark.thorough
 @pytest.mark.one_in(4)
-@pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.parametrize("name", DAMAGES)
 def test_the_smallest_relevant_fault_is_detected(name: str, thorough: bool) -> None:
@@ -70,13 +71,11 @@ def test_the_smallest_relevant_fault_is_detected(name: str, thorough: bool) -> N
         assert len(passed) <= 0.05 * len(seeds), (kind, passed)
 
 
-@pytest.mark.slow
 def test_every_check_that_is_made_has_its_share_of_the_false_alarms() -> None:
     made = sorted({kind_of(check) for check in check_run(drawn(3, KINDS["ADIS16465"]).run)})
     assert made == sorted(CHECKS)
 
 
-@pytest.mark.slow
 def test_what_changes_on_one_axis_alone_is_told_by_the_ways_between_the_sweeps() -> None:
     """The axis is swept in one stretch of time, and its gain changes after it: no sweep shows that."""
     kind = KINDS["ADIS16465"]
@@ -87,7 +86,6 @@ def test_what_changes_on_one_axis_alone_is_told_by_the_ways_between_the_sweeps()
 
 
 @pytest.mark.one_in(2)  # a frozen recording of several speeds has the same checks
-@pytest.mark.slow
 @pytest.mark.parametrize("setup", [Setup(rest_s=0.0), Setup(procedure=(("speeds_deg_s", "[40, 90]"),))])
 def test_a_recording_without_rests_or_with_several_speeds_is_held_to_the_model_too(setup: Setup) -> None:
     checks = check_run(drawn(11, KINDS["quiet LSM9DS1"], setup).run)
@@ -95,7 +93,6 @@ def test_a_recording_without_rests_or_with_several_speeds_is_held_to_the_model_t
     assert not list_failed(checks)
 
 
-@pytest.mark.slow
 def test_a_wrist_whose_zero_is_off_makes_axes_lean_farther_than_the_sensors_do() -> None:
     """No sweep contradicts another, and the scale factors of a sensor that is mounted askew are off by it."""
     leaning = replace(NOMINAL, theta_rad=(0, 0, 0, 0, float(np.radians(5)), 0))

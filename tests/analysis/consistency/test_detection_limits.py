@@ -18,6 +18,8 @@ from rig.observation.windows import swept
 from support.recordings.drawn_recording import KINDS, Drawn, add_readings, drawn
 from support.recordings.synthetic_run import Motion, Setup
 
+pytestmark = pytest.mark.slow
+
 SURE = 1.3  # times the size from which on it is told in 95 of 100
 AXES = np.eye(3)
 
@@ -66,7 +68,6 @@ def planted(seen: Drawn, kind: str, times: float, way: int) -> Iterator[tuple[De
 
 @pytest.mark.thorough
 @pytest.mark.one_in(2)
-@pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.timeout(3000)
 @pytest.mark.parametrize("kind", ["ADIS16465", "quiet LSM9DS1"])
@@ -80,7 +81,6 @@ def test_a_fault_above_the_stated_detection_limit_is_detected(kind: str, thoroug
     assert not missed
 
 
-@pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.thorough
 @pytest.mark.timeout(3000)
@@ -99,7 +99,6 @@ def test_what_is_as_large_is_told_nearly_always_and_a_quarter_of_it_hardly_ever(
     assert np.mean(told[0.25]) < 0.35
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("seed", [902, 903])
 def test_a_good_sensor_shows_damage_as_small_whether_or_not_its_encoders_have_noise(seed: int) -> None:
     """Of an ADIS16465 the noise of a second is no larger than what 24 µrad make of its rate."""
@@ -110,7 +109,6 @@ def test_a_good_sensor_shows_damage_as_small_whether_or_not_its_encoders_have_no
     assert all(noisy[what] < 1.4 * exact[what] for what in exact), (exact, noisy)
 
 
-@pytest.mark.slow
 def test_a_plan_predicts_the_detection_limits_of_its_recording() -> None:
     seen = drawn(3, KINDS["quiet LSM9DS1"])
     motion = Motion(Setup(), np.random.default_rng(0))

@@ -9,6 +9,8 @@ from rig.estimation.statistics.rounding import Steps
 from rig.observation.consistency.raw_dwells import RawDwell
 from rig.observation.windows import Window
 
+pytestmark = pytest.mark.slow
+
 NOISE, SWING, LASTING_S, SAMPLES = 20.0, 90.0, 3.0, 300  # counts; a swing of five times what noise leaves in a half
 DWELLS, RATE = 18, 1e-3
 
@@ -37,13 +39,11 @@ def told(seed: int, hertz: float | None, step: Array | None = None) -> bool:
     return value > limit
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("hertz", [None, 0.25, 0.76])
 def test_what_swings_in_all_dwells_is_no_knock(hertz: float | None) -> None:
     assert not any(told(seed, hertz) for seed in range(4))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("hertz", "step"), [(None, 12.0), (1.0, 200.0)])
 def test_a_knock_in_one_of_them_is_detected(hertz: float | None, step: float) -> None:
     assert all(told(seed, hertz, np.array([step, 0.0, -step])) for seed in range(4))

@@ -12,8 +12,9 @@ from rig.data.recording.run_file import read_run
 from rig.observation.windows import swept
 from support.paths import RECORDINGS
 
+pytestmark = pytest.mark.slow
 
-@pytest.mark.slow
+
 def test_a_sample_lost_where_the_arm_moves_between_two_sweeps_fails_no_check() -> None:
     run = read_run(RECORDINGS / "lines" / "run.h5")
     samples = run.samples["imu"]

@@ -21,6 +21,8 @@ from support.motions.arm_sweeps import Truth, joints_at, plan_sweeps, record_dwe
 from support.recordings import drawn_accelerations
 from support.recordings.reference_p_values import p_values
 
+pytestmark = pytest.mark.slow
+
 NORM = 9.80665
 JOINTS = joints_rad(EIGHTEEN)
 WRIST_1 = 3
@@ -71,7 +73,6 @@ def read_of(movement: Movement, axes: int, axis_rad: float) -> ReferenceModel:
 
 @pytest.mark.thorough
 @pytest.mark.one_in(3)
-@pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.parametrize(("axes", "density_ug"), [(6, 150.0), (6, 23.0), (0, 150.0)])
 @pytest.mark.parametrize("arm_rad", [0.0, 5e-4])
@@ -100,7 +101,6 @@ def chance_of(values: list[float], below: float) -> float:
     return float(ksone.sf(early[ranked < below].max(initial=0.0), len(ranked)))
 
 
-@pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.thorough
 @pytest.mark.parametrize(("evenly", "below"), [(False, 1.0), (True, SMALL)], ids=["normal", "even"])
@@ -125,7 +125,6 @@ def test_p_values_of_sensors_as_their_data_sheets_let_them_be_are_uniform(
     assert all(chance_of(values, below) > 0.01 for values in found.values())
 
 
-@pytest.mark.slow
 def test_what_a_wrist_errs_by_is_told_as_such_an_arm_makes_it() -> None:
     """Twist, zero and the waves of the angle, of each wrist, made in where the flange goes."""
     size, axes = 1e-4, 6
@@ -164,7 +163,6 @@ def _off(error: int, size_rad: float) -> Poses:
     return poses
 
 
-@pytest.mark.slow
 def test_a_turn_of_one_dwell_is_named_however_far_off_the_arm_is() -> None:
     rng = np.random.default_rng(3)
     movement = moved(drawn(rng), draw_true_arm(5e-4, rng), 150.0, rng)

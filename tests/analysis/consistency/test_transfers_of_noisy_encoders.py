@@ -7,8 +7,9 @@ from rig.analysis.gyroscope.calibration import observe_recordings
 from rig.observation.consistency.transfers import average_transfers
 from support.recordings.drawn_recording import KINDS, drawn
 
+pytestmark = pytest.mark.slow
 
-@pytest.mark.slow
+
 @pytest.mark.parametrize("seed", [900, 904])
 def test_noise_of_encoders_hides_no_transfer_and_makes_none_longer(seed: int) -> None:
     """Without a look at the rate over a while, one of the four was left out, and two took 0.6 s longer."""

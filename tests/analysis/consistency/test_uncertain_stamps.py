@@ -9,6 +9,8 @@ from rig.analysis.analyses import calibrate
 from rig.data.recording.run_file import read_run
 from support.paths import RECORDINGS
 
+pytestmark = pytest.mark.slow
+
 WANDERS_S, IN_S = 3e-3, 7.0
 
 
@@ -25,7 +27,6 @@ def failed(stamp_std_s: float | None) -> set[str]:
     return {check.name for check in outcome.checks if not check.passed}
 
 
-@pytest.mark.slow
 def test_times_that_wander_as_is_stated_change_no_scale_factor() -> None:
     assert failed(None) == {"imu.scale_changed", "imu.loose_mounting", "imu.axis_changed"}
     assert not failed(WANDERS_S)

@@ -10,12 +10,13 @@ from rig.analysis.external.rests_agree import check_rests_agree
 from rig.errors import Fault
 from support.external.followed_body import World, follow, turning
 
+pytestmark = pytest.mark.slow
+
 # As of a reference with bad time stamps: it errs much while the body moves, and little at rest.
 STOPPING = World(duration_s=30, attitude_rad=6e-3, colour_s=0.5, stops_s=(7.0, 14.0, 21.0))
 OFF_RAD_S = 0.02
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("stop_lasts_s", [0.8, 3.0])
 def test_a_bias_that_short_rests_contradict_is_refused_and_a_sound_one_is_not(stop_lasts_s: float) -> None:
     body = turning(follow(replace(STOPPING, stop_lasts_s=stop_lasts_s), 1))
@@ -25,7 +26,6 @@ def test_a_bias_that_short_rests_contradict_is_refused_and_a_sound_one_is_not(st
             check_rests_agree(body, replace(sound, bias=sound.bias + OFF_RAD_S * axis))
 
 
-@pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.thorough
 def test_sound_recordings_are_hardly_ever_refused() -> None:

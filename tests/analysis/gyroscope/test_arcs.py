@@ -12,6 +12,8 @@ from support.recordings.checked_runs import check_run, list_failed, solve_inputs
 from support.recordings.drawn_recording import KINDS, Drawn, drawn
 from support.recordings.synthetic_run import Setup, synthetic_run, truth
 
+pytestmark = pytest.mark.slow
+
 STD_DEG = 0.05
 
 
@@ -33,7 +35,6 @@ def errors(seen: Drawn) -> tuple[Array, Budget, tuple[Observation, ...]]:
 
 @pytest.mark.thorough
 @pytest.mark.one_in(2)
-@pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.parametrize("arc_deg", [90, 180, 270])
 def test_errors_are_as_large_as_is_stated(arc_deg: float, thorough: bool) -> None:
@@ -49,7 +50,6 @@ def test_errors_are_as_large_as_is_stated(arc_deg: float, thorough: bool) -> Non
     assert low < min(rms) and max(rms) < high
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("arc_deg", [90, 180])
 def test_gravity_s_share_is_that_of_the_arc_s_attitudes(arc_deg: float) -> None:
     """Over an arc it does not average out: as of a whole turn, scale and bias would be off by a part in a hundred."""
@@ -61,7 +61,6 @@ def test_gravity_s_share_is_that_of_the_arc_s_attitudes(arc_deg: float) -> None:
     assert np.abs(off[3:]).max() < 1e-4
 
 
-@pytest.mark.slow
 def test_a_ripple_is_motion_and_no_noise() -> None:
     """What the readings add up to between the ends is held against what the encoders say of the same ends."""
     still, shaken = (
@@ -75,7 +74,6 @@ def test_a_ripple_is_motion_and_no_noise() -> None:
     assert ratio < 1.3  # 0.05 of the speed is fifty times the noise
 
 
-@pytest.mark.slow
 def test_the_encoders_are_in_the_budget_as_they_are_stated() -> None:
     """√2 of a standard deviation over the arc, the same one way and back, so nothing of the bias."""
     for arc_deg in (90.0, 180.0):
@@ -90,7 +88,6 @@ def test_the_encoders_are_in_the_budget_as_they_are_stated() -> None:
         assert line.half_width == pytest.approx(2 * STD_DEG)
 
 
-@pytest.mark.slow
 def test_of_whole_turns_the_encoders_err_by_nothing() -> None:
     """What is stated of them changes no number."""
     stated, unstated = (
@@ -105,7 +102,6 @@ def test_of_whole_turns_the_encoders_err_by_nothing() -> None:
     )
 
 
-@pytest.mark.slow
 @pytest.mark.proof
 def test_encoder_errors_as_stated_fail_nothing_and_ten_times_as_large_ones_are_detected(thorough: bool) -> None:
     """Where cw and ccw pass the same angle, the parts of both sweeps err alike; a bias that drifts does not."""

@@ -14,6 +14,8 @@ from rig.data.recording.run_data import RunData
 from rig.observation.observed_run import ObservedRun
 from support.recordings.synthetic_run import SENSITIVITY, Setup, synthetic_run
 
+pytestmark = pytest.mark.slow
+
 RIPPLED = Setup(noise_rad_s=4.5e-4, vibration=0.05, orders=(5, 9, 68), state_rate_hz=500.0, sample_rate_hz=200.0)
 SHORTER_US = 15_000  # at either end: blocks of readings do not end where a turn does
 
@@ -38,7 +40,6 @@ def with_averages(recording: ObservedRun, factors: Sequence[float]) -> ObservedR
     return replace(recording, run=replace(run, events=tuple(events)))
 
 
-@pytest.mark.slow
 def test_of_an_arm_that_ripples_both_agree_although_their_windows_differ(recording: ObservedRun) -> None:
     """Over its window the board's average differs from 2π/T by the ripple: by twenty times what is allowed."""
     (check,) = board_averages("gyro", [with_averages(recording, [1.0] * 6)])
@@ -46,13 +47,11 @@ def test_of_an_arm_that_ripples_both_agree_although_their_windows_differ(recordi
     assert check.value is not None and check.value < LIMIT / 3
 
 
-@pytest.mark.slow
 def test_an_average_that_is_not_of_these_readings_fails_and_names_the_sweep(recording: ObservedRun) -> None:
     """By seven parts in ten thousand: so far was a mean rate that did not belong to its mean reading."""
     checks = board_averages("gyro", [with_averages(recording, [1.0, 1.0, 1.0007, 1.0, 1.0, 1.0])])
     assert [check.name for check in checks if not check.passed] == ["gyro.board_average.2"]
 
 
-@pytest.mark.slow
 def test_without_the_board_s_averages_nothing_is_compared(recording: ObservedRun) -> None:
     assert board_averages("gyro", [recording]) == ()

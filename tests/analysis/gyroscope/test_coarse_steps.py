@@ -10,13 +10,14 @@ import pytest
 
 from support.recordings.coarse_sources import SOURCES, record, state_solution
 
+pytestmark = pytest.mark.slow
+
 NOISE_RAD_S = (0.0003, 0.0015, 0.005)
 FIRST_SEED, SEEDS = 900, 5
 WITHIN, BEYOND = 0.93, 1.5  # at least such a share of the errors within U, and none so many U away
 
 
 @pytest.mark.thorough
-@pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("source", SOURCES)

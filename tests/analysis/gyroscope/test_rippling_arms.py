@@ -11,6 +11,8 @@ from support.recordings.drawn_recording import KINDS, drawn
 from support.recordings.drawn_ripple import drawn_ripple
 from support.recordings.synthetic_run import Setup
 
+pytestmark = pytest.mark.slow
+
 SEEDS, A_FEW = 60, 2
 BEYOND = 2.2  # U
 
@@ -37,7 +39,6 @@ def errors(kind: str, arc_deg: float | None, seed: int) -> tuple[np.ndarray, np.
 
 
 @pytest.mark.thorough
-@pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.parametrize(("kind", "arc_deg"), [("quiet LSM9DS1", None), ("ADIS16465", None), ("quiet LSM9DS1", 180.0)])
 def test_errors_are_as_large_as_is_stated(kind: str, arc_deg: float | None, thorough: bool) -> None:

@@ -8,6 +8,8 @@ from rig.estimation.arrays import Array
 from support.motions.drawn_servo import Source, drawn_servo
 from support.motions.servo_other_sources import sample_autopilot, sample_lines
 
+pytestmark = pytest.mark.slow
+
 SOURCES = {"lines": sample_lines, "autopilot": sample_autopilot}
 NOISE_RAD_S = 0.01
 QUICK = ("turner.state_rate_hz=100", "procedure.speed_deg_s=150", "procedure.rest_s=1.5")
@@ -26,13 +28,11 @@ def off(source: Source, seed: int) -> Array:
 
 
 @pytest.mark.one_in(2)
-@pytest.mark.slow
 @pytest.mark.parametrize("source", SOURCES)
 def test_a_servo_calibrates_what_is_on_a_port_of_its_own(source: str) -> None:
     assert np.abs(off(SOURCES[source], 3)).max() < 4
 
 
-@pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.thorough
 @pytest.mark.timeout(3000)

@@ -15,6 +15,8 @@ from support.recordings.drawn_recording import KINDS
 from support.recordings.drawn_stages import drawn_stages, stage_setup
 from support.recordings.synthetic_run import Setup, synthetic_run
 
+pytestmark = pytest.mark.slow
+
 SEEDS, FEW = range(20), range(2)
 KIND = KINDS["quiet LSM9DS1"]
 OFF_DEG = 1.0  # as `uncertainty.mount_deg` has it by default
@@ -38,7 +40,6 @@ def solved(setup: Setup, seed: int, off_deg: Array) -> tuple[Array, Budget, tupl
 
 
 @pytest.mark.thorough
-@pytest.mark.slow
 @pytest.mark.proof
 def test_three_mountings_determine_the_scale_as_well_as_their_budget_states(thorough: bool) -> None:
     ratios = []
@@ -49,7 +50,6 @@ def test_three_mountings_determine_the_scale_as_well_as_their_budget_states(thor
     assert (0.8 if thorough else 0.3) < rms < (1.2 if thorough else 2.0), rms
 
 
-@pytest.mark.slow
 def test_how_the_item_was_mounted_off_is_found() -> None:
     off_deg = np.array([[0.0, 0.0, 0.0], [1.0, -0.5, 0.8]])
     _, budget, (mount,) = solved(stage_setup(Setup(), TWO), 3, off_deg)
@@ -60,7 +60,6 @@ def test_how_the_item_was_mounted_off_is_found() -> None:
     assert line.half_width == OFF_DEG
 
 
-@pytest.mark.slow
 def test_what_one_axis_a_stage_does_not_tell_of_the_mounts_is_in_the_budget() -> None:
     setup = stage_setup(replace(Setup(), repeats=2), BY_ONE_JOINT)
     off_deg = np.random.default_rng(5).uniform(-OFF_DEG, OFF_DEG, (3, 3))
@@ -70,7 +69,6 @@ def test_what_one_axis_a_stage_does_not_tell_of_the_mounts_is_in_the_budget() ->
     assert np.abs(error / budget.std[:3]).max() < 4
 
 
-@pytest.mark.slow
 def test_an_item_that_is_not_mounted_anew_is_recorded_as_before() -> None:
     run = synthetic_run(Setup())
     assert run.settings.mounts == ()
@@ -78,7 +76,6 @@ def test_an_item_that_is_not_mounted_anew_is_recorded_as_before() -> None:
     assert observe_as_mounted([run], run.settings)[1] == ()
 
 
-@pytest.mark.slow
 def test_the_mounts_are_recorded() -> None:
     runs, _ = drawn_stages(1, KIND, stage_setup(Setup(), TWO), np.zeros((2, 3)))
     assert [run.settings.stage for run in runs] == [0, 1]

@@ -15,6 +15,8 @@ from rig.motion.chain import DenavitHartenberg
 from rig.motion.geometry import NOMINAL
 from support.recordings.synthetic_run import Setup, synthetic_run, truth
 
+pytestmark = pytest.mark.slow
+
 
 def made(*errors_rad: float) -> DenavitHartenberg:
     """An arm whose twists of wrists 1 and 2 and zeros of wrists 2 and 3 are off by so much."""
@@ -54,26 +56,22 @@ def off(setup: Setup) -> Array:
     return error / np.sqrt(np.diag(result.solution.covariance))
 
 
-@pytest.mark.slow
 def test_three_axes_do_not_tell_the_sensors_angles_from_the_arms_and_say_so() -> None:
     found, std = skew_deg(solved(THREE))
     assert found > 0.04
     assert found < 3 * std
 
 
-@pytest.mark.slow
 def test_six_axes_tell_them_apart() -> None:
     found, std = skew_deg(solved(SIX))
     assert found < 0.01
     assert std < 0.01
 
 
-@pytest.mark.slow
 def test_six_axes_leave_scale_and_bias_as_well_known() -> None:
     assert np.abs(off(SIX)).max() < 4
 
 
-@pytest.mark.slow
 def test_several_speeds_tell_the_nonlinearity_and_the_scale_without_it() -> None:
     explained = solved(CURVED).explained
     assert explained is not None
@@ -85,7 +83,6 @@ def test_several_speeds_tell_the_nonlinearity_and_the_scale_without_it() -> None
     assert np.abs(off(CURVED)).max() < 4
 
 
-@pytest.mark.slow
 def test_one_speed_tells_no_nonlinearity_and_is_named() -> None:
     explained = solved(THREE).explained
     assert explained is not None

@@ -15,6 +15,8 @@ from rig.motion.geometry import NOMINAL, flange_pose
 from support.motions.arm_attitudes import draw_true_arm, joints_rad
 from support.recordings.reference_p_values import p_values
 
+pytestmark = pytest.mark.slow
+
 JOINTS = joints_rad(MAGNETIC)
 FIELD_T = np.array([17.0, -4.0, -44.7]) * 1e-6  # in the base's axes
 NOISE_T = 0.32e-6 / np.sqrt(80 * 3.0)  # of a dwell of three seconds
@@ -44,7 +46,6 @@ def read_of(seed: int) -> ReferenceModel:
 
 
 @pytest.mark.thorough
-@pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.timeout(3600)
 def test_p_values_of_a_magnetometer_are_no_smaller_than_uniform_ones(thorough: bool) -> None:

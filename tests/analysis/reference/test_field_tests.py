@@ -11,6 +11,8 @@ from rig.observation.field_means import field_tests
 from rig.plans.recorded_run import RecordedRun, judge_phases, open_run
 from support.paths import RECORDINGS
 
+pytestmark = pytest.mark.slow
+
 
 def drift_of(run: RecordedRun) -> FieldDrift:
     drift = judge_phases(run).magnetometers.results["compass"].drift
@@ -19,7 +21,6 @@ def drift_of(run: RecordedRun) -> FieldDrift:
 
 
 @pytest.mark.thorough
-@pytest.mark.slow
 def test_what_is_stated_of_the_arms_returns_is_a_half_width_and_no_standard_deviation() -> None:
     recorded = open_run(RECORDINGS / "magnetometer")
     (run,) = recorded.movement

@@ -13,6 +13,8 @@ from rig.estimation.gyroscope.budget import Unknown, budget
 from rig.observation.observed_run import observe_runs
 from support.recordings.synthetic_run import Setup, synthetic_run, truth
 
+pytestmark = pytest.mark.slow
+
 SENSITIVE = ((5.1e-3, -1.5e-3, 1.2e-3), (1.8e-3, -4.5e-3, 1.5e-3), (-0.9e-3, 2.1e-3, 3.6e-3))  # rad/s/g, 0.3 °/s/g
 FAST = Setup(speed_deg_s=120, noise_rad_s=3e-4, g_sensitivity_rad_s_per_g=SENSITIVE)
 WITHOUT_RESTS = replace(FAST, rest_s=0)
@@ -49,19 +51,16 @@ def std(result: SensorResult) -> Array:
     return result.uncertainty.std[3:]
 
 
-@pytest.mark.slow
 def test_the_bias_is_free_of_what_the_flanges_circling_makes_the_sensor_feel() -> None:
     assert np.abs(bias_off(FAST, solved(FAST))).max() < 1e-5
 
 
-@pytest.mark.slow
 def test_at_the_end_of_an_extension_it_circles_farther_out() -> None:
     there = solved(AT_THE_END_OF_300_MM, extension_m=(0.0, 0.0, 0.3))
     assert np.abs(bias_off(AT_THE_END_OF_300_MM, there)).max() < 1e-5
     assert np.abs(bias_off(AT_THE_END_OF_300_MM, solved(AT_THE_END_OF_300_MM))).max() > 3e-5
 
 
-@pytest.mark.slow
 def test_where_attitudes_do_not_tell_the_sensitivity_the_circling_does_not_either_but_is_in_its_uncertainty() -> None:
     explained = solved(WITHOUT_RESTS).explained
     assert explained is not None and explained.solution.g_sensitivity is None
@@ -71,7 +70,6 @@ def test_where_attitudes_do_not_tell_the_sensitivity_the_circling_does_not_eithe
 
 
 @pytest.mark.thorough
-@pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("speed_deg_s", [60, 90, 120])

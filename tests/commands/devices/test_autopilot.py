@@ -24,6 +24,8 @@ from support.processes.waiting import PATIENCE_S
 from support.processes.warm import start_module
 from support.wires.autopilot_on_a_wire import AutopilotOnAWire, autopilot_on_a_wire, section
 
+pytestmark = pytest.mark.slow
+
 LEFT = {"INS_GYROFFS_X": 0.1, "INS_ACCSCAL_Y": 1.01}  # of which no single-precision number is just that
 STORED = 10  # parameters: three offsets and INS_GYR_CAL, three offsets and three scales
 
@@ -66,7 +68,6 @@ def fields(wire: AutopilotOnAWire) -> dict[str, bytes]:
     return {name: wire.parameters.field(name) for name in wire.parameters.names}
 
 
-@pytest.mark.slow
 def test_a_calibration_is_stored_and_the_old_one_comes_back_bit_by_bit(tmp_path: Path) -> None:
     with autopilot_on_a_wire("ardupilot", LEFT) as wire:
         before, config, found = fields(wire), configuration(tmp_path, wire.port), result(tmp_path)
@@ -87,7 +88,6 @@ def test_a_calibration_is_stored_and_the_old_one_comes_back_bit_by_bit(tmp_path:
         assert "autopilot_not_kept" in rig_here("autopilot", "store", config, found, "--old", kept, "--yes").stderr
 
 
-@pytest.mark.slow
 def test_of_px4_offsets_are_stored_as_it_has_them(tmp_path: Path) -> None:
     with autopilot_on_a_wire("px4") as wire:
         before, config = fields(wire), configuration(tmp_path, wire.port)
@@ -102,7 +102,6 @@ def test_of_px4_offsets_are_stored_as_it_has_them(tmp_path: Path) -> None:
         assert rig_here("autopilot", "restore", config, kept, "--yes").returncode == 0 and fields(wire) == before
 
 
-@pytest.mark.slow
 @pytest.mark.proof
 def test_killed_at_any_moment_the_set_is_old_or_new_or_said_to_be_a_mixture(thorough: bool, tmp_path: Path) -> None:
     moments = [(place, applied) for place in range(STORED) for applied in (False, True)]

@@ -22,7 +22,10 @@ from support.documents.signed_laboratory import PDF, RESULT, XML, Laboratory, ma
 from support.documents.signing import Holder, holder, issue, signing_as
 
 # WeasyPrint does not close its colour profile.
-pytestmark = pytest.mark.filterwarnings("ignore:.*sRGB2014.icc:pytest.PytestUnraisableExceptionWarning")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.filterwarnings("ignore:.*sRGB2014.icc:pytest.PytestUnraisableExceptionWarning"),
+]
 ALTERED, NOBODY_TRUSTED = 1, 4
 
 
@@ -47,26 +50,22 @@ def refused(lab: Laboratory, file: str, forge: Callable[[bytes], bytes], *beside
 
 
 @pytest.mark.one_in(3)
-@pytest.mark.slow
 @pytest.mark.parametrize("what", FORGED_XML)
 def test_a_digital_certificate_in_which_something_is_not_signed_is_refused(what: str, lab: Laboratory) -> None:
     assert refused(lab, XML, FORGED_XML[what]) == f"{ALTERED} not_as_signed"
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("what", MOVED_XML)
 def test_a_digital_certificate_whose_signature_is_not_its_own_is_not_signed(what: str, lab: Laboratory) -> None:
     assert refused(lab, XML, MOVED_XML[what]) == f"{NOBODY_TRUSTED} not_signed"
 
 
 @pytest.mark.one_in(3)
-@pytest.mark.slow
 @pytest.mark.parametrize("what", FORGED_PDF)
 def test_a_pdf_in_which_something_is_not_signed_is_refused(what: str, lab: Laboratory) -> None:
     assert refused(lab, PDF, FORGED_PDF[what]) == f"{ALTERED} not_as_signed"
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("what", UNTRUSTED_PDF)
 def test_a_pdf_that_nobody_trusted_answers_for_is_refused(what: str, lab: Laboratory) -> None:
     forge, name = UNTRUSTED_PDF[what]
@@ -74,14 +73,12 @@ def test_a_pdf_that_nobody_trusted_answers_for_is_refused(what: str, lab: Labora
 
 
 @pytest.mark.one_in(3)
-@pytest.mark.slow
 @pytest.mark.parametrize("what", FORGED_JSON | IN_OTHER_BYTES)
 def test_a_result_that_is_not_to_the_byte_the_attached_one_is_refused(what: str, lab: Laboratory) -> None:
     assert refused(lab, RESULT, (FORGED_JSON | IN_OTHER_BYTES)[what], PDF) == f"{ALTERED} not_as_signed"
 
 
 @pytest.mark.one_in(3)
-@pytest.mark.slow
 @pytest.mark.parametrize("what", FORGED_JSON)
 def test_a_history_knows_a_result_by_each_of_its_values(what: str, lab: Laboratory) -> None:
     assert refused(lab, RESULT, FORGED_JSON[what], history=True) == f"{ALTERED} not_signed unknown_to_history"
@@ -91,7 +88,6 @@ def text_of(content: bytes) -> str:
     return bytes(etree.tostring(etree.fromstring(content), encoding="UTF-8")).decode()
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "written",
     [
@@ -155,7 +151,6 @@ def signed_by(lab: Laboratory, by: Holder) -> None:
 
 
 @pytest.mark.one_in(2)
-@pytest.mark.slow
 @pytest.mark.parametrize("file", [PDF, XML])
 @pytest.mark.parametrize("who", OTHERS)
 def test_whoever_may_not_sign_documents_or_is_another_is_not_trusted(who: str, file: str, lab: Laboratory) -> None:
@@ -164,7 +159,6 @@ def test_whoever_may_not_sign_documents_or_is_another_is_not_trusted(who: str, f
     assert (status, names_of(said)) == (NOBODY_TRUSTED, ["signer_not_trusted"]), said
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("purposes", [(), (DOCUMENTS,), (ServerAuth, MAIL)], ids=["none", "documents", "mail too"])
 def test_a_certificate_for_documents_is_trusted_by_its_name_or_by_all_of_it(
     purposes: tuple[ObjectIdentifier, ...], lab: Laboratory
@@ -176,7 +170,6 @@ def test_a_certificate_for_documents_is_trusted_by_its_name_or_by_all_of_it(
     assert lab.verified(PDF, history=False, signer="laboratory")[0] == NOBODY_TRUSTED
 
 
-@pytest.mark.slow
 def test_a_self_signed_one_is_trusted_by_its_own_certificate_alone(lab: Laboratory, tmp_path: Path) -> None:
     by = OTHERS["oneself"](lab.authority)
     signed_by(lab, by)
@@ -186,7 +179,6 @@ def test_a_self_signed_one_is_trusted_by_its_own_certificate_alone(lab: Laborato
     assert replace(lab, root=tmp_path / "own.pem").verified(PDF, XML, history=False)[0] == 0
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("change", ["other", "double"])
 def test_what_is_signed_must_be_a_certificate_with_one_set_of_results(change: str, lab: Laboratory) -> None:
     root = etree.fromstring(lab.read(XML))

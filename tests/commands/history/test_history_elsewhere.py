@@ -28,6 +28,8 @@ from support.laboratories.commands import rig_here
 from support.paths import CONFIGS, RECORDINGS
 from support.processes.waiting import PATIENCE_S
 
+pytestmark = pytest.mark.slow
+
 
 @contextmanager
 def heard() -> Iterator[tuple[int, socket.socket]]:
@@ -44,7 +46,6 @@ def folder_that_names(url: str, folder: Path) -> Path:
     return folder
 
 
-@pytest.mark.slow
 def test_nothing_connects_to_a_history_that_a_folder_names(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("RIG_HISTORY", str(tmp_path / "mine.sqlite"))
     with heard() as (port, server):
@@ -61,7 +62,6 @@ def test_nothing_connects_to_a_history_that_a_folder_names(tmp_path: Path, monke
         assert len(list(history.kept())) == 1
 
 
-@pytest.mark.slow
 def test_no_file_that_a_folder_names_becomes_a_history(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("RIG_HISTORY")
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "share"))
@@ -71,7 +71,6 @@ def test_no_file_that_a_folder_names_becomes_a_history(tmp_path: Path, monkeypat
     assert (tmp_path / "theirs.sqlite").read_bytes() == b"" and not (tmp_path / "share").exists()
 
 
-@pytest.mark.slow
 def test_a_certificate_is_noted_in_the_history_that_the_command_names(tmp_path: Path) -> None:
     mine = str(tmp_path / "mine.sqlite")
     folder = folder_that_names("postgresql://rig@192.0.2.1/theirs", tmp_path / "sent")
@@ -82,7 +81,6 @@ def test_a_certificate_is_noted_in_the_history_that_the_command_names(tmp_path: 
         assert len(next(history.kept()).certificates) == 1
 
 
-@pytest.mark.slow
 def test_a_spreadsheet_is_given_no_formulas(tmp_path: Path) -> None:
     texts = ('=HYPERLINK("http://192.0.2.1/")', "+1", "-1", "@SUM(A1)", "\tx", "\rx")
     with open_history(str(tmp_path / "history.sqlite")) as history:
@@ -97,7 +95,6 @@ def test_a_spreadsheet_is_given_no_formulas(tmp_path: Path) -> None:
 
 
 @pytest.mark.thorough
-@pytest.mark.slow
 def test_a_run_waits_four_seconds_for_a_server_that_says_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("RIG_HISTORY")
     with heard() as (port, _):
@@ -106,7 +103,6 @@ def test_a_run_waits_four_seconds_for_a_server_that_says_nothing(monkeypatch: py
 
 
 @pytest.mark.thorough
-@pytest.mark.slow
 def test_a_database_that_freezes_in_an_entry_costs_four_seconds_and_no_end_of_a_process(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

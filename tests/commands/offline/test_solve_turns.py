@@ -13,6 +13,8 @@ from rig.observation.by_hand.hand_segmentation import segment_session
 from support.external.handled_body import TWELVE, creeping, handle, write
 from support.external.real import unpack
 
+pytestmark = pytest.mark.slow
+
 CLOCK = ("--turns", "--clock-ppm", "50")
 
 
@@ -31,7 +33,6 @@ def expanded(found: dict[str, Any]) -> Any:
     return 2 * np.sqrt(np.diag(found["covariance_combined"]))[:3]
 
 
-@pytest.mark.slow
 def test_a_recording_by_hand_reaches_every_outlet(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     recorded = handle(TWELVE, 1)
     samples, folder = write(tmp_path / "samples.csv", recorded), tmp_path / "run"
@@ -51,7 +52,6 @@ def test_a_recording_by_hand_reaches_every_outlet(tmp_path: Path, capsys: pytest
     assert "by hand: 13 rests, 12 flips, 0 turns" in " ".join(capsys.readouterr().out.split())
 
 
-@pytest.mark.slow
 def test_a_rest_that_creeps_is_counted_with_its_time(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     recorded = handle(TWELVE, 1)
     rest = segment_session(recorded.time_s, recorded.rates, recorded.acceleration).rests[5]
@@ -64,7 +64,6 @@ def test_a_rest_that_creeps_is_counted_with_its_time(tmp_path: Path, capsys: pyt
     assert [float(group) for group in told.groups()] == pytest.approx([rest.start_s, rest.end_s], abs=0.3)
 
 
-@pytest.mark.slow
 def test_what_no_reading_shows_must_be_stated(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     samples = write(tmp_path / "samples.csv", handle(TWELVE, 1), level=False)
     assert "clock_unknown" in refused(capsys, samples, "--turns")
@@ -75,7 +74,6 @@ def test_what_no_reading_shows_must_be_stated(tmp_path: Path, capsys: pytest.Cap
     assert "level_m_s2" not in {size["name"] for size in found["by_hand"]["errors"]}
 
 
-@pytest.mark.slow
 def test_a_real_session_tells_its_own_accuracy(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Its README: turns alone and flips alone disagree by 2e-3."""
     found = solved(capsys, unpack("imucal", "samples.csv", tmp_path), *CLOCK)
@@ -87,7 +85,6 @@ def test_a_real_session_tells_its_own_accuracy(tmp_path: Path, capsys: pytest.Ca
     assert {rest["face"] for rest in by_hand["rests"]} == {"+x", "-x", "+y", "-y", "+z", "-z"}
 
 
-@pytest.mark.slow
 def test_halves_of_a_real_session_agree(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """An MPU-9150 laid down in attitudes that nobody knows, and often held in the hand.
 

@@ -9,6 +9,8 @@ from rig.estimation.arrays import Array
 from rig.estimation.external.placement import laid_down
 from rig.estimation.reference.reference_model import BIAS, F, KnownNorm
 
+pytestmark = pytest.mark.slow
+
 GRAVITY_M_S2 = 9.81
 NO_RESTS = np.zeros((0, 3))
 
@@ -30,7 +32,6 @@ def draw_session(rng: np.random.Generator) -> tuple[Equations, Array, Array]:
     return Equations(readings, variances, attitudes.as_matrix(), None, reference, dof), matrix, bias
 
 
-@pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.timeout(1800)
 def test_u_holds_if_attitudes_err_alike(thorough: bool) -> None:

@@ -14,6 +14,8 @@ from rig.estimation.gyroscope.vector_fit import VectorInputs
 from rig.observation.observe import Observation
 from support.recordings.synthetic_run import Setup, synthetic_run
 
+pytestmark = pytest.mark.slow
+
 Turns = tuple[tuple[Observation, ...], Solution, VectorInputs]
 
 
@@ -26,7 +28,6 @@ def turns() -> Turns:
     return observations, solve_six_observation(observations, "newton"), collect_inputs(recordings, "gyro", surroundings)
 
 
-@pytest.mark.slow
 def test_it_is_the_derivative_of_the_solution(turns: Turns) -> None:
     observations, found, seen = turns
     response = response_of(found, seen)

@@ -14,6 +14,8 @@ from rig.world.ur10e.motion.links import links
 from support.motions.arm_attitudes import joints_rad
 from support.motions.arm_sweeps import MICRO_G, find_signed_speed, joints_at, make_sweeps, plan_sweeps
 
+pytestmark = pytest.mark.slow
+
 NORM = 9.80665
 UP = NORM * np.array([0.02, -0.01, 1.0]) / np.linalg.norm([0.02, -0.01, 1.0])
 SITE = SiteTruth((0.0, 0.0, 0.0), (UP[0], UP[1], UP[2]))
@@ -35,7 +37,6 @@ def read(joints: Array, speeds: Array) -> Array:
     return np.asarray(whole @ MATRIX.T + BIAS_M_S2, dtype=np.float64)
 
 
-@pytest.mark.slow
 def test_what_the_world_lets_a_sensor_feel_gives_the_truth_back() -> None:
     harmonics = []
     for sweep in plan_sweeps(6):

@@ -7,6 +7,8 @@ from rig.estimation.arrays import Array
 from rig.estimation.temperature.over_temperature import fit_over_temperature, powers_at
 from support.motions.heated_course import BIAS_RAD_S, HYSTERESIS_RAD_S, REFERENCE_C, SCALE, repeat_means, warm_board
 
+pytestmark = pytest.mark.slow
+
 COLD_C, WARM_C = 26.0, 44.0
 GRADIENT_K = 0.1  # uncertainty.thermometer_gradient_k as it usually is
 
@@ -34,7 +36,6 @@ def changed(coefficients: Array, covariance: Array, from_c: float, to_c: float) 
     return error
 
 
-@pytest.mark.slow
 def test_slopes_of_a_heated_run_lie_within_u() -> None:
     slopes, loops = errors(3)
 
@@ -42,7 +43,6 @@ def test_slopes_of_a_heated_run_lie_within_u() -> None:
     assert np.sqrt(np.mean(slopes**2)) < 1.3 and np.sqrt(np.mean(loops**2)) < 1.6
 
 
-@pytest.mark.slow
 @pytest.mark.thorough
 @pytest.mark.proof
 def test_slopes_of_forty_heated_runs_lie_within_u() -> None:

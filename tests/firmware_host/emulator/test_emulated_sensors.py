@@ -8,6 +8,8 @@ from firmware_host.frames import Frame, encode
 from firmware_host.protocol import BATCH_AGE_US, ERRORS
 from support.board.emulated_session import OTHER_PARTS, PARTS, Session, samples
 
+pytestmark = pytest.mark.slow
+
 NAMES = list(PARTS)
 BATCH_AGE_S = BATCH_AGE_US / 1e6
 RATES_HZ = {"lsm9ds1": 952.0, "mpu9250": 1000.0, "adis16465": 1000.0}
@@ -29,7 +31,6 @@ def errors_of(frames: list[Frame]) -> list[tuple[str, str]]:
     return [(NAMES[values["sensor"]], ERRORS[values["code"]].name) for values in errors]
 
 
-@pytest.mark.slow
 def test_all_sensors_at_their_full_rates_lose_nothing() -> None:
     """The gyroscopes, and the magnetometer beside them."""
     session = started(RATES_HZ)
@@ -46,7 +47,6 @@ def test_all_sensors_at_their_full_rates_lose_nothing() -> None:
 
 
 @pytest.mark.one_in(4)
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "fault", "error"),
     [

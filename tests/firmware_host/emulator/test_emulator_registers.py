@@ -6,6 +6,8 @@ from firmware_host.emulator.chip.bus import Peripheral
 from support.board.emulated_session import Session
 from support.board.svd import number, peripherals
 
+pytestmark = pytest.mark.slow
+
 MODELLED = {peripheral.name: peripheral for peripheral in Session().board.peripherals}
 MAKERS_NAMES = {"SysTick": "STK"}
 MISSING = {("SCB", "CPACR")}  # the maker lists it as a peripheral of its own, FPU_CPACR
@@ -33,7 +35,6 @@ def described(peripheral: Peripheral) -> dict[int, tuple[str, int]]:
 
 
 @pytest.mark.one_in(3)
-@pytest.mark.slow
 @pytest.mark.parametrize("name", MODELLED)
 def test_every_modelled_register_is_the_makers(name: str) -> None:
     peripheral = MODELLED[name]

@@ -11,6 +11,8 @@ from rig.estimation.arrays import Array
 from rig.observation.observe import Observation
 from support.recordings.synthetic_run import BIAS_RAD_S, SCALE, SENSITIVITY, Setup, synthetic_run
 
+pytestmark = pytest.mark.slow
+
 QUIET = Setup(
     noise_rad_s=4.5e-4, vibration=0.0, mounting_error_rad=(0.0, 0.0, 0.0), state_rate_hz=500.0, sample_rate_hz=200.0
 )
@@ -36,7 +38,6 @@ def errors(seen: Observation) -> Array:
 
 
 @pytest.mark.thorough
-@pytest.mark.slow
 @pytest.mark.parametrize(("seen_rad_s", "unseen_rad_s"), [(0.004, 0.0), (0.010, 0.0), (0.010, 0.004)])
 def test_the_scale_is_as_well_known_as_stated_whatever_the_encoders_see_of_a_vibration(
     seen_rad_s: float, unseen_rad_s: float
@@ -55,7 +56,6 @@ def test_the_scale_is_as_well_known_as_stated_whatever_the_encoders_see_of_a_vib
     assert 0.6 < np.sqrt(np.mean([error**2 for error, _ in found])) < 1.25
 
 
-@pytest.mark.slow
 def test_of_an_arm_that_turns_evenly_the_speed_is_that_of_a_turn_whatever_was_taken_out() -> None:
     """2π/T, but for the steps of the encoders and for where samples meet its ends: a tenth of the best that is stated.
 
@@ -65,7 +65,6 @@ def test_of_an_arm_that_turns_evenly_the_speed_is_that_of_a_turn_whatever_was_ta
         assert revolution.speed_rad_s == pytest.approx(2 * np.pi / revolution.average.duration_s, rel=2e-6)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("sample_rate_hz", [25.0, 50.0])
 def test_noise_of_the_encoders_between_samples_that_are_far_apart_is_in_no_speed(sample_rate_hz: float) -> None:
     """It makes no more than what is stated of a turn, where the rates at the samples' times would be off by 4e-4."""

@@ -10,6 +10,8 @@ from rig.observation.observe import Observation
 from rig.world.servo.shaft import Shaft
 from support.motions.drawn_servo import drawn_servo
 
+pytestmark = pytest.mark.slow
+
 FEW, SEEDS = 1, 10  # in `make test`, and in `make proof`
 NOISE_RAD_S = 5e-4  # of a good gyroscope
 QUIET = ("uncertainty.g_sensitivity_deg_s_g=0", "turner.state_rate_hz=100",
@@ -29,7 +31,6 @@ def turns(seed: int) -> list[tuple[Observation, Shaft]]:
 
 
 @pytest.mark.thorough
-@pytest.mark.slow
 def test_beside_a_servos_lines_the_noise_is_that_of_the_gyroscope_alone() -> None:
     """Three times a turn, 18 and 22 times: what is as large as the noise, and would be taken for coloured noise."""
     scatter = np.array([turn.average.variance_rad2_s2 * turn.average.samples for turn, _ in turns(0)]) / NOISE_RAD_S**2
@@ -37,7 +38,6 @@ def test_beside_a_servos_lines_the_noise_is_that_of_the_gyroscope_alone() -> Non
     assert scatter.max() < 1.4, scatter
 
 
-@pytest.mark.slow
 @pytest.mark.proof
 def test_a_servos_speed_is_as_accurate_as_stated(thorough: bool) -> None:
     """What its encoder sees of the lines is how single readings scatter: ten times as much as a turn's time is out."""

@@ -8,6 +8,8 @@ from rig.report.certificate.dcc import digital_certificate
 from support.documents.certified import add_comparison, certificate, read, result
 from support.documents.dcc_rules import schema_faults
 
+pytestmark = pytest.mark.slow
+
 
 def of_arcs(angle_rad: float) -> ResultDocument:
     sensor = result().gyroscopes["gyro"]
@@ -17,7 +19,6 @@ def of_arcs(angle_rad: float) -> ResultDocument:
     )
 
 
-@pytest.mark.slow
 def test_whole_turns_close() -> None:
     for turns in (1, 3):
         found = certificate(of_arcs(2 * np.pi * turns))
@@ -25,7 +26,6 @@ def test_whole_turns_close() -> None:
         assert "whole turns, 2π by closure of the circle" in digital_certificate(found).decode()
 
 
-@pytest.mark.slow
 def test_the_encoders_determine_arcs_and_no_traceability_is_claimed() -> None:
     found = certificate(of_arcs(np.pi))
     text, xml = read(found).text, digital_certificate(found).decode()

@@ -11,6 +11,8 @@ import pytest
 from rig.cli import main
 from support.paths import RECORDINGS
 
+pytestmark = pytest.mark.slow
+
 UNCERTAIN = re.compile("std|expanded|covariance|budget|limit")
 
 
@@ -23,7 +25,6 @@ def made(value: Any, number: float, place: str = "") -> Any:
     return number if isinstance(value, float) and UNCERTAIN.search(place) else value
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("number", [0.0, 5e-324, 1e-300])
 def test_uncertainties_of_nothing_are_shown(number: float, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     run = Path(shutil.copytree(RECORDINGS / "six_observation", tmp_path / "run"))

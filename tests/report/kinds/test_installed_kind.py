@@ -14,6 +14,8 @@ from scipy.spatial.transform import Rotation
 from support.paths import ROOT
 from support.processes.waiting import PATIENCE_S
 
+pytestmark = pytest.mark.slow
+
 SCALE, BIAS_RAD = (1.02, 0.97), (0.004, -0.007)
 # One process for all commands: each would take a second to import the same. What they print, then what Python has.
 IN_TURN = """
@@ -78,7 +80,6 @@ def ran(environment: dict[str, str], *command: str) -> str:
     return done.stdout
 
 
-@pytest.mark.slow
 def test_an_inclinometer_of_somebodys_package_is_shown_everywhere(tmp_path: Path, installed: dict[str, str]) -> None:
     run, history = str(tmp_path / "run"), str(tmp_path / "history.sqlite")
     keeping = ["--out", run, "--history", history, "--serial-number", "I-1", "--part", "tilt2"]
@@ -111,7 +112,6 @@ def test_an_inclinometer_of_somebodys_package_is_shown_everywhere(tmp_path: Path
 
 
 @pytest.mark.thorough
-@pytest.mark.slow
 def test_a_certificate_is_none_where_a_package_knows_the_noise_alone(tmp_path: Path, installed: dict[str, str]) -> None:
     run = tmp_path / "run"
     ran(installed, "-m", "rig", "solve", *files(tmp_path), "--out", str(run))
@@ -129,7 +129,6 @@ def test_a_certificate_is_none_where_a_package_knows_the_noise_alone(tmp_path: P
 
 
 @pytest.mark.thorough
-@pytest.mark.slow
 def test_without_the_package_its_result_is_left_alone(tmp_path: Path, installed: dict[str, str]) -> None:
     run = str(tmp_path / "run")
     ran(installed, "-m", "rig", "solve", *files(tmp_path), "--out", run)
@@ -143,7 +142,6 @@ def test_without_the_package_its_result_is_left_alone(tmp_path: Path, installed:
 
 
 @pytest.mark.thorough
-@pytest.mark.slow
 def test_an_inclinometer_on_the_arm_is_solved_from_the_dwells(tmp_path: Path, installed: dict[str, str]) -> None:
     """Beside a gyroscope and its accelerometer, as a source with a channel of its own would record it."""
     ran(installed, "-m", "support.extensions.inclined_run", str(tmp_path))

@@ -11,8 +11,9 @@ from support.board.hand_on_board import play
 from support.external.handled_body import TWELVE, handle
 from support.laboratories.hand_session_laboratory import SENSOR
 
+pytestmark = pytest.mark.slow
 
-@pytest.mark.slow
+
 def test_a_press_of_the_button_begins_anew_and_only_what_follows_is_held_against_double_precision() -> None:
     told: list[OfTheHand] = []
     session = FollowedSession(SENSOR, 12, told.append)

@@ -27,6 +27,8 @@ from support.paths import CONFIGS
 from support.processes.waiting import PATIENCE_S
 from support.processes.warm import start_module
 
+pytestmark = pytest.mark.slow
+
 SOURCES = {"lines": ("imu", {"range_g": 8}, "oscillator_ppm"), "autopilot": ("imu1", {"range_g": 16}, "clock_ppm")}
 CLOCK_PPM, SEEDS = 50.0, 12
 SHORT: dict[str, Any] = {"procedure": {"flips": 8, "turns": 1}, "world": {"hand": {"mistakes": {}}}}
@@ -111,7 +113,6 @@ def began(laboratory: dict[str, Any], log: str) -> float:
 
 
 @pytest.mark.one_in(2)
-@pytest.mark.slow
 @pytest.mark.parametrize("source", SOURCES)
 def test_what_tells_its_own_time_is_calibrated_by_hand(source: str, tmp_path: Path) -> None:
     found = ran(source, tmp_path, SHORT)
@@ -123,7 +124,6 @@ def test_what_tells_its_own_time_is_calibrated_by_hand(source: str, tmp_path: Pa
     assert again["gyroscopes"][SOURCES[source][0]]["scale"] == entry["scale"]
 
 
-@pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.thorough
 @pytest.mark.timeout(3600)
@@ -160,7 +160,6 @@ def problems(source: str, *changes: dict[str, Any]) -> str:
     return "\n".join(caught.value.problems)
 
 
-@pytest.mark.slow
 def test_a_clock_that_nobody_vouches_for_is_refused() -> None:
     unsaid = document("autopilot")
     unsaid.pop("uncertainty")

@@ -13,6 +13,8 @@ from support.laboratories.ideal import ideal_document
 from support.laboratories.worlds import fresh_host, merge
 from support.paths import CONFIGS
 
+pytestmark = pytest.mark.slow
+
 QUICK: dict[str, Any] = {
     "arm": {"transfer_speed_deg_s": 170},
     "sensors": {"imu1": {"acceleration": None}},
@@ -41,7 +43,6 @@ def off(folder: Path) -> tuple[np.ndarray, np.ndarray]:
     return np.array(entry["scale"] + entry["bias_rad_s"]) - TRUTH, np.sqrt(np.diag(entry["covariance_combined"]))
 
 
-@pytest.mark.slow
 def test_what_a_run_found_is_stored_corrects_and_is_undone_in_the_next(tmp_path: Path, thorough: bool) -> None:
     """The first undoes what was stored before it, as the next does: that one is for `make proof`."""
     kept = {"world": {"sensors": {"imu1": {"autopilot": {"parameter_file": str(tmp_path / "memory.json")}}}}}
@@ -65,7 +66,6 @@ def test_what_a_run_found_is_stored_corrects_and_is_undone_in_the_next(tmp_path:
 
 
 @pytest.mark.thorough
-@pytest.mark.slow
 def test_an_armed_autopilot_is_refused_before_anything_moves(tmp_path: Path) -> None:
     config = configuration(tmp_path, {"world": {"sensors": {"imu1": {"autopilot": {"armed": True}}}}})
     done = rig("run", config, "--out", tmp_path / "run")

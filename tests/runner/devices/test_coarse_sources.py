@@ -16,6 +16,8 @@ from support.laboratories.hidden_results import Judged, solve
 from support.laboratories.hidden_worlds import move_to_address, run_in, world_of_message, world_with_digits
 from support.laboratories.worlds import fresh_host
 
+pytestmark = pytest.mark.slow
+
 MESSAGES = ("RAW_IMU", "SCALED_IMU", "HIGHRES_IMU")
 DIGITS = (1, 2, 3)
 NOISE_RAD_S = (0.0003, 0.0015, 0.005)
@@ -37,7 +39,6 @@ def shares(runs: list[Judged]) -> tuple[float, float]:
 
 
 @pytest.mark.thorough
-@pytest.mark.slow
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize("message", MESSAGES)
 def test_a_quiet_imu_passes_by_every_message(message: str, tmp_path: Path) -> None:
@@ -48,7 +49,6 @@ def test_a_quiet_imu_passes_by_every_message(message: str, tmp_path: Path) -> No
     assert not run.refused and shares([run])[1] < BEYOND
 
 
-@pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.thorough
 @pytest.mark.timeout(14_400)

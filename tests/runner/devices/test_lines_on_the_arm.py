@@ -13,6 +13,8 @@ from support.laboratories.commands import rig
 from support.laboratories.worlds import fresh_host, merge
 from support.paths import CONFIGS
 
+pytestmark = pytest.mark.slow
+
 JITTER_MS = 40.0  # of when a line arrives that a shared computer simulates
 LINES = CONFIGS / "own_port" / "lines.yaml"
 TRUTH = np.array([1.011, 0.993, 1.006, 0.012, -0.02, 0.007])
@@ -54,7 +56,6 @@ def by_noise(entry: dict[str, Any]) -> np.ndarray:
     return found
 
 
-@pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.thorough
 @pytest.mark.timeout(3000)
@@ -69,7 +70,6 @@ def test_its_noise_is_what_its_errors_are(tmp_path: Path) -> None:
     assert 0.70 < np.sqrt(np.mean(np.square(errors))) < 1.31, "99 % of the means of 36 squares lie between"
 
 
-@pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.thorough
 def test_arrival_times_cost_as_much_as_the_budget_states(tmp_path: Path) -> None:

@@ -14,6 +14,8 @@ from rig.motion.model import load_turner_model
 from support.laboratories.hidden_results import Judged, solve
 from support.laboratories.hidden_worlds import MORE_ARMS, OTHER_ARMS, WORLDS, first_seed, record
 
+pytestmark = pytest.mark.slow
+
 NAMED = {
     "ur3e": "UR3e", "ur5e": "UR5e or UR7e", "ur20": "UR20", "ur10_cb3": "UR10",
     "ur7e": "UR5e or UR7e", "ur12e": "UR10e or UR12e", "ur16e": "UR16e", "ur30": "UR30",
@@ -24,13 +26,11 @@ LOW, HIGH = 0.8, 1.2  # of the RMS of error over u, of all of them together
 
 @pytest.mark.thorough
 @pytest.mark.one_in(2)
-@pytest.mark.slow
 @pytest.mark.parametrize("model", UNLIKE)
 def test_another_arm_calibrates_a_gyroscope(model: ModelName, tmp_path: Path) -> None:
     _calibrates(model, tmp_path)
 
 
-@pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.thorough
 @pytest.mark.parametrize("model", [other_arm for other_arm in (*OTHER_ARMS, *MORE_ARMS) if other_arm not in UNLIKE])
@@ -60,7 +60,6 @@ def _calibrates(model: ModelName, tmp_path: Path) -> None:
     assert _rms([judged]) < 2
 
 
-@pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.thorough
 @pytest.mark.timeout(3600)

@@ -17,6 +17,8 @@ from support.laboratories.ideal import ideal_document
 from support.laboratories.worlds import fresh_host, merge
 from support.paths import CONFIGS
 
+pytestmark = pytest.mark.slow
+
 QUICK: dict[str, Any] = {
     "arm": {"transfer_speed_deg_s": 170},
     "sensors": {"kvh": {"rate_hz": 100, "acceleration": None}},
@@ -58,7 +60,6 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, 
     return folder / "run", result, done.stderr
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", TRUTH)
 def test_the_truth_is_found_without_a_board(finished: tuple[Path, dict[str, Any], str], name: str) -> None:
     entry = finished[1]["gyroscopes"][name]
@@ -67,7 +68,6 @@ def test_the_truth_is_found_without_a_board(finished: tuple[Path, dict[str, Any]
     assert std[:3].max() < {"kvh": 1e-4, "imu": 1e-2}[name]
 
 
-@pytest.mark.slow
 def test_a_kvh_1775_is_set_right_and_timed_by_its_own_oscillator(finished: tuple[Path, dict[str, Any], str]) -> None:
     folder, result, said = finished
     assert "ROTUNITS was DEG, corrected" in said
@@ -78,7 +78,6 @@ def test_a_kvh_1775_is_set_right_and_timed_by_its_own_oscillator(finished: tuple
     assert clock.drift == pytest.approx(8e-6, abs=5 * clock.drift_std + 1e-6), "its oscillator is 8 ppm slow"
 
 
-@pytest.mark.slow
 def test_what_a_device_prints_beside_its_rates_comes_out_of_every_way_out(
     finished: tuple[Path, dict[str, Any], str], tmp_path: Path
 ) -> None:

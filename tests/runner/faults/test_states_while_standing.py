@@ -9,6 +9,8 @@ from rig.motion.turner_state import ArmState
 from rig.runner.acquisition import STANDING_S, WHOLE_S, Acquisition
 from support.recordings.synthetic_run import PROVENANCE, SENSOR, UR, Setup, synthetic_run
 
+pytestmark = pytest.mark.slow
+
 STEP_S = 0.008
 
 
@@ -18,7 +20,6 @@ def states(acquisition: Acquisition, from_s: float, to_s: float) -> None:
         acquisition.on_state(ArmState(from_s + number * STEP_S, 1.0, q, q, 1.0, 1.0, 7, 1, 2, 3, 1))
 
 
-@pytest.mark.slow
 def test_a_long_dwell_is_recorded_with_few_states_after_a_while(tmp_path: Path) -> None:
     run = synthetic_run(Setup(rest_s=0.5, speed_deg_s=150))
     path, acquisition = tmp_path / "run.h5", Acquisition()

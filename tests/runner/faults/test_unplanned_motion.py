@@ -6,6 +6,8 @@ import pytest
 
 from support.laboratories.commands import configuration, rig
 
+pytestmark = pytest.mark.slow
+
 SCRIPT = """
 from rig.procedure import Procedure, SixObservationSection, plan_six_observation
 
@@ -23,7 +25,6 @@ PROCEDURE = Procedure(name="six_observation", section=SixObservationSection, pla
 
 
 @pytest.mark.one_in(2)
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("before", "status", "said"),
     [

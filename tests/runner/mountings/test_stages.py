@@ -15,6 +15,8 @@ from support.laboratories.commands import configuration, rig, wait_for_log
 from support.laboratories.worlds import hardware
 from support.processes.waiting import PATIENCE_S
 
+pytestmark = pytest.mark.slow
+
 QUARTER = {"x": "+y", "y": "-x", "z": "+z"}  # about wrist 3
 TIPPED = {"x": "+x", "y": "+z", "z": "-y"}
 STAGES: list[dict[str, Any]] = [
@@ -28,7 +30,6 @@ def in_stages(truth: list[dict[str, Any]], stages: list[dict[str, Any]] = STAGES
 
 
 @pytest.mark.thorough
-@pytest.mark.slow
 def test_a_board_that_is_mounted_anew_gives_one_calibration(tmp_path: Path) -> None:
     out = tmp_path / "run"
     config = configuration(tmp_path, in_stages([{}, {**QUARTER, "rotation_deg": [0.4, -0.6, 0.5]}]))
@@ -47,7 +48,6 @@ def test_a_board_that_is_mounted_anew_gives_one_calibration(tmp_path: Path) -> N
 
 
 @pytest.mark.thorough
-@pytest.mark.slow
 def test_an_instruction_that_was_not_followed_ends_the_run_before_a_sweep(tmp_path: Path) -> None:
     """The board stays as it was: no accelerometer tells, so a small turn does, about the first axis that differs."""
     out = tmp_path / "run"
@@ -59,7 +59,6 @@ def test_an_instruction_that_was_not_followed_ends_the_run_before_a_sweep(tmp_pa
 
 
 @pytest.mark.thorough
-@pytest.mark.slow
 def test_an_accelerometer_refuses_it_before_anything_has_moved(tmp_path: Path) -> None:
     stages: list[dict[str, Any]] = [{"instruction": "as it is"}, {"instruction": "tip the board", "mount": TIPPED}]
     config = configuration(tmp_path, in_stages([TIPPED], stages, sensors={"gyro": {"acceleration": {}}}))
@@ -70,7 +69,6 @@ def test_an_accelerometer_refuses_it_before_anything_has_moved(tmp_path: Path) -
 
 
 @pytest.mark.thorough
-@pytest.mark.slow
 def test_a_run_that_was_interrupted_in_its_second_stage_goes_on_there(tmp_path: Path) -> None:
     out = tmp_path / "run"
     config = configuration(tmp_path, in_stages([{}, QUARTER]))
@@ -88,7 +86,6 @@ def test_a_run_that_was_interrupted_in_its_second_stage_goes_on_there(tmp_path: 
     assert "stage 1 of 2" not in resumed.stderr.lower()
 
 
-@pytest.mark.slow
 def test_yes_cannot_say_that_the_item_is_mounted(tmp_path: Path) -> None:
     """Hands are at the item when it is mounted, so a person says that they are away; nothing is connected before."""
     config = hardware(configuration(tmp_path, {"procedure": {"stages": STAGES}}), tmp_path)

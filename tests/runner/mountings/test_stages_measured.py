@@ -14,6 +14,8 @@ from support.laboratories.commands import rig
 from support.laboratories.hidden_worlds import STATED, move_to_address, quiet
 from support.laboratories.worlds import fresh_host, merge
 
+pytestmark = pytest.mark.slow
+
 SEEDS, FEW = range(20), range(1)
 BEYOND = 2.2  # U of the difference: none of 60 values that are normal is farther off
 WITHIN = 0.92  # of the values, at least: U is what holds 95 of a hundred
@@ -60,7 +62,6 @@ def swept(folder: Path, recording: str) -> int:
     return sum("Sweep" in type(event.event).__name__ for event in read_run(path).events) if path.exists() else 0
 
 
-@pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.thorough
 @pytest.mark.timeout(5400)
@@ -88,7 +89,6 @@ def test_three_stages_tell_the_scale_of_one_run(tmp_path: Path) -> None:
 
 
 @pytest.mark.thorough
-@pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.timeout(5400)
 def test_a_board_put_on_90_degrees_wrong_is_refused_before_it_is_swept(tmp_path: Path, thorough: bool) -> None:
@@ -107,7 +107,6 @@ def test_a_board_put_on_90_degrees_wrong_is_refused_before_it_is_swept(tmp_path:
 
 
 @pytest.mark.thorough
-@pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.timeout(5400)
 def test_an_instruction_that_is_not_followed_is_refused_before_the_stage_is_swept(

@@ -15,10 +15,9 @@ from rig.world.servo.truth import ServoTruth
 from support.wires.driven_servo import BOARD, MODEL, STANDS_RAD_S, act_at_speed, control_servo, turn
 from support.wires.servo_on_a_wire import SET_UP, servo_on_a_wire
 
-pytestmark = pytest.mark.usefixtures("no_crowd")  # their clock stands while the machine is busy
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("no_crowd")]  # their clock stands while the machine is busy
 
 
-@pytest.mark.slow
 def test_a_look_moves_nothing_and_switches_no_torque_on() -> None:
     with servo_on_a_wire() as wire:
         before_rad = wire.angle_rad
@@ -32,7 +31,6 @@ def test_a_look_moves_nothing_and_switches_no_torque_on() -> None:
         assert wire.do("register", "Torque Enable") == 0
 
 
-@pytest.mark.slow
 def test_moves_arrive_and_the_shaft_stays_held_without_anybody_speaking_to_it() -> None:
     states: list[ServoState] = []
     with servo_on_a_wire() as wire:
@@ -52,7 +50,6 @@ def test_moves_arrive_and_the_shaft_stays_held_without_anybody_speaking_to_it() 
     assert np.ptp(record["q_rad"]) > math.radians(55.0)
 
 
-@pytest.mark.slow
 def test_a_whole_turn_is_asked_for_to_the_millisecond_and_its_speed_is_measured() -> None:
     states: list[ServoState] = []
     with (
@@ -70,7 +67,6 @@ def test_a_whole_turn_is_asked_for_to_the_millisecond_and_its_speed_is_measured(
     assert abs(found.speed_rad_s / motion.speed_rad_s - 1.0) < 6 * found.speed_std_rad_s / motion.speed_rad_s + 2e-3
 
 
-@pytest.mark.slow
 def test_a_servo_as_delivered_is_put_into_extended_position_and_time_based_profile() -> None:
     with servo_on_a_wire(ServoTruth(settings={"Baud Rate": 3})) as wire:
         with control_servo(wire) as servo:
@@ -79,7 +75,6 @@ def test_a_servo_as_delivered_is_put_into_extended_position_and_time_based_profi
 
 
 @pytest.mark.thorough
-@pytest.mark.slow
 def test_after_a_trip_of_the_watchdog_the_next_run_s_move_is_no_jump() -> None:
     """Its profile is zero then, which is as fast as the servo can."""
     states: list[ServoState] = []
@@ -93,7 +88,6 @@ def test_after_a_trip_of_the_watchdog_the_next_run_s_move_is_no_jump() -> None:
         assert max(abs(state.qd_rad_s[0]) for state in states) < math.radians(60.0) * 1.15
 
 
-@pytest.mark.slow
 def test_a_rest_lasts_as_long_as_it_should_by_the_states_clock() -> None:
     with servo_on_a_wire() as wire, control_servo(wire) as servo:
         began_s = servo.latest.time_s
@@ -101,7 +95,6 @@ def test_a_rest_lasts_as_long_as_it_should_by_the_states_clock() -> None:
         assert 0.3 <= servo.latest.time_s - began_s < 0.5
 
 
-@pytest.mark.slow
 def test_a_stop_on_request_holds_the_shaft_where_it_is() -> None:
     with servo_on_a_wire() as wire, control_servo(wire) as servo:
         took_s: list[float] = []
@@ -121,7 +114,6 @@ def test_a_stop_on_request_holds_the_shaft_where_it_is() -> None:
             servo.rest(0.1)
 
 
-@pytest.mark.slow
 def test_ctrl_c_stops_the_shaft_and_the_last_line_says_how_it_was_left() -> None:
     with servo_on_a_wire() as wire:
         with pytest.raises(KeyboardInterrupt) as interrupt, control_servo(wire) as servo:
@@ -131,7 +123,6 @@ def test_ctrl_c_stops_the_shaft_and_the_last_line_says_how_it_was_left() -> None
         assert "the shaft is at rest" in interrupt.value.__notes__[0]
 
 
-@pytest.mark.slow
 def test_what_the_watch_raises_stops_the_shaft_and_goes_on_to_the_caller() -> None:
     def disk_full() -> None:
         raise OSError(28, "No space left on device")
@@ -142,7 +133,6 @@ def test_what_the_watch_raises_stops_the_shaft_and_goes_on_to_the_caller() -> No
         assert abs(wire.rate_rad_s) < STANDS_RAD_S
 
 
-@pytest.mark.slow
 def test_a_state_that_nobody_takes_stops_the_shaft() -> None:
     armed: list[bool] = []
 
@@ -158,7 +148,6 @@ def test_a_state_that_nobody_takes_stops_the_shaft() -> None:
         assert abs(wire.rate_rad_s) < STANDS_RAD_S
 
 
-@pytest.mark.slow
 def test_one_program_at_a_time_has_the_port() -> None:
     with servo_on_a_wire(pty=True) as wire, Servo(wire.port, MODEL, clock=wire.clock):
         with pytest.raises(Refused) as refused, Servo(wire.port, MODEL, clock=wire.clock):
@@ -167,7 +156,6 @@ def test_one_program_at_a_time_has_the_port() -> None:
 
 
 @pytest.mark.one_in(3)
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ["servo_out_of_range", "servo_too_fast", "servo_move_too_long"])
 def test_a_move_that_the_servo_cannot_make_is_not_begun(name: str) -> None:
     motion = {

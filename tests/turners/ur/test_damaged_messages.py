@@ -10,8 +10,9 @@ from rig.turners.ur.controller.dashboard import DASHBOARD_PORT, Dashboard
 from support.laboratories.worlds import fresh_host
 from support.wires.damaged_messages import carry_to_rig
 
+pytestmark = pytest.mark.slow
 
-@pytest.mark.slow
+
 @pytest.mark.parametrize("name", ["RTDE", "dashboard", "primary"])
 def test_a_damaged_message_is_read_or_an_error_of_the_link(name: str) -> None:
     ends = carry_to_rig(name, 100, seed=1)
@@ -19,7 +20,6 @@ def test_a_damaged_message_is_read_or_an_error_of_the_link(name: str) -> None:
     assert 10 < ends["ConnectionError"] < 100, ends
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("said", [b"Connected: again\n", b"Program running: fal"], ids=["greetings", "no end of line"])
 def test_a_dashboard_that_talks_without_end_is_given_up_in_time(said: bytes) -> None:
     host = fresh_host()

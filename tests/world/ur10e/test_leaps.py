@@ -21,6 +21,8 @@ from support.laboratories.worlds import fresh_host, merge
 from support.paths import CONFIGS
 from support.processes.waiting import PATIENCE_S
 
+pytestmark = pytest.mark.slow
+
 OUTPUTS = "timestamp,actual_q,actual_qd,actual_TCP_pose,runtime_state,speed_scaling,output_int_register_0"
 INPUTS = "input_int_register_0,input_int_register_1," + ",".join(f"input_double_register_{i}" for i in range(8))
 AWAY = (0.0, -1.5, 1.5, -1.5, -1.4, 0.3)
@@ -152,7 +154,6 @@ def session(loaded: Loaded, ports: dict[str, int], dwell_s: float) -> tuple[dict
         return run.heard, run.turns / run.senses
 
 
-@pytest.mark.slow
 def test_every_wire_carries_the_same_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
     host = fresh_host()
     found = []
