@@ -127,7 +127,7 @@ def _count_until(board_time_s: Array, span_s: float) -> int:
 
 @dataclass(frozen=True, slots=True)
 class _MovingTimes:
-    """The times `step_s` apart from `start_s` on, with a mask `near` (m,) of those at or near which a body turns.
+    """The blocks of `BLOCK_S` from `start_s` on in or near which a body turns: a mask `near` (m,).
 
     At rest there are only vibrations, of which the turner's encoders show another part than the sensor.
     """
@@ -137,7 +137,7 @@ class _MovingTimes:
 
     @classmethod
     def find(cls, motion: KnownMotion) -> "_MovingTimes":
-        """Return the moving times of a motion."""
+        """Return the blocks in or near which the speed is at least `MOVING` of the highest."""
         start_s, end_s = motion.time_s[[0, -1]].tolist()
         count = int((end_s - start_s) / BLOCK_S) + 1
         middle_s = start_s + BLOCK_S * (np.arange(count)[:, None] + (np.arange(RATES) + 0.5) / RATES)
@@ -148,7 +148,7 @@ class _MovingTimes:
         return cls(start_s, around >= MOVING * speed.max())
 
     def mask(self, time_s: Array) -> NDArray[np.bool_]:
-        """Return a mask of times (n,) near motion."""
+        """Return the mask of those of the times (n,) that lie in such a block."""
         index = np.clip((time_s - self.start_s) / BLOCK_S, 0, len(self.near) - 1).astype(np.intp)
         mask: NDArray[np.bool_] = self.near[index]
         return mask
