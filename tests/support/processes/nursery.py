@@ -35,7 +35,7 @@ IMPORTED = (
     *("rig.turners.ur.ur_kind", "rig.turners.servo.servo_kind", "rig.turners.hand.hand_kind"),
     *("rig.turners.ur.arm_driver", "rig.turners.ur.arm_preflight", "rig.turners.servo.servo_driver"),
     *("rig.commands.measure.check_devices", "rig.commands.devices.board_commands", "rig.commands.station.station"),
-    *("rig.analysis.judging", "rig.report.entry_sources", "rig.report.certificate.writer"),
+    *("rig.analysis.judging", "rig.report.entry_sources", "rig.report.certificate.certificate_page"),
     *("procedures.six_observation", "procedures.imu", "procedures.verify", "procedures.by_hand"),
     *("firmware_host.emulator.parts.lsm9ds1", "firmware_host.emulator.parts.adis16465"),
     *("h5py", "jinja2", "scipy.interpolate", "scipy.ndimage", "serial.urlhandler.protocol_socket", "encodings.idna"),
@@ -218,15 +218,14 @@ def _serve() -> None:
     addresses = {"rig": address_of(everything), LABORATORY: address_of(everything), READER: address_of(reading)}
     print(json.dumps(addresses), flush=True)
     reads = not os.fork()
+    (everything if reads else reading).close()  # so that who asks one that has ended is refused
     if reads:
         os.environ.update(json.loads(sys.argv[1]))
     for module in READS if reads else IMPORTED:
         import_module(module)
     if not reads:
         import_module("firmware_host.emulator.hooks").address_of("block")  # translated here, for every laboratory
-        import_module("rig.config.load").load(
-            DEMO
-        )  # builds the models of the sections, which takes longer than to use them
+        import_module("rig.config.load").load(DEMO)  # builds the models, which takes longer than to use them
     gc.collect()
     gc.freeze()  # objects that are never scanned are shared, not copied
     if order := serve_orders(reading if reads else everything):
