@@ -164,7 +164,7 @@ def _find_turn_lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines
     sizes = fit_columns(columns, ripple_rate)
     fast = np.repeat(ripple >= SLOW, column_count(ENCODED.beats))
     slow = ripple_rate - columns[:, fast] @ sizes[fast]
-    smooth = find_slow_ripple(slow, turn.share)
+    smooth = _find_slow_ripple(slow, turn.share)
     late = _changes(smooth) if turn.closed else none  # over an arc it resembles encoder errors
     encoded = np.column_stack([smooth, late, slow - _fit_slow_part(slow, turn.share)])
     explained = np.column_stack([steady, encoded, columns[:, fast]])
@@ -177,7 +177,7 @@ def _find_turn_lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines
 def lag_columns(rate: Array, columns: Array, share: Array) -> Array:
     """Return columns (n, 0 or 2) of a lag behind the slow ripple of a rate (n,) that columns (n, k) do not explain."""
     residuals = rate[:, None] - columns @ fit_columns(columns, rate[:, None])
-    return _changes(find_slow_ripple(residuals, share))
+    return _changes(_find_slow_ripple(residuals, share))
 
 
 def _changes(slow: Array) -> Array:
@@ -186,15 +186,15 @@ def _changes(slow: Array) -> Array:
     return np.column_stack([change, np.gradient(change, axis=0)])
 
 
-def find_slow_ripple(rate: Array, share: Array) -> Array:
+def _find_slow_ripple(rate: Array, share: Array) -> Array:
     """Return the part (n, 1) of a rate (n, 1) with less than `SLOW` cycles per turn, or no column if it is noise.
 
     `share` (n,) is elapsed time. The encoders' noise is white in the angle, the sum of the rate.
     """
     powers = np.abs(np.fft.rfft(apply_window(np.cumsum(rate, axis=0))[:, 0])) ** 2
-    slowest = int(SLOW) + MAIN_LOBE
-    noise = np.median(powers[slowest:])
-    return _fit_slow_part(rate, share) if powers[1:slowest].max() > SHOWN * noise else rate[:, :0]
+    slow_bins = int(SLOW) + MAIN_LOBE
+    noise = np.median(powers[slow_bins:])
+    return _fit_slow_part(rate, share) if powers[1:slow_bins].max() > SHOWN * noise else rate[:, :0]
 
 
 def _fit_slow_part(rate: Array, share: Array) -> Array:
