@@ -62,6 +62,7 @@ def test_a_run_is_agreed_to_followed_and_stopped_on_the_page_and_resumed(
     driver.switch_to.active_element.send_keys(Keys.SPACE)
     driver.switch_to.active_element.send_keys(Keys.TAB)
     assert driver.switch_to.active_element.get_attribute("id") == "yes"
+    laboratory.control({"do": "pace", "time_scale": 0.5})  # the run takes a minute: a slow browser sees its first sweep
     driver.switch_to.active_element.send_keys(Keys.ENTER)
     wait_for(lambda: kind(driver) in ("moving", "measuring"), "motion")
     wait_for(lambda: re.match(r"\D*([3-9]|\d\d)\b", text(driver, "step-number")), "the end of the first sweep")
