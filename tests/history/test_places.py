@@ -15,7 +15,7 @@ from sqlalchemy import URL
 from rig.config.load import ConfigurationRefused, load
 from rig.errors import Refused
 from rig.history.storage.address import resolve_address
-from rig.history.storage.engine import connect_arguments
+from rig.history.storage.libpq import connect_arguments
 from rig.history.store import open_history
 from support.paths import DEMO
 

@@ -1,6 +1,6 @@
 """The checks of accelerometers and magnetometers: bits and noise of readings, halves of dwells, and the model's fit."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from rig.analysis.consistency.converter_tests import COUNTS, Digits, find_digits, judge_readings
 from rig.analysis.consistency.gyroscope_checks import DISTURBED_SWEEP
+from rig.analysis.consistency.knocked_dwells import compare_dwell_halves
 from rig.analysis.consistency.reference_alternatives import ReferenceModel
 from rig.analysis.consistency.reference_checks import check_reference
 from rig.analysis.consistency.residual_tests import Statistic
@@ -17,11 +18,8 @@ from rig.analysis.reference.datasheet_errors import list_windows
 from rig.analysis.reference.reference_budgets import drift_patterns, lag_pattern
 from rig.data.quantity import ACCELERATION, FIELD
 from rig.data.recording.settings import Uncertainty
-from rig.estimation.arrays import Array
 from rig.estimation.earth import MICRO_G_M_S2
 from rig.estimation.reference.accelerometer_model import LEVER, NO_SWEEPS, PARAMETERS, Movement
-from rig.estimation.statistics.rounding import Steps
-from rig.observation.consistency.dwell_halves import compare_halves
 from rig.observation.consistency.raw_dwells import (
     RawDwell,
     raw_acceleration_dwells,
@@ -35,8 +33,6 @@ from rig.observation.observed_run import ObservedRun
 if TYPE_CHECKING:
     from rig.analysis.reference.accelerometer import AccelerometerResult
     from rig.analysis.reference.magnetometer import MagnetometerResult
-
-FEWEST_IN_HALF = 20  # readings: fewer do not show how their mean scatters
 
 DISTURBED_DWELL = "disturbed_dwell"
 
@@ -168,40 +164,3 @@ def compute_reference_statistics(
         **judge_readings(readings.counts, windows, false_alarm_probability, digits=readings.digits),
     }
     return ReferenceStatistics(disturbed or [(worst, tested.worst)], statistics, tested.detection_limits)
-
-
-def compare_dwell_halves(
-    dwells: Sequence[RawDwell], flicker_counts: float, false_alarm_probability: float, steps: Steps
-) -> Mapping[str, Statistic]:
-    """Return the largest difference between a dwell's halves, as χ² of three axes, and its limit; skip short dwells.
-
-    The limit is a quantile of the F distribution, because the noise is estimated from the dwells' readings. Flicker
-    with the Allan deviation `flicker_counts` makes the halves differ by √2 times as much. A slow oscillation that no
-    encoder measures affects every dwell, a knock only one; so the differences in the other dwells are added to the
-    variance, with degrees of freedom by Welch–Satterthwaite. `steps` are those of the counts.
-    """
-    from scipy.special import fdtri
-
-    long_dwells = [dwell for dwell in dwells if len(dwell.counts) >= 2 * FEWEST_IN_HALF]
-    if not long_dwells:
-        return {}
-    halves = [compare_halves(dwell, steps) for dwell in long_dwells]
-    differences, variances = (np.array(part) for part in zip(*halves, strict=True))
-    # One noise for all dwells: in a single dwell, half a cycle of an oscillation looks like coloured noise, which would
-    # explain a step as well.
-    noise = np.median(variances, axis=0) + 2 * flicker_counts**2
-    swing = _swing_variances(differences, noise)
-    dof_of_noise = min(len(dwell.counts) for dwell in long_dwells) - 2
-    dof_of_swing = max(len(long_dwells) - 1, 1)
-    dof = (noise.mean() + swing) ** 2 / (noise.mean() ** 2 / dof_of_noise + swing**2 / dof_of_swing)
-    chi_squared = np.sum(differences**2 / (noise + swing[:, None]), axis=1)
-    limits = 3 * fdtri(3, dof, 1 - false_alarm_probability / len(long_dwells))
-    worst = int(np.argmax(chi_squared / limits))
-    return {"knocked_dwell": (float(chi_squared[worst]), float(limits[worst]))}
-
-
-def _swing_variances(differences: Array, noise: Array) -> Array:
-    """Return by dwell (N,) the mean square of all other dwells' `differences` (N, 3), minus the `noise` (3,)."""
-    beyond = (differences**2 - noise).mean(axis=1)
-    others: Array = np.maximum((beyond.sum() - beyond) / max(len(beyond) - 1, 1), 0.0)
-    return others

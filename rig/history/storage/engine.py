@@ -1,28 +1,19 @@
 """The database of a history: SQLite in a file, or PostgreSQL."""
 
-import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
-from ipaddress import ip_address
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from sqlalchemy import URL, Connection, Engine, create_engine
 
-from rig.config.judging.history_address import ENCRYPTED
 from rig.errors.extras import requiring
 from rig.history.storage import continuity, schema
 from rig.history.storage.address import HistoryAddress
 from rig.history.storage.forks import kept_from_children
+from rig.history.storage.libpq import connect_arguments
 from rig.history.storage.migrations import bring_up_to_date, version_of
 from rig.history.storage.sqlite_engine import WAIT_S, WRITES, share_engine, sqlite_engine
 from rig.history.storage.sqlite_file import history_is_there, new_file_in_place
-
-if TYPE_CHECKING:
-    from sqlalchemy import URL
-
-CONNECT_S = 5
-SILENCE_S = 5  # time after which an unresponsive connection is closed
 
 
 @contextmanager
@@ -89,43 +80,3 @@ def _postgresql(server: URL) -> Engine:
     with requiring("postgres"):
         arguments = {"options": limits, **connect_arguments(server)}
         return kept_from_children(create_engine(server, connect_args=arguments))
-
-
-def connect_arguments(server: "URL", environment: Mapping[str, str] = os.environ) -> dict[str, str | int]:
-    """Return the options of a connection, which to another computer is always encrypted and authenticated.
-
-    On this computer there is no network to listen on, and the system may authenticate the user without a password. A
-    user may require more encryption by PGSSLMODE, and another method, such as `gss`, by PGREQUIREAUTH.
-    """
-    is_local = _is_on_this_computer(server, environment)
-    options: dict[str, str | int] = {
-        "require_auth": environment.get("PGREQUIREAUTH") or ("scram-sha-256,none" if is_local else "scram-sha-256"),
-        "connect_timeout": CONNECT_S,
-        "tcp_user_timeout": SILENCE_S * 1000,
-        "keepalives_idle": SILENCE_S,
-    }
-    if "sslmode" not in server.query:
-        requested = environment.get("PGSSLMODE", "")
-        options["sslmode"] = requested if requested in ENCRYPTED else "prefer" if is_local else ENCRYPTED[0]
-    return options
-
-
-def _is_on_this_computer(server: "URL", environment: Mapping[str, str]) -> bool:
-    if environment.get("PGHOSTADDR") or environment.get("PGSERVICE"):
-        return False  # these name a server that is unknown here
-    queried = server.query.get("host", ())
-    names = [server.host or "", *([queried] if isinstance(queried, str) else queried)]
-    hosts = [host for name in names for host in name.split(",") if host] or [environment.get("PGHOST", "")]
-    return all(map(_is_at_hand, hosts))
-
-
-def _is_at_hand(host: str) -> bool:
-    """Return whether the host is this computer: a local address, or a socket's folder."""
-    if host in ("", "localhost") or host[0] in "/@":
-        return True
-    try:
-        return ip_address(host).is_loopback
-    except ValueError:
-        # If there are several hosts in a query, each may have a port.
-        name, _, port = host.rpartition(":")
-        return port.isdecimal() and _is_at_hand(name)

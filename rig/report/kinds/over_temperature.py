@@ -9,7 +9,7 @@ from rig.analysis.outcome import Outcome
 from rig.data.entries.temperature import OverTemperatureEntry
 from rig.data.installed_kinds import quantities
 from rig.data.result_file import ResultDocument
-from rig.report.c_code.c_functions import temperature_lines
+from rig.report.c_code.temperature import temperature_lines
 from rig.report.findings.characteristics import BIAS_SLOPE_AT_REFERENCE, POLYNOMIALS
 from rig.report.findings.finding import Finding
 from rig.report.findings.history_records import HistoryRecord

@@ -14,12 +14,11 @@ from rich.table import Table
 from rig.analysis.design.candidate_search import target_of
 from rig.config.models import RigConfig
 from rig.config.procedures.procedure_sections import SixObservationSection
-from rig.estimation.earth import MICRO_G_M_S2
 from rig.motion.plan_warnings import doubts
 from rig.motion.steps import SAME_PLACE_RAD, Dwell, Plan, Rest, Step, Sweep, Transfer, closes, turn_words
 from rig.motion.turner_state import JOINT_NAMES, Joints
 from rig.report.terminal.shortest_words import wish_words
-from rig.station.plain_text import LONG_S, build_number_table, duration_words, plain
+from rig.station.plain_text import LONG_S, duration_words, plain
 
 if TYPE_CHECKING:
     from rig.analysis.consistency.detection_limits import DetectionLimit
@@ -78,6 +77,7 @@ class DryRun:
 
 def plan_document(planned: DryRun) -> dict[str, Any]:
     """Return the plan for machines: SI units, every field of every step."""
+    from rig.report.terminal.attitude_accuracy import account_document
     from rig.report.words.detection_limit_words import detection_limit_entries
 
     plan, account, predicted = planned.plan, planned.account, planned.detection_limits
@@ -155,6 +155,8 @@ def _print_steps(planned: DryRun, console: Console) -> None:
 
 def _print_predictions(planned: DryRun, console: Console) -> None:
     """Print the accuracy of accelerometers expected from the attitudes, and the detection limits of the checks."""
+    from rig.report.terminal.attitude_accuracy import print_account
+
     account, detection_limits = planned.account, planned.detection_limits
     if account is not None:
         print_account(console, account)
@@ -208,46 +210,3 @@ def _motion(step: Step) -> tuple[str, str, str]:
 def _names(q_rad: Joints) -> Sequence[str]:
     """Return the names of joints: those of an arm, else numbers."""
     return JOINT_NAMES if len(q_rad) == len(JOINT_NAMES) else [f"joint {i + 1}" for i in range(len(q_rad))]
-
-
-def account_document(account: "AttitudeAccount") -> dict[str, Any]:
-    """Return the expected accuracy in SI units.
-
-    The condition number of attitudes that do not determine the second order is null.
-    """
-    return {
-        "count": account.count,
-        "order": account.order,
-        "rank": account.chosen.rank,
-        "needed": account.chosen.needed,
-        "condition": account.first.condition,
-        "condition_second_order": account.second.condition if math.isfinite(account.second.condition) else None,
-        "g_efficiency": account.g_efficiency,
-        "attitude_std_rad": account.attitude_std_rad,
-        "sensors": {name: asdict(expected) for name, expected in account.sensors.items()},
-    }
-
-
-def print_account(console: Console, account: "AttitudeAccount") -> None:
-    """Print a line on the attitudes and a table of the accuracy of each sensor."""
-    second = f"{account.second.condition:.2f}" if math.isfinite(account.second.condition) else "not determined"
-    console.print(
-        f"{account.count} attitudes: rank {account.chosen.rank} of {account.chosen.needed}, condition "
-        f"{account.first.condition:.2f} (second order {second}), G-efficiency {account.g_efficiency:.3f}",
-        soft_wrap=True,
-    )
-    arm_mrad = 1e3 * account.attitude_std_rad
-    console.print(f"Expected standard deviations of accelerometers, if the attitudes' is {arm_mrad:.2g} mrad:")
-    second_order = ["φ 1e-6 s²/m"] if account.order == 2 else []
-    headings = ("sensor", "scale ppm", "non-orthogonality mrad", "bias µg", *second_order)
-    table = build_number_table(headings, texts=("sensor",), box=SIMPLE)
-    for name, expected in account.sensors.items():
-        values = [
-            1e6 * expected.scale_std,
-            1e3 * expected.non_orthogonality_std_rad,
-            expected.bias_std_m_s2 / MICRO_G_M_S2,
-        ]
-        if expected.second_order_std_s2_m is not None:
-            values.append(1e6 * expected.second_order_std_s2_m)
-        table.add_row(plain(name), *(f"{value:.3g}" for value in values))
-    console.print(table)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rig.analysis.consistency.reference_contradictions import compare_dwell_halves
+from rig.analysis.consistency.knocked_dwells import compare_dwell_halves
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.rounding import Steps
 from rig.observation.consistency.raw_dwells import RawDwell

@@ -1,0 +1,50 @@
+"""The check for a knock in a dwell, whose halves then differ by more than noise. Pure."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from rig.analysis.consistency.residual_tests import Statistic
+from rig.estimation.arrays import Array
+from rig.estimation.statistics.rounding import Steps
+from rig.observation.consistency.dwell_halves import compare_halves
+from rig.observation.consistency.raw_dwells import RawDwell
+
+FEWEST_IN_HALF = 20  # readings: fewer do not show how their mean scatters
+
+
+def compare_dwell_halves(
+    dwells: Sequence[RawDwell], flicker_counts: float, false_alarm_probability: float, steps: Steps
+) -> Mapping[str, Statistic]:
+    """Return the largest difference between a dwell's halves, as χ² of three axes, and its limit; skip short dwells.
+
+    The limit is a quantile of the F distribution, because the noise is estimated from the dwells' readings. Flicker
+    with the Allan deviation `flicker_counts` makes the halves differ by √2 times as much. A slow oscillation that no
+    encoder measures affects every dwell, a knock only one; so the differences in the other dwells are added to the
+    variance, with degrees of freedom by Welch–Satterthwaite. `steps` are those of the counts.
+    """
+    from scipy.special import fdtri
+
+    long_dwells = [dwell for dwell in dwells if len(dwell.counts) >= 2 * FEWEST_IN_HALF]
+    if not long_dwells:
+        return {}
+    halves = [compare_halves(dwell, steps) for dwell in long_dwells]
+    differences, variances = (np.array(part) for part in zip(*halves, strict=True))
+    # One noise for all dwells: in a single dwell, half a cycle of an oscillation looks like coloured noise, which would
+    # explain a step as well.
+    noise = np.median(variances, axis=0) + 2 * flicker_counts**2
+    swing = _swing_variances(differences, noise)
+    dof_of_noise = min(len(dwell.counts) for dwell in long_dwells) - 2
+    dof_of_swing = max(len(long_dwells) - 1, 1)
+    dof = (noise.mean() + swing) ** 2 / (noise.mean() ** 2 / dof_of_noise + swing**2 / dof_of_swing)
+    chi_squared = np.sum(differences**2 / (noise + swing[:, None]), axis=1)
+    limits = 3 * fdtri(3, dof, 1 - false_alarm_probability / len(long_dwells))
+    worst = int(np.argmax(chi_squared / limits))
+    return {"knocked_dwell": (float(chi_squared[worst]), float(limits[worst]))}
+
+
+def _swing_variances(differences: Array, noise: Array) -> Array:
+    """Return by dwell (N,) the mean square of all other dwells' `differences` (N, 3), minus the `noise` (3,)."""
+    beyond = (differences**2 - noise).mean(axis=1)
+    others: Array = np.maximum((beyond.sum() - beyond) / max(len(beyond) - 1, 1), 0.0)
+    return others
