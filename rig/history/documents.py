@@ -3,7 +3,6 @@
 import csv
 import io
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -21,10 +20,11 @@ FIELDS = (  # of a calibration, in the order of its document
     "full_scale", "simulated", "estimator", "temperature_c", "verdict", "fit", "check_standard", "operator", "note",
     "voided",
 )  # fmt: skip
+PARAMETER_FIELDS = ("value", "std_statistical", "std_combined", "unit", "max_deviation", "coverage_factor")
 COLUMNS = (
     "calibration", "run", "started_utc", "rig", "arm_serial_number", "part", "serial_number", "quantity",
     "full_scale", "estimator", "temperature_c", "verdict", "fit", "simulated", "check_standard", "operator", "note",
-    "voided", "parameter", "value", "std_statistical", "std_combined", "unit", "max_deviation", "coverage_factor",
+    "voided", "parameter", *PARAMETER_FIELDS,
 )  # fmt: skip
 
 
@@ -146,7 +146,7 @@ def chart_entry(chart: Chart) -> dict[str, Any]:
 
 
 def _parameter(parameter: Parameter) -> dict[str, Any]:
-    return {name: value for name, value in asdict(parameter).items() if name != "name"}
+    return {name: getattr(parameter, name) for name in PARAMETER_FIELDS}
 
 
 def cell(value: object) -> object:

@@ -5,7 +5,7 @@ from sqlalchemy import Connection, insert, select
 from rig.history.entered.issued_certificate import Issued
 from rig.history.storage import journal
 from rig.history.storage.row_numbers import next_number
-from rig.history.storage.schema import certificate, certificate_file, select_columns
+from rig.history.storage.schema import certificate, certificate_file, fill_row
 
 
 def enter(connection: Connection, run_id: int, issued: Issued, now_utc: str) -> None:
@@ -13,7 +13,7 @@ def enter(connection: Connection, run_id: int, issued: Issued, now_utc: str) -> 
     number = connection.scalar(select(certificate.c.id).where(certificate.c.number == issued.number))
     if number is None:
         number = next_number(connection, certificate)
-        row = {"id": number, "run_id": run_id, **select_columns(certificate, issued), "entered_utc": now_utc}
+        row = fill_row(certificate, issued, id=number, run_id=run_id, entered_utc=now_utc)
         connection.execute(insert(certificate).values(row))
         journal.note(connection, certificate, number)
     files = certificate_file.c

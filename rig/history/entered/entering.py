@@ -64,9 +64,8 @@ def _enter_calibration(
     connection: Connection, run_id: int, calibration: "HistoryRecord", *, check_standard: bool
 ) -> None:
     number = next_number(connection, schema.calibration)
-    stated = schema.select_columns(schema.calibration, calibration)
-    row = {"id": number, "run_id": run_id, **stated, "check_standard": check_standard}
+    row = schema.fill_row(schema.calibration, calibration, id=number, run_id=run_id, check_standard=check_standard)
     connection.execute(insert(schema.calibration).values(row))
-    rows = [{"calibration_id": number, **schema.select_columns(schema.parameter, p)} for p in calibration.parameters]
+    rows = [schema.fill_row(schema.parameter, p, calibration_id=number) for p in calibration.parameters]
     if rows:
         connection.execute(insert(schema.parameter), rows)

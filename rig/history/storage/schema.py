@@ -36,9 +36,12 @@ def number_column() -> Column[int]:
     return Column("id", Integer, primary_key=True, autoincrement=False)
 
 
-def select_columns(table: Table, record: object) -> dict[str, Any]:
-    """Return the attributes of a record that are columns of the table, by name."""
-    return {name: getattr(record, name) for name in table.c.keys() if hasattr(record, name)}  # noqa: SIM118
+def fill_row(table: Table, record: object, **stated: object) -> dict[str, Any]:
+    """Return a row of the table: what is `stated`, and for every other column the record's attribute of its name.
+
+    Raise AttributeError if the record lacks one: a column that stayed empty would be lost unnoticed.
+    """
+    return {name: stated[name] if name in stated else getattr(record, name) for name in table.c.keys()}  # noqa: SIM118
 
 
 meta = Table("meta", metadata, Column("key", String(40), primary_key=True), Column("value", String(NAME)))
