@@ -7,10 +7,10 @@ within sweeps and between rests, so that a disturbed sweep does not mask itself.
 
 A ripple faster than readings and states affects the transfers' mean readings but no rates, and looks like noise unless
 it is synchronous with the samples. So the unexplained variance of transfers is inflated by their Birge ratio, after a
-fit of all changes from quarter to quarter.
+fit of all changes from quarter to quarter. A transfer that remains an outlier tells nothing about the others.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -63,6 +63,7 @@ CHECKS = (
     "sweeps_against_rests",
 )
 
+AXES = 3
 MOST, TRIED = 16.0, 7  # largest variance inflation by a synchronous ripple; number of factors that are tried
 
 
@@ -113,7 +114,7 @@ def check_gyroscope(
     steady_columns = _steady_columns(segments, encoders.reshape(len(encoders), -1))
     bias = _estimate_bias_process(segments, axis_rates, steady_columns, scatter)
     segments_only = _Tested(segments, axis_rates, whiten_segments(segments, scatter, bias))
-    with_transfers = _inflate_transfers(segments_only, matrix, allowance, bias)
+    with_transfers = _free_disturbed_transfers(segments_only, matrix, allowance, bias, false_alarm_probability)
     sweeps_alone = repeat_per_axis(segments_only.means.sweeps)
     statistics = test_alternatives(
         with_transfers.model, changes(with_transfers.segments, with_transfers.axis_rates), false_alarm_probability
@@ -167,20 +168,56 @@ def predict_detection_limits(
     )
 
 
-def _inflate_transfers(segments_only: _Tested, matrix: Array, allowance: ErrorPatterns, bias: BiasProcess) -> _Tested:
+def _free_disturbed_transfers(
+    segments_only: _Tested,
+    matrix: Array,
+    allowance: ErrorPatterns,
+    bias: BiasProcess,
+    false_alarm_probability: float,
+) -> _Tested:
+    """Return `_inflate_transfers` with a mean of its own for each transfer that differs from all other segments.
+
+    A ripple at the data rate shifts the mean of one transfer. A change of a scale factor shifts all later transfers, so
+    a transfer is an outlier only if its own mean explains more of the residuals than any such change.
+    """
+    disturbed: list[int] = []
+    while True:
+        with_transfers = _inflate_transfers(segments_only, matrix, allowance, bias, disturbed)
+        segments, model = with_transfers.segments, with_transfers.model
+        transfers = [number for number in segments.sweep[segments.sweep < REST].tolist() if number not in disturbed]
+        axis_columns = single_axis_columns(segments, with_transfers.axis_rates)
+        axis_changed = model.test_single_columns(axis_columns, false_alarm_probability)
+        if not transfers or axis_changed is None:
+            return with_transfers
+        explained = model.chi_square_of([_own_mean(segments, number) for number in transfers], ())
+        worst = int(np.argmax(explained))
+        critical = critical_value(false_alarm_probability / len(transfers))(AXES)
+        if explained[worst] <= max(critical, axis_changed[0]):
+            return with_transfers
+        disturbed.append(transfers[worst])
+
+
+def _own_mean(segments: Segments, sweep: int) -> Array:
+    """Return columns (3, N, 3) that give a sweep or transfer a mean of its own."""
+    return repeat_per_axis((segments.sweep == sweep).astype(np.float64)[:, None])
+
+
+def _inflate_transfers(
+    segments_only: _Tested, matrix: Array, allowance: ErrorPatterns, bias: BiasProcess, disturbed: Sequence[int]
+) -> _Tested:
     """Return `_whiten_with_transfers` with the transfers' variance inflated until their χ² equals their number.
 
     Their χ² is that of all segments minus that of the segments without transfers. The factor is at most `MOST`.
     """
     transfers, (segments_chi_square, segments_dof) = allowance.transfers, _residual_chi_square(segments_only)
-    with_transfers = _whiten_with_transfers(matrix, allowance, bias)
+    with_transfers = _whiten_with_transfers(matrix, allowance, bias, disturbed)
     for ratio in np.geomspace(1.0, MOST, TRIED)[1:]:
         chi_square, dof = _residual_chi_square(with_transfers)
         if chi_square - segments_chi_square <= dof - segments_dof:
             break
         variances = transfers.variances_rad2_s2 + (ratio - 1) * transfers.unexplained_rad2_s2
         with_transfers = _whiten_with_transfers(
-            matrix, replace(allowance, transfers=replace(transfers, variances_rad2_s2=variances)), bias
+            matrix, replace(allowance, transfers=replace(transfers, variances_rad2_s2=variances)), bias, disturbed
         )
     return with_transfers
 
@@ -197,11 +234,19 @@ def _residual_chi_square(tested: _Tested) -> tuple[float, int]:
     return chi_square_of(tested.model.readings, np.concatenate([basis, possible], axis=1), None)
 
 
-def _whiten_with_transfers(matrix: Array, allowance: ErrorPatterns, bias: BiasProcess) -> _Tested:
-    """Return the segments with the transfers appended, their model rates, and their whitened model."""
+def _whiten_with_transfers(
+    matrix: Array, allowance: ErrorPatterns, bias: BiasProcess, disturbed: Sequence[int] = ()
+) -> _Tested:
+    """Return the segments with the transfers appended, their model rates, and their whitened model.
+
+    Each `disturbed` transfer has a mean of its own.
+    """
     transfers = allowance.transfers
     scatter = _build_scatter(transfers, allowance.transfer_patterns_rad_s, allowance)
-    return _Tested(transfers, transfers.rates_rad_s @ matrix.T, whiten_segments(transfers, scatter, bias))
+    model = whiten_segments(transfers, scatter, bias)
+    own = [apply_whitener(model.whitener, _own_mean(transfers, number)) for number in disturbed]
+    model = replace(model, model=np.concatenate([model.model, *own], axis=1))
+    return _Tested(transfers, transfers.rates_rad_s @ matrix.T, model)
 
 
 def _detection_limits(

@@ -27,10 +27,11 @@ from rig.observation.statistics.spectral_lines import (
     find_lines,
     fit_columns,
     line_swing,
+    unit_columns,
     waves,
 )
 from rig.observation.statistics.tapered_weights import noise_at_zero
-from rig.observation.turn_mean import SLOW
+from rig.observation.turn_mean import SLOW, line_variances
 
 # Not four segments: one of an encoder's waves with two periods per revolution is zero at the ends of quarters, and no
 # segment would show it.
@@ -162,7 +163,7 @@ def _segment_revolution(
     """Average a revolution or an arc in segments, without the spectral lines of the whole average.
 
     Lines slower than `SLOW` remain, because weights that cancel them would amplify the encoders' noise; the variance of
-    the whole average contains them. A vibration that the encoders measure only in part does not count as noise.
+    each segment contains them. A vibration that the encoders measure only in part does not count as noise.
     """
     average, axis = turn.average, turn.axis_flange
     times_s = stream.time_s[slice_time(stream, average.start_s, average.end_s)]
@@ -171,6 +172,8 @@ def _segment_revolution(
     fraction = (division.time_s - average.start_s) / average.duration_s
     lines = waves(average.lines_hz * average.duration_s, fraction, turn.beats)
     vibration = np.column_stack([rates @ axis, motion.rate(division.time_s, 1) @ axis])
+    encoded = unit_columns(np.column_stack([np.ones(len(rates)), vibration]))
+    not_encoded = division.readings_rad_s - encoded @ fit_columns(encoded, division.readings_rad_s)
     residual, vibration = (
         division.subtract_means(values, division.averages) for values in (division.readings_rad_s, vibration)
     )
@@ -178,10 +181,12 @@ def _segment_revolution(
     noise_alone = residual - vibrating
     noise = MeanNoise(average.noise_rad_s**2, average.noise_rad2_s2 * average.samples, average.dof)
     is_slow = np.repeat(average.lines_hz * average.duration_s < SLOW, column_count(turn.beats))
+    weights = mean_weights(division.groups, lines[:, ~is_slow])
     segments = _average(
         division,
         motion,
-        weights=mean_weights(division.groups, lines[:, ~is_slow]),
+        weights=weights,
+        slow=line_variances(lines[:, is_slow], weights, not_encoded),
         residuals=noise_alone - lines @ fit_columns(lines, noise_alone),
         rates=rates,
         noise=noise,
@@ -215,6 +220,7 @@ def _segment_rest(stream: Stream, motion: ArmMotion, average: Average, count: in
         residuals=residuals,
         rates=np.zeros((len(readings), 3)),
         noise=_noise_at_rest(residuals, len(division.enough), lines.shape[1], division.steps),
+        slow=np.zeros((len(weights), 3)),
     )
     lsb = stream.sensor.channel(RATE).unit_per_count
     vibrating = division.subtract_means(readings, division.averages)
@@ -240,9 +246,19 @@ def _noise_at_rest(residuals: Array, segments: int, columns: int, steps: Steps) 
 
 
 def _average(
-    division: _Division, motion: ArmMotion, *, weights: Array, residuals: Array, rates: Array, noise: MeanNoise
+    division: _Division,
+    motion: ArmMotion,
+    *,
+    weights: Array,
+    residuals: Array,
+    rates: Array,
+    noise: MeanNoise,
+    slow: Array,
 ) -> tuple[Segment, ...]:
-    """Return the segments with enough samples, averaged by weights (p, m): readings and the flange's rates (m, 3)."""
+    """Return the segments with enough samples, averaged by weights (p, m): readings and the flange's rates (m, 3).
+
+    `slow` (p, 3): variances by slow lines.
+    """
     readings = division.readings_rad_s
     groups, rows = division.groups[:, division.enough], weights[list(division.enough)]
     smooth = readings - residuals
@@ -253,7 +269,7 @@ def _average(
         segments.append(
             Segment(
                 position=2 * index / last - 1 if last else 0.0,
-                mean=mean,
+                mean=replace(mean, variance=mean.variance + slow[index]),
                 rate_rad_s=rate_rad_s,
                 attitude=motion.attitude(start_s, end_s),
                 interval=MotionInterval(motion, start_s, end_s),
