@@ -36,7 +36,8 @@ class Average:
     - drift_rad2_s2 (3,): the part of the variance by bias drift from rest to rest.
     - dof (3,): degrees of freedom of the noise's part of the variance, infinite if they were not counted.
     - lines_hz (k,): frequencies of the vibrations removed from the mean.
-    - rounding_rad2_s2 (3,): the part of the variance by rounding to steps.
+    - rounding_rad2_s2, slow_lines_rad2_s2 (3,): the parts of the variance by rounding to steps, and by lines that are
+      too slow to remove.
     """
 
     mean_rad_s: Array
@@ -51,6 +52,7 @@ class Average:
     dof: Array | float = np.inf
     lines_hz: Array = field(default_factory=partial(np.zeros, 0))
     rounding_rad2_s2: Array | float = 0.0
+    slow_lines_rad2_s2: Array | float = 0.0
 
     @property
     def duration_s(self) -> float:
@@ -60,7 +62,7 @@ class Average:
     @property
     def noise_rad2_s2(self) -> Array:
         """The part (3,) of the variance due to noise, (rad/s)²."""
-        return self.variance_rad2_s2 - self.drift_rad2_s2 - self.rounding_rad2_s2
+        return self.variance_rad2_s2 - self.drift_rad2_s2 - self.rounding_rad2_s2 - self.slow_lines_rad2_s2
 
     @property
     def mean_std_rad_s(self) -> Array:
@@ -150,4 +152,5 @@ def build_average(stream: Stream, inside: slice, window: Window, mean: Mean) -> 
         dof=mean.dof,
         lines_hz=mean.cycles / (window.end_s - window.start_s),
         rounding_rad2_s2=mean.rounding,
+        slow_lines_rad2_s2=mean.slow_lines,
     )

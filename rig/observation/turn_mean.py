@@ -100,7 +100,7 @@ def turn_mean(readings: Array, steps: Steps, turn: SampledTurn) -> tuple[Mean, A
     smooth = columns @ coefficients
     noise = estimate_noise(readings - smooth, int(rank), steps, BRIEF if lines.not_encoded else MEMORIES)
     (mean,) = compute_weighted_means(readings, ones, weights, smooth=smooth, noise=noise, steps=steps)
-    return replace(mean, variance=mean.variance + added, cycles=lines.cycles), weights[0]
+    return replace(mean, variance=mean.variance + added, slow_lines=added, cycles=lines.cycles), weights[0]
 
 
 def _gain(weights: Array) -> float:
@@ -117,18 +117,18 @@ def _slow_line_variance(readings: Array, turn: SampledTurn, slow: Array, change:
     """
     without_ripple = _fit_residuals(np.column_stack([whole(readings), turn.uneven_rad_s]), readings)
     residuals = _fit_residuals(explained, readings)
-    return np.maximum((change @ without_ripple) ** 2, line_variances(slow, change[None], residuals)[0])
+    return np.maximum((change @ without_ripple) ** 2, _line_variance(slow, change, residuals))
 
 
-def line_variances(slow: Array, weights: Array, residuals: Array) -> Array:
-    """Return the variances (p, 3) of means with weights (p, n) due to slow columns (n, k) fitted to residuals (n, 3).
+def _line_variance(slow: Array, weights: Array, residuals: Array) -> Array:
+    """Return the variance (3,) of a mean with weights (n,) due to slow columns (n, k) fitted to residuals (n, 3).
 
     Only their amplitude is used, because with some phases even a large line hardly changes the mean.
     """
     powers = (fit_columns(slow, residuals) ** 2).reshape(-1, 2, 3).sum(axis=1)
-    kept = ((weights @ slow) ** 2).reshape(len(weights), -1, 2).sum(axis=2)
-    variances: Array = kept @ powers / 2
-    return variances
+    kept = ((weights @ slow) ** 2).reshape(-1, 2).sum(axis=1)
+    variance: Array = kept @ powers / 2
+    return variance
 
 
 def _fit_residuals(columns: Array, values: Array) -> Array:

@@ -31,12 +31,13 @@ from rig.observation.statistics.spectral_lines import (
     waves,
 )
 from rig.observation.statistics.tapered_weights import noise_at_zero
-from rig.observation.turn_mean import SLOW, line_variances
+from rig.observation.turn_mean import SLOW
 
 # Not four segments: one of an encoder's waves with two periods per revolution is zero at the ends of quarters, and no
 # segment would show it.
 OF_REVOLUTION, OF_REST, MOST = 6, 3, 72
 FEWEST_SAMPLES = 20  # fewest samples of a segment
+FEWEST_SCATTERED = 3  # segments: as many or fewer show no scatter around a straight line
 FEWEST_AT_REST = 60  # fewest samples of a rest: fewer do not determine its noise well enough for a weight
 PREVAILS = 0.7  # fraction of the residuals' variance, below which the noise of a long mean is that at zero frequency
 AT_REST = LineSearch(stands_out=30.0, beats=0)  # noise alone exceeds this in one bin of 10⁹
@@ -186,7 +187,7 @@ def _segment_revolution(
         division,
         motion,
         weights=weights,
-        slow=line_variances(lines[:, is_slow], weights, not_encoded),
+        added=_slow_line_variance(lines[:, is_slow], weights, not_encoded) if is_slow.any() else np.zeros(3),
         residuals=noise_alone - lines @ fit_columns(lines, noise_alone),
         rates=rates,
         noise=noise,
@@ -199,6 +200,21 @@ def _segment_revolution(
         vibration_counts=np.sqrt(np.mean(vibrating**2, axis=0)) / lsb,
     )
     return SegmentedAverage(average, segments, readings, turn.speed_std_rad_s / turn.speed_rad_s)
+
+
+def _slow_line_variance(slow: Array, weights: Array, residuals: Array) -> Array:
+    """Return the variance (3,) of means with weights (p, n) by slow columns (n, k) of lines in residuals (n, 3).
+
+    The frequencies of slow lines are uncertain. So the variance is at least the means' scatter around a straight line,
+    which would be a fault, not a vibration.
+    """
+    fitted = np.mean((weights @ slow @ fit_columns(slow, residuals)) ** 2, axis=0)
+    if len(weights) <= FEWEST_SCATTERED:
+        return np.asarray(fitted, dtype=np.float64)
+    means, straight = weights @ residuals, np.vander(np.linspace(-1, 1, len(weights)), 2)
+    around = means - straight @ fit_columns(straight, means)
+    variance: Array = np.maximum(fitted, np.sum(around**2, axis=0) / (len(weights) - 2))
+    return variance
 
 
 def _segment_rest(stream: Stream, motion: ArmMotion, average: Average, count: int, response: Array) -> SegmentedAverage:
@@ -220,7 +236,7 @@ def _segment_rest(stream: Stream, motion: ArmMotion, average: Average, count: in
         residuals=residuals,
         rates=np.zeros((len(readings), 3)),
         noise=_noise_at_rest(residuals, len(division.enough), lines.shape[1], division.steps),
-        slow=np.zeros((len(weights), 3)),
+        added=np.zeros(3),
     )
     lsb = stream.sensor.channel(RATE).unit_per_count
     vibrating = division.subtract_means(readings, division.averages)
@@ -253,11 +269,11 @@ def _average(
     residuals: Array,
     rates: Array,
     noise: MeanNoise,
-    slow: Array,
+    added: Array,
 ) -> tuple[Segment, ...]:
     """Return the segments with enough samples, averaged by weights (p, m): readings and the flange's rates (m, 3).
 
-    `slow` (p, 3): variances by slow lines.
+    `added` (3,): the variance of each mean by slow lines.
     """
     readings = division.readings_rad_s
     groups, rows = division.groups[:, division.enough], weights[list(division.enough)]
@@ -269,7 +285,7 @@ def _average(
         segments.append(
             Segment(
                 position=2 * index / last - 1 if last else 0.0,
-                mean=replace(mean, variance=mean.variance + slow[index]),
+                mean=replace(mean, variance=mean.variance + added),
                 rate_rad_s=rate_rad_s,
                 attitude=motion.attitude(start_s, end_s),
                 interval=MotionInterval(motion, start_s, end_s),

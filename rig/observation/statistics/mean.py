@@ -23,7 +23,8 @@ class Mean:
     - `mean` (3,), its `variance` (3,), the `noise` (3,) of one reading, and the number of `samples`.
     - `dof` (3,): degrees of freedom of the variance, fewer than samples if these are not independent.
     - `cycles` (k,): of each spectral line that was removed from the mean, its number of cycles in the window.
-    - `rounding` (3,): the part of the variance by rounding to steps.
+    - `rounding`, `slow_lines` (3,): the parts of the variance by rounding to steps, and by lines that are too slow to
+      remove.
     - `weights` (n,): weights of the readings, for averaging other data of the same samples; empty if they are not
       stored.
     """
@@ -35,6 +36,7 @@ class Mean:
     dof: Array | float = np.inf
     cycles: Array = field(default_factory=partial(np.zeros, 0))
     rounding: Array | float = 0.0
+    slow_lines: Array | float = 0.0
     weights: Array = field(default_factory=partial(np.zeros, 0))
 
 
