@@ -48,6 +48,7 @@ SLOWNESS = 1.1  # a move may take this much longer than planned …
 SLOWNESS_S = 1.0  # … plus this, in the controller's time
 REPORT_S = 5.0  # … and the wall time to report it, once the arm has reached its target
 SILENCE_S = 0.8  # after a longer silence the controller may have lost the client
+SETTLED_S = 2.0  # after this wall time an arm that was not at rest for a moment moves
 REASON_S = 0.2  # a failure waits this long (wall time) for its explanation
 OUR_PROGRAM = "rtde_control"  # the client's name for it
 NOT_BEGUN = ("not_in_remote_control", "registers_in_use")  # reasons for which the client could not start a program
@@ -120,8 +121,13 @@ class Arm:
         return self._latest
 
     def report(self) -> ArmReport:
-        """Return what the controller reports about its arm, for the pre-flight check."""
+        """Return what the controller reports about its arm, for the pre-flight check.
+
+        An arm that settles or vibrates seems to move at moments. So wait up to `SETTLED_S` for a state at rest.
+        """
         self.check()
+        with self._changed:
+            self._changed.wait_for(lambda: self.latest.at_rest or self._link.ended, SETTLED_S)
         return read_report(self._host, self._controller, self.latest, self._robot_api_port)
 
     def check(self) -> None:

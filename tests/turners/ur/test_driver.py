@@ -68,6 +68,17 @@ def driver(world: WorldHandle, on_state: Callable[[ArmState], None] = lambda sta
     return Arm(world.host, on_state, robot_api_port=ROBOT_API_PORT, **options)
 
 
+SWAYING = {
+    "vibration_measured_rms_rad_s": 0.004,
+    "vibration_measured_hz": 1.5,
+}  # at most moments one joint seems to move
+
+
+def test_an_arm_that_sways_on_its_base_is_reported_at_rest(world: World) -> None:
+    with driver(world({"world": {"arm": SWAYING}})) as arm:
+        assert all(arm.report().state.at_rest for _ in range(5))
+
+
 def turn(start: Joints, angle_rad: float) -> Transfer:
     """A move of wrist 3 alone at 1 rad/s."""
     target = (*start[:WRIST_3], start[WRIST_3] + angle_rad)
