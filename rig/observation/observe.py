@@ -161,7 +161,7 @@ def _observe_revolution(
     turn = motion.turn(finished.sweep, finished.window, settings)
     observation = _average_revolution(stream, motion, finished.sweep, turn, settings)
     if stream.sensor.measures(ACCELERATION) and run.settings.planned_dwells:
-        acceleration = swept_acceleration(stream, motion, finished.sweep, turn, run.settings.site)
+        acceleration = swept_acceleration(stream, motion, finished.sweep, turn, run.settings)
         return replace(observation, acceleration=acceleration)
     return observation
 

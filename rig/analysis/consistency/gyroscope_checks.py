@@ -28,6 +28,7 @@ from rig.analysis.consistency.alternatives import (
     sweep_columns,
 )
 from rig.analysis.consistency.residual_tests import (
+    ALIKE,
     Alternative,
     Statistic,
     TestResults,
@@ -178,7 +179,7 @@ def _free_disturbed_transfers(
     """Return `_inflate_transfers` with a mean of its own for each transfer that differs from all other segments.
 
     A ripple at the data rate shifts the mean of one transfer. A change of a scale factor shifts all later transfers, so
-    a transfer is an outlier only if its own mean explains more of the residuals than any such change.
+    a transfer is an outlier only if its own mean explains clearly more of the residuals than any such change.
     """
     disturbed: list[int] = []
     while True:
@@ -192,7 +193,7 @@ def _free_disturbed_transfers(
         explained = model.chi_square_of([_own_mean(segments, number) for number in transfers], ())
         worst = int(np.argmax(explained))
         critical = critical_value(false_alarm_probability / len(transfers))(AXES)
-        if explained[worst] <= max(critical, axis_changed[0]):
+        if explained[worst] <= max(critical, axis_changed[0] + ALIKE):
             return with_transfers
         disturbed.append(transfers[worst])
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rig.data.recording.settings import Site
+from rig.data.recording.settings import RunSettings
 from rig.estimation.arrays import Array
 from rig.estimation.reference.sweep_harmonics import FirstHarmonic, first_harmonic
 from rig.estimation.sensor_axes import nearest_rotation
@@ -13,6 +13,7 @@ from rig.observation.average import Stream, slice_time
 from rig.observation.motion.arm_motion import ArmMotion
 from rig.observation.motion.revolution import Revolution, describe
 from rig.observation.reference.dwell_acceleration import accelerations, check_acceleration, gravity_difference
+from rig.observation.reference.sway import sway_acceleration
 from rig.observation.statistics.vibration_noise import fit_inflation, line_columns
 
 
@@ -35,12 +36,12 @@ class SweptAcceleration:
 
 
 def swept_acceleration(
-    stream: Stream, motion: ArmMotion, sweep: Sweep, turn: Revolution, site: Site
+    stream: Stream, motion: ArmMotion, sweep: Sweep, turn: Revolution, settings: RunSettings
 ) -> SweptAcceleration:
     """Fit the first harmonic of one sweep's revolution, together with its vibrations.
 
-    In the model only the sweep's joint changes the attitude; other joints may oscillate, so the difference of gravity
-    due to them, by the encoders, is subtracted. Raise Fault `saturation`, `stuck_sensor`, `incomplete_revolution` or
+    In the model only the sweep's joint moves; other joints may sway, so the difference of gravity and the acceleration
+    due to them, by the encoders, are subtracted. Raise Fault `saturation`, `stuck_sensor`, `incomplete_revolution` or
     `not_finite`.
     """
     inside = slice_time(stream, turn.start_s, turn.end_s)
@@ -51,9 +52,11 @@ def swept_acceleration(
     angle_rad = motion.angle(sweep, time_s) - motion.angle(sweep, turn.start_s)
     attitudes, rotations = motion.attitudes(time_s), _rotations(-sweep.growing * turn.axis_flange, angle_rad)
     began = nearest_rotation((rotations.swapaxes(1, 2) @ attitudes).mean(axis=0))
+    by_gravity = gravity_difference(attitudes, rotations @ began, stream.sensor, settings.site)
+    swayed = sway_acceleration(motion, sweep.joint, time_s, (turn.start_s, turn.end_s), np.array(settings.extension_m))
     harmonic = first_harmonic(
         time_s,
-        accelerations(stream, inside)[covered] - gravity_difference(attitudes, rotations @ began, stream.sensor, site),
+        accelerations(stream, inside)[covered] - by_gravity - swayed @ np.array(stream.sensor.mounting).T,
         angle_rad,
         motion.angle(sweep, time_s, 1),
         coloured=fit_inflation,
