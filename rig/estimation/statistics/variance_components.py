@@ -173,16 +173,18 @@ class MixedModel:
 
     def _whiten(self, std: Array) -> tuple[Array, Array, Array, Array, float]:
         """Return L of the covariance L Lᵀ, whitened design, whitened observations, information and log-likelihood."""
-        from scipy.linalg import solve_triangular
+        from scipy.linalg.lapack import dpotrf, dtrtrs  # without the checks of `solve_triangular`, which take longer
 
         mixed = self.mixed
-        lower = np.asarray(np.linalg.cholesky(self.covariance(std)), dtype=np.float64)
-        both = solve_triangular(lower, np.column_stack([mixed.design, mixed.observed]), lower=True, check_finite=False)
+        lower, failed = dpotrf(self.covariance(std).T, lower=1, overwrite_a=1)
+        if failed:
+            raise np.linalg.LinAlgError("the covariance is not positive definite")
+        both = dtrtrs(lower, np.column_stack([mixed.design, mixed.observed]), lower=1)[0]
         design, observed = both[:, :-1], both[:, -1]
         information = design.T @ design + np.diag(mixed.precision)
         unit = 1 / np.sqrt(np.diag(information))
         small = np.linalg.cholesky(information * unit[:, None] * unit)
-        projection = solve_triangular(small, unit * (design.T @ observed), lower=True, check_finite=False)
+        projection = dtrtrs(small, unit * (design.T @ observed), lower=1)[0]
         determinant = 2 * float(np.sum(np.log(np.diag(lower)))) + 2 * float(np.sum(np.log(np.diag(small) / unit)))
         square = float(observed @ observed - projection @ projection)
         return lower, design, observed, information, -0.5 * (determinant + square)
@@ -191,8 +193,9 @@ class MixedModel:
         """Return P (m, m) and P y (m,), as `restrict`, from L (m, m) and the information (p, p) of `_whiten`."""
         from scipy.linalg.lapack import dpotri
 
-        inverse = np.tril(dpotri(lower, lower=1)[0])
-        inverse += np.tril(inverse, -1).T
+        half = dpotri(lower, lower=1)[0]
+        inverse = half + half.T
+        np.fill_diagonal(inverse, np.diag(half))
         weighted = inverse @ self.mixed.design
         projected = inverse - weighted @ np.linalg.solve(information, weighted.T)
         return projected, projected @ self.mixed.observed
