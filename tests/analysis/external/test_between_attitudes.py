@@ -193,10 +193,10 @@ def test_a_marker_taken_for_another_is_set_aside() -> None:
 def test_a_body_laid_down_ten_times_is_solved_by_the_moves_between() -> None:
     """Each lying has an error of its own, which its beginning and its end share."""
     still = [laid_down(seed) for seed in range(3)]
-    errors = np.array([off(solve_turning(each, None, any_mounting=False), followed) for followed, each in still])
+    found = [solve_turning(each, None, any_mounting=False) for _, each in still]
+    errors = np.array([off(each, followed) for each, (followed, _) in zip(found, still, strict=True)])
     assert np.sqrt(np.mean(errors[:, :3] ** 2)) < 1.6
-    found = solve_turning(still[0][1], None, any_mounting=False)
-    assert len(found.solution.residuals_rad) == 2 * 13 - 1 and found.solution.fix_std_rad < 6e-3
+    assert len(found[0].solution.residuals_rad) == 2 * 13 - 1 and found[0].solution.fix_std_rad < 6e-3
 
 
 def laid_down(seed: int) -> tuple[Followed, Turning]:
