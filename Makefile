@@ -32,8 +32,8 @@ all-extras: $(VENV)/all.installed
 
 # Fast tests compute, so two run at a time on two processors; of all tests three, as many wait for a laboratory: every
 # simulated one has a loopback address of its own. With four, each takes an eighth more processor time from the others.
-# As many threads for linear algebra would only be in each other's way.
-PYTEST = OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n $(AT_A_TIME) --dist $(DIST)
+# As many threads for linear algebra would only be in each other's way. Hypothesis' plugins would import the whole of trio.
+PYTEST = OPENBLAS_NUM_THREADS=1 HYPOTHESIS_NO_PLUGINS=1 $(BIN)/pytest -n $(AT_A_TIME) --dist $(DIST)
 AT_A_TIME := 2
 DIST := worksteal
 

@@ -1,8 +1,8 @@
 """The notebook in the docs runs from its first cell to its last, and shows what it says."""
 
-import nbformat
+import json
+
 import pytest
-from nbclient import NotebookClient
 
 from support.paths import DOCS
 from support.processes.waiting import PATIENCE_S
@@ -14,6 +14,9 @@ NOTEBOOK = DOCS / "notebooks" / "first_look.ipynb"
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")  # of Jupyter's own packages
 def test_the_notebook_runs_and_shows_tables_and_pictures() -> None:
+    import nbformat
+    from nbclient import NotebookClient
+
     notebook = nbformat.read(NOTEBOOK, as_version=4)
     NotebookClient(notebook, timeout=PATIENCE_S, resources={"metadata": {"path": NOTEBOOK.parent}}).execute()
     shown = [output.get("data", {}) for cell in notebook.cells if cell.cell_type == "code" for output in cell.outputs]
@@ -26,4 +29,4 @@ def test_the_notebook_runs_and_shows_tables_and_pictures() -> None:
 
 
 def test_no_output_is_kept_in_the_notebook() -> None:
-    assert not any(cell.get("outputs") for cell in nbformat.read(NOTEBOOK, as_version=4).cells)
+    assert not any(cell.get("outputs") for cell in json.loads(NOTEBOOK.read_text(encoding="utf-8"))["cells"])

@@ -24,8 +24,11 @@ from support.laboratories.commands import rig_here
 from support.processes.waiting import PATIENCE_S
 
 DS = "{http://www.w3.org/2000/09/xmldsig#}"
-# WeasyPrint does not close its colour profile.
-pytestmark = pytest.mark.filterwarnings("ignore:.*sRGB2014.icc:pytest.PytestUnraisableExceptionWarning")
+pytestmark = [
+    pytest.mark.slow,  # to import what signs takes longer than the shortest of these tests
+    # WeasyPrint does not close its colour profile.
+    pytest.mark.filterwarnings("ignore:.*sRGB2014.icc:pytest.PytestUnraisableExceptionWarning"),
+]
 SIMULATED = "Simulated laboratory: no real item was calibrated"
 ALTERED, NOBODY_TRUSTED = 1, 4
 
@@ -42,7 +45,6 @@ def lab(made: Laboratory, tmp_path: Path) -> Laboratory:
     return made.copied(tmp_path)
 
 
-@pytest.mark.slow
 def test_what_was_signed_is_whole_and_says_who_when_and_that_it_is_simulated(lab: Laboratory) -> None:
     status, said = lab.verified(PDF, XML, RESULT, PAGE)
     assert (status, names_of(said)) == (0, []), said
@@ -56,7 +58,6 @@ def test_what_was_signed_is_whole_and_says_who_when_and_that_it_is_simulated(lab
     assert all("RIG-" in " ".join(each["history"]) for each in (pdf, xml, page)) and beside["history"]
 
 
-@pytest.mark.slow
 def test_it_is_told_in_words_and_nobody_is_trusted_unasked(lab: Laboratory, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["verify", str(lab.folder / PDF)]) == NOBODY_TRUSTED
     said = capsys.readouterr().out
@@ -80,7 +81,6 @@ def pdfsig(file: Path) -> str:
     return said
 
 
-@pytest.mark.slow
 def test_other_programs_find_the_signatures_valid_and_those_of_altered_files_not(lab: Laboratory) -> None:
     said = pdfsig(lab.folder / PDF)
     assert "Signature is Valid" in said and "Total document signed" in said
@@ -106,13 +106,11 @@ def test_other_programs_find_the_signatures_valid_and_those_of_altered_files_not
         assert (ended.returncode != 0) == bool(status), ended.stderr
 
 
-@pytest.mark.slow
 def test_a_signed_digital_certificate_is_one_by_its_schema(lab: Laboratory) -> None:
     assert schema_faults(lab.read(XML)) == []
 
 
 @pytest.mark.thorough
-@pytest.mark.slow
 def test_with_revocation_lists_it_can_be_checked_long_after(
     lab: Laboratory, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -129,7 +127,6 @@ def test_with_revocation_lists_it_can_be_checked_long_after(
     assert "was not revoked at that time" in capsys.readouterr().out
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("file", [PDF, XML])
 def test_one_signed_by_a_stranger_of_the_same_name_is_refused(file: str, lab: Laboratory) -> None:
     shutil.copy(lab.stranger / file, lab.folder / file)
@@ -141,7 +138,6 @@ def test_one_signed_by_a_stranger_of_the_same_name_is_refused(file: str, lab: La
         assert status == NOBODY_TRUSTED and set(names_of(said)) == {name}, said
 
 
-@pytest.mark.slow
 def test_two_certificates_at_once_are_each_beside_their_own_result(lab: Laboratory) -> None:
     shutil.copytree(lab.folder, lab.folder / "other")
     (lab.folder / "other" / RESULT).write_bytes(b"{}")
@@ -152,7 +148,6 @@ def test_two_certificates_at_once_are_each_beside_their_own_result(lab: Laborato
     assert whole == beside == set() and other == {"signer_not_trusted"} and forged == {"not_as_signed"}
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("statements", "name"),
     [
@@ -176,13 +171,11 @@ def test_an_alteration_of_the_history_is_refused_by_name(statements: list[str], 
     assert main(["history", "verify", "--history", str(lab.history)]) == 1
 
 
-@pytest.mark.slow
 def test_one_of_an_unsigned_run_is_known_by_the_history_alone(lab: Laboratory) -> None:
     status, said = lab.verified(PAGE, RESULT)
     assert status == 0 and names_of(said) == [], said
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("form", ["p12", "pem", "open pem"])
 def test_keys_come_from_files_under_a_passphrase_of_the_environment(
     form: str, lab: Laboratory, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
@@ -202,7 +195,6 @@ def test_keys_come_from_files_under_a_passphrase_of_the_environment(
     assert names_of(lab.verified(XML, history=False, trust=False)[1]) == ["signer_unknown"]
 
 
-@pytest.mark.slow
 def test_a_key_in_a_token_signs_both(
     lab: Laboratory, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -273,7 +265,6 @@ def test_an_address_of_a_token_with_a_pin_in_it_is_refused_and_not_repeated(
     assert "7391" not in ended.stderr + ended.stdout
 
 
-@pytest.mark.slow
 def test_what_cannot_be_signed_is_refused_before_anything_is_written(
     lab: Laboratory, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -305,7 +296,6 @@ def test_a_certificate_is_trusted_itself_or_by_its_authority_while_it_is_valid()
     assert "key usage" in why_untrusted([root], Trust((root,)), now), "an authority's key signs certificates"
 
 
-@pytest.mark.slow
 def test_a_time_server_that_gives_none_leaves_out_the_pdf_alone(
     lab: Laboratory, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

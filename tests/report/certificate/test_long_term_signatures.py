@@ -28,6 +28,8 @@ from rig.report.signatures.trust import Trust
 from support.documents.signing import PASSPHRASE, Holder, holder, revocation_list, stamping, time_server
 from support.processes.waiting import PATIENCE_S
 
+pytestmark = pytest.mark.slow  # to import what signs takes longer than the shortest of these tests
+
 
 @dataclass(frozen=True)
 class Signing:
@@ -73,7 +75,6 @@ def seen(pdf: bytes, trust: list[bytes]) -> FileInspection:
     return inspect_file("certificate.pdf", pdf, Trust(tuple(trust)))
 
 
-@pytest.mark.slow
 def test_the_lists_are_signed_too_and_clear_the_signer_and_other_programs_agree(signing: Signing) -> None:
     made = signing.signed(revocation_list(signing.authority))
     looked = seen(made, signing.trust)
@@ -98,7 +99,6 @@ def test_the_lists_are_signed_too_and_clear_the_signer_and_other_programs_agree(
         assert status.intact and status.trusted is clear
 
 
-@pytest.mark.slow
 def test_the_claim_is_made_only_where_an_authority_is_trusted(signing: Signing) -> None:
     made = signing.signed(revocation_list(signing.authority))
     own = signing.laboratory.chain[0].public_bytes(Encoding.DER)
@@ -109,7 +109,6 @@ def test_the_claim_is_made_only_where_an_authority_is_trusted(signing: Signing) 
         assert [problem.name for problem in looked.problems] == problems and not looked.signatures[0].long_term
 
 
-@pytest.mark.slow
 def test_a_byte_of_a_list_cannot_be_changed_unnoticed(signing: Signing) -> None:
     made = bytearray(signing.signed(revocation_list(signing.authority)))
     reader = PdfFileReader(io.BytesIO(bytes(made)))
@@ -121,7 +120,6 @@ def test_a_byte_of_a_list_cannot_be_changed_unnoticed(signing: Signing) -> None:
     ]
 
 
-@pytest.mark.slow
 def test_what_no_list_clears_is_not_signed(signing: Signing) -> None:
     revoked = revocation_list(signing.authority, signing.laboratory)
     expired = revocation_list(signing.authority, days=(-9, -2))
