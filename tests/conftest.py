@@ -114,9 +114,14 @@ def pytest_collection_finish() -> None:
 
 
 def pytest_sessionfinish() -> None:
-    """The firmware's executed lines are written while the process is sure to live: xdist kills one that ends slowly."""
+    """The firmware's executed lines are written while the process is sure to live: xdist kills one that ends slowly.
+
+    What nobody closed is looked for here once: the two looks of pytest then find little to go through.
+    """
     if host_board := sys.modules.get("support.board.host_board"):
         host_board.write_coverage()
+    gc.collect()
+    gc.freeze()
 
 
 def place_files(files: Collection[Path]) -> dict[Path, float]:
