@@ -15,6 +15,8 @@ from rig.observation.motion.arm_motion import motion_of
 from rig.observation.windows import swept
 from support.recordings.synthetic_run import BIAS_RAD_S, SCALE, Setup, synthetic_run
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def run() -> RunData:
@@ -27,7 +29,6 @@ def until(run: RunData, sweeps: int) -> RunData:
     return replace(run, events=run.events[: ends[sweeps - 1] + 1])
 
 
-@pytest.mark.slow
 def test_parameters_come_when_the_sweeps_tell_them(run: RunData) -> None:
     for sweeps in range(1, 7):
         found = so_far([until(run, sweeps)]).gyroscopes["gyro"]
@@ -41,7 +42,6 @@ def test_parameters_come_when_the_sweeps_tell_them(run: RunData) -> None:
     assert np.allclose(found.solution.scale, SCALE, rtol=1e-3)
 
 
-@pytest.mark.slow
 def test_a_refused_sweep_says_why_and_the_others_count(run: RunData) -> None:
     samples = run.samples["gyro"].copy()
     third = list(swept(run))[2].window

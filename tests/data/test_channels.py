@@ -108,6 +108,7 @@ def test_a_scalar_is_shown_while_it_comes_on_the_terminal_and_on_the_page() -> N
     assert page.sections["sensors"][0]["units"] == {"pressure_pa": ["pressure", "hPa"]}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "complaint"),
     [

@@ -15,6 +15,8 @@ from rig.observation.by_hand.rests_and_moves import NotCounted
 from rig.world.hand.habits import Action, Face, FlipAction, Mistake, MistakeKind, TurnAction
 from support.external.handled_body import BOTH_WAYS, LSM9DS1, SIX_TURNS, TWELVE, Part, Recorded, creeping, handle
 
+pytestmark = pytest.mark.slow
+
 TOLD = SessionConditions(20.0, first_face="+z")
 SESSION = (*TWELVE, TurnAction(1), FlipAction("+x"), TurnAction(1), FlipAction("+y"), TurnAction(1))
 NOISY = Part(rate_hz=238.0, noise_rad_s=0.035)
@@ -160,7 +162,6 @@ SMALLER: dict[str, tuple[Callable[[int], Made], set[str]]] = {
 }
 
 
-@pytest.mark.slow
 def test_moves_that_fit_only_a_much_skewed_box_are_refused() -> None:
     recorded = handle(TWELVE, 13)
     later = recorded.time_s > np.median(recorded.time_s)
@@ -170,7 +171,6 @@ def test_moves_that_fit_only_a_much_skewed_box_are_refused() -> None:
     solved(recorded)
 
 
-@pytest.mark.slow
 def test_twelve_flips_tell_scale_axes_and_bias() -> None:
     recorded = handle(TWELVE, 1)
     found = solved(recorded)
@@ -181,7 +181,6 @@ def test_twelve_flips_tell_scale_axes_and_bias() -> None:
     assert (found.budget.expanded[:3] > 9e-4).all(), "no hand's recording supports less"
 
 
-@pytest.mark.slow
 @pytest.mark.one_in(2)
 @pytest.mark.proof
 @pytest.mark.timeout(3600)
@@ -207,7 +206,6 @@ def test_uncertainties_are_those_of_many_sessions(
         assert within > (0.93 if thorough else 0.77)
 
 
-@pytest.mark.slow
 @pytest.mark.one_in(5)
 @pytest.mark.proof
 @pytest.mark.timeout(3600)
@@ -218,7 +216,6 @@ def test_a_mistake_is_named_or_within_the_uncertainty(kind: MistakeKind, thoroug
     assert {each for each in found if each is not None} <= names, found
 
 
-@pytest.mark.slow
 @pytest.mark.one_in(5)
 @pytest.mark.proof
 @pytest.mark.timeout(3600)
@@ -239,7 +236,6 @@ def test_what_is_smaller_is_named_or_within_the_uncertainty(what: str) -> None:
     assert {each for each in found if each is not None} <= names, found
 
 
-@pytest.mark.slow
 @pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("kind", "at", "size", "said"),
@@ -259,7 +255,6 @@ CREEPS = {
 }
 
 
-@pytest.mark.slow
 @pytest.mark.one_in(len(CREEPS))
 @pytest.mark.parametrize(("axis", "rest_s", "level"), CREEPS.values(), ids=CREEPS)
 def test_a_rest_that_creeps_is_left_out_and_costs_no_session(axis: str, rest_s: float, level: bool) -> None:
@@ -276,7 +271,6 @@ def test_a_rest_that_creeps_is_left_out_and_costs_no_session(axis: str, rest_s: 
     assert (np.abs(found.bias_rad_s - recorded.truth[3:]) < 1.3 * found.budget.expanded[3:]).all()
 
 
-@pytest.mark.slow
 @pytest.mark.one_in(2)
 @pytest.mark.parametrize("after", [0, 2, 16, 9])
 def test_a_bias_that_jumps_for_good_ends_a_session_at_the_right_rest(after: int) -> None:
@@ -290,12 +284,10 @@ def test_a_bias_that_jumps_for_good_ends_a_session_at_the_right_rest(after: int)
     assert f"ended at {session.rests[after + 1].start_s:.1f} s" in refusal.value.problem.what
 
 
-@pytest.mark.slow
 def test_without_a_level_somebody_has_to_say_which_face_was_up() -> None:
     assert refused(handle(TWELVE, 2), level=False, told=replace(TOLD, first_face=None)) == "first_face_unknown"
 
 
-@pytest.mark.slow
 def test_a_clock_that_is_off_is_in_the_scale_and_nowhere_else() -> None:
     recorded = handle(TWELVE, 4)
     usual, slow = (solved(replace(recorded, time_s=recorded.time_s * by)) for by in (1.0, 1 + 50e-6))
@@ -303,7 +295,6 @@ def test_a_clock_that_is_off_is_in_the_scale_and_nowhere_else() -> None:
     assert slow.chi_square == pytest.approx(usual.chi_square, rel=0.02)
 
 
-@pytest.mark.slow
 def test_time_stamps_that_scatter_are_in_the_uncertainty() -> None:
     recorded = handle(TWELVE, 6)
     usual, uneven = (
@@ -314,7 +305,6 @@ def test_time_stamps_that_scatter_are_in_the_uncertainty() -> None:
 
 
 @pytest.mark.thorough
-@pytest.mark.slow
 def test_a_session_tells_more_with_every_move_and_names_the_last_one() -> None:
     wrong = TurnAction(1, Mistake("short", 5.0))
     recorded = handle((*TWELVE[:9], TurnAction(1), wrong, *TWELVE[9:]), 5, rest_s=1.8)

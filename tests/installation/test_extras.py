@@ -60,6 +60,7 @@ def test_what_came_from_an_index_comes_from_there_again(tmp_path: Path) -> None:
     assert printed(tmp_path, None)[3:] == ["install", "calibration-rig[study]"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "library"), [("parquet", "pyarrow"), ("ros2", "rosbags")])
 def test_an_export_without_its_extra_names_the_command_and_leaves_no_folder(
     name: str, library: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

@@ -84,6 +84,7 @@ def test_equal_sweeps_to_and_fro_are_not_taken_for_each_other(first_s: float) ->
     assert clock.controller_time_s(np.array([-690.0]))[0] == pytest.approx(10.0, abs=0.01)
 
 
+@pytest.mark.slow
 def test_vibrations_of_a_long_rest_do_not_move_the_clock_of_the_one_sweep_after_it() -> None:
     """The encoders show little of the vibrations, and with another phase than the sensor."""
     time_s = np.arange(0.0, 300.0, STATE_S)

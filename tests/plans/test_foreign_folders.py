@@ -85,6 +85,7 @@ def test_a_script_that_the_user_names_is_executed(foreign: Path, tmp_path: Path)
     assert other.returncode == 2 and "rig: another_script: " in other.stderr
 
 
+@pytest.mark.slow
 def test_a_run_by_anothers_script_goes_on_by_a_script_that_the_user_names_or_not_at_all(
     foreign: Path, tmp_path: Path
 ) -> None:
@@ -124,6 +125,7 @@ def test_nothing_is_written_through_what_somebody_laid_into_a_folder(
     assert target.read_text(encoding="utf-8") == "mine"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("endless", ["pipe", "/dev/zero"])
 def test_a_recording_that_never_ends_ends_no_import(foreign: Path, endless: str) -> None:
     (foreign / "run.h5").unlink()

@@ -46,6 +46,7 @@ def terminal(document: ResultDocument) -> str:
     return console.export_text()
 
 
+@pytest.mark.slow
 def test_u_of_angles_is_the_same_in_every_outlet() -> None:
     document = scarce()
     vector = document.gyroscopes["gyro"].vector_model
@@ -97,6 +98,7 @@ def warmed() -> ResultDocument:
     return everything().model_copy(update={"over_temperature": {"gyro": {"rate": over_temperature()}}})
 
 
+@pytest.mark.slow
 def test_u_over_temperature_is_k_times_u_in_the_digital_certificate() -> None:
     entry = over_temperature()
     xml = fromstring(digital_certificate(certificate(warmed(), GERMAN)))

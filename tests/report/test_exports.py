@@ -80,6 +80,7 @@ def motion() -> tuple[Array, Array]:
     return rng.normal(size=3), up / np.linalg.norm(up)
 
 
+@pytest.mark.slow
 def test_imucal_takes_readings_to_the_true_rate_and_force(sensed: ResultDocument) -> None:
     from imucal import CalibrationInfo
 

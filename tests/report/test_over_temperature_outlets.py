@@ -22,6 +22,8 @@ from support.documents.certified import certificate
 from support.documents.dcc_rules import rule_faults, schema_faults
 from support.motions.warmed_sweeps import FROM_C, REFERENCE_C, TO_C, Drawn, drawn, session, write_files
 
+pytestmark = pytest.mark.slow
+
 READING = np.array([0.3, -0.9, 1.2])
 
 
@@ -49,7 +51,6 @@ def entry(result: ResultDocument) -> OverTemperatureEntry:
     return result.over_temperature["imu"]["rate"]
 
 
-@pytest.mark.slow
 def test_the_result_holds_the_sensor_and_agrees_with_its_calibration(
     warmed: tuple[Path, Drawn], result: ResultDocument, entry: OverTemperatureEntry
 ) -> None:
@@ -67,7 +68,6 @@ def test_the_result_holds_the_sensor_and_agrees_with_its_calibration(
     assert any(line.name == "polynomials over temperature" for line in calibration.budget.contributors)
 
 
-@pytest.mark.slow
 def test_the_run_folder_has_picture_certificate_and_history(
     warmed: tuple[Path, Drawn], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -80,7 +80,6 @@ def test_the_run_folder_has_picture_certificate_and_history(
     assert "over temperature" in capsys.readouterr().out
 
 
-@pytest.mark.slow
 def test_a_history_follows_the_slopes_and_the_values_at_the_reference(
     result: ResultDocument, entry: OverTemperatureEntry
 ) -> None:
@@ -92,7 +91,6 @@ def test_a_history_follows_the_slopes_and_the_values_at_the_reference(
     assert all(slope.expanded > 0 for slope in slopes.values())
 
 
-@pytest.mark.slow
 def test_the_digital_certificate_has_every_temperature(result: ResultDocument) -> None:
     xml = digital_certificate(certificate(result, StatedFacts(SiteSection(country="DE"))))
     names = [each.text for each in ElementTree.fromstring(xml).iter("{https://ptb.de/dcc}content")]
@@ -101,7 +99,6 @@ def test_the_digital_certificate_has_every_temperature(result: ResultDocument) -
     assert rule_faults(xml) == []
 
 
-@pytest.mark.slow
 def test_the_digital_certificate_is_valid_by_ptbs_schema(result: ResultDocument) -> None:
     assert schema_faults(digital_certificate(certificate(result, StatedFacts(SiteSection(country="DE"))))) == []
 
@@ -127,7 +124,6 @@ int main(void) {{
     )
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("asked_c", [25.0, 41.5, 90.0])
 def test_the_header_corrects_by_temperature(
     result: ResultDocument, entry: OverTemperatureEntry, tmp_path: Path, asked_c: float
@@ -152,7 +148,6 @@ def ours(entry: OverTemperatureEntry, temperature_c: float) -> Array:
     return found
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("temperature_c", [0.0, FROM_C + 0.5, REFERENCE_C, 35.0, 47.3, TO_C - 1, 80.0])
 def test_px4_corrects_as_we_do(result: ResultDocument, entry: OverTemperatureEntry, temperature_c: float) -> None:
     """By calc_thermal_offsets_3D of TemperatureCompensation.cpp and Gyroscope::Correct."""
@@ -169,7 +164,6 @@ def test_px4_corrects_as_we_do(result: ResultDocument, entry: OverTemperatureEnt
     assert np.allclose(READING - thermal - offset, ours(entry, temperature_c), rtol=0, atol=1e-6)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("temperature_c", [0.0, FROM_C + 0.5, REFERENCE_C, 35.0, 47.3, TO_C - 1, 80.0])
 def test_ardupilot_corrects_as_we_do(result: ResultDocument, entry: OverTemperatureEntry, temperature_c: float) -> None:
     """By TCal::correct_sensor of AP_InertialSensor_tempcal.cpp and _rotate_and_correct_gyro."""

@@ -55,6 +55,7 @@ def test_each_value_is_compared_with_its_truth_in_units_of_u(run: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_show_has_the_truth_in_short_and_in_full(run: Path) -> None:
     assert "simulated truth: " in rig_here("show", run).stdout
     assert "with its simulated truth, d = (result − truth)/U" in rig_here("show", run, "--budget").stdout

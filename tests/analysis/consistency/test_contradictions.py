@@ -232,6 +232,7 @@ def test_other_procedures_are_held_against_themselves_too(rest_s: float, repeats
     assert not failed(checks)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rms_counts", [3.0, 6.0, 12.0])
 def test_an_arm_that_vibrates_under_a_quiet_sensor_is_no_stuck_bit(rms_counts: float) -> None:
     """One count of noise and a steady 14 Hz: readings crowd at the ends of the swing, whatever bits are set there."""

@@ -14,6 +14,8 @@ from rig.observation.consistency.segments import segment_recordings
 from rig.observation.windows import swept
 from support.recordings.synthetic_run import BIAS_RAD_S, SCALE, SENSITIVITY, Setup, synthetic_run
 
+pytestmark = pytest.mark.slow
+
 SHAKEN = Setup(
     noise_rad_s=4.5e-4,
     vibration=0.0,
@@ -50,7 +52,6 @@ def segments_of(run: RunData) -> Segments:
     return stack_segments(segment_recordings("gyro", recordings), result.explained, run.settings.site)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("lost_s", "known_rad_s"), [(0.0, 4e-5), (0.3, 8e-5)])
 def test_of_a_vibration_that_no_encoder_sees_a_segment_keeps_no_more_than_is_stated(
     lost_s: float, known_rad_s: float
@@ -65,7 +66,6 @@ def test_of_a_vibration_that_no_encoder_sees_a_segment_keeps_no_more_than_is_sta
     assert 0.75 < np.sqrt(np.mean(off**2 / variances)) < 1.25
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("axes", [(1.0, 0.0, 0.0), (1.0, 1.0, 1.0)])
 def test_a_vibration_slower_than_a_segment_is_in_its_uncertainty(axes: tuple[float, float, float]) -> None:
     """Weights that cancel it would amplify the encoders' noise: sound sweeps would contradict each other."""
@@ -93,7 +93,6 @@ def swinging(run: RunData) -> RunData:
     return replace(run, states=states)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("state_rate_hz", [125.0, 500.0])
 def test_what_the_encoders_noise_makes_of_rates_across_the_swept_axis_is_stated(state_rate_hz: float) -> None:
     """Errors of neighbouring segments have the edge between them in common: over a whole sweep they cancel."""

@@ -149,12 +149,14 @@ def test_a_file_of_stops_alone_tells_no_clock(capsys: pytest.CaptureFixture[str]
     assert "wrong_columns: the samples contain no turn rate" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("estimator", ["as_published", "maximum_likelihood", "attitude_weighted"])
 def test_any_estimator_can_be_asked_for(estimator: str, capsys: pytest.CaptureFixture[str]) -> None:
     found = solved(capsys, example(STILL), *PLACE, "--estimator", estimator, "--second-order")
     assert off(found["acceleration"], *ACCELEROMETER) < 4
 
 
+@pytest.mark.slow
 def test_people_read_what_was_found_and_what_was_not(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(solve(example(STILL), *PLACE, "--all")) == 0
     said = " ".join(capsys.readouterr().out.split())

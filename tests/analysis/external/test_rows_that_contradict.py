@@ -33,6 +33,7 @@ def swept(row: int, factor: float) -> ExternalData:
     return average_sweeps(read_samples(EXAMPLES / "samples.csv", [RATE]), sweeps)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [0.5, 2.0])
 @pytest.mark.parametrize("row", [1, 3])
 def test_of_two_sweeps_about_an_axis_both_are_named_for_either_may_be_wrong(row: int, factor: float) -> None:
@@ -75,6 +76,7 @@ def test_half_a_turn_given_as_a_whole_one_is_refused_by_its_row_if_others_contra
         solve_swept(average_sweeps(read_samples(EXAMPLES / "samples.csv", [RATE]), sweeps), None)
 
 
+@pytest.mark.slow
 def test_what_sweeps_contradict_each_other_by_is_in_the_uncertainty() -> None:
     sound, contradicting = (solve_swept(swept(1, factor), None) for factor in (1.0, 1.03))
     std = np.sqrt(np.diag(contradicting.covariance))[:3]

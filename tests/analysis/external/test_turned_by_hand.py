@@ -46,6 +46,7 @@ def document(capsys: pytest.CaptureFixture[str], *arguments: object) -> dict[str
     return found
 
 
+@pytest.mark.slow
 def test_a_hands_turns_tell_the_scale_to_a_thousandth(tmp_path: Path) -> None:
     session = turn(Hand(BOTH_WAYS), 1)
     found = solved(tmp_path, session)

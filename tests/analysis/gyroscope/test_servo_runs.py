@@ -12,6 +12,8 @@ from rig.estimation.gyroscope.budget import AXES, MOUNTS
 from rig.estimation.gyroscope.six_observation_budget import NOT_SQUARE
 from support.motions.drawn_servo import drawn_servo
 
+pytestmark = pytest.mark.slow
+
 RUNS = 50  # by chance alone twenty may scatter by a fifth more or less than they should
 QUIET_RAD_S = 5e-4  # of a reading of a good gyroscope, beside which all that the turning errs by shows
 SQUARE = "uncertainty.non_orthogonality_deg=0.02", "uncertainty.g_sensitivity_deg_s_g=0.001"
@@ -43,7 +45,6 @@ def turning(outcome: Outcome) -> float:
 
 
 @pytest.mark.thorough
-@pytest.mark.slow
 def test_a_run_errs_by_what_it_says_and_the_turning_adds_next_to_nothing() -> None:
     found = ran(3, "turner.state_rate_hz=100")
     assert np.all(np.abs(found.in_expanded) < 1.5), found.in_u

@@ -88,6 +88,7 @@ def test_real_losses_are_refused(stamps: Stamps, tmp_path: Path, capsys: pytest.
     assert "lost_samples: " in refused(capsys, samples, "--sweeps", sweeps)
 
 
+@pytest.mark.slow
 def test_a_few_losses_are_counted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     samples, sweeps = write_rates(tmp_path, swept(104), Stamps(rounded_s=1e-3, gaps=((450, 3),)))
     said = in_brief(capsys, samples, "--sweeps", sweeps)
@@ -183,6 +184,7 @@ def test_units_that_contradict_what_is_said_are_named(tmp_path: Path, capsys: py
     assert "wrong_unit: " in said and "line 2 says that x_rad_s is in 'deg/s'" in said.replace('"', "'")
 
 
+@pytest.mark.slow
 def test_a_heading_one_short_is_no_heading(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """R's write.table."""
     rows = [f"{number},{row}" for number, row in enumerate(rows_of(tmp_path), 1)]

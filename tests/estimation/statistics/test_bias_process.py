@@ -45,6 +45,8 @@ def test_the_covariance_of_a_walk_is_that_of_many_walks() -> None:
     assert np.abs(found - expected).max() < 0.06 * expected.diagonal().max()
 
 
+@pytest.mark.slow
+@pytest.mark.kernels
 def test_flicker_changes_the_harmonics_of_revolutions_as_drawn_flicker_does() -> None:
     samples, revolution = 2**18, 1024
     rng = np.random.default_rng(5)

@@ -33,6 +33,8 @@ def test_a_size_that_was_measured_alone_is_that_of_both() -> None:
     assert model.find_maxima()[0, 1] == pytest.approx(3 * BETWEEN, rel=0.05)
 
 
+@pytest.mark.slow
+@pytest.mark.kernels
 def test_an_interval_holds_both_of_two_equally_likely_explanations() -> None:
     apart = Mixed(
         np.array([0.0, 1.0]),

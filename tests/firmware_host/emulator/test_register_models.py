@@ -145,6 +145,7 @@ def test_non_orthogonal_axes_pick_up_their_neighbours(part: DataSheet) -> None:
     assert axes @ [0, 1, 0] == pytest.approx([0, math.cos(xy), math.sin(yz)], abs=3e-4)
 
 
+@pytest.mark.slow
 @every_part
 def test_noise_is_white_and_as_strong_as_configured(part: DataSheet) -> None:
     noise_rad_s, count = 0.035, 3000

@@ -48,6 +48,7 @@ def scaled(factor: float, columns: slice) -> Callable[[list[str]], list[str]]:
     return change
 
 
+@pytest.mark.slow
 def test_the_example_is_solved_within_its_uncertainty(capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["solve", str(EXAMPLES / "samples.csv"), "--sweeps", str(EXAMPLES / "sweeps.csv"), "--json"]
     assert main(arguments) == 0
@@ -76,6 +77,7 @@ def test_the_example_holds_six_turns_and_six_rests() -> None:
     assert all(turn.speed_rad_s == pytest.approx(np.pi / 3) for turn in data.sweeps)
 
 
+@pytest.mark.slow
 def test_speeds_may_stand_in_place_of_angles(tmp_path: Path) -> None:
     def with_speeds(lines: list[str]) -> list[str]:
         rows = [line.split(",") for line in lines[1:]]
@@ -208,6 +210,7 @@ def test_readings_of_other_sensors_in_the_samples_change_nothing(tmp_path: Path)
         read_with(tmp_path, lambda lines: [f"{lines[0]},humidity", *(f"{line},0" for line in lines[1:])])
 
 
+@pytest.mark.slow
 def test_people_see_uncertainties_with_one_coverage_factor_and_the_angles_between_the_axes(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

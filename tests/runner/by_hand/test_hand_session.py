@@ -10,6 +10,8 @@ from rig.data.recording.hand_events import HandAsked, HandBegunAnew
 from rig.errors import Fault
 from support.laboratories.hand_session_laboratory import LIST, TRUE_SCALE, Table
 
+pytestmark = pytest.mark.slow
+
 SHORT = replace(LIST, flips=8, turns=2)
 
 
@@ -21,7 +23,6 @@ def held(table: Table) -> None:
 
 
 @pytest.mark.thorough
-@pytest.mark.slow
 def test_without_a_mistake_the_list_is_made_and_gives_the_truth() -> None:
     table = Table(seed=3)
     table.sit()
@@ -31,7 +32,6 @@ def test_without_a_mistake_the_list_is_made_and_gives_the_truth() -> None:
     held(table)
 
 
-@pytest.mark.slow
 def test_a_device_that_is_picked_up_as_the_session_begins_is_measured_from_its_next_rest() -> None:
     """The pause before is no rest, so the move after it begins nowhere."""
     table = Table(seed=3, settings=SHORT, hand={"reaction_time_s": [1.4, 1.4]})
@@ -45,7 +45,6 @@ def test_a_device_that_is_picked_up_as_the_session_begins_is_measured_from_its_n
 
 
 @pytest.mark.thorough
-@pytest.mark.slow
 def test_it_ends_when_u_is_as_small_as_is_wanted() -> None:
     short = Table(seed=4, settings=replace(LIST, wanted_scale_u=2e-3))
     short.sit()
@@ -54,7 +53,6 @@ def test_it_ends_when_u_is_as_small_as_is_wanted() -> None:
 
 
 @pytest.mark.one_in(2)
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("mistakes", "names"),
     [
@@ -83,7 +81,6 @@ def test_who_holds_it_in_the_hand_is_told_to_lay_it_down() -> None:
 
 
 @pytest.mark.thorough
-@pytest.mark.slow
 def test_a_crumb_under_it_does_no_harm_where_an_accelerometer_is_the_level() -> None:
     table = Table(seed=5, mistakes={"crumb": 0.2}, settings=SHORT)
     table.sit()
@@ -92,7 +89,6 @@ def test_a_crumb_under_it_does_no_harm_where_an_accelerometer_is_the_level() -> 
 
 
 @pytest.mark.thorough
-@pytest.mark.slow
 def test_a_wrong_side_is_read_and_the_list_goes_on_from_there() -> None:
     table = Table(seed=7, mistakes={"wrong_face": 0.2}, settings=SHORT)
     table.sit()
@@ -101,7 +97,6 @@ def test_a_wrong_side_is_read_and_the_list_goes_on_from_there() -> None:
 
 
 @pytest.mark.thorough
-@pytest.mark.slow
 def test_after_ten_refusals_in_a_row_it_ends_by_the_name_of_the_last() -> None:
     with pytest.raises(Fault) as ended:
         Table(seed=8, mistakes={"too_fast": 1.0}).sit()
@@ -109,7 +104,6 @@ def test_after_ten_refusals_in_a_row_it_ends_by_the_name_of_the_last() -> None:
 
 
 @pytest.mark.thorough
-@pytest.mark.slow
 @pytest.mark.parametrize("creeps", [6, 11])
 def test_a_rest_in_which_it_creeps_costs_this_rest_and_not_the_session(creeps: int) -> None:
     table = Table(seed=3, settings=SHORT, creeps=creeps)
