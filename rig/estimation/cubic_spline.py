@@ -32,22 +32,23 @@ class CubicSpline:
         slopes = _slopes(step, secants)
         cubic = (slopes[:-1] + slopes[1:] - 2 * secants) / steps
         quadratic = (secants - slopes[:-1]) / steps - cubic
-        # (n − 1, 4, k): the coefficients of one interval are adjacent in memory.
-        self._coefficients = np.stack([cubic / steps, quadratic, slopes[:-1], flat[:-1]], axis=1)
+        cubic /= steps
+        # (n − 1, k) each, the highest power first: of the polynomial and of its derivative.
+        self._coefficients = (cubic, quadratic, slopes[:-1], flat[:-1].copy()), (3 * cubic, 2 * quadratic, slopes[:-1])
 
     def __call__(self, x: ArrayLike, derivative: int = 0) -> Array:
         """Return the values at `x`, or with `derivative` 1 their derivatives."""
+        if derivative not in (0, 1):
+            raise ValueError(f"derivative {derivative} of a spline: 0 and 1 are there")
         x = np.asarray(x, dtype=np.float64)
         flat = x.ravel()
         interval = np.searchsorted(self._x[1:-1], flat, side="right")
-        cubic, quadratic, linear, constant = np.swapaxes(self._coefficients[interval], 0, 1)
-        offset = (flat - self._x[interval])[:, None]
-        if derivative == 0:
-            value = ((cubic * offset + quadratic) * offset + linear) * offset + constant
-        elif derivative == 1:
-            value = (3 * cubic * offset + 2 * quadratic) * offset + linear
-        else:
-            raise ValueError(f"derivative {derivative} of a spline: 0 and 1 are there")
+        offset = (flat - self._x.take(interval))[:, None]
+        highest, *others = self._coefficients[derivative]
+        value = highest.take(interval, axis=0)
+        for coefficient in others:  # in place, one power after the other: it waits for memory alone
+            value *= offset
+            value += coefficient.take(interval, axis=0)
         values: Array = value.reshape(x.shape + self._shape)
         return values
 
