@@ -99,6 +99,7 @@ def test_what_is_as_large_is_told_nearly_always_and_a_quarter_of_it_hardly_ever(
     assert np.mean(told[0.25]) < 0.35
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("seed", [902, 903])
 def test_a_good_sensor_shows_damage_as_small_whether_or_not_its_encoders_have_noise(seed: int) -> None:
     """Of an ADIS16465 the noise of a second is no larger than what 24 µrad make of its rate."""

@@ -223,6 +223,7 @@ def test_scale_factors_that_change_are_named(axes: list[int]) -> None:
         solved(changed(record(STEADY, 1), np.zeros(3), by))
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("error_rad", [0.003, 0.015])
 def test_a_new_home_of_the_reference_is_told_and_harms_nothing(error_rad: float) -> None:
     sound = record(replace(STEADY, error_rad=error_rad, poses_hz=25), 2)
