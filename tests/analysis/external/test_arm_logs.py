@@ -50,7 +50,7 @@ def figures(seeds: range) -> tuple[Array, Counter[str]]:
 
 
 def test_uncertainties_of_an_arm_log_hold() -> None:
-    off, refused = figures(range(21, 22))
+    off, refused = figures(range(20, 21))
     assert not refused and np.abs(off).max() < 5
 
 
