@@ -29,8 +29,8 @@ SHORT = {BY_COMPUTER: "computer", BY_CRYSTAL: "crystal"}
 class ClockComparison:
     """The relative error of the controller's clock according to another clock, and its standard uncertainty.
 
-    `half_width`: of the other clock's stated error; `noise_std`: uncertainty by the recording, with `dof` degrees of
-    freedom.
+    `half_width`: that of the other clock's stated error. `noise_std`: the uncertainty from the recording's noise, with
+    `dof` degrees of freedom.
     """
 
     by: str
@@ -72,7 +72,7 @@ class ClockCheck:
     half_width: float
 
     def differences(self) -> Iterator[ClockDifference]:
-        """Yield the difference of each pair of clocks; its limit adds the half-widths of uniform distributions."""
+        """Yield the difference of each pair of clocks, and its limit: the sum of both half-widths, and noise."""
         clocks = [("controller", 0.0, self.half_width, 0.0)]
         clocks += [
             (SHORT[comparison.by], comparison.error, comparison.half_width, comparison.noise_std)

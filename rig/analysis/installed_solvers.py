@@ -41,7 +41,7 @@ class KindFound:
 
 
 def kinds_on_arm(recordings: Sequence[ObservedRun], settings: RunSettings) -> Iterator[KindFound]:
-    """Yield every recorded sensor of an installed kind, in the order of the kinds."""
+    """Yield the solution of every recorded sensor of an installed kind, in the order of the kinds."""
     for kind in installed_kinds():
         faults = dict[str, Fault]()
         for name, sensor in recordings[0].run.measuring(kind.quantity).items():

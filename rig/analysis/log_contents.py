@@ -32,7 +32,7 @@ from rig.sensors.lines.log_columns import OPEN, LogColumns, guess_columns
 class LookedFile:
     """The contents of a file.
 
-    - layout, guess: of a table; None for a bag or a log of an autopilot.
+    - layout, guess: those of a table; None for a bag or an autopilot's log.
     - columns: the map of its columns, in the form of `--columns`, incomplete if it contains "?".
     - samples, survey: its readings, if any can be read; others: number of rows without readings; note: what the
       readings lack.
@@ -55,7 +55,7 @@ class LookedFile:
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
-        """The quantities of its readings."""
+        """The quantities of the file's readings."""
         return () if self.samples is None else tuple(self.samples.readings)
 
 
@@ -84,7 +84,7 @@ def look_at(path: Path, stated: ColumnMap | None = None) -> LookedFile:
 
 
 def count_from(looked: LookedFile, origin_s: int) -> LookedFile:
-    """Return a reference's file with the times of its attitudes counted from the origin of a log's times."""
+    """Return a reference's file whose attitudes' times count from the origin of a log's times."""
     if looked.attitudes is None or not origin_s:
         return looked
     times = {name: looked.attitudes[name] - origin_s for name in ("start_s", "end_s")}

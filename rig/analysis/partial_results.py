@@ -34,7 +34,7 @@ class PartialGyroscope:
     """A gyroscope's partial result: its finished sweeps by index, observed or refused.
 
     The `solution` of the vector model is None while it lacks data, by the fault `missing`. `bias_rad_s`: the bias (3,)
-    by the rests alone, and its standard deviation (3,); None without rests.
+    from the rests alone, and its standard deviation (3,); None without rests.
     """
 
     sweeps: Attempts[int, Observation]

@@ -94,7 +94,7 @@ def _scale_std(results: Sequence[MagnetometerResult]) -> Array:
 
 
 def _list_common(run: AsMounted) -> dict[str, object]:
-    """Return by name the values in which the runs of a reversal must agree."""
+    """Return the values, by name, in which the runs of a reversal must agree."""
     sensor, settings = run.result.sensor, run.outcome.settings
     return {
         "the magnetometer": (sensor.part, sensor.serial_number),

@@ -1,4 +1,4 @@
-"""The operator, who names the parts and answers questions, at a terminal or elsewhere; or a list, without questions."""
+"""The source of a batch's serial numbers: an operator at a terminal or page, who also answers questions, or a list."""
 
 import sys
 from collections.abc import Callable, Sequence
@@ -36,7 +36,7 @@ class Operator:
         return self.numbers is not None
 
     def next_part(self, done: Sequence[BatchPart], why: str = "") -> str | None:
-        """Return the next serial number, from the list or typed; `why`: why the last was refused, if so."""
+        """Return the next serial number, from the list or typed; `why`: the reason if the last one was refused."""
         if self.numbers is not None:
             return following(self.numbers, [part.serial for part in done])
         text = f"part {len(done) + 1}, serial number (Enter alone ends):"
@@ -88,7 +88,7 @@ class Operator:
 
 
 def refuse_without_terminal() -> None:
-    """Raise Refused `not_confirmed` without a terminal to ask at."""
+    """Raise Refused `not_confirmed` if there is no terminal for questions."""
     if not sys.stdin.isatty():
         raise Refused(
             "not_confirmed",

@@ -70,7 +70,7 @@ class Desk:
 
 @dataclass(slots=True)
 class Work:
-    """A batch at work; `notify` is called after every entry."""
+    """A batch in progress; `notify` is called after every entry."""
 
     journal: Journal
     section: StationSection

@@ -35,7 +35,7 @@ class SensorSolution(Protocol):
 def store_calibrations(
     config: RigConfig, results: Mapping[str, SensorSolution]
 ) -> Iterator[tuple[str, StoredCalibration]]:
-    """Store the solution of every sensor to calibrate on the board; yield its name and its record.
+    """Store the solution of every sensor to calibrate on the board; yield each sensor's name and record.
 
     Raise BoardError if the board refuses, or `not_stored` if another record is read back; Refused as `find_sensor`.
     """

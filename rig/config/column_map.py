@@ -69,7 +69,7 @@ class ColumnSection(Section):
 
     @property
     def to_si(self) -> float:
-        """The factor that converts its numbers to SI units."""
+        """The factor that converts the column's numbers to SI units."""
         step = 1 / self.lsb_per_unit if self.lsb_per_unit is not None else 1.0 if self.factor is None else self.factor
         return step * (1.0 if self.unit is None else UNITS[self.unit].size)
 

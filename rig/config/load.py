@@ -67,7 +67,7 @@ class Loaded:
 class ConfigurationRefused(Refused):
     """A configuration that is not valid; `problems` has one line for each error.
 
-    `give` is what to do where the file cannot be read.
+    `give` is the remedy for a file that cannot be read.
     """
 
     def __init__(self, source: str, problems: Sequence[str], give: str = GIVE_CONFIGURATION) -> None:
@@ -132,7 +132,7 @@ def load_statement(overrides: Sequence[str]) -> StatementConfig:
 def load_as(model: type[Model], path: str | Path, give: str) -> Model:
     """Read a file that holds one section, of this `model`. Raise `ConfigurationRefused` as `load` does.
 
-    `give` is what to do where the file cannot be read.
+    `give` is the remedy for a file that cannot be read.
     """
     with _refusing_unreadable(str(path), give):
         layered = read_layers(Path(path))
@@ -154,7 +154,7 @@ def parse(
 
 @contextmanager
 def _refusing_unreadable(source: str, give: str = GIVE_CONFIGURATION) -> Iterator[None]:
-    """Raise `ConfigurationRefused` for a text that cannot be read at all; `give` is then what to do."""
+    """Raise `ConfigurationRefused` for a text that cannot be read at all; `give` is then the remedy."""
     try:
         yield
     except Unreadable as error:

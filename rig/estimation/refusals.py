@@ -223,7 +223,7 @@ def check_rotations(attitudes: Array) -> None:
 
 
 def check_side(reference: Array, side: Array) -> None:
-    """Raise Fault `sign_unknown` if a direction (3,) is nearly perpendicular to v_ref (3,), so its sign is open."""
+    """Raise Fault `sign_unknown` if a direction (3,) nearly perpendicular to v_ref (3,) leaves the sign unknown."""
     if abs(reference @ side) < MIN_SIDE * np.linalg.norm(reference) * np.linalg.norm(side):
         raise Fault(
             "sign_unknown",

@@ -137,7 +137,8 @@ class History:
     def enter(self, finished: FinishedRun) -> Entered:
         """Add a run; if the history already has it, add only a new location of its folder.
 
-        The result is not compared with its recordings, as by `rig history import`. Raise Refused `entry_not_kept`.
+        Unlike `rig history import`, this does not compare the result with its recordings. Raise Refused
+        `entry_not_kept`.
         """
         content = finished.content_sha256
         try:
@@ -304,7 +305,7 @@ def _read_kept(connection: Connection, number: int) -> Kept:
 
 
 def replacement_condition() -> Any:
-    """Return the SQL condition that a later result of the same measurement replaces a run's row."""
+    """Return the SQL condition under which a later result of the same measurement replaces a run's row."""
     later = schema.run.alias("later")
     newer = or_(later.c.solved_utc > _RUN.solved_utc, and_(later.c.solved_utc == _RUN.solved_utc, later.c.id > _RUN.id))
     return exists(select(later.c.id).where(later.c.measurement_sha256 == _RUN.measurement_sha256, newer))

@@ -33,7 +33,7 @@ class Average:
     - noise_rad_s (3,): standard deviation of one sample.
     - start_s, end_s: the window on the controller's clock.
     - attitude (3, 3): mean rotation from the arm's base frame into the flange's; None without an arm.
-    - drift_rad2_s2 (3,): the part of the variance by bias drift from rest to rest.
+    - drift_rad2_s2 (3,): the part of the variance due to bias drift from rest to rest.
     - dof (3,): degrees of freedom of the noise's part of the variance, infinite if they were not counted.
     - lines_hz (k,): frequencies of the vibrations removed from the mean.
     - rounding_rad2_s2, slow_lines_rad2_s2 (3,): the parts of the variance by rounding to steps, and by lines that are

@@ -43,7 +43,7 @@ class SampledTurn:
     """A turn or an arc at a sensor's n samples.
 
     - `share` (n,): elapsed fraction of its time.
-    - `rates_rad_s` (n, 3): the flange's mean rate around each sample, by the encoders.
+    - `rates_rad_s` (n, 3): the flange's mean rate around each sample, from the encoders.
     - `uneven_rad_s` (n,): that rate along the axis minus the turn's mean rate, which the angles at its ends determine.
     - `passing` (n, k): columns of the turn's harmonics; for an arc minus their means.
     - `beats`: number of sidebands of spectral lines, see `Revolution`.

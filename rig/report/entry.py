@@ -60,7 +60,7 @@ def list_dof(dof: Array) -> list[Any]:
 
 
 def _attributes(kind: type[BaseModel], source: object) -> Mapping[str, str]:
-    """Return for each field of `kind` the name of the source's attribute that fills it."""
+    """Return the name of the source's attribute that fills each field of `kind`, by field."""
     from rig.report.entry_sources import SOURCES  # imported here: it imports all entries, and only writing one needs it
 
     names = {cls.__name__ for cls in type(source).__mro__}

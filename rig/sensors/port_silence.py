@@ -1,4 +1,4 @@
-"""The silence of a sensor with a port of its own, by reads of its port and by another clock."""
+"""The silence of a sensor with a port of its own, measured by reads of the port and by another clock."""
 
 from dataclasses import dataclass
 

@@ -179,7 +179,7 @@ class PhaseRecorded:
 class HandSeen:
     """The present movement of a hand, ten times a second, by the first sensor to calibrate.
 
-    - time_s: by the board's clock.
+    - time_s: the board's time.
     - doing: "starting", "resting", "moving" or "held".
     - since_s: the duration of that state.
     - turned_rad: the angle of the move so far.

@@ -3,7 +3,7 @@
 JCGM 101: a draw is a session with its own gyroscope, arm and controller. Its mean readings are computed from the true
 motion; the solver gets the controller's values. The interval ± 2 u of the budget must then cover the truth in 95 of 100
 draws. For comparison the solver also runs without this rig's remedies: no gravity columns, no bias random walk, no
-correction of the clock, and an uncertainty by noise alone.
+correction of the clock, and an uncertainty from noise alone.
 """
 
 from dataclasses import dataclass
@@ -42,12 +42,13 @@ WARM_UP_S, STEP_K = 300.0, 1 / 16  # warm-up, and the resolution of the thermome
 class Effects:
     """Magnitudes of the effects: standard deviations; for clock, offset, nonlinearity and warming half-widths.
 
-    - `g_sensitivity_rad_s_g`: of every element; `axis_rad`: twist of each wrist's axis; `jitter_s`: of states' times.
+    - `g_sensitivity_rad_s_g`: that of every element; `axis_rad`: twist of each wrist's axis; `jitter_s`: jitter of the
+      states' times.
     - `clock`, `clock_known`: error of the controller's clock, and standard uncertainty of its correction.
     - `walk_rad_s_sqrt_s`: bias random walk; `offset_m`: the sensor's offset from the flange's centre, by axis.
     - `nonlinearity`: as a fraction of full scale; `warming_k`: change of temperature, which affects bias and scale.
 
-    The noise is an LSM9DS1's by its data sheet, 0.01 °/s/√Hz, the nonlinearity an MPU-9250's (PS-MPU-9250A-01, table
+    The noise is an LSM9DS1's from its data sheet, 0.01 °/s/√Hz, the nonlinearity an MPU-9250's (PS-MPU-9250A-01, table
     1).
     """
 

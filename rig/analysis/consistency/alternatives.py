@@ -19,7 +19,7 @@ from rig.observation.consistency.raw_readings import REST
 class Means:
     """The mean readings of N sweeps and rests.
 
-    - sensed_rad_s (N, 3): rates along the sensor's axes, by the arm.
+    - sensed_rad_s (N, 3): the arm's rates along the sensor's axes.
     - times_s (N, 2): start and end.
     - sweep (N,): index of the sweep, negative for a rest.
     """
@@ -82,7 +82,7 @@ FAULT_MODES: tuple[FaultMode[Means], ...] = (  # (k, N, 3) each
 
 
 def changes(segments: Segments, axis_rates: Array) -> Alternatives:
-    """Return, for each check, columns (3, N, k): a scale factor or a mounting changes with time."""
+    """Return columns (3, N, k) for each check of a scale factor or a mounting that changes with time."""
     time = normalise_time(segments)
     for sweep in np.unique(segments.sweep):  # a change within a sweep is tested for that sweep
         time[segments.sweep == sweep] = time[segments.sweep == sweep].mean()
@@ -94,10 +94,10 @@ def changes(segments: Segments, axis_rates: Array) -> Alternatives:
 
 
 def differences(segments: Segments, axis_rates: Array, whole: Array | None) -> dict[str, Array | None]:
-    """Return by check the columns (3, N, k) of differences: between directions, sweeps and rests, and all residuals.
+    """Return columns (3, N, k) for each check of a difference between directions, sweeps or rests.
 
-    `whole` (3, N, k) are the columns that give each sweep its own mean. If it is None, the check `residuals` uses all
-    residuals, including the scatter within sweeps.
+    The check `residuals` has the columns `whole` (3, N, k), which give each sweep its own mean. If `whole` is None, it
+    uses all residuals, including the scatter within sweeps.
     """
     columns_by_name: dict[str, Array | None] = {
         "cw_against_ccw": split_per_axis(np.abs(axis_rates)),
@@ -110,7 +110,7 @@ def differences(segments: Segments, axis_rates: Array, whole: Array | None) -> d
 
 
 def single_axis_columns(segments: Segments, axis_rates: Array) -> Array:
-    """Return columns (3, N, k): the scale factor of one axis changes at the start of a sweep or transfer."""
+    """Return columns (3, N, k) for a scale factor of one axis that changes at the start of a sweep or transfer."""
     starts = np.unique(
         [segments.times_s[segments.sweep == sweep].min() for sweep in np.unique(segments.sweep[segments.sweep != REST])]
     )
@@ -119,7 +119,7 @@ def single_axis_columns(segments: Segments, axis_rates: Array) -> Array:
 
 
 def quarter_columns(means: Means) -> Array:
-    """Return columns (3, N, 9): the scale factor of an axis changes after 1, 2 or 3 quarters of the recording."""
+    """Return columns (3, N, 9) for a scale factor that changes after 1, 2 or 3 quarters of the recording."""
     middle, (begin, end) = means.times_s.mean(axis=1), (means.times_s.min(), means.times_s.max())
     edges = np.linspace(begin, end, 5)[1:-1]
     return np.concatenate([split_per_axis(means.sensed_rad_s * (middle > edge)[:, None]) for edge in edges], axis=2)

@@ -44,7 +44,7 @@ def compare_dwell_halves(
 
 
 def _swing_variances(differences: Array, noise: Array) -> Array:
-    """Return by dwell (N,) the mean square of all other dwells' `differences` (N, 3), minus the `noise` (3,)."""
+    """Return the mean square of all other dwells' `differences` (N, 3), minus the `noise` (3,), for each dwell."""
     beyond = (differences**2 - noise).mean(axis=1)
     others: Array = np.maximum((beyond.sum() - beyond) / max(len(beyond) - 1, 1), 0.0)
     return others

@@ -68,7 +68,7 @@ class KnownErrors:
     - reading_rad: noise of one reading of a joint's angle.
     - earth_rad_s (3, k): error of the Earth's rate in the base's frame, a column for each unknown direction.
     - curve: prior of the sensor's nonlinearity.
-    - sensor: its properties by the data sheet, None if unknown.
+    - sensor: the sensor's properties from the data sheet, None if unknown.
     - temperature_times_s: the times of the sensor's temperatures.
     - stamp_s: error of the times of the sensor's samples.
     """

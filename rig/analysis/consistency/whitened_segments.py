@@ -23,7 +23,7 @@ from rig.estimation.statistics.bias_process import BiasProcess
 class Scatter:
     """The errors of means, apart from bias drift.
 
-    - variances_rad2_s2 (N, 3): of independent errors.
+    - variances_rad2_s2 (N, 3): the variances of independent errors.
     - shared_rad_s (P, N, 3): independent patterns of shared errors.
     - instability_rad_s: the least Allan deviation of the bias, if known.
     """

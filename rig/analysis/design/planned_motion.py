@@ -66,7 +66,7 @@ class Timed(Generic[StepT_co]):
 
 
 def time_steps(plan: Plan) -> Iterator[Timed[Step]]:
-    """Yield every step in order with its times, if sensors settle at once before a dwell."""
+    """Yield every step in order with its times, assuming that sensors settle at once before a dwell."""
     time_s, q_rad = STANDING_S, plan.start_q_rad
     for step in plan.steps:
         yield Timed(step, time_s, time_s + step.duration_s, q_rad)

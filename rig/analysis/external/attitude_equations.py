@@ -23,7 +23,8 @@ class Equations:
     """The readings of a sensor and the attitudes in which they were taken.
 
     - `means`, `variances` (N, 3), with `dof` (N, 3) degrees of freedom of the variances.
-    - `attitudes` (N, 3, 3); `std_rad` (N,): their stated standard deviation; `reference`: its norm, or its vectors.
+    - `attitudes` (N, 3, 3); `std_rad` (N,): their stated standard deviation; `reference`: the norm of the reference, or
+      its vectors.
     """
 
     means: Array

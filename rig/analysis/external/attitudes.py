@@ -151,7 +151,7 @@ def _solve_placements(
 ) -> InAttitudes:
     """Return the calibration from placements, with placement errors if the method models attitude errors.
 
-    Raise Fault `bias_jumped` or `scale_changed` if the sensor changed abruptly by more than U may contain, and as
+    Raise Fault `bias_jumped` or `scale_changed` if the sensor changed abruptly by more than U covers, and as
     `Equations.solve` does.
     """
     unplaced, moving = placements.unplaced, placements.left_out

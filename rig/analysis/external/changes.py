@@ -1,4 +1,4 @@
-"""The refusal of a recording in which a sensor changes abruptly, by more than U may contain."""
+"""The refusal of a recording in which a sensor changes abruptly, by more than U covers."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ REMEDY = "Solve the parts before and after separately; look for a knock, or a ra
 
 
 def check_steady(change: AbruptChange | None, quantity: Quantity, least_evidence: float = CERTAIN) -> None:
-    """Raise Fault `bias_jumped` or `scale_changed` if a sensor changed by more than U may contain."""
+    """Raise Fault `bias_jumped` or `scale_changed` if a sensor changed by more than U covers."""
     if change is None or change.evidence < least_evidence:
         return
     axis = int(np.argmax(np.abs(change.sizes)))

@@ -30,7 +30,7 @@ def check_sweeps_steady(data: ExternalData) -> None:
 
 
 def estimate_changes(data: ExternalData, matrix: Array) -> Array:
-    """Return the covariance (12, 12) of F `matrix` (3, 3), row by row, and the bias due to changes over the rows.
+    """Return the covariance (12, 12) that changes over the rows add to F `matrix` (3, 3), row by row, and bias.
 
     The covariance includes an abrupt change, and changes of the bias from rest to rest; it is zero if the rows show no
     change.
@@ -86,7 +86,7 @@ def _is_certain(data: ExternalData, change: AbruptChange) -> bool:
 
 
 def _find_leverage(rates_rad_s: Array, readings_rad_s: Array, is_later: Array) -> float:
-    """Return the standard deviation of the step, rad/s, estimated on one axis if every rate had a relative error of 1.
+    """Return the standard deviation, rad/s, of the step that one axis shows, for rates with a relative error of 1.
 
     The N rows have `rates_rad_s` (N, 3) and `readings_rad_s` (N,) of the axis; `is_later` (N,) is true after the step.
     """

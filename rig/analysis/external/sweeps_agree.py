@@ -63,7 +63,7 @@ def _name_contradiction(worst: int, data: ExternalData) -> str:
 class SweepErrors:
     """The covariances that errors of the stated motion and changes of the sensor add to a solution, with `dof`.
 
-    `covariance` (6, 6): of scale and bias; `matrix_covariance` (12, 12) and `angles_covariance_rad2` (6, 6): as in
+    `covariance` (6, 6): that of scale and bias; `matrix_covariance` (12, 12) and `angles_covariance_rad2` (6, 6): as in
     `VectorSolution`, scaled so that twice a standard uncertainty is U.
     """
 
@@ -93,7 +93,7 @@ def sweep_errors(solution: VectorSolution, data: ExternalData) -> SweepErrors | 
     rate_variance, axis_variance = sizes.median_variances
 
     def inflate(to_values: Array, dof: float, noise_dof: float) -> Array:
-        """Return the covariance (q, q), without noise, of values with derivatives `to_values` (q, 12) by F and c.
+        """Return the covariance (q, q), without noise, of values with derivatives `to_values` (q, 12) to F and c.
 
         The covariance is for errors of the median size. Each value's part is scaled so that, together with the noise,
         twice its standard uncertainty is the U over the posterior distribution of the sizes.
@@ -118,7 +118,7 @@ def sweep_errors(solution: VectorSolution, data: ExternalData) -> SweepErrors | 
 
 
 def count_redundant_rows(data: ExternalData) -> int:
-    """Return the number of rows beyond those that a solution needs: so many rows can contradict each other.
+    """Return the number of rows beyond those that a solution needs.
 
     A row has three equations but counts once, because a wrong rate or a wrong end time affects all three.
     """

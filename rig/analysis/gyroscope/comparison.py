@@ -185,7 +185,7 @@ def _find_delay(recording: ObservedRun, sensor: str, reference: str) -> Delay | 
 
 
 def _mask_covered(time_s: Array, by_s: Array) -> NDArray[np.bool_]:
-    """Return a mask of the times (n,) that do not lie in a gap of the times `by_s` (m,) or beyond them."""
+    """Return a mask (n,) of the times that lie between the times `by_s` (m,) and not in a gap of these."""
     after = np.searchsorted(by_s, time_s)
     gaps = np.diff(by_s, prepend=-np.inf, append=np.inf)
     close: NDArray[np.bool_] = gaps[after] <= MAX_GAP * np.median(gaps)

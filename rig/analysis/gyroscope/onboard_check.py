@@ -116,7 +116,7 @@ def _recall_observation(earlier: Sequence[RunData], recalled: BoardRecalled) -> 
 
 
 def _average_observation(run: RunData, event: BoardObserved) -> _BoardObservation:
-    """Return the mean of the board's samples; the board's own mean if lost messages held some, else NaN."""
+    """Return the mean of the board's samples; if some were lost on the way, the board's own mean, else NaN."""
     samples, observed = run.samples[event.sensor], event.observation
     times_us = samples["board_time_us"]
     used = slice(*np.searchsorted(times_us, [observed.start_us, observed.end_us]).tolist())
@@ -137,7 +137,7 @@ def _events(run: RunData, sensor: str) -> Iterator[OfTheBoard]:
 
 
 def _count_missing(sequence: NDArray[np.uint32]) -> int:
-    """Return how many numbers are missing in a sequence modulo 2³²."""
+    """Return the number of values missing in a sequence modulo 2³²."""
     return int(np.sum(np.diff(sequence).astype(np.int64) - 1))
 
 

@@ -62,7 +62,7 @@ class AccelerometerResult:
     """One accelerometer's calibration, a = F (s + φ s²) + b, in the axes of its nominal mounting.
 
     - `movement`: the readings from which the solution is estimated; `sweeps`: the number of sweeps.
-    - `triad`: scale and axes, with the solution's uncertainty; `budget`: uncertainty of scale and bias by all causes.
+    - `triad`: scale and axes, with the solution's uncertainty; `budget`: uncertainty of scale and bias from all causes.
     - `alignment`: rotation from the gyroscope of the same sensor, None if that was not calibrated.
     - `other_methods`: the solutions from the attitudes alone, by method, or the Fault of a method that fails.
     - `held_out`: the validation, if the attitudes were repeated.

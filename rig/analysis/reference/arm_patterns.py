@@ -27,7 +27,8 @@ class Posture:
 class StatedArm:
     """The stated kinematics, the half-width of its angles, and the sensor's nominal mounting (3, 3).
 
-    `estimated_rad`: standard deviation of the wrists' errors by the readings, which may exceed the stated one.
+    `estimated_rad`: standard deviation of the wrists' errors as estimated from the readings, which may exceed the
+    stated one.
     """
 
     arm: DenavitHartenberg
@@ -37,7 +38,7 @@ class StatedArm:
 
 
 def arm_patterns(theta: Array, movement: Movement, postures: Sequence[Posture], stated: StatedArm) -> Array:
-    """Return the changes (18, 3 K) of the readings by one standard uncertainty of each of the wrists' errors."""
+    """Return the changes (18, 3 K) of the readings that one standard uncertainty of each wrist error causes."""
     by_turns = turned(theta, replace(movement, sweeps=movement.sweeps.alone()))
     stated_rad = np.radians(stated.axis_deg) / np.sqrt(3) * _error_fractions()
     std_rad = np.maximum(stated_rad, stated.estimated_rad)

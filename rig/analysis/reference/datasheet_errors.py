@@ -161,7 +161,7 @@ def add_errors(
 def separate_sensor_errors(
     spread: Spread, theta: Array, movement: Movement, datasheet: Datasheet
 ) -> tuple[Spread, list[Contributor]]:
-    """Return the `spread` by noise and arm, and the contributors of the sensor itself in this `movement`.
+    """Return the `spread` due to noise and arm, and the contributors of the sensor's own errors in this `movement`.
 
     The spread's response is that of a fit of all parameters including φ, so the noise has a larger effect.
     """

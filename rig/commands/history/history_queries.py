@@ -208,8 +208,8 @@ def void(options: Namespace) -> int:
 def open_named_history(options: Namespace) -> AbstractContextManager[History]:
     """Open the named history.
 
-    Raise Refused `no_history` if there is none, because opening would make an empty one; as `open_history` does, and as
-    `load` does if a configuration names the history.
+    Raise Refused `no_history` if there is none, because opening would make an empty one. Raise as `open_history` does,
+    and as `load` does if a configuration names the history.
     """
     return _open_existing(_read_address(options))
 

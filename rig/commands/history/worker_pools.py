@@ -39,7 +39,7 @@ class Workers(Protocol):
         ...
 
     def room(self) -> int:
-        """Return how many more tasks the workers can take now. Raise Fault `cluster_lost` if no worker is left."""
+        """Return the number of tasks that the workers can still take. Raise Fault `cluster_lost` if none is left."""
         ...
 
     def give(self, solve: Solve, task: Task) -> None:
@@ -130,7 +130,7 @@ class Cluster:
         raise _cluster_lost("the scheduler does not answer any more")
 
     def room(self) -> int:
-        """Return how many more tasks the cluster can take: a few per thread, minus those in progress.
+        """Return the number of further tasks that the cluster can take: a few per thread, minus those in progress.
 
         Raise Fault `cluster_lost` if there has been no worker for long.
         """

@@ -1,4 +1,4 @@
-"""A loopback address for each simulated laboratory: if another one uses the file's address, the new one moves."""
+"""A loopback address for each simulated laboratory: it gets another one if the file's address is in use."""
 
 import os
 import socket

@@ -113,7 +113,7 @@ def _try_solutions(
     stated: "ColumnMap | None",
     columns: Mapping[str, Any],
 ) -> "TriedSolutions":
-    """Return which solutions the log permits: Allan deviation, turns and attitudes."""
+    """Return the solutions that the log permits: Allan deviation, turns, attitudes."""
     from rig.analysis.log_contents import find_allan_obstacle, try_attitudes, try_turns
     from rig.config.column_map import ColumnMap
     from rig.data.quantity import RATE

@@ -1,7 +1,7 @@
 """The bench of a station: the common devices and configuration of all parts, and the run of one part.
 
-The claims, the simulated laboratory, the configuration and its script remain. A run stops its turner for good, so it is
-reconnected for each part, ahead of time, while the part is changed.
+The claims, the simulated laboratory, the configuration and its script remain. A run stops its turner for good, so the
+turner is reconnected for each part, while the operator changes the part.
 """
 
 import json

@@ -37,7 +37,7 @@ def _part_default_key(what: str) -> Any:
 
 
 class ObservationKeys(BaseModel):
-    """The rows of `observation`."""
+    """The keys of the section `observation` in this table."""
 
     model_config = JUDGES
 
@@ -60,7 +60,7 @@ class ObservationKeys(BaseModel):
 
 
 class UncertaintyKeys(BaseModel, Generic[OfSensors]):
-    """The rows of `uncertainty`; those of sensors are `OfSensors`."""
+    """The keys of the section `uncertainty` in this table, except those of each sensor: `OfSensors`."""
 
     model_config = JUDGES
 

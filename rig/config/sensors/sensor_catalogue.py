@@ -39,7 +39,7 @@ class PartSpec:
     - non_orthogonality_deg: deviation from 90° between two axes.
     - ranges_g: the ranges of its accelerometer, the usual one first; the data rate is the gyroscope's.
     - acceleration_noise_ug_sqrt_hz: noise density, one-sided, as data sheets state it.
-    - acceleration_nonlinearity_percent: of the range that acceleration_nonlinear_over_g states.
+    - acceleration_nonlinearity_percent: relative to the range that acceleration_nonlinear_over_g states.
     - acceleration_bias_mg_k, acceleration_scale_ppm_k, acceleration_bias_instability_ug: as the gyroscope's.
     - acceleration_nonlinear_over_g: that range, in either direction; 0 for the configured range.
     - delivered: the quantities that its calibration estimates.

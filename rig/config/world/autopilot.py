@@ -1,4 +1,4 @@
-"""The part of a simulated sensor's section about the autopilot that contains it."""
+"""The part of a simulated sensor's section about the autopilot that contains the sensor."""
 
 from pathlib import Path
 from typing import Literal

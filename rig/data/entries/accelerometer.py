@@ -66,10 +66,10 @@ class AlignmentEntry(Entry):
 class AccelerometerEntry(Entry):
     """A calibration a = F (s + φ s²) + b of the specific force s in the flange's frame.
 
-    - covariance: of scale and bias by the solution alone; covariance_combined: by all contributors in budget.
+    - covariance: that of scale and bias from the solution alone; covariance_combined: from all contributors in budget.
     - gravity_m_s2: the gravity to which the scale is relative.
-    - scale, bias_m_s2: if the budget contains the nonlinearity, the scale is that between the readings at +1 g and
-      −1 g, and the bias is the reading at 0 g.
+    - scale, bias_m_s2: if the budget contains the nonlinearity, the scale is that between the readings at +1 g and −1
+      g, and the bias is the reading at 0 g.
     - reference_m_s2: specific force at rest in the arm's base frame; attitude_error_rad: error of the arm's attitudes
       about each axis, estimated from the readings.
     - lever_arm_m, from the sweeps' axes to the sensor in the flange's frame, and delay_s, its lag behind the gyroscope:

@@ -50,7 +50,7 @@ class DriftEntry(Entry):
     - scatter_ratio: scatter of the readings from repeat to repeat over that within a dwell.
     - steps: jumps of the bias.
     - false_alarm_probability: probability that a steady bias shows steps.
-    - largest_change: between any two repeats.
+    - largest_change: the largest change between any two repeats.
     - temperature_slope: the slope of the bias, or why there is none.
     - earth_rate_known: whether the Earth's rate was subtracted.
     - degrees_of_freedom: those of the standard deviations with the scale fixed, null if infinite.

@@ -41,7 +41,7 @@ class ByHandEntry(Entry):
     """A session by hand: its rests and moves, and the errors of the hand.
 
     `chi_square`, with `degrees_of_freedom`, is χ² of the residuals of all rests and moves. `session_std` (3,) is the
-    standard uncertainty of the scale factors by this session and its clock alone; the budget adds the disagreement
+    standard uncertainty of the scale factors from this session and its clock alone; the budget adds the disagreement
     among recordings of real hands.
     """
 

@@ -4,13 +4,13 @@ from rig.data.entries.result_types import Entry, Freedom, Matrix3, Vector3
 
 
 class EarthRateEntry(Entry):
-    """The Earth's rate in the frame of the arm's base, by the sweeps and rests of a sensor.
+    """The Earth's rate in the frame of the arm's base, from the sweeps and rests of a sensor.
 
-    - `latitude_rad`: by the rate's angle to `up`, north positive.
+    - `latitude_rad`: from the rate's angle to `up`, north positive.
     - `heading_rad`: direction of the base's x axis, clockwise from north; null if that axis is vertical.
     - `vertical_fixed`: whether a given latitude fixed the vertical part, to identify the g-sensitivity; `latitude_rad`
-      is then that of the level part.
-    - `birge_ratio`: of the residuals; above 1 it has inflated `covariance_rad2_s2`.
+      is then from the level part alone.
+    - `birge_ratio`: that of the residuals; if above 1, it has inflated `covariance_rad2_s2`.
     - `degrees_of_freedom`: those of the standard deviations; null if infinite.
     """
 

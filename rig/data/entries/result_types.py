@@ -47,7 +47,7 @@ class Entry(BaseModel):
 class ConditionsEntry(Entry):
     """The time of readings, from start to end (UTC, by the arm controller's clock since the recording's start).
 
-    `mean_utc` is the mean time. `temperature_c` and `temperature_range_c` are mean and range by the sensor's own
+    `mean_utc` is the mean time. `temperature_c` and `temperature_range_c` are mean and range from the sensor's own
     thermometer, null without one; a temperature without range was stated.
     """
 
@@ -69,7 +69,7 @@ class PlacementEntry(Entry):
     - `placement_std`: standard deviation of a reading from placement to placement, not due to attitude errors; null if
       the method does not estimate it. `rests_without_attitude` further rests contributed to it.
     - `rows_omitted`: number of rows left out because the body moved.
-    - `covariance`: of all estimates, in `covariance_order`.
+    - `covariance`: that of all estimates, in `covariance_order`.
     """
 
     placement_std: float | None
@@ -83,9 +83,9 @@ class PlacementEntry(Entry):
 class DetectionLimitEntry(Entry):
     """The smallest `size` of a `fault` that the `check` detects in 95 of 100 recordings; null if it detects none.
 
-    This is the minimal detectable bias (Baarda 1968); for a change half-way it is the complete change.
-    `error_over_expanded` is the largest error of scale factor or bias just below that size, in multiples of its
-    expanded uncertainty; null if not computed.
+    This is the minimal detectable bias (Baarda 1968); for a change half-way through the recording, `size` is the
+    complete change. `error_over_expanded` is the largest error of scale factor or bias just below that size, in
+    multiples of its expanded uncertainty; null if not computed.
     """
 
     fault: str

@@ -39,7 +39,7 @@ class Silence:
     def tick(self, unheard: bool = False) -> None:
         """Count one more interval without a sign of life.
 
-        Call this at even intervals. `unheard`: whether an answer has arrived that is still unread: the process was not
+        Call this at even intervals. `unheard`: whether an unread answer has arrived, so that the process was not
         silent.
         """
         self._all_ticks += 1
@@ -78,7 +78,7 @@ class Silence:
 
 
 def _times(tasks: Path) -> _Times:
-    """Return how long each thread ran and waited for a processor, s; empty if the system does not say."""
+    """Return the times, s, that each thread ran and waited for a processor; empty if the system does not tell."""
     times: _Times = {}
     try:
         for task in tasks.iterdir():

@@ -55,7 +55,7 @@ class ReadingLimits:
 
     - `memory_bytes`: address space.
     - `processor_s`: time on a processor; `idle_s`: all time except waits for a processor or the disk.
-    - `written_bytes`: of each file that it writes, for its results and for unpacking.
+    - `written_bytes`: the size of each file that it writes, for its results and for unpacking.
     """
 
     memory_bytes: int

@@ -36,7 +36,7 @@ class Contents:
 
     - `texts`: the attributes named in `TEXTS`; `described`: the attributes of each sensor.
     - `samples` (n,) by sensor, `states` (n,) of the turner, `events` (n,) in bytes.
-    - `tables` (n,): of external readings, by the names in `TABLES`.
+    - `tables` (n,): those of external readings, by the names in `TABLES`.
     """
 
     schema: str

@@ -38,12 +38,12 @@ class Provenance:
     - rig_version, python_version, package_versions, firmware_version: the software.
     - configuration_sha256: the hash of the configuration.
     - arm_serial_number, arm_software, board_unique_id: the devices.
-    - sensor_serial_numbers: by sensor name.
-    - stored_calibrations: by which the board corrected its stream, by sensor name.
+    - sensor_serial_numbers: the serial numbers, by sensor name.
+    - stored_calibrations: the calibrations by which the board corrected its stream, by sensor name.
     - script, script_sha256, script_installed: the procedure's script, its hash, and whether a package provided it.
     - arm_kinematics: the turner's geometry, None without one.
     - tcp_offset: the controller's tool centre point in the flange's frame, unused; None if unknown.
-    - arm_maker, arm_model: of the connected turner.
+    - arm_maker, arm_model: those of the connected turner.
     - turner_kind: its registered kind.
     - board_follows_crystal: the board's statement on its clock, None without a board.
     - readings_file, motion_file: the files of an external recording.

@@ -190,16 +190,16 @@ class RunSettings:
     - to_calibrate: names of the sensors to calibrate.
     - reference: the sensor with a given calibration.
     - home_q_rad: angles of the turner's joints, of which there may be none.
-    - planned_sweeps, planned_dwells: of the complete procedure, even if the run was interrupted.
+    - planned_sweeps, planned_dwells: those of the complete procedure, even if the run was interrupted.
     - site: location of the arm.
     - matrix_corrected: names of the sensors whose readings the complete matrix corrects.
     - second_order: whether the accelerometers' model has terms of second order.
     - finds_earth_rate: whether the Earth's rate is estimated from the gyroscopes' readings.
     - extension_m: end of the extension that carries the sensors, in the flange's frame.
-    - elsewhere: for an external recording.
+    - elsewhere: settings of an external recording.
     - mounts: nominal rotations from the flange's to the item's frame by stage, empty for an item that is mounted once.
     - stage: number of this recording's stage, from 0.
-    - by_hand: for a session by hand.
+    - by_hand: settings of a session by hand.
     - reference_c: temperature at which a calibration over temperature is stated, None for other calibrations.
     """
 

@@ -1,4 +1,4 @@
-"""The face on which the body lay in each rest, by the accelerometer or by tracking from the first face."""
+"""The face on which the body lay in each rest, from the accelerometer, or by tracking from the first face."""
 
 import numpy as np
 

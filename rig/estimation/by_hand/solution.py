@@ -67,7 +67,7 @@ class HandSolution:
     - `turned`: the solution in the form of a solution from known rotations; `budget`: its budget.
     - `stds`: standard deviations of the hand by name: estimated, stated, and largest allowed.
     - `creeping_s`: times at which the body crept during intended rests, which are left out.
-    - `expanded_scale` (3,): U (k = 2) by this session and its clock; the budget adds recordings of real hands.
+    - `expanded_scale` (3,): U (k = 2) from this session and its clock; the budget adds recordings of real hands.
     """
 
     turned: TurnedSolution
@@ -294,7 +294,7 @@ def _largest_of_factor(fit: GraphFit, row: Factor) -> float:
 
 
 def _summarise_move(fit: GraphFit, row: int) -> MoveSummary:
-    """Return how a move turned the body, and how well it fits."""
+    """Return the rotation of a move, and its fit with the others."""
     move, turns = fit.session.moves[row], fit.faces.turns[row]
     closure = next((factor for factor in fit.factors if factor.kind == CLOSURE and factor.index == row), None)
     return MoveSummary(

@@ -1,1 +1,1 @@
-"""Estimators for external recordings only: by stated attitudes, and of bodies that are placed repeatedly."""
+"""Estimators for external recordings only: for stated attitudes, and for bodies that are placed repeatedly."""

@@ -27,7 +27,8 @@ WORTH_FITTING = 1.0  # least ln of the Bayes factor with the sizes of the model 
 class AbruptChange:
     """A change of `what` at the time `from_s`; "attitude" is a rotation of the reference's own coordinates.
 
-    - `sizes` (3,): of each axis, in the unit of the readings, relative to the scale factor, or rad; zero if unknown.
+    - `sizes` (3,): the change of each axis, in the unit of the readings, relative to the scale factor, or rad; zero if
+      unknown.
     - `evidence`: ln of the Bayes factor minus ln of the number of possible changes (Bonferroni's correction).
     """
 

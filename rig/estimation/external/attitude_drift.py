@@ -126,7 +126,7 @@ class FixedAttitudes:
 
 
 def average_fixes(recorded: AttitudeSamples, state: DriftState) -> FixedAttitudes:
-    """Return the mean attitude of each fix, after removing the motion by the gyroscope with a state's parameters."""
+    """Return the mean attitude of each fix, less the motion that the gyroscope measures with a state's parameters."""
     fixes, time_s = recorded.fixes, recorded.time_s
     at_s = np.clip(fixes.at_s + state.clock_s, time_s[0], time_s[-1])
     integrated = course(time_s, recorded.readings, state.matrix, state.bias, at_s)
@@ -231,7 +231,7 @@ def drift_model(averaged: FixedAttitudes, fixes: Fixes) -> DriftModel:
 
 
 def _list_errors(averaged: FixedAttitudes, fixes: Fixes, correlation: Array, step: Array) -> dict[str, Array]:
-    """Return by cause the covariance (3n, 3n) of the increments due to unit errors of the reference or the times.
+    """Return the covariance (3n, 3n) of the increments, by cause, due to unit errors of the reference or the times.
 
     Errors of the reference vary with attitude, or are new in each visit, rest, or fix in motion. Times err by jitter of
     the stamps, and by a drift of the sampling interval.

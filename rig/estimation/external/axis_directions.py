@@ -26,7 +26,7 @@ LEAST_RAD2 = 1e-14  # of a fix's squared rotations: rounding
 class Inclinations:
     """Inclinations of a reference's axes of motion.
 
-    - `response` (m, r): of the m components of all increments to r independent inclinations of 1 rad.
+    - `response` (m, r): that of the m components of all increments to r independent inclinations of 1 rad.
     - `prior_median_rad`: the prior median of their standard deviation.
     """
 

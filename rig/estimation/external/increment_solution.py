@@ -1,12 +1,12 @@
 """A gyroscope's matrix and bias from its rotations between attitudes of a reference: cameras, a table.
 
 The reference's rates are not used: noise in the regressors would bias the scale (errors in variables). The rotation
-between fixes (measured attitudes) is used (`attitude_drift`); its noise by the gyroscope grows only with the root of
-time.
+between fixes (measured attitudes) is used (`attitude_drift`); the gyroscope's part of its noise grows only with the
+square root of time.
 
 The variances of the errors of fixes and gyroscope are estimated from the residuals (`variance_components`), together
 with those of the changes of matrix and bias between intervals of the recording: nonlinearity, g-sensitivity,
-temperature. Matrix and bias are their means over the intervals, with the uncertainty by these variances.
+temperature. Matrix and bias are their means over the intervals, with the uncertainty that follows from these variances.
 """
 
 from dataclasses import dataclass, replace
@@ -85,18 +85,18 @@ class KnownIncrements:
     """A gyroscope's matrix and bias from its increments, with their covariance and variance components.
 
     - matrix (3, 3), bias (3,): F and b.
-    - covariance (15, 15): of F row by row, ω_E, b.
+    - covariance (15, 15): that of F row by row, ω_E, b.
     - causes: parts (15, 15) of the covariance, by name.
     - earth: the Earth's rate from the increments, or the fault.
     - clock_s, clock_std_s: τ; the reference's attitude with the time stamp t belongs to the readings' time t + τ.
     - fix_std_rad: error of a fix about each axis.
     - random_walk_rad_sqrt_s: random walk of the gyroscope's angle.
     - matrix_scatter, bias_scatter_rad_s: standard deviation of each element between intervals of the recording.
-    - residuals_rad (n, 3): of the increments.
+    - residuals_rad (n, 3): those of the increments.
     - aside_s (k,): start of each omitted outlier.
     - reset: the time from which all attitudes are rotated relative to the earlier ones, as after a new origin, and the
       angle; None if there is none.
-    - condition: of the scaled design.
+    - condition: that of the scaled design.
     - iterations: number of Gauss-Newton steps.
     - change: an abrupt change, on the attitudes' clock; U contains both states of the gyroscope. None without one.
     """
@@ -128,7 +128,7 @@ class KnownIncrements:
 def solve_known_increments(time_s: Array, readings: Array, fixes: Fixes, start: DriftState) -> KnownIncrements:
     """Estimate a gyroscope's matrix and bias from readings (n, 3) in rad/s at times (n,), with outlying fixes left out.
 
-    `start` holds the initial values of the bias drift. Raise Fault `rank_deficient`, `ill_conditioned`,
+    `start` holds the initial values of F, b and τ. Raise Fault `rank_deficient`, `ill_conditioned`,
     `attitude_untrustworthy`, `clocks_apart`, `wrong_unit`, `mirrored_axis`.
     """
     recorded = AttitudeSamples(time_s, readings, fixes, np.ones(len(fixes.at_s), dtype=np.bool_))

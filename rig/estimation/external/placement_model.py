@@ -25,8 +25,7 @@ USUAL = 1e-3  # median of η, relative to the reference (a milli-g)
 def build_placement_model(theta: Array, placed: Placed, stated: int) -> MixedModel:
     """Return the model of N placements, linear in the free directions of `theta` (p,).
 
-    Only the first `stated` placements have an attitude that somebody measured, and with it γ. The components are ε, γ
-    and η.
+    Only the first `stated` placements have a measured attitude, and so an error γ. The components are ε, γ and η.
     """
     attitudes, count = placed.attitudes, len(placed.readings)
     free, alone = free_directions(theta, norm_known=placed.norm_known), np.eye(count)

@@ -22,7 +22,7 @@ NEGLIGIBLE = 1e-3  # fraction of a mean's variance below which a common rounding
 
 @dataclass(frozen=True, slots=True)
 class KnownSensor:
-    """Half-widths of errors by the data sheet, and the temperature of N averages.
+    """Half-widths of errors from the data sheet, and the temperature of N averages.
 
     - `nonlinearity`: largest distance from the best straight line by the odd or the even part, as a fraction of
       `full_scale_rad_s`.

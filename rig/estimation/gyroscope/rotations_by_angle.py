@@ -7,7 +7,7 @@ The rate during a rotation does not matter, so a hand may turn the gyroscope. It
 
 R is the body's rotation by its gyroscope (m = F ω + c), n the axis in the body's frame, α the angle. e contains the end
 attitude's error about all three axes, the effect of a tilted axis, and the gyroscope's noise. A whole revolution
-determines nᵀ F n alone; the mean reading determines the components across, as far as the axis is fixed in the body:
+determines nᵀ F n alone; the mean reading determines the components across it, if the axis is fixed in the body:
 
     m̄ = F n α/T + c                                                      across F n
 
@@ -38,7 +38,8 @@ NOISE, BIAS, ENDS, AXES = "noise", "bias from rest to rest", "ends of the turns"
 class Turn:
     """A rotation from rest to rest: from `start_s` to `end_s` about the unit `axis` (3,) of the body by `angle_rad`.
 
-    `angle_std_rad`: standard uncertainty of the end attitude about any axis; `axis_std_rad`: of the axis in the body.
+    `angle_std_rad`: standard uncertainty of the end attitude about any axis; `axis_std_rad`: that of the axis in the
+    body.
     """
 
     start_s: float
@@ -72,7 +73,7 @@ class Gyroscope:
 class TurnedSolution:
     """A solution with the fields of `vector_model.VectorSolution`; `budget` divides its covariance by cause.
 
-    - `residuals_rad_s` (N, 3): of the means, then of the rotations as mean rates.
+    - `residuals_rad_s` (N, 3): those of the means, then of the rotations as mean rates.
     - `widened`: the Birge ratio of the rotations, at least 1, with `widened_dof` degrees of freedom.
     - `estimator`: the name of the method, "increments" or "by_hand".
     """

@@ -6,7 +6,7 @@
 determine a variance badly: the restricted maximum likelihood is often at zero, and its U covers the true value in only
 60 to 85 of 100 cases. So the result averages over all pairs of sizes, weighted by the restricted likelihood (Harville,
 J. Am. Stat. Assoc. 72 (1977) 320) and a prior: log-uniform from a tenth of the noise, below which a size changes
-nothing, to `PRIOR_KNEE`; beyond, it falls as 1/size. If the sweeps determine the size, U becomes that by Student's t
+nothing, to `PRIOR_KNEE`; beyond, it falls as 1/size. If the sweeps determine the size, U approaches that of Student's t
 with the dof of the redundant sweeps (Box and Tiao, Bayesian Inference in Statistical Analysis, 1973, 5.2; Gelman,
 Bayesian Analysis 1 (2006) 515).
 """

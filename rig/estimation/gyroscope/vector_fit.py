@@ -45,7 +45,7 @@ class VectorInputs:
       last).
     - arms_m (N, 3): lever arms from the rotation axis to the sensor in the flange frame, None to neglect them.
     - noise_dof (N, 3): degrees of freedom of the variances.
-    - sensor: its properties by the data sheet, None if unknown.
+    - sensor: the sensor's properties from the data sheet, None if unknown.
     - encoder_errors_rad_s (P, N, 3): effect of encoders at the ends of arcs, None for whole revolutions.
     - ripples (N,): RMS ripple of each rotation as a fraction of its rate.
     - state_gains (N,): noise of the arm's states in the mean rates, relative to that in Δθ/T.

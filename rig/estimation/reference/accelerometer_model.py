@@ -57,7 +57,7 @@ class Sweeps:
     """Whole revolutions at nearly constant speed.
 
     - `harmonics_m_s2` (M, 3, 3): mean, cosine and sine over the joint's angle (rows) of the axes x y z.
-    - `covariances_m2_s4` (M, 9, 9): of these nine, row by row, by `rig.estimation.reference.sweep_harmonics`.
+    - `covariances_m2_s4` (M, 9, 9): that of these nine, row by row, by `rig.estimation.reference.sweep_harmonics`.
     - `axes_flange` (M, 3): unit vector of a rotation with increasing angle; `speeds_rad_s` (M,): negative if it
       decreases.
     - `attitudes` (M, 3, 3): flange to base at the angle zero.
@@ -144,7 +144,7 @@ class Movement:
         return [slice(*ends) for ends in pairwise(first)]
 
     def constant(self) -> Array:
-        """Return (K,) 1 for a reading that contains the bias, 0 for a cosine and a sine."""
+        """Return factors (K,) of the bias: 1 for a reading that contains it, 0 for a cosine or a sine."""
         return np.concatenate(
             [np.ones(len(self.dwells.readings_m_s2)), np.tile([1.0, 0.0, 0.0], len(self.sweeps.speeds_rad_s))]
         )

@@ -27,7 +27,8 @@ ATTITUDES = "arm's attitudes"
 class Spread:
     """The uncertainty of scale and bias, kx ky kz bx by bz, from n readings.
 
-    - `scale` (3,); `covariance` (6, 6): by noise and attitudes; `response` (6, n): derivative by the readings.
+    - `scale` (3,); `covariance` (6, 6): due to noise and attitudes; `response` (6, n): derivative with respect to the
+      readings.
     - `noise` (n, n): covariance of the readings' own noise.
     - `attitude_error`: the error of the attitudes.
     - `chi_square` of the residuals, and its `dof`.

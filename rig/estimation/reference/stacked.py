@@ -66,7 +66,7 @@ def null_vector(x: Array, sizes: Array, norm: float, side: Array) -> Array:
 
 
 def to_theta(beta: Array) -> Array:
-    """Return θ of the forward model from β: F is the inverse of β's rows, b = F b*."""
+    """Return θ of the forward model, which has F and b, from β, which has F⁻¹ and b* = F⁻¹ b."""
     theta = beta.copy()
     f = np.linalg.inv(matrix(beta))
     theta[..., F] = f.reshape(*f.shape[:-2], 9)

@@ -45,7 +45,8 @@ class RepeatedMeans:
     """Mean readings of repeated poses.
 
     - `means` (N, 3) and their `variances` (N, 3); `inputs` (N, 3): rates or specific forces in body axes.
-    - `poses` (N,): the number of the plan's pose, from 0; `windows_s` (N, 2); `temperature_c` (N,) by the thermometer.
+    - `poses` (N,): the number of the plan's pose, from 0; `windows_s` (N, 2); `temperature_c` (N,) from the
+      thermometer.
     - `instability`: the Allan deviation of the bias' flicker.
     """
 

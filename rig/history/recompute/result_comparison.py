@@ -25,7 +25,7 @@ class StatedResult:
 
     - `run_id`, `content_sha256`, `started_utc`, `rig`, `verdict`: the run.
     - `calibrations`: the selected valid calibrations.
-    - `recordings`: its recordings. `places`: computer and folder, the newest first.
+    - `recordings`: the run's recordings. `places`: their computers and folders, the newest first.
     - `certificates`: those in force, without a mark and not replaced.
     """
 

@@ -116,7 +116,7 @@ def broken(connection: Connection) -> Iterator[Broken]:
 
 
 def unlike(connection: Connection, table: Table, *key: int | str) -> Broken | None:
-    """Return how the row with this primary key differs from the journal; None if it does not."""
+    """Return the difference of the row with this primary key from the journal; None if there is none."""
     lines = schema.journal.c
     query = select(lines.sha256).where(lines.kind == table.name, lines.key == json.dumps(key))
     entered = connection.scalar(query)

@@ -164,7 +164,7 @@ def collect_inputs(settings: RunSettings, provenance: Provenance, sensor: Record
 
 
 def clock_unknown() -> Refused:
-    """Return the error where a board's clock does not follow its crystal."""
+    """Return the error for a board whose clock does not follow its crystal."""
     return Refused(
         "clock_unknown",
         "the board's clock does not follow its crystal, so it may be 1 % off, which a session by hand cannot show",

@@ -121,7 +121,7 @@ def _find_first_clock(board_time_s: Array, readings: Array, motion: KnownMotion)
 
 
 def _count_until(board_time_s: Array, span_s: float) -> int:
-    """Return how many samples lie in the first `span_s`."""
+    """Return the number of samples in the first `span_s`."""
     return int(np.searchsorted(board_time_s, board_time_s[0] + span_s, side="right"))
 
 
@@ -129,7 +129,7 @@ def _count_until(board_time_s: Array, span_s: float) -> int:
 class _MovingTimes:
     """The blocks of `BLOCK_S` from `start_s` on in or near which a body turns: a mask `near` (m,).
 
-    At rest there are only vibrations, of which the turner's encoders show another part than the sensor.
+    At rest there are only vibrations, which the turner's encoders and the sensor show differently.
     """
 
     start_s: float

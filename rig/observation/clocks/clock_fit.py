@@ -53,9 +53,9 @@ def _average_samples(time_s: Array, readings: Array, count: int) -> tuple[Array,
 def fit_clock(clock: TimeBase, board_time_s: Array, readings: Array, motion: KnownMotion) -> TimeBase:
     """Return the clock with the best fit of readings and motion, first by their slow parts.
 
-    A ripple is the same after a period, and a fast ripple differs between readings and states because of their filters.
-    If the finest fit has no optimum for this reason, the clock of the slow parts remains, with its own uncertainty.
-    Raise Fault `time_base_not_found`.
+    A ripple looks the same after one period, and a fast ripple differs between readings and states because of their
+    filters. If the finest fit has no optimum for this reason, the clock of the slow parts remains, with its own
+    uncertainty. Raise Fault `time_base_not_found`.
     """
     first, *finer = _list_stages(clock, board_time_s, readings, motion)
     clock = _iterate_clock(clock, *first)

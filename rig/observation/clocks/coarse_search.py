@@ -58,12 +58,12 @@ def _arm_rate(motion: KnownMotion, step_s: float) -> tuple[float, Array]:
 
 @dataclass(frozen=True, slots=True, order=True)
 class _Match:
-    """An offset (controller − board), the better the larger.
+    """A candidate for the offset (controller − board); the larger of two matches is the better one.
 
-    - `share`: explained by the arm's motion, of the sum of squares of all readings. With another offset, by which each
-      sweep matches the next, fewer sweeps are explained.
-    - `fraction`: explained, of the sum of squares of the readings while the arm's motion was recorded. `enough`:
-      whether this is at least `MIN_EXPLAINED`.
+    - `share`: the fraction of the sum of squares of all readings that the arm's motion explains. A wrong offset, which
+      matches each sweep with the next, explains fewer sweeps.
+    - `fraction`: that of the readings taken while the arm's motion was recorded. `enough`: whether `fraction` is at
+      least `MIN_EXPLAINED`.
     """
 
     enough: bool

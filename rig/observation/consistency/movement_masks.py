@@ -36,7 +36,7 @@ def mask_movement(run: RunData, time_s: Array) -> MovementMasks:
 
 
 def _mask_windows(time_s: Array, *windows: Window) -> NDArray[np.bool_]:
-    """Return which times (n,) lie in any of the windows."""
+    """Return a mask of the times (n,) that lie in any of the windows."""
     inside = np.zeros(len(time_s), dtype=np.bool_)
     for window in windows:
         inside |= (time_s >= window.start_s) & (time_s <= window.end_s)

@@ -1,4 +1,4 @@
-"""Transfers between sweeps and rests, each averaged whole: rotations about other axes than the sweeps around them.
+"""Transfers between sweeps and rests, each averaged as a whole: rotations about other axes than the sweeps around them.
 
 The sweeps about an axis follow each other, so they do not show a change of its scale factor at another time. In a
 transfer two wrists turn by half a revolution, from standstill to standstill, and the arm states the mean rate as well
@@ -53,8 +53,8 @@ class WristTransfer:
     """A transfer in which only the wrists turned, averaged; times are on the clock of its recording.
 
     - clock_offset_s: converts its times to the clock of the first recording.
-    - mean_rad_s (3,): mean of the readings; scatter_rad2_s2, rounding_rad2_s2 (3,): its variances by the residuals of a
-      fit of the arm's rate and gravity, and by rounding.
+    - mean_rad_s (3,): mean of the readings; scatter_rad2_s2, rounding_rad2_s2 (3,): its variances due to the residuals
+      of a fit of the arm's rate and gravity, and due to rounding.
     - rate_rad_s (3,): the flange's mean rate relative to the base, in the flange's frame.
     - gravity_m_s2 (3,): gravity minus the acceleration at the sensors' position, in the same frame.
     - attitude (3, 3): from the base into that frame.

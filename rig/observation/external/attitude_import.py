@@ -79,8 +79,8 @@ class PlacedReadings:
     """The contents of the two files, for the `quantities` that were recorded.
 
     - `rows`: a gyroscope's averages; `turning`: its readings and all rows, for a solution by rotation angles.
-    - `placements`: of the other sensors, or the fault.
-    - `clock`: of the table, if it had to be found.
+    - `placements`: those of the other sensors, or the fault.
+    - `clock`: that of the table, if it had to be found.
     - `omitted`: rows that the recording does not cover; `incomplete`: rows with missing samples and no mean rate.
     """
 

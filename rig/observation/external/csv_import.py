@@ -116,7 +116,7 @@ def average_sweeps(samples: Samples, sweeps: Mapping[str, Array]) -> ExternalDat
 
 
 def _add_turns(samples: Samples, sweeps: Mapping[str, Array], data: ExternalData) -> ExternalData:
-    """Return the data with those of its rows, which state angles, that are turns from rest to rest."""
+    """Return the data with the turns from rest to rest among the rows that state an angle."""
     declared = DeclaredTurns(sweeps["angle_rad"], *(sweeps.get(name) for name in STD_COLUMNS))
     by_angle = find_turns(samples.time_s, samples.readings[RATE], declared, data.sweeps, data.rests)
     if by_angle is None:

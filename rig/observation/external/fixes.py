@@ -148,7 +148,7 @@ def _drop_thin(fixes: Fixes) -> Fixes:
 def _find_joined(
     turning: Turning, fixes: Fixes, clock_s: float
 ) -> tuple[NDArray[np.bool_], Array, tuple[LeftOut, ...]]:
-    """Return which fixes are joined to the next (N − 1,), the std of rotation in gaps, rad, and omitted increments."""
+    """Return a mask (N − 1,) of fixes joined to the next, the std of rotation in gaps, rad, and omitted increments."""
     count = len(fixes.placement)
     first_s = clock_s + fixes.at_s[np.searchsorted(fixes.fix, np.arange(count))]
     last_s = clock_s + fixes.at_s[np.searchsorted(fixes.fix, np.arange(count), side="right") - 1]

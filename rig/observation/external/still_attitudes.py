@@ -1,4 +1,4 @@
-"""The rests of a body by a reference's attitudes: a row over a long window, or successive rows with equal attitudes."""
+"""The rests of a body, from a reference's attitudes: a row over a long window, or successive rows of equal attitude."""
 
 import numpy as np
 

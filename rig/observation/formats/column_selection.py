@@ -16,9 +16,10 @@ from rig.observation.formats.csv_cells import DAY_S, is_value
 class Mapped:
     """The columns of another program's file.
 
-    - columns: by the rig's name of a column, its name in the file or its number from 1, and the factor to SI.
+    - columns: each column's name in the file, or its number from 1, and the factor to SI, by the rig's name of the
+      column.
     - skip_lines: lines before the heading.
-    - wraps: by the rig's name of a time, the number at which its counter begins again at 0.
+    - wraps: the number at which a counter of time begins again at 0, by the rig's name of the time.
     - rate_hz: rows per second, for a file without times.
     - missing: texts that stand for a blank cell.
     - in_any_unit: the numbers are used as they are, whatever a row of units states.

@@ -34,7 +34,7 @@ ATTITUDES = 72  # attitudes in a mean: over whole turns the part perpendicular t
 
 
 class ArmMotion:
-    """The `KnownMotion` of a chain of k joints: `angles(t)` (n, k) rad of them, `rate(t)` (n, 3) rad/s of the flange.
+    """The `KnownMotion` of a chain of k joints: `angles(t)` (n, k) rad, and `rate(t)` (n, 3) rad/s of the flange.
 
     Rates come from the recorded joint angles, because the controller filters its velocity signal. `states` (m,) are
     rows of `state_dtype`; `kinematics` and `names` are those of the joints. `mount` (3, 3) transforms all vectors in
@@ -130,7 +130,7 @@ class ArmMotion:
         return travel_rad
 
     def is_moving(self, start_s: float, end_s: float) -> NDArray[np.bool_]:
-        """Return whether each joint (k,) shows more than its encoder's noise between two times."""
+        """Return a mask (k,) of the joints whose angles change by more than encoder noise between two times."""
         return np.isnan(self._standing_rad(start_s, end_s))
 
     def max_distance_rad(self, window: Window, q_rad: Sequence[float]) -> float | None:

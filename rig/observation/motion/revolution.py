@@ -23,8 +23,8 @@ MIN_SPEED_FRACTION = 0.995
 class Revolution:
     """A turn of `angle_rad` between two controller times: exactly 2π, or an arc by the encoders.
 
-    - `duration_std_s`: uncertainty by interpolation between arm states.
-    - `axis_flange` (3,): unit vector of the turn in the flange frame, by the measured joints.
+    - `duration_std_s`: uncertainty due to interpolation between arm states.
+    - `axis_flange` (3,): unit vector of the turn in the flange frame, from the measured joint angles.
     - `axis_errors` (13, 3): the axis' change per radian of each arm error (`rig.motion.geometry.AXIS_ERRORS`).
     - `attitude` (3, 3): transforms a vector from the arm's base frame to the flange's, at the start.
     - `arm_m` (3,): a vector from the joint's axis to the flange's origin, in the flange's frame.

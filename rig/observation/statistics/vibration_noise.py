@@ -1,7 +1,7 @@
 """The noise of readings that vibrate: the residuals of a model of the vibration by spectral lines.
 
-A vibration's scatter is not noise, and one turn has too few low frequencies to show the noise beside it. Without the
-lines the noise is usually white, and all residuals determine it; otherwise their correlations do.
+A vibration's scatter is not noise, and one turn has too few low frequencies to show the noise itself. Without the lines
+the noise is usually white, and all residuals determine it; otherwise their correlations do.
 """
 
 from collections.abc import Sequence

@@ -6,7 +6,7 @@ from rig.estimation.arrays import Array
 
 
 def find_least_around(values: Array, width: int) -> Array:
-    """Return for each value the larger of two minima (n,): of the values ahead, and of the values behind.
+    """Return the larger of two minima (n,) for each value: of the values ahead, and of the values behind.
 
     At the ends, where one of the minima is missing, the other is returned.
     """
@@ -17,7 +17,7 @@ def find_least_around(values: Array, width: int) -> Array:
 
 
 def find_least_ahead(values: Array, width: int) -> Array:
-    """Return for each value (n,) the minimum of `width` values from this one on."""
+    """Return the minima (n,) of `width` values, from each value on."""
     least, covered = values.copy(), 1
     while covered < min(width, len(values)):
         more = min(covered, width - covered)
@@ -27,7 +27,7 @@ def find_least_ahead(values: Array, width: int) -> Array:
 
 
 def find_least_behind(values: Array, width: int) -> Array:
-    """Return for each value (n,) the minimum of `width` values up to this one."""
+    """Return the minima (n,) of `width` values, up to each value."""
     return find_least_ahead(values[::-1], width)[::-1]
 
 

@@ -203,7 +203,7 @@ def _is_beat(missing: NDArray[np.intp]) -> bool:
     """Return whether the missing readings (n − 1,) come more regularly than by chance.
 
     Stamps of a polled port, multiples of a time shorter than the interval, cause such a beat. So does a logger that
-    loses every n-th reading, but hardly as many.
+    loses every n-th reading, but it hardly loses as many.
     """
     missing = np.minimum(missing, 1)  # a gap counts once
     lost = int(missing.sum())

@@ -36,7 +36,7 @@ WRIST_1, WRIST_2, WRIST_3 = (JOINT_NAMES.index(name) for name in ("wrist_1", "wr
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """A sweep order: every station in turn, in the `directions`, reversed at every second one if it `alternates`."""
+    """A sweep order: the stations in turn, each in the `directions`; every second one reversed if it `alternates`."""
 
     stations: tuple[SweepPose, ...]
     directions: tuple[tuple[Direction, ...], ...]

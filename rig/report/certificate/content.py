@@ -60,7 +60,7 @@ class HeldStill:
 
     @property
     def whose(self) -> str:
-        """Whose scale the values refer to, with its article: "a gyroscope's scale"."""
+        """The owner of the scale to which the values refer, with its article: "a gyroscope's scale"."""
         return f"{'an' if self.kind[0] in 'aeiou' else 'a'} {self.kind}'s scale"
 
 

@@ -52,7 +52,7 @@ class WithMotion:
         return since_s
 
     def noise(self, sensor: str, quantity: Quantity) -> Sequence[Array]:
-        """Return the noise (3,) of one sample in each rest, of accelerations in each dwell."""
+        """Return the noise (3,) of one sample in each rest or, for accelerations, in each dwell."""
         sensor_observations = self.observed.sensors[sensor]
         if quantity == ACCELERATION:
             return [dwell.reading.noise for dwell in sensor_observations.dwells]

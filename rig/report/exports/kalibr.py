@@ -15,7 +15,7 @@ from rig.report.exports.exported_corrections import ExportedCalibrations, Imu
 
 
 def kalibr_files(calibrations: ExportedCalibrations) -> Mapping[str, str]:
-    """Return for each IMU `…_imu.yaml` (noise) and `…_intrinsics.yaml`. Raise Refused `nothing_to_export`."""
+    """Return `…_imu.yaml` (noise) and `…_intrinsics.yaml` of each IMU. Raise Refused `nothing_to_export`."""
     files = {}
     names = plain_names(imu.name for imu in calibrations.imus)
     for imu in calibrations.imus:

@@ -44,7 +44,7 @@ class DisplayRow:
     """A row of page and notebook: numbers, with scale factors if there are any.
 
     - sensor, quantity: the sensor and what it measures.
-    - name, unit: of the row.
+    - name, unit: those of the row.
     - numbers: the values with U.
     - combined: whether U includes all contributors; otherwise it is two standard deviations of the noise.
     - scale: the scale factors with U.

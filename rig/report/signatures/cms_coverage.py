@@ -55,7 +55,7 @@ def _certificates(content: Any) -> list[Certificate]:
 
 
 def _find_uncovered(content: Any, der: bytes, version: str) -> Iterator[str]:
-    """Yield what the container of the signature has beyond what is signed."""
+    """Yield the parts of the signature's container that are not signed."""
     container = content["content"]
     (info,) = container["signer_infos"]
     if _rebuild(container, info, extract_certificate_info(container).signer_cert, version).dump() != der:

@@ -13,10 +13,10 @@ from rig.station.plain_text import plain
 class KvhInfo:
     """A KVH 1775 and its stream.
 
-    - sensor: its name.
+    - sensor: the sensor's name.
     - port, baud: its line.
     - serial_number: the instrument's.
-    - settings: in its memory.
+    - settings: those in its memory.
     - built_in_test: the result, None without one.
     - messages, lost: numbers of received and lost messages.
     - rotation, acceleration_g (3,): means over the messages, in the instrument's units.

@@ -99,7 +99,7 @@ class TriedSolutions:
 
 
 def describe_solutions(looked: LookedFile | None, reference: LookedFile | None, tried: TriedSolutions) -> Iterator[str]:
-    """Yield which solutions the files allow, with the command of each."""
+    """Yield the solutions that the files allow, with the command of each."""
     option = "" if tried.columns is None else f" --columns {tried.columns}"
     if looked is None or looked.survey is None:
         if reference is not None:

@@ -39,7 +39,7 @@ def profile(plan: Plan) -> list[ProfilePoint]:
 
 
 def _corners(axis: str, sweeps: list[tuple[Sweep, float]]) -> Iterator[ProfilePoint]:
-    """Yield the points at which the rate about the axis begins or ends to change."""
+    """Yield the points at which the rate about the axis starts or stops changing."""
     at_s, angle_deg = 0.0, 0.0
     for sweep, rest_s in sweeps:
         sign = 1 if _leading_component(sweep.axis_flange) > 0 else -1

@@ -219,7 +219,7 @@ def _have_valid_bytes(
 
 
 def _count(positions: NDArray[np.intp], line_starts: NDArray[np.intp], line_ends: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return how many of the increasing `positions` lie in each line."""
+    """Return the number of the increasing `positions` in each line."""
     counts: NDArray[np.intp] = np.searchsorted(positions, line_ends) - np.searchsorted(positions, line_starts)
     return counts
 
@@ -242,7 +242,7 @@ def _are_in_lines(
 
 
 def _markers(keys: tuple[str, ...]) -> Mapping[bytes, bytes]:
-    """Return for each key a marker of its length. Longer keys come first, because they may contain shorter ones."""
+    """Return a marker of equal length for each key. Longer keys come first, because they may contain shorter ones."""
     by_length = sorted(enumerate(keys), key=lambda indexed_key: -len(indexed_key[1]))
     return MappingProxyType({key.encode(): bytes([_KEYS + index]) + b" " * (len(key) - 1) for index, key in by_length})
 

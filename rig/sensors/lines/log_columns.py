@@ -117,7 +117,7 @@ def _guess_samples(
 
 
 def _may_be_gyroscope(names: Sequence[str], guessed: Guess) -> bool:
-    """Return whether three columns without names, but for the axes, or units can be a gyroscope."""
+    """Return whether three columns whose headings state neither quantity nor unit can be a gyroscope's."""
     is_nameless = not any(names) or all(map(_is_axis, names)) or not guessed.units
     return is_nameless and len(names) == 3 and set(guessed.units) <= {"m"}
 
@@ -242,7 +242,7 @@ def _group_columns(
 
 
 def _order_axes(indices: Sequence[int], names: Sequence[str]) -> list[int]:
-    """Return the columns, those whose names are x, y and z alone in this order: some loggers write z first."""
+    """Return the columns; if their names are x, y and z alone, in this order, because some loggers write z first."""
     axes = iter(sorted((index for index in indices if _is_axis(names[index])), key=lambda index: names[index]))
     return [next(axes) if _is_axis(names[index]) else index for index in indices]
 

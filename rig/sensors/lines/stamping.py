@@ -1,4 +1,4 @@
-"""Numbers and times of samples: by the device's time, by counting, or by the arrival of lines. Pure."""
+"""Numbers and times of samples: from the device's time, from counting, or from the arrival of lines. Pure."""
 
 from copy import copy
 from dataclasses import dataclass, field
@@ -199,7 +199,7 @@ class Stamper:
         return steps
 
     def _compute_times_s(self, numbers: NDArray[np.int64], device_s: Array, host_time_s: float) -> Array:
-        """Return the samples' times: counted, by the device, or by smoothed arrival, as the section says."""
+        """Return the samples' times: counted, the device's own, or from smoothed arrival, as the section states."""
         if self.section.clock == "counted":
             return numbers / self.rate_hz
         if self.section.clock == "device":

@@ -1,4 +1,4 @@
-"""The step of a device's printed time: by its digits, or by the resolution of a single-precision number. Pure."""
+"""The step of a device's printed time, from its digits or from the resolution of a single-precision number. Pure."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Watches whether the rig could stop an arm that it controls by a way that does not need the client.
+"""Watches whether the rig could still stop an arm under its control without the client.
 
 Local control disables every independent stop, and neither the states nor the client report it. The dashboard reports it
 if polled (from 5.6 on), as does the Robot API of a PolyScope X (from 10.12 on). At that moment the controller also

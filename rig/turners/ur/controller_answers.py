@@ -1,7 +1,7 @@
 """The controller's answers while nothing moves: the rig's ability to stop its arm, and the arm's report.
 
 A controller with PolyScope 5 answers by its dashboard. A PolyScope X has none: RTDE, the primary interface and the
-Robot API answer as far as possible.
+Robot API answer what they can.
 """
 
 from contextlib import closing

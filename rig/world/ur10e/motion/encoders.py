@@ -17,10 +17,10 @@ class Encoders:
     """The encoders of six joints.
 
     - `step_rad`: resolution of the angles, 0 for none.
-    - `noise_rad`: of each angle, white.
-    - `speed_noise_rad_s`: of the speed of each joint that turns.
+    - `noise_rad`: white noise of each angle.
+    - `speed_noise_rad_s`: noise of the speed of each joint that turns.
     - `lateness_s`: draws the delay of a reading, once a tick.
-    - `seed`: of the noise, which is the same for every client that asks in the same tick.
+    - `seed`: seed of the noise, which is the same for every client that asks in the same tick.
     """
 
     step_rad: float = 0.0

@@ -25,7 +25,7 @@ class Errors:
     """Magnitudes of a joint's errors.
 
     - `hysteresis_rad`: the full width between both directions.
-    - `vibration_rms_rad_s`: of each wrist's rate.
+    - `vibration_rms_rad_s`: RMS of each wrist's vibration rate.
     - `vibration_rad_s` (of its tones), `settling_rad_s`: angular frequencies.
     """
 
