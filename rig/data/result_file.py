@@ -240,7 +240,7 @@ class AverageEntry(Entry):
 class ObservationEntry(Entry):
     """One revolution, its mean reading, and its joint if an arm made it.
 
-    `angle_rad` is the angle turned: a multiple of 2π, or an arc by the encoders; null for a file of speeds.
+    `angle_rad` is the angle turned: a multiple of 2π, or an arc as the encoders measure it; null for a file of speeds.
     """
 
     sweep: int
@@ -297,8 +297,8 @@ class BoardEntry(Entry):
 class GyroscopeEntry(Entry):
     """A sensor's calibration by the chosen estimator, its observations, and the solutions of the other estimators.
 
-    - covariance: by noise and bias random walk; covariance_combined: by all contributors in the budget, with the vector
-      model.
+    - covariance: due to noise and bias random walk; covariance_combined: due to all contributors in the budget, with
+      the vector model.
     - correction_matrix: M of g = M (m + b), by which the board and the C header correct readings.
     - speeds_rad_s: those of the sweeps. A calibration at one speed, in either direction, is valid at that speed,
       without nonlinearity. axis_rate_ranges_rad_s: smallest and largest rate along each of the sensor's axes in the

@@ -1,8 +1,8 @@
 """Averaged revolutions of a recording, the input of the estimators.
 
 An observation is the mean reading over exactly one turn of a joint, or over an arc of it. Over a whole turn the mean
-speed is 2π/T regardless of the servo's vibration; over an arc it is Δθ/T by the encoders at its ends. The same weights
-average the readings and the arm's rate, so a vibration that the encoders measure adds no noise.
+speed is 2π/T regardless of the servo's vibration; over an arc it is Δθ/T, from the encoders at its ends. The same
+weights average the readings and the arm's rate, so a vibration that the encoders measure adds no noise.
 
 Whatever does not belong in a calibration raises a Fault with a name of its own.
 """

@@ -168,7 +168,7 @@ class Warming:
             )
 
     def _refuse_fast(self, name: str, read_s: float, temperature_c: float) -> None:
-        """Raise Fault `too_fast`, by the board's times: readings may arrive late on a busy computer."""
+        """Raise Fault `too_fast` for a fast change by the board's times, because readings may arrive late."""
         history = self._history.setdefault(name, deque())
         if history and read_s <= history[-1][0]:
             return

@@ -40,7 +40,7 @@ class SocketTable:
                 self._netlink = None
 
     def count_unread(self, connection: socket.socket) -> Unread:
-        """Return a function that counts the bytes sent by `connection` and not read at its other end, if known."""
+        """Return a function that counts the bytes sent by `connection` and unread at its other end, if known."""
         netlink = self._netlink
         if netlink is None:
             return lambda: 0

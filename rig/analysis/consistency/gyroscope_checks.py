@@ -72,7 +72,7 @@ MOST, TRIED = 16.0, 7  # largest variance inflation by a synchronous ripple; num
 class ErrorPatterns:
     """The known errors of segments, one pattern of one standard deviation each: `patterns_rad_s` (P, N, 3).
 
-    - `encoders_rad_s` (E, N, 3): the patterns among `patterns_rad_s` by the encoders in arcs.
+    - `encoders_rad_s` (E, N, 3): the patterns among `patterns_rad_s` that the encoders cause in arcs.
     - `transfers`: N segments and M − N transfers; `transfer_patterns_rad_s` (Q, M, 3): the error patterns of all M.
     - `instability_rad_s`: the sensor's bias instability.
     """

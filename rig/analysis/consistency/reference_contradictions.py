@@ -39,7 +39,7 @@ DISTURBED_DWELL = "disturbed_dwell"
 
 @dataclass(frozen=True, slots=True)
 class SegmentName:
-    """A sweep or dwell, by its index in the plan; without an index, the worst one if none contradicts the others."""
+    """A sweep or dwell that contradicts the others, by its index in the plan; if all agree, the worst, unnumbered."""
 
     what: str
     sweep: int | None = None

@@ -67,7 +67,7 @@ class RevolutionError:
     """Mean reading minus mean reference over one revolution or arc.
 
     - `sweep`, `joint_name`, `direction`: the motion; `angle_rad`: the joint's angle, None for a whole revolution.
-    - `error_rad_s`, `std_rad_s` (3,): the difference, and its standard deviation by noise.
+    - `error_rad_s`, `std_rad_s` (3,): the difference, and its standard deviation due to noise.
     - `gravity_rad_s` (3,): the part of the error that gravity explains, None if no calibration determines it.
     """
 

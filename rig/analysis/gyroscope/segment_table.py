@@ -27,7 +27,7 @@ class Segments:
     - attitudes (N, 3, 3): from the base into that frame.
     - speed_std (N,): relative standard deviation of the mean speed.
     - times_s (N, 2): start and end on the clock of the first recording; `intervals` are on their own recording's clock.
-    - roundings_rad_s (N, 3): standard uncertainty of each mean by rounding.
+    - roundings_rad_s (N, 3): standard uncertainty of each mean due to rounding.
     - unexplained_rad2_s2 (N, 3): part of the variances that neither arm nor noise explains.
     """
 

@@ -22,8 +22,8 @@ from rig.observation.observed_run import ObservedRun
 class Verification:
     """How uncalibrated readings (`before`, None if not recorded) and calibrated ones compare with a reference.
 
-    `reference_error_rad_s`: the reference's largest error in the norm of its mean rate, 2π/T by the arm over a
-    revolution and zero over a rest.
+    `reference_error_rad_s`: the largest error of the norm of the reference's mean rate. The arm shows the true norm,
+    2π/T over a revolution and zero over a rest.
     """
 
     sensor: str

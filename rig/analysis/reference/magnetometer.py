@@ -154,7 +154,7 @@ def _solve(solve: Callable[..., TriaxialSolution]) -> TriaxialSolution:
 def _attitude_error_rad(
     name: str, recordings: Sequence[ObservedRun], accelerometers: Mapping[str, AccelerometerResult]
 ) -> float:
-    """Return an upper bound (2σ) of the arm's attitude error, by an accelerometer, if possible on the same clock."""
+    """Return an upper bound (2σ) of the arm's attitude error from an accelerometer, if possible on the same clock."""
     by = next((other for run in recordings if (other := find_companion(run, name)) in accelerometers), None)
     accelerometer = accelerometers[by] if by is not None else next(iter(accelerometers.values()))
     error = accelerometer.solution.attitude_error

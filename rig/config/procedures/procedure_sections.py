@@ -93,7 +93,7 @@ class SixSweepsSection(ProcedureSection):
 
     @model_validator(mode="after")
     def require_every_direction(self) -> Self:
-        """Refuse an order without one of the six directions of SIX, section II-B, and a speed named twice."""
+        """Refuse an order that lacks one of the six directions of SIX, section II-B, and a speed named twice."""
         order, directions = self.order or get_args(Wrist), self.directions or ("cw", "ccw")
         if len(set(order)) < 3 or len(order) > 3 or set(directions) != {"cw", "ccw"}:
             raise ValueError("order must name wrist_1, wrist_2 and wrist_3 once each, and directions both cw and ccw")

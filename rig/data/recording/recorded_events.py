@@ -179,7 +179,7 @@ def _decode_document(document: Any) -> TimedEvent:
 
 
 def _nest_answer(name: str, detail: dict[str, Any]) -> dict[str, Any]:
-    """Return the details with the board's answer nested; in schema "rig.run/1" its fields were not nested."""
+    """Return an event's fields with the board's answer as one nested value, which schema "rig.run/1" stores flat."""
     answer = {"board_observed": "observation", "board_solved": "solution"}.get(name)
     return {**detail, answer: detail} if answer is not None and answer not in detail else detail
 

@@ -233,7 +233,7 @@ def _move(graph: Graph, row: int) -> Factor:
 
 
 def _tilt_factor(graph: Graph, row: int) -> Factor:
-    """Return two equations of whole turns by α about the face's normal n: ∫(m − b) dt/α = F n, perpendicular to F n."""
+    """Return the equations ∫(m − b) dt/α = F n of turns by α about a face's normal n, in two directions across F n."""
     normal, matrix = graph.faces.up[row], graph.state.matrix
     integral_rad, duration_s = graph.integrals.swept_rad[row], graph.integrals.durations_s[row]
     angle_rad = float(normal @ integral_rad)

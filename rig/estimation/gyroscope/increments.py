@@ -96,7 +96,7 @@ def course(time_s: Array, readings: Array, matrix: Array, bias: Array, at_s: Arr
 
 
 def track(time_s: Array, readings: Array, matrix: Array) -> Track:
-    """Integrate readings without bias, at their own times; otherwise as `course`."""
+    """Integrate readings without bias, at their own times. Other arguments: see `course`."""
     inverse = np.asarray(np.linalg.inv(matrix), dtype=np.float64)
     interval = _find_slopes(time_s, readings @ inverse.T)
     steps = _whole_steps(interval)
@@ -108,7 +108,7 @@ def track(time_s: Array, readings: Array, matrix: Array) -> Track:
 
 
 def increments(time_s: Array, readings: Array, matrix: Array, bias: Array, windows_s: Array) -> Increments:
-    """Return the rotations over windows (w, 2) [start, end], which may overlap; otherwise as `course`."""
+    """Return the rotations over windows (w, 2) [start, end], which may overlap. Other arguments: see `course`."""
     at_s, index = np.unique(windows_s, return_inverse=True)
     path = course(time_s, readings, matrix, bias, at_s)
     start, end = index.reshape(-1, 2).T

@@ -49,7 +49,7 @@ class VectorInputs:
     - encoder_errors_rad_s (P, N, 3): effect of encoders at the ends of arcs, None for whole revolutions.
     - ripples (N,): RMS ripple of each rotation as a fraction of its rate.
     - state_gains (N,): noise of the arm's states in the mean rates, relative to that in Δθ/T.
-    - roundings_rad_s (N, 3): standard uncertainty of each mean by rounding.
+    - roundings_rad_s (N, 3): standard uncertainty of each mean due to rounding.
     """
 
     means_rad_s: Array

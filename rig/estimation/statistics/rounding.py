@@ -100,7 +100,7 @@ def bound_rounding_variance(readings: Array, steps: Steps, smooth: Array, scatte
     """Return an upper bound of the variance (3,) that rounding adds to a mean of readings (n, 3).
 
     `smooth` (n, 3) is the readings' known variation across steps, such as the ripple of the arm; `scatter` (3,) is the
-    remaining variance, by noise and rounding (Sheppard). Readings with fewer than three different values do not
+    remaining variance, due to noise and rounding (Sheppard). Readings with fewer than three different values do not
     determine their noise, which may be zero.
     """
     units = steps.units

@@ -38,7 +38,7 @@ class BiasStep:
 class BiasByRepeat:
     """The bias of every repeat.
 
-    - `bias` (R, 3); `std` (R, 3): standard deviation of its differences; `moves`: its steps.
+    - `bias` (R, 3); `std` (R, 3): standard deviation of its differences; `moves`: the steps of the bias.
     - `excess` (3,): the ratio of the scatter of means in an attitude to their standard deviation, at least 1 (Birge
       ratio). Causes: inexact repeats of attitudes, or bias drift within a repeat. `std` includes it.
     - `dof` (3,): degrees of freedom of the excess if there is one, else infinite.

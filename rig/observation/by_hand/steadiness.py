@@ -1,4 +1,4 @@
-"""A check that a log of readings was made at rest, by the readings themselves."""
+"""A check that a log of readings was made at rest, from the readings themselves."""
 
 from collections.abc import Iterator
 from itertools import pairwise

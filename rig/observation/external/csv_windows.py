@@ -90,7 +90,7 @@ def average_bridged(readings: Array, numbers: NDArray[np.intp], window: Window, 
 
 @dataclass(frozen=True, slots=True)
 class RowGaps:
-    """The numbers of a row's readings: present (`count`), `expected`, and `missing` in the number `gaps` of gaps.
+    """The readings of a row: the numbers present (`count`), `expected` and `missing`, and the number of `gaps`.
 
     `hidden_rad`: standard deviation of the rotation that the gaps hide; `first_s`: time before the first of them;
     `is_inside`: whether the recording covers the row.

@@ -18,7 +18,7 @@ FEWEST, FEWEST_S = 2, 1.0  # fewest rests that show a scatter, and their total d
 
 @dataclass(frozen=True, slots=True)
 class MeansAtRest:
-    """The gyroscope's mean `readings_rad_s` (k, 3) in k rests, and the body's rate by the reference (k, 3)."""
+    """The gyroscope's mean `readings_rad_s` (k, 3) in k rests, and the body's rate from the reference (k, 3)."""
 
     readings_rad_s: Array
     rates_rad_s: Array

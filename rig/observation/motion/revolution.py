@@ -21,7 +21,7 @@ MIN_SPEED_FRACTION = 0.995
 
 @dataclass(frozen=True, slots=True)
 class Revolution:
-    """A turn of `angle_rad` between two controller times: exactly 2π, or an arc by the encoders.
+    """A turn of `angle_rad` between two controller times: exactly 2π, or an arc as the encoders measure it.
 
     - `duration_std_s`: uncertainty due to interpolation between arm states.
     - `axis_flange` (3,): unit vector of the turn in the flange frame, from the measured joint angles.
@@ -181,7 +181,7 @@ def _check_slider(turning: NDArray[Any], where: str) -> None:
 
 
 def _check_speed(time_s: Array, travelled: Array, where: str, settings: ObservationThresholds) -> None:
-    """Raise Fault `speed_not_constant` if the smoothed rate strays from its mean: by a halt, but not by vibration."""
+    """Raise Fault `speed_not_constant` if the smoothed rate strays from its mean, as after a halt, not by vibration."""
     middles = np.arange(time_s[0] + SMOOTHING_S / 2, time_s[-1] - SMOOTHING_S / 2, SMOOTHING_S / 5)
     ahead = np.interp(middles + SMOOTHING_S / 2, time_s, travelled)
     behind = np.interp(middles - SMOOTHING_S / 2, time_s, travelled)
@@ -190,7 +190,7 @@ def _check_speed(time_s: Array, travelled: Array, where: str, settings: Observat
 
 
 def check_constant(relative_speeds: Array, where: str, settings: ObservationThresholds) -> None:
-    """Raise Fault `speed_not_constant` if smoothed speeds (n,), relative to their mean, stray from it: by a halt."""
+    """Raise Fault `speed_not_constant` if smoothed speeds (n,), relative to their mean, stray from 1, as at a halt."""
     deviation = float(np.max(np.abs(relative_speeds - 1), initial=0.0))
     if deviation > settings.max_speed_deviation:
         raise Fault(

@@ -36,7 +36,10 @@ WRIST_1, WRIST_2, WRIST_3 = (JOINT_NAMES.index(name) for name in ("wrist_1", "wr
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """A sweep order: the stations in turn, each in the `directions`; every second one reversed if it `alternates`."""
+    """A sweep order: the stations in turn, each in the `directions`.
+
+    `alternates`: whether every second station has them reversed.
+    """
 
     stations: tuple[SweepPose, ...]
     directions: tuple[tuple[Direction, ...], ...]

@@ -1,4 +1,4 @@
-"""Reading of a signed digital certificate, and the form that it has if everything in it is signed."""
+"""Reading of a signed digital certificate, and its reconstruction from the signed content alone."""
 
 import re
 from base64 import b64decode, b64encode

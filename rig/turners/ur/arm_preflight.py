@@ -30,7 +30,7 @@ MAX_TOOL_ROTATION_RAD = 1e-3  # above a pendant's rounding, below any intended r
 def preflight_problems(plans: Sequence[Plan], arm: ArmSection, report: ArmReport) -> list[Problem]:
     """Return all reasons against moving: another arm, a plan beyond a limit, an arm that is not ready.
 
-    The last of `plans` is to be driven. For another arm only that is reported, because all other reasons concern the
+    The last of `plans` is to be driven. If another arm answers, no other reason is reported, because these concern the
     configured arm.
     """
     if others := identity_problems(arm, report):

@@ -32,7 +32,7 @@ class ArmReport:
     - tcp_offset: the pose of its tool centre point in the flange's frame.
     - setup: the arm for which the controller is set up.
     - called: the dashboard's name for it.
-    - model: the maker's name of the arm, by these items.
+    - model: the maker's name of the arm, from these items.
     - registers_free: whether a half of the registers is free for the client's script.
     """
 

@@ -117,7 +117,7 @@ class SimulatedHand:
         self._go(self._find_rest_attitude(target, self.face, mistake), vector, start_s, mistake)
 
     def _go(self, target: Array, vector: Array | None, start_s: float, mistake: Mistake | None) -> None:
-        """Move the body to the attitude `target`, by the rotation vector `vector` (3,) or on the shortest path."""
+        """Move the body to the attitude `target`, by the rotation `vector` (3,) or, if None, on the shortest path."""
         habits, kind = self.habits, mistake.kind if mistake is not None else None
         size = mistake.magnitude if mistake is not None else 0.0
         if kind == "too_fast":

@@ -28,7 +28,7 @@ class ArmModel:
 
     `limit_rad` and `speed_rad_s`: greatest joint angles, to either side, and speeds. `home_deg` and `polyscope`:
     initial pose and software version, if the configuration has none. `name` is the dashboard's. `encoder_step_rad`:
-    that of a UR3 of the CB3 series, by its logs; the e-Series' step is only known to be finer.
+    that of a UR3 of the CB3 series, from its logs; the e-Series' step is only known to be finer.
     """
 
     robot_type: int

@@ -31,7 +31,7 @@ class Instant:
 
 
 class _Tick(NamedTuple):
-    """The execution of a tick: its start, its start on the trajectory, the time scaling there and its derivative."""
+    """The execution of a tick: its start, the trajectory's time then, and the time scaling then with its derivative."""
 
     start_s: float
     trajectory_s: float
