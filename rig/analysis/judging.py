@@ -123,6 +123,7 @@ def _judge_gyroscopes(
     estimator: Estimator,
     polynomials: "Polynomials",
 ) -> _GyroscopeOutcome:
+    """Solve and judge the gyroscopes of a run: calibration, the board's arithmetic, contradictions and clocks."""
     surroundings = surroundings_of(recordings, settings)
     results = solve_observed(runs[0].measuring(RATE), recordings, surroundings, estimator, settings.matrix_corrected)
     if polynomials:
@@ -165,6 +166,7 @@ class _DwellOutcome:
 def _judge_dwells(
     recordings: tuple[ObservedRun, ...], settings: RunSettings, swept: _GyroscopeOutcome, *, drifting: bool
 ) -> _DwellOutcome:
+    """Solve and judge accelerometers and magnetometers from their dwells; gyroscopes are solved already."""
     from rig.analysis.reference.accelerometer import calibrate_accelerometers
     from rig.analysis.reference.magnetometer import calibrate_magnetometers
 

@@ -141,6 +141,7 @@ def _map_of(layout: TableLayout, guess: LogColumns) -> dict[str, Any]:
 
 
 def _read_contents(looked: LookedFile, column_map: ColumnMap, *, has_readings: bool, has_attitudes: bool) -> LookedFile:
+    """Return the file with its readings and attitudes; what cannot be read becomes one of its `refusals`."""
     refusals: list[RigError] = []
     if has_readings:
         try:
@@ -159,6 +160,7 @@ def _read_contents(looked: LookedFile, column_map: ColumnMap, *, has_readings: b
 
 
 def _read_samples(looked: LookedFile, column_map: ColumnMap) -> LookedFile:
+    """Return the file with its readings; if sensors' rows differ, with those of the gyroscope alone."""
     mapped = map_samples(column_map)
     try:
         table = read_sample_table(looked.path, (), mapped)
@@ -222,6 +224,7 @@ def try_attitudes(
 
 
 def _find_obstacle(files: Files, request: Elsewhere, up: str) -> str | None:
+    """Return the reason why the files have no solution in this attitude, or which checks fail; None if all pass."""
     x, y, z = axis_of(up).tolist()
     site = Site(up=(x, y, z), gravity_m_s2=STANDARD_GRAVITY_M_S2, earth_rate_rad_s=None)
     try:

@@ -86,6 +86,7 @@ def so_far(runs: Sequence[RunData]) -> SoFar:
 
 
 def _solve_gyroscope(sweeps: Attempts[int, Observation], rests: Sequence[Average], mounting: Array) -> PartialGyroscope:
+    """Return a gyroscope's partial result, whose solution is None while sweeps and rests do not suffice."""
     observations = [observation for _, observation in sorted(sweeps.results.items())]
     solution, missing = None, NO_SWEEP_YET if not observations else None
     if observations:
@@ -148,6 +149,7 @@ def _read_field(
 def _observe_sweeps(
     run: RunData, name: str, stream: Stream, motion: ArmMotion
 ) -> tuple[Attempts[int, Observation], Sequence[Average]]:
+    """Return the observed sweeps with the refusals of the others, and the averaged rests."""
     thresholds = run.settings.observation
     sweeps = observe_each_sweep(run, stream, motion, thresholds)
     dwells = {dwell.index for dwell in run.settings.planned_dwells}

@@ -1,7 +1,4 @@
-"""The journal of a batch: a line for each entry, written to the disk before the next step.
-
-An incomplete line is no entry.
-"""
+"""The journal of a batch: a line for each entry, complete on the disk before the next step."""
 
 import json
 import os
@@ -67,10 +64,7 @@ def open_journal(out: Path | None, parent: Path, entry: Begun) -> Journal:
 
 
 def resume_journal(folder: Path) -> Journal:
-    """Return the journal in `folder` without an incomplete last line.
-
-    Raise Refused `no_batch`, and as `refuse_links` does.
-    """
+    """Return the journal in `folder` without an incomplete last line. Raise Refused `no_batch` or for a link."""
     path = folder / JOURNAL
     try:
         text = read_regular_file(path, LARGEST_BYTES, follow_links=False)

@@ -70,6 +70,7 @@ def page_of(batch: Batch, *, simulated: bool) -> str:
 
 
 def _cells(part: BatchPart) -> Iterator[str]:
+    """Yield a part's cells in the columns of the batch's table."""
     ended = part.ended
     yield from (str(part.number), part.serial, part.state)
     if ended is None:

@@ -73,10 +73,7 @@ class Now:
 
 @dataclass(slots=True)
 class Present:
-    """The present state of a station: a listener of its runs and of its batch.
-
-    The `listeners` are called after every change and must not block.
-    """
+    """The present state of a station. The `listeners` are called after every change and must not block."""
 
     now: Now
     listeners: Sequence[Callable[[Now], None]] = field(default=())

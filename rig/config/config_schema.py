@@ -78,10 +78,7 @@ def _add_kind(section: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _chosen(key: str, sections: Mapping[str, Mapping[str, Any]], text: str) -> dict[str, Any]:
-    """Return the schema of a section whose keys depend on the value of one key.
-
-    If that value is unknown, all other keys are allowed.
-    """
+    """Return the schema of a section whose keys depend on one key; all others are allowed if its value is unknown."""
     names = {"anyOf": [{"enum": [*sections]}, {"type": "string"}], "description": f"one of {', '.join(sections)}"}
     branches = [
         {"if": {"properties": {key: {"const": name}}, "required": [key], "type": "object"}, "then": section}

@@ -65,10 +65,7 @@ class Loaded:
 
 
 class ConfigurationRefused(Refused):
-    """A configuration that is not valid; `problems` has one line for each error.
-
-    `give` is the remedy for a file that cannot be read.
-    """
+    """An invalid configuration: its `problems`, one line each, and `give`, the remedy for an unreadable file."""
 
     def __init__(self, source: str, problems: Sequence[str], give: str = GIVE_CONFIGURATION) -> None:
         self.problems = tuple(printable(problem) for problem in problems)
@@ -170,6 +167,7 @@ def _require(model: type[Model], data: Any, layered: Layered, source: str, more:
 
 
 def _validate_all(layered: Layered, source: str, sections: Sections, turners: Turners) -> Loaded:
+    """Return the valid configuration. Raise ConfigurationRefused with all problems of all sections."""
     document = layered.document
     rig_part = {key: value for key, value in document.items() if key != "world"}
     config, rig_problems = _validate_rig(rig_part, sections, turners, layered)

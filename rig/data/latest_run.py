@@ -35,10 +35,7 @@ def latest_run() -> Path:
 
 
 def meant_run(path: str | Path) -> Path:
-    """Return the run that a user names: a path, or `latest` unless a file or folder here has that name.
-
-    Raise Refused as `latest_run` does.
-    """
+    """Return the run that a user names: a path, or `latest` unless a file here is called so. Raise as `latest_run`."""
     return latest_run() if str(path) == LATEST and not Path(LATEST).exists() else Path(path)
 
 

@@ -36,10 +36,7 @@ class ScriptIdentity:
 
 
 def new_folder(out: Path | None, loaded: "Loaded", script: str, identity: ScriptIdentity) -> Path:
-    """Make a run folder that holds only the configuration as used, and the script's text and identity.
-
-    Raise Refused `run_folder`.
-    """
+    """Make a run folder with the configuration as used and the script. Raise Refused `run_folder`."""
     parent = Path(loaded.config.output.folder)
     with refuse_unwritable(out or parent):
         folder = out or folder_of_its_own(parent, loaded.config.procedure.name)
@@ -59,10 +56,7 @@ def discard(folder: Path) -> None:
 
 
 def empty_folder(folder: Path, *, or_else: str = "") -> Path:
-    """Make the folder, or return it if it is empty; `or_else` is a further remedy for a folder that is not empty.
-
-    Raise Refused `run_folder`.
-    """
+    """Make the folder, or return it if it is empty. Raise Refused `run_folder`, with `or_else` as a further remedy."""
     with refuse_unwritable(folder):
         folder.mkdir(parents=True, exist_ok=True)
         if any(folder.iterdir()):

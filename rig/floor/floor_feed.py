@@ -36,6 +36,7 @@ def looking(address: HistoryAddress) -> Iterator[Sections]:
 
 
 def _watch_history(address: HistoryAddress, feed: Sections, over: threading.Event) -> None:
+    """Feed the page from the history; after an error show it and try again."""
     while not over.is_set():
         try:
             with open_history(address) as history:
@@ -48,6 +49,7 @@ def _watch_history(address: HistoryAddress, feed: Sections, over: threading.Even
 
 
 def _follow(history: History, feed: Sections, over: threading.Event) -> None:
+    """Feed the page from an open history: the stations at every look, past results after new entries."""
     before: object = None
     while not over.is_set():
         today = datetime.now(UTC).date()

@@ -327,6 +327,7 @@ def chosen(question: Select[*tuple[Any, ...]], selection: Selection) -> Select[*
 
 
 def _parameters(connection: Connection, numbers: Sequence[int]) -> dict[int, dict[str, Parameter]]:
+    """Return the parameters of calibrations, by calibration number, in the order of display."""
     columns, by_number = schema.parameter.c, dict[int, dict[str, Parameter]]()
     for start in range(0, len(numbers), _MANY):
         batch = numbers[start : start + _MANY]

@@ -221,8 +221,7 @@ def flange_axes(q_rad: ArrayLike, arm: DenavitHartenberg = NOMINAL) -> Array:
 def flange_arm(q_rad: ArrayLike, joint: int, arm: DenavitHartenberg = NOMINAL) -> Array:
     """Return the lever arm (…, 3), m, from a joint's axis to the flange's origin, in the flange's frame.
 
-    The joint angles are `q_rad` (…, n). The lever arm begins at the joint's origin; its part along the axis is
-    arbitrary.
+    The joint angles are `q_rad` (…, n). It begins at the joint's origin; its part along the axis is arbitrary.
     """
     frames = _frames(q_rad, arm)
     to_flange = np.swapaxes(frames[-1][..., :3, :3], -1, -2)

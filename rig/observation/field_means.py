@@ -104,6 +104,7 @@ def _is_at_home(recording: ObservedRun, rest: Window, home_q_rad: Sequence[float
 
 
 def _mean(run: RunData, name: str, samples: NDArray[Any], where: str, thresholds: ObservationThresholds) -> Mean:
+    """Return the mean field of samples in a dwell. Raise Fault `lost_samples` or `saturation`."""
     check_complete(run.sensors[name], samples, where, thresholds)
     channel = run.sensors[name].channel(FIELD)
     if channel.is_saturated(samples).any():

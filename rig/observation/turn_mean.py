@@ -141,8 +141,7 @@ def _fit_residuals(columns: Array, values: Array) -> Array:
 def _find_turn_lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines:
     """Find the vibrations in readings (n, 3) apart from steady columns (n, k) and the rates that the encoders measure.
 
-    Fast spectral lines of the arm's rate appear in the readings at the same frequency. The residuals show the other
-    lines.
+    Fast spectral lines of the arm's rate appear in the readings at their frequency. The residuals show the others.
     """
     uneven = turn.uneven_rad_s[:, None]
     none = uneven[:, :0]

@@ -106,6 +106,7 @@ def _dwell_rows(dwells: Attempts[QuantityInDwell, ReadAtRest]) -> list[Row]:
 
 
 def _parameters_so_far(name: str, partial: PartialGyroscope) -> Row:
+    """Return the row of a partial result: the solution with U, or else the bias at rest with what is missing."""
     if (solution := partial.solution) is not None:
         u = (COVERAGE_FACTOR * np.sqrt(np.diag(solution.covariance))).tolist()
         bias, scale = AxisValues(solution.bias_rad_s.tolist(), u[3:]), AxisValues(solution.scale.tolist(), u[:3])

@@ -194,6 +194,7 @@ class _TurnerSearch:
     per_repeat: Collection[str] = PER_REPEAT
 
     def candidates(self) -> Sequence[Candidate]:
+        """Return all possible runs: each motion with coarse choices of repeats and waits, and its duration."""
         candidates = []
         least_s = dict.fromkeys(self.waits, RESTS_S[0])
         for family, turned, keys in self.motions(self.config):

@@ -1,7 +1,4 @@
-"""The truth of a simulated laboratory next to the result: (result − truth)/U.
-
-It is for people only: no estimator imports this module.
-"""
+"""The truth of a simulated laboratory next to the result: (result − truth)/U. For people, not for estimators."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -85,6 +82,7 @@ def truth_rows(folder: Path, result: ResultDocument) -> list[TruthRow]:
 
 
 def _rows(truth: _TruthFile, result: ResultDocument) -> Iterator[TruthRow]:
+    """Yield the displayed rows whose true values a simulated laboratory has written."""
     true_values: Mapping[str, Mapping[str, TrueGyroscope | TrueAccelerometer]] = {
         RATE.name: truth.gyroscopes,
         ACCELERATION.name: truth.accelerometers,

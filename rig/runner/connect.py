@@ -163,6 +163,7 @@ class Connector:
     def _connect_turner(
         self, kind: AnyTurner, stack: ExitStack, acquisition: Acquisition
     ) -> tuple[Turner, Report, TurnerIdentity]:
+        """Connect the turner for the run; return it with its report and its identity. Nothing moves."""
         section = self.loaded.config.turner
         log = self.path.with_name(ARM_LOG)
         refuse_links(log)
@@ -198,6 +199,7 @@ class Connector:
     def _record(
         self, stack: ExitStack, made_with: Provenance, turner: RecordedTurner, described: Mapping[str, RecordedSensor]
     ) -> Recording:
+        """Start the recording. Raise Refused if a device differs from those of earlier recordings."""
         self.resumed.refuse_other_instruments(made_with, described)
         with refusing():
             recorder = RunRecorder(

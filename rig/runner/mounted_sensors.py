@@ -47,8 +47,7 @@ class Memory:
 class MountedSensor:
     """A sensor of this run: its name, its part, and its board (None: a port of its own).
 
-    `last`: the last calibration of its serial number; `other_board`: the last one on a board, if that was another
-    board.
+    `last`: the last calibration of its serial number; `other_board`: the last one on a board, if on another.
     """
 
     name: str

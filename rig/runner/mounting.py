@@ -46,10 +46,7 @@ class GyroscopeReadings:
 
 
 def refuse_unsteady(readings: GyroscopeReadings, turner: str) -> None:
-    """Raise Refused `item_not_at_rest` if a gyroscope's readings change by more than noise.
-
-    `turner` is the operator's name for the turner.
-    """
+    """Raise Refused `item_not_at_rest`, naming the `turner`, if a gyroscope's readings change by more than noise."""
     rates = readings.rates_rad_s
     means = np.array([part.mean(axis=0) for part in np.array_split(rates, PARTS)])
     noise = np.diff(rates, axis=0).std(axis=0) / np.sqrt(2 * len(rates) / PARTS)

@@ -169,6 +169,7 @@ class Run:
         return replace(settings, procedure=phase.procedure.name, then_verify=then)
 
     def _judge(self, phase: Phase, runs: tuple[RunData, ...], before: Outcome | None) -> Outcome:
+        """Return the outcome of a phase, and send its observations to the station."""
         with self.report_end(self._advice_to_repeat, moved=True):
             outcome = phase.procedure.analyse(runs, before, phase.procedure.estimator)
             if runs and phase.procedure.calibrates_along:

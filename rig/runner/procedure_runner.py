@@ -221,10 +221,7 @@ class Rig:
             self._resting_rad_s[readings.name] = readings.rates_rad_s.mean(axis=0)
 
     def _collect_readings(self, lasting_s: float, watch: Callable[[], None]) -> list[GyroscopeReadings]:
-        """Return the gyroscopes' readings since the latest `keep`, once they span `lasting_s` on each clock.
-
-        Raise Fault `no_samples`.
-        """
+        """Return the gyroscopes' readings since `keep` once they span `lasting_s`. Raise Fault `no_samples`."""
         acquisition = self.devices.acquisition
         sensors = {name: sensor for name, sensor in self.recording.sensors.items() if sensor.measures(RATE)}
 

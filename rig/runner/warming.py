@@ -157,6 +157,7 @@ class Warming:
         return max(now_c.values()) if self.course.warming is False else min(now_c.values())
 
     def _refuse_hot(self, now_c: Mapping[str, float]) -> None:
+        """Raise Fault `overheated` if a sensor or the heater is above its limit."""
         hottest = max(now_c, key=lambda name: now_c[name])
         too_hot = self.heater is not None and self.heater.heating is not None and self.heater.heating.cause == "too_hot"
         if now_c[hottest] > self.section.max_temperature_c or too_hot:

@@ -127,6 +127,7 @@ class OwnPort:
         self._port.close()
 
     def _run(self) -> None:
+        """Read the port until it is closed; keep the first error as the fault."""
         try:
             while not self._closing.is_set():
                 self._take(self._port.read(), time.monotonic())

@@ -57,6 +57,7 @@ def extreme(settings: Settings) -> StudyReport:
 
 
 def _study(population: sim.Population, settings: Settings) -> StudyReport:
+    """Return the report of a study of all conditions for one population of gyroscopes."""
     task = partial(_simulate_gyroscope, population, settings.runs or sim.RUNS)
     errors = np.concatenate(run_parallel(task, range(sim.SETS), settings), axis=1)  # (conditions, all runs, 6)
     rows = [
@@ -122,6 +123,7 @@ def _summarise(errors: Array) -> dict[str, float]:
 
 
 def _findings(rows: list[dict[str, Any]]) -> tuple[StudyFinding, ...]:
+    """Return the width of each error band, and how far the two estimators differ."""
     findings = []
     for condition in _list_conditions():
         if condition.estimator != "algorithm_1":
@@ -148,6 +150,7 @@ def _findings(rows: list[dict[str, Any]]) -> tuple[StudyFinding, ...]:
 
 
 def _select(rows: list[dict[str, Any]], condition: _Condition) -> list[dict[str, Any]]:
+    """Return the rows of one condition."""
     return [
         row
         for row in rows

@@ -48,8 +48,7 @@ class Effects:
     - `walk_rad_s_sqrt_s`: bias random walk; `offset_m`: the sensor's offset from the flange's centre, by axis.
     - `nonlinearity`: as a fraction of full scale; `warming_k`: change of temperature, which affects bias and scale.
 
-    The noise is an LSM9DS1's from its data sheet, 0.01 °/s/√Hz, the nonlinearity an MPU-9250's (PS-MPU-9250A-01, table
-    1).
+    The noise is an LSM9DS1's from its data sheet, 0.01 °/s/√Hz, the nonlinearity an MPU-9250's (PS-MPU-9250A-01).
     """
 
     speed_rad_s: float = np.pi / 3

@@ -92,6 +92,7 @@ def _simulate_drift(seed: int) -> list[dict[str, Any]]:
 
 
 def _draw(rows: list[dict[str, Any]], drift: list[dict[str, Any]], figure: "Figure") -> None:
+    """Draw the errors of the Earth's rate and bias at both noise levels, and the bias by repeat."""
     first, second = figure.subplots(1, 2)
     chosen = [row for row in rows if row["unit"] == "deg/h"]
     names = list(dict.fromkeys(row["parameter"] for row in chosen))

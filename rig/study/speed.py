@@ -78,6 +78,7 @@ def _findings(rows: list[dict[str, Any]]) -> tuple[StudyFinding, ...]:
 
 
 def _draw(rows: list[dict[str, Any]], figure: "Figure") -> None:
+    """Draw the errors over the speed, for one revolution and for a fixed number of samples."""
     panels = figure.subplots(1, 2, sharey=True)
     styles = {"whole_turn": "-", "fixed_samples": "--"}
     series = {"scale_mse": ("scale factors (1)", "tab:blue"), "bias_mse_rad2_s2": ("biases (rad²/s²)", "tab:orange")}

@@ -128,6 +128,7 @@ class ControlSession:
         }
 
     def _motion_orders(self) -> dict[str, Callable[..., Reply | None]]:
+        """Return the orders that the laboratory's turner obeys."""
         match self._world.laboratory.motion_source:
             case OnArm():
                 return {

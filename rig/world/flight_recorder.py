@@ -76,6 +76,7 @@ class FlightRecorder:
         )
 
     def _write(self, text: str, *, stacks: bool) -> None:
+        """Append a dated line, and on request all threads' stacks; stop after `RECORDS` records."""
         with self._writing, suppress(OSError):
             if self._records >= RECORDS:
                 return

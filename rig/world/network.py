@@ -98,10 +98,7 @@ class ClientConnection:
         self.due = (b"" if self.listener.silent else self.due) + self.session.tick()
 
     def deliver(self, idle: bool, patient: bool) -> float:
-        """Send the bytes of past ticks.
-
-        Return the time to wait, s, if a client lags too far behind and `patient` is set.
-        """
+        """Send the bytes of past ticks. Return the time to wait, s, if a client lags too far and `patient` is set."""
         if self.listener.silent:
             return 0.0
         if self.listener.gathers and not idle and time.monotonic() - self._delivered_s < GATHER_S:
@@ -218,6 +215,7 @@ class PortListener:
         self._socket = listening
 
     def _accept(self, events: int) -> None:
+        """Accept a client, or hang up on it if the limit is reached."""
         if self._socket is None:  # closed while this event was waiting
             return
         try:

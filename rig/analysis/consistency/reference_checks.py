@@ -146,10 +146,7 @@ class WhitenedReference:
 
 
 def check_reference(readings: ReferenceModel, false_alarm_probability: float, *, drifting: bool = False) -> TestResults:
-    """Return every statistic with its critical value, each with the given false-alarm probability.
-
-    If `drifting`, the bias may change steadily.
-    """
+    """Return every statistic with its critical value; if `drifting`, the bias may change steadily."""
     whitened, columns_by_name = _whiten_readings(readings, drifting=drifting), alternatives(readings)
     segments = range(readings.dwells + readings.sweeps)
     ranked = find_outliers(

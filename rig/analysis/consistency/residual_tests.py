@@ -42,8 +42,7 @@ class FaultMode(Generic[Subject]):
 class TestResults:
     """The statistics of one sensor by the name of their check, each with its critical value.
 
-    - `worst`: that of the sweep or dwell that differs most from the others; `disturbed`: those beyond their critical
-      value, by index.
+    - `worst`: that of the segment that differs most from the others; `disturbed`: those of all outliers, by index.
     - `detection_limits`: the minimal detectable size of fault modes, by name, if known.
     """
 

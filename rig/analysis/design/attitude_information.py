@@ -99,6 +99,7 @@ def _attitudes(poses_rad: Sequence[Joints]) -> Array:
 
 
 def _check_identifiability(identifiability: Identifiability, count: int) -> None:
+    """Raise Refused `rank_deficient` or `ill_conditioned` if the attitudes do not determine an accelerometer."""
     remedy = "Add attitudes to procedure.attitudes in which wrist 1 and wrist 3 are turned, or take eighteen"
     if identifiability.undetermined:
         raise Refused(

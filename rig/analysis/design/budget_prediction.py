@@ -167,6 +167,7 @@ def _average(timed: Timed[Step], run: PlannedRun, sensor: SensorSection) -> Aver
 
 
 def _plan_observation(timed: Timed[Sweep], run: PlannedRun, sensor: SensorSection, speed_std: float) -> Observation:
+    """Return the observation that a planned sweep would give, without noise; `speed_std` is relative."""
     sweep, turn = timed.step, predict_revolution(timed, run.arm, np.array(run.settings.mount))
     axis, sign = nearest_axis(mounting_matrix(sensor.mounting) @ turn.axis_flange)
     return Observation(

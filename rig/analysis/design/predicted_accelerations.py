@@ -25,10 +25,7 @@ from rig.motion.steps import Plan
 
 
 def predict_accelerometer_budgets(config: RigConfig, plan: Plan, arm: DenavitHartenberg) -> dict[str, Budget]:
-    """Return the predicted budget of each accelerometer to calibrate on an `arm`.
-
-    Raise LinAlgError if the plan determines too little.
-    """
+    """Return the predicted budget of each accelerometer on an `arm`. Raise LinAlgError for an insufficient plan."""
     if config.procedure.accelerometer_order == 0:
         return {}
     return {
@@ -38,6 +35,7 @@ def predict_accelerometer_budgets(config: RigConfig, plan: Plan, arm: DenavitHar
 
 
 def _budget(accelerometer: PlannedAccelerometer) -> Budget:
+    """Return the budget of scale and bias from the Cramér–Rao bound of the planned dwells and sweeps."""
     model, run = predict_readings(accelerometer), accelerometer.run
     delta_rad = float(np.radians(run.uncertainty.axis_deg) / np.sqrt(3))
     movement = replace(model.movement, own_share=_new_fraction(run.uncertainty))

@@ -131,6 +131,7 @@ def find_method(name: str | None) -> Chosen | None:
 
 
 def _solve_rows(equations: Equations, method: Method, *, any_mounting: bool) -> InAttitudes:
+    """Return a gyroscope's calibration from the mean rates in all attitudes, with the other methods' solutions."""
     solution = equations.solve(method)
     if not any_mounting:
         check_mounted(solution.matrix)

@@ -32,7 +32,7 @@ def check_sweeps_steady(data: ExternalData) -> None:
 def estimate_changes(data: ExternalData, matrix: Array) -> Array:
     """Return the covariance (12, 12) that changes over the rows add to F `matrix` (3, 3), row by row, and bias.
 
-    The covariance includes an abrupt change, and changes of the bias from rest to rest; it is zero if the rows show no
+    The covariance includes an abrupt change, and changes of the bias from rest to rest; zero if the rows show no
     change.
     """
     change = data.change

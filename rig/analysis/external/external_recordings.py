@@ -142,6 +142,7 @@ def _solve_turns(read: ReadElsewhere, samples: Samples, name: str | None) -> OfS
 
 
 def _solve_sweeps(read: ReadElsewhere, samples: Samples, name: str | None, reference_c: float | None) -> OfSensor:
+    """Solve a file's sweeps and rests, corrected to `reference_c` if given; estimator `name` (None: automatic)."""
     chosen = None if name is None else choose_estimator(BY_SWEEPS, name)
     data, polynomials = average_sweeps(samples, read.motion), None
     if reference_c is not None and data.turned is not None:
@@ -238,6 +239,7 @@ def _vector(data: ExternalData) -> VectorSolution:
 
 
 def _solve_attitudes(read: ReadElsewhere, samples: Samples, settings: RunSettings, name: str | None) -> OfSensor:
+    """Solve all quantities of readings in known attitudes by the method `name` (None: one for each quantity)."""
     method, site, options = find_method(name), settings.site, settings.elsewhere
     assert options is not None, "of readings of others"
     placed = average_placements(samples, read.motion, find_clock=options.find_clock)

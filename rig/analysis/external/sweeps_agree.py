@@ -159,8 +159,7 @@ def _derivatives(design: Array, means: Array, variances: Array) -> Array:
 def _contradictions(stated: StatedMotion, sizes: MotionErrors, design: Array) -> Array:
     """Return the contradiction (N, 3) of each sweep with the others, beyond errors of the given sizes.
 
-    One wrong row among many hardly increases the sizes. With only two sweeps about an axis, only the sizes show a wrong
-    row.
+    One wrong row among many hardly increases the sizes. With only two sweeps about an axis, only the sizes show it.
     """
     rate_variance, axis_variance = sizes.median_variances
     spread = rate_variance * stated.rate_patterns**2 + axis_variance * np.sum(stated.axis_patterns**2, axis=0)

@@ -158,6 +158,7 @@ def _solve_sensor(
     *,
     whole_matrix: bool,
 ) -> SensorResult:
+    """Return a gyroscope's calibration by the estimator; the other estimators' results or Faults are added."""
     parts = [recording.sensors[name] for recording in recordings]
     observations = tuple(observation for part in parts for observation in part.revolutions)
     rests = tuple(rest for part in parts for rest in part.rests)

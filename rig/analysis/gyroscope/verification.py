@@ -118,6 +118,7 @@ def _find_reference_error(recordings: Sequence[ObservedRun], reference: Referenc
 
 
 def _check_recorded(run: RunData, sensor: str, mode: str) -> None:
+    """Raise Fault `sensor_missing` or `wrong_mode` unless the run has the sensor's readings in this mode."""
     if sensor not in run.sensors:
         raise Fault(
             "sensor_missing", f"the recording contains nothing of {sensor}", "Name it under sensors and run again"

@@ -43,10 +43,7 @@ NOT_IDENTIFIABLE = "Set procedure.second_order: false, which makes the bias much
 
 @dataclass(frozen=True, slots=True)
 class HeldOut:
-    """The last repeat of the attitudes, which the calibration does not use.
-
-    `error_m_s2` (N,): norm of each calibrated acceleration minus gravity.
-    """
+    """The unused last repeat of the attitudes; `error_m_s2` (N,): norm of each calibrated acceleration less gravity."""
 
     dwells: tuple[DwellReading, ...]
     error_m_s2: Array
@@ -133,6 +130,7 @@ def calibrate_accelerometers(
 def _calibrate(
     name: str, recordings: Sequence[ObservedRun], settings: RunSettings, site: Site, gyroscope: SensorResult | None
 ) -> AccelerometerResult:
+    """Calibrate one accelerometer from its dwells and sweeps by maximum likelihood, and compare other methods."""
     sensor = recordings[0].run.sensors[name]
     dwells = tuple(dwell for recording in recordings for dwell in recording.sensors[name].dwells)
     used, left_out = _split_dwells(dwells, _select_planned(dwells, settings))

@@ -27,8 +27,7 @@ class Posture:
 class StatedArm:
     """The stated kinematics, the half-width of its angles, and the sensor's nominal mounting (3, 3).
 
-    `estimated_rad`: standard deviation of the wrists' errors as estimated from the readings, which may exceed the
-    stated one.
+    `estimated_rad`: standard deviation of the wrists' errors, from the readings; it may exceed the stated one.
     """
 
     arm: DenavitHartenberg

@@ -35,8 +35,8 @@ class MagnetometerResult:
     """One magnetometer's calibration m = F B + b, in the axes of its nominal mounting.
 
     - `field_t`: the size of the field; `extension_m` (3,): the sensor's position on the flange.
-    - `triad`: scale, relative to `field_t`, and axes, with the solution's uncertainty; `budget`: the uncertainty from
-      all causes.
+    - `triad`: scale, relative to `field_t`, and axes, with the solution's uncertainty; `budget`: uncertainty of all
+      causes.
     - `uniformity`: the test of the field over the attitudes; `drift`: between tests at home, None with fewer than two.
     - `measurements`: the means from which the solution is estimated, in tesla.
     - `other_methods`: the solutions by the other methods, or the Fault of a method that fails.
@@ -80,6 +80,7 @@ def _calibrate(
     settings: RunSettings,
     accelerometers: Mapping[str, AccelerometerResult],
 ) -> MagnetometerResult:
+    """Calibrate one magnetometer from its dwells. Raise the Faults of `calibrate_magnetometers`."""
     site = settings.site
     if not settings.planned_dwells:
         raise Fault(

@@ -48,6 +48,7 @@ def run(options: Namespace) -> int:
 
 
 def _store(options: Namespace) -> int:
+    """Write a passed run's calibration into the autopilot, and keep its old parameters in a file."""
     from rig.data.result_file import read_passed_result
     from rig.sensors.mavlink.parameter_encoding import AutopilotParameter, encode_value
     from rig.sensors.mavlink.parameter_journal import ParameterChange
@@ -81,6 +82,7 @@ def _store(options: Namespace) -> int:
 
 
 def _restore(options: Namespace) -> int:
+    """Write the old (or with `--new` the new) parameters of a kept file into the same autopilot."""
     from rig.sensors.mavlink.parameter_journal import read_change
     from rig.sensors.mavlink.writing import autopilot_id
     from rig.station.confirm import require_agreement

@@ -58,6 +58,7 @@ def run(options: Namespace) -> int:
 
 
 def _read_answers(options: Namespace) -> "Answers":
+    """Return the answers from options, or else from questions at the terminal."""
     from rig.config.first_configuration import Answers
     from rig.config.sensors.sensor_catalogue import PARTS
     from rig.config.sensors.sensor_sections import check_serial_number
@@ -79,6 +80,7 @@ def _read_answers(options: Namespace) -> "Answers":
 
 
 def _turner_answers(turner: "Turner", options: Namespace) -> dict[str, Any]:
+    """Return the turner's address and model from options or questions; empty for a hand."""
     from rig.config.models import ArmSection
     from rig.config.procedures.servo_section import ServoSection
     from rig.config.section import check_host

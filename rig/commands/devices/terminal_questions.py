@@ -35,10 +35,7 @@ def ask(
 def ask_choice(
     question: str, option: str, choices: Mapping[KeyT, str], value: str | None = None, usual: KeyT | None = None
 ) -> KeyT:
-    """Return the key of a choice; the user types it or its number; Enter selects `usual`, or the first.
-
-    Raise as `ask` does.
-    """
+    """Return the key of a choice, typed by name or number; Enter selects `usual`, or the first. Raise as `ask` does."""
     keys = [*choices]
 
     def key_of(text: str) -> str:

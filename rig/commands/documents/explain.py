@@ -52,6 +52,7 @@ def _explain_check(name: str) -> Iterator[str]:
 
 
 def _explain_limit(name: str) -> Iterator[str]:
+    """Yield the meaning and unit of a limit of the configuration; nothing for another name."""
     from rig.config.judging.verdict_limits import LIMITS, Limits
 
     key = name.removeprefix("limits.")

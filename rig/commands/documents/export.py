@@ -100,8 +100,7 @@ def _read_recordings(run: Path, columns: Path | None) -> "Sequence[RunData]":
 def _make_folder(folder: Path, *, named_by_user: bool) -> None:
     """Make the folder unless a link leads out of it.
 
-    Raise Refused and OSError. Links among its contents are refused. The folder itself may be a link if the user named
-    it.
+    Raise OSError, and Refused for a link in it. The folder itself may be a link if the user named it.
     """
     from rig.data.run_folder import refuse_links
 
@@ -111,6 +110,7 @@ def _make_folder(folder: Path, *, named_by_user: bool) -> None:
 
 
 def _read_calibrations(run: Path, moved: tuple[str, str] | None) -> "ExportedCalibrations":
+    """Return the calibrations of a passed run, moved to another temperature by the slopes of a drift run if given."""
     from rig.data.result_file import read_passed_result, read_result
     from rig.report.exports.exported_corrections import calibrations
     from rig.report.exports.temperature import move_to_temperature

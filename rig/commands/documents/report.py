@@ -87,6 +87,7 @@ def write_documents(options: Namespace) -> tuple[list[Path], list[Refused]]:
 
 
 def _write_signed(options: Namespace, by: "Signatory | None") -> tuple[list[Path], list[Refused]]:
+    """Write the certificate in every requested form and enter it in the history; return files and failures."""
     from rig.commands.history.remember import find_journal_end, remember_certificate
     from rig.data.entries.magnetometer import read_reversal
     from rig.data.result_file import read_result

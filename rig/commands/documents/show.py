@@ -22,10 +22,7 @@ def add(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Print a finished run as it was judged, without solving or writing anything.
-
-    Return 0, whatever the verdict. Raise Refused `no_result`, `not_a_result`, `no_such_sensor`.
-    """
+    """Print a finished run as judged; return 0. Raise Refused `no_result`, `not_a_result`, `no_such_sensor`."""
     from rich.console import Console
 
     from rig.data.result_file import read_result

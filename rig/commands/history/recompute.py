@@ -70,6 +70,7 @@ def recompute_history(options: Namespace, solve: Solve = solve_task) -> int:
 
 
 def _question(options: Namespace) -> RecomputeQuestion:
+    """Return the question of the options. Raise Refused for an unusable option."""
     from rig.analysis.estimator_names import find_estimator
 
     if options.jobs < 1:
@@ -112,6 +113,7 @@ def _solve_all(
 
 @contextmanager
 def _solve_by_workers(tasks: Sequence[Task], options: Namespace, solve: Solve) -> Iterator[Iterable[SolvedTask]]:
+    """Yield the answers of this process, of several processes or of a Dask cluster, as the options request."""
     with ExitStack() as stack:
         if not tasks:
             yield ()

@@ -55,6 +55,7 @@ def _find_folder(task: Task) -> Path | Unsolved:
 
 
 def _find_damage(file: Path, entered: EnteredRecording) -> Unsolved | None:
+    """Return why a recording is missing, unreadable or not as entered; None if it is as entered."""
     try:
         recording = recording_of(file)
     except (FileNotFoundError, NotADirectoryError):
@@ -67,6 +68,7 @@ def _find_damage(file: Path, entered: EnteredRecording) -> Unsolved | None:
 
 
 def _solve(folder: Path, task: Task) -> Answer:
+    """Return the result of the recordings in a folder under today's program, or the reason for its absence."""
     from rig.plans.recorded_run import describe_omission, judge_phases, open_run
     from rig.report.document import document_of
     from rig.report.kinds.kind_registry import history_records

@@ -168,6 +168,7 @@ def _certify(address: "HistoryAddress", content_sha256: str, certificate: "Issue
 
 
 def _read_journal_end(address: "HistoryAddress") -> tuple[int, str] | None:
+    """Return number and SHA-256 of the journal's last entry; None without a history or an entry."""
     from rig.history.storage.continuity import is_there
     from rig.history.store import open_history
 

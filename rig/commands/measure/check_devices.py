@@ -133,10 +133,7 @@ def _check_turner(configured: "Configured", tell: Tell) -> list[Problem]:
 
 
 def _find_other_claims(host: str) -> list[Problem]:
-    """Return a problem if another rig has claimed the arm.
-
-    No claim is kept, because a check of the arm disturbs no other rig.
-    """
+    """Return a problem if another rig has claimed the arm. No claim is kept, as a check disturbs no other rig."""
     from rig.commands.laboratory.claims import claim_arm
 
     if not host:

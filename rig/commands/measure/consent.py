@@ -18,10 +18,7 @@ CONFIG_MAX_BYTES = 10_000_000
 
 
 def refuse_foreign_addresses(folder: Path, loaded: Loaded, agreed: Sequence[str] = ()) -> None:
-    """Refuse addresses not in `agreed`, unless this user has run the folder's configuration on this computer.
-
-    Raise Refused `foreign_folder`.
-    """
+    """Raise Refused `foreign_folder` for addresses not in `agreed`, unless this user has run the configuration here."""
     if is_own(_sha256(folder / CONFIG)):
         return
     addresses = [(what, where) for what, where in _list_addresses(loaded) if where not in agreed]

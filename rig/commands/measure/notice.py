@@ -45,6 +45,7 @@ def notify_after(command: str | None, folder: Path, work: Callable[[], int]) -> 
 
 
 def _notify(command: str, folder: Path, status: int) -> None:
+    """Run the user's command with the run's folder and exit status in its environment; report a failure."""
     environment = {**os.environ, "RIG_RUN": str(folder.resolve()), "RIG_STATUS": str(status)}
     try:
         # Its output is not a result, so it goes to stderr like the run's progress.

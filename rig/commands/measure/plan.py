@@ -63,10 +63,7 @@ def _print_by_hand(section: "ByHandSection", *, as_json: bool) -> None:
 
 
 def make_plan(options: Namespace) -> "DryRun":
-    """Plan the motion from the home pose.
-
-    Raise Refused if a motion breaks a limit, or if the attitudes do not determine the parameters.
-    """
+    """Plan the motion from home. Raise Refused for a motion beyond a limit or attitudes that determine too little."""
     from rig.commands.configured import load_configured
     from rig.errors import refuse
     from rig.report.terminal.plan_table import DryRun

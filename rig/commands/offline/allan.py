@@ -45,6 +45,7 @@ def run(options: Namespace) -> int:
 
 
 def _analyse_logs(paths: Sequence[Path], columns: Path | None) -> "dict[str, SensorAtRest]":
+    """Return the noise of each log at rest, by the name of its file."""
     from rig.analysis.rest_noise import log_at_rest
     from rig.observation.external.csv_samples import read_sample_table, samples_in
     from rig.observation.formats.column_selection import map_samples
@@ -60,6 +61,7 @@ def _analyse_logs(paths: Sequence[Path], columns: Path | None) -> "dict[str, Sen
 
 
 def _analyse_run(path: Path) -> "dict[str, SensorAtRest]":
+    """Return the noise of every gyroscope at rest in a run. Raise Refused `no_raw_readings`."""
     from rig.analysis.rest_noise import log_at_rest, rest_noises
     from rig.observation.external.csv_samples import samples_in
     from rig.plans.recorded_run import open_run

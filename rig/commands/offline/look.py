@@ -61,10 +61,7 @@ def run(options: Namespace) -> int:
 def _print(
     looks: "Sequence[LookedFile]", columns: dict[str, Any], stated: "ColumnMap | None", named: Path | None
 ) -> None:
-    """Print the files and the commands that can use them.
-
-    Enter into `columns` the convention that the gyroscope shows.
-    """
+    """Print the files and the commands that can use them. Enter the gyroscope's convention into `columns`."""
     from rig.analysis.log_contents import count_from
     from rig.report.terminal.look_lines import describe_convention, describe_file, describe_solutions
 

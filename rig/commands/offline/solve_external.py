@@ -158,6 +158,7 @@ def run(options: Namespace) -> int:
 
 
 def _build_recording(options: Namespace) -> "RunData":
+    """Return the recording of the options' files. Raise Refused `bad_option` for an impossible value."""
     from rig.data.recording.motion_file import Item
     from rig.data.recording.settings import Elsewhere, Site
     from rig.data.validation import validate

@@ -44,10 +44,7 @@ from rig.turners.turner_registry import kind_of
 
 @dataclass(slots=True)
 class PartListener:
-    """A listener of one run.
-
-    It notes the connected board, whether anything was recorded, and whether refused sweeps can be repeated.
-    """
+    """A listener of one run: notes the board, whether anything was recorded, whether refused sweeps can be repeated."""
 
     chip: Chip | None = None
     recorded: bool = False

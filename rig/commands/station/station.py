@@ -79,6 +79,7 @@ def run(options: Namespace) -> int:
 
 
 def _carry_out_batch(options: Namespace, configured: "Configured", operator: "Operator", present: "Present") -> int:
+    """Run all parts of a new or continued batch; return 0 if every part passed in the end, else 1."""
     from rig.batch.batch_journal import open_journal
     from rig.batch.batch_state import Begun
     from rig.batch.batch_table import CSV, summary

@@ -99,6 +99,7 @@ def _describe_replay(folder: Path, runs: "list[RunData]") -> "About":
 
 
 def _replay(recorded: "Iterator[Moment]", feed: "Feed", speed: float) -> None:
+    """Pass the events on at their recorded times, `speed` times as fast."""
     from rig.page.rows import Look
 
     began_s = time.monotonic()

@@ -118,6 +118,7 @@ class _Loader(yaml.SafeLoader):
         self._size_of: dict[str, int] = {}  # number of nodes that an alias stands for, once all of them are known
 
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        """Compose a node within the limits of depth and size; refuse tags and values that contain themselves."""
         event: Any = self.peek_event()
         if isinstance(event, yaml.AliasEvent):
             anchor = str(event.anchor)

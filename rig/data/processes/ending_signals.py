@@ -41,8 +41,7 @@ class Interrupts:
     """The signal handler that raises KeyboardInterrupt in the main thread, except while that thread takes a lock.
 
     An exception while `threading` takes or releases a lock would leave it taken, and stopping the arm needs the same
-    locks. After the exception, an interrupted wait takes its lock again, so a second exception must not follow too
-    soon.
+    locks. After the exception, an interrupted wait takes its lock again, so a second exception must not follow soon.
     """
 
     def __init__(self) -> None:

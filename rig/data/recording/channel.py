@@ -57,8 +57,7 @@ class Channel:
     def steps(self, readings: Array, *, trusts_counts: bool = False) -> Steps:
         """Return the resolution steps of readings (n, 3): as stated, or larger if the readings show larger steps.
 
-        `trusts_counts`: whether the recorded numbers are the converter's counts, so readings are not searched for
-        steps.
+        `trusts_counts`: whether the numbers are the converter's counts, so readings are not searched for steps.
         """
         if self.step is not None:
             return cut_steps(readings, self.step / 2)

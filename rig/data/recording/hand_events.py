@@ -61,10 +61,7 @@ class HandRestRefused:
 
 @dataclass(frozen=True, slots=True)
 class HandBegunAnew:
-    """A restart of the session: everything before `begin_us` is discarded.
-
-    `again` names the error that caused it, such as a table that moved.
-    """
+    """A restart that discards everything before `begin_us`; `again` names its cause, such as a table that moved."""
 
     begin_us: Microseconds
     again: Reason

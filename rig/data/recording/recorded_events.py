@@ -162,6 +162,7 @@ def decode_events(stream: bytes) -> Iterator[TimedEvent]:
 
 
 def _decode_document(document: Any) -> TimedEvent:
+    """Return the event of a line's JSON. Raise ValueError for one that this program does not write."""
     if not isinstance(document, dict) or not isinstance(document.get("detail"), dict):
         raise ValueError("it has no name and no details")
     name, detail = document.get("name"), document["detail"]

@@ -31,8 +31,7 @@ AS_THE_FLANGE: Mounting = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 class RecordedSensor:
     """A sensor and its `channels`, in the order of their columns in its samples.
 
-    - `mounting` (3 rows of 3): nominal rotation from the flange frame to the sensor's, by default for a sensor without
-      axes.
+    - `mounting` (3 rows of 3): nominal rotation from flange to sensor frame, by default for a sensor without axes.
     - `mode`: "calibrated" if the rates were corrected before they were recorded.
     - `clock`: the sensor whose clock stamps the samples, itself or its device; None for the board.
     - `stamp_std_s`: standard uncertainty of a time stamp, None if negligible.

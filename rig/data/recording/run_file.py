@@ -144,6 +144,7 @@ class RunRecorder:
         self._file.close()
 
     def _flush(self) -> None:
+        """Write the pending samples, states and events to the file."""
         with self._lock:
             pending = self._pending
             self._pending = _Pending({name: [] for name in pending.samples}, [], [])

@@ -32,6 +32,7 @@ def _limits(stored_bytes: int, time_s: float) -> ReadingLimits:
 
 
 def _measure_stored_bytes(path: Path) -> int:
+    """Return the size of the data in a run file. Raise Refused `no_run_file`."""
     try:
         with open_regular_file(path, RECORDING_MAX_BYTES) as file:
             return size_without_holes(file)

@@ -162,6 +162,7 @@ def _minimum_chi_square(rows: Sequence[Factor]) -> float:
 
 
 def describe_fault(fit: GraphFit, hypothesis: FaultHypothesis) -> Fault:
+    """Return the Fault that explains a fault hypothesis to the operator, with its time."""
     rests, moves = fit.session.rests, fit.session.moves
     at_s = rests[hypothesis.index].start_s
     if hypothesis.name == "turn_not_closed":

@@ -27,7 +27,7 @@ WORTH_FITTING = 1.0  # least ln of the Bayes factor with the sizes of the model 
 class AbruptChange:
     """A change of `what` at the time `from_s`; "attitude" is a rotation of the reference's own coordinates.
 
-    - `sizes` (3,): the change of each axis, in the unit of the readings, relative to the scale factor, or rad; zero if
+    - `sizes` (3,): the change of each axis, in the readings' unit, relative to the scale factor, or rad; zero if
       unknown.
     - `evidence`: ln of the Bayes factor minus ln of the number of possible changes (Bonferroni's correction).
     """
@@ -54,8 +54,7 @@ class AbruptChange:
 class PossibleChanges:
     """A change of `what`, by one standard deviation `size` of each axis: `of_axes` (n, 3, 3) are its effects on n rows.
 
-    `possible` (n, 3): whether the axis may have changed just before the row. `lasts`: whether it affects later rows
-    too.
+    `possible` (n, 3): whether the axis may have changed just before the row. `lasts`: whether it affects later rows.
     """
 
     what: Changing

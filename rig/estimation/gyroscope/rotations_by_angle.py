@@ -293,10 +293,7 @@ def _check_closed(turns: Sequence[Turn], equations: Sequence[_NormalEquations], 
 
 
 def _budget(equations: Sequence[_NormalEquations], gain: Array) -> Budget:
-    """Return each cause's contribution to scale and bias.
-
-    `gain` (6, 12) maps the gradient of the least squares to scale and bias.
-    """
+    """Return each cause's contribution; `gain` (6, 12) maps the least squares' gradient to scale and bias."""
     sources = {
         NOISE: "scatter of the readings",
         BIAS: "scatter of the rests",

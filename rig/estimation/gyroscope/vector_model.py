@@ -187,10 +187,7 @@ def solve_vector_batch(means_rad_s: ArrayLike, rates_rad_s: ArrayLike, variances
 
 
 def check_identifiable(rates: Array, gravity: Array | None) -> None:
-    """Check that rates and gravity (N, 3) identify axes, bias and g-sensitivity.
-
-    Raise Fault `rank_deficient`, `ill_conditioned`.
-    """
+    """Raise Fault `rank_deficient`, `ill_conditioned` unless rates and gravity (N, 3) identify all parameters."""
     design = design_matrix(rates, gravity)
     _check_identifiable(design / _unit(design))
 

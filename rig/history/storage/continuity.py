@@ -34,10 +34,7 @@ _identities: dict[Path | URL, _Identity] = {}
 
 
 def is_there(address: HistoryAddress) -> bool:
-    """Return whether there is a history to open; for a server always True, because it is not asked.
-
-    Raise as `refuse_another_file` does.
-    """
+    """Return whether there is a history; True for a server, which is not asked. Raise as `refuse_another_file` does."""
     refuse_another_file(address)
     return not isinstance(address.where, Path) or address.where.exists()
 

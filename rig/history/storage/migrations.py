@@ -21,10 +21,7 @@ MIGRATIONS: Mapping[int, Callable[[Connection], None]] = {}
 
 
 def version_of(connection: Connection, label: str) -> int:
-    """Return the version of the tables, 0 if there are none.
-
-    Raise Refused `not_a_history`, `history_too_old`, `history_too_new`.
-    """
+    """Return the tables' version, 0 if none. Raise Refused `not_a_history`, `history_too_old`, `history_too_new`."""
     tables = inspect(connection).get_table_names()
     if not tables:
         return 0

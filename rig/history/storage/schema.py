@@ -1,7 +1,6 @@
 """The tables of a history. Rows are only added, never changed (`triggers`, `journal`).
 
-`run.result` is the complete `result.json`; all other columns of a run, its calibrations and parameters are an index of
-it.
+`run.result` is the complete `result.json`; all other columns of a run, its calibrations and parameters index it.
 """
 
 from typing import Any

@@ -23,10 +23,7 @@ SUFFIXES = ("-wal", "-shm")
 
 
 def history_is_there(file: Path) -> bool:
-    """Return whether a history exists; False if there is no file.
-
-    Raise Refused `not_a_history`, `history_too_old`; OSError.
-    """
+    """Return whether there is a history in the file. Raise Refused `not_a_history`, `history_too_old`; OSError."""
     try:
         status = file.lstat()
     except FileNotFoundError:

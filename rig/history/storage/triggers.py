@@ -77,6 +77,7 @@ def unlike_made(connection: Connection) -> Iterator[Broken]:
 
 
 def _unlike_made_by_server(connection: Connection) -> Iterator[Broken]:
+    """Yield PostgreSQL's triggers that are missing, disabled or changed."""
     existing = {(table, name): row for table, name, *row in connection.execute(_MADE_BY_SERVER)}
     for trigger in _server_triggers():
         name, row = f"{trigger.name} of {trigger.table}", existing.get((trigger.table.name, trigger.name))

@@ -43,10 +43,7 @@ class TableColumn:
 
 @dataclass(frozen=True, slots=True)
 class FittingTable:
-    """A table that shows as many of its `columns` as fit.
-
-    On an ASCII-only terminal, block characters are replaced.
-    """
+    """A table that shows as many of its `columns` as fit. On an ASCII-only terminal, block characters are replaced."""
 
     title: str
     columns: Sequence[TableColumn]

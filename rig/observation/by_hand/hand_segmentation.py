@@ -32,10 +32,7 @@ HELD_S, HELD_RAD_S, PAUSE_S = 0.75, 0.15, 0.25
 def segment_session(
     time_s: Array, rates: Array, acceleration: Array | None = None, *, range_rad_s: float | None = None
 ) -> HandRecording:
-    """Return the session of readings (n, 3) in rad/s and m/s² at rising times (n,).
-
-    `range_rad_s` is the gyroscope's range, None if unknown.
-    """
+    """Return the session of readings (n, 3), rad/s and m/s², at rising times (n,); `range_rad_s` None: unknown."""
     windows = find_rests(time_s, {RATE: rates}, still_at_first=_began_still(time_s, rates)) if len(time_s) > 1 else ()
     rests = tuple(_rest(time_s, rates, acceleration, window) for window in windows)
     top = _find_clipped(rates, range_rad_s)

@@ -54,6 +54,7 @@ def estimate_time_base(board_time_s: Array, readings_rad_s: Array, motion: Known
 
 
 def _check_samples(board_time_s: Array, readings: Array, motion: KnownMotion) -> None:
+    """Raise a Fault for too few, impossible or constant samples, from which no clock can be found."""
     if len(board_time_s) < MIN_SAMPLES:
         raise time_base_not_found(
             f"the recording holds {len(board_time_s)} samples, of at least {MIN_SAMPLES} that are needed",

@@ -275,6 +275,7 @@ def _check_has_rates(readings: Mapping[Quantity, Array]) -> None:
 
 
 def _windows(rows: Mapping[str, Array]) -> list[Window]:
+    """Return the window of each row. Raise Fault or Refused for missing, reversed or overlapping rows."""
     if not len(rows["start_s"]):
         raise Fault("too_few_observations", "there is no attitude", "Give a row for every attitude")
     windows = [Window(start_s, end_s) for start_s, end_s in zip(rows["start_s"], rows["end_s"], strict=True)]
@@ -311,6 +312,7 @@ def _rotations(rows: Mapping[str, Array]) -> Array:
 
 
 def _attitude_std(rows: Mapping[str, Array]) -> Array | None:
+    """Return the rows' stated standard deviations (N,), rad, or None. Raise Refused for a negative one."""
     std_rad = rows.get(STD_COLUMN)
     if std_rad is not None and (std_rad < 0).any():
         raise Refused(

@@ -67,8 +67,7 @@ class ExternalData:
 
     - `at_reference`: whether means are corrected to one temperature by polynomials, which include the repeats'
       contradictions.
-    - `by_mean`: numbers of the rows with an angle that are solved by mean speed, because the body moved before or
-      after.
+    - `by_mean`: numbers of the rows with an angle solved by mean speed, because the body moved before or after.
     - `omitted`: rows left out for missing readings, and the readings missing in the others.
     - `change`: an abrupt change of the gyroscope that the rows show.
     """

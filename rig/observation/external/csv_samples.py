@@ -160,6 +160,7 @@ def _drop_blanks(
 def _refuse_separate_rows(
     path: Path, quantity: Quantity, wanted: Sequence[Quantity], read: Mapping[Quantity, NDArray[np.bool_]]
 ) -> Refused:
+    """Return the refusal of a log in which the wanted sensors have values in different rows."""
     other = wanted[0]
     alone, both = int((read[other] & ~read[quantity]).sum()), int((read[other] & read[quantity]).sum())
     return Refused(

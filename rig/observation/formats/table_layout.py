@@ -148,6 +148,7 @@ def _find_beginning(path: Path, largest_mb: int) -> tuple[int, list[str]]:
 def _describe(  # noqa: PLR0917
     skip: int, headings: list[str], units: list[str], cells: list[list[str]], missing: list[str], rows: int
 ) -> dict[str, Any]:
+    """Return the fields of a `TableLayout`: which columns hold numbers, texts and the time."""
     columns = _strip_columns(cells, missing)
     stated = [unit or unit_in(heading) for heading, unit in zip(headings, units, strict=True)]
     numbers = _select_indices(columns, is_number)

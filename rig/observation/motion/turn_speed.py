@@ -20,10 +20,7 @@ CLOSE = 1e-12  # relative change of the period between two steps, at convergence
 
 @dataclass(frozen=True, slots=True)
 class TurnSpeed:
-    """The mean speed of whole turns and its standard deviation.
-
-    `speed_rad_s` has the sign of the turning. `period_s` is the time of one turn.
-    """
+    """The signed mean speed of whole turns, its standard deviation, and the time `period_s` of one turn."""
 
     speed_rad_s: float
     speed_std_rad_s: float

@@ -107,6 +107,7 @@ def _is_noisy(stream: Stream) -> bool:
 def _dwell_reading(
     run: RunData, stream: Stream, motion: ArmMotion, finished: Dwelt, settings: ObservationThresholds
 ) -> DwellReading:
+    """Return a dwell's mean acceleration and attitude, with weights by which the arm's oscillation adds no noise."""
     dwell, window = finished.dwell, trim_dwell(run, finished).window
     where = f"dwell {dwell.index} ({dwell.name})"
     inside = slice_time(stream, window.start_s, window.end_s)
@@ -144,6 +145,7 @@ def trim_dwell(run: RunData, finished: Dwelt) -> Dwelt:
 
 
 def _check_standstill(motion: ArmMotion, window: Window, where: str) -> None:
+    """Raise Fault `arm_moved_in_dwell` or `arm_states_lost` unless the arm stood still in the window."""
     moved_rad = motion.travel_rad(window)
     if moved_rad is None:
         raise Fault(

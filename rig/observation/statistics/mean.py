@@ -79,10 +79,7 @@ class QuantityInDwell:
 
 @dataclass(frozen=True, slots=True)
 class ReadAtRest:
-    """The mean `reading` of a quantity in one dwell.
-
-    `expected` is the stated norm of the quantity in the dwell, in SI units, or None.
-    """
+    """The mean `reading` of a quantity in one dwell, and the stated norm `expected` there, in SI units, or None."""
 
     subject: QuantityInDwell
     reading: Mean
@@ -116,6 +113,7 @@ def compute_weighted_means(
 def _average_group(
     readings: Array, group: NDArray[np.bool_], weights: Array, *, smooth: Array, noise: MeanNoise, steps: Steps
 ) -> Mean:
+    """Return the mean of one group by its weights, with the variance due to noise and rounding."""
     rounding = bound_rounding_variance(readings[group], steps, smooth[group], noise.scatter)
     return Mean(
         mean=weights @ readings,

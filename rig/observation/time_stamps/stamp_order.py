@@ -194,6 +194,7 @@ def _sort(log: _UnorderedLog) -> _UnorderedLog:
 
 
 def _check_rising(log: _UnorderedLog, where: str) -> None:
+    """Raise Refused `time_not_increasing` if the clock of an ordered log was set back."""
     backward_steps = np.flatnonzero(np.diff(log.stamps_s) < 0)
     if not len(backward_steps):
         return

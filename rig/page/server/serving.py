@@ -121,6 +121,7 @@ def serving(
 
 
 def _server(broadcast: Broadcast, control: Control, door: Door, folder: Path | None, shown: Page) -> "uvicorn.Server":
+    """Return uvicorn's server of the page, with limits against strangers."""
     import uvicorn
     from starlette.applications import Starlette
 

@@ -60,10 +60,7 @@ def sweep_about(index: int, station: SweepPose, direction: Direction, axis_flang
 def connect_sweeps(
     sweeps: Sequence[Sweep], home: Joints, pace: Pace, rest_s: float, is_clear: Callable[[Joints, Joints], bool]
 ) -> Iterator[Step]:
-    """Yield sweeps with rests after them and transfers between, from home and back.
-
-    Transfers lead through home if no direct one is clear.
-    """
+    """Yield sweeps, rests after them and transfers between (through home if not clear), from home and back."""
     pose = home
     for sweep in sweeps:
         if not is_clear(pose, sweep.start_q_rad):

@@ -53,6 +53,7 @@ def prefix_of(name: str) -> str:
 
 
 def _correction(prefix: str, sensor: GyroscopeEntry) -> Iterator[str]:
+    """Yield C source of a gyroscope's constants and of the function that corrects its readings."""
     about = f"{sensor.part}, serial number {sensor.serial_number}{_warm(sensor.temperature_c)}"
     yield from (
         "",
@@ -73,6 +74,7 @@ def _correction(prefix: str, sensor: GyroscopeEntry) -> Iterator[str]:
 
 
 def _gravity_correction(prefix: str, sensitivity: Array) -> Iterator[str]:
+    """Yield C source of the correction that first subtracts the effect of gravity."""
     yield from (
         "",
         "/* The same, corrected for g-sensitivity: gravity_m_s2 points down, in the frame of the corrected",

@@ -48,6 +48,7 @@ def certificate_page(certificate: Certificate) -> str:
 
 @cache
 def _template() -> "Template":
+    """Return the certificate's template, with the functions and constants that it calls."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     loader = FileSystemLoader(list(dict.fromkeys([OWN_TEMPLATES, *(kind.templates for kind in kinds())])))

@@ -297,6 +297,7 @@ def _find_incomplete(result: ResultDocument) -> Iterator[str]:
 
 
 def _check_same(result: ResultDocument, reversals: Mapping[str, ReversalEntry]) -> None:
+    """Raise Refused `another_sensor` unless the reversals contain this run and its magnetometers."""
     for name, reversal in reversals.items():
         entry = result.magnetometers.get(name)
         starts = {run.started_utc for run in reversal.runs}
@@ -360,6 +361,7 @@ def _size_stated(budget: BudgetEntry) -> bool:
 
 
 def _deviations(result: ResultDocument) -> Iterator[str]:
+    """Yield what was unusual in the measurement, a sentence each: interruptions, losses, warnings, omissions."""
     provenance = result.provenance
     if provenance.resumed_utc:
         yield f"The measurement was interrupted and continued at {', '.join(provenance.resumed_utc)} (UTC)."

@@ -155,6 +155,7 @@ def _identification(issuer: str, value: str, name: str) -> Element:
 
 
 def _statements(c: Certificate) -> Iterator[Element]:
+    """Yield the declarations on validity, traceability, scope and each limit of conformity."""
     for mark in c.marks:
         yield dcc("statement", text("name", "validity"), text("declaration", f"{mark}."), words("valid", "false"))
     time = c.stated.where.time_reference

@@ -44,6 +44,7 @@ def _describe_hand(certificate: Certificate) -> str:
 
 
 def _describe_file(certificate: Certificate) -> Iterator[str]:
+    """Yield sentences on the method for readings whose motion a file states."""
     yield "The readings are external, and a file states the motion of the items during them."
     if certificate.gyroscopes:
         axes = (
@@ -64,6 +65,7 @@ def _describe_file(certificate: Certificate) -> Iterator[str]:
 
 
 def _describe_turner(certificate: Certificate) -> Iterator[str]:
+    """Yield sentences on the method for a turner with joints."""
     if certificate.gyroscopes:
         yield from _describe_sweeps(certificate)
     if stages := certificate.mounted:
@@ -80,6 +82,7 @@ def _describe_turner(certificate: Certificate) -> Iterator[str]:
 
 
 def _describe_sweeps(certificate: Certificate) -> Iterator[str]:
+    """Yield sentences on the sweeps of gyroscopes: numbers, reference, estimator."""
     counts = "; ".join(
         f"{gyroscope.name}: {len(gyroscope.sensor.observations)} sweeps, {len(gyroscope.sensor.rests)} rests"
         for gyroscope in certificate.gyroscopes

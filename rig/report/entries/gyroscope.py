@@ -91,6 +91,7 @@ def _estimate_or_error(solution: Estimate | None, fault: Fault | None) -> Estima
 
 
 def _vector_or_error(result: SensorResult) -> VectorEntry | ErrorEntry:
+    """Return the vector model's entry with degrees of freedom, or the error that prevented a solution."""
     outcome = result.vector_model
     if outcome is None:
         return error_entry(result.faults[VECTOR])

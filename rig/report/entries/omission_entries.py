@@ -57,6 +57,7 @@ def _words(entry: OmittedEntry) -> str:
 
 
 def _rests(solution: "HandSolution") -> Iterator[OmittedEntry]:
+    """Yield the entry of the rests that were left out because the body crept, if any."""
     if solution.creeping_s:
         start_s, end_s = solution.creeping_s[0]
         yield OmittedEntry(
@@ -70,6 +71,7 @@ def _rests(solution: "HandSolution") -> Iterator[OmittedEntry]:
 
 
 def _moves(solution: "HandSolution") -> Iterator[OmittedEntry]:
+    """Yield the entry of the moves that were left out, if any."""
     from rig.estimation.by_hand.solution import MOVES_LEFT_OUT
 
     omissions = [number for number, move in enumerate(solution.moves, 1) if move.kind == LEFT_OUT]

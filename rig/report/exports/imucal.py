@@ -40,6 +40,7 @@ def _document(calibrations: ExportedCalibrations, imu: Imu) -> dict[str, object]
 
 
 def _convention(calibrations: ExportedCalibrations, imu: Imu) -> list[str]:
+    """Return sentences on the file's convention and on the results that it omits."""
     sentences = [
         "w = R_g^-1 K_g^-1 (m - K_ga a - b_g), in the right-angled frame nearest to the gyroscope's axes; b_g = -b"
     ]

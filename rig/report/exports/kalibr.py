@@ -26,16 +26,14 @@ def kalibr_files(calibrations: ExportedCalibrations) -> Mapping[str, str]:
 
 
 def triangular(matrix: Array) -> tuple[Array, Array]:
-    """Return M and C (3, 3) such that M · C is the given right-handed matrix.
-
-    M is lower triangular with a positive diagonal, C a rotation.
-    """
+    """Return M, lower triangular with positive diagonal, and a rotation C (3, 3) whose product M · C is `matrix`."""
     q, r = np.linalg.qr(matrix.T)
     signs = np.sign(np.diag(r))
     return r.T * signs + 0.0, (q * signs).T  # no −0.0
 
 
 def _noise(calibrations: ExportedCalibrations, imu: Imu, topic: str) -> str:
+    """Return Kalibr's noise file: densities of white noise, and what the run did not measure."""
     rates, forces = imu.gyroscope, imu.accelerometer
     parameters = {
         "rostopic": topic,
@@ -54,6 +52,7 @@ def _noise(calibrations: ExportedCalibrations, imu: Imu, topic: str) -> str:
 
 
 def _intrinsics(calibrations: ExportedCalibrations, imu: Imu, topic: str) -> str:
+    """Return Kalibr's intrinsics: triangular matrices in the frame of the accelerometer, with comments."""
     rates, forces = imu.gyroscope, imu.accelerometer
     intrinsics: dict[str, object] = {"model": "scale-misalignment", "rostopic": topic}
     to_body = np.eye(3)

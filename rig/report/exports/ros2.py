@@ -28,10 +28,7 @@ CONVENTION = (
 
 
 def write_bag(recordings: Sequence[Exported], folder: Path) -> list[Path]:
-    """Write the folder `bag`, which must not exist, completely or not at all.
-
-    Raise OSError, Refused `report_folder`, `nothing_to_export`.
-    """
+    """Write the new folder `bag`, all or nothing. Raise OSError, Refused `report_folder`, `nothing_to_export`."""
     path = folder / BAG
     if path.exists():
         raise Refused("report_folder", f"{path} exists already", "Choose another with --out")
@@ -48,6 +45,7 @@ def write_bag(recordings: Sequence[Exported], folder: Path) -> list[Path]:
 
 
 def _write(recordings: Sequence[Exported], gyroscopes: Iterable[str], path: Path) -> None:
+    """Write the bag of all recordings: one topic for each gyroscope, its accelerations included."""
     from rosbags.rosbag2 import Writer
     from rosbags.typesys import Stores, get_typestore
 
@@ -92,10 +90,7 @@ def _messages(types: Mapping[str, Any], recording: Exported, name: str, frame: s
 
 
 def _covariance(noises: Sequence[Array]) -> Array:
-    """Return the covariance (9,) of one sample, row by row.
-
-    Without intervals at rest, return zeros, which ROS reads as "unknown".
-    """
+    """Return the covariance (9,) of one sample by rows; without rests zeros, which ROS reads as "unknown"."""
     variance = np.mean(np.square(noises), axis=0) if noises else np.zeros(3)
     return np.diag(variance).ravel()
 

@@ -37,10 +37,7 @@ def move_to_temperature(
 
 
 def _change(drift: ResultDocument, sensor: Corrected, to_c: float) -> Array:
-    """Return the change (3,) of the bias in a reading up to `to_c`.
-
-    Raise Refused `temperature_slope_unknown`, `temperature_outside`.
-    """
+    """Return the bias' change (3,) up to `to_c`. Raise Refused `temperature_slope_unknown`, `temperature_outside`."""
     name, quantity, from_c = sensor.sensor, sensor.quantity.name, sensor.temperature_c
     if from_c is None:
         raise Refused(

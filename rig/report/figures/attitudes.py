@@ -84,6 +84,7 @@ def _mounting(outcome: Outcome, sensor: str) -> Array:
 
 
 def _draw_residuals(axes: "Axes", sensor_plot: AttitudePlot) -> None:
+    """Draw the residuals of each attitude with noise bars and their expected range."""
     unit, count = sensor_plot.quantity.drift, np.arange(1, len(sensor_plot.residuals) + 1)
     expected = 2 * sensor_plot.expected.max(axis=1) / unit.size
     axes.fill_between(count, -expected, expected, color="0.9", label="expected, ± 2 σ", step="mid")

@@ -35,6 +35,7 @@ def write_temperature_figures(outcome: Outcome, document: ResultDocument, folder
 
 
 def _draw(figure: "Figure", entries: Mapping[str, OverTemperatureEntry]) -> None:
+    """Draw the changes of scale and bias over temperature with ± U, one row of panels for each quantity."""
     panels = figure.subplots(len(entries), 2, squeeze=False)
     for (scale_axes, bias_axes), (quantity, entry) in zip(panels, entries.items(), strict=True):
         unit = quantities()[quantity].drift

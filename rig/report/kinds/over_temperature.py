@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 
 def _entries(outcome: Outcome) -> Mapping[str, Mapping[str, OverTemperatureEntry]]:
+    """Return the entries of all polynomials, by sensor and quantity."""
     from rig.report.entries.temperature import temperature_entry
 
     return {

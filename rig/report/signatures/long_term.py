@@ -41,10 +41,7 @@ class Authorities:
 
 
 def read_authorities(files: Sequence[Path]) -> Authorities:
-    """Return the certificates and revocation lists in these files: PEM, or DER for a single list.
-
-    Raise Refused `revocation_list`.
-    """
+    """Return certificates and revocation lists: PEM, or DER for a single list. Raise Refused `revocation_list`."""
     from cryptography.hazmat.primitives.serialization import Encoding
     from cryptography.x509 import load_der_x509_crl, load_pem_x509_certificates, load_pem_x509_crl
 

@@ -60,6 +60,7 @@ def signatory(where: str) -> Iterator[Signatory]:
 
 @contextmanager
 def _open_file(file: Path) -> Iterator[Signatory]:
+    """Open the key and certificates of a PKCS#12 or PEM file. Raise Refused `signing_key`."""
     from cryptography.hazmat.primitives import serialization
     from cryptography.hazmat.primitives.serialization import pkcs12
     from cryptography.x509 import load_pem_x509_certificates

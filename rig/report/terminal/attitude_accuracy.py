@@ -13,10 +13,7 @@ from rig.station.plain_text import build_number_table, plain
 
 
 def account_document(account: AttitudeAccount) -> dict[str, Any]:
-    """Return the expected accuracy in SI units.
-
-    The condition number of attitudes that do not determine the second order is null.
-    """
+    """Return the expected accuracy in SI units; a condition is null if the attitudes do not determine the order."""
     return {
         "count": account.count,
         "order": account.order,

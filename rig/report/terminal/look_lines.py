@@ -49,6 +49,7 @@ def describe_file(looked: LookedFile) -> Iterator[str]:
 
 
 def _describe_table(path: Path, layout: TableLayout, guess: LogColumns) -> Iterator[str]:
+    """Yield lines on the table's columns, on unknown properties and on missing values."""
     heading = f"heading in line {layout.skip_lines + 1}" if layout.has_heading else "no heading"
     yield f"{path}: {layout.rows} rows, {len(layout.headings)} columns, {heading}"
     if layout.is_shifted:
@@ -155,6 +156,7 @@ def _spell(*entries: Mapping[str, Any]) -> str:
 
 
 def _describe_readings(looked: LookedFile, survey: LogSurvey) -> Iterator[str]:
+    """Yield lines on the sampling, the largest readings, the rests and the turns of a log."""
     sampling = survey.sampling
     rate = f"{1 / sampling.interval_s:.5g} Hz over {survey.span_s:.1f} s"
     uncounted = f", about {100 * sampling.scattered:.1f} % missing at unknown times" if sampling.scattered else ""
@@ -179,6 +181,7 @@ def _describe_readings(looked: LookedFile, survey: LogSurvey) -> Iterator[str]:
 
 
 def _describe_attitudes(attitudes: Mapping[str, Any]) -> Iterator[str]:
+    """Yield lines on the number, rate and longest gap of a file's attitudes."""
     middles_s = np.sort((attitudes["start_s"] + attitudes["end_s"]) / 2)
     steps_s = np.diff(middles_s)
     usual_s = float(np.median(steps_s)) if len(steps_s) else 0.0

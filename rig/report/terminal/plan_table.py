@@ -40,10 +40,7 @@ class DryRun:
 
     @cached_property
     def account(self) -> "AttitudeAccount | None":
-        """The expected accuracy of a calibration in the plan's attitudes; None without attitudes.
-
-        Raise the errors of `attitude_account`.
-        """
+        """The expected accuracy of the plan's attitudes; None without any. Raise the errors of `attitude_account`."""
         from rig.analysis.design.attitude_information import attitude_account
 
         return attitude_account(self.config, self.plan)
@@ -197,6 +194,7 @@ def _name(step: Transfer | Rest) -> str:
 
 
 def _motion(step: Step) -> tuple[str, str, str]:
+    """Return a step's joint angles, speed and acceleration in degrees, as cells; blank for a rest."""
     if isinstance(step, (Rest, Dwell)):
         return "", "", ""
     turns = [

@@ -103,6 +103,7 @@ def _set_up_magnetometer(board: Board, name: str, section: MagnetometerSection) 
 
 
 def _set_up_raw(board: Board, name: str, section: SensorSection) -> BoardSensor:
+    """Set up one sensor on the board for raw readings, and return its description."""
     info = find_sensor(board.identity, name, section)
     range_g = 0.0 if section.acceleration is None else section.acceleration.range_g
     setup = board.configure(info.index, section.rate_hz, section.range_deg_s, range_g)

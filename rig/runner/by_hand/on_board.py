@@ -64,10 +64,7 @@ class FollowedSession:
     _has_asked: bool = False
 
     def take(self, report: HandReport) -> None:
-        """Process the board's report and announce its changes.
-
-        If the board's button has begun a new session, this session begins anew, too.
-        """
+        """Process the board's report and announce its changes; restart if the board's button began a new session."""
         wrong = None
         if self.reports and report.judged < self.reports[-1].judged:
             self._has_asked = False
@@ -170,6 +167,7 @@ def read_kept_solution(board: Board) -> CalibratedByBoard:
 
 
 def _check(name: str, sensor: RecordedSensor, board: Board) -> None:
+    """Raise Refused unless the board can calibrate the sensor by hand: accelerations, and a clock on its crystal."""
     if not sensor.measures(ACCELERATION):
         raise Refused(
             "first_face_unknown",

@@ -141,6 +141,7 @@ class Kvh1775:
             raise self._why_no_answer() from error
 
     def _why_no_answer(self) -> SensorError:
+        """Return the error of an instrument that does not answer: by what it sends instead, if anything."""
         if self._message_count:
             does_not_hear = f"{self._where} sends, but does not answer"
             return SensorError("kvh_does_not_hear", does_not_hear, "Check the pair of wires to its receiver")
@@ -154,10 +155,7 @@ class Kvh1775:
         return SensorError("no_kvh", f"{self._where}: nothing came within {self._patience.first_s:g} s", _CABLE)
 
     def _ask(self, command: str, name: str) -> str:
-        """Return the text after `name` in the answer to a command.
-
-        Raise SensorError `kvh_command_refused`, `kvh_link_lost`.
-        """
+        """Return the answer's text after `name`. Raise SensorError `kvh_command_refused`, `kvh_link_lost`."""
         answer = re.compile(rb"%s,([^\r\n]*)[\r\n]" % re.escape(name.encode()))
         for wait_s in self._patience.attempts():
             with self.own_port.news:

@@ -38,10 +38,7 @@ class Kvh1775Source:
     """An instrument, set up for a run. A message with an axis marked invalid counts as lost."""
 
     def __init__(self, name: str, section: SensorSection, on_samples: OnSamples, *, patience: Patience = USUAL) -> None:
-        """Connect and set up the instrument.
-
-        Raise SensorError: `kvh_other_serial_number`, and those of `Kvh1775` and `refusals`.
-        """
+        """Connect and set up the instrument. Raise SensorError `kvh_other_serial_number`, and as `refusals` yields."""
         self._name, self._on_samples = name, on_samples
         line = _port_section(section)
         self._required = make_settings(section)
@@ -117,6 +114,7 @@ class Kvh1775Source:
         self._on_samples(self._name, samples)
 
     def _watch(self, messages: NDArray[Any], valid: NDArray[np.bool_]) -> None:
+        """Raise SensorError `kvh_axis_invalid` if all messages have been invalid for `INVALID_S`."""
         good = np.flatnonzero(valid)
         self._invalid_run = len(valid) - 1 - int(good[-1]) if len(good) else self._invalid_run + len(valid)
         if self._invalid_run > INVALID_S * self._required.rate_hz:

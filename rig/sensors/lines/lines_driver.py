@@ -188,6 +188,7 @@ class LinesDevice:
         return count / span_s if coarse else 1 / typical_s if typical_s > 0 else count / span_s
 
     def _why_no_sample(self, timeout_s: float) -> SensorError:
+        """Return the error of a device without samples: silent, at another speed, or of another format."""
         reader, counts = self._lines, self.counts
         if not reader.byte_count:
             return SensorError("lines_silent", f"{self.where} has sent nothing within {timeout_s:g} s", _CABLE)
@@ -230,6 +231,7 @@ class LinesDevice:
             self._on_values(decoded.values[is_sample], numbers, times_us, host_time_s)
 
     def _refuse_damage(self) -> None:
+        """Raise SensorError `lines_damaged` if too many lines are no samples."""
         counts = self.counts
         if counts.damaged > DAMAGED_LINES and counts.damaged > DAMAGED * (counts.samples + counts.damaged):
             raise SensorError(

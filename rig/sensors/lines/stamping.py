@@ -130,10 +130,7 @@ class Stamper:
         self._last_sequence = float(row[columns.index("sequence")]) if "sequence" in columns else None
 
     def _select_possible(self, values: Array) -> NDArray[np.bool_]:
-        """Return a mask of the rows of (n, columns) whose time or number can follow the previous row's.
-
-        Raise SensorError `lines_time_jumped`.
-        """
+        """Return a mask of the rows that can follow the previous row. Raise SensorError `lines_time_jumped`."""
         is_sample = np.zeros(len(values), np.bool_)
         last = (self._last_time, self._last_sequence)
         try:

@@ -93,10 +93,7 @@ class AutopilotLink:
 
     # -- the dialogue ----------------------------------------------------------------------------------------------
     def parameters(self, needed: Iterable[str], others: Iterable[str] = ()) -> Mapping[str, AutopilotParameter]:
-        """Read the parameters `needed`, and existing ones of `others`.
-
-        Raise SensorError `autopilot_silent` if no request is answered.
-        """
+        """Read the parameters `needed`, and those of `others` that exist. Raise SensorError `autopilot_silent`."""
         needed = set(needed)
         names = needed | set(others)
         with self.own_port.news:
@@ -272,6 +269,7 @@ class AutopilotLink:
         return self.autopilot is not None and source == self._address
 
     def _note(self, message: Any) -> None:
+        """Store a message's contents by its type: state, parameter, answer or version."""
         match message.get_type():
             case "HEARTBEAT":
                 self.armed = bool(message.base_mode & ARMED)

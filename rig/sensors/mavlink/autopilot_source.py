@@ -171,6 +171,7 @@ class MavlinkSource:
                 imu.correction = read_correction(parameter_names(self.link.identity.firmware, imu.line), values)
 
     def _confirm_rates(self) -> None:
+        """Raise SensorError unless every IMU's messages come at the requested rate with new readings."""
         imus = self._imus.values()
         self.link.own_port.wait(lambda: all(imu.has_enough_messages for imu in imus), RATE_WAIT_S)
         for imu in imus:

@@ -144,10 +144,7 @@ def refusals(sensor: str, names: ParameterNames, parameters: Mapping[str, float]
 
 
 def read_correction(names: ParameterNames, parameters: Mapping[str, float]) -> OnboardCorrection:
-    """Return the correction to undo, from parameters that `refusals` does not refuse.
-
-    Raise ValueError for an orientation that is refused.
-    """
+    """Return the correction to undo. Raise ValueError for an orientation that `refusals` refuses."""
     orientation = board_rotation(parameters[names.orientation])
     if orientation is None:
         raise ValueError(f"{names.orientation} is refused before")

@@ -32,10 +32,7 @@ ANSWER_ALL = 2  # value of Status Return Level: every write is acknowledged
 
 
 def look_at(bus: Bus, port: str, servo_id: int) -> ServoReport:
-    """Read what the servo reports about itself.
-
-    Raise Refused `no_servo`, `servo_not_alone`, `other_servo`, `servo_garbled`.
-    """
+    """Return the servo's report. Raise Refused `no_servo`, `servo_not_alone`, `other_servo`, `servo_garbled`."""
     try:
         _ping(bus, port, servo_id)
         _request_acknowledgements(bus)
@@ -89,6 +86,7 @@ def _request_acknowledgements(bus: Bus) -> None:
 
 
 def _report(bus: Bus, port: str, servo_id: int) -> ServoReport:
+    """Read identity, settings and several states. Raise Refused `other_servo`, ReplyLost."""
     (number,) = bus.look_up(MODEL_NUMBER)
     model = model_of(number)
     if model is None:

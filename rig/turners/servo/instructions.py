@@ -70,6 +70,7 @@ def _hold_position(bus: Bus) -> None:
 
 
 def _read_back(bus: Bus, register: Register, *wanted: int) -> None:
+    """Raise Refused `servo_setting_not_kept` unless the register holds the wanted values."""
     readback = bus.look_up(register)
     if readback != wanted:
         raise Refused.from_problem(

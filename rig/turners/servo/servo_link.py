@@ -111,6 +111,7 @@ class ServoLink:
 
     # Its thread -------------------------------------------------------------------------------------------------
     def _run(self) -> None:
+        """Poll states and run jobs until the link is closed; pauses while it must be quiet."""
         due_s = looked_s = self._clock.now_s()
         try:
             while not self._closing.is_set():
@@ -132,6 +133,7 @@ class ServoLink:
             self._on_problem(problems.driver_died(error))
 
     def _poll(self) -> None:
+        """Read one state and pass it on; count a lost reply, and report a hardware error."""
         clock = self._clock
         try:
             began_s = clock.reference_s()

@@ -38,6 +38,7 @@ def servo_problems(report: ServoReport, wanted_model: str, carried: FlangeLoad, 
 
 
 def _identity(report: ServoReport, wanted_model: str) -> list[Problem]:
+    """Return the problems of another model than the configured one, or of firmware too old."""
     problems = []
     if report.servo.name != wanted_model:
         problems.append(
@@ -60,6 +61,7 @@ def _identity(report: ServoReport, wanted_model: str) -> list[Problem]:
 
 
 def _settings(report: ServoReport) -> list[Problem]:
+    """Return the problems of settings that could move the shaft, or leave it unprotected."""
     problems = []
     if report.startup:
         problems.append(
@@ -107,6 +109,7 @@ def _settings(report: ServoReport) -> list[Problem]:
 
 
 def _condition(report: ServoReport) -> list[Problem]:
+    """Return the problems of the servo's state: errors, supply voltage, temperature."""
     state = report.state
     problems = []
     if state.hardware_error:

@@ -382,6 +382,7 @@ class Arm:
             self._changed.notify_all()
 
     def _take_state(self, state: ArmState) -> None:
+        """Pass a state on and judge it; count the states that are missing before it."""
         before, self._latest = self._latest, state
         if not self._forwards_states:
             return

@@ -140,6 +140,7 @@ def program_interruption(state: ArmState) -> Problem | None:
 
 
 def _safety_problem(state: ArmState) -> Problem | None:
+    """Return the problem of a safety mode other than normal, by the mode or the safety bits."""
     mode = state.safety_mode
     if mode == SafetyMode.NORMAL:
         mode = next((bit_mode for bit, bit_mode in _SAFETY_BITS.items() if state.safety_status_bits >> bit & 1), mode)

@@ -69,6 +69,7 @@ class ControlWatch:
             self._thread.join(2 * ANSWER_S)
 
     def _run(self) -> None:
+        """Watch control mode and primary interface until the end, or until a problem is found."""
         try:
             while not self._ending.is_set():
                 remote = self._ask()

@@ -25,6 +25,7 @@ def motion_problems(motion: Motion, ours: JointLimits, theirs: JointLimits | Non
 
 
 def _position_problems(motion: Motion, ours: JointLimits, theirs: JointLimits | None) -> list[Problem]:
+    """Return the problem of each joint that the motion takes beyond the narrower limits."""
     problems = []
     for joint, name in enumerate(JOINT_NAMES):
         most = ours.greatest_rad[joint]
@@ -104,8 +105,5 @@ def _fractions(motion: Motion) -> Array:
 
 
 def _narrower(ours: float, theirs: float | None) -> tuple[float, str]:
-    """Return the narrower of the model's and the controller's limit, and its owner.
-
-    Limits that differ by rounding count as equal.
-    """
+    """Return the narrower of the model's and the controller's limit, apart from rounding, and its owner."""
     return (ours, OURS) if theirs is None or theirs >= ours * (1 - ROUNDING) else (theirs, THEIRS)

@@ -118,6 +118,7 @@ class SimulatedAutopilot:
 
     # -- sending -----------------------------------------------------------------------------------------------------
     def _send_due(self, own_s: float, now_us: int) -> None:
+        """Send heartbeat, attitude and IMU messages that are due; both times are since power-up."""
         if own_s >= self._due_s["heartbeat"]:
             self._due_s["heartbeat"] += HEARTBEAT_S
             mode, state = (128, ACTIVE) if self.armed else (0, STANDBY)
@@ -133,6 +134,7 @@ class SimulatedAutopilot:
                 self._send_imu(number, now_us)
 
     def _send_imu(self, number: int, now_us: int) -> None:
+        """Send an IMU's readings in the requested message: floats, or truncated integers."""
         imu = self._imus[IMU_INDEX[number]]
         rate = imu.rate_to_send()
         px4 = self._firmware == "px4"
@@ -186,6 +188,7 @@ class SimulatedAutopilot:
 
     # -- receiving ---------------------------------------------------------------------------------------------------
     def _obey(self, message: Any) -> None:
+        """Carry out a message from the client: read or set parameters, or a command."""
         match message.get_type():
             case "PARAM_REQUEST_READ" if message.param_index < 0:
                 self._send_parameter(message.param_id)
@@ -211,6 +214,7 @@ class SimulatedAutopilot:
         self._send(message)
 
     def _command(self, message: Any) -> int:
+        """Carry out a command and return its result: version, message interval, or one message."""
         if message.command == 512 and int(message.param1) == AUTOPILOT_VERSION:
             uid = list(self._uid.ljust(18, b"\0"))
             zeros = [0] * 8

@@ -12,10 +12,7 @@ from rig.world.instruments import FieldOf, InstrumentMount, MotionOf, sensor_see
 
 
 def build_autopilot_mounts(config: RigConfig, world: WorldSection) -> dict[str, InstrumentMount]:
-    """Return the autopilots by port.
-
-    Raise Refused `autopilot_parameters` for a parameter that an autopilot does not have.
-    """
+    """Return the autopilots by port. Raise Refused `autopilot_parameters` for a parameter that one does not have."""
     imus_by_port: dict[str, dict[int, str]] = {}
     for name, sensor in config.sensors.items():
         if sensor.mavlink is not None:

@@ -150,6 +150,7 @@ class SimulatedKvh1775:
         self._before = now
 
     def _send(self, at_s: float) -> None:
+        """Send a message with the readings at `at_s`, in the format of the settings, and tests that are due."""
         memory = self._memory
         delta = memory["ROTFMT"] == "DELTA"
         now = cast(Sequence[float], self._before)
@@ -196,6 +197,7 @@ class SimulatedKvh1775:
 
     # -- commands ------------------------------------------------------------------------------------------------
     def _obey(self, command: str) -> None:
+        """Carry out a command in the present mode; ignore those of the other mode."""
         if command in ("?BIT", "?BIT,2") and not self.configuring:
             self._tests_due.append(6 if command == "?BIT" else 8)
         elif command == "=CONFIG,1":

@@ -39,10 +39,7 @@ CHOICES: Mapping[str, tuple[str, ...]] = {
 
 
 class KvhMemory:
-    """The instrument's non-volatile memory: `settings` replace the factory's.
-
-    Raise ValueError for a setting that the instrument does not have.
-    """
+    """The instrument's memory: `settings` replace the factory's. Raise ValueError for one that it does not have."""
 
     def __init__(self, settings: Mapping[str, str]) -> None:
         self._settings = dict(FACTORY)
@@ -78,6 +75,7 @@ class KvhMemory:
         return f"{name},{self[name]}"
 
     def _set(self, name: str, value: str) -> bool:
+        """Set a setting if the value is allowed; return whether it is."""
         if name == "AXES":
             if not _is_matrix(value):
                 return False

@@ -94,6 +94,7 @@ class SimulatedBus:
         self._send(end_s, bytes(wire[slot] for slot in sorted(wire)))
 
     def _send(self, time_s: float, data: bytes) -> None:
+        """Queue an answer for the host at the converter's next transfer; lose or corrupt it on request."""
         if self.lose > 0:
             self.lose -= 1
             return

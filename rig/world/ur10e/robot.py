@@ -182,6 +182,7 @@ class Robot:
         )
 
     def _play(self) -> None:
+        """Play one tick of the program, and stop it at an error, at its end, or without a sign of its watchdog."""
         if self.watchdog_s and (self.tick - self._last_input_tick) * TICK_S > self.watchdog_s:
             self.stop_program("the RTDE watchdog stopped the program")
             return
@@ -366,6 +367,7 @@ class Robot:
         self.robot_mode = mode
 
     def set_payload(self, mass_kg: float, centre_m: Sequence[float]) -> None:
+        """Set the payload, unless a fault keeps it. Raise `ProgramError` for an impossible one."""
         limit_kg = self.model.payload_kg
         if not 0.0 <= mass_kg <= limit_kg:
             raise ProgramError(f"payload {mass_kg} kg is outside 0 to {limit_kg} kg")

@@ -180,10 +180,7 @@ class _Child:
                 self.abandon()
 
     def watch_move(self) -> NoReturn:
-        """Report the end of a move.
-
-        The watch needs a thread of its own, because the client may take long to answer, and heartbeats cannot wait.
-        """
+        """Report the end of a move, in a thread of its own: heartbeats cannot wait for the client's answers."""
         while True:
             time.sleep(MOVE_POLL_S)
             changes_before = self._operations_before
@@ -205,6 +202,7 @@ class _Child:
                 self.send(Braked(self._brake(request.deceleration_rad_s2)))
 
     def _take_control(self, request: TakeControl) -> Message:
+        """Upload the control script, set the payload and wait until the states show it."""
         from rtde_control import RTDEControlInterface
 
         flags = RTDEControlInterface.FLAG_UPLOAD_SCRIPT.value | RTDEControlInterface.FLAG_NO_EXT_FT.value
@@ -272,6 +270,7 @@ class _Child:
             time.sleep(HEARTBEAT_S)
 
     def _move(self, move: MoveRequest) -> None:
+        """Start a movement, and answer whether the controller has begun it."""
         changes_before = self._control.getAsyncOperationProgressEx().changeCount()
         try:
             started = self._control.moveJ(list(move.target_q_rad), move.speed_rad_s, move.acceleration_rad_s2, True)

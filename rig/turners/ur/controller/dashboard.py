@@ -84,6 +84,7 @@ class Dashboard:
         self.close()
 
     def _line(self, deadline_s: float) -> str:
+        """Return the next line from the dashboard. Raise TimeoutError, ConnectionError."""
         while b"\n" not in self._received:
             remaining_s = deadline_s - time.monotonic()
             if remaining_s <= 0.0:

@@ -174,14 +174,14 @@ class StateStream:
     def _missed_s(self) -> float:
         """The longest time, s of the controller's clock, for which states may have been lost in recent silences.
 
-        A local controller's connection loses no states unless it was silent for `SILENT_S`; then any number may be
-        lost.
+        A local connection loses no states unless it was silent for `SILENT_S`; then any number may be lost.
         """
         if self._is_remote:
             return CLOCKS_DIFFER * self._gap_s
         return 0.0 if self._gap_s < SILENT_S else math.inf
 
     def _set_up(self, rate_hz: float) -> None:
+        """Agree with the controller on protocol version, variables and rate, and start the stream."""
         is_supported = self._ask("V", struct.pack(">H", VERSION)) == b"\1"
         version = self._ask("v", b"")
         if len(version) != CONTROLLER_VERSION.size:
@@ -222,6 +222,7 @@ class StateStream:
             raise ConnectionError("it closed the connection")
 
     def _receive(self) -> None:
+        """Add arrived bytes to the buffer, without waiting; note a closed connection."""
         try:
             data = self._socket.recv(65536)
         except BlockingIOError:

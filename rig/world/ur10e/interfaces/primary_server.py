@@ -69,6 +69,7 @@ def _message(robot: Robot, kind: int, payload: bytes) -> bytes:
 
 
 def _content(message: Message) -> bytes:
+    """Return the body of a robot message, whose form depends on its kind."""
     text = message.text.encode(errors="replace")  # a program's text may hold half a character
     if message.kind == MessageKind.KEY:
         title = message.title.encode()
@@ -90,6 +91,7 @@ def _state(robot: Robot, parts: tuple[Part, ...]) -> bytes:
 
 
 def _robot_mode(robot: Robot) -> bytes:
+    """Return the sub-package of robot mode data."""
     playing = robot.runtime_state in (RuntimeState.PLAYING, RuntimeState.RESUMING, RuntimeState.STOPPING)
     return struct.pack(
         ">Q7?BB3dB",

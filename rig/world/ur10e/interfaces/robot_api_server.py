@@ -124,6 +124,7 @@ class RobotApiSession:
         return b""
 
     def receive(self, data: bytes) -> bytes:
+        """Return the answer once the request is complete; an order is answered when it has been carried out."""
         self._buffer += data
         head, has_end, body = bytes(self._buffer).partition(END)
         length = LENGTH.search(head)

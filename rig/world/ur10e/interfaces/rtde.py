@@ -92,6 +92,7 @@ class RtdeSession:
         return b""
 
     def receive(self, data: bytes) -> bytes:
+        """Answer every complete package, and keep the rest; refuse what is no package."""
         self._buffer += data
         answer = b""
         while len(self._buffer) >= HEADER.size:
@@ -136,6 +137,7 @@ class RtdeSession:
         return build_package("v", struct.pack(">4I", *self._robot.identity.polyscope))
 
     def _setup_outputs(self, payload: bytes) -> bytes:
+        """Set up the output recipe of a request; answer with the types of its variables."""
         frequency_hz = DEFAULT_HZ
         if self._version == 2:
             (frequency_hz,) = struct.unpack_from(">d", payload)
@@ -153,6 +155,7 @@ class RtdeSession:
         return build_package("O", lead + ",".join(kinds).encode())
 
     def _setup_inputs(self, payload: bytes) -> bytes:
+        """Set up an input recipe and claim its registers; answer with the types, or why it is refused."""
         if len(self._inputs) == INPUT_RECIPES:
             return self._say("no more input recipes") + build_package("I", b"\0")
         names = _names(payload)
@@ -185,6 +188,7 @@ class RtdeSession:
         return build_package("P", b"\1")
 
     def _data(self, payload: bytes) -> bytes:
+        """Write a data package's values into the inputs of its recipe."""
         recipe = self._inputs.get(payload[0]) if payload else None
         if recipe is None:
             return self._say("data package for an input recipe that was never set up")

@@ -109,6 +109,7 @@ class ScriptSession:
         return b""
 
     def receive(self, data: bytes) -> bytes:
+        """Read programs from the client; in local control report that they are not accepted."""
         try:
             for lines in self._reader.feed(data):
                 if self._read_only or self._robot.local_control:
@@ -128,6 +129,7 @@ class ScriptSession:
         pass
 
     def _obey(self, lines: list[str]) -> None:
+        """Carry out a line or a program, and report its errors as messages."""
         order = ORDERS.get(lines[0].strip())
         if order is not None:
             order(self._robot)

@@ -43,10 +43,7 @@ def links(
     alpha_rad: Sequence[float] = ZERO6,
     drawing: Drawing = UR10E,
 ) -> Links:
-    """Return the drawing's links with the given deviations of each joint.
-
-    Without deviations, quarter turns are exact.
-    """
+    """Return the drawing's links with the given deviations of each joint. Without any, quarter turns are exact."""
     return tuple(
         _link(theta, a + da, d + dd, quarters, twist)
         for (a, d, quarters), theta, da, dd, twist in zip(drawing, theta_rad, a_m, d_m, alpha_rad, strict=True)

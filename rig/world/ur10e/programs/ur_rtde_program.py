@@ -187,6 +187,7 @@ class ControlProgram:
         return _nothing()
 
     def _speed_thread(self) -> Steps:
+        """Follow the newest joint or tool speed every tick."""
         last = None
         tool: Sequence[float] = (0.0,) * 6
         while True:

@@ -158,6 +158,7 @@ class ScriptProgram:
             raise ProgramError(str(error), call.position) from None
 
     def _play(self, block: Block) -> Steps:
+        """Play the statements of a block in order; a loop plays its body for ever."""
         for item in block:
             if isinstance(item, Loop):
                 while True:
