@@ -72,7 +72,7 @@ def look_at(path: Path, stated: ColumnMap | None = None) -> LookedFile:
     layout = find_layout(path, SAMPLES_MB)
     if set(layout.headings).issuperset(MOTIONS["sweeps"].needed):
         remedy = f"Give it with its log: rig solve LOG --sweeps {path}"
-        raise Refused("bad_option", f"{path} is no log: it states sweeps, in the rig's own columns", remedy)
+        raise Refused("bad_option", f"{path} is not a log: it states sweeps, in the rig's own columns", remedy)
     values, time = _read_numbers(path, layout)
     guess = guess_columns(layout, values, time)
     columns = _map_of(layout, guess)

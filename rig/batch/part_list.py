@@ -12,10 +12,7 @@ HEADING = "serial_number"
 
 
 def numbers_in(path: Path) -> tuple[str, ...]:
-    """Return the serial numbers in a CSV file's column `serial_number`, or else in its first column.
-
-    Raise Refused `parts_file`.
-    """
+    """Return a CSV file's column `serial_number`, or else its first column. Raise Refused `parts_file`."""
     try:
         text = read_regular_file(path, LARGEST_BYTES).decode("utf-8-sig")
         rows = [row for row in csv.reader(text.splitlines()) if any(cell.strip() for cell in row)]

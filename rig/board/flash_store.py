@@ -91,7 +91,7 @@ def store(board: Board, index: int, calibration: Calibration) -> StoredCalibrati
     if stored is None or stored.calibration != calibration.quantize():
         raise BoardError(
             "not_stored",
-            f"the board reads back another calibration for sensor {index} than was written",
+            f"the board reads back another calibration for sensor {index} than the one that was written",
             "Write it again; if that does not help, replace the microcontroller board",
         )
     return stored

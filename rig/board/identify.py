@@ -33,7 +33,7 @@ def refuse_other_firmware(identity: BoardIdentity) -> None:
     if identity.firmware != FIRMWARE_VERSION:
         raise Refused(
             "firmware_version",
-            f"the board {identity.unique_id} runs firmware {identity.firmware}, this program comes with "
+            f"the board {identity.unique_id} runs firmware {identity.firmware}, but this program comes with "
             f"{FIRMWARE_VERSION}",
             "Flash the image that comes with this program: `rig board flash`",
         )
@@ -102,14 +102,14 @@ def refuse_other_sensor(
     if (part, serial_number) != (section.part, section.serial_number):
         raise Refused(
             "another_sensor",
-            f"{calibration} is of {part} {serial_number}, the configuration says {section.part} "
+            f"{calibration} is of {part} {serial_number}, but the configuration states {section.part} "
             f"{section.serial_number}",
             "Calibrate this sensor, or correct part and serial_number in the configuration",
         )
     if not isclose(range_deg_s, section.range_deg_s, rel_tol=1e-6):
         raise Refused(
             "another_range",
-            f"{calibration} holds for {range_deg_s:g} °/s, the configuration says {section.range_deg_s:g} °/s",
+            f"{calibration} holds for {range_deg_s:g} °/s, but the configuration states {section.range_deg_s:g} °/s",
             "Set range_deg_s to what it was calibrated at, or calibrate at this range",
         )
 

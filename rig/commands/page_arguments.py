@@ -43,7 +43,7 @@ class PageWish:
         if not colon or (host.count(":") and not host.endswith("]")):  # no port, or an IPv6 address alone
             host, port = self.host_and_port or ADDRESS, ""
         if port and not (port.isascii() and port.isdecimal() and int(port) < 65536):
-            raise Refused("page_address", f"{port!r} is no port", "Give --page-address ADDRESS:PORT")
+            raise Refused("page_address", f"{port!r} is not a port", "Give --page-address ADDRESS:PORT")
         return PageAddress(host.strip("[]"), int(port) if port else None, self.token)
 
 

@@ -1,4 +1,4 @@
-"""The columns of external files and their units: the file that `--columns` names."""
+"""The columns of external files and their units, as stated in the file that `--columns` names."""
 
 from typing import Annotated, Literal, Self
 

@@ -44,7 +44,7 @@ def config_schema() -> dict[str, Any]:
     own_sections = {
         BASE: {"type": "string", "description": "file on which this one builds; this one states what differs"},
         "arm": _section(STOCK_TURNERS["ur"]),
-        "turner": _chosen("kind", turners, "what turns the sensors, if it is no arm"),
+        "turner": _chosen("kind", turners, "what turns the sensors, if it is not an arm"),
         "procedure": _chosen("name", {**procedures, SHORTEST: SHORTEST_SECTION}, "what is done"),
         "world": _section(WorldSection),
     }

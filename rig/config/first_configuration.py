@@ -150,8 +150,8 @@ def _procedure(answers: Answers) -> Iterator[str]:
 def _uncertainty(answers: Answers) -> Iterator[str]:
     if answers.turner == "hand" and answers.source != "board":
         yield "uncertainty:"
-        yield "  crystal_ppm: 50          # how far the device's clock may be off: 50 of a crystal, 5000 of a ceramic"
-        yield "                           # resonator, as an Arduino Uno has one. No reading shows it"
+        yield "  crystal_ppm: 50          # how far the device's clock may be off: 50 for a crystal, 5000 for a"
+        yield "                           # ceramic resonator such as that of an Arduino Uno. No reading shows it"
     elif answers.turner == "servo":
         yield "uncertainty:"
         yield "  mount_deg: 2             # how far off an adapter holds the board, about each axis"

@@ -316,7 +316,7 @@ def _hint_at_override(section: Location, layered: Layered) -> str:
     others = [str(key) for key in siblings if key != section[-1] and layered.places.get((*section[:-1], key)) != SET]
     if not others or not section[:-1]:
         return ""
-    return f"; {format_path(section)} is given by --set only, the file has {', '.join(others)}"
+    return f"; {format_path(section)} comes from --set alone; the file has {', '.join(others)}"
 
 
 def _describe_location(location: Location, places: Places) -> str:

@@ -163,7 +163,7 @@ def _procedures() -> Iterator[str]:
     yield from (
         "### `procedure`",
         "",
-        f"`name` says which procedure is run; if it is left out, this is `{DEFAULT_PROCEDURE}`. The keys of this "
+        f"`name` states which procedure is run; the default is `{DEFAULT_PROCEDURE}`. The keys of this "
         "section depend on it.",
         "[A procedure of your own](how-to/with-code/own-procedure.md) has its own section.",
         "",

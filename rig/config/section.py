@@ -92,8 +92,8 @@ def check_port(value: str) -> str:
         is_port = PORT_NAME.fullmatch(value) is not None
     if not is_port:
         raise ValueError(
-            "must be the name of a serial port, as /dev/ttyUSB0 or COM3, or socket://host:port with a port from 1 to "
-            "65535"
+            "must be the name of a serial port, such as /dev/ttyUSB0 or COM3, or socket://host:port with a port from 1 "
+            "to 65535"
         )
     return value
 

@@ -24,14 +24,11 @@ def note_run(folder: Path) -> None:
 
 
 def latest_run() -> Path:
-    """Return the newest remembered run folder that still exists, relative to the working folder if it is inside.
-
-    Raise Refused `no_latest_run`.
-    """
+    """Return the newest remembered run folder that still exists. Raise Refused `no_latest_run`."""
     for noted in reversed(_read_noted()):
         if (folder := Path(noted)).is_dir():
             return folder.relative_to(Path.cwd()) if folder.is_relative_to(Path.cwd()) else folder
-    raise Refused("no_latest_run", "no run folder of yours is known to be there", "Name the run folder")
+    raise Refused("no_latest_run", "no run folder of yours is known", "Name the run folder")
 
 
 def meant_run(path: str | Path) -> Path:

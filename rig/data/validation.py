@@ -52,13 +52,13 @@ def read_document(kind: type[Document], file: Path, limit_bytes: int, *, what: s
             raise Refused("not_a_result", what_else, "Use the version of the rig that wrote it") from error
         where = ".".join(map(str, first["loc"]))
         why = f"{where}{': ' if where else ''}{first['msg']}"
-        raise Refused("not_a_result", f"{file} is no result of {what}: {why}", remedy) from error
+        raise Refused("not_a_result", f"{file} is not a result of {what}: {why}", remedy) from error
     except UnicodeDecodeError as error:
-        raise Refused("not_a_result", f"{file} is no result of {what}: it is not text", remedy) from error
+        raise Refused("not_a_result", f"{file} is not a result of {what}: it is not text", remedy) from error
     except json.JSONDecodeError as error:
-        raise Refused("not_a_result", f"{file} is no result of {what}: it is not JSON: {error}", remedy) from error
+        raise Refused("not_a_result", f"{file} is not a result of {what}: it is not JSON: {error}", remedy) from error
     except (ValueError, RecursionError) as error:
-        raise Refused("not_a_result", f"{file} is no result of {what}: {error}", remedy) from error
+        raise Refused("not_a_result", f"{file} is not a result of {what}: {error}", remedy) from error
 
 
 def parse_json(content: str | bytes, most: int = MOST_RECORDED) -> Any:
@@ -93,7 +93,7 @@ def _parse_number(text: str) -> int | float:
     """Return a number of a JSON file. Raise ValueError for a number that no measurement has."""
     value = float(text)
     if not abs(value) <= LARGEST_NUMBER:
-        raise ValueError(f"{quote(text)} is no number that can be measured")
+        raise ValueError(f"{quote(text)} is not a number that can be measured")
     return value if set(text) & set(".eE") else int(text)
 
 

@@ -68,7 +68,7 @@ def check_count(observations: int, least: int, parameters: int) -> None:
     if observations < least:
         raise Fault(
             "too_few_observations",
-            f"{observations} observations are too few for {parameters} parameters, {least} are the least",
+            f"{observations} observations are too few for {parameters} parameters; at least {least} are needed",
             "Record more sweeps or attitudes; resume the run if it was interrupted",
         )
 
@@ -310,7 +310,7 @@ def check_conditioning(conditioned: Conditioning, needed: int, limit: float, wha
     if not conditioned.condition <= limit:
         raise Fault(
             "ill_conditioned",
-            f"the observations hardly determine {what} (condition {conditioned.condition:.3g}, {limit:g} is the most)",
+            f"the observations hardly determine {what} (condition {conditioned.condition:.3g}; the limit is {limit:g})",
             remedy,
         )
 

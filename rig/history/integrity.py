@@ -123,10 +123,7 @@ def _files(
 
 
 def _unknown(folder: Path, entered: Mapping[str, set[tuple[str, str]]]) -> Iterator[EntryState]:
-    """Yield the files in a run's folder that were not entered with any run.
-
-    A further recording would change the folder's result.
-    """
+    """Yield the files in a run's folder that were entered with no run, such as a further recording."""
     entered_names = {name for name, _ in entered.get(str(folder), set())}
     recorded = [file.name for readings in ("raw", "calibrated") for file in recordings(folder, readings)]
     present = [name for name in (*DOCUMENTS, *CERTIFICATES) if os.path.lexists(folder / name)]

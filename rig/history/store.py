@@ -167,10 +167,7 @@ class History:
             return self._run_id(connection, content_sha256) is not None
 
     def certify(self, content_sha256: str, certificate: Issued) -> bool:
-        """Add a certificate of the run with this result; return False if the run is not in the history.
-
-        Raise Refused `entry_not_kept`.
-        """
+        """Add a run's certificate; return False if the run is not in the history. Raise Refused `entry_not_kept`."""
         with self._writing() as connection:
             run_id = self._run_id(connection, content_sha256)
             if run_id is not None:

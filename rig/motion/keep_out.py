@@ -53,7 +53,7 @@ def find_clearance_problems(
                 Problem(
                     "forearm_too_near",
                     f"{path.name} brings the {what} within {distance_m:.3f} m of the forearm's "
-                    f"{'middle' if model.forearm.offset_m else 'line'}, {least_m:g} m is the least",
+                    f"{'middle' if model.forearm.offset_m else 'line'}; at least {least_m:g} m is required",
                     path.remedy,
                 )
             )
@@ -63,8 +63,8 @@ def find_clearance_problems(
             problems.append(
                 Problem(
                     "upper_arm_too_near",
-                    f"{path.name} brings the {what} within {distance_m:.3f} m of the middle of the upper arm, "
-                    f"{least_m:g} m is the least",
+                    f"{path.name} brings the {what} within {distance_m:.3f} m of the middle of the upper arm; at least "
+                    f"{least_m:g} m is required",
                     OTHER_EXTENSION if what == "extension" else OTHER_ELBOW,
                 )
             )

@@ -45,7 +45,7 @@ def check_possible(readings: Array, rows: NDArray[np.intp], quantity: Quantity, 
         value = readings[wrong[0], axis]
         raise Refused(
             "not_a_number",
-            f"{where} has {len(wrong)} samples that no {quantity.sensor} reads, the first is sample "
+            f"{where} has {len(wrong)} samples that no {quantity.sensor} can read; the first is sample "
             f"{rows[wrong[0]] + 1}, with {value:.6g} {quantity.unit} in {quantity.columns[axis]}",
             "If the logger marks a missing value so, state its text with --columns (samples_missing); otherwise leave "
             "out these rows",
@@ -58,7 +58,7 @@ def check_temperatures(temperature_c: Array, rows: NDArray[np.intp], where: str)
     if len(wrong):
         raise Refused(
             "wrong_unit",
-            f"{where} has {len(wrong)} samples whose temperature_c is no temperature in °C, the first is sample "
+            f"{where} has {len(wrong)} samples whose temperature_c is not a temperature in °C; the first is sample "
             f"{rows[wrong[0]] + 1}, with {temperature_c[wrong[0]]:.6g}",
             "Convert kelvins, or counts by the data sheet, to °C; or give the column another name: then it is not read",
         )

@@ -315,7 +315,7 @@ def _check_direction(rate_read: Array, expected: Array, where: str, settings: Ob
     if angle <= limit:
         return
     opposite = angle >= 180 - limit
-    what = "opposite to the turn" if opposite else f"{angle:.0f}° away from the turn, {limit:g}° is allowed"
+    what = "opposite to the turn" if opposite else f"{angle:.0f}° away from the turn; {limit:g}° is allowed"
     raise Fault(
         "wrong_sign" if opposite else "wrong_axis",
         f"in {where} the gyroscope reads {what}",

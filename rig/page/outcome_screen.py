@@ -84,7 +84,7 @@ def after_verdict(about: About, checks: Sequence[Check], *, passed: bool, stored
         which = "sweep " + ", ".join(map(str, sweeps))
         return _next(f"Check who touched arm or cable in {which}, and repeat it alone", resuming(Path(about.folder)))
     if all(check.means.kind == "conformity" for check in failed):
-        return _next("The measurement is valid, the part is beyond its limits. Details", f"rig show {folder} --all")
+        return _next("The measurement is valid, but the part is beyond its limits. Details", f"rig show {folder} --all")
     config = shlex.quote(str(Path(about.folder) / CONFIG))
     return _next(f"Find the cause (rig show {folder} --checks), then measure again", f"rig run {config}")
 

@@ -62,7 +62,7 @@ def turner_for(procedure: AnyProcedure, config: RigConfig) -> TurnerSection:
     if not isinstance(config.turner, procedure.turner):
         raise Refused(
             "other_turner",
-            f"the procedure {procedure.name} plans for {procedure.turner.__name__}, the configuration says "
+            f"the procedure {procedure.name} plans for {procedure.turner.__name__}, but the configuration states "
             f"{type(config.turner).__name__}",
             "Name a procedure for what turns the sensors, or the turner that the procedure is for",
         )

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rig.errors import ProblemError, Refused
 
-ENDING = 'Let it end nothing by itself: `if __name__ == "__main__":` belongs before what runs it alone'
+ENDING = 'Do not let it end the program: put what runs it alone below `if __name__ == "__main__":`'
 
 
 @contextmanager

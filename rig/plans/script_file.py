@@ -59,10 +59,7 @@ def find_installed_script(name: str) -> ScriptFile:
 
 
 def load_script(path: Path) -> ScriptFile:
-    """Execute a file and return its `PROCEDURE`.
-
-    Other files in its folder are not imported. Raise Refused `no_script`, `script_failed`, `not_a_script`.
-    """
+    """Execute a file and return its `PROCEDURE`. Raise Refused `no_script`, `script_failed`, `not_a_script`."""
     return _execute(path, path.name, _text(path))
 
 

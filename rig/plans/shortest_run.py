@@ -144,7 +144,7 @@ def _refuse_others(wanted: TargetUncertainty, config: RigConfig) -> None:
     )
     for (kind, calibrated), sizes in zip(kinds.items(), (SIZES[:2], SIZES[2:]), strict=True):
         if not calibrated and any(getattr(wanted, size) < inf for size in sizes):
-            raise _not_predictable(f"the procedure calibrates no {kind} whose uncertainty could be wanted")
+            raise _not_predictable(f"the procedure calibrates no {kind}, so no uncertainty of one can be reached")
 
 
 def plan_of(config: RigConfig, procedure: ProcedureSection) -> Plan:

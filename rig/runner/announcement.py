@@ -65,8 +65,8 @@ def announcement(
         )
     if repeated is not None:
         lines.append(
-            "If the calibration passes, the board stores it in the place of what it had, and without another "
-            f"question {len(repeated.sweeps)} sweeps follow to verify it, for {repeated.duration_s:.0f} s."
+            "If the calibration passes, the board stores it in place of the old one; then, without another question, "
+            f"{len(repeated.sweeps)} sweeps verify it, for {repeated.duration_s:.0f} s."
         )
     lines += [*doubts(plan), *filter(None, [words.beware])]
     lines += [NOBODY, *cable_words(plan, report.state.q_rad, report.joints)]

@@ -118,8 +118,8 @@ def ask_of_other_boards(mounted: Mounted, station: Station) -> None:
     ]
     numbers = ", ".join(sensor.serial_number for sensor in doubtful)
     another = (
-        "If this is another sensor, its serial number in the configuration is wrong, and this calibration would be "
-        "taken for one of the other sensor."
+        "If this is another sensor, its serial number in the configuration is wrong, and the history would count this "
+        "calibration as one of the other sensor."
     )
     question = Prompt(
         (*statements, another),

@@ -363,7 +363,8 @@ class Rig:
                 due = self._wait(lambda: warming.is_due, at_most_s, lambda: self._watch(rest))
             if not due:
                 raise range_not_reached(
-                    missing, f"in {warming.section.timeout_min:g} minutes the sensors did not become as warm as wanted"
+                    missing,
+                    f"in {warming.section.timeout_min:g} minutes the sensors did not reach the wanted temperature",
                 )
         warming.begin_set()
         return True
@@ -381,7 +382,7 @@ class Rig:
         if self.warming is None:
             raise Refused(
                 "other_procedure",
-                "the script waits for temperatures, and the procedure has none",
+                "the script waits for temperatures, but the procedure has none",
                 "Use the section of the procedure thermal",
             )
         return self.warming
@@ -479,7 +480,7 @@ def _span_s(samples: np.ndarray) -> float:
 
 def _not_settled(dwell: Dwell, unsettled: Mapping[str, float | None]) -> Fault:
     scatter = ", ".join(
-        f"{name} has sent too little" if ratio is None else f"{name} scatters {ratio:.1f} times as much as at rest"
+        f"{name} has sent too few samples" if ratio is None else f"{name} scatters {ratio:.1f} times as much as at rest"
         for name, ratio in unsettled.items()
     )
     return Fault(

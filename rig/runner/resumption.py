@@ -37,7 +37,7 @@ class Resumption:
                 if before != now:
                     raise Refused(
                         "another_board" if what == "board" else "another_arm",
-                        f"the run was begun with the {what} {before}, this is {now}",
+                        f"the run was begun with the {what} {before}, but this is {now}",
                         f"Connect the {what} that the run began with, or start a new run with `rig run`",
                     )
             if run.sensors != sensors:

@@ -59,7 +59,7 @@ class Warming:
             if sensor.temperature_stated or not sensor.measures(TEMPERATURE):
                 raise Refused(
                     "no_thermometer",
-                    f"{name} provides no temperature, and the procedure thermal calibrates over it",
+                    f"{name} provides no temperature, but the procedure thermal calibrates over temperature",
                     "Use a sensor with a thermometer, or another procedure",
                 )
         if self.heater is None:

@@ -59,7 +59,7 @@ class WorldClock:
     def pace(self, time_scale: float) -> None:
         """Limit virtual time to `time_scale` times wall time. Raise ValueError if that is not positive and finite."""
         if not 0.0 < time_scale < float("inf"):
-            raise ValueError(f"{time_scale} is no time scale")
+            raise ValueError(f"{time_scale} is not a time scale")
         self.time_scale = time_scale
         self._anchor()
 

@@ -32,10 +32,7 @@ from rig.world.ur10e.robot import Robot
 
 
 class Laboratory:
-    """The simulated laboratory. `step` simulates 2 ms.
-
-    The same inputs at the same ticks give the same states and the same bytes from the board.
-    """
+    """The simulated laboratory, deterministic in its inputs: each `step` simulates 2 ms."""
 
     def __init__(self, config: RigConfig, world: WorldSection) -> None:
         self._config, self._world = config, world

@@ -307,7 +307,7 @@ def _parse_address(key: str, url: str) -> tuple[str, int]:
             return parts.hostname, parts.port
     except ValueError:
         pass  # the port is not a number
-    raise Refused("board_port", f"{key} {url!r} is no address to listen on", "Write socket://host:port")
+    raise Refused("board_port", f"{key} {url!r} is not an address to listen on", "Write socket://host:port")
 
 
 def _open_pty(line: SerialLine, selector: selectors.BaseSelector) -> "PtyPort":

@@ -112,7 +112,7 @@ def test_a_key_given_twice_in_a_base_is_refused(folder: Path) -> None:
         ("base: demo.yml\n", "base (line 1): demo.yml cannot be read: No such file or directory"),
         ("base: mine.yaml\n", "base (line 1): the files build on one another in a circle: this file → mine.yaml"),
         ("base: stock/../mine.yaml\n", "base (line 1): the files build on one another in a circle: this file → stock/"),
-        ("base: stock\n", "base (line 1): stock cannot be read: it is no regular file"),
+        ("base: stock\n", "base (line 1): stock cannot be read: it is not a regular file"),
         ("base: 3\n", "base (line 1): 3: must be the name of a file"),
         ("base: null\n", "base (line 1): None: must be the name of a file"),
         ("base: [a, b]\n", "base (line 1): ['a', 'b']: must be the name of a file"),

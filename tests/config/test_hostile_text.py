@@ -113,10 +113,10 @@ def test_only_regular_files_are_opened(kind: str, tmp_path: Path, monkeypatch: p
         else:
             monkeypatch.chdir(tmp_path)  # a socket's path must be short
             listener.bind("config.yaml")
-        assert "cannot be read: it is no regular file" in refusal_of(path)
+        assert "cannot be read: it is not a regular file" in refusal_of(path)
         base = tmp_path / "top.yaml"
         base.write_text(f"base: {path}\n", encoding="utf-8")
-        assert "cannot be read: it is no regular file" in refusal_of(base)
+        assert "cannot be read: it is not a regular file" in refusal_of(base)
 
 
 @pytest.mark.parametrize(
@@ -160,7 +160,7 @@ def test_an_override_that_cannot_be_read_is_refused_by_name(override: str, why: 
         ('arm: {host: "a\\u0007b"}\n', r"arm.host (line 1): holds the control character \x07"),
         ('"ar\\e[0m": 1\n', r"ar\x1b[0m (line 1): holds the control character \x1b"),
         ("arm: !!set {a}\n", "line 1: tag:yaml.org,2002:set: tags are not used in a configuration"),
-        ("3: 1\n", "the file (line 1): the key '3' is no word; put it in quotes"),
+        ("3: 1\n", "the file (line 1): the key '3' is not a word; quote it"),
         ("? [1, 2]\n: 1\n", "found unhashable key"),
         ("a: 1\n---\nb: 1\n", "expected a single document"),
         ("\ufffe: 1", "unacceptable character"),
@@ -173,9 +173,9 @@ def test_text_that_cannot_be_read_is_refused_with_its_line(text: str, why: str) 
 def test_bytes_that_are_no_text_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "config.yaml"
     path.write_bytes(b"arm: \xff\xfe\n")
-    assert "byte 6 is no UTF-8 text" in refusal_of(path)
+    assert "byte 6 is not UTF-8 text" in refusal_of(path)
     path.write_bytes(DEMO_TEXT.encode("utf-16"))
-    assert "is no UTF-8 text" in refusal_of(path)
+    assert "is not UTF-8 text" in refusal_of(path)
     path.write_bytes(b"\xef\xbb\xbf" + DEMO_TEXT.encode())
     load(path)
 

@@ -117,7 +117,10 @@ def test_a_rate_may_be_rounded_as_people_write_it() -> None:
         ("part: adis16465, range_deg_s: 245", "sensors.gyro.range_deg_s: 245: not available; the nearest is 125;"),
         ("part: mpu9250, range_deg_s: 245", "sensors.gyro.range_deg_s: 245: not available; the nearest is 250;"),
         ("part: mpu6050, rate_hz: 7", "sensors.gyro.part: 'mpu6050' is not allowed, did you mean mpu9250?"),
-        ("part: lsm9ds1, turntable: {}", "sensors.gyro.turntable: only a sensor with role: reference has one"),
+        (
+            "part: lsm9ds1, turntable: {}",
+            "sensors.gyro.turntable: only a sensor with role: reference has a calibration",
+        ),
         ("part: lsm9ds1, serial_number: Größe", "sensors.gyro.serial_number: 'Größe': must be 1 to 24 plain ASCII"),
         ("part: lsm9ds1, role: reference", "sensors: at least one sensor must have role: calibrate"),
     ],
@@ -293,7 +296,7 @@ def test_a_value_that_was_given_by_an_override_is_refused_as_that() -> None:
     told = str(caught.value)
     assert "procedure.speed_deg_s (--set): 'fast': " in told
     assert "arm.home_deg (--set): 1: must be a list in brackets" in told
-    assert "sensors.lsm9ds1.part: missing; sensors.lsm9ds1 is given by --set only, the file has gyro" in told
+    assert "sensors.lsm9ds1.part: missing; sensors.lsm9ds1 comes from --set alone; the file has gyro" in told
     assert "Correct the command line" in told
 
 

@@ -38,7 +38,7 @@ def test_without_a_number_of_repeats_there_are_enough() -> None:
 @pytest.mark.parametrize(
     ("wish", "where"),
     [
-        ((), "procedure.target_uncertainty: say the expanded uncertainty"),
+        ((), "procedure.target_uncertainty: state the expanded uncertainty"),
         (("procedure.target_uncertainty=5e-4",), "procedure.target_uncertainty (--set): "),
         (("procedure.target_uncertainty={field: 1}",), "procedure.target_uncertainty.field"),
         (("procedure.target_uncertainty={scale: often}",), "procedure.target_uncertainty.scale"),

@@ -19,7 +19,7 @@ MAGNETOMETER = "magnetometers={compass: {part: lsm9ds1_magnetometer, serial_numb
 
 
 def test_a_verification_has_one_mounting() -> None:
-    assert "procedure.verify repeats one movement with one mounting, and stages have several" in refused(
+    assert "procedure.verify repeats one movement with one mounting, but stages have several" in refused(
         "procedure.verify=true", f"procedure.{STAGES}"
     )
     assert "stages are of six_observation and servo_six_observation" in refused(
@@ -48,6 +48,6 @@ def test_an_accelerometer_that_only_looks_where_up_is_goes_with_stages_and_arcs(
 
 
 def test_an_accelerometer_cannot_be_calibrated_from_arcs() -> None:
-    assert "is not for imu" in refused(
+    assert "cannot be used with imu" in refused(
         "procedure={name: imu, arc_deg: 180}", "uncertainty.angle_std_deg=0.02", "sensors.gyro.acceleration={}"
     )

@@ -176,9 +176,9 @@ def within(text: str, key: str, value: str) -> str:
         ("home_q_rad", "[" + "[]," * 300_000 + "[]]", "over 50000 values"),
         ("home_q_rad", "[" * 100_000, "over 50000 values"),
         ("home_q_rad", "[" * 40_000, "recursion"),
-        ("stage", "9" * 5000, "no number that can be measured"),
-        ("extension_m", "[NaN, 0, 0]", "'NaN' is no number"),
-        ("extension_m", "[1e101, 0, 0]", "'1e101' is no number"),
+        ("stage", "9" * 5000, "not a number that can be measured"),
+        ("extension_m", "[NaN, 0, 0]", "'NaN' is not a number"),
+        ("extension_m", "[1e101, 0, 0]", "'1e101' is not a number"),
     ],
 )
 def test_settings_that_no_run_has_are_refused(key: str, value: str, complaint: str) -> None:
@@ -196,7 +196,7 @@ def test_what_a_terminal_would_obey_is_made_seen() -> None:
         ({"name": []}, "no event"),
         ({"name": {}}, "no event"),
         ({"detail": {"reason": [{}] * 60_000}, "name": "board_not_observed"}, "over 50000"),
-        ({"host_time_s": float("inf")}, "'Infinity' is no number"),
+        ({"host_time_s": float("inf")}, "'Infinity' is not a number"),
     ],
 )  # fmt: skip
 def test_an_event_that_never_was_is_refused(changes: dict[str, Any], complaint: str) -> None:

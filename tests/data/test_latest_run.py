@@ -46,4 +46,4 @@ def test_a_folder_of_that_name_is_meant_by_its_name(tmp_path: Path) -> None:
 def test_every_command_that_takes_a_run_takes_the_latest(words: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit, match="2"):
         main(words.split())
-    assert "latest: no run folder of yours is known to be there" in capsys.readouterr().err
+    assert "latest: no run folder of yours is known" in capsys.readouterr().err

@@ -78,11 +78,11 @@ def test_only_files_that_end_have_a_size(tmp_path: Path) -> None:
     (tmp_path / "folder").mkdir()
     assert stored_bytes(tmp_path / "a") > 0 and stored_bytes(tmp_path) == stored_bytes(tmp_path / "a")
     os.mkfifo(tmp_path / "pipe")
-    with pytest.raises(UnfitFile, match="'pipe' is no regular file"):
+    with pytest.raises(UnfitFile, match="'pipe' is not a regular file"):
         stored_bytes(tmp_path)
     with (tmp_path / "hole").open("wb") as file:
         file.truncate(1 << 40)
-    with pytest.raises(UnfitFile, match="it swells 0 bytes to 1099511627776"):
+    with pytest.raises(UnfitFile, match="it expands 0 bytes to 1099511627776"):
         stored_bytes(tmp_path / "hole")
 
 

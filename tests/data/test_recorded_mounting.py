@@ -1,4 +1,4 @@
-"""A recorded mounting that is no rotation is refused in words alone: NumPy's warnings would come before them."""
+"""A recorded mounting that is not a rotation is refused in words alone: NumPy's warnings would come before them."""
 
 import shutil
 from pathlib import Path

@@ -124,7 +124,7 @@ NINE = [f"axis {number}" for number in range(9)]
         (described(joints=["a\n", "c"]), r"turner\.joints"),
         (described(geometry=geometry(3)), "2 joints and a geometry of 3"),
         (described(geometry={**geometry(2), "a_m": [0.0]}), "geometry"),
-        (described(geometry={**geometry(2), "a_m": [0.0, float("nan")]}), "'NaN' is no number"),
+        (described(geometry={**geometry(2), "a_m": [0.0, float("nan")]}), "'NaN' is not a number"),
         (described(kind="../ur"), r"turner\.kind"),
         (described(fields=[{"name": f"f{n}", "type": "f8"} for n in range(1000)]), r"turner\.fields"),
         (field("current_a", "O"), r"turner\.fields"),

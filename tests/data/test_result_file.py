@@ -75,7 +75,7 @@ def test_only_a_regular_file_of_a_sensible_size_is_read(kind: str, tmp_path: Pat
     else:
         with path.open("wb") as file:
             file.truncate(SIZE_MAX_BYTES + 1)
-    with pytest.raises(Refused, match=r"no_result: .*(no regular file|longer than 16000000 bytes)"):
+    with pytest.raises(Refused, match=r"no_result: .*(not a regular file|longer than 16000000 bytes)"):
         read_result(path)
 
 

@@ -193,7 +193,7 @@ def test_what_is_not_a_run_file_is_refused(tmp_path: Path, content: bytes) -> No
 
 def test_a_pipe_is_no_run_file_and_is_not_waited_for(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "run.h5")
-    with pytest.raises(Refused, match=r"no_run_file.*is no regular file"):
+    with pytest.raises(Refused, match=r"no_run_file.*is not a regular file"):
         read_run(tmp_path / "run.h5")
 
 

@@ -102,7 +102,7 @@ def test_attitudes_are_possible_or_refused_with_the_distance(name: ModelName, at
     if name != "ur3e":
         assert found == []
     else:
-        assert found and all("m of the middle of the upper arm, 0.095 m is the least" in each for each in found)
+        assert found and all("m of the middle of the upper arm; at least 0.095 m is required" in each for each in found)
 
 
 def test_a_ur3e_can_stand_in_attitudes_with_wrist_2_away_from_its_arm() -> None:

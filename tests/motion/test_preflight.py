@@ -228,7 +228,8 @@ def test_an_attitude_that_brings_the_flange_to_the_forearm_is_refused() -> None:
     ]
     assert names(near) == ["forearm_too_near"]
     assert (
-        near[0].what == "dwell at 45 -135 0 brings the flange within 0.095 m of the forearm's line, 0.15 m is the least"
+        near[0].what
+        == "dwell at 45 -135 0 brings the flange within 0.095 m of the forearm's line; at least 0.15 m is required"
     )
     assert plan_problems(attitudes((45, -45, 0)), LIGHT) == []  # away from it
 
@@ -305,7 +306,7 @@ def test_a_home_about_which_wrist_2_sweeps_into_the_forearm_is_refused() -> None
     problems = plan_problems(plan(SWEPT_INTO), LIGHT)
     assert names(problems) == ["forearm_too_near"]
     assert {problem.what for problem in problems} >= {
-        f"sweep wrist_2 {way} brings the flange within 0.058 m of the forearm's line, 0.115 m is the least"
+        f"sweep wrist_2 {way} brings the flange within 0.058 m of the forearm's line; at least 0.115 m is required"
         for way in ("cw", "ccw")
     }
     assert all("wrist 1 in arm.home_deg" in problem.remedy for problem in problems)

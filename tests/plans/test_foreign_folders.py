@@ -135,7 +135,7 @@ def test_a_recording_that_never_ends_ends_no_import(foreign: Path, endless: str)
         (foreign / "run.h5").symlink_to(endless)
     for solved in ((), ("--solve",)):
         done = rig_here("history", "import", foreign, *solved, "--history", foreign.parent / "history.sqlite")
-        assert done.returncode == 1 and "it is no regular file" in done.stderr, done.stderr
+        assert done.returncode == 1 and "it is not a regular file" in done.stderr, done.stderr
 
 
 @pytest.mark.parametrize("command", [("report",), ("history", "import")])
@@ -268,6 +268,6 @@ def test_a_configuration_cannot_have_a_file_replaced_that_is_no_boards_flash(tmp
         file.symlink_to(target)
     else:
         os.mkfifo(file)
-    with pytest.raises(Refused, match=r"flash_file: .* is no flash that a simulated board left"):
+    with pytest.raises(Refused, match=r"flash_file: .* is not the flash of a simulated board"):
         open_flash(file)
     assert target.read_bytes() == bytes(300_000)

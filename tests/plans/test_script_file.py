@@ -83,7 +83,7 @@ def test_only_a_regular_file_of_a_sensible_size_is_a_script(tmp_path: Path, kind
         path = Path("/dev/zero")
     else:
         path.write_bytes(b"#" * (SIZE_MAX_BYTES + 1))
-    with pytest.raises(Refused, match=r"no_script: .*(no regular file|longer than 1000000 bytes)"):
+    with pytest.raises(Refused, match=r"no_script: .*(not a regular file|longer than 1000000 bytes)"):
         load_script(path)
 
 

@@ -39,7 +39,7 @@ def test_an_arm_that_was_moved_between_the_halves_goes_on_only_if_somebody_agree
         failed.callback(process.kill)
         os.close(terminal)
         read_until(b"Type go to start")
-        assert b"without another question 6 sweeps follow to verify it, for " in said
+        assert b"without another question, 6 sweeps verify it, for " in said
         os.write(operator, b"go\n")
         read_until(b"stored on the board: gyro")
         with socket.create_connection((handle.host, 30002)) as pendant:

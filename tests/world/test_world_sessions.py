@@ -148,13 +148,13 @@ def test_a_client_may_not_ask_for_more_than_there_is() -> None:
     answers = [rtde.receive(struct.pack(">HB", 3 + len(recipe), ord("I")) + recipe) for _ in range(300)]
     assert answers[254][3] == 255 and answers[255].endswith(b"\0\x04I\0")
     rtde.handle_close()
-    assert b"no RTDE" in rtde.receive(b"\0\0\0") and rtde.closing
+    assert b"not RTDE" in rtde.receive(b"\0\0\0") and rtde.closing
     said = b"".join(dashboard.receive(b"x" * 10_000) for _ in range(7))
     assert said.startswith(b"could not understand: a line of more than") and dashboard.closing
     script.greeting()
     for _ in range(17):
         script.receive(b"def odd():\n" + b" sleep(1)\n" * 6600)
-    assert script.closing and b"bytes is none" in script.tick()
+    assert script.closing and b"bytes is not accepted" in script.tick()
 
 
 @pytest.mark.parametrize("port", ["socket://127.0.0.1", "socket://127.0.0.1:x", "/dev/ttyACM0"])

@@ -13,7 +13,7 @@ from rig.observation.external.csv_samples import Samples
 from rig.observation.false_readings import check_frozen
 from rig.observation.stuck_check import check_reads
 
-NO_SWEEPS = Fault("too_few_observations", "moves by hand are no sweeps", "Give sweeps in six directions")
+NO_SWEEPS = Fault("too_few_observations", "moves by hand are not sweeps", "Give sweeps in six directions")
 
 
 def solve_hand_samples(item: Item, samples: Samples, columns: Columns) -> SensorResult:

@@ -105,15 +105,13 @@ def _check_identifiability(identifiability: Identifiability, count: int) -> None
         raise Refused(
             "rank_deficient",
             f"{count} attitudes determine {identifiability.rank} of the {identifiability.needed} numbers of an "
-            "accelerometer's calibration; "
-            f"undetermined: {', '.join(identifiability.undetermined)}",
+            f"accelerometer's calibration; undetermined: {', '.join(identifiability.undetermined)}",
             remedy,
         )
     if identifiability.condition > MAX_CONDITION:
         raise Refused(
             "ill_conditioned",
             f"{count} attitudes hardly determine an accelerometer's calibration "
-            f"(condition {identifiability.condition:.3g}, "
-            f"{MAX_CONDITION:g} is the most)",
+            f"(condition {identifiability.condition:.3g}; the limit is {MAX_CONDITION:g})",
             remedy,
         )

@@ -42,7 +42,7 @@ class Equations:
         if rows is None or rows.rates_rad_s is None or not exact_rates:
             raise Fault(
                 "no_rates",
-                "the attitudes do not say how the table turned, or not that it is exact",
+                "the attitudes do not state how the table turned, or not that this is exact",
                 "Use increments, which need no rates; or give the columns rate_x_rad_s, rate_y_rad_s, rate_z_rad_s "
                 "in body coordinates, with --exact-rates where their noise is far below the sensor's",
             )

@@ -198,7 +198,7 @@ def _check_not_sole(
         "too_few_observations",
         f"the scale factor of {quantity.sensor} {quantity.axes[axis]} depends on one attitude, from "
         f"{window.start_s:.4g} to {window.end_s:.4g} s: if that is wrong, no other attitude shows it",
-        "Let the body lie still in more attitudes: with each axis up, down and aslant",
+        "Let the body lie still in more attitudes: with each axis up, down and tilted",
     )
 
 

@@ -20,7 +20,7 @@ def check_steady(change: AbruptChange | None, quantity: Quantity, least_evidence
         raise Fault(
             "bias_jumped",
             f"from {change.from_s:.6g} s on the {quantity.sensor} reads {abs(size):.2g} {quantity.unit} "
-            f"{'more' if size > 0 else 'less'} on {name} than before: its bias is another",
+            f"{'more' if size > 0 else 'less'} on {name} than before: its bias has changed",
             f"{REMEDY}; let it warm up",
         )
     if change.what == "scale" and abs(size) > MOST_OF_SCALE:
@@ -28,5 +28,5 @@ def check_steady(change: AbruptChange | None, quantity: Quantity, least_evidence
             "scale_changed",
             f"from {change.from_s:.6g} s on the {quantity.sensor} reads {100 * abs(size):.2g} % "
             f"{'more' if size > 0 else 'less'} on {name} of the same motion than before",
-            f"{REMEDY}; see that what tells the motion does not change either",
+            f"{REMEDY}; check that the source of the motion did not change either",
         )

@@ -60,8 +60,8 @@ class InIncrements:
         """A note on attitudes that are turned from some time on."""
         if (reset := self.solution.reset) is not None:
             yield (
-                f"from {reset[0]:.2f} s on all attitudes are turned by {np.degrees(reset[1]):.2g}° against those "
-                "before: the reference has a new home, or readings are missing there"
+                f"from {reset[0]:.2f} s on, all attitudes are rotated by {np.degrees(reset[1]):.2g}° relative to "
+                "those before: the reference has a new zero, or readings are missing there"
             )
 
 

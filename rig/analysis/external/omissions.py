@@ -50,7 +50,7 @@ def notes_on_reading(read: ReadElsewhere, samples: Samples) -> Iterator[str]:
 def notes_on_speeds(data: ExternalData) -> Iterator[str]:
     """Yield a note if speeds look like °/s; a wrong unit that both files share falsifies only the bias."""
     fastest = max((sweep.speed_rad_s for sweep in data.sweeps), default=0.0)
-    remedy = "if both files are in °/s, name that unit with --columns, for the bias depends on it"
+    remedy = "if both files are in °/s, state that unit with --columns, because the bias depends on it"
     if RATE.mistaken is not None and fastest > RATE.mistaken.unusual:
         yield (
             f"the sweeps turn at up to {fastest:.4g} rad/s ({np.degrees(fastest):.4g} °/s), faster than most "
@@ -76,8 +76,8 @@ def notes_on_changes(data: ExternalData) -> Iterator[str]:
     count = len(data.sweeps) + len(data.all_rests)
     if count > MOST_ROWS:
         yield (
-            f"abrupt changes of the sensor were not looked for in {count} rows of sweeps and rests: that is done in up "
-            f"to {MOST_ROWS}"
+            f"abrupt changes of the sensor were not searched for: there are {count} rows of sweeps and rests, and the "
+            f"search takes up to {MOST_ROWS}"
         )
 
 
@@ -88,6 +88,6 @@ def notes_on_turns(data: ExternalData, solution: Estimate) -> Iterator[str]:
     why = "the body moves before or after them"
     if isinstance(solution, TurnedSolution):
         rows = ", ".join(map(str, data.by_mean))
-        yield f"{len(data.by_mean)} of {len(data.sweeps)} turns count by their mean speed, since {why}: rows {rows}"
+        yield f"{len(data.by_mean)} of {len(data.sweeps)} turns count by their mean speed because {why}: rows {rows}"
     else:
         yield f"all {len(data.sweeps)} turns count by their mean speed: {why}"

@@ -55,7 +55,7 @@ def _name_contradiction(worst: int, data: ExternalData) -> str:
     axis = data.sweeps[worst].axis_flange
     about = [sweep.sweep for sweep in data.sweeps if abs(sweep.axis_flange @ axis) > SAME_AXIS]
     if len(about) == 2:
-        return f"of sweeps {about[0]} and {about[1]}, alone about their axis, one contradicts the other"
+        return f"of sweeps {about[0]} and {about[1]}, the only ones about their axis, one contradicts the other"
     return f"sweep {data.sweeps[worst].sweep} contradicts the others"
 
 

@@ -134,8 +134,8 @@ def _drift(name: str, recordings: Sequence[ObservedRun], settings: RunSettings) 
         change_t, std_t = np.linalg.norm(drift.change_t), np.linalg.norm(drift.std_t)
         raise Fault(
             "field_drifts",
-            f"at home the readings changed by {1e6 * change_t:.3f} µT between two tests, and noise explains "
-            f"{1e6 * std_t:.3f}: a field that drifts reads as bias and scale",
+            f"at home the readings changed by {1e6 * change_t:.3f} µT between two tests, but noise explains only "
+            f"{1e6 * std_t:.3f} µT: a drifting field is taken for bias and scale",
             "Find what changed (a lift, a vehicle, a current, a sensor that warms up), wait, and run again",
         )
     return drift
@@ -165,8 +165,7 @@ def _attitude_error_rad(
 def _describe_nonuniformity(uniformity: Uniformity, solution: TriaxialSolution) -> str:
     residual_t = np.sqrt(np.mean(solution.residuals**2))
     return (
-        f"the field is not the same in all attitudes: χ² of the residuals is {uniformity.chi_square:.4g}, "
-        f"{uniformity.limit:.3g} at most by noise and by attitude errors of "
-        f"{1e3 * uniformity.attitude_error_rad:.2g} mrad; "
-        f"{1e6 * residual_t:.3f} µT is their RMS"
+        f"the field is not the same in all attitudes: χ² of the residuals is {uniformity.chi_square:.4g}, but noise "
+        f"and attitude errors of {1e3 * uniformity.attitude_error_rad:.2g} mrad explain {uniformity.limit:.3g} at "
+        f"most; their RMS is {1e6 * residual_t:.3f} µT"
     )

@@ -85,5 +85,7 @@ def check_identifiable(second_order: Array, std: Array, remedy: str) -> None:
     largest = float(np.max(np.abs(second_order) / std))
     if largest < IDENTIFIABLE:
         raise Fault(
-            "second_order_not_seen", f"no second-order term is beyond {largest:.1f} of its standard deviations", remedy
+            "second_order_not_seen",
+            f"the largest second-order term is only {largest:.1f} times its standard deviation",
+            remedy,
         )

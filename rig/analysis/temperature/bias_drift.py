@@ -109,7 +109,7 @@ def _select_complete(means: Mapping[int, DwellMean], table: Sequence[Sequence[in
     if len(complete) < FEWEST_REPEATS:
         raise Fault(
             "not_all_attitudes",
-            f"{len(complete)} of {len(table)} repeats were finished, and a drift needs {FEWEST_REPEATS}",
+            f"{len(complete)} of {len(table)} repeats were finished, but a drift needs {FEWEST_REPEATS}",
             "Go on with `rig resume RUN_DIR`, or run the procedure again",
         )
     return complete

@@ -35,7 +35,7 @@ CONTRIBUTOR = "polynomials over temperature"
 ASSUMED_GRADIENT_K = 0.1  # a half-width, if no configuration states it
 NOT_RECORDED = Fault(
     "temperature_not_recorded",
-    "a calibration over temperature is requested, and the readings have no temperature",
+    "a calibration over temperature is requested, but the readings have no temperature",
     "Record the part's thermometer with its readings, column temperature_c",
 )
 

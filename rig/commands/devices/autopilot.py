@@ -92,7 +92,7 @@ def _restore(options: Namespace) -> int:
         if (planned.autopilot_id, planned.firmware) != (autopilot_id(link), link.identity.firmware):
             raise Refused(
                 "autopilot_other_uid",
-                f"{options.file} is of the autopilot {planned.autopilot_id}, the one at {link.port} is "
+                f"{options.file} is of the autopilot {planned.autopilot_id}, but the one at {link.port} is "
                 f"{autopilot_id(link)}",
                 "Connect that autopilot, or give the file of this one",
             )
@@ -165,10 +165,7 @@ def _backup_path(options: Namespace) -> Path:
 
 @contextmanager
 def _connect(options: Namespace) -> Iterator[tuple["AutopilotLink", Mapping[str, "SensorSection"]]]:
-    """Connect to the only autopilot of a configuration, with its IMUs; start the simulated laboratory, if any.
-
-    Raise Refused `no_autopilot_section`.
-    """
+    """Connect to the configuration's only autopilot, real or simulated. Raise Refused `no_autopilot_section`."""
     from rig.commands.laboratory.claims import claim_sensor
     from rig.commands.laboratory.laboratory_process import run_simulated_laboratory
     from rig.commands.laboratory.own_address import load_at_own_address

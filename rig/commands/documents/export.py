@@ -122,6 +122,6 @@ def _read_calibrations(run: Path, moved: tuple[str, str] | None) -> "ExportedCal
     try:
         temperature_c = float(temperature)
     except ValueError as error:
-        remedy = "Give it as in --at-temperature 31.5 DRIFT_RUN"
+        remedy = "Give it like this: --at-temperature 31.5 DRIFT_RUN"
         raise Refused("bad_option", f"--at-temperature {temperature} is not a temperature", remedy) from error
     return move_to_temperature(run_calibrations, read_result(Path(drift)), temperature_c)

@@ -185,7 +185,7 @@ def find_signed_holder(
 def _print_file(documents: VerifiedFile) -> None:
     say(f"{documents.file}: {_describe_state(documents.problems)}")
     for seal in documents.signatures:
-        when = "at a time it does not say" if seal.when is None else f"{seal.when:%Y-%m-%d %H:%M:%S %Z}"
+        when = "at a time that it does not state" if seal.when is None else f"{seal.when:%Y-%m-%d %H:%M:%S %Z}"
         clock = "the signer's own clock" if seal.time_server is None else f"the time server {seal.time_server}"
         say(f"  signed by {seal.signer}, {when} by {clock}")
         say(f"  its certificate has SHA-256 {seal.certificate_sha256}; {TRUST_WORDS[seal.trusted]}")

@@ -107,7 +107,7 @@ def _day(text: str) -> date:
     try:
         return date.fromisoformat(text)
     except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is no day; write it as 2026-11-20") from None
+        raise argparse.ArgumentTypeError(f"{text!r} is not a date; write it as 2026-11-20") from None
 
 
 def run(options: argparse.Namespace) -> int:

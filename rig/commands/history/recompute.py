@@ -77,7 +77,9 @@ def _question(options: Namespace) -> RecomputeQuestion:
         raise Refused("bad_option", f"--jobs {options.jobs} is too small", "Give 1 or more")
     if not options.u_fraction > 0:
         raise Refused(
-            "bad_option", f"--u-fraction {options.u_fraction} is not a fraction of U", "Give a number above 0, as 0.1"
+            "bad_option",
+            f"--u-fraction {options.u_fraction} is not a fraction of U",
+            "Give a number above 0, such as 0.1",
         )
     for item in options.overrides:
         find_setting(item)

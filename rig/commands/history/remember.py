@@ -97,7 +97,7 @@ def remember_certificate(folder: Path, result: str, certificate: "Issued", histo
 
 
 def _find_own(folder: Path, history: str | None) -> "tuple[Loaded | None, HistoryAddress | None]":
-    """Return the configuration of the run in `folder`, and the address of `history`, or of the user's own.
+    """Return the configuration of the run in `folder`, and the address of `history`, by default the user's own.
 
     The address is None if there is no history, or if the configuration switches it off and none is named.
     """

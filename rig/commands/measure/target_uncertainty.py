@@ -79,7 +79,7 @@ def parse_target(options: Sequence[str], at_most_s: float | None) -> "TargetUnce
         except ValueError:
             raise Refused("bad_option", f"--target-uncertainty {option} is not a number", EXAMPLE) from None
         if name not in NAMES or not 0 < uncertainties[name] < inf:
-            raise Refused("bad_option", f"--target-uncertainty {option} is none of {', '.join(NAMES)}", EXAMPLE)
+            raise Refused("bad_option", f"--target-uncertainty {option} is not one of {', '.join(NAMES)}", EXAMPLE)
     if not uncertainties:
         raise Refused("bad_option", "--max-duration-s and --write are for a run with --target-uncertainty", EXAMPLE)
     if at_most_s is not None and not (isfinite(at_most_s) and at_most_s > 0):

@@ -21,7 +21,9 @@ def add(solve: ArgumentParser) -> None:
         ".ulg, .mat",
     )
     motion = solve.add_mutually_exclusive_group()
-    motion.add_argument("--sweeps", type=Path, metavar="CSV", help="the sweeps, for samples of another program")
+    motion.add_argument(
+        "--sweeps", type=Path, metavar="CSV", help="file of the sweeps, for samples that another program recorded"
+    )
     motion.add_argument(
         "--attitudes", type=Path, metavar="CSV", help="the attitudes in which the samples were recorded"
     )

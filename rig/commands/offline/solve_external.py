@@ -114,7 +114,7 @@ def _read_time(text: str) -> datetime:
     try:
         return datetime.fromisoformat(text)
     except ValueError:
-        raise ArgumentTypeError(f"{text!r} is no time; write it as 2026-11-25T08:30") from None
+        raise ArgumentTypeError(f"{text!r} is not a time; write it as 2026-11-25T08:30") from None
 
 
 def refuse_for_recording(options: Namespace) -> None:
@@ -240,7 +240,8 @@ def _read_turn_options(options: Namespace) -> "Columns":
         raise Refused(
             "clock_unknown",
             "no reading shows the error of the time stamps' rate, and the scale factors have the same relative error",
-            "State it: --clock-ppm 50 for a crystal; a part's own data rate is wrong by some per cent, and is no clock",
+            "State it: --clock-ppm 50 for a crystal. A part's own data rate is wrong by a few per cent and cannot "
+            "serve as a clock",
         )
     for name, largest in (("clock_ppm", 1e5), ("squareness_deg", 10.0)):
         if not 0 < getattr(options, name) <= largest:

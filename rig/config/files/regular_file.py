@@ -13,7 +13,7 @@ _shut: list[Callable[[], Iterable[FileIdentity]]] = []
 
 
 class UnfitFile(Exception):
-    """The reason why a file is not read, as the end of a sentence: "it is no regular file"."""
+    """The reason why a file is not read, as the end of a sentence: "it is not a regular file"."""
 
 
 def file_identity(path: Path) -> FileIdentity | None:
@@ -65,7 +65,7 @@ def _check(status: os.stat_result, max_bytes: int) -> None:
     if stat.S_ISLNK(status.st_mode):
         raise UnfitFile("it is a link")
     if not stat.S_ISREG(status.st_mode):
-        raise UnfitFile("it is no regular file")
+        raise UnfitFile("it is not a regular file")
     if any((status.st_dev, status.st_ino) in identities() for identities in tuple(_shut)):
         raise UnfitFile("it is the history that is open")
     if status.st_size > max_bytes:

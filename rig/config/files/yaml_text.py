@@ -26,9 +26,9 @@ TEXT = "tag:yaml.org,2002:str"
 NOTHING = "tag:yaml.org,2002:null"
 MERGE = "tag:yaml.org,2002:merge"
 OTHER_FILES = {  # files given for a configuration by mistake, and where they belong
-    ".py": "a Python script, no configuration; a procedure of your own is run by `rig run CONFIG --script FILE.py`",
-    ".h5": "a recording, no configuration; it is solved by `rig solve FILE.h5`",
-    ".csv": "a table of readings, no configuration; it is solved by `rig solve FILE.csv`",
+    ".py": "a Python script, not a configuration; run a procedure of your own with `rig run CONFIG --script FILE.py`",
+    ".h5": "a recording, not a configuration; solve it with `rig solve FILE.h5`",
+    ".csv": "a table of readings, not a configuration; solve it with `rig solve FILE.csv`",
 }
 # Invisible characters: control, format, surrogates, breaks of lines and paragraphs.
 UNSEEN = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})
@@ -73,13 +73,13 @@ def read_file(path: Path) -> str:
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise Unreadable(f"cannot be read: byte {error.start + 1} is no UTF-8 text") from None
+        raise Unreadable(f"cannot be read: byte {error.start + 1} is not UTF-8 text") from None
 
 
 def read_yaml(text: str) -> Document:
     """Parse one YAML document. Raise `Unreadable`."""
     if len(text) > SIZE_MAX_BYTES:
-        raise Unreadable(f"is longer than {SIZE_MAX_BYTES} characters, so it is no configuration")
+        raise Unreadable(f"is longer than {SIZE_MAX_BYTES} characters, so it is not a configuration")
     for number, line in enumerate(text.split("\n"), 1):
         if (character := first_control_character(line.rstrip("\r").replace("\t", " "))) is not None:
             raise Unreadable(f"holds the control character {printable(character)}", number)
@@ -168,7 +168,7 @@ def _survey(
         for key, value in node.value:
             line = key.start_mark.line + 1
             if key.tag not in (TEXT, MERGE):
-                yield f"{format_path(location)} (line {line}): the key {quote(key.value)} is no word; put it in quotes"
+                yield f"{format_path(location)} (line {line}): the key {quote(key.value)} is not a word; quote it"
                 continue
             path = (*location, key.value)
             if path in lines:

@@ -20,14 +20,14 @@ def history_url(text: str) -> "URL":
     try:
         url = make_url(text)
     except (ArgumentError, ValueError) as error:
-        raise ValueError("is no URL") from error
+        raise ValueError("is not a URL") from error
     if url.drivername not in SCHEMES:
         raise ValueError(f"must be a file or begin with {' or '.join(f'{scheme}://' for scheme in SCHEMES)}")
     allowed = ALLOWED[url.drivername]
     for key in url.query:
         if key not in allowed:
-            may = f"; it may say {', '.join(allowed)}" if allowed else ""
-            raise ValueError(f"says {key!r} after its question mark, which is not for a URL of a history{may}")
+            may = f"; it may state {', '.join(allowed)}" if allowed else ""
+            raise ValueError(f"states {key!r} after its question mark, which a URL of a history cannot have{may}")
     if url.query.get("sslmode", ENCRYPTED[0]) not in ENCRYPTED:
         raise ValueError(f"has an sslmode other than {', '.join(ENCRYPTED)}")
     if url.drivername == "sqlite" and (not url.database or url.host or url.username):

@@ -74,8 +74,8 @@ class UncertaintyKeys(BaseModel, Generic[OfSensors]):
     )
     crystal_ppm: Positive = Field(
         default=20.0,
-        description="error of the board's 32768 Hz crystal at room temperature; by hand also of the clock of a device "
-        "that prints lines or of an autopilot, and then it must be stated",
+        description="error of the board's 32768 Hz crystal at room temperature; in a session by hand also that of "
+        "the clock of an autopilot or of a device that prints lines, for which it must be stated",
     )
     axis_deg: float = Field(
         default=0.06,
@@ -95,15 +95,16 @@ class UncertaintyKeys(BaseModel, Generic[OfSensors]):
         default=0.1,
         ge=0,
         le=20,
-        description="of a calibration over temperature: by how much the difference between the part's "
-        "thermometer and its sensor may change from the run to the use; a typical value, as no data sheet states it",
+        description="for a calibration over temperature: how much the temperature difference between a part's "
+        "thermometer and its sensing element may change between run and use; a typical value, as no data sheet "
+        "states it",
     )
     angle_std_deg: float | None = Field(
         default=None,
         ge=0,
         le=5,
-        description="standard deviation of a joint's angle about the angle of its encoder: for sweeps that are no "
-        "whole turns. No default, for no maker of these arms states it; whole turns do not need it",
+        description="standard deviation of a joint's angle about the angle of its encoder, for sweeps that are not "
+        "whole turns. There is no default because no maker of these arms states it",
     )
     mount_deg: float = Field(
         default=1.0,

@@ -65,8 +65,8 @@ class SiteSection(Section):
         default=None,
         ge=1,
         le=1000,
-        description="size of the magnetic field at the magnetometer's place, measured there with a reference; the "
-        "scale factors are relative to it; without it a magnetometer is recorded but not calibrated",
+        description="magnitude of the magnetic field at the magnetometer's position, measured there with a reference; "
+        "the scale factors are relative to it; without it a magnetometer is recorded but not calibrated",
     )
     magnetic_field_uncertainty_ut: float | None = Field(
         default=None,

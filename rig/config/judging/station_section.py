@@ -43,5 +43,5 @@ class StationSection(Section):
         try:
             re.compile(value, re.ASCII)
         except re.error as error:
-            raise ValueError(f"is no regular expression: {error}") from None
+            raise ValueError(f"is not a regular expression: {error}") from None
         return value

@@ -43,8 +43,8 @@ class ByHandSection(ProcedureSection):
         default=0.3,
         gt=0,
         le=1.1,
-        description="how well a whole turn ends where it began, a standard deviation; one that misses by more than "
-        "three of these is asked for again",
+        description="standard deviation of the angle by which a whole turn misses its start; a turn that misses it "
+        "by more than three of these must be repeated",
     )
     target_scale_u: Ratio | None = Field(
         default=None,
@@ -59,17 +59,18 @@ class ByHandSection(ProcedureSection):
         others = [name for name, sensor in config.sensors.items() if not sensor.on_board]
         if others and "crystal_ppm" not in config.uncertainty.model_fields_set:
             yield (
-                f"uncertainty.crystal_ppm: say by how much the clock of {' and '.join(others)} may be off, for nothing "
-                "in a session by hand shows it: 50 of a crystal, 5000 of a ceramic resonator, as an Arduino Uno has one"
+                f"uncertainty.crystal_ppm: state how far the clock of {' and '.join(others)} may be off, because "
+                "nothing in a session by hand shows it: 50 for a crystal, 5000 for a ceramic resonator such as that "
+                "of an Arduino Uno"
             )
         for name, sensor in config.sensors.items():
             if not sensor.on_board and sensor.part not in STAMPED_THERE:
                 yield f"sensors.{name}: a {sensor.part} is not calibrated by hand"
             elif sensor.lines is not None and sensor.lines.clock == "arrival":
                 yield (
-                    f"sensors.{name}.lines.clock: by hand the device has to print its time, for no other clock is "
-                    "there. Let its program begin each line with micros(), or with the sample's number if a timer "
-                    "starts it; then write a new file: rig lines PORT --write NEW.yaml"
+                    f"sensors.{name}.lines.clock: in a session by hand the device must print its time, because there "
+                    "is no other clock. Let its program begin each line with micros(), or with the sample's number if "
+                    "a timer starts it; then write a new file: rig lines PORT --write NEW.yaml"
                 )
             elif sensor.rate_hz < LEAST_RATE_HZ:
                 yield f"sensors.{name}.rate_hz: {sensor.rate_hz:g} is too slow for a hand; at least {LEAST_RATE_HZ:g}"

@@ -76,8 +76,8 @@ class SixSweepsSection(ProcedureSection):
         default=360.0,
         ge=30,
         le=3600,
-        description="how far a sweep turns at constant speed, centred on `arm.home_deg`; 360 and its multiples are "
-        "whole turns, whose angle is known because the circle closes; any other angle is that of the encoders: "
+        description="angle of a sweep at constant speed, centred on `arm.home_deg`; 360 and its multiples are whole "
+        "turns, whose angle is known because the circle closes; the encoders measure any other angle, with the error "
         "`uncertainty.angle_std_deg`",
     )
     acceleration_deg_s2: float = Field(
@@ -103,9 +103,8 @@ class SixSweepsSection(ProcedureSection):
 
     earth_rate: Literal["known", "find"] = Field(
         default="known",
-        description="`known`: taken out if `site` gives latitude and heading, else part of the uncertainty; "
-        "`find`: found from the readings of a gyroscope that is good enough; this needs rests in many "
-        "attitudes (`imu`)",
+        description="`known`: taken out if `site` gives latitude and heading, else part of the uncertainty; `find`: "
+        "found from the readings of a gyroscope that is good enough; this needs rests in many attitudes (`imu`)",
     )
 
     @property
@@ -147,9 +146,9 @@ class SixSweepsSection(ProcedureSection):
         """Yield a problem for an arc whose angle is too uncertain, or that exceeds the board's memory."""
         if self.arcs and config.uncertainty.angle_std_deg is None:
             yield (
-                f"procedure.arc_deg {self.arc_deg:g} is no whole turn, so the encoders measure how far a "
-                "sweep went: give "
-                "uncertainty.angle_std_deg, how far a joint may be from the angle of its encoder"
+                f"procedure.arc_deg {self.arc_deg:g} is not a whole turn, so the encoders measure the angle of a "
+                "sweep: give uncertainty.angle_std_deg, the standard deviation of a joint's angle about that of its "
+                "encoder"
             )
         if self.arcs and self.finds_earth_rate:
             yield f"procedure.earth_rate: find needs whole turns, and procedure.arc_deg is {self.arc_deg:g}"
@@ -177,15 +176,15 @@ class SixObservationSection(SixSweepsSection):
         default=None,
         gt=0,
         lt=0.1,
-        description="expanded uncertainty of the scale factors at which the run ends: after a repeat, with the arm at "
-        "home; without it and `target_bias_u_rad_s`, it ends when all repeats are made; a run that does not come to it "
-        "fails the check `scale_u`",
+        description="expanded uncertainty of the scale factors at which the run ends: it ends after a repeat, with "
+        "the arm at home; without this and `target_bias_u_rad_s`, it ends when all repeats are made; a run that does "
+        "not reach it fails the check `scale_u`",
     )
     target_bias_u_rad_s: float | None = Field(
         default=None,
         gt=0,
         lt=1,
-        description="the same of the biases, with the check `bias_u`; where both are given, both must be reached",
+        description="the same for the biases, with the check `bias_u`; if both are given, both must be reached",
     )
 
     @property
@@ -207,12 +206,12 @@ class SixObservationSection(SixSweepsSection):
         yield from SixSweepsSection.problems(self, config)
         if self.stages and (self.target_scale_u or self.target_bias_u_rad_s):
             yield (
-                "procedure.target_scale_u and target_bias_u_rad_s (or name: shortest) end a run after a repeat, and "
-                "procedure.stages has its repeats in each mounting: leave out one or the other"
+                "procedure.target_scale_u and target_bias_u_rad_s (or name: shortest) end a run after a repeat, but "
+                "procedure.stages makes all repeats in each mounting: leave out one or the other"
             )
         if self.stages and self.verify:
             yield (
-                "procedure.verify repeats one movement with one mounting, and stages have several: leave out "
+                "procedure.verify repeats one movement with one mounting, but stages have several: leave out "
                 "procedure.stages, or calibrate in stages first and run procedure.name: verify afterwards"
             )
         beyond = "procedure.stages" if self.stages else f"procedure.arc_deg {self.arc_deg:g}" if self.arcs else None
@@ -259,10 +258,9 @@ class AttitudesSection(ProcedureSection):
         default=SETS["eighteen"],
         min_length=1,
         max_length=100,
-        description="`eighteen`: the best for an arm whose attitudes are good to 1 mrad; `faces`: twelve that "
-        "are the best for exact attitudes; `magnetic`: the eighteen, and eight more for "
-        "magnetometers; or a list of your own, with the angles of wrists 1, 2 and 3 for each "
-        "attitude; base, shoulder and elbow stay as in `arm.home_deg`",
+        description="`eighteen`: the best for an arm whose attitudes are good to 1 mrad; `faces`: twelve that are the "
+        "best for exact attitudes; `magnetic`: the eighteen, and eight more for magnetometers; or a list of your own, "
+        "with the angles of wrists 1, 2 and 3 for each attitude; base, shoulder and elbow stay as in `arm.home_deg`",
         json_schema_extra={
             "unit": "°",
             "allowed": f"{', '.join(f'`{name}`' for name in SETS)} or a list of 3 numbers each",
@@ -350,8 +348,8 @@ class ImuSection(SixSweepsSection, AttitudesSection):
         yield from AttitudesSection.problems(self, config)
         if self.arc_deg != 360:
             yield (
-                f"procedure.arc_deg {self.arc_deg:g} is not for imu: of each sweep an accelerometer's wave is found, "
-                "which is that of one whole turn; leave it at 360, or use six_observation"
+                f"procedure.arc_deg {self.arc_deg:g} cannot be used with imu, which fits an accelerometer's wave over "
+                "one whole turn of each sweep; leave it at 360, or use six_observation"
             )
 
     name: Literal["imu"] = Field(default="imu", description="this procedure")
@@ -418,11 +416,11 @@ class ThermalSection(SixSweepsSection, AttitudesSection):
         gaps, other = (2, "") if self.both_directions else (3, " with both_directions: false")
         if self.to_c - self.from_c < gaps * self.max_step_k:
             raise ValueError(
-                f"from_c and to_c must be {gaps} gaps apart at least{other}: a line through two points shows nothing"
+                f"from_c and to_c must be at least {gaps} gaps apart{other}: a line through two points shows nothing"
             )
         least_k = MIN_RANGE_C + self.max_step_k
         if self.to_c - self.from_c < least_k:
-            raise ValueError(f"from_c and to_c must be {MIN_RANGE_C:g} K and a gap apart at least: {least_k:g} K")
+            raise ValueError(f"from_c and to_c must be at least {MIN_RANGE_C:g} K and a gap apart: {least_k:g} K")
         if not self.max_step_k / 2 <= self.reference_c - self.from_c <= self.to_c - self.from_c - self.max_step_k / 2:
             raise ValueError("reference_c must lie between from_c and to_c, half a gap from each: sets end before them")
         if self.max_temperature_c <= self.to_c:

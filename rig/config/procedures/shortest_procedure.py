@@ -36,7 +36,7 @@ class TargetUncertaintySection(Section):
     def require_target(self) -> Self:
         """Refuse a section without any target, which could not end the run early."""
         if self.scale is None and self.bias is None:
-            raise ValueError("say the expanded uncertainty at which the run ends, as {scale: 1e-3, bias: 1e-4}")
+            raise ValueError("state the expanded uncertainty at which the run ends, such as {scale: 1e-3, bias: 1e-4}")
         return self
 
 
@@ -54,7 +54,7 @@ def alternative_procedure(document: Mapping[str, Any]) -> str | None:
     if kind not in OTHERS:
         return None
     why, name = OTHERS[kind]
-    return f"{SHORTEST}: {why}; say name: {name}, and {IN_ADVANCE}"
+    return f"{SHORTEST}: {why}; set name: {name}, and {IN_ADVANCE}"
 
 
 def expand_procedure(section: Mapping[str, Any], wanted: TargetUncertaintySection) -> dict[str, Any]:

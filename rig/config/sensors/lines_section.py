@@ -155,13 +155,14 @@ class LinesSection(Section):
         default="#",
         max_length=4,
         pattern=PRINTABLE,
-        description="beginning of lines that are no samples",
+        description="beginning of lines that are not samples",
         json_schema_extra={"allowed": "at most 4 plain characters"},
     )
     checksum: Literal["none", "nmea"] = Field(
         default="none",
-        description="`nmea`: the line ends with `*` and two hexadecimal digits, the XOR of all characters before, but "
-        "for a `$` or `!` at the start; one damaged line in 256 passes it, without it a damaged digit always does",
+        description="`nmea`: the line ends with `*` and two hexadecimal digits, the XOR of all characters before it "
+        "except a `$` or `!` at the start; one damaged line in 256 passes this test, whereas without it a damaged "
+        "digit always passes",
     )
     clock: Literal["device", "counted", "arrival"] = Field(
         default="device",

@@ -273,7 +273,10 @@ class SensorSection(Section):
     def require_reference(cls, value: TurntableSection, info: ValidationInfo) -> TurntableSection:
         """Refuse a given calibration for a sensor that is to be calibrated."""
         if info.data.get("role") == "calibrate":
-            raise ValueError("only a sensor with role: reference has one; a sensor to calibrate gets its own here")
+            raise ValueError(
+                "only a sensor with role: reference has a calibration in the configuration; the run finds that of a "
+                "sensor to calibrate"
+            )
         return value
 
 

@@ -38,9 +38,7 @@ class SimulatedDriveSection(Section):
     """The response of each joint to its target, as in public logs of real arms ([simulated arm](simulated-arm.md))."""
 
     ripple: tuple[DriveRippleSection, ...] = Field(default=HARMONIC_DRIVE, max_length=20)
-    lag_s: float = Field(
-        default=4.5e-4, ge=0, le=0.005, description="by how much a joint is late; 0.3 to 0.7 ms were measured"
-    )
+    lag_s: float = Field(default=4.5e-4, ge=0, le=0.005, description="delay of a joint; 0.3 to 0.7 ms were measured")
     yield_s2: float = Field(
         default=1.5e-4,
         ge=0,

@@ -18,19 +18,23 @@ class SimulatedHandSection(Section):
     """The simulated operator, who follows each instruction after a reaction time and sometimes makes mistakes."""
 
     peak_deg_s: float = Field(default=250.0, ge=30, le=1500, description="peak rate of a push")
-    wobble_deg: float = Field(default=1.5, ge=0, le=20, description="how far the axis of a move swings")
+    wobble_deg: float = Field(
+        default=1.5, ge=0, le=20, description="amplitude of the oscillation of the axis of a move"
+    )
     tremor_deg: float = Field(default=0.15, ge=0, le=2, description="tremor of 6 to 12 Hz while it is touched")
     tilt_mrad: float = Field(
         default=0.3,
         ge=0,
         le=20,
-        description="how much the attitude on a face varies from one time to the next; 2 for a bare board",
+        description="scatter of the attitude on a face from one time to the next; 2 for a bare board",
     )
-    closure_mrad: float = Field(default=3.0, ge=0, le=50, description="by how much a whole turn misses the rule")
-    faces_mrad: float = Field(default=2.0, ge=0, le=50, description="by how much the item's faces are off right angles")
-    table_mrad: float = Field(default=5.0, ge=0, le=50, description="by how much the table leans")
+    closure_mrad: float = Field(default=3.0, ge=0, le=50, description="angle by which a whole turn misses the rule")
+    faces_mrad: float = Field(
+        default=2.0, ge=0, le=50, description="deviation of the angles between the item's faces from 90°"
+    )
+    table_mrad: float = Field(default=5.0, ge=0, le=50, description="tilt of the table")
     reaction_time_s: tuple[Seconds, Seconds] = Field(
-        default=(0.5, 2.0), description="how long, at least and at most, from an instruction to the first touch"
+        default=(0.5, 2.0), description="shortest and longest time from an instruction to the first touch"
     )
     mistakes: dict[Mistaken, Probability] = Field(
         default=dict[Mistaken, Probability](),

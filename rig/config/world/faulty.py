@@ -15,6 +15,6 @@ class SimulatedFaultySection(Section):
     )
     frozen_from_s: float = Field(default=0.0, ge=0, le=1e6, description="time of the world at which it freezes")
     repeated: Ratio = Field(
-        default=0.0, ge=0, lt=1, description="share of the samples that hold rates which were sent before"
+        default=0.0, ge=0, lt=1, description="fraction of the samples that repeat rates sent before"
     )
     repeated_length: WholeNumber = Field(default=1, ge=1, le=1000, description="how many samples come again in a row")

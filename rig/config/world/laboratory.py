@@ -72,7 +72,7 @@ class WorldSiteSection(Section):
         default=48.0,
         ge=0,
         le=1000,
-        description="size of the magnetic field at the base's origin; the Earth's own is 22 to 67 (IGRF-13)",
+        description="magnitude of the magnetic field at the base's origin; the Earth's own is 22 to 67 (IGRF-13)",
     )
     magnetic_dip_deg: float = Field(
         default=65.0, ge=-90, le=90, description="angle of the field below the horizon; negative above it"
@@ -85,11 +85,11 @@ class WorldSiteSection(Section):
     )
     magnetic_gradient_ut_m: tuple[Gradient, Gradient, Gradient, Gradient, Gradient] = Field(
         default=(0.0, 0.0, 0.0, 0.0, 0.0),
-        description="how the field changes with place, in the base's axes: ∂Bx/∂x, ∂Bx/∂y, ∂Bx/∂z, ∂By/∂y, "
+        description="gradient of the field, in the base's axes: ∂Bx/∂x, ∂Bx/∂y, ∂Bx/∂z, ∂By/∂y, "
         "∂By/∂z; the others follow from these if no current flows",
     )
     magnetic_drift_ut_min: tuple[Gradient, Gradient, Gradient] = Field(
-        default=(0.0, 0.0, 0.0), description="how the field changes with time, along the base's axes"
+        default=(0.0, 0.0, 0.0), description="change of the field with time, along the base's axes"
     )
 
 
@@ -113,8 +113,8 @@ class ResidueSection(Section):
     zero_rad: Joints = Field(
         default=NO_ANGLES,
         description="true angle of each joint minus the one that its encoder shows: attitude errors that repeat with "
-        "the pose, up to 1 mrad on a calibrated arm (Slamani, Nubiola and Bonev, 2012) and up to 40 mrad on one whose "
-        "zeros nobody has set (a public data set with an ABB arm)",
+        "the pose, up to 1 mrad on a calibrated arm (Slamani, Nubiola and Bonev, 2012) and up to 40 mrad on one "
+        "whose joint zeros were never calibrated (a public data set with an ABB arm)",
     )
     encoder_once_rad: float = Field(
         default=0.0, ge=0, le=0.01, description="amplitude of each encoder's error with one period per turn"
@@ -136,12 +136,12 @@ class SimulatedArmSection(Section):
     joints: JointsKind = Field(
         default="measured",
         description="how its joints move and are read: as `measured` on real arms; `rough`, with a ripple ten times "
-        "as large, in proportion to the speed, and encoders without noise; or `ideal`. It says what `drive`, "
-        "`vibration_fraction` and the three keys of the encoders are if they are left out",
+        "as large, in proportion to the speed, and encoders without noise; or `ideal`. It sets the defaults of "
+        "`drive`, `vibration_fraction` and the three keys of the encoders",
     )
     model: ModelName | None = Field(
         default=None,
-        description="which arm it is; another one than `arm.model` is for tests of the refusal",
+        description="which arm it is; a model other than `arm.model` is for tests of the refusal",
         json_schema_extra={"usual": "as `arm.model`"},
     )
 
@@ -242,10 +242,13 @@ class SimulatedArmSection(Section):
         default=0.0,
         ge=0,
         le=0.01,
-        description="first amplitude of the swing of a joint that has just stopped; its encoder does not see it",
+        description="first amplitude of the oscillation of a joint that has just stopped; its encoder does not "
+        "measure it",
     )
-    settling_hz: float = Field(default=10.0, ge=0.1, le=200, description="frequency of that swing")
-    settling_decay_s: float = Field(default=0.1, ge=0.001, le=10, description="time in which it falls to 1/e")
+    settling_hz: float = Field(default=10.0, ge=0.1, le=200, description="frequency of that oscillation")
+    settling_decay_s: float = Field(
+        default=0.1, ge=0.001, le=10, description="time in which its amplitude falls to 1/e"
+    )
     clock_ppm: float = Field(
         default=0.0, ge=-1000, le=1000, description="how much too fast the controller's clock runs, and with it the arm"
     )
@@ -312,13 +315,13 @@ Delay = Annotated[
 ]
 ScalePerK = Annotated[
     Vector3,
-    Field(description="relative growth of each axis' scale factor with temperature", json_schema_extra={"unit": "1/K"}),
+    Field(description="relative change of each axis' scale factor with temperature", json_schema_extra={"unit": "1/K"}),
 ]
 ScalePerK2 = Annotated[
     Vector3, Field(description="the same with the square of the temperature", json_schema_extra={"unit": "1/K²"})
 ]
-BiasPerK = Annotated[Vector3, Field(description="by how much b of each axis grows with temperature")]
-BiasPerK2 = Annotated[Vector3, Field(description="by how much b of each axis grows with the square of the temperature")]
+BiasPerK = Annotated[Vector3, Field(description="change of b of each axis with temperature")]
+BiasPerK2 = Annotated[Vector3, Field(description="change of b of each axis with the square of the temperature")]
 Flicker = Annotated[float, Field(ge=0, le=0.1, description="flicker of the bias: the floor of its Allan deviation")]
 
 
@@ -386,7 +389,7 @@ class SimulatedSensorSection(Section):
         le=85,
         description="reading of its thermometer when it is switched on; without it, the sensor is warm at once",
     )
-    warm_up_s: float = Field(default=300.0, ge=1, le=100_000, description="time constant of its warming up")
+    warm_up_s: float = Field(default=300.0, ge=1, le=100_000, description="time constant of its warm-up")
     bias_rad_s_per_k: BiasPerK = NO_ROW
     scale_per_k: ScalePerK = NO_ROW
     bias_rad_s_per_k2: BiasPerK2 = NO_ROW
@@ -412,14 +415,14 @@ class SimulatedSensorSection(Section):
     )
     offset_mm: Vector3 = Field(
         default=NO_ROW,
-        description="place of the sensor, x y z from the flange's centre in the flange's frame; if left out, the "
+        description="position of the sensor, x y z from the flange's centre in the flange's frame; if left out, the "
         "end of `arm.extension_mm`",
     )
     nonlinearity_even_per_rad_s: float = Field(
-        default=0.0, ge=-0.1, le=0.1, description="relative growth of a reading with its rate"
+        default=0.0, ge=-0.1, le=0.1, description="relative change of a reading with its rate"
     )
     nonlinearity_odd_per_rad_s: float = Field(
-        default=0.0, ge=-0.1, le=0.1, description="relative growth of a reading with the magnitude of its rate"
+        default=0.0, ge=-0.1, le=0.1, description="relative change of a reading with the magnitude of its rate"
     )
     bandwidth_hz: Bandwidth = None
     delay_ms: Delay = 0.0
@@ -427,7 +430,7 @@ class SimulatedSensorSection(Section):
         default=0.0,
         ge=-100_000,
         le=100_000,
-        description="by how much too fast its own oscillator makes its data rate, of a part on the board",
+        description="for a part on the board: how much too fast its own oscillator makes its data rate",
     )
     accelerometer: SimulatedAccelerometerSection = Field(
         default=SimulatedAccelerometerSection(),
@@ -437,11 +440,14 @@ class SimulatedSensorSection(Section):
         default=SimulatedFieldSection(),
         description="the magnetometer of the same device, for a `kvh1775` that sends format C",
     )
-    kvh1775: SimulatedKvhSection | None = Field(default=None, description="the instrument it is in, of a `kvh1775`")
-    autopilot: SimulatedAutopilotSection | None = Field(
-        default=None, description="the autopilot it is in, of a `mavlink`; of several at one port the first says it"
+    kvh1775: SimulatedKvhSection | None = Field(
+        default=None, description="for a `kvh1775`: the instrument that it is in"
     )
-    lines: SimulatedLinesSection | None = Field(default=None, description="the device it is in, of `part: lines`")
+    autopilot: SimulatedAutopilotSection | None = Field(
+        default=None,
+        description="for a `mavlink`: the autopilot that it is in; for several at one port, the first one's is used",
+    )
+    lines: SimulatedLinesSection | None = Field(default=None, description="for `part: lines`: the device that it is in")
     faulty: SimulatedFaultySection = SimulatedFaultySection()
 
 
@@ -503,6 +509,6 @@ class WorldSection(Section):
                 yield f"world.{name}: there is none; another kind of turner turns the sensors"
         if isinstance(turner, ServoSection) and self.time_scale != 1.0:
             yield (
-                f"world.time_scale: {self.time_scale:g}: must be 1 with a servo, whose driver measures time by this "
-                "computer's clock, as with a real one"
+                f"world.time_scale: {self.time_scale:g}: must be 1 with a servo, because its driver measures time by "
+                "this computer's clock"
             )

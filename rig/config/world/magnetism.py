@@ -17,7 +17,7 @@ class IronSection(Section):
         "wrist 3 is carried by `wrist_2`, the flange by `wrist_3`"
     )
     position_mm: Vector3 = Field(
-        default=NOTHING, description="place in the frame of that link (Denavit and Hartenberg)"
+        default=NOTHING, description="position in the frame of that link (Denavit and Hartenberg)"
     )
     moment_a_m2: Vector3 = Field(description="magnetic moment, in that frame")
 
@@ -30,7 +30,7 @@ RowLengths = Annotated[
     ),
 ]
 NonOrthogonality = Annotated[
-    Vector3, Field(description="by how much the angles between its axes x y, x z, y z are off 90°")
+    Vector3, Field(description="deviation from 90° of the angles between its axes x y, x z, y z")
 ]
 MountingError = Annotated[
     Vector3, Field(description="rotation of the sensor from its nominal mounting, as a rotation vector")
@@ -55,6 +55,6 @@ class SimulatedMagnetometerSection(SimulatedFieldSection):
     mounting_error_deg: MountingError = NOTHING
     offset_mm: Vector3 | None = Field(
         default=None,
-        description="place of the sensor, x y z from the flange's centre in the flange's frame; if left out, the "
+        description="position of the sensor, x y z from the flange's centre in the flange's frame; if left out, the "
         "end of `arm.extension_mm`",
     )

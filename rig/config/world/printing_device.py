@@ -24,11 +24,13 @@ class SimulatedLinesSection(Section):
     comment_every: WholeNumber = Field(
         default=0, ge=0, description="number of samples after which it prints a comment; `0`: never"
     )
-    lost_fraction: Ratio = Field(default=0.0, ge=0, le=0.5, description="share of the samples that it does not print")
+    lost_fraction: Ratio = Field(
+        default=0.0, ge=0, le=0.5, description="fraction of the samples that it does not print"
+    )
     stolen: Ratio = Field(
         default=0.0, ge=0, lt=1, description="fraction of its bytes that another program with the same port reads"
     )
-    bit_error_rate: Ratio = Field(default=0.0, ge=0, le=0.01, description="share of wrong bits on the line")
+    bit_error_rate: Ratio = Field(default=0.0, ge=0, le=0.01, description="fraction of wrong bits on the line")
     scalars: dict[str, float] = Field(
         default=dict[str, float](),
         description="the number that it prints in a column of `lines.scalars`, by its name; left out, 0",

@@ -16,7 +16,7 @@ class SimulatedServoSection(Section):
 
     model: ServoName | None = Field(
         default=None,
-        description="which servo it is; another one than `turner.model` is for tests of the refusal",
+        description="which servo it is; a model other than `turner.model` is for tests of the refusal",
         json_schema_extra={"usual": "as `turner.model`"},
     )
     firmware: WholeNumber = Field(default=48, ge=1, le=255, description="version of its firmware")

@@ -31,16 +31,20 @@ class SimulatedThermalSection(Section):
     )
     heater_w: float = Field(default=0.0, ge=0, le=1e4, description="power of the heater at its pin")
     thermometer_lag_s: float = Field(
-        default=0.5, gt=0, le=1e4, description="time constant of a part's thermometer behind the body"
+        default=0.5, gt=0, le=1e4, description="time constant with which a part's thermometer lags behind the body"
     )
     element_lag_s: float = Field(
-        default=0.5, gt=0, le=1e4, description="time constant of a part's sensing element behind its thermometer"
+        default=0.5,
+        gt=0,
+        le=1e4,
+        description="time constant with which a part's sensing element lags behind its thermometer",
     )
     gradient_k_w: float = Field(
         default=0.0,
         ge=-100,
         le=100,
-        description="how much warmer what moves in a part is than its thermometer, for each watt of the heater",
+        description="temperature of a part's sensing element above that of its thermometer, for each watt of the "
+        "heater",
     )
     hysteresis_k: float = Field(
         default=2.0,

@@ -24,10 +24,7 @@ _SIGNAL_AT_PARENTS_DEATH = 1  # PR_SET_PDEATHSIG of prctl(2)
 
 
 def read_and_end(request: Mapping[str, Any]) -> NoReturn:
-    """Read a file, write its parts to stdout, and end this process.
-
-    `request` is that of `rig.data.processes.reading_process.ReadingTask`.
-    """
+    """Read the file of a `ReadingTask` (`request`), write its parts to stdout, and end this process."""
     limits: Mapping[str, Any] = request["limits"]
     _end_with_parent()
     written_bytes = _limit(limits)

@@ -106,7 +106,7 @@ def _file_size_on_disk(path: Path, name: str = "it") -> int:
     except UnfitFile as error:
         raise UnfitFile(str(error).replace("it ", f"{name} ", 1)) from None
     if size > MAX_UNPACKED * stored + SPARE_BYTES:
-        raise UnfitFile(f"{name} swells {stored} bytes to {size}")
+        raise UnfitFile(f"{name} expands {stored} bytes to {size}")
     return stored
 
 

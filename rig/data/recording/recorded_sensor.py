@@ -152,4 +152,4 @@ def check_rotation(mounting: Mounting, what: str) -> None:
     # No element of a rotation exceeds one; the squares of much larger ones would overflow.
     small = np.abs(rows).max() < 2
     if not (small and np.allclose(rows @ rows.T, np.eye(3), atol=MOUNTING_TOLERANCE)):
-        raise ValueError(f"{what} is no rotation: {quote(mounting)}")
+        raise ValueError(f"{what} is not a rotation: {quote(mounting)}")

@@ -355,7 +355,7 @@ def hand_settings(section: "ByHandSection") -> HandSettings:
 def _angle_std_not_stated() -> Refused:
     return Refused(
         "angle_std_not_stated",
-        "a sweep is no whole turn, so the encoders measure how far it went, and their error is not stated",
+        "a sweep is not a whole turn, so the encoders measure its angle, but their error is not stated",
         "Give uncertainty.angle_std_deg, how far a joint may be from the angle of its encoder, or sweep whole turns",
     )
 
@@ -435,7 +435,7 @@ def _override(settings: RunSettings, item: str) -> RunSettings:
     try:
         return validate(RunSettings, document, "settings")
     except ValueError as error:
-        raise Refused("wrong_setting", str(error), f"Give a number, as in {path}=0.001") from None
+        raise Refused("wrong_setting", str(error), f"Give a number, for example {path}=0.001") from None
 
 
 def setting(key: str) -> str:

@@ -58,7 +58,8 @@ def _check_turned(unit: Array) -> None:
     if angle_rad > TURNED_RAD:
         raise Fault(
             "wrong_mounting",
-            f"the gyroscope's axes lie {np.degrees(angle_rad):.0f}° off the accelerometer's, as by no order of columns",
+            f"the gyroscope's axes lie {np.degrees(angle_rad):.0f}° off the accelerometer's, which no order of "
+            "columns explains",
             "Give both sensors' readings in one frame: turn those of one into the axes of the other",
         )
 

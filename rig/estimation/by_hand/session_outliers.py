@@ -172,25 +172,26 @@ def describe_fault(fit: GraphFit, hypothesis: FaultHypothesis) -> Fault:
             "turn_not_closed",
             f"the turn from {move.start_s:.1f} to {move.end_s:.1f} s ended {abs(np.degrees(residual)):.1f}° from where "
             "it began",
-            "Turn against a straight edge, so that it ends where it began. Of a file without one: --no-closure",
+            "Turn against a straight edge, so that it ends where it began. For a file recorded without one: "
+            "--no-closure",
         )
     if hypothesis.name == "lost_in_move":
         move = moves[hypothesis.index]
         return Fault(
             "lost_in_move",
-            f"what the gyroscope read from {move.start_s:.1f} to {move.end_s:.1f} s is not how the body turned",
+            f"from {move.start_s:.1f} to {move.end_s:.1f} s the gyroscope's readings contradict how the body turned",
             "See that no reading is lost, and that time stamps are those of the readings; make the move again",
         )
     if hypothesis.name == "bias_jumped":
         return _describe_jump(hypothesis.index, rests)
     if hypothesis.name == "table_moved":
         return Fault(
-            "table_moved", f"from {at_s:.1f} s on the table leans otherwise", "Begin again, and leave it alone"
+            "table_moved", f"from {at_s:.1f} s on the table is tilted differently", "Begin again, and leave it alone"
         )
     if hypothesis.name == "accelerometer_jumped":
         return Fault(
             "accelerometer_jumped",
-            f"from {at_s:.1f} s on the accelerometer's bias is another",
+            f"from {at_s:.1f} s on the accelerometer has another bias",
             "Begin again: let it warm up, and handle it gently",
         )
     return Fault(
@@ -203,11 +204,11 @@ def describe_fault(fit: GraphFit, hypothesis: FaultHypothesis) -> Fault:
 def _describe_jump(index: int, rests: Sequence[HandRest]) -> Fault:
     """Return the Fault of a bias that jumped in the move `index`; at the first and last rest it may be a creep."""
     after_s = rests[index + 1].start_s
-    what = f"the gyroscope's bias was another after the move that ended at {after_s:.1f} s"
+    what = f"the gyroscope had another bias after the move that ended at {after_s:.1f} s"
     if index == len(rests) - 2:
-        what += ", or the body crept in the last rest, which comes then"
+        what += ", or the body crept in the last rest, which follows it"
         return Fault(
-            "bias_jumped", what, "Let it lie for another rest, which distinguishes them; after a fall, begin again"
+            "bias_jumped", what, "Let it lie for another rest, which tells the two apart; after a fall, begin again"
         )
     if index == 0:
         what += f", or the body crept in the first rest, until {rests[0].end_s:.1f} s"
@@ -225,7 +226,9 @@ def _find_excessive_std(fit: GraphFit) -> Fault | None:
         return Fault("not_flat", what, _REMEDY)
     if stds.closure_rad >= NEARLY * LARGEST.closure_rad:
         what = f"the turns do not end where they began, by {1e3 * stds.closure_rad:.0f} mrad or more"
-        return Fault("turn_not_closed", what, "Turn against a straight edge. Of a file without one: --no-closure")
+        return Fault(
+            "turn_not_closed", what, "Turn against a straight edge. For a file recorded without one: --no-closure"
+        )
     if stds.of_angle >= NEARLY * LARGEST.of_angle:
         what = f"the moves contradict each other by {100 * stds.of_angle:.2f} % of a quarter turn or more"
         return Fault("lost_in_move", what, _REMEDY)
@@ -249,7 +252,8 @@ def _find_unlikely_box(fit: GraphFit) -> Fault | None:
         "not_flat",
         f"the moves fit together only if the faces are up to {np.degrees(np.abs(skew_rad).max()):.2g}° out of square, "
         f"where {np.degrees(stated_rad):.2g}° is stated",
-        "If the body is no better box, state its squareness_deg (rig solve: --squareness-deg); else begin again",
+        "If the faces of the body are really so far out of square, state its squareness_deg (rig solve: "
+        "--squareness-deg); otherwise begin again",
     )
 
 

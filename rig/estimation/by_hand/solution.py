@@ -123,7 +123,7 @@ def solve_by_hand(session: HandRecording, conditions: SessionConditions) -> Hand
     refusals.check_unit(scale_of(fitted.state.matrix))
     refusals.check_handedness(fitted.state.matrix)
     one = find_masked_fault(fitted)
-    return summarise_fit(fitted, () if one is None else (f"{one.what}: for this one alone U is larger",))
+    return summarise_fit(fitted, () if one is None else (f"{one.what}: U is larger for this session alone",))
 
 
 def _check_session(session: HandRecording) -> None:
@@ -217,15 +217,15 @@ def insufficient_session(session: HandRecording, expanded: Array | None) -> Faul
             "held_not_laid_down",
             f"from {start_s:.1f} to {end_s:.1f} s the body was held in the hand, not laid down"
             + (f", and {len(session.held_in_air_s) - 1} times more" if len(session.held_in_air_s) > 1 else ""),
-            "Lay it down and let go, for a second, after every move",
+            "After every move, lay it down and let go of it for a second",
         )
     so_far = "" if expanded is None else f"; the scale is known to {float(f'{100 * expanded.max():.2g}'):g} %"
     if creeping_s := session.creeping_s:
-        so_far += f"; {len(creeping_s)} more are left out, as the body crept from {creeping_s[0][0]:.1f} s on"
+        so_far += f"; {len(creeping_s)} more are left out because the body crept from {creeping_s[0][0]:.1f} s on"
     return Fault(
         "too_few_moves",
         f"there are {len(session.rests)} rests and {sum(move.is_usable for move in session.moves)} moves{so_far}",
-        "Lay it on all six faces, eight moves at least, with a second of rest after each",
+        "Lay it on all six faces in at least eight moves, with a second of rest after each",
     )
 
 
@@ -254,7 +254,7 @@ def _find_first_face(session: HandRecording, conditions: SessionConditions, but:
             return Fault(
                 "wrong_face",
                 f"the body did not begin with {conditions.first_face} upwards: its moves are those from {face}",
-                f"Say --first-face {face}, or look again which axis is which",
+                f"Give --first-face {face}, or check again which axis is which",
             )
     return None
 

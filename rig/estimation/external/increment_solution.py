@@ -233,7 +233,7 @@ def _check(fixes: Fixes, remaining: Fixes, settled: _Settled) -> None:
         raise Fault(
             "clocks_apart",
             f"the estimated offset of the attitudes' clock is {1e3 * settled.state.clock_s:+.0f} ± {2e3 * std_s:.0f} "
-            f"ms, and {1e3 * MOST_CLOCK * CLOCK_STD_S:.0f} ms is the largest allowed offset",
+            f"ms, but the largest allowed offset is {1e3 * MOST_CLOCK * CLOCK_STD_S:.0f} ms",
             "Write both files by one clock, or let --estimate-clock-offset find the difference",
         )
     if len(outliers) > _limit_outliers(fixes):
@@ -258,7 +258,7 @@ def _check_identified(matrix: Array, covariance: Array) -> None:
         f"a turn about {'xyz'[axis]} reads {sizes[axis]:.4g} ± {2 * std[axis]:.1g} times as large"
         for axis in np.flatnonzero(~unknown)
     )
-    what = f"the body hardly turned about {names}: what the sensor reads of it is only known to {std.max():.2g}"
+    what = f"the body hardly turned about {names}: the sensor's response to that is known to {std.max():.2g}"
     raise Fault("ill_conditioned", f"{what}{f'; {identified}' if identified else ''}", REMEDY)
 
 

@@ -275,7 +275,7 @@ def check_earth_seen(
     if abs(free - expected_rad_s) > MAX_DEVIATION * std:
         raise Fault(
             "earth_rate_not_observable",
-            f"the gyroscope finds {component} to be {free / DEG_H:.4g} ± {std / DEG_H:.2g} deg/h, where "
-            f"{expected_rad_s / DEG_H:.4g} is right: something else turns with the attitude",
+            f"the gyroscope finds {component} to be {free / DEG_H:.4g} ± {std / DEG_H:.2g} deg/h, but "
+            f"{expected_rad_s / DEG_H:.4g} is expected: something else turns with the attitude",
             "Look at the gyroscope's residuals, for warming and for a sensitivity to gravity; repeat the movement",
         )

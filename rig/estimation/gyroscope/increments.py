@@ -190,10 +190,7 @@ def _whole_steps(interval: _Interval) -> _IncrementSteps:
 
 
 def _steps_from(interval: _Interval, start: NDArray[np.intp], fraction: Array) -> tuple[_IncrementSteps, Array]:
-    """Return steps and their initial rates (k, 3).
-
-    Each begins at a reading `start` (k,) and lasts a `fraction` (k,) of an interval.
-    """
+    """Return steps from the readings `start` (k,) over a `fraction` (k,) of an interval, and initial rates (k, 3)."""
     u = fraction[:, None]
     h = np.diff(interval.time_s)[start][:, None]
     w0, w1, d0, d1 = (values[index] for values in (interval.rates, interval.slopes) for index in (start, start + 1))

@@ -256,12 +256,12 @@ def check_trustworthy(error_rad: float, furthest: Callable[[], tuple[int, float,
     `error_rad` is the error of all. `furthest`, called if `enough` others remain, returns the index of the worst
     attitude, its error in rad relative to the others, and the others' error.
     """
-    message = f"the readings say that the attitudes are off by {1e3 * error_rad:.2g} mrad each"
+    message = f"the readings show that each attitude is off by {1e3 * error_rad:.2g} mrad"
     if error_rad > SUSPICIOUS_RAD and enough:
         worst, worst_rad, expected = furthest()
         if worst_rad > max(UNTRUSTWORTHY_RAD, OUTLIER * expected):
             error_rad = worst_rad
-            by_others = f"say the others, which are by {1e3 * expected:.2g}"
+            by_others = f"but the others by {1e3 * expected:.2g} mrad"
             message = f"attitude {worst + 1} is off by {1e3 * worst_rad:.2g} mrad, {by_others}"
     if error_rad > UNTRUSTWORTHY_RAD:
         limit = f"the limit is {1e3 * UNTRUSTWORTHY_RAD:.0f} mrad"

@@ -83,7 +83,7 @@ def allan_curve(stretches: Sequence[Array], interval_s: float) -> AllanCurve:
     """
     used = [np.asarray(stretch, dtype=np.float64) for stretch in stretches if len(stretch) >= FEWEST]
     if not used:
-        raise too_short(f"no stretch at rest has {FEWEST} readings without a gap")
+        raise too_short(f"no interval at rest has {FEWEST} readings without a gap")
     for stretch in used:
         check_finite(readings=stretch)
     phases = [np.vstack([np.zeros(3), np.cumsum(stretch - stretch.mean(axis=0), axis=0)]) for stretch in used]
@@ -111,7 +111,7 @@ def read_axis(curve: AllanCurve, axis: int) -> AllanAxis:
 
 def too_short(what: str, enough_s: float = ENOUGH_S) -> Fault:
     """Return the error for a recording too short for a value; about `enough_s` would suffice."""
-    return Fault("recording_too_short", what, f"Record at rest for {enough_s:.0f} s or more, in one stretch")
+    return Fault("recording_too_short", what, f"Record at rest for {enough_s:.0f} s or more without interruption")
 
 
 def equivalent_dof(points: int, factor: int, noise: Noise) -> float:
@@ -175,7 +175,7 @@ def _random_walk(curve: AllanCurve, axis: int) -> AllanReading | Fault:
     index = int(np.argmin(np.abs(curve.tau_s - RANDOM_WALK_TAU_S)))
     tau_s, relative_std = float(curve.tau_s[index]), float(curve.relative_std[index, axis])
     if abs(tau_s - RANDOM_WALK_TAU_S) > RANDOM_WALK_TAU_S / 2:
-        what = f"no stretch reaches {RANDOM_WALK_TAU_S:g} s, at which random walk is read"
+        what = f"no interval at rest reaches {RANDOM_WALK_TAU_S:g} s, the averaging time at which random walk is read"
         if curve.total_s >= ENOUGH_S:
             what = f"readings are missing so often that {what}"
             return Fault("lost_samples", what, "See that the sensor's link loses nothing, and record again")
@@ -183,7 +183,7 @@ def _random_walk(curve: AllanCurve, axis: int) -> AllanReading | Fault:
     if relative_std > RANDOM_WALK_STD:
         worst = float(curve.relative_std[index].max())  # one sentence for all axes
         return too_short(
-            f"random walk would be known to {100 * worst:.0f} %, {100 * RANDOM_WALK_STD:.0f} % is the most",
+            f"random walk would be known to {100 * worst:.0f} %; the limit is {100 * RANDOM_WALK_STD:.0f} %",
             max(ENOUGH_S, curve.total_s * (worst / RANDOM_WALK_STD) ** 2),
         )
     # A factor of about two to either side, so that the slope does not depend on one point.
@@ -216,7 +216,7 @@ def _instability(curve: AllanCurve, axis: int, walk: AllanReading | Fault) -> Al
     if least == 0:
         return Fault(
             "not_white_noise",
-            f"the deviation is smallest at {tau_s:.2g} s, the shortest there is, and only rises from there",
+            f"the deviation is smallest at {tau_s:.2g} s, the shortest averaging time, and only rises from there",
             "Look at the curve: something moves or vibrates, or the readings are filtered over that time",
         )
     by_noise = walk.value / np.sqrt(tau_s) if isinstance(walk, AllanReading) else 0.0

@@ -15,10 +15,7 @@ from rig.history.storage import journal, schema
 from rig.history.storage.address import HistoryAddress
 from rig.history.storage.journal import Head
 
-REMEDY = (
-    "Restore the history, then enter what is missing with `rig history import`; a program that is started now takes "
-    "what is there"
-)
+REMEDY = "Restore the history, then enter what is missing with `rig history import`; a new program uses what is there"
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +72,7 @@ def _history_gone(label: str) -> Refused:
 
 
 def _history_exchanged(label: str) -> Refused:
-    why = f"the history {label} was replaced by another one since this program worked with it"
+    why = f"the history {label} has been replaced by another one since this program last used it"
     return Refused("history_exchanged", why, REMEDY)
 
 

@@ -57,7 +57,7 @@ def _check_samples(board_time_s: Array, readings: Array, motion: KnownMotion) ->
     """Raise a Fault for too few, impossible or constant samples, from which no clock can be found."""
     if len(board_time_s) < MIN_SAMPLES:
         raise time_base_not_found(
-            f"the recording holds {len(board_time_s)} samples, of at least {MIN_SAMPLES} that are needed",
+            f"the recording holds {len(board_time_s)} samples, but at least {MIN_SAMPLES} are needed",
             "Raise the rate of the samples, or sweep more slowly",
         )
     check_readings(board_time_s, readings)

@@ -218,7 +218,7 @@ def _select_different_times(rows: Mapping[str, Array]) -> NDArray[np.intp]:
 def _list_repeated(numbers: NDArray[np.intp], total: int) -> Iterator[Omitted]:
     """Yield an entry for the rows out of `total` that repeat another row's time, if any."""
     if len(repeated := np.setdiff1d(np.arange(1, total + 1), numbers)):
-        yield Omitted("rows", len(repeated), total, "they repeat the time of another one", f"row {repeated[0]}")
+        yield Omitted("rows", len(repeated), total, "they repeat the time of another attitude", f"row {repeated[0]}")
 
 
 def _is_covered(rows_s: Array, time_s: Array) -> NDArray[np.bool_]:

@@ -234,11 +234,11 @@ def _speeds(sweeps: Mapping[str, Array]) -> Array:
         if duration <= 0:
             what = "ends before it starts"
         elif duration < MIN_DURATION_S:
-            what = f"lasts {duration:g} s, which is no time to sweep"
+            what = f"lasts {duration:g} s, which is too short for a sweep"
         elif moved < 0:
-            what = "turns by less than nothing"
+            what = "turns by a negative amount"
         elif 0 < moved < LEAST_MOTION:
-            what = f"turns by {moved:.0e}, which is nothing, and a rest has 0"
+            what = f"turns by {moved:.0e}, which is too little; a rest has 0"
         elif moved > 0 and abs(norm - 1) > 1e-3:
             what = f"has an axis of length {norm:.3g}"
         elif any(sweeps[name][row - 1] <= 0 for name in STD_COLUMNS if name in sweeps and moved > 0):
@@ -307,8 +307,8 @@ def _check_directions(turns: Sequence[Observation], rests: Sequence[Average]) ->
     if contradicting.any():
         worst = int(np.argmax(contradicting.sum(axis=1)))
         others = np.flatnonzero(contradicting[worst])
-        what = f"sweep {turns[worst].sweep} reads the other way round than the others about its axis"
+        what = f"sweep {turns[worst].sweep} has the opposite sign to the others about its axis"
         if len(others) == 1:
             both = sorted((turns[worst].sweep, turns[int(others[0])].sweep))
-            what = f"sweeps {both[0]} and {both[1]} read the other way round than their axes say"
+            what = f"sweeps {both[0]} and {both[1]} have the opposite sign to what their axes state"
         raise Refused("bad_sweep", what, "Look at the sign of the axis in their rows, and at start and end")

@@ -31,7 +31,7 @@ from rig.observation.time_stamps.sampling import Sampling
 from rig.observation.time_stamps.stamp_order import OrderedStamps, order_stamps
 
 SAMPLES_MB = 256  # enough for an hour at 1 kHz
-SPIKES = "spikes: each stands alone, far from those before and after, as no body turns"
+SPIKES = "spikes: each is far from the readings before and after it, which no rotation explains"
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +89,7 @@ def read_sample_table(
                     "wrong_columns",
                     f"{path} holds no {' '.join(quantity.columns)}; it holds {', '.join(columns)}"
                     + (f": {readings.note}" if readings.note else ""),
-                    "Name a recording, or a part of it behind ::, that holds them",
+                    "Name a recording that holds them, or the part of it after ::",
                 )
         return SampleTable(columns, others=readings.others, note=readings.note)
     table = read_table(path, samples_header(needed), SAMPLES_MB, mapped)
@@ -187,7 +187,7 @@ def samples_in(table: Columns, where: str) -> Samples:
         if len(wrong := np.flatnonzero(~np.isfinite(column[rows]))):
             raise Refused(
                 "not_a_number",
-                f"{where} has {len(wrong)} samples whose {name} is not a number, the first is sample "
+                f"{where} has {len(wrong)} samples whose {name} is not a number; the first is sample "
                 f"{rows[wrong[0]] + 1}",
                 "Leave out what was not measured, or record again",
             )

@@ -22,7 +22,9 @@ MOSTLY = 0.5  # least fraction of a row's readings that determines its mean
 
 def check_times(time_s: Array, where: str = "the samples") -> None:
     """Raise Refused `time_not_increasing`, naming `where`, for too few samples or times that do not rise."""
-    what = f"{where} has {len(time_s)} samples, {MIN_SAMPLES} are the least" if len(time_s) < MIN_SAMPLES else None
+    what = (
+        f"{where} has {len(time_s)} samples; at least {MIN_SAMPLES} are needed" if len(time_s) < MIN_SAMPLES else None
+    )
     steps_back = np.flatnonzero(~(np.diff(time_s) > 0))
     if len(steps_back):
         first = int(steps_back[0])
@@ -142,7 +144,7 @@ def check_complete(count: int, expected: float, window: Window, where: str, leas
     lasts_s = window.end_s - window.start_s
     wanted = f"{expected:.0f} are expected from {window.start_s:.10g} to {window.end_s:.10g} s"
     if expected < least:
-        wanted = f"{least} are the least; it lasts {lasts_s:.3g} s at {expected / lasts_s:.3g} Hz"
+        wanted = f"at least {least} are needed; it lasts {lasts_s:.3g} s at {expected / lasts_s:.3g} Hz"
     raise Fault("lost_samples", f"{where} has {count} samples, but {wanted}", ONE_CLOCK)
 
 
@@ -157,7 +159,7 @@ def check_scattered(sampling: Sampling) -> None:
         raise Fault(
             "lost_samples",
             f"about {100 * sampling.scattered:.2g} % of the samples are missing all over the recording: their stamps "
-            "advance in steps that no even clock explains, and do not say where",
+            "advance in steps that no even clock explains and that do not show where",
             "See that the sensor's link loses nothing; stamp every reading when it is taken",
         )
 

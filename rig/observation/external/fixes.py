@@ -208,5 +208,5 @@ def _all_lost(count: int, total: int, left_out: tuple[LeftOut, ...]) -> Fault:
 
 def _too_few(what: str) -> Fault:
     return Fault(
-        "too_few_observations", f"{what}, {FEWEST} increments are the least", "Record longer, in more attitudes"
+        "too_few_observations", f"{what}; at least {FEWEST} increments are needed", "Record longer, in more attitudes"
     )

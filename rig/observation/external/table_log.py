@@ -25,8 +25,8 @@ def read_table_log(
     if len(log[TIME]) < 2 or not (np.diff(log[TIME]) > 0).all():
         raise Refused(
             "time_not_increasing",
-            f"{path} has fewer than two looks at the table, or their time does not increase from row to row",
-            "Give every look once, in the order of time",
+            f"{path} has fewer than two rows about the table, or their time does not increase from row to row",
+            "Give every row once, in the order of time",
         )
     return _attitudes(log, table)
 

@@ -37,7 +37,7 @@ class TableMotion:
         close = (np.diff(self.time_s) <= MAX_STEP_S) & (np.linalg.norm(turned, axis=1) < MAX_STEP_RAD)
         if close.sum() < MIN_ROWS:
             raise _not_found(
-                f"of {len(close) + 1} rows {int(close.sum())} follow another within {MAX_STEP_S:g} s and less than "
+                f"of {len(close) + 1} rows, only {int(close.sum())} follow the row before within {MAX_STEP_S:g} s and "
                 "half a turn: they do not show how the table turned"
             )
         self._close = close

@@ -103,7 +103,7 @@ def _inertial(
         raise Refused(
             "bag_topic",
             "the messages hold neither rates nor accelerations: the first element of their covariances is -1 in all",
-            "Name the topic of a sensor that measures behind the bag: BAG::/topic",
+            "After the bag, name the topic of a sensor that measures: BAG::/topic",
         )
     if not has_rates:
         columns[1:4] = [None] * 3
@@ -150,7 +150,7 @@ def _select_topic(reader: Any, types: Sequence[str], topic: str | None, what: st
         raise Refused(
             "bag_topic",
             f"the bag has {len(names)} topics{name} with {what} ({', '.join(types)}); its topics are {topics}",
-            "Name one behind the bag: BAG::/topic",
+            "Name one after the bag: BAG::/topic",
         )
     return connections
 
@@ -207,7 +207,7 @@ def _check_layout(store: Any, connections: Any) -> None:
         if other := sorted(
             name for name in fields if name in store.fielddefs and fields[name] != store.fielddefs[name]
         ):
-            raise ValueError(f"its {listing(map(shorten, other))} is none of ROS")
+            raise ValueError(f"its {listing(map(shorten, other))} differs from that of ROS")
 
 
 def _orientation(message: Any) -> Any:

@@ -136,7 +136,7 @@ def _find_column(path: Path, headings: Sequence[str], width: int, name: str, col
         raise Refused(
             "wrong_columns",
             f"{path} has the column {quote(column)} {how}, which is to be {name}",
-            "Give the number of the one that is meant in place of its name" if named else remedy,
+            "Give the number of the one that is meant instead of its name" if named else remedy,
         )
     return named[0]
 
@@ -185,7 +185,7 @@ def _check_unit(path: Path, name: str, names: Sequence[str], header: Header) -> 
         raise Refused(
             "wrong_unit",
             f"{path} has a column {shorten(name)} where {meant} belongs",
-            f"Convert it to the unit in the name {meant}, or say its unit with --columns",
+            f"Convert it to the unit in the name {meant}, or state its unit with --columns",
         )
 
 

@@ -202,8 +202,9 @@ class _Wanted:
             name = [*self.names.values()][wrong]
             raise Refused(
                 "wrong_unit",
-                f"{self.path}, line {line} says that {name} is in {quote(cells[wrong])}, which it is not read as",
-                "Say its unit with --columns, or convert it to the one in the name",
+                f"{self.path}, line {line} states that {name} is in {quote(cells[wrong])}, but it is read in another "
+                "unit",
+                "State its unit with --columns, or convert it to the one in the name",
             )
         return True
 
@@ -254,6 +255,6 @@ class _Wanted:
                 f"{self.path}, line {line}: {quote(','.join(cells))} is not {len(cells)} numbers below "
                 f"{LARGEST_NUMBER:g}",
                 "Write plain decimal numbers with a point, no NaN, one for each column; state the text of a missing "
-                "value with --columns; or leave out what is no reading",
+                "value with --columns; or leave out what is not a reading",
             )
         return numbers

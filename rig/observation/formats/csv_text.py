@@ -74,7 +74,7 @@ def _text(file: BinaryIO | GzipFile) -> TextIOWrapper:
     if begin.startswith(UTF_16):
         return TextIOWrapper(file, encoding="utf-16", errors="replace", newline="")
     if b"\0" in begin:
-        raise UnfitFile("it is no text, but a spreadsheet, an archive or another program's own file")
+        raise UnfitFile("it is not text but a spreadsheet, an archive or another program's own file")
     try:
         codecs.getincrementaldecoder("utf-8")().decode(begin)
     except UnicodeDecodeError:

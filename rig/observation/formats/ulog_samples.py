@@ -79,7 +79,7 @@ def _is_combined(path: Path, topics: Mapping[tuple[str, int], Any], inside: str 
         raise Refused(
             "ulog_topic",
             f"{path} holds no {wanted}; of sensor_gyro, sensor_accel and sensor_combined it holds {listing(logged)}",
-            "Let SDLOG_PROFILE log the sensors at full rate, or name another instance behind the file: LOG.ulg::1",
+            "Let SDLOG_PROFILE log the sensors at full rate, or name another instance after the file: LOG.ulg::1",
         )
     return False
 

@@ -58,7 +58,7 @@ class ArmMotion:
         self.time_s, first = np.unique(states["time_s"], return_index=True)
         self._states = states[first]
         if len(self.time_s) < 4 or not names:
-            what = f"the recording holds {len(self.time_s)} arm states" if names else "what turned has no joints"
+            what = f"the recording holds {len(self.time_s)} arm states" if names else "the turner has no joints"
             raise Fault("no_motion", what, "Record a run with the arm on")
         if not (np.isfinite(self.time_s).all() and np.isfinite(self._states["q_rad"]).all()):
             raise not_finite("an arm state")
@@ -266,7 +266,7 @@ def _check_order(time_s: Array) -> None:
             "arm_clock_stepped",
             f"the time of the arm's states goes back from {before_s:.3f} s to {after_s:.3f} s: the controller's clock "
             "was set",
-            "Record again; of this recording nothing can be put on one clock",
+            "Record again; nothing in this recording can be put on one clock",
         )
 
 

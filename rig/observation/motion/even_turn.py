@@ -27,10 +27,7 @@ GUARD_RAD = float(np.radians(1.5))  # angle left out next to the ramps: the shaf
 
 
 def well_timed(states: NDArray[Any]) -> NDArray[Any]:
-    """Return the states without those of slow requests, if the duration of requests was recorded.
-
-    The servo measures at an unknown moment of the request.
-    """
+    """Return the states whose requests were fast: in a slow one the servo measures at an unknown moment."""
     if "took_s" not in (states.dtype.names or ()) or not len(states):
         return states
     in_time: NDArray[Any] = states[states["took_s"] <= HELD_UP * np.quantile(states["took_s"], USUAL)]

@@ -55,7 +55,7 @@ def check_span(time_s: Array, what: str) -> None:
     if span_s > MAX_SPAN_S:
         raise Fault(
             "impossible_times",
-            f"{what} in the recording reach over {span_s / 3600:.3g} h",
+            f"{what} in the recording span {span_s / 3600:.3g} h",
             "Do not use this recording, which is damaged; make a new one",
         )
 

@@ -195,7 +195,7 @@ def check_constant(relative_speeds: Array, where: str, settings: ObservationThre
     if deviation > settings.max_speed_deviation:
         raise Fault(
             "speed_not_constant",
-            f"in {where} the joint's speed differed by {100 * deviation:.0f} % from its mean, "
+            f"in {where} the joint's speed differed by {100 * deviation:.0f} % from its mean; "
             f"{100 * settings.max_speed_deviation:.0f} % is allowed",
             "Repeat the sweep without pausing it; if it happens again check payload and acceleration",
         )

@@ -169,7 +169,7 @@ def check_complete(sensor: RecordedSensor, samples: NDArray[Any], where: str, se
         lost = int(sequence[-1] - sequence[0]) + 1 - count
     if count < MIN_SAMPLES_AT_REST or lost > settings.max_lost_fraction * (count + lost):
         what = (
-            f"there are {count} samples and {lost} are missing, {100 * settings.max_lost_fraction:g} % may be missing, "
-            f"and {MIN_SAMPLES_AT_REST} are needed"
+            f"there are {count} samples, and {lost} are missing; {100 * settings.max_lost_fraction:g} % may be "
+            f"missing, and at least {MIN_SAMPLES_AT_REST} samples are needed"
         )
         raise lost_samples(sensor, samples, where, what, "repeat the run, or dwell longer")

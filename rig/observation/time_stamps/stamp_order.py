@@ -167,7 +167,7 @@ def _drop_repeated(log: _UnorderedLog) -> _UnorderedLog:
         return log
     kept = np.ones(len(log.rows), dtype=np.bool_)
     kept[shared[repeated]] = False
-    return log.select(kept, "they repeat another one, stamp and readings")
+    return log.select(kept, "they repeat the stamp and the readings of another one")
 
 
 def _find_repeated_values(values: Array) -> Array:
@@ -280,7 +280,7 @@ def _separate_equal(log: _UnorderedLog) -> _UnorderedLog:
     stamps_s[equal[after] + 1] += sampling.interval_s
     stamps_s[equal[before & ~after]] -= sampling.interval_s
     if (moved := stamps_s != log.stamps_s).any():
-        log = log.restamp(stamps_s, moved, "they have the stamp of another one, and the time between is free")
+        log = log.restamp(stamps_s, moved, "they have the stamp of another one, and a time beside it is free")
     return log.select(kept, "they are second readings with one stamp")
 
 

@@ -31,8 +31,8 @@ def earth_rate_lines(earth: EarthRateEntry | ErrorEntry | None) -> Iterator[str]
     rate = " ".join(f"{component:+.3f}" for component in np.divide(earth.rate_rad_s, DEG_H))
     std = k * np.sqrt(np.diag(earth.covariance_rad2_s2)).max() / DEG_H
     yield (
-        f"Earth's rate found: {earth.norm_rad_s / DEG_H:.3f} deg/h (± {k * earth.norm_std_rad_s / DEG_H:.3f}), "
-        f"{EARTH_RATE_RAD_S / DEG_H:.3f} is right; in the arm's base {rate} deg/h (± {std:.3f}), {words}"
+        f"Earth's rate found: {earth.norm_rad_s / DEG_H:.3f} deg/h (± {k * earth.norm_std_rad_s / DEG_H:.3f}; "
+        f"expected {EARTH_RATE_RAD_S / DEG_H:.3f}); in the arm's base {rate} deg/h (± {std:.3f}), {words}"
     )
     bearings = [
         f"latitude {np.degrees(earth.latitude_rad):.2f}° (± {k * np.degrees(earth.latitude_std_rad):.2f})"

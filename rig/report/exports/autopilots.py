@@ -29,7 +29,7 @@ HEADING = (
     "# there is no parameter for them.",
 )
 OF_ARDUPILOT = (
-    "# Magnetic fields are in milligauss, and a the offset of a compass is added.",
+    "# Magnetic fields are in milligauss, and the offset of a compass is added.",
     "# ArduPilot corrects readings after their rotation by the compass's and the board's orientation and the driver:",
     "# these values apply if none of these rotates them. COMPASS_SCALE, where there is one, must be 0 or 1.",
 )

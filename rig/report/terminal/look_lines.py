@@ -53,7 +53,7 @@ def _describe_table(path: Path, layout: TableLayout, guess: LogColumns) -> Itera
     heading = f"heading in line {layout.skip_lines + 1}" if layout.has_heading else "no heading"
     yield f"{path}: {layout.rows} rows, {len(layout.headings)} columns, {heading}"
     if layout.is_shifted:
-        yield _row("note", "the rows have a cell more than the heading: columns are named by number")
+        yield _row("note", "the rows have one cell more than the heading: columns are named by number")
     entries = {**guess.motion, **guess.samples}
     for name, *columns in COLUMNS:
         if columns[0] in entries:
@@ -69,7 +69,9 @@ def _describe_table(path: Path, layout: TableLayout, guess: LogColumns) -> Itera
 def describe_convention(convention: Convention | None, *, is_order_named: bool) -> Iterator[str]:
     """Yield the convention of the quaternions that the gyroscope shows; their order only if no heading names it."""
     if convention is None:
-        yield _row("direction", "the gyroscope does not show that of the quaternions: is it one body and one clock?")
+        yield _row(
+            "direction", "the gyroscope does not show the direction of the quaternions: is it one body and one clock?"
+        )
         return
     order = "" if is_order_named else f", read as {'x y z w' if convention.scalar_last else 'w x y z'}"
     direction = "room to body (motion_inverse)" if convention.inverse else "body to room"

@@ -142,7 +142,8 @@ def _print_steps(planned: DryRun, console: Console) -> None:
     if plan.dwells:
         whole_s = plan.duration_s + plan.settling_s
         console.print(
-            f"Before each dwell the sensors may take {plan.dwells[0].settle_s:g} s to settle: {whole_s:.1f} s at most"
+            f"Before each dwell the sensors may take {plan.dwells[0].settle_s:g} s to settle: {whole_s:.1f} s in all "
+            "at most"
         )
     if planned.repeated:
         console.print(f"If the calibration passes, it is repeated to verify it: {2 * plan.duration_s:.1f} s in all")

@@ -39,8 +39,8 @@ SIGNIFICANT = 0.05  # least fraction of the variance of a contributor that is li
 MANY = 8  # a list of speeds is shorter
 ASSUMED = (
     "Predicted for parts as in their data sheets, at one temperature, with flicker noise as the only bias drift, "
-    "and a mounting error of 5° (in stages uncertainty.mount_deg). A sensor that is mounted more exactly does better, "
-    "one that warms up does worse."
+    "and a mounting error of 5° (in stages uncertainty.mount_deg). A sensor that is mounted more exactly does "
+    "better; one that warms up does worse."
 )
 
 

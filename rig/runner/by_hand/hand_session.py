@@ -188,7 +188,7 @@ class HandSession:
         if missed_rad is None or abs(missed_rad) <= MISSED * self.settings.closure_rad:
             return None
         what = f"that turn ended {abs(np.degrees(missed_rad)):.1f}° from where it began"
-        return Fault("turn_not_closed", what, "Lay it against the ruler, and turn again")
+        return Fault("turn_not_closed", what, "Lay it against the rule, and turn again")
 
     def _next(self, now: SessionProgress, face: Face | None) -> Instruction | None:
         """Return the next instruction, or None if the session has enough moves."""

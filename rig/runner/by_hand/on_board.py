@@ -36,7 +36,7 @@ AGAIN = {  # the board's term: the error's name, what, what to do
     "no_face": ("not_flat", "it does not lie on any of its six sides", "Lay it down on a side, and let go"),
     "contradicts": (
         "lost_in_move",
-        "the move is not what all the others say",
+        "the move contradicts all the others",
         "Lay it down flat on a side; a turn must end where it began",
     ),
 }
@@ -156,12 +156,12 @@ def read_kept_solution(board: Board) -> CalibratedByBoard:
         return CalibratedByBoard(report.sensor, board.hand_solution(), None)
     why = "none has been made since it was switched on or reset"
     if report.state == "failed":
-        why = f"it was given up, for ten moves in a row were refused; the last because {AGAIN[report.outcome][1]}"
+        why = f"it was given up because ten moves in a row were refused; the last because {AGAIN[report.outcome][1]}"
     elif report.state != "idle":
         why = f"it was not done after {report.accepted} moves, and has ended now"
     raise Refused(
         "no_answer_by_hand",
-        f"the board keeps no answer of a session by hand: {why}",
+        f"the board holds no result of a session by hand: {why}",
         "Press its button, make the moves until the LED flashes once a second, and leave the power on until then",
     )
 

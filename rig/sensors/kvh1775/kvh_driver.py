@@ -60,10 +60,7 @@ class Kvh1775:
             self.settings = {name: self._ask(f"?{name}", name) for name in NAMES}
 
     def correct(self, settings: dict[str, str]) -> None:
-        """Change settings in the instrument's memory, and read all of them back.
-
-        Raise SensorError, among others `kvh_setting_not_kept`.
-        """
+        """Change settings in the instrument's memory and read all back. Raise SensorError."""
         for name, value in settings.items():
             self._ask(f"={name},{value}", name)
         self.settings = {name: self._ask(f"?{name}", name) for name in NAMES}
@@ -149,7 +146,7 @@ class Kvh1775:
             received = f"{self._byte_count} bytes came from {self._where} at {self._baud} Bd"
             return SensorError(
                 "kvh_wrong_baud_rate",
-                f"{received}, and no message or answer in them",
+                f"{received}, but they hold no message or answer",
                 "Set serial.baud to what the instrument is set to; it is delivered with 921600",
             )
         return SensorError("no_kvh", f"{self._where}: nothing came within {self._patience.first_s:g} s", _CABLE)

@@ -146,8 +146,8 @@ def judge(driver: Kvh1775, name: str, section: SensorSection) -> Iterator[Sensor
     if driver.serial_number != section.serial_number:
         yield SensorError(
             "kvh_other_serial_number",
-            f"sensors.{name}: the KVH 1775 on {driver.port} has serial number {driver.serial_number}, the "
-            f"configuration says {section.serial_number}",
+            f"sensors.{name}: the KVH 1775 on {driver.port} has serial number {driver.serial_number}, but the "
+            f"configuration states {section.serial_number}",
             "Correct serial_number in the configuration, or connect that instrument",
         )
     yield from refusals(f"sensors.{name}", driver.settings)

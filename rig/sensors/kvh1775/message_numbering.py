@@ -71,7 +71,7 @@ class MessageCounter:
             index = int(np.argmax(by_time != steps))
             raise SensorError(
                 "kvh_time_contradicts",
-                f"{self.where}: by its microseconds {by_time[index]} data periods passed between two messages, by "
+                f"{self.where}: by its microseconds {by_time[index]} data periods passed between two messages, but by "
                 f"their sequence numbers {steps[index]}",
                 "Look at its supply: it may have restarted. Then run again",
             )

@@ -154,7 +154,7 @@ def _find_time(shape: Shape, guess: Guess) -> None:
     if "time" not in guess.columns:
         guess.clock = "counted" if "sequence" in guess.columns else "arrival"
         how = "it samples by a timer, and counts" if guess.clock == "counted" else "when its lines arrive"
-        guess.gaps.append(f"when it took a sample: no column is a time. Taken: {how}")
+        guess.gaps.append(f"when it took a sample: no column is a time. Assumed: {how}")
 
 
 def _set_time(guess: Guess, index: int, column: Array, unit: str) -> None:
@@ -163,7 +163,7 @@ def _set_time(guess: Guess, index: int, column: Array, unit: str) -> None:
     if wrap is None and (unit in {"s", "ns"} or column.max() >= 2**32):
         wrap = 0
     if wrap is None:
-        guess.reasons.append("the time did not wrap while it was looked at: 2^32 is taken, as of an Arduino")
+        guess.reasons.append("the time did not wrap while it was observed: 2^32 is assumed, as on an Arduino")
     guess.time = {"unit": unit, "wrap": 2**32 if wrap is None else wrap}
     steps = np.diff(column)
     rate_hz = TIMES[unit] / float(np.mean(steps[steps >= 0]))

@@ -124,10 +124,7 @@ class LinesDevice:
 
     # -- the first lines -----------------------------------------------------------------------------------------
     def _look(self, timeout_s: float) -> float:
-        """Return the sample rate according to the device's own time; NaN if it prints none.
-
-        Raise SensorError as the constructor does.
-        """
+        """Return the sample rate by the device's own time, NaN if it prints none. Raise SensorError."""
         has_enough = self.own_port.wait(self._has_enough, timeout_s)
         if not has_enough and not self.counts.samples:
             raise self._why_no_sample(timeout_s)
@@ -135,7 +132,7 @@ class LinesDevice:
         if abs(rate_hz / self._rate_hz - 1) > max(RATE_TOLERANCE, self._rate_error):
             raise SensorError(
                 "lines_other_rate",
-                f"{self.where} sends {rate_hz:.4g} samples a second, sensors.{self._sensor}.rate_hz is "
+                f"{self.where} sends {rate_hz:.4g} samples a second, but sensors.{self._sensor}.rate_hz is "
                 f"{self._rate_hz:g}",
                 "Set rate_hz to what it sends; if that is too little, its program prints for too long: raise the speed "
                 "of the line, or print less",
@@ -195,14 +192,14 @@ class LinesDevice:
         if reader.unprintable > UNPRINTABLE * reader.byte_count or not (counts.before or counts.comments):
             return SensorError(
                 "lines_wrong_baud_rate",
-                f"{reader.byte_count} bytes came from {self.where} at {self._line.baud} Bd, and they are no lines of "
+                f"{reader.byte_count} bytes came from {self.where} at {self._line.baud} Bd, but they are not lines of "
                 "text",
                 "Set serial.baud to what the device's program sets; `rig lines` finds it",
             )
         first = counts.first_other[:QUOTED].decode("ascii", "replace")
         return SensorError(
             "lines_other_format",
-            f"{self.where} prints other lines than sensors.{self._sensor}.lines says, such as {quote(first)}",
+            f"{self.where} prints other lines than sensors.{self._sensor}.lines states, such as {quote(first)}",
             "Correct the section, or let `rig lines` write one; if it is another device, correct serial.port",
         )
 
@@ -236,7 +233,7 @@ class LinesDevice:
         if counts.damaged > DAMAGED_LINES and counts.damaged > DAMAGED * (counts.samples + counts.damaged):
             raise SensorError(
                 "lines_damaged",
-                f"{self.where}: {counts.damaged} of {counts.samples + counts.damaged} lines are no samples, such as "
+                f"{self.where}: {counts.damaged} of {counts.samples + counts.damaged} lines are not samples, such as "
                 f"{quote(counts.first_other[:QUOTED].decode('ascii', 'replace'))}",
                 "Check the cable and the speed of the line; see that nothing else prints there",
             )

@@ -301,7 +301,7 @@ def _unit_of(kind: str, unit: dict[str, Any], values: Array, still: NDArray[np.b
     if unit["unit"] != "?":
         return {"unit": unit["unit"]}, ""
     if kind != "g":
-        return {"unit": SI_UNITS[kind]}, "the size of its readings fits none; see that it is SI"
+        return {"unit": SI_UNITS[kind]}, "the size of its readings fits no unit; check that it is SI"
     if (values == np.rint(values)).all() and np.abs(values).max() > LARGEST_COUNT:
         return {"unit": "deg/s", "lsb_per_unit": OPEN}, "steps of a converter: state lsb_per_unit by its data sheet"
     turned = values - np.median(values[still], axis=0)

@@ -86,13 +86,13 @@ def _find_number_shape(checked: Sequence[_CheckedLine]) -> Shape:
     common = _find_common(texts)
     alike = [line for line, line_texts in zip(checked, texts, strict=True) if line_texts == common]
     if any(not sum_ok for _, _, sum_ok in alike) and any(_SUM.search(line.text) for line, _, _ in alike):
-        raise NoShape("its lines end as if with a sum, which is another one than NMEA's")
+        raise NoShape("its lines seem to end with a check sum, but not with NMEA's")
     separator, prefix, keys = _interpret_texts(common)
     numbers = [_NUMBER.findall(text) for _, text, _ in alike]
     values = np.array(numbers, dtype=np.float64)
     measured: NDArray[np.bool_] = np.all(np.abs(values) < LARGEST, axis=1)
     if np.count_nonzero(measured) < ENOUGH * len(checked):
-        raise NoShape(f"it prints numbers that nothing measures: {_find_impossible(numbers, values)}")
+        raise NoShape(f"it prints numbers that no sensor measures: {_find_impossible(numbers, values)}")
     arrived_s = np.array([line.arrived_s for line, _, _ in alike])[measured]
     others = [text for (_, text, _), line_texts in zip(checked, texts, strict=True) if line_texts != common]
     checksum = _SUM.search(alike[0][0].text) is not None
@@ -126,12 +126,13 @@ def _find_common(texts: Sequence[tuple[str, ...]]) -> tuple[str, ...]:
     numbers = len(common) - 1
     if count < ENOUGH * len(texts):
         raise NoShape(
-            f"only {count} of {len(texts)} lines look alike: its lines are not one sample each, or of several kinds"
+            f"only {count} of {len(texts)} lines look alike: its lines do not hold one sample each, or are of several "
+            "kinds"
         )
     if numbers < 3:
-        raise NoShape(f"a line holds {numbers} numbers, and three axes of a gyroscope are three")
+        raise NoShape(f"a line holds {numbers} numbers, but a gyroscope needs three")
     if numbers > MOST_NUMBERS:
-        raise NoShape(f"a line holds {numbers} numbers, and a section has room for {MOST_NUMBERS}")
+        raise NoShape(f"a line holds {numbers} numbers, but a section has room for {MOST_NUMBERS}")
     return common
 
 

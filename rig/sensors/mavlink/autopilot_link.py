@@ -109,7 +109,7 @@ class AutopilotLink:
         if not parameters:
             raise SensorError(
                 "autopilot_silent",
-                f"{self._where} sends, but answers no question for a parameter",
+                f"{self._where} sends, but answers no request for a parameter",
                 "Check the line to its receiver (RX), and that the port is not one that only sends",
             )
         return parameters
@@ -185,7 +185,7 @@ class AutopilotLink:
             if self._byte_count:
                 raise SensorError(
                     "mavlink_no_message",
-                    f"{self._byte_count} bytes came from {self._where} at {self._baud} Bd, and no message in them",
+                    f"{self._byte_count} bytes came from {self._where} at {self._baud} Bd, but they hold no message",
                     "Set mavlink.baud to the speed of that port of the autopilot (SERIALn_BAUD, SER_TELn_BAUD), and "
                     "see that the port speaks MAVLink 2",
                 )

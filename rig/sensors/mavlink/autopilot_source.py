@@ -187,7 +187,7 @@ class MavlinkSource:
             if abs(measured_hz / requested_hz - 1.0) > RATE_TOLERANCE:
                 raise SensorError(
                     "autopilot_rate",
-                    f"sensors.{imu.name}: {imu.line.imu} was requested {requested_hz:g} times a second and comes "
+                    f"sensors.{imu.name}: {imu.line.imu} was requested {requested_hz:g} times a second but comes "
                     f"{measured_hz:.1f} times",
                     "Lower rate_hz: the autopilot sends no faster than its main loop and its line allow",
                 )
@@ -221,8 +221,8 @@ def check_parameters(
         problems.append(
             SensorError(
                 "autopilot_other_uid",
-                f"sensors.{name}: the autopilot at {line.port} has the number {identity.uid or 'unknown'}, the "
-                f"configuration says {line.uid}",
+                f"sensors.{name}: the autopilot at {line.port} has the number {identity.uid or 'unknown'}, but the "
+                f"configuration states {line.uid}",
                 "Correct mavlink.uid in the configuration, or connect that autopilot",
             )
         )

@@ -95,7 +95,7 @@ def read_change(path: Path) -> ParameterChange:
             raise ValueError(f"its schema is {document['schema']!r}")
         old, new = (_read_parameters(document[name], int(document["firmware"])) for name in ("old", "new"))
         if old.keys() != new.keys() or not old:
-            raise ValueError("its two sets have not the same names")
+            raise ValueError("its two sets do not have the same names")
         return ParameterChange(str(document["autopilot"]), int(document["firmware"]), old, new, Path(document["kept"]))
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise Refused(
@@ -119,7 +119,7 @@ def _read_parameters(document: Mapping[str, Any], firmware: int) -> dict[str, Au
              for name, entry in document.items()}  # fmt: skip
     for parameter in parameters.values():
         if len(parameter.field) != 4 or not (parameter.type in WHOLE or parameter.type == REAL32):
-            raise ValueError(f"{parameter.name} is no parameter")
+            raise ValueError(f"{parameter.name} is not a parameter")
     return parameters
 
 

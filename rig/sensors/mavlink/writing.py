@@ -27,7 +27,7 @@ def change(link: AutopilotLink, planned: ParameterChange, target: Mapping[str, A
     if wrong:
         raise SensorError(
             "autopilot_not_stored",
-            f"the autopilot at {link.port} reads back other values than were written of {', '.join(wrong)}",
+            f"the autopilot at {link.port} reads back other values than those written for {', '.join(wrong)}",
             f"Restore the old ones: rig autopilot restore CONFIG {planned.backup}",
         )
     planned.end()

@@ -44,20 +44,20 @@ def move_problems(motions: Iterable[Motion], velocity_limit_rad_s: float) -> lis
         if abs(move.goal) > FARTHEST:
             problem = Problem(
                 "servo_out_of_range",
-                f"{motion.name} ends {move.goal} pulses from zero, and the servo counts {FARTHEST} either way",
+                f"{motion.name} ends {move.goal} pulses from zero, but the servo counts {FARTHEST} either way",
                 "Switch the servo off and on, so that it forgets its turns, and plan fewer",
             )
         elif move.total_ms > LONGEST_MS:
             problem = Problem(
                 "servo_move_too_long",
-                f"{motion.name} takes {motion.duration_s:.1f} s, and the longest that the servo can do is "
+                f"{motion.name} takes {motion.duration_s:.1f} s, but the servo can take at most "
                 f"{1e-3 * LONGEST_MS:.1f} s",
                 "Turn faster, or fewer turns at a time",
             )
         elif speed_rad_s > velocity_limit_rad_s:
             problem = Problem(
                 "servo_too_fast",
-                f"{motion.name} needs {speed_rad_s:.2f} rad/s, and the servo's velocity limit is "
+                f"{motion.name} needs {speed_rad_s:.2f} rad/s, but the servo's velocity limit is "
                 f"{velocity_limit_rad_s:.2f} rad/s",
                 "Turn slower; raise Velocity Limit (44) only as far as the servo's no-load speed",
             )

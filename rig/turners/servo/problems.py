@@ -65,7 +65,7 @@ def driver_hung(silent_s: float) -> Problem:
     """Describe a link whose thread hangs."""
     return Problem(
         "servo_driver_hung",
-        f"the thread that has the servo's line has not come round for {silent_s:.1f} s",
+        f"the thread that drives the servo's line has not run for {silent_s:.1f} s",
         "Look at the adapter and its cable, then start again",
     )
 

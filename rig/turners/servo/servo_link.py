@@ -104,7 +104,7 @@ class ServoLink:
         self._jobs.append(carry_out)
         self._woken.set()
         if not self._clock.wait(done, JOB_S):
-            raise PortGone("the thread that has the line does not come round")
+            raise PortGone("the thread that drives the line does not run")
         if "error" in outcome:
             raise outcome["error"]
         return outcome["value"]

@@ -28,8 +28,8 @@ def servo_problems(report: ServoReport, wanted_model: str, carried: FlangeLoad, 
         problems.append(
             Problem(
                 "servo_line_slow",
-                f"a state of the servo takes {1e3 * report.round_trip_s:.1f} ms, and one is needed "
-                f"every {1e3 * period_s:.1f} ms",
+                f"a state of the servo takes {1e3 * report.round_trip_s:.1f} ms, but one is needed every "
+                f"{1e3 * period_s:.1f} ms",
                 "Set Baud Rate (8) to 3, which is 1 Mbit/s, and Return Delay Time (9) to 0, and turner.baud to match; "
                 "an FTDI adapter needs a latency timer of 1 ms",
             )
@@ -44,7 +44,7 @@ def _identity(report: ServoReport, wanted_model: str) -> list[Problem]:
         problems.append(
             Problem(
                 "other_servo",
-                f"the servo at {report.port} is an {report.servo.name}, and the configuration names {wanted_model}",
+                f"the servo at {report.port} is an {report.servo.name}, but the configuration names {wanted_model}",
                 "Correct turner.model, or connect the servo that is meant",
             )
         )
@@ -119,7 +119,7 @@ def _condition(report: ServoReport) -> list[Problem]:
         problems.append(
             Problem(
                 "servo_voltage",
-                f"the servo has {state.voltage_v:.1f} V, its limits are {low:.1f} V to {high:.1f} V",
+                f"the servo has {state.voltage_v:.1f} V; its limits are {low:.1f} V to {high:.1f} V",
                 "Give it 12 V",
             )
         )
@@ -127,7 +127,7 @@ def _condition(report: ServoReport) -> list[Problem]:
         problems.append(
             Problem(
                 "servo_hot",
-                f"the servo has {state.temperature_c:.0f} °C, and switches itself off above "
+                f"the servo has {state.temperature_c:.0f} °C and switches itself off above "
                 f"{report.temperature_limit_c} °C",
                 "Let it cool, with its supply off",
             )
@@ -145,7 +145,7 @@ def _load(report: ServoReport, carried: FlangeLoad) -> list[Problem]:
     return [
         Problem(
             "servo_load",
-            f"the load of the servo pulls with {torque_nm:.2f} N·m, and an {report.servo.name} turns smoothly with "
+            f"the load of the servo pulls with {torque_nm:.2f} N·m, but an {report.servo.name} turns smoothly with "
             f"{most_nm:.2f} N·m at most",
             "Balance the board about the shaft, or take a stronger servo",
         )

@@ -79,7 +79,7 @@ def arm_problems(plan: Plan, report: ArmReport) -> list[Problem]:
         problems.append(
             Problem(
                 "far_from_home",
-                f"the way to the home pose is too long to drive without a look ({', '.join(too_far)})",
+                f"the way to the home pose is too long to drive without looking ({', '.join(too_far)})",
                 "Bring the arm near its home pose from the pendant, or correct arm.home_deg",
             )
         )
@@ -135,10 +135,7 @@ def kinematics_problems(arm: ArmSection, report: ArmReport) -> list[Problem]:
 
 
 def make_recorded(arm: ArmSection, report: ArmReport) -> TurnerIdentity:
-    """Return the arm for the recording, with the geometry that the configuration selects.
-
-    Raise Refused `no_kinematics`, `kinematics_disagree`.
-    """
+    """Return the arm to record, with the configured geometry. Raise Refused `no_kinematics`, `kinematics_disagree`."""
     refuse(kinematics_problems(arm, report))
     return TurnerIdentity(MAKER, identify_model(report), _geometry(arm, report), report.tcp_offset)
 

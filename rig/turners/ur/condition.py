@@ -81,7 +81,7 @@ def readiness(state: ArmState) -> Problem | None:
     if state.target_speed_fraction < FULL_SPEED_FRACTION:
         return Problem(
             "speed_slider",
-            f"the speed slider is at {100 * state.target_speed_fraction:.0f} %, and the plan needs 100 %",
+            f"the speed slider is at {100 * state.target_speed_fraction:.0f} %, but the plan needs 100 %",
             "Set the speed slider on the pendant to 100 %",
         )
     return None

@@ -68,7 +68,7 @@ def _speed_problems(motion: Motion, ours_rad_s: Joints, theirs_rad_s: Joints | N
     return [
         Problem(
             "joint_speed",
-            f"{motion.name} turns {name} at {math.degrees(speed):.1f}°/s, {whose} is {math.degrees(limit):.1f}°/s",
+            f"{motion.name} turns {name} at {math.degrees(speed):.1f}°/s; {whose} is {math.degrees(limit):.1f}°/s",
             f"Lower procedure.speed_deg_s or arm.transfer_speed_deg_s{WIDER if whose == THEIRS else ''}",
         )
         for name, speed, limit, whose in _find_excess(motion.speed_rad_s * _fractions(motion), ours_rad_s, theirs_rad_s)
@@ -79,8 +79,8 @@ def _ramp_problems(motion: Motion, ours_rad_s2: Joints, theirs_rad_s2: Joints | 
     return [
         Problem(
             "joint_acceleration",
-            f"{motion.name} accelerates {name} with {math.degrees(acceleration):.0f}°/s², "
-            f"{whose} is {math.degrees(limit):.0f}°/s²",
+            f"{motion.name} accelerates {name} with {math.degrees(acceleration):.0f}°/s²; {whose} is "
+            f"{math.degrees(limit):.0f}°/s²",
             "Lower procedure.acceleration_deg_s2",
         )
         for name, acceleration, limit, whose in _find_excess(

@@ -36,7 +36,7 @@ def open_flash(path: Path | None) -> FlashMemory:
     except (UnfitFile, OSError) as error:
         raise Refused(
             "flash_file",
-            f"world.board.flash_file {path} is no flash that a simulated board left: {error}",
+            f"world.board.flash_file {path} is not the flash of a simulated board: {error}",
             "Name another file, or delete this one",
         ) from error
     torn = frozenset(offset for (offset,) in struct.iter_unpack("<I", data[FLASH_BYTES:]))

@@ -45,10 +45,7 @@ class SimulatedBus:
             self._answer(packet, now_s)
 
     def advance(self) -> None:
-        """Simulate every servo until now.
-
-        If this process was suspended, no watchdog counts that time, because the host's bytes have not been read yet.
-        """
+        """Simulate every servo until now. No watchdog counts a time in which this process was suspended."""
         now_s = self._now()
         stalled_s, self._advanced_s = now_s - self._advanced_s, now_s
         for servo in self.servos:

@@ -182,7 +182,7 @@ class Robot:
         )
 
     def _play(self) -> None:
-        """Play one tick of the program, and stop it at an error, at its end, or without a sign of its watchdog."""
+        """Play one tick of the program; stop it at an error, at its end, or if its watchdog gets no sign of life."""
         if self.watchdog_s and (self.tick - self._last_input_tick) * TICK_S > self.watchdog_s:
             self.stop_program("the RTDE watchdog stopped the program")
             return

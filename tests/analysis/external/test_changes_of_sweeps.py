@@ -104,4 +104,4 @@ def test_a_file_too_long_to_be_examined_for_changes_is_noted(tmp_path: Path) -> 
     data = average_files(*write_rates(tmp_path, swept(HZ)))
     assert not list(notes_on_changes(data))
     (note,) = notes_on_changes(replace(data, sweeps=data.sweeps * 101))
-    assert note.startswith("abrupt changes of the sensor were not looked for in 6")
+    assert note.startswith("abrupt changes of the sensor were not searched for: there are 6")

@@ -37,7 +37,7 @@ def swept(row: int, factor: float) -> ExternalData:
 @pytest.mark.parametrize("factor", [0.5, 2.0])
 @pytest.mark.parametrize("row", [1, 3])
 def test_of_two_sweeps_about_an_axis_both_are_named_for_either_may_be_wrong(row: int, factor: float) -> None:
-    both = "bad_sweep: of sweeps 1 and 3, alone about their axis, one contradicts the other by "
+    both = "bad_sweep: of sweeps 1 and 3, the only ones about their axis, one contradicts the other by "
     with pytest.raises(Refused, match=both + r"\d+ % of its rate"):
         solve_swept(swept(row, factor), None)
     with pytest.raises(Refused, match=both):
@@ -48,7 +48,7 @@ def test_a_sweep_whose_axis_has_the_wrong_sign_is_no_stuck_sensor() -> None:
     sweeps = read_sweeps(EXAMPLES / "sweeps.csv")
     for axis in "xyz":
         sweeps[f"axis_{axis}"][2] *= -1
-    with pytest.raises(Refused, match="bad_sweep: sweeps 1 and 3 read the other way round than their axes say"):
+    with pytest.raises(Refused, match="bad_sweep: sweeps 1 and 3 have the opposite sign to what their axes state"):
         average_sweeps(read_samples(EXAMPLES / "samples.csv", [RATE]), sweeps)
 
 
@@ -158,7 +158,7 @@ def test_poses_in_any_order_and_repeated_ones_are_placed_by_their_times(tmp_path
         matrices.append(result.solution.matrix)
     assert matrices[1] == pytest.approx(matrices[0], rel=1e-9)
     assert [str(entry) for entry in placed.omitted] == [
-        "10 of 610 rows, they repeat the time of another one; the first row 601"
+        "10 of 610 rows, they repeat the time of another attitude; the first row 601"
     ]
 
 

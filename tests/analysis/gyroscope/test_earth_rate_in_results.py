@@ -48,7 +48,7 @@ def test_a_person_reads_degrees_an_hour_and_where_the_arm_stands() -> None:
     rate = 15.041 * DEG_H * np.array([0.0, -np.cos(np.radians(40)), np.sin(np.radians(40))])
     found = EarthRate(rate, (0.05 * DEG_H) ** 2 * np.eye(3), np.array([0.0, 0.0, 1.0]), False, 1.0, 1e5)
     said = "\n".join(earth_rate_lines(earth_rate_entry(found)))
-    assert "15.041 deg/h (± 0.100)" in said
+    assert "15.041 deg/h (± 0.100; expected 15.041)" in said
     assert "latitude 40.00° (± 0.38)" in said
     assert "270.00° from north" in said, "north is to the right of the x axis, which looks west"
 

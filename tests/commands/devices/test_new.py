@@ -166,6 +166,6 @@ def test_what_is_no_port_is_refused_with_the_ports_that_there_are(
     words = ("--turner", "hand", "--sensor", "lines", "--port", port, "--listen", "no", "--serial-number", "E-1")
     assert main(["new", str(tmp_path / "my.yaml"), *words]) == 2
     said = " ".join(capsys.readouterr().err.split())
-    assert f"bad_option: --port {port}: must be the name of a serial port, as /dev/ttyUSB0 or COM3" in said
+    assert f"bad_option: --port {port}: must be the name of a serial port, such as /dev/ttyUSB0 or COM3" in said
     assert f"; {describe_ports()}" in said
     assert all(words in said for words in find_ports().values())

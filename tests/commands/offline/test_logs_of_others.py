@@ -181,7 +181,7 @@ def test_a_row_of_units_is_read_over(units: str, tmp_path: Path, capsys: pytest.
 
 def test_units_that_contradict_what_is_said_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     said = refused(capsys, *others(tmp_path, "t,gx,gy,gz", ["s,deg/s,deg/s,deg/s", *rows_of(tmp_path)]))
-    assert "wrong_unit: " in said and "line 2 says that x_rad_s is in 'deg/s'" in said.replace('"', "'")
+    assert "wrong_unit: " in said and "line 2 states that x_rad_s is in 'deg/s'" in said.replace('"', "'")
 
 
 @pytest.mark.slow

@@ -113,7 +113,7 @@ def test_a_frame_whose_z_axis_points_up_says_so() -> None:
 
 def test_second_order_asks_for_a_sixth_attitude() -> None:
     r = attitudes(5)
-    with pytest.raises(Fault, match=r"too_few_observations: 5 .* 18 parameters, 6 are the least"):
+    with pytest.raises(Fault, match=r"too_few_observations: 5 .* 18 parameters; at least 6 are needed"):
         solve_triaxial(readings(r), r, VARIANCES[:5], KNOWN, second_order=True)
 
 

@@ -137,10 +137,14 @@ def test_only_regular_files_of_a_sensible_size_are_opened(tmp_path: Path) -> Non
     with huge.open("wb") as file:
         file.truncate(300_000_000)
     sweeps = EXAMPLES / "sweeps.csv"
-    for path, why in ((pipe, "no regular file"), (endless, "no regular file"), (huge, "longer than 256000000 bytes")):
+    for path, why in (
+        (pipe, "not a regular file"),
+        (endless, "not a regular file"),
+        (huge, "longer than 256000000 bytes"),
+    ):
         with pytest.raises(Refused, match=f"no_file: .*{why}"):
             average_files(path, sweeps)
-    with pytest.raises(Refused, match=r"no_file: .*no regular file"):
+    with pytest.raises(Refused, match=r"no_file: .*not a regular file"):
         average_files(EXAMPLES / "samples.csv", pipe)
 
 

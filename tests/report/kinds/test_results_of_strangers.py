@@ -63,13 +63,13 @@ def test_what_texts_hide_is_shown_and_not_obeyed(tmp_path: Path, capsys: pytest.
         (
             "six_observation",
             lambda d: d["gyroscopes"]["gyro"].update(scale=[1, 1, 1e300]),
-            "'1e+300' is no number that",
+            "'1e+300' is not a number that",
         ),
-        ("six_observation", lambda d: d["gyroscopes"]["gyro"].update(scale=[1, 1, 10**200]), "is no number that"),
+        ("six_observation", lambda d: d["gyroscopes"]["gyro"].update(scale=[1, 1, 10**200]), "is not a number that"),
         (
             "six_observation",
             lambda d: d["gyroscopes"]["gyro"].update(scale=[1, 1, float("nan")]),
-            "'NaN' is no number",
+            "'NaN' is not a number",
         ),
         ("verified", lambda d: d["verification"]["gyro"]["after"].update(delay_std_s=[]), "must be as many"),
     ],

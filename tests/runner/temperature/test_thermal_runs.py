@@ -254,7 +254,7 @@ def test_a_killed_rig_leaves_the_heater_on_for_two_and_a_half_seconds_at_most(tm
     ("changes", "words"),
     [
         ({"to_c": 36, "reference_c": 30}, "3 gaps apart"),
-        ({"to_c": 36, "both_directions": True}, "10 K and a gap apart at least: 15 K"),
+        ({"to_c": 36, "both_directions": True}, "at least 10 K and a gap apart: 15 K"),
         ({"reference_c": 40}, "reference_c must lie between"),
         ({"reference_c": 26}, "half a gap from each"),
         ({"max_temperature_c": 34}, "max_temperature_c must lie above"),

@@ -127,7 +127,7 @@ def test_a_recipe_as_long_as_the_makers_test_program_sends_is_taken() -> None:
 
 def test_values_that_no_package_has_room_for_are_refused() -> None:
     answer = asked(laboratory(), ",".join(["actual_q"] * 1400))
-    assert b"a recipe of values of 67200 bytes" in answer and answer.endswith(build_package("O", b"\0"))
+    assert b"a recipe of 67200 bytes of values" in answer and answer.endswith(build_package("O", b"\0"))
 
 
 def test_slider_and_scaling_multiply_to_what_the_joints_do() -> None:

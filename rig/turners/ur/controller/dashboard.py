@@ -90,7 +90,7 @@ class Dashboard:
             if remaining_s <= 0.0:
                 raise TimeoutError("the dashboard server does not answer in time")
             if len(self._received) > LINE_BYTES:
-                raise ConnectionError("this is no dashboard server")
+                raise ConnectionError("this is not a dashboard server")
             self._socket.settimeout(remaining_s)
             data = self._socket.recv(LINE_BYTES)
             if not data:

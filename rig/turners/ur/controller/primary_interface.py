@@ -125,7 +125,7 @@ def packages(buffer: bytearray) -> Iterator[tuple[int, bytes]]:
     while len(buffer) >= HEADER.size:
         size, kind = HEADER.unpack_from(buffer)
         if not HEADER.size <= size <= SIZE_MAX:
-            raise ConnectionError("this is no primary interface")
+            raise ConnectionError("this is not a primary interface")
         if len(buffer) < size:
             return
         payload = bytes(buffer[HEADER.size : size])

@@ -67,7 +67,7 @@ class RobotApi:
                 if answer.status not in MOVED or not location:
                     return answer.status, answer.read(ANSWER_BYTES)
                 path = urlsplit(location).path
-        raise HTTPException("it is moved on and on")
+        raise HTTPException("it redirects again and again")
 
 
 class RobotApiStop:

@@ -18,7 +18,7 @@ def packages(buffer: bytearray) -> Iterator[tuple[str, bytes]]:
     while len(buffer) >= HEADER.size:
         size, kind = HEADER.unpack_from(buffer)
         if size < HEADER.size:
-            raise ConnectionError("this is no RTDE")  # nothing that follows can be trusted
+            raise ConnectionError("this is not RTDE")  # nothing that follows can be trusted
         if len(buffer) < size:
             return
         payload = bytes(buffer[HEADER.size : size])

@@ -85,8 +85,8 @@ def clock_step(before_s: float, after_s: float, period_s: float, missed_s: float
         return None
     return Problem(
         "arm_clock_stepped",
-        f"the controller's time went from {before_s:.3f} s to {after_s:.3f} s from one state to the next, where "
-        f"{period_s:.3f} s belong: its clock was set",
+        f"the controller's time went from {before_s:.3f} s to {after_s:.3f} s from one state to the next, instead "
+        f"of by {period_s:.3f} s: its clock was set",
         f"Look whether a second controller answers at arm.host, then start again. {RESTART}",
     )
 

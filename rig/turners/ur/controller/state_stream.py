@@ -236,7 +236,7 @@ class StateStream:
 def _decode_packet(payload: bytes) -> StatePacket:
     """Decode a packet. Raise `ConnectionError` for another number of bytes: some were lost in transfer."""
     if len(payload) != PACKET.size:
-        raise ConnectionError(f"a state of {len(payload)} bytes where {PACKET.size} belong")
+        raise ConnectionError(f"a state of {len(payload)} bytes instead of {PACKET.size}")
     values = PACKET.unpack(payload)
     fraction, scaling, robot_mode, safety_mode, runtime_state, robot_bits, safety_bits, payload_kg = values[14:22]
     state = ArmState(

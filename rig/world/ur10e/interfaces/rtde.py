@@ -100,7 +100,7 @@ class RtdeSession:
             if size < HEADER.size:
                 self._buffer.clear()  # nothing that follows can be trusted
                 self.closing = True
-                answer += self._say(f"a package of {size} bytes is no RTDE")
+                answer += self._say(f"a package of {size} bytes is not RTDE")
                 break
             if len(self._buffer) < size:
                 break
@@ -110,7 +110,7 @@ class RtdeSession:
             try:
                 answer += handler(payload) if handler else self._say(f"unknown package type {kind}")
             except struct.error:
-                answer += self._say(f"package of type {chr(kind)} with {len(payload)} bytes where others belong")
+                answer += self._say(f"package of type {chr(kind)} with {len(payload)} bytes, which is not its length")
         return answer
 
     def tick(self) -> bytes:
@@ -147,7 +147,7 @@ class RtdeSession:
         if (size := _size_bytes(kinds)) > DATA_BYTES:
             self._output = None
             refusal = build_package("O", b"\0" if self._version == 2 else b"")
-            return self._say(f"a recipe of values of {size} bytes, the most is {DATA_BYTES}") + refusal
+            return self._say(f"a recipe of {size} bytes of values; the limit is {DATA_BYTES}") + refusal
         fastest_hz = TICKS_PER_SECOND if self._robot.identity.polyscope[0] >= E_SERIES else CB3_HZ
         valid = "NOT_FOUND" not in kinds and bool(names) and 0.0 < frequency_hz <= fastest_hz
         self._output = OutputRecipe(names, frequency_hz, 1 if self._version == 2 else None) if valid else None
@@ -193,7 +193,7 @@ class RtdeSession:
         if recipe is None:
             return self._say("data package for an input recipe that was never set up")
         if len(payload) - 1 != recipe.layout.size:
-            return self._say(f"data package of {len(payload) - 1} bytes where {recipe.layout.size} belong")
+            return self._say(f"data package of {len(payload) - 1} bytes instead of {recipe.layout.size}")
         values = iter(recipe.layout.unpack_from(payload, 1))
         named: dict[str, Any] = {}
         for name, count, put in recipe.fields:

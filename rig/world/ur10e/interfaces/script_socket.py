@@ -49,7 +49,7 @@ class ScriptReader:
                 self._lines = []
                 yield program
         if self._size > TEXT_BYTES:
-            raise ProgramError(f"a program of more than {TEXT_BYTES} bytes is none")
+            raise ProgramError(f"a program of more than {TEXT_BYTES} bytes is not accepted")
 
 
 def compile_program(robot: Robot, lines: list[str]) -> Program:
