@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 def calibrate(runs: "Sequence[RunData]", estimator: str = DEFAULT_ESTIMATOR, *, drifting: bool = False) -> Outcome:
     """Solve and judge the recordings of a calibration.
 
-    `runs`: at least one recording, of a run or from files. If `drifting`, a bias drift is no contradiction. Raise Fault
-    or Refused if the recordings lack something.
+    `runs`: at least one recording, of a run or from files. If `drifting`, a bias drift does not count as a
+    contradiction. Raise Fault or Refused if the recordings lack something.
     """
     if (external := runs[0].external) is not None:
         from rig.analysis.external import external_outcome as external_judging

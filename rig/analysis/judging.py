@@ -51,7 +51,7 @@ def calibrate(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Out
     if not recordings:
         raise Fault(
             "too_few_observations",
-            "no finished sweep is recorded, and a calibration needs sweeps in six directions, or dwells in attitudes",
+            "no finished sweep is recorded, but a calibration needs sweeps in six directions, or dwells in attitudes",
             "Record the movement; resume the run if it was interrupted",
         )
     polynomials: Polynomials = {}

@@ -19,7 +19,7 @@ def solvable() -> Iterator[None]:
         raise Fault(
             "not_solvable",
             f"the readings and their stated motion have no common solution ({error})",
-            "Look whether the recording is of this movement and undamaged; record it again, or resume the run if it "
+            "Check that the recording is of this movement and undamaged; record it again, or resume the run if it "
             "was interrupted",
         ) from error
 

@@ -40,7 +40,7 @@ def following(numbers: Sequence[str], done: Sequence[str]) -> str | None:
     if tuple(done) != tuple(numbers[: len(done)]):
         raise Refused(
             "another_series",
-            f"the batch has run {', '.join(done)}, and the list begins differently",
+            f"the batch has run {', '.join(done)}, but the list begins differently",
             "Give the list that the batch began with, or another folder with --out",
         )
     return numbers[len(done)] if len(done) < len(numbers) else None

@@ -23,7 +23,7 @@ def require_board_section(config: SensorsConfig) -> BoardSection:
         raise Refused(
             "no_board_section",
             "the configuration has no section board: its sensors have ports of their own",
-            "Name a configuration with a board; a KVH 1775 is looked at with `rig kvh info`",
+            "Name a configuration with a board; inspect a KVH 1775 with `rig kvh info`",
         )
     return config.board
 
@@ -110,7 +110,7 @@ def refuse_other_sensor(
         raise Refused(
             "another_range",
             f"{calibration} holds for {range_deg_s:g} °/s, but the configuration states {section.range_deg_s:g} °/s",
-            "Set range_deg_s to what it was calibrated at, or calibrate at this range",
+            "Set range_deg_s to the range of its calibration, or calibrate at this range",
         )
 
 

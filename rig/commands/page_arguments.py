@@ -110,7 +110,7 @@ def read_page_wish(options: argparse.Namespace) -> PageWish | None:
     """
     if not options.page:
         if options.confirm_on_page or options.page_address or options.page_token or options.page_token_file:
-            raise Refused("page_address", "this option needs a page, and --page is not given", "Give --page as well")
+            raise Refused("page_address", "this option needs a page, but --page is not given", "Give --page as well")
         return None
     from rig.page.server.serving import check
 

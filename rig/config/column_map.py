@@ -99,7 +99,7 @@ class TableSection(Section):
     time: ColumnSection
     axes: tuple[AxisSection, ...] = Field(min_length=1, max_length=3)
     attitude_std_deg: Positive | None = Field(
-        default=None, description="how well the attitude is known about each axis, one standard deviation"
+        default=None, description="standard deviation of the attitude about each axis"
     )
 
     @model_validator(mode="after")
@@ -107,7 +107,7 @@ class TableSection(Section):
         """Refuse columns without a unit, and rates of only some axes, because the item's rate needs all axes."""
         _fit("time", self.time, TIME)
         if any(column.unit is None for axis in self.axes for column in (self.time, axis.angle, axis.rate) if column):
-            raise ValueError("say the unit of every column of a table")
+            raise ValueError("state the unit of every column of a table")
         if len({axis.rate is None for axis in self.axes}) > 1:
             raise ValueError("give the rate of every axis, or of none")
         return self
@@ -155,10 +155,10 @@ GIVE_MAP = "Give a map of the columns; rig look LOG --write FILE writes one"
 
 def _fit(name: str, column: ColumnSection, wanted: str) -> None:
     if column.wraps_at is not None and wanted != TIME:
-        raise ValueError(f"{name} is {_add_article(wanted)}, and only a counter of time has wraps_at")
+        raise ValueError(f"{name} is {_add_article(wanted)}, but only a counter of time has wraps_at")
     quantity = wanted if column.unit is None else UNITS[column.unit].quantity
     if quantity != wanted:
-        raise ValueError(f"{name} is {_add_article(wanted)}, and {column.unit} is the unit of {_add_article(quantity)}")
+        raise ValueError(f"{name} is {_add_article(wanted)}, but {column.unit} is the unit of {_add_article(quantity)}")
 
 
 def _add_article(name: str) -> str:

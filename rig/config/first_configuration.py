@@ -62,7 +62,7 @@ def configuration_text(answers: Answers, schema: str, name: str) -> str:
     sections = (
         [
             f"# yaml-language-server: $schema={schema}",
-            f"# A first configuration: rig check {name} looks whether all is there; rig run {name} calibrates.",
+            f"# A first configuration: rig check {name} checks that all is there; rig run {name} calibrates.",
             "# Every key, its unit and its range: the schema above, which an editor shows.",
         ],
         _turner(answers),
@@ -141,7 +141,7 @@ def _procedure(answers: Answers) -> Iterator[str]:
         yield "  flips: 12                # to another side of the box"
         yield "  turns: 3                 # once round on the table, against a straight edge"
         yield "  rest_s: 1"
-        yield "  squareness_deg: 0.2      # of a box; 0.6 of a bare board"
+        yield "  squareness_deg: 0.2      # for a box; 0.6 for a bare board"
     else:
         yield "  speed_deg_s: 60          # the sensor's range must be at least 1.5 times as large"
         yield "  rest_s: 3"

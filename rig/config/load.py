@@ -276,7 +276,7 @@ def _validate(model: type[Model], data: Any, prefix: Location, layered: Layered)
 
 
 SHAPES = {
-    "tuple_type": "a list in brackets, as [a, b, c]",
+    "tuple_type": "a list in brackets, such as [a, b, c]",
     "dict_type": "a section that holds others by their names",
 }
 
@@ -350,7 +350,7 @@ def _world_fits(config: RigConfig, world: WorldSection) -> Iterator[str]:
     """Yield the conflicts of world and rig: an address on another machine, or sensors that the rig does not have."""
     turner = config.turner
     if (host := turner.simulated_at) is None and not isinstance(turner, HandSection):
-        yield "world: simulates an arm, a hand, or a servo whose port is socket://host:port, and turner says otherwise"
+        yield "world: simulates an arm, a hand, or a servo whose port is socket://host:port, but turner is another"
         return
     if host is not None and not _is_loopback(host):
         key = "arm.host" if isinstance(turner, ArmSection) else f"turner.{next(iter(turner.override_host(host)))}"

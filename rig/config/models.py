@@ -102,7 +102,7 @@ class ArmSection(TurnerSection):
         default=80,
         ge=1,
         le=65535,
-        description="TCP port of a PolyScope X's Robot API; a simulator may have it at another one",
+        description="TCP port of a PolyScope X's Robot API; a simulator may use another",
     )
     kinematics: Literal["controller", "nominal"] = Field(
         default="controller",
@@ -164,9 +164,9 @@ class ProcedureSection(Section):
         """Refuse `stages` for attitudes and verifications, which have one mounting."""
         if isinstance(data, dict) and "stages" in data and "stages" not in cls.model_fields:
             raise ValueError(
-                "stages are of six_observation and servo_six_observation, which calibrate gyroscopes: accelerometers "
-                "and magnetometers are turned against gravity and field in one mounting, and a verification repeats "
-                "one movement; leave out stages, or use six_observation"
+                "stages belong to six_observation and servo_six_observation, which calibrate gyroscopes: "
+                "accelerometers and magnetometers are turned against gravity and field in one mounting, and a "
+                "verification repeats one movement; leave out stages, or use six_observation"
             )
         return data
 

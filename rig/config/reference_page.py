@@ -149,7 +149,7 @@ def _turners() -> Iterator[str]:
     yield from (
         "### `turner`",
         "",
-        "What turns the sensors, said by its `kind`. `turner: {kind: ur, …}` with the keys of `arm` is the same as",
+        "What turns the sensors, by its `kind`. `turner: {kind: ur, …}` with the keys of `arm` is the same as",
         "`arm`; a file has one of the two. `turner: {kind: hand}` is an operator's hand, and has no keys",
         "([by hand](how-to/without-an-arm/by-hand.md)). `kind: servo` has the keys below. A package may bring another",
         "kind, which brings its own keys ([another turner](how-to/with-code/other-hardware.md)).",

@@ -1,7 +1,7 @@
 """Values by which a source marks a field that it does not provide. Pure.
 
 Each source declares a table of `Absent` for its fields, by its protocol. A temperature that is not provided is unknown,
-and a sample without a rate is no sample.
+and a sample without a rate does not count as a sample.
 """
 
 from dataclasses import dataclass

@@ -48,7 +48,7 @@ def read_document(kind: type[Document], file: Path, limit_bytes: int, *, what: s
         first = error.errors()[0]
         if first["loc"] == ("schema",) and isinstance(first.get("input"), str):
             expected = first.get("ctx", {}).get("expected", "another")
-            what_else = f"{file} is of the schema {quote(first['input'])}, and this version reads {expected}"
+            what_else = f"{file} is of the schema {quote(first['input'])}, but this version reads {expected}"
             raise Refused("not_a_result", what_else, "Use the version of the rig that wrote it") from error
         where = ".".join(map(str, first["loc"]))
         why = f"{where}{': ' if where else ''}{first['msg']}"

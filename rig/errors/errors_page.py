@@ -18,7 +18,7 @@ def page() -> str:
         "programs may rely on them. The exit status of the command depends on the time of the error. It is 2 if the",
         "command refused before anything had moved or changed. It is 3 if something failed afterwards, or if the data",
         "do not allow a result. It is also 3 if the second half of a run is refused after the first has moved the arm.",
-        "It is 5 if all was done, and stdout has not taken what was to be printed. Status 1 is not an error: the run",
+        "It is 5 if all was done but stdout has not taken what was to be printed. Status 1 is not an error: the run",
         "finished, and its verdict is fail.",
         "",
         "| error | status | when | what to do |",

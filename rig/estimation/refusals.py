@@ -228,7 +228,7 @@ def check_side(reference: Array, side: Array) -> None:
         raise Fault(
             "sign_unknown",
             "the reference is at right angles to the direction that should show its sign",
-            "Give a direction the reference points along, for example the vertical for gravity",
+            "Give a direction along which the reference points, for example the vertical for gravity",
         )
 
 

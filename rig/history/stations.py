@@ -1,6 +1,6 @@
 """The present state of each station in a shared history: one row for each rig, replaced every second.
 
-It is no entry of the history: no result depends on it, and no journal contains it. Ages are by the database's clock
+It is not an entry of the history: no result depends on it, and no journal contains it. Ages are by the database's clock
 alone, so the computers' clocks need not agree.
 """
 

@@ -135,7 +135,7 @@ def calibrations(
     if not pasts and serial_number is not None:
         raise Refused(
             "not_in_history",
-            f"no calibration of {serial_number} in the history fits",
+            f"no calibration of {serial_number} in the history matches",
             "Look with `rig history`, or enter runs with `rig history import`",
         )
     return Calibrations(tuple(pasts))

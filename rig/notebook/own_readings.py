@@ -48,7 +48,7 @@ def _refuse_other_units(values: Array, quantity: Quantity, limit: float | None, 
         reaches = f"its range is ±{limit:.4g}" if limit is not None else f"no such sensor reads more than {most:g}"
         raise Refused(
             "wrong_unit",
-            f"the readings for {whose} reach {largest:.4g}, and {reaches} {quantity.unit}: they look like "
+            f"the readings for {whose} reach {largest:.4g}, but {reaches} {quantity.unit}: they look like "
             f"{other_unit}, or like counts",
             remedy,
         )

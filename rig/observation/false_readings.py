@@ -1,4 +1,4 @@
-"""Checks for numbers in a log that are no readings.
+"""Checks for numbers in a log that are not readings.
 
 Examples are a logger's mark of a missing value, a frozen axis, and the end of a sensor's range.
 """
@@ -80,9 +80,9 @@ def check_unwrapped(time_s: Array, readings: Array, rows: NDArray[np.intp], quan
         before, after = readings[first : first + 2, axis]
         raise Refused(
             "readings_overflow",
-            f"{where}: {name} jumps from {before:.6g} to {after:.6g} {quantity.unit} between two readings, as a number "
-            f"that overflows does, from one end of its range to the other: {len(jumps)} such steps, the first before "
-            f"sample {rows[first + 1] + 1}, at {time_s[first + 1]:.10g} s",
+            f"{where}: {name} jumps from {before:.6g} to {after:.6g} {quantity.unit} between two readings, from one "
+            f"end of its range to the other, as a number does that overflows: {len(jumps)} such steps, the first "
+            f"before sample {rows[first + 1] + 1}, at {time_s[first + 1]:.10g} s",
             f"Choose a wider range of the {quantity.sensor}, or turn more slowly; or store its readings in more bits",
         )
 
@@ -169,7 +169,7 @@ def check_frozen(time_s: Array, readings: Array) -> None:
         if (high - low).max() > TURNED_RAD_S:
             raise Fault(
                 "stuck_sensor",
-                f"from {time_s[run.start]:.6g} to {time_s[run.stop - 1]:.6g} s the gyroscope reads {value:.6g} rad/s "
-                f"on {letter} always, while it turns about its other axes",
+                f"from {time_s[run.start]:.6g} to {time_s[run.stop - 1]:.6g} s the gyroscope always reads {value:.6g} "
+                f"rad/s on {letter} while it turns about its other axes",
                 "Check the sensor's supply and its bus wires, then record again; or solve what was read before",
             )

@@ -180,7 +180,7 @@ def lag_columns(rate: Array, columns: Array, share: Array) -> Array:
 
 
 def _changes(slow: Array) -> Array:
-    """Return the first and second differences of a rate (n, 1), the effects of a lag and a filter; none of none."""
+    """Return the first and second differences of a rate (n, k), the effects of a lag and of a filter (n, 2 k)."""
     change = np.gradient(slow, axis=0)
     return np.column_stack([change, np.gradient(change, axis=0)])
 

@@ -20,8 +20,8 @@ def entry(kind: type[EntryT], /, *sources: object, **more: Any) -> EntryT:
     """Return an entry of `kind`, with each field from `more`, or from the first source that fills it by the table.
 
     Arrays become tuples. Raise ValueError for a field without a source or with a value that does not fit; TypeError if
-    `more` has a name that is no field, or for a source that the table does not list; AttributeError if a source lacks
-    an attribute of the table.
+    `more` has a name that is not a field, or for a source that the table does not list; AttributeError if a source
+    lacks an attribute of the table.
     """
     if unknown := more.keys() - kind.model_fields.keys():
         raise TypeError(f"{kind.__name__} has no {', '.join(sorted(unknown))}")

@@ -35,7 +35,7 @@ COMMAND_WORDS = frozenset(word for choices in CHOICES.values() for choice in cho
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """A question of a `kind`: the `lines` before it, its `text`, and a `hint` after an input that was no answer."""
+    """A question of a `kind`: the `lines` before it, its `text`, and a `hint` after an input that was not an answer."""
 
     kind: Kind
     text: str

@@ -53,6 +53,7 @@ class Dipole:
         x, y, z = (target - base - offset for target, base, offset in zip(position_m, origin, source, strict=True))
         distance = max(sqrt(x * x + y * y + z * z), 1e-3)
         u, v, w = moment
+        # B = μ₀/4π (3 (m · r) r / r⁵ − m / r³)
         parallel = 3.0 * (u * x + v * y + w * z) / distance**5
         across = 1.0 / distance**3
         return (

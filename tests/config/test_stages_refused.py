@@ -22,7 +22,7 @@ def test_a_verification_has_one_mounting() -> None:
     assert "procedure.verify repeats one movement with one mounting, but stages have several" in refused(
         "procedure.verify=true", f"procedure.{STAGES}"
     )
-    assert "stages are of six_observation and servo_six_observation" in refused(
+    assert "stages belong to six_observation and servo_six_observation" in refused(
         "procedure.name=verify", f"procedure.{STAGES}"
     )
 

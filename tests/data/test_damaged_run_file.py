@@ -274,7 +274,7 @@ SHAPES: dict[str, tuple[Callable[[h5py.File], None], str]] = {
     "a dataset for the samples": (instead("samples", rows("u1")), "samples is not a group"),
     "events of text": (instead("events", rows("f4")), "events holds float32"),
     "an external link": (instead("states", linked), "states is a link to somewhere else"),
-    "10^12 rows": (announced, "states announces 1000000000000 rows and holds"),
+    "10^12 rows": (announced, "states announces 1000000000000 rows but holds"),
     "an event that is a number": (instead("events", number), "event 1 cannot be understood"),
     "an unknown event": (events(lambda line: line.update(name="sweep_danced")), "no event 'sweep_danced'"),
     "an event without a time": (events(lambda line: line.pop("host_time_s")), "host_time_s"),

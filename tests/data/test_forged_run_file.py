@@ -260,13 +260,13 @@ def test_rows_that_cannot_be_reckoned_with_are_refused(
     [
         ({name: [] for name in SAID_BY_HAND}, "it has 0 rows of clock_ppm, not one"),
         ({name: value * 2 for name, value in SAID_BY_HAND.items()}, "it has 2 rows of clock_ppm, not one"),
-        ({"clock_ppm": [0.0]}, "its clock_ppm is not above 0"),
-        ({"box_rad": [-0.003]}, "its box_rad is not above 0"),
-        ({"box_rad": [1.0]}, "and 0.2 at most"),
-        ({"closure": [7.0]}, "its closure is not above -1 and 1 at most"),
-        ({"gravity_m_s2": [-9.81]}, "its gravity_m_s2 is not above 0"),
-        ({"first_face": [6.0]}, "its first_face is not above -1 and 5 at most"),
-        ({"first_face": [-1.0]}, "its first_face is not above -1 and 5 at most"),
+        ({"clock_ppm": [0.0]}, "its clock_ppm must be above 0"),
+        ({"box_rad": [-0.003]}, "its box_rad must be above 0"),
+        ({"box_rad": [1.0]}, "and at most 0.2"),
+        ({"closure": [7.0]}, "its closure must be above -1 and at most 1"),
+        ({"gravity_m_s2": [-9.81]}, "its gravity_m_s2 must be above 0"),
+        ({"first_face": [6.0]}, "its first_face must be above -1 and at most 5"),
+        ({"first_face": [-1.0]}, "its first_face must be above -1 and at most 5"),
     ],
 )
 def test_what_nobody_said_of_a_session_by_hand_is_refused(changes: dict[str, list[float]], complaint: str) -> None:

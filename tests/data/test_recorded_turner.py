@@ -122,7 +122,7 @@ NINE = [f"axis {number}" for number in range(9)]
         (described(joints=["a/b", "c"]), r"turner\.joints"),
         (described(joints=["a", "a"]), "one name"),
         (described(joints=["a\n", "c"]), r"turner\.joints"),
-        (described(geometry=geometry(3)), "2 joints and a geometry of 3"),
+        (described(geometry=geometry(3)), "2 joints but a geometry of 3"),
         (described(geometry={**geometry(2), "a_m": [0.0]}), "geometry"),
         (described(geometry={**geometry(2), "a_m": [0.0, float("nan")]}), "'NaN' is not a number"),
         (described(kind="../ur"), r"turner\.kind"),
@@ -151,7 +151,7 @@ def test_poses_have_the_joints_of_the_turner(tmp_path: Path) -> None:
     with h5py.File(path, "r+") as file:
         settings = json.loads(file.attrs["settings"])
         file.attrs["settings"] = json.dumps({**settings, "home_q_rad": [0.0] * 3})
-    with pytest.raises(Refused, match="2 joints, and one of its poses has another number"):
+    with pytest.raises(Refused, match="2 joints, but one of its poses has another number"):
         read_run(path)
 
 

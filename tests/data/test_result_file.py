@@ -82,7 +82,7 @@ def test_only_a_regular_file_of_a_sensible_size_is_read(kind: str, tmp_path: Pat
 def test_a_result_of_another_schema_names_it(tmp_path: Path) -> None:
     document = {**json.loads(VERIFIED.text()), "schema": "rig.result/9"}
     (tmp_path / "result.json").write_text(json.dumps(document))
-    with pytest.raises(Refused, match=r"not_a_result: .* of the schema 'rig.result/9', and this version reads 'rig"):
+    with pytest.raises(Refused, match=r"not_a_result: .* of the schema 'rig.result/9', but this version reads 'rig"):
         read_result(tmp_path)
 
 

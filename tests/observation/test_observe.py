@@ -470,7 +470,7 @@ def gap_in_states(run: RunData) -> RunData:
         (doubled, "duplicated_samples"),
         (
             lambda run: with_samples(run, lambda samples: samples[:50]),
-            "time_base_not_found: .* 50 samples, of .*Raise the rate",
+            "time_base_not_found: .* 50 samples, but .*Raise the rate",
         ),
         (halt, "speed_not_constant: in sweep 0"),
         (slow_slider, "speed_slider: .* 80 %"),

@@ -164,7 +164,7 @@ def test_the_rest_of_an_interrupted_run_has_what_is_missing_of_both() -> None:
 @pytest.mark.parametrize(
     ("attitudes", "said"),
     [
-        ("six", "no set of attitudes; allowed: eighteen, faces"),
+        ("six", "is not a set of attitudes; allowed: eighteen, faces"),
         ([[0, -90, 0], [360, -90, 0]], "is listed twice"),
         ([[0, -90]], "Field required"),
         ([[0, -90, 400]], "less than or equal to 360"),

@@ -94,7 +94,7 @@ def test_columns_without_axes_are_sensors_of_their_own_on_the_same_clock() -> No
     [
         (SEVEN, {"air": {"unit": "hPa"}}, "no column air"),
         ((*SEVEN, "air"), {}, "no such column"),
-        ((*SEVEN, "field"), {"field": {"unit": "hPa"}}, "no name of a scalar"),
+        ((*SEVEN, "field"), {"field": {"unit": "hPa"}}, "cannot name a scalar"),
         ((*SEVEN, "air"), {"air": {"unit": "torr"}}, "scalars.air.unit"),
     ],
 )

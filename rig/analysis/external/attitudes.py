@@ -119,8 +119,9 @@ def _check_noisy(placements: Placements, quantity: Quantity) -> None:
         window, reads = read.windows[row], read.means[quantity][row, axis]
         raise Fault(
             "stuck_sensor",
-            f"from {window.start_s:.4g} to {window.end_s:.4g} s the {quantity.sensor} reads {reads:g} {quantity.unit} "
-            f"on {quantity.axes[axis]} always: stuck, at the end of its range, or too coarse to show its noise",
+            f"from {window.start_s:.4g} to {window.end_s:.4g} s the {quantity.sensor} always reads {reads:g} "
+            f"{quantity.unit} on {quantity.axes[axis]}: it is stuck, at the end of its range, or too coarse to show "
+            "its noise",
             "Check its supply, its bus wires and its range; record with all digits",
         )
 

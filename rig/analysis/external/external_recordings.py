@@ -148,7 +148,7 @@ def _solve_sweeps(read: ReadElsewhere, samples: Samples, name: str | None, refer
     if reference_c is not None and data.turned is not None:
         raise Refused(
             "bad_option",
-            "the body was turned from rest to rest, and over temperature mean rates are solved",
+            "the body was turned from rest to rest, but a calibration over temperature needs mean rates",
             "Give sweeps at constant speed, with speed_rad_s; or leave out --reference-c",
         )
     if reference_c is not None:

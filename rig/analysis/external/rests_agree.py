@@ -44,7 +44,7 @@ def check_rests_agree(turning: Turning, solution: KnownIncrements) -> None:
         return
     raise Fault(
         "bias_contradicts_rests",
-        f"at rest the gyroscope reads {bias[worst]:+.2g} rad/s on {RATE.axes[worst]}, and the increments between "
+        f"at rest the gyroscope reads {bias[worst]:+.2g} rad/s on {RATE.axes[worst]}, but the increments between "
         f"attitudes give a bias of {solution.bias[worst]:+.2g} ± {2 * std[worst]:.1g} rad/s: one of them is wrong",
         "See that both files use one clock and that no readings are missing; turn more slowly, or add rows at rest",
     )

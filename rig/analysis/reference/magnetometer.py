@@ -148,7 +148,7 @@ def _solve(solve: Callable[..., TriaxialSolution]) -> TriaxialSolution:
     except Fault as fault:
         if fault.name != "attitude_untrustworthy":
             raise
-        what = f"the accelerometer agrees with the attitudes, the magnetometer does not ({fault.what})"
+        what = f"the accelerometer agrees with the attitudes, but the magnetometer does not ({fault.what})"
         raise Fault("field_not_uniform", what, REMEDY) from fault
 
 

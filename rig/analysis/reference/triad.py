@@ -59,8 +59,8 @@ def field_reference(site: Site, key: str) -> KnownNorm:
     if site.magnetic_field_t is None:
         raise Fault(
             "field_strength_unknown",
-            "the size of the magnetic field is not given, and the scale of a magnetometer is relative to it",
-            f"Give {key}, as a reference magnetometer measured it where the sensor was",
+            "the size of the magnetic field is not given, but the scale of a magnetometer is relative to it",
+            f"Give {key} as a reference magnetometer measured it at the sensor's position",
         )
     up = np.array(site.up)
     return KnownNorm(site.magnetic_field_t, up if site.magnetic_field_upwards else -up)

@@ -188,7 +188,7 @@ def fit_rate_drift(repeats: Sequence[Sequence[DwellMean]], site: Site) -> BiasDr
         if site.earth_rate_rad_s is None:
             raise Fault(
                 "earth_rate_unknown",
-                "a gyroscope at rest shows the Earth's rate, and the configuration does not state the site",
+                "a gyroscope at rest shows the Earth's rate, but the configuration does not state the site",
                 "Give site.latitude_deg and site.heading_deg",
             )
         field = KnownNorm(float(np.linalg.norm(earth)), earth)

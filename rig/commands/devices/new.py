@@ -44,7 +44,7 @@ def add(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--listen",
         choices=("yes", "no"),
-        help="whether to look at a device that prints lines, for ten seconds; without, its section is an example",
+        help="whether to look at a device that prints lines for ten seconds; if not, its section is an example",
     )
 
 

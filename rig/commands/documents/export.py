@@ -53,9 +53,9 @@ def export_files(options: Namespace) -> list[Path]:
     run, name, out = options.run, options.format, options.out
     moved: tuple[str, str] | None = options.at_temperature
     if moved is not None and name in OF_READINGS:
-        raise Refused("bad_option", f"--at-temperature is for calibrations, and {name} holds readings", "Leave it out")
+        raise Refused("bad_option", f"--at-temperature is for calibrations, but {name} holds readings", "Leave it out")
     if options.columns is not None and name not in OF_READINGS:
-        raise Refused("bad_option", f"--columns is for readings, and {name} holds calibrations", "Leave it out")
+        raise Refused("bad_option", f"--columns is for readings, but {name} holds calibrations", "Leave it out")
     folder: Path = out or (run if run.is_dir() else run.parent) / "export" / name
     with refuse_unwritable(folder):
         if name in OF_READINGS:
@@ -89,7 +89,7 @@ def _read_recordings(run: Path, columns: Path | None) -> "Sequence[RunData]":
     logs = list[Path]() if run.is_dir() and not is_in_format(run) else find_logs(run)
     if not logs:
         if columns is not None:
-            raise Refused("bad_option", "--columns is for a log, and a run needs no map", "Leave it out")
+            raise Refused("bad_option", "--columns is for a log; a run needs no map", "Leave it out")
         return open_run(run).movement
     recording = read_log(logs[0], read_column_map(columns))
     if recording.external is not None and recording.external.note:

@@ -49,8 +49,8 @@ def add(parser: ArgumentParser) -> None:
         default=[],
         type=Path,
         metavar="FILE",
-        help="put revocation lists under the PDF's signature (PAdES B-LT): of the authority of the key, and of that of "
-        "the time server, the list (CRL) and the certificate, as PEM; may be repeated",
+        help="add revocation lists to the PDF's signature (PAdES B-LT): the list (CRL) and the certificate, as PEM, "
+        "of the authority of the key and of that of the time server; may be repeated",
     )
     add_history(parser)
     add_set(parser, "replace an entry on the certificate, for example certificate.customer=Example")

@@ -50,7 +50,8 @@ def add(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--signer",
         metavar="NAME",
-        help="the name that the key's certificate must have: its common name, or all of it, as CN=Example,O=Laboratory",
+        help="the name that the key's certificate must have: its common name, or all of it, such as "
+        "CN=Example,O=Laboratory",
     )
     parser.add_argument("--history", metavar="PLACE", help="check that the files are in this history, unchanged")
     add_json(parser)
@@ -74,7 +75,7 @@ def run(options: Namespace) -> int:
     from rig.report.signatures.trust import Trust
 
     if options.signer is not None and not options.trust:
-        what = "--signer names the holder of a certificate, and no --trust names the authority that issued it"
+        what = "--signer names the holder of a certificate, but no --trust names the authority that issued it"
         raise Refused("bad_option", what, "Give --trust CERTIFICATE too, or leave it out")
     trust = Trust(read_trusted_certificates(options.trust), options.signer)
     contents = {file: _read_content(file) for file in options.files}

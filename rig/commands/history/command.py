@@ -92,13 +92,13 @@ def _add_recompute(parser: argparse.ArgumentParser) -> None:
     workers = parser.add_mutually_exclusive_group()
     workers.add_argument("--jobs", type=int, default=1, metavar="N", help="processes on this computer (default: 1)")
     workers.add_argument(
-        "--dask", metavar="ADDRESS", help="workers of this Dask scheduler, as tcp://10.0.0.2:8786 (extra `dask`)"
+        "--dask", metavar="ADDRESS", help="workers of this Dask scheduler, such as tcp://10.0.0.2:8786 (extra `dask`)"
     )
 
 
 def _add_selection(parser: argparse.ArgumentParser, *, rig: bool = True) -> None:
     parser.add_argument("--part", metavar="PART", help="only sensors of this part")
-    parser.add_argument("--since", type=_day, metavar="DATE", help="only from this day on, as 2026-11-20")
+    parser.add_argument("--since", type=_day, metavar="DATE", help="only from this day on, such as 2026-11-20")
     if rig:
         parser.add_argument("--rig", metavar="RIG", help="only by this rig: its name or its arm's serial number")
 

@@ -35,7 +35,7 @@ def run(options: Namespace) -> int:
     with raise_as(Refused):  # no arm moves: wrong data is a refusal
         logs = find_logs(options.run)
         if not logs and options.columns is not None:
-            raise Refused("bad_option", "--columns is for a log, and a run needs no map", "Leave it out")
+            raise Refused("bad_option", "--columns is for a log; a run needs no map", "Leave it out")
         sensors = _analyse_logs(logs, options.columns) if logs else _analyse_run(options.run)
     print_at_rest(sensors, as_json=options.json)
     if options.plot is not None:

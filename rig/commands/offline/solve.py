@@ -74,8 +74,8 @@ def _refuse_samples(path: Path) -> None:
     if path.is_file() and path.suffix.lower() in SAMPLES:
         raise Refused(
             "bad_option",
-            f"{path} holds samples, and no option says how the sensor was turned",
-            "Give --turns (by hand on a table), --sweeps CSV or --attitudes CSV; of a sensor at rest: rig allan",
+            f"{path} holds samples, but no option states how the sensor was turned",
+            "Give --turns (by hand on a table), --sweeps CSV or --attitudes CSV; for a sensor at rest: rig allan",
         )
 
 

@@ -56,7 +56,7 @@ def add(solve: ArgumentParser) -> None:
         "--clock-ppm",
         type=float,
         metavar="PPM",
-        help="largest error of the time stamps' rate (20 to 50 for a crystal); required, as no reading shows it",
+        help="largest error of the time stamps' rate (20 to 50 for a crystal); required because no reading shows it",
     )
     turn_group.add_argument(
         "--squareness-deg",
@@ -239,7 +239,7 @@ def _read_turn_options(options: Namespace) -> "Columns":
     if options.clock_ppm is None:
         raise Refused(
             "clock_unknown",
-            "no reading shows the error of the time stamps' rate, and the scale factors have the same relative error",
+            "no reading shows the error of the time stamps' rate, but the scale factors have the same relative error",
             "State it: --clock-ppm 50 for a crystal. A part's own data rate is wrong by a few per cent and cannot "
             "serve as a clock",
         )
@@ -247,7 +247,7 @@ def _read_turn_options(options: Namespace) -> "Columns":
         if not 0 < getattr(options, name) <= largest:
             option = f"--{name.replace('_', '-')}"
             raise Refused(
-                "bad_option", f"{option} is {getattr(options, name):g}", f"Give more than 0, {largest:g} at most"
+                "bad_option", f"{option} is {getattr(options, name):g}", f"Give more than 0 and at most {largest:g}"
             )
     values = {
         "clock_ppm": options.clock_ppm,

@@ -88,8 +88,8 @@ class UncertaintyKeys(BaseModel, Generic[OfSensors]):
         default=0.005,
         ge=0,
         le=5,
-        description="how much the arm's angle differs when it returns to the same angle; the default is 87 µrad, "
-        "as for an arm of this size (Slamani, Nubiola and Bonev, 2012)",
+        description="repeatability of a joint's angle; the default is 87 µrad, as for an arm of this size (Slamani, "
+        "Nubiola and Bonev, 2012)",
     )
     thermometer_gradient_k: float = Field(
         default=0.1,
@@ -123,8 +123,8 @@ class UncertaintyKeys(BaseModel, Generic[OfSensors]):
         default=5.0,
         ge=0,
         le=100,
-        description="delay of an accelerometer's own filter, at most; it makes the wave of a sweep smaller by "
-        "half the square of the angle (in rad) that the arm turns in this time",
+        description="largest delay of an accelerometer's own filter; it reduces the wave of a sweep by half the "
+        "square of the angle (in rad) that the arm turns in this time",
     )
     g_sensitivity_deg_s_g: OfSensors = _part_default_key(
         "change of a reading for 1 g, if attitudes do not determine it"

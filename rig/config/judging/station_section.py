@@ -19,8 +19,8 @@ class StationSection(Section):
     parts: tuple[Words, ...] = Field(
         default=(),
         max_length=10_000,
-        description="serial numbers of the parts that there are; another one is asked about. Empty: every number that "
-        "matches is one",
+        description="serial numbers of the existing parts; the station asks about any other. Empty: it accepts every "
+        "number that matches",
     )
     sensors: tuple[SensorName, ...] = Field(
         default=(),

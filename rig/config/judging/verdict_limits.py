@@ -22,7 +22,7 @@ class Limit:
     """A limit for a sensor's `quantity`: `what` names its check, `unit` is that of the value and the limit.
 
     A "conformity" limit judges a property of the item, a "fitness" limit the measurement's fitness for use. `parameter`
-    is the judged parameter of the calibration, None if it is no parameter. `needed_by`: the kind of run that cannot
+    is the judged parameter of the calibration, None if it is not a parameter. `needed_by`: the kind of run that cannot
     pass without the limit; None if every configuration states the limit.
     """
 
@@ -58,13 +58,13 @@ class Limits(BaseModel):
     )
     scale_u: Annotated[Positive | None, Limit("rate", "scale_u", "1", "fitness", "scale")] = Field(
         default=None,
-        description="largest expanded uncertainty of a scale factor; if it is left out, `procedure.target_scale_u` of "
-        "six_observation, where that is given",
+        description="largest expanded uncertainty of a scale factor; the default is `procedure.target_scale_u` of "
+        "six_observation, if that is given",
     )
     bias_u_rad_s: Annotated[Positive | None, Limit("rate", "bias_u", "rad/s", "fitness", "bias")] = Field(
         default=None,
-        description="largest expanded uncertainty of a bias; if it is left out, `procedure.target_bias_u_rad_s`, where "
-        "that is given",
+        description="largest expanded uncertainty of a bias; the default is `procedure.target_bias_u_rad_s`, if that "
+        "is given",
     )
     condition: Annotated[Positive, Limit("rate", "condition", "1", "fitness")] = Field(
         description="largest condition number of the equations: how well the sweeps separate the parameters (1 is best)"
@@ -103,8 +103,8 @@ class Limits(BaseModel):
         Positive | None, Limit("acceleration", "verification", "m/s²", "conformity", needed_by="repeated attitudes")
     ] = Field(
         default=None,
-        description="largest difference between the size of a corrected acceleration at rest and gravity; needed "
-        "with repeats",
+        description="largest difference between the magnitude of a corrected acceleration at rest and gravity; "
+        "needed with repeats",
     )
     bias_drift_rad_s: Annotated[
         Positive | None, Limit("rate", "bias_drift", "rad/s", "conformity", "bias_drift", "bias drift")

@@ -22,22 +22,22 @@ class ByHandSection(ProcedureSection):
         default=12,
         ge=8,
         le=96,
-        description="how many moves from one face to another are asked for; twelve go over all six faces",
+        description="number of moves from one face to another; twelve cover all six faces",
     )
     turns: WholeNumber = Field(
         default=3,
         ge=0,
         le=24,
-        description="how many whole turns on the table are asked for, about one axis after the other",
+        description="number of whole turns on the table, about one axis after the other",
     )
     rest_s: float = Field(
-        default=1.0, ge=1.0, le=60, description="how long the item has to lie at rest before the next move is asked for"
+        default=1.0, ge=1.0, le=60, description="how long the item must lie at rest before the next move is requested"
     )
     squareness_deg: float = Field(
         default=0.2,
         gt=0,
         le=1.7,
-        description="how far the faces of the item may be from right angles, a standard deviation; 0.6 of a bare board",
+        description="standard deviation of the angles between the item's faces from 90°; 0.6 for a bare board",
     )
     closure_deg: float = Field(
         default=0.3,

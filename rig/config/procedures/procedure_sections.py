@@ -35,7 +35,7 @@ SweptAxes = Annotated[
     ),
 ]
 Repeats = Annotated[WholeNumber, Field(ge=1, le=100, description="how many times the whole procedure is done")]
-DwellTime = Annotated[float, Field(ge=0.1, le=3600, description="time of standing still in each attitude")]
+DwellTime = Annotated[float, Field(ge=0.1, le=3600, description="time at rest in each attitude")]
 DEFAULT_PROCEDURE = "six_observation"
 LONGEST_SWEEP_S = 720  # one revolution at the lowest speed
 HOTTEST_HEATED_C = 65.0  # below the part's limit, because the heater overshoots the range a little
@@ -86,7 +86,7 @@ class SixSweepsSection(ProcedureSection):
         le=ACCELERATION_RANGE_DEG_S2,
         description="acceleration of every motion; the ramps of a sweep are outside the revolution that is averaged",
     )
-    rest_s: float = Field(default=DEFAULT_REST_S, ge=0, le=3600, description="time of standing still after each sweep")
+    rest_s: float = Field(default=DEFAULT_REST_S, ge=0, le=3600, description="time at rest after each sweep")
     margin_deg: float = Field(
         default=2.0, gt=0, le=90, description="angle of constant speed before the revolution begins, and after it ends"
     )
@@ -103,7 +103,7 @@ class SixSweepsSection(ProcedureSection):
 
     earth_rate: Literal["known", "find"] = Field(
         default="known",
-        description="`known`: taken out if `site` gives latitude and heading, else part of the uncertainty; `find`: "
+        description="`known`: subtracted if `site` gives latitude and heading, else part of the uncertainty; `find`: "
         "found from the readings of a gyroscope that is good enough; this needs rests in many attitudes (`imu`)",
     )
 
@@ -151,7 +151,7 @@ class SixSweepsSection(ProcedureSection):
                 "encoder"
             )
         if self.arcs and self.finds_earth_rate:
-            yield f"procedure.earth_rate: find needs whole turns, and procedure.arc_deg is {self.arc_deg:g}"
+            yield f"procedure.earth_rate: find needs whole turns, but procedure.arc_deg is {self.arc_deg:g}"
         slowest = min(self.speeds)
         if self.arc_deg / slowest > LONGEST_SWEEP_S:
             yield (
@@ -243,7 +243,7 @@ def set_of_that_name(value: Any) -> Any:
     if not isinstance(value, str):
         return value
     if value not in SETS:
-        raise ValueError(f"no set of attitudes; allowed: {', '.join(SETS)}, or a list of them")
+        raise ValueError(f"is not a set of attitudes; allowed: {', '.join(SETS)}, or a list of them")
     return SETS[value]
 
 
@@ -272,7 +272,7 @@ class AttitudesSection(ProcedureSection):
         default=5.0,
         gt=0,
         le=5,
-        description="how long the sensors may take to settle before; if they take longer, the run ends",
+        description="how long the sensors may take to settle before each attitude; if they take longer, the run ends",
     )
     second_order: bool = Field(
         default=False,
@@ -283,7 +283,7 @@ class AttitudesSection(ProcedureSection):
         default=0.0,
         ge=0,
         le=600,
-        description="time of standing still at home before the attitudes and after them, which shows whether the "
+        description="time at rest at home before the attitudes and after them, which shows whether the "
         "magnetic field drifted; `0`: no such test",
     )
     repeats: Repeats = 1
@@ -336,7 +336,7 @@ class BiasDriftSection(AttitudesSection):
         """Yield what is missing for the calibration of an accelerometer, and for limits of the drift."""
         yield from AttitudesSection.problems(self, config)
         if lacking := config.limits.lacking("bias drift"):
-            yield f"a bias that is watched needs {', '.join(lacking)}"
+            yield f"the bias drift needs {', '.join(lacking)}"
 
 
 class ImuSection(SixSweepsSection, AttitudesSection):
@@ -364,7 +364,9 @@ class ThermalSection(SixSweepsSection, AttitudesSection):
         ge=-40, le=85, description="lower end of the range of temperatures, by the part's thermometer"
     )
     to_c: float = Field(ge=-40, le=85, description="upper end of the range")
-    max_step_k: float = Field(default=5.0, gt=0, le=50, description="how far neighbouring sets may be apart")
+    max_step_k: float = Field(
+        default=5.0, gt=0, le=50, description="largest difference in temperature between neighbouring sets"
+    )
     max_rate_k_per_min: float = Field(
         default=2.0,
         gt=0,
@@ -378,8 +380,8 @@ class ThermalSection(SixSweepsSection, AttitudesSection):
         default=0.0,
         ge=0,
         le=1,
-        description="most power of the heater on the board's pin, as a part of all it has; `0`: the operator, or "
-        "the board's own warm-up, changes the temperature",
+        description="largest power of the heater on the board's pin, as a fraction of its full power; `0`: the "
+        "operator, or the board's own warm-up, changes the temperature",
     )
     both_directions: bool = Field(
         default=True,
@@ -406,8 +408,7 @@ class ThermalSection(SixSweepsSection, AttitudesSection):
         default=40,
         ge=2,
         le=100,
-        description="how many sets are made at most; if the range is not covered then, the run ends "
-        "(`range_not_reached`)",
+        description="largest number of sets; if the range is not covered then, the run ends (`range_not_reached`)",
     )
 
     @model_validator(mode="after")
@@ -422,7 +423,7 @@ class ThermalSection(SixSweepsSection, AttitudesSection):
         if self.to_c - self.from_c < least_k:
             raise ValueError(f"from_c and to_c must be at least {MIN_RANGE_C:g} K and a gap apart: {least_k:g} K")
         if not self.max_step_k / 2 <= self.reference_c - self.from_c <= self.to_c - self.from_c - self.max_step_k / 2:
-            raise ValueError("reference_c must lie between from_c and to_c, half a gap from each: sets end before them")
+            raise ValueError("reference_c must lie between from_c and to_c, at least half a gap from each")
         if self.max_temperature_c <= self.to_c:
             raise ValueError("max_temperature_c must lie above to_c")
         return self
@@ -438,13 +439,13 @@ class ThermalSection(SixSweepsSection, AttitudesSection):
         if self.with_attitudes:  # each set is one temperature: no repeat of the attitudes is held out
             yield from AttitudesSection.problems(self.model_copy(update={"repeats": 1}), config)
         if self.arc_deg != 360:
-            yield f"procedure.arc_deg {self.arc_deg:g} is not for thermal: leave it at 360"
+            yield f"procedure.arc_deg {self.arc_deg:g} cannot be used with thermal: leave it at 360"
         if self.finds_earth_rate:
-            yield "procedure.earth_rate: find is not for thermal: the biases move; give site.heading_deg"
+            yield "procedure.earth_rate: find cannot be used with thermal, as biases change; give site.heading_deg"
         if config.magnetometers:
             yield f"magnetometers.{', '.join(config.magnetometers)} cannot be calibrated over temperature; leave it out"
         if self.heater_power > 0 and not config.on_board:
-            yield "procedure.heater_power: the heater is on the board, and no sensor is on a board"
+            yield "procedure.heater_power: the heater is on the board, but no sensor is on a board"
         if self.heater_power > 0 and self.to_c > HOTTEST_HEATED_C:
             yield (
                 f"procedure.to_c {self.to_c:g} is too hot for the heater, which the board switches off at 70: at most "

@@ -70,7 +70,7 @@ class ServoSixObservationSection(ProcedureSection):
         default=240.0, ge=10, le=ACCELERATION_RANGE_DEG_S2, description="acceleration of every motion"
     )
     rest_s: float = Field(
-        default=DEFAULT_REST_S, gt=0.5, le=3600, description="time of standing still before and after each turn"
+        default=DEFAULT_REST_S, gt=0.5, le=3600, description="time at rest before and after each turn"
     )
     overtravel_deg: float = Field(
         default=90.0,

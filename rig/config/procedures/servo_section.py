@@ -23,7 +23,7 @@ class ServoSection(TurnerSection):
         description="serial port of the servo's adapter, such as `/dev/ttyUSB0` or `COM4`, or `socket://host:port`",
     )
     id: WholeNumber = Field(default=1, ge=0, le=252, description="the servo's ID on its bus")
-    model: ServoName = Field(description="which servo it is; the servo must say the same")
+    model: ServoName = Field(description="model of the servo; the servo must report the same")
     baud: Literal[57600, 115200, 1_000_000, 2_000_000, 3_000_000, 4_000_000] = Field(
         default=1_000_000, description="speed of its serial line, as set in the servo"
     )

@@ -17,7 +17,7 @@ class StageMountSection(MountingSection):
 
     rotation_deg: Vector3 = Field(
         default=(0.0, 0.0, 0.0),
-        description="rotation vector, in the item's own axes, by which it is turned beyond that",
+        description="rotation vector, in the item's own axes, of a further rotation",
     )
 
 
@@ -28,7 +28,7 @@ class StageSection(Section):
         description="what the operator is to do before this stage, such as `turn the board by 90° about wrist 3`"
     )
     sweeps: tuple[Wrist, ...] | None = Field(
-        default=None, min_length=1, max_length=3, description="which wrists are swept in this stage; left out, all"
+        default=None, min_length=1, max_length=3, description="which wrists are swept in this stage; if left out, all"
     )
     mount: StageMountSection = Field(
         default=StageMountSection(), description="how the item is mounted in this stage, nominally"

@@ -22,7 +22,7 @@ Scale = Annotated[
     float,
     Field(
         gt=0,
-        description="what a printed 1 is worth in the unit; 1 if the device prints the unit itself, the sensitivity if "
+        description="value of a printed 1 in the unit; 1 if the device prints the unit itself, the sensitivity if "
         "it prints counts",
         json_schema_extra={"unit": "1"},
     ),
@@ -32,7 +32,8 @@ Decimals = Annotated[
     Field(
         ge=0,
         le=9,
-        description="digits after the point that the device prints: the resolution; left out, it counts as fine enough",
+        description="digits after the point that the device prints, which set the resolution; if left out, it counts "
+        "as fine enough",
         json_schema_extra={"unit": "1"},
     ),
 ]
@@ -99,8 +100,8 @@ class LineTemperatureSection(Section):
         default=None,
         ge=-40,
         le=85,
-        description="how warm the sensor is, stated where the device prints no temperature; without it U allows for "
-        "20 K of change",
+        description="temperature of the sensor, stated if the device prints none; without it U allows for a change "
+        "of 20 K",
     )
     stated_within_k: WithinK = 5.0
 
@@ -218,7 +219,7 @@ class LinesSection(Section):
         if self.keys and len(self.keys) != len(self.columns):
             raise ValueError(f"there are {len(self.keys)} keys for {len(self.columns)} columns; give one for each")
         if reserved := sorted(self.scalars.keys() & {*COLUMNS, "field"}):
-            raise ValueError(f"{', '.join(reserved)}: no name of a scalar, it means something else here")
+            raise ValueError(f"{', '.join(reserved)}: cannot name a scalar, because it means something else here")
         if unknown := [name for name in self.columns if name not in COLUMNS and name not in self.scalars]:
             raise ValueError(
                 f"no such column: {', '.join(map(quote, unknown))}; it may be {', '.join(COLUMNS)} or a name in scalars"

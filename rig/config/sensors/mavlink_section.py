@@ -32,7 +32,7 @@ class MavlinkSection(Section):
         "or `udp:host:port`, an address of this computer to which the autopilot sends",
     )
     baud: Literal[57600, 115200, 230400, 460800, 921600, 1500000] = Field(
-        default=115200, description="speed of the line, as the autopilot has it; over USB any will do"
+        default=115200, description="speed of the line, as set in the autopilot; over USB any value works"
     )
     imu: ImuMessage = Field(
         default="HIGHRES_IMU",
@@ -47,7 +47,7 @@ class MavlinkSection(Section):
         json_schema_extra={"allowed": "8 to 36 hexadecimal digits, small letters"},
     )
     temperature: StatedTemperatureSection | None = Field(
-        default=None, description="how warm the IMU is, of an autopilot that provides no temperature of it"
+        default=None, description="temperature of the IMU, stated if the autopilot provides none"
     )
 
     @field_validator("port")

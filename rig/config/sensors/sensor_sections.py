@@ -64,13 +64,13 @@ class OwnPortSection(Section):
     )
     message: Literal["A", "B", "C"] = Field(
         default="B",
-        description="of a `kvh1775`: format of its messages: `B` contains the sensor's own microseconds, which show "
+        description="for a `kvh1775`: format of its messages: `B` contains the sensor's own microseconds, which show "
         "without doubt how many messages were lost; `A` and `C` do not contain them; `C` contains the magnetic "
         "field, recorded as the magnetometer `<sensor>_field`",
     )
     rotation: Literal["delta", "rate"] = Field(
         default="delta",
-        description="of a `kvh1775`: `delta`: the angle since the message before, without aliasing; `rate`: the rate "
+        description="for a `kvh1775`: `delta`: the angle since the message before, without aliasing; `rate`: the rate "
         "after the sensor's own filter",
     )
 
@@ -170,18 +170,18 @@ class SensorSection(Section):
         "paper; `matrix`, with the whole matrix, which also brings the axes to right angles",
     )
     turntable: TurntableSection = Field(
-        default=TurntableSection(), description="its own calibration, of a reference only; left out, it reads true"
+        default=TurntableSection(), description="its own calibration, only for a reference; if left out, it reads true"
     )
     acceleration: AccelerationSection | None = Field(
-        default=None, description="its accelerometer; left out, only the gyroscope is read"
+        default=None, description="its accelerometer; if left out, only the gyroscope is read"
     )
     serial: OwnPortSection | None = Field(
-        default=None, description="its own serial port, of a `kvh1775` or `lines`; the other parts are on the board"
+        default=None, description="its own serial port, for a `kvh1775` or `lines`; the other parts are on the board"
     )
     mavlink: MavlinkSection | None = Field(
-        default=None, description="the autopilot that the IMU is in, of a `mavlink`; other parts have none"
+        default=None, description="the autopilot that the IMU is in, for a `mavlink`; other parts have none"
     )
-    lines: LinesSection | None = Field(default=None, description="what it prints, of `lines`")
+    lines: LinesSection | None = Field(default=None, description="what it prints, for `lines`")
 
     @property
     def on_board(self) -> bool:

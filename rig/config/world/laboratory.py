@@ -204,7 +204,7 @@ class SimulatedArmSection(Section):
         le=1,
         description="resolution of the joint angles it reports; in logs of a CB3 all angles are multiples of 2π/2¹⁹, "
         "those of the e-Series are finer",
-        json_schema_extra={"usual": "2π/2²⁰; of a `ur10_cb3` 2π/2¹⁹; of `joints: rough` `6e-06`"},
+        json_schema_extra={"usual": "2π/2²⁰; for a `ur10_cb3` 2π/2¹⁹; for `joints: rough` `6e-06`"},
     )
     encoder_noise_rad: float = Field(
         default=2.4e-5,

@@ -33,21 +33,21 @@ class SimulatedLinesSection(Section):
     bit_error_rate: Ratio = Field(default=0.0, ge=0, le=0.01, description="fraction of wrong bits on the line")
     scalars: dict[str, float] = Field(
         default=dict[str, float](),
-        description="the number that it prints in a column of `lines.scalars`, by its name; left out, 0",
+        description="the number that it prints in a column of `lines.scalars`, by its name; if left out, 0",
         json_schema_extra={"unit": "as printed", "allowed": "a number for each name"},
     )
     trailing_separator: bool = Field(default=False, description="whether a separator follows the last column too")
     texts: tuple[Annotated[str, Field(max_length=40)], ...] = Field(
         default=(),
         max_length=40,
-        description="what it prints in the columns `-`, from left to right, such as a date; left out, 0",
+        description="what it prints in the columns `-`, from left to right, such as a date; if left out, 0",
         json_schema_extra={"usual": "none", "allowed": "at most 40 texts"},
     )
     colours: bool = Field(default=False, description="whether colour codes surround a line, as in ESP-IDF's log")
     temperature_text: str | None = Field(
         default=None,
         max_length=20,
-        description="what it prints for its temperature, such as `nan` or `-127.00`; left out, its temperature",
+        description="what it prints for its temperature, such as `nan` or `-127.00`; if left out, its temperature",
         json_schema_extra={"usual": "its temperature", "allowed": "at most 20 characters"},
     )
     time_decimals: WholeNumber = Field(

@@ -33,11 +33,11 @@ class SimulatedServoSection(Section):
         default=0.07, ge=0, lt=0.5, description="amplitude of the gear's ripple over the rate"
     )
     ripple_per_turn: WholeNumber = Field(default=20, ge=1, le=200, description="periods of the ripple in one turn")
-    lag_ms: float = Field(default=15.0, ge=0, le=200, description="how late the shaft follows")
+    lag_ms: float = Field(default=15.0, ge=0, le=200, description="delay of the shaft")
     tick_ppm: float = Field(default=3000.0, ge=-20_000, le=20_000, description="how much too fast its own clock runs")
     fall_deg_s: float = Field(
         default=0.0, ge=-360, le=360, description="how fast the shaft falls with torque off; 0 if it is balanced"
     )
     latency_ms: float = Field(
-        default=0.0, ge=0, le=50, description="the adapter hands on what came this often; 0: at once"
+        default=0.0, ge=0, le=50, description="interval at which the adapter passes on what it has received; 0: at once"
     )

@@ -50,7 +50,7 @@ class SimulatedThermalSection(Section):
         default=2.0,
         gt=0,
         le=100,
-        description="how far a part must cool after it was warmed until all of its hysteresis has turned round",
+        description="how far a part must cool after it was warmed until its hysteresis has reversed completely",
     )
 
     @field_validator("air_c")

@@ -114,7 +114,7 @@ def _check(dataset: Any, name: str) -> None:
         raise ValueError(f"{name} holds {dataset.dtype!s:.200} in {dataset.ndim} dimensions, not rows of numbers")
     stored = _count_stored_rows(dataset)
     if len(dataset) > stored + MAX_UNWRITTEN_ROWS:
-        raise ValueError(f"{name} announces {len(dataset)} rows and holds {stored}")
+        raise ValueError(f"{name} announces {len(dataset)} rows but holds {stored}")
 
 
 def _refuse_endless(path: Path, unpacked: int) -> None:

@@ -59,7 +59,7 @@ class Header:
                 raise ValueError(f"it has {len(column)} rows of {name}, not one")
             above, most = self.between.get(name, (-LARGEST_NUMBER, LARGEST_NUMBER))
             if not ((column > above) & (column <= most)).all():
-                raise ValueError(f"its {name} is not above {above:g} and {most:g} at most")
+                raise ValueError(f"its {name} must be above {above:g} and at most {most:g}")
 
 
 def samples_header(needed: Collection[Quantity] = ()) -> Header:

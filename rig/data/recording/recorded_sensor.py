@@ -48,7 +48,7 @@ class RecordedSensor:
 
     @property
     def on_board(self) -> bool:
-        """Whether the board reads it, and stamps its samples."""
+        """Whether the board reads the sensor and stamps its samples."""
         return self.clock is None
 
     @property
@@ -63,7 +63,7 @@ class RecordedSensor:
 
     @property
     def unseen_change_k(self) -> float:
-        """The possible unrecorded change of its temperature, K, below the thermometer's step."""
+        """The possible unrecorded change of the sensor's temperature, K, below the thermometer's step."""
         return self.channel(TEMPERATURE).resolution if self.measures(TEMPERATURE) else UNKNOWN_CHANGE_K
 
     @property

@@ -66,7 +66,7 @@ def parse_turner(document: Any) -> RecordedTurner:
     if not all(name.isascii() and name.isidentifier() and len(name) <= 40 for name in names):
         raise ValueError("a field of its turner's states has a name that is not allowed")
     if turner.geometry.joints != len(turner.joints):
-        raise ValueError(f"its turner has {len(turner.joints)} joints and a geometry of {turner.geometry.joints}")
+        raise ValueError(f"its turner has {len(turner.joints)} joints but a geometry of {turner.geometry.joints}")
     return turner
 
 
@@ -84,4 +84,4 @@ def check_joints(turner: RecordedTurner, settings: RunSettings, events: Iterable
         if isinstance(event, DwellStarted | DwellFinished):
             poses.append(event.dwell.q_rad)
     if any(len(pose) != len(turner.joints) for pose in poses):
-        raise ValueError(f"its turner has {len(turner.joints)} joints, and one of its poses has another number")
+        raise ValueError(f"its turner has {len(turner.joints)} joints, but one of its poses has another number")

@@ -282,7 +282,7 @@ def settings_from_json(text: str) -> RunSettings:
     if settings.elsewhere is None and (settings.limits is None or settings.uncertainty is None):
         raise ValueError("its settings have no limits or no uncertainty, but those of a run have both")
     if settings.mounts and settings.stage >= len(settings.mounts):
-        raise ValueError(f"its settings are of stage {settings.stage}, and there are {len(settings.mounts)} mounts")
+        raise ValueError(f"its settings are of stage {settings.stage}, but there are {len(settings.mounts)} mounts")
     for mount in settings.mounts:
         check_rotation(mount, "the mount of a stage")
     return settings

@@ -47,7 +47,7 @@ def check_axes(session: HandRecording) -> None:
     names = [nearest_face(row) for row in unit]
     if names == ["+x", "+y", "+z"]:
         return
-    axes_read = f"the gyroscope's x, y, z read the turning about the accelerometer's {', '.join(names)}"
+    axes_read = f"the gyroscope's x, y, z read the rotation about the accelerometer's {', '.join(names)}"
     remedy = "Correct order and signs of the columns of one of them"
     raise Fault("mirrored_axis" if strongest.tolist() == [0, 1, 2] else "swapped_axes", axes_read, remedy)
 

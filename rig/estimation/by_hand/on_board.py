@@ -131,18 +131,21 @@ def _move_equations(centre: Array, move: BoardMove) -> Iterator[Equation]:
     rates = move.rates - move.before.mean_rad_s
     turned, middles = _attitudes(rates @ matrix.T * move.steps_s[:, None])
     weighted = middles * move.steps_s[:, None, None]
+    # The derivatives of the rotation by the matrix, and by the bias and g-sensitivity that act while it turns.
     by_matrix = np.einsum("nar,nc->arc", weighted, rates).reshape(3, 9)
     by_tilt = np.einsum("nas,nbc,b->asc", weighted, middles, up)
     by_bias = weighted.sum(axis=0) @ matrix
     by_gravity = np.einsum("ar,c->arc", by_bias, (up + after) / 2) - np.einsum("asc,sr->arc", by_tilt, matrix)
     drift = move.after.mean_rad_s - move.before.mean_rad_s
     corrected = np.einsum("arc,rc->a", by_gravity, sensitivity) - by_bias @ drift / 2
+    # The vertical after the move, in the axes before it, corrected for gravity and a steady drift.
     reached = turned @ after
     reached = reached + np.cross(corrected, reached)
     middle = (reached + up) / np.linalg.norm(reached + up)
     steps = rates @ matrix.T * move.steps_s[:, None]
     variance = _variance(move, float(np.linalg.norm(steps, axis=1).sum()))
     design = np.hstack([by_matrix, by_gravity.reshape(3, 9), np.zeros((3, 15))])
+    # The angle between the verticals over its sine.
     half = np.linalg.norm(up - reached) / 2
     stretched = np.arcsin(half) / (half * np.sqrt(1 - half**2)) if half > 1e-9 else 1.0
     for axis in perpendicular_unit_vectors(middle):

@@ -44,7 +44,7 @@ class SessionProgress:
 
 
 def assess_progress(session: HandRecording, conditions: SessionConditions) -> SessionProgress:
-    """Assess an unfinished session of one rest or more; few rests are no error.
+    """Assess an unfinished session of one rest or more; few rests are not an error.
 
     Raise Fault `mirrored_axis`, `swapped_axes`, `wrong_unit`; Refused `first_face_unknown`.
     """

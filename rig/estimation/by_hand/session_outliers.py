@@ -251,7 +251,7 @@ def _find_unlikely_box(fit: GraphFit) -> Fault | None:
     return Fault(
         "not_flat",
         f"the moves fit together only if the faces are up to {np.degrees(np.abs(skew_rad).max()):.2g}° out of square, "
-        f"where {np.degrees(stated_rad):.2g}° is stated",
+        f"but only {np.degrees(stated_rad):.2g}° is stated",
         "If the faces of the body are really so far out of square, state its squareness_deg (rig solve: "
         "--squareness-deg); otherwise begin again",
     )

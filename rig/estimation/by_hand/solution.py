@@ -216,7 +216,7 @@ def insufficient_session(session: HandRecording, expanded: Array | None) -> Faul
         return Fault(
             "held_not_laid_down",
             f"from {start_s:.1f} to {end_s:.1f} s the body was held in the hand, not laid down"
-            + (f", and {len(session.held_in_air_s) - 1} times more" if len(session.held_in_air_s) > 1 else ""),
+            + (f", and {len(session.held_in_air_s) - 1} more times" if len(session.held_in_air_s) > 1 else ""),
             "After every move, lay it down and let go of it for a second",
         )
     so_far = "" if expanded is None else f"; the scale is known to {float(f'{100 * expanded.max():.2g}'):g} %"

@@ -140,7 +140,7 @@ class _Interval:
 
 def _find_slopes(time_s: Array, rates: Array) -> _Interval:
     if len(time_s) < 2 or rates.shape != (len(time_s), 3) or not (np.diff(time_s) > 0).all():
-        raise ValueError("a course needs readings (n, 3) at two rising times (n,) at least")
+        raise ValueError("a course needs readings (n, 3) at two or more rising times (n,)")
     slopes = np.asarray(np.gradient(rates, axis=0), dtype=np.float64)
     slopes[2:-2] = (8 * (rates[3:-1] - rates[1:-3]) - rates[4:] + rates[:-4]) / 12
     return _Interval(time_s, rates, slopes)
@@ -194,6 +194,7 @@ def _steps_from(interval: _Interval, start: NDArray[np.intp], fraction: Array) -
     u = fraction[:, None]
     h = np.diff(interval.time_s)[start][:, None]
     w0, w1, d0, d1 = (values[index] for values in (interval.rates, interval.slopes) for index in (start, start + 1))
+    # The rate is a cubic Hermite polynomial between readings; `turned` is its integral. The cross product adds coning.
     turned = h * (
         (u - u**3 + u**4 / 2) * w0
         + (u**3 - u**4 / 2) * w1

@@ -69,7 +69,7 @@ def separate(biases_t: Array, covariances_t2: Array, matrices: Array, mountings:
         raise Fault(
             "reversal_contradicts",
             "the runs do not agree in the parameters that must stay the same when the sensor is turned over: "
-            f"χ² is {chi_square:.3g}, at most {limit:.3g} by noise",
+            f"χ² is {chi_square:.3g}; noise explains at most {limit:.3g}",
             "Make sure that the sensor is in the same place in all runs and that the field did not change between "
             "them; then repeat",
         )

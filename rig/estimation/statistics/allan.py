@@ -116,6 +116,7 @@ def too_short(what: str, enough_s: float = ENOUGH_S) -> Fault:
 
 def equivalent_dof(points: int, factor: int, noise: Noise) -> float:
     """Return the equivalent dof (at least 1) of σ² from `points` phases (readings + 1) at τ = `factor` τ₀."""
+    # Approximations for white, flicker and random-walk noise of frequency: NIST SP 1065, table 5.
     n, m = float(points), float(factor)
     if noise == "white":
         dof = (3 * (n - 1) / (2 * m) - 2 * (n - 2) / n) * 4 * m**2 / (4 * m**2 + 5)

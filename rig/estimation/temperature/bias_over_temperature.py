@@ -43,7 +43,7 @@ def bias_over_temperature(bias: Array, std: Array, temperature_c: Array, time_s:
     if np.isnan(temperature_c).any():
         raise Fault(
             "temperature_not_recorded",
-            "the slope of a bias over temperature is requested, and the readings have no temperature",
+            "the slope of a bias over temperature is requested, but the readings have no temperature",
             "Use a sensor that provides its temperature, or record a thermometer next to it",
         )
     low, high = float(temperature_c.min()), float(temperature_c.max())

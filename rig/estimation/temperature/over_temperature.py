@@ -142,7 +142,7 @@ def check_inside(range_c: tuple[float, float], temperature_c: float) -> None:
     if not low <= temperature_c <= high:
         raise Fault(
             "temperature_outside",
-            f"the polynomials hold from {low:.1f} to {high:.1f} °C, and {temperature_c:.1f} °C is requested",
+            f"the polynomials hold from {low:.1f} to {high:.1f} °C, but {temperature_c:.1f} °C is requested",
             "Request a temperature in that range, or measure over a wider one",
         )
 

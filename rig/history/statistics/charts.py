@@ -90,6 +90,7 @@ def _deviation(values: Array, std: Array, counted: Alarms) -> Array:
     weights include the variance between runs (as in `random_effects.fit`).
     """
     before, newest = values[..., :-1], values[..., -1]
+    # First a mean with fixed weights, from which the variance between runs follows; then one with both variances.
     fixed = counted / std[..., :-1] ** 2
     total = fixed.sum(axis=-1)
     count = counted.sum(axis=-1)

@@ -226,7 +226,7 @@ def _speeds(sweeps: Mapping[str, Array]) -> Array:
             "wrong_unit",
             f"angle_rad is {moved_rad[0]:g} in row {int(np.argmax(motion > 0)) + 1}, and a whole multiple of "
             f"{QUARTER_DEG:g} in every row: these are degrees",
-            "Give radians, or name the column's unit with --columns (unit: deg); of a turn of so many radians give "
+            "Give radians, or name the column's unit with --columns (unit: deg); for a turn of so many radians, give "
             "speed_rad_s",
         )
     for row, (duration, moved, norm) in enumerate(zip(durations, motion, norms, strict=True), start=1):
@@ -276,8 +276,8 @@ def _check_noisy(mean: Average, row: int) -> None:
         axis = int(quiet[0])
         raise Fault(
             "stuck_sensor",
-            f"in row {row}, from {mean.start_s:.6g} to {mean.end_s:.6g} s, the gyroscope reads "
-            f"{mean.mean_rad_s[axis]:.6g} rad/s on {RATE.axes[axis]} always: stuck, at the end of its range, or too "
+            f"in row {row}, from {mean.start_s:.6g} to {mean.end_s:.6g} s, the gyroscope always reads "
+            f"{mean.mean_rad_s[axis]:.6g} rad/s on {RATE.axes[axis]}: it is stuck, at the end of its range, or too "
             "coarse to show its noise",
             "Check its supply, its bus wires and its range; record with all digits",
         )

@@ -60,7 +60,7 @@ class Account:
             what = f"more rows are left out than kept: {next(self._moving(self.dwells))}"
         raise Fault(
             "not_at_rest",
-            f"{what}; but only in a body at rest the sensor measures gravity, or a field, alone",
+            f"{what}; but a sensor measures gravity, or a field, alone only while the body is at rest",
             "Add attitudes in which it lies still for half a second or longer; begin a row when it lies still",
         )
 

@@ -74,7 +74,7 @@ def check_one_clock(turning: Turning, rates_rad_s: Array | None) -> None:
     raise Fault(
         "clocks_apart",
         f"the clock of the attitudes gains {100 * drift:+.2g} % on that of the samples, "
-        f"{1e3 * abs(drift) * lasts_s:.0f} ms over the recording: the scale factors would be wrong as much",
+        f"{1e3 * abs(drift) * lasts_s:.0f} ms over the recording: the scale factors would be wrong by as much",
         "Write both files by one clock, or let --estimate-clock-offset find the difference",
     )
 

@@ -114,6 +114,7 @@ def _find_still(turning: Turning, clock_s: float) -> NDArray[np.bool_]:
     if not len(long):
         return still
     cuts = [turning.readings_rad_s[start[row] : end[row]] for row in long]
+    # White noise by differences of successive readings, in the quietest row.
     noise = min(float(np.diff(cut, axis=0).std(axis=0).max()) for cut in cuts) / np.sqrt(2)
     quiet = np.array([cut.std(axis=0).max() for cut in cuts]) <= 2 * noise + STILL_RAD_S
     means = np.array([cut.mean(axis=0) for cut in cuts])

@@ -85,7 +85,7 @@ def check_rates_agree(middles_s: Array, attitudes: Array, rates_rad_s: Array) ->
         return
     slowest_rad, fastest_rad = np.quantile(turned_rad[moving], (0.1, 0.9))
     if ratio < 1 or fastest_rad > VARIED * slowest_rad or abs(ratio / DEGREES - 1) < NEARLY:
-        raise wrong_unit(f"the table's rates are {ratio:.3g} times what its attitudes turn", ratio, CONFUSED_RATES)
+        raise wrong_unit(f"the table's rates are {ratio:.3g} times those of its attitudes", ratio, CONFUSED_RATES)
 
 
 def _thin(time_s: Array) -> NDArray[np.intp]:
@@ -106,6 +106,6 @@ def _thin(time_s: Array) -> NDArray[np.intp]:
 def _not_found(what: str) -> Fault:
     return Fault(
         "time_base_not_found",
-        f"{what}, and the sensor cannot be put on its clock",
+        f"{what}, so the sensor cannot be put on its clock",
         "Let the table write a row every quarter of a second or more often while it turns, or use one clock",
     )

@@ -126,7 +126,7 @@ def _find_column(path: Path, headings: Sequence[str], width: int, name: str, col
     named = named or [index for index, heading in enumerate(headings) if heading.strip() == column.strip(" #%")]
     if not named and column.isdecimal():
         if not 1 <= int(column) <= width:
-            what = f"{path} has {width} columns, and column {column} is to be {name}"
+            what = f"{path} has {width} columns, but column {column} is to be {name}"
             raise Refused("wrong_columns", what, "Count its columns from 1")
         return int(column) - 1
     if len(named) != 1:
@@ -184,7 +184,7 @@ def _check_unit(path: Path, name: str, names: Sequence[str], header: Header) -> 
     if meant:
         raise Refused(
             "wrong_unit",
-            f"{path} has a column {shorten(name)} where {meant} belongs",
+            f"{path} has a column {shorten(name)} instead of {meant}",
             f"Convert it to the unit in the name {meant}, or state its unit with --columns",
         )
 

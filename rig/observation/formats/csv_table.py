@@ -213,8 +213,8 @@ class _Wanted:
         if any(map(str.strip, row[self.width :])):
             raise Refused(
                 "wrong_columns",
-                f"{self.path}, line {line} has {len(row)} cells, and the heading names {self.width} columns: "
-                "so the cells cannot be assigned to columns",
+                f"{self.path}, line {line} has {len(row)} cells, but the heading names {self.width} columns, so the "
+                "cells cannot be assigned to columns",
                 "Write a name for every column into the heading (col.names=NA in R's write.table), or a decimal point "
                 "where a comma divides the columns",
             )

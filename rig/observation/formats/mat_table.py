@@ -77,7 +77,7 @@ def read_mat_columns(path: Path) -> dict[str, Array]:
                 raise ValueError(f"it holds more than {MOST_COLUMNS} columns")
     if not columns:
         what = (
-            f"holds no numbers but in objects, which MATLAB alone can read: {listing(map(shorten, objects))}"
+            f"holds numbers only in objects, which only MATLAB can read: {listing(map(shorten, objects))}"
             if objects
             else "holds no numbers"
         )

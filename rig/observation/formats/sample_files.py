@@ -46,7 +46,8 @@ FORMATS = (
     Format(
         "bag",
         is_bag,
-        "Name the folder of the bag, with its metadata.yaml, which `ros2 bag reindex FOLDER` writes; of ROS 1 the file",
+        "Name the folder of the bag, with its metadata.yaml, which `ros2 bag reindex FOLDER` writes; for ROS 1 name "
+        "the file",
         "rig.observation.formats.bag_samples:bag_readings",
         "rig.observation.formats.bag_samples:bag_attitudes",
         bag_of,
@@ -99,7 +100,7 @@ def attitudes_in(path: Path) -> Columns | None:
     if not columns:
         raise Refused(
             "no_attitudes",
-            f"{path} contains readings of sensors, and not their attitudes",
+            f"{path} contains readings of sensors, but not their attitudes",
             "Give the attitudes as CSV, or as poses in a ROS 2 bag",
         )
     time_s = columns.pop(TIME)
@@ -141,7 +142,11 @@ def _read(form: Format, reader: str, path: Path) -> FormatColumns:
     """Return the columns, ordered by time. Raise Refused as `readings_in` does."""
     source = form.reads(whole(path))
     parts = parts_read_apart(
-        reader, source, {"inside": _part_inside(path)}, else_=f"is no {form.name} that can be read", remedy=form.remedy
+        reader,
+        source,
+        {"inside": _part_inside(path)},
+        else_=f"is not a {form.name} that can be read",
+        remedy=form.remedy,
     )
     columns = columns_of(parts)
     time_s = columns[TIME]

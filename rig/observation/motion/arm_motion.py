@@ -167,6 +167,7 @@ class ArmMotion:
         `weights` (n,) are those of the mean. Angles between states are interpolated, here linearly.
         """
         lasting_s = _averaging_time(time_s)
+        # A rate at a sample is the difference of two interpolated angles; `by_state` is the weight of each state.
         edges_s = np.concatenate([time_s + lasting_s / 2, time_s - lasting_s / 2])
         sizes = np.concatenate([weights, -weights]) / lasting_s
         later = np.clip(np.searchsorted(self.time_s, edges_s), 1, len(self.time_s) - 1)

@@ -174,8 +174,8 @@ def _check_slider(turning: NDArray[Any], where: str) -> None:
     if scaling < MIN_SPEED_FRACTION:
         raise Fault(
             "speed_limited",
-            f"in {where} the controller ran at {100 * scaling:.0f} % of the programmed speed with the slider at 100 %, "
-            "as where a limit of the safety settings slows it down",
+            f"in {where} the controller ran at {100 * scaling:.0f} % of the programmed speed with the slider at 100 "
+            "%, as it does if a limit of the safety settings slows it down",
             "Widen that limit in the arm's safety settings, or lower procedure.speed_deg_s, then repeat the sweep",
         )
 

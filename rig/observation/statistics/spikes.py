@@ -1,7 +1,7 @@
 """Single readings of a gyroscope far from those before and after: bit errors, dropped digits, markers of a logger.
 
-A body needs several readings to turn there and back, so a single deviating reading is no motion, however large it is. A
-vibration, or a knock that rings, moves its neighbours too, and is kept.
+A body needs several readings to turn there and back, so a single deviating reading is not a motion, however large it
+is. A vibration, or a knock that rings, moves its neighbours too, and is kept.
 
 A reading is compared with the cubic through two readings on either side. A spike of size 1 leaves deviations of 1/6,
 −2/3, 1, −2/3, 1/6, while a step leaves −1/6, 1/2, −1/2, 1/6. Remainders of a motion or a vibration also show in the
@@ -60,11 +60,13 @@ def _find_lone(axis: Array, changes: Array) -> NDArray[np.intp]:
     `changes` (n,) are those of all axes around each reading.
     """
     deviation = np.zeros(len(axis))
+    # The deviation from the cubic through the two readings before and the two after.
     before, after = axis[:-4] + axis[4:], axis[1:-3] + axis[3:-1]
     deviation[2:-2] = axis[2:-2] - (4 * after - before) / 6
     candidates = np.flatnonzero(np.abs(deviation) > np.maximum(SMALLEST_RAD_S, SUDDEN * changes))
     size = deviation[candidates]
     alone = np.ones(len(candidates), dtype=np.bool_)
+    # A lone spike deflects the cubics of its neighbours by a known fraction; a motion does not.
     for side in (-1, 1):
         of_next = deviation[np.clip(candidates + side, 0, len(axis) - 1)]
         alone &= np.abs(of_next - NEXT * size) < ALIKE * np.abs(size)

@@ -118,7 +118,7 @@ class Ramp:
     _time_s: float = 0.0
 
     def power(self, time_s: float, now_c: float, goal_c: float) -> float:
-        """Return the power now, on the way to `goal_c`."""
+        """Return the heater's power at `time_s` as a fraction, to bring a sensor at `now_c` towards `goal_c`."""
         if self.wanted_c is None:
             self.wanted_c, self._time_s = now_c, time_s
         dt_s, self._time_s = time_s - self._time_s, time_s

@@ -228,7 +228,7 @@ class LinesDevice:
             self._on_values(decoded.values[is_sample], numbers, times_us, host_time_s)
 
     def _refuse_damage(self) -> None:
-        """Raise SensorError `lines_damaged` if too many lines are no samples."""
+        """Raise SensorError `lines_damaged` if too many lines are not samples."""
         counts = self.counts
         if counts.damaged > DAMAGED_LINES and counts.damaged > DAMAGED * (counts.samples + counts.damaged):
             raise SensorError(

@@ -57,7 +57,7 @@ class SimulatedServo:
 
     @property
     def shaft(self) -> Shaft:
-        """The shaft of its drive."""
+        """The shaft of the servo's drive."""
         return self.drive.shaft
 
     @property

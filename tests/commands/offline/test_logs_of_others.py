@@ -189,7 +189,7 @@ def test_a_heading_one_short_is_no_heading(tmp_path: Path, capsys: pytest.Captur
     """R's write.table."""
     rows = [f"{number},{row}" for number, row in enumerate(rows_of(tmp_path), 1)]
     said = refused(capsys, *others(tmp_path, "t,gx,gy,gz", rows))
-    assert "wrong_columns: " in said and "line 2 has 5 cells, and the heading names 4 columns" in said
+    assert "wrong_columns: " in said and "line 2 has 5 cells, but the heading names 4 columns" in said
     named = others(tmp_path, '"",t,gx,gy,gz', rows)
     assert (off_and_u(solved(capsys, *named))[0] < 1.6).all(), "an index with a name, if an empty one, is read over"
 
@@ -226,7 +226,7 @@ def test_turns_that_count_by_their_mean_speed_are_reported(tmp_path: Path, capsy
     cut[2, 5] *= 0.7
     log = type(log)(log.time_s, log.readings, cut)
     said = in_brief(capsys, *_interleave(write_rates(tmp_path, log, None, "angle_rad")))
-    assert "1 of 6 turns count by their mean speed, since the body moves before or after them: rows 3" in said
+    assert "1 of 6 turns count by their mean speed because the body moves before or after them: rows 3" in said
 
 
 @pytest.mark.slow

@@ -155,7 +155,7 @@ def test_what_a_message_quotes_is_short_and_harmless(tmp_path: Path) -> None:
 
 
 def test_the_refusal_names_the_column_to_convert(tmp_path: Path) -> None:
-    with pytest.raises(Refused, match="column x_deg_s where x_rad_s belongs"):
+    with pytest.raises(Refused, match="column x_deg_s instead of x_rad_s"):
         read_with(tmp_path, lambda lines: [lines[0].replace("x_rad_s", "x_deg_s"), *lines[1:]])
 
 

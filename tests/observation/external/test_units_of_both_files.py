@@ -21,13 +21,13 @@ WAY = ("axis_x", "axis_y", "axis_z")
     [
         (
             np.degrees(1.0),
-            r"wrong_unit: the table's rates are 57\.\d times what its attitudes turn: they look like",
+            r"wrong_unit: the table's rates are 57\.\d times those of its attitudes: they look like",
         ),
         (
             np.radians(1.0),
-            r"wrong_unit: the table's rates are 0\.017\d times what its attitudes turn: they look like",
+            r"wrong_unit: the table's rates are 0\.017\d times those of its attitudes: they look like",
         ),
-        (9.55, r"wrong_unit: the table's rates are 9\.5\d times what its attitudes turn: check range"),
+        (9.55, r"wrong_unit: the table's rates are 9\.5\d times those of its attitudes: check range"),
     ],
 )
 def test_rates_in_another_unit_than_attitudes_are_named(factor: float, name: str) -> None:

@@ -67,7 +67,7 @@ def test_a_mistake_is_asked_again_by_its_name_and_mended(mistakes: Mapping[str, 
     assert table.operator.state["mistakes"]
     assert names <= set(table.again)
     why = " ".join(event.why for event in table.events if isinstance(event, HandAsked))
-    assert "touches the rule." in why or "the move is asked for again." in why
+    assert "touches the rule." in why or "the rig asks for the move again." in why
     assert "--no-closure" not in why
     held(table)
 

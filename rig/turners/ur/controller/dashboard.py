@@ -45,7 +45,7 @@ class Dashboard:
         """Stop the running program, and with it the arm.
 
         In local control the controller refuses with a sentence. An answer that it failed to execute the command, as
-        without a running program, is no refusal.
+        without a running program, is not a refusal.
         """
         answer = self.ask("stop")
         self.acknowledged = answer == STOPPED

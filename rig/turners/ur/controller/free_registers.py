@@ -20,7 +20,7 @@ IN_USE = "IN_USE"
 LOWER_ONLY_SINCE = (5, 23)  # version of the controller's software
 OWNERS = (
     "End the other client; disable EtherNet/IP, PROFINET and MODBUS in the installation (they take 0-23); remove "
-    "URCaps that use RTDE, as those of grippers and force sensors do"
+    "URCaps that use RTDE, such as those of grippers and force sensors"
 )
 
 

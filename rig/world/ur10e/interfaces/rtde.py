@@ -92,7 +92,7 @@ class RtdeSession:
         return b""
 
     def receive(self, data: bytes) -> bytes:
-        """Answer every complete package, and keep the rest; refuse what is no package."""
+        """Answer every complete package, and keep the rest; refuse what is not a package."""
         self._buffer += data
         answer = b""
         while len(self._buffer) >= HEADER.size:

@@ -57,6 +57,7 @@ def propagate(
     links: Sequence[ArmLink],
 ) -> BodyMotion:
     """Return the motion of the last of `links`, if the body before the first has the motion `inner`."""
+    # Rate, its derivative and the specific force, in the axes of the link that has been reached so far.
     (x, y, z), (u, v, w), (f, g, h) = inner
     for (cosine, sine), speed, acceleration, link in zip(cosines, qd_rad_s, qdd_rad_s2, links, strict=True):
         u, v, w = u + y * speed, v - x * speed, w + acceleration
@@ -77,6 +78,7 @@ def transfer_force(rate: Components, change: Components, force: Components, leve
     x, y, z = rate
     u, v, w = change
     a, b, c = lever_arm_m
+    # f + dω/dt × r + ω × (ω × r)
     projection = a * x + b * y + c * z
     square = x * x + y * y + z * z
     return (
