@@ -51,7 +51,7 @@ class JointState:
     qd_rad_s: Joints
 
     def to_record(self) -> Row:
-        """Return the values in the order of `state_dtype`, for at least one joint."""
+        """Return the values in the order of `state_dtype`."""
         return self.time_s, self.host_time_s, self.q_rad, self.qd_rad_s
 
 

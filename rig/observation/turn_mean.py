@@ -132,7 +132,7 @@ def _line_variance(slow: Array, weights: Array, residuals: Array) -> Array:
 
 
 def _fit_residuals(columns: Array, values: Array) -> Array:
-    """Return the residuals of values (n, m) after a fit of columns (n, k) of any size."""
+    """Return the residuals of values (n, m) after a fit of columns (n, k), which may be in different units."""
     unit = unit_columns(columns)
     residuals: Array = values - unit @ fit_columns(unit, values)
     return residuals

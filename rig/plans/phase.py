@@ -13,7 +13,7 @@ from rig.plans.script_errors import script_errors
 
 
 class PhasePlanner(Protocol):
-    """A planner, as `Planner`, for the turner and the section of one configuration."""
+    """A `Planner` whose turner and section are those of one configuration."""
 
     def __call__(self, start_q_rad: Joints | None = None, done: Collection[int] = ()) -> Plan: ...
 

@@ -221,7 +221,7 @@ def test_what_is_no_sample_a_line_is_said_to_be_none() -> None:
 
 
 HARM: dict[str, tuple[Callable[[int], str], str]] = {
-    "numbers beyond all": (lambda n: f"{n},1e400,-1e400,0.{n}", "numbers that nothing measures: 1e400"),
+    "numbers beyond all": (lambda n: f"{n},1e400,-1e400,0.{n}", "numbers that no sensor measures: 1e400"),
     "ten thousand columns": (lambda n: ",".join(["0.5"] * 10_000), "longer than 2000 characters"),
     "a hundred columns": (lambda n: ",".join(["0.5"] * 100), "a line holds 100 numbers"),
     "a key that writes on the terminal": (lambda n: f"\x1b[2J{n} a{n} b{n}", "has nothing in common|stands|look alike"),

@@ -58,7 +58,7 @@ class SimulatedTruth:
         return self._world.sensors[name].nonlinearity_odd_per_rad_s != 0
 
     def _rates(self, name: str, windows_s: Windows, rate_rad_s: float) -> np.ndarray:
-        """Return the readings (n, 3) of an ideal-axis, noiseless gyroscope at one rate about every axis."""
+        """Return the readings (n, 3) of the gyroscope without noise or axis errors, at one rate about every axis."""
         sensor, time_s = self._sensor(name), _instants(windows_s)
         quiet = replace(
             sensor.gyro,
@@ -71,7 +71,7 @@ class SimulatedTruth:
         return readings(quiet, time_s, np.full((len(time_s), 3), rate_rad_s), self._seed(name), sensor.temperature_c)
 
     def _accelerations(self, name: str, windows_s: Windows, force_m_s2: float) -> np.ndarray:
-        """Return the readings (n, 3) of an ideal-axis, noiseless accelerometer under one force along every axis."""
+        """Return the readings (n, 3) of the accelerometer without noise or axis errors, at a force along every axis."""
         sensor, time_s = self._sensor(name), _instants(windows_s)
         if sensor.accelerometer is None:
             raise ValueError(f"nothing reads the accelerometer of {name}")

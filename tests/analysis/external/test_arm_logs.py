@@ -231,7 +231,7 @@ def test_a_new_home_of_the_reference_is_told_and_harms_nothing(error_rad: float)
     later = sound.stamps_s > sound.stamps_s[-1] / 2
     found = solved(replace(sound, attitudes=np.where(later[:, None, None], turned @ sound.attitudes, sound.attitudes)))
     (note,) = found.notes
-    assert note.startswith("from ") and "all attitudes are turned by 15°" in note
+    assert note.startswith("from ") and "all attitudes are rotated by 15°" in note
     error, std = errors(found, sound)
     assert (np.abs(error) < 4 * std).all()
     assert not list(solved(sound).notes)

@@ -163,9 +163,9 @@ def problems(source: str, *changes: dict[str, Any]) -> str:
 def test_a_clock_that_nobody_vouches_for_is_refused() -> None:
     unsaid = document("autopilot")
     unsaid.pop("uncertainty")
-    with pytest.raises(ConfigurationRefused, match="crystal_ppm: say by how much the clock of imu1 may be off"):
+    with pytest.raises(ConfigurationRefused, match="crystal_ppm: state how far the clock of imu1 may be off"):
         parse(yaml.safe_dump(unsaid), turners=sections())
     columns = ["-", "gx", "gy", "gz", "ax", "ay", "az", "temperature"]
     arrival = {"sensors": {"imu": {"lines": {"columns": columns, "time": None, "clock": "arrival"}}}}
-    assert "sensors.imu.lines.clock: by hand the device has to print its time" in problems("lines", arrival)
+    assert "sensors.imu.lines.clock: in a session by hand the device must print its time" in problems("lines", arrival)
     assert "too slow for a hand" in problems("autopilot", {"sensors": {"imu1": {"rate_hz": 20}}})

@@ -131,7 +131,7 @@ def test_a_plan_is_held_against_the_controllers_limits_where_they_are_narrower(w
     config = hardware(laboratory.config_path, tmp_path)
     done = rig("run", config, "--out", tmp_path / "run", "--yes")
     assert done.returncode == 2 and "rig: joint_speed: " in done.stderr, done.stderr
-    assert "turns wrist_3 at 60.0°/s, the controller's limit is 30.0°/s" in done.stderr
+    assert "turns wrist_3 at 60.0°/s; the controller's limit is 30.0°/s" in done.stderr
     assert "sweep wrist_2 cw takes wrist_2 from" in done.stderr and "sweep wrist_1 cw takes" not in done.stderr
     assert "beyond -175.0° to 175.0°, the controller's limits" in done.stderr and "safety settings" in done.stderr
     assert untouched(laboratory)

@@ -287,7 +287,7 @@ def test_states_at_any_rate_follow_each_other(rate_hz: float) -> None:
         ({"S": package("S", b"\0")}, "does not start"),
         ({"S": ANSWERS["S"]}, "does not answer"),
         ({"V": b"HTTP/1.1 400 Bad Request\r\n"}, "does not answer|RTDE"),
-        ({"V": b"\0\0\0\0"}, "no RTDE"),
+        ({"V": b"\0\0\0\0"}, "not RTDE"),
     ],
     ids=["version", "a variable", "no recipe", "start", "silence", "another protocol", "zeros"],
 )
