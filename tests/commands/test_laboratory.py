@@ -27,7 +27,7 @@ def test_a_laboratory_whose_port_is_taken_is_refused_by_the_worlds_own_words_and
         pass
     done = rig("check", running.config_path)
     assert done.returncode == 0 and done.stdout.endswith("ready\n"), done
-    assert f"another one uses {running.host}, so this one uses 127.0." in done.stderr
+    assert f"another one is at {running.host}, so this one is at 127.0." in done.stderr
     assert running.host not in done.stdout
 
 

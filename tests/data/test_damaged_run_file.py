@@ -261,7 +261,7 @@ SHAPES: dict[str, tuple[Callable[[h5py.File], None], str]] = {
     "provenance that is no JSON": (attribute("provenance", "{"), "not_a_run_file"),
     "provenance of bytes": (attribute("provenance", np.void(b"\xff\x00")), "not_a_run_file"),
     "mounting of one row": (attribute("mounting", [1.0, 0.0, 0.0], "samples/gyro"), r"sensor\.mounting"),
-    "mounting of zeros": (attribute("mounting", np.zeros((3, 3)), "samples/gyro"), "no rotation"),
+    "mounting of zeros": (attribute("mounting", np.zeros((3, 3)), "samples/gyro"), "not a rotation"),
     "mounting of text": (attribute("mounting", "+x", "samples/gyro"), r"sensor\.mounting"),
     "a negative sensitivity": (of_channel("unit_per_count", -1.0), "unit_per_count"),
     "a sensitivity of text": (of_channel("unit_per_count", "low"), "unit_per_count"),

@@ -166,7 +166,7 @@ def test_moves_that_fit_only_a_much_skewed_box_are_refused() -> None:
     recorded = handle(TWELVE, 13)
     later = recorded.time_s > np.median(recorded.time_s)
     changed = replace(recorded, rates=recorded.rates * np.where(later[:, None], [1.0, 1.0, 1.05], 1.0))
-    with pytest.raises(Fault, match=r"not_flat: .*out of square, where 0\.2° is stated"):
+    with pytest.raises(Fault, match=r"not_flat: .*out of square, but only 0\.2° is stated"):
         solved(changed)
     solved(recorded)
 

@@ -82,7 +82,7 @@ def test_the_mounts_are_recorded() -> None:
     again = settings_from_json(runs[1].settings.to_json())
     assert again == runs[1].settings
     assert np.array(again.mount) == pytest.approx(np.array([[0, 1, 0], [-1, 0, 0], [0, 0, 1]]))
-    with pytest.raises(ValueError, match="no rotation"):
+    with pytest.raises(ValueError, match="not a rotation"):
         settings_from_json(replace(runs[1].settings, mounts=(((2.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0)),) * 2).to_json())
     with pytest.raises(ValueError, match="of stage 2"):
         settings_from_json(replace(runs[1].settings, stage=2).to_json())

@@ -35,7 +35,7 @@ def test_a_dashboard_that_talks_without_end_is_given_up_in_time(said: bytes) -> 
         talker.start()
         with (
             Dashboard(host, timeout_s=0.1) as dashboard,
-            pytest.raises(OSError, match=r"in time|timed out|no dashboard"),
+            pytest.raises(OSError, match=r"in time|timed out|not a dashboard"),
         ):
             dashboard.program_running()
         talker.join()
