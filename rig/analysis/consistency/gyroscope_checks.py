@@ -190,7 +190,7 @@ def _free_disturbed_transfers(
         axis_changed = model.test_single_columns(axis_columns, false_alarm_probability)
         if not transfers or axis_changed is None:
             return with_transfers
-        explained = model.chi_square_of([_own_mean(segments, number) for number in transfers], ())
+        explained = model.chi_square_of([_build_offset(segments, number) for number in transfers], ())
         worst = int(np.argmax(explained))
         critical = critical_value(false_alarm_probability / len(transfers))(AXES)
         if explained[worst] <= max(critical, axis_changed[0] + ALIKE):
@@ -198,7 +198,7 @@ def _free_disturbed_transfers(
         disturbed.append(transfers[worst])
 
 
-def _own_mean(segments: Segments, sweep: int) -> Array:
+def _build_offset(segments: Segments, sweep: int) -> Array:
     """Return columns (3, N, 3) that give a sweep or transfer a mean of its own."""
     return repeat_per_axis((segments.sweep == sweep).astype(np.float64)[:, None])
 
@@ -245,8 +245,8 @@ def _whiten_with_transfers(
     transfers = allowance.transfers
     scatter = _build_scatter(transfers, allowance.transfer_patterns_rad_s, allowance)
     model = whiten_segments(transfers, scatter, bias)
-    own = [apply_whitener(model.whitener, _own_mean(transfers, number)) for number in disturbed]
-    model = replace(model, model=np.concatenate([model.model, *own], axis=1))
+    offsets = [apply_whitener(model.whitener, _build_offset(transfers, number)) for number in disturbed]
+    model = replace(model, model=np.concatenate([model.model, *offsets], axis=1))
     return _Tested(transfers, transfers.rates_rad_s @ matrix.T, model)
 
 

@@ -217,7 +217,7 @@ def of_other_rows(table: Table) -> Table:
 ACCELERATION = ("x_m_s2", "y_m_s2", "z_m_s2")
 WRONG: dict[str, tuple[str, Change | None, Change | None]] = {
     "g for m/s²": ("wrong_unit: .* given as m/s²", times(1 / 9.80665, *ACCELERATION), None),
-    "a column in g": ("wrong_unit: .* x_g where .*x_m_s2", renamed("x_m_s2", "x_g"), None),
+    "a column in g": ("wrong_unit: .* x_g instead of .*x_m_s2", renamed("x_m_s2", "x_g"), None),
     "mirrored axis": ("mirrored_axis", times(-1, "z_m_s2"), None),
     "two axes swapped": ("mirrored_axis", swapped("x_m_s2", "y_m_s2"), None),
     "quaternions of length 1.01": ("bad_quaternion: .* length 1.01", None, times(1.01, "qw", "qx", "qy", "qz")),

@@ -126,7 +126,7 @@ def test_units_are_spelt_as_in_the_section_of_a_device_that_prints_lines() -> No
 @pytest.mark.parametrize(
     ("told", "words"),
     [
-        (SAMPLES.replace("unit: dps", "unit: deg", 1), "x_rad_s is a rate, and deg is the unit of an angle"),
+        (SAMPLES.replace("unit: dps", "unit: deg", 1), "x_rad_s is a rate, but deg is the unit of an angle"),
         (SAMPLES.replace("unit: dps", "unit: knots", 1), "this unit is not known"),
         (SAMPLES.replace("unit: dps", "unit: K", 1), "this unit is not known"),  # begins elsewhere than at zero
         (SAMPLES.replace("column: gx", "column: gyro x", 1), "has the column 'gyro x' nowhere, which is to be x_rad_s"),
