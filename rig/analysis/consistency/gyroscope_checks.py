@@ -12,6 +12,7 @@ fit of all changes from quarter to quarter. A transfer that remains an outlier t
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -64,7 +65,6 @@ CHECKS = (
     "sweeps_against_rests",
 )
 
-AXES = 3
 MOST, TRIED = 16.0, 7  # largest variance inflation by a synchronous ripple; number of factors that are tried
 
 
@@ -115,7 +115,9 @@ def check_gyroscope(
     steady_columns = _steady_columns(segments, encoders.reshape(len(encoders), -1))
     bias = _estimate_bias_process(segments, axis_rates, steady_columns, scatter)
     segments_only = _Tested(segments, axis_rates, whiten_segments(segments, scatter, bias))
-    with_transfers = _free_disturbed_transfers(segments_only, matrix, allowance, bias, false_alarm_probability)
+    with_transfers, axis_changed = _free_disturbed_transfers(
+        segments_only, matrix, allowance, bias, false_alarm_probability
+    )
     sweeps_alone = repeat_per_axis(segments_only.means.sweeps)
     statistics = test_alternatives(
         with_transfers.model, changes(with_transfers.segments, with_transfers.axis_rates), false_alarm_probability
@@ -125,9 +127,7 @@ def check_gyroscope(
         differences(segments, axis_rates, np.concatenate([sweeps_alone, encoders.swapaxes(0, 1)], axis=2)),
         false_alarm_probability,
     )
-    if axis_changed := with_transfers.model.test_single_columns(
-        single_axis_columns(with_transfers.segments, with_transfers.axis_rates), false_alarm_probability
-    ):
+    if axis_changed is not None:
         statistics["axis_changed"] = axis_changed
     bias_jump = _test_bias_jump(segments, axis_rates, scatter, false_alarm_probability)
     if bias_jump is not None:
@@ -175,8 +175,8 @@ def _free_disturbed_transfers(
     allowance: ErrorPatterns,
     bias: BiasProcess,
     false_alarm_probability: float,
-) -> _Tested:
-    """Return `_inflate_transfers` with a mean of its own for each transfer that differs from all other segments.
+) -> tuple[_Tested, Statistic | None]:
+    """Return `_inflate_transfers` with a mean of its own for each outlier among the transfers, and `axis_changed`.
 
     A ripple at the data rate shifts the mean of one transfer. A change of a scale factor shifts all later transfers, so
     a transfer is an outlier only if its own mean explains clearly more of the residuals than any such change.
@@ -185,22 +185,17 @@ def _free_disturbed_transfers(
     while True:
         with_transfers = _inflate_transfers(segments_only, matrix, allowance, bias, disturbed)
         segments, model = with_transfers.segments, with_transfers.model
-        transfers = [number for number in segments.sweep[segments.sweep < REST].tolist() if number not in disturbed]
         axis_columns = single_axis_columns(segments, with_transfers.axis_rates)
         axis_changed = model.test_single_columns(axis_columns, false_alarm_probability)
+        transfers = [number for number in segments.sweep[segments.sweep < REST].tolist() if number not in disturbed]
         if not transfers or axis_changed is None:
-            return with_transfers
-        explained = model.chi_square_of([_build_offset(segments, number) for number in transfers], ())
-        worst = int(np.argmax(explained))
-        critical = critical_value(false_alarm_probability / len(transfers))(AXES)
-        if explained[worst] <= max(critical, axis_changed[0] + ALIKE):
-            return with_transfers
-        disturbed.append(transfers[worst])
-
-
-def _build_offset(segments: Segments, sweep: int) -> Array:
-    """Return columns (3, N, 3) that give a sweep or transfer a mean of its own."""
-    return repeat_per_axis((segments.sweep == sweep).astype(np.float64)[:, None])
+            return with_transfers, axis_changed
+        worst, (explained, limit) = find_outliers(
+            model, transfers, partial(sweep_columns, segments), false_alarm_probability
+        )[0]
+        if explained <= max(limit, axis_changed[0] + ALIKE):
+            return with_transfers, axis_changed
+        disturbed.append(worst)
 
 
 def _inflate_transfers(
@@ -245,7 +240,7 @@ def _whiten_with_transfers(
     transfers = allowance.transfers
     scatter = _build_scatter(transfers, allowance.transfer_patterns_rad_s, allowance)
     model = whiten_segments(transfers, scatter, bias)
-    offsets = [apply_whitener(model.whitener, _build_offset(transfers, number)) for number in disturbed]
+    offsets = [apply_whitener(model.whitener, sweep_columns(transfers, number)) for number in disturbed]
     model = replace(model, model=np.concatenate([model.model, *offsets], axis=1))
     return _Tested(transfers, transfers.rates_rad_s @ matrix.T, model)
 
