@@ -22,6 +22,7 @@ from rig.observation.statistics.spectral_lines import (
     column_count,
     find_lines,
     fit_columns,
+    fit_residuals,
     harmonics,
     median_power,
     unit_columns,
@@ -115,8 +116,8 @@ def _slow_line_variance(readings: Array, turn: SampledTurn, slow: Array, change:
     two: the square of the difference, and its variance for the lines' fitted amplitudes at random phases. `explained`
     (n, m): columns of everything else in the readings (n, 3).
     """
-    without_ripple = _fit_residuals(np.column_stack([whole(readings), turn.uneven_rad_s]), readings)
-    residuals = _fit_residuals(explained, readings)
+    without_ripple = fit_residuals(np.column_stack([whole(readings), turn.uneven_rad_s]), readings)
+    residuals = fit_residuals(explained, readings)
     return np.maximum((change @ without_ripple) ** 2, _line_variance(slow, change, residuals))
 
 
@@ -129,13 +130,6 @@ def _line_variance(slow: Array, weights: Array, residuals: Array) -> Array:
     kept = ((weights @ slow) ** 2).reshape(-1, 2).sum(axis=1)
     variance: Array = kept @ powers / 2
     return variance
-
-
-def _fit_residuals(columns: Array, values: Array) -> Array:
-    """Return the residuals of values (n, m) after a fit of columns (n, k), which may be in different units."""
-    unit = unit_columns(columns)
-    residuals: Array = values - unit @ fit_columns(unit, values)
-    return residuals
 
 
 def _find_turn_lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines:
@@ -167,7 +161,7 @@ def _find_turn_lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines
     late = _changes(smooth) if turn.closed else none  # over an arc it resembles encoder errors
     encoded = np.column_stack([smooth, late, slow - _fit_slow_part(slow, turn.share)])
     explained = np.column_stack([steady, encoded, columns[:, fast]])
-    residuals = _fit_residuals(explained, readings)
+    residuals = fit_residuals(explained, readings)
     encoded_lines = ripple[ripple >= SLOW]
     cycles = find_lines(residuals, NOT_ENCODED, encoded_lines, turn.share)
     return Lines(cycles, len(cycles) - len(encoded_lines), encoded, late)

@@ -26,8 +26,8 @@ from rig.observation.statistics.spectral_lines import (
     column_count,
     find_lines,
     fit_columns,
+    fit_residuals,
     line_swing,
-    unit_columns,
     waves,
 )
 from rig.observation.statistics.tapered_weights import noise_at_zero
@@ -173,8 +173,7 @@ def _segment_revolution(
     fraction = (division.time_s - average.start_s) / average.duration_s
     lines = waves(average.lines_hz * average.duration_s, fraction, turn.beats)
     vibration = np.column_stack([rates @ axis, motion.rate(division.time_s, 1) @ axis])
-    encoded = unit_columns(np.column_stack([np.ones(len(rates)), vibration]))
-    not_encoded = division.readings_rad_s - encoded @ fit_columns(encoded, division.readings_rad_s)
+    encoded = np.column_stack([np.ones(len(rates)), vibration])
     residual, vibration = (
         division.subtract_means(values, division.averages) for values in (division.readings_rad_s, vibration)
     )
@@ -183,11 +182,14 @@ def _segment_revolution(
     noise = MeanNoise(average.noise_rad_s**2, average.noise_rad2_s2 * average.samples, average.dof)
     is_slow = np.repeat(average.lines_hz * average.duration_s < SLOW, column_count(turn.beats))
     weights = mean_weights(division.groups, lines[:, ~is_slow])
+    added: Array | float = 0.0
+    if is_slow.any():
+        added = _slow_line_variance(lines[:, is_slow], weights, fit_residuals(encoded, division.readings_rad_s))
     segments = _average(
         division,
         motion,
         weights=weights,
-        added=_slow_line_variance(lines[:, is_slow], weights, not_encoded) if is_slow.any() else np.zeros(3),
+        added=added,
         residuals=noise_alone - lines @ fit_columns(lines, noise_alone),
         rates=rates,
         noise=noise,
@@ -212,7 +214,7 @@ def _slow_line_variance(slow: Array, weights: Array, residuals: Array) -> Array:
     if len(weights) <= FEWEST_SCATTERED:
         return np.asarray(fitted, dtype=np.float64)
     means, straight = weights @ residuals, np.vander(np.linspace(-1, 1, len(weights)), 2)
-    around = means - straight @ fit_columns(straight, means)
+    around = fit_residuals(straight, means)
     variance: Array = np.maximum(fitted, np.sum(around**2, axis=0) / (len(weights) - 2))
     return variance
 
@@ -236,7 +238,6 @@ def _segment_rest(stream: Stream, motion: ArmMotion, average: Average, count: in
         residuals=residuals,
         rates=np.zeros((len(readings), 3)),
         noise=_noise_at_rest(residuals, len(division.enough), lines.shape[1], division.steps),
-        added=np.zeros(3),
     )
     lsb = stream.sensor.channel(RATE).unit_per_count
     vibrating = division.subtract_means(readings, division.averages)
@@ -269,7 +270,7 @@ def _average(
     residuals: Array,
     rates: Array,
     noise: MeanNoise,
-    added: Array,
+    added: Array | float = 0.0,
 ) -> tuple[Segment, ...]:
     """Return the segments with enough samples, averaged by weights (p, m): readings and the flange's rates (m, 3).
 

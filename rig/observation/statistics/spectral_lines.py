@@ -127,6 +127,13 @@ def fit_columns(columns: Array, values: Array) -> Array:
     return np.asarray(np.linalg.lstsq(columns.T @ columns, columns.T @ values, rcond=ALIKE**2)[0], dtype=np.float64)
 
 
+def fit_residuals(columns: Array, values: Array) -> Array:
+    """Return the residuals of values (n, m) after a fit of columns (n, k), which may be in different units."""
+    unit = unit_columns(columns)
+    residuals: Array = values - unit @ fit_columns(unit, values)
+    return residuals
+
+
 def line_swing(residuals: Array, columns: Array, lines_hz: Array) -> Array:
     """Return the mean square (3,), rad², of the change of the lines' angle between two moments.
 
