@@ -31,6 +31,8 @@ from rig.estimation.by_hand.session_parts import LARGEST, STATED, HandRecording,
 PASSES, SIZED = 30, 4
 SETTLED = 1e-2  # largest step, relative to the standard uncertainty, at which the fit has converged
 PRIOR_DOF = 5.0  # degrees of freedom of the stated values
+# The walk of the bias at which the fit begins: from a small one, a rest that contradicts the others looks like noise.
+LOOSE_WALK_RAD_S_SQRT_S = 1e-4
 LEAST = 0.4  # least fraction of the stated value: no hand is better
 CAUSE_OF_STD = {
     "repeat_rad": (FLAT, "repeat"),
@@ -72,7 +74,7 @@ def fit_session(session: HandRecording, conditions: SessionConditions, trusted: 
     Refused `first_face_unknown`.
     """
     biases = np.array([rest.mean_rad_s for rest in session.rests])
-    stds = STATED
+    stds = replace(STATED, walk_rad_s_sqrt_s=LOOSE_WALK_RAD_S_SQRT_S)
     initial = GyroscopeModel(np.eye(3), biases, np.zeros((3, 3)), np.zeros(6))
     integrals = integrate_moves(session, initial, np.tile([0.0, 0.0, 1.0], (len(biases), 1)))
     faces = find_faces(session, conditions, integrals)
@@ -107,6 +109,7 @@ def _start(integrals: MoveIntegrals, faces: RestFaces, initial: GyroscopeModel) 
         matrix=initial.matrix,
         sensitivity=initial.sensitivity,
         bends=initial.bends,
+        drift_rad_s=np.zeros((2, 3)),
         level=np.eye(3),
         offset=np.zeros(3),
         table=np.zeros(2),

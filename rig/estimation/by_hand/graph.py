@@ -5,7 +5,7 @@ for each rest the attitude Q (body to table) and the gyroscope's bias. A factor 
 deviation of each cause of their errors (Dellaert and Kaess, Factor Graphs for Robot Perception, 2017).
 
 - move: Log(R (Qᵢᵀ Qⱼ)ᵀ), with the gyroscope's noise and an error in proportion to the angle
-- rest: m̄ − b − G f; walk: the change of the bias from rest to rest
+- rest: m̄ − b − G f; walk: the change of the bias from rest to rest, less that of a drift by a parabola
 - flat: the table's normal in the body equals the face's normal; box: the face's normal equals the nominal one
 - closure: the heading after a whole turn; lean: the mean axis of a turn is the face's normal
 - acceleration: ā − F_a Qᵀ g − b_a, used as a level, so the component along the vertical has little weight
@@ -21,16 +21,19 @@ from rig.estimation.arrays import Array, axis_of, rotation_vectors
 from rig.estimation.by_hand.move_rotations import GyroscopeModel, MoveIntegrals
 from rig.estimation.by_hand.session_parts import FACES, HandRecording, HandStds, RestFaces, SessionConditions
 
-MATRIX, GRAVITY, LEVEL, OFFSET, TABLE, BOX, BENDS = (
-    slice(0, 9), slice(9, 18), slice(18, 27), slice(27, 30), slice(30, 32), slice(32, 44), slice(44, 50),
+MATRIX, GRAVITY, LEVEL, OFFSET, TABLE, BOX, BENDS, DRIFT = (
+    slice(0, 9), slice(9, 18), slice(18, 27), slice(27, 30), slice(30, 32), slice(32, 44), slice(44, 50), slice(50, 56),
 )  # fmt: skip
-RESTS = 50  # index of the first rest's parameters; each rest has six: attitude, bias
+RESTS = 56  # index of the first rest's parameters; each rest has six: attitude, bias
 
 MATRIX_STD = 0.2  # prior of an element of F
 SENSITIVITY_STD = float(np.radians(0.1))  # prior of an element of G, rad/s per g
 LEVEL_STD, OFFSET_STD_M_S2 = 0.05, 1.0
 TABLE_STD_RAD = 0.02
 BIAS_STD_RAD_S = 1.0
+# Prior of the bias' drift from the first rest to the last, and of its middle from the line between these: a part
+# that warms up.
+DRIFT_STD_RAD_S, CURVE_STD_RAD_S = 1e-3, 3e-4
 EARTH_STD_RAD_S = 5e-5  # prior of each axis: on the same face the Earth's rate is sensed alike
 LEAN_RAD = 0.02
 HAND_RAD_S = float(np.radians(150))  # usual rate of a hand during half of a move
@@ -52,15 +55,22 @@ MOVE, REST, WALK, FLAT, CLOSURE, LEANING, ACCELERATION, PRIOR = (
 class GraphState:
     """The current values of all unknowns.
 
-    - `matrix` F (3, 3), `sensitivity` G (3, 3) in rad/s per g; `bends` (6,): even and odd nonlinearity, s/rad.
-    - `level` F_a (3, 3), `offset` b_a (3,) in m/s² of the accelerometer; `table` (2,): its tilt, rad.
-    - `normals` (6, 2): the tilt of each face relative to its nominal normal, rad.
-    - `attitudes` (N, 3, 3) body to table and `biases` (N, 3) in rad/s at the rests.
+    - matrix: F (3, 3).
+    - sensitivity: G (3, 3) in rad/s per g.
+    - bends: the even and the odd nonlinearity (6,), s/rad.
+    - drift_rad_s: the bias' drift from the first rest to the last, and its deviation in the middle of it (2, 3).
+    - level: F_a (3, 3) of the accelerometer.
+    - offset: b_a (3,) of the accelerometer, m/s².
+    - table: the table's tilt (2,), rad.
+    - normals: the tilt of each face relative to its nominal normal (6, 2), rad.
+    - attitudes: the attitudes (N, 3, 3) at the rests, body to table.
+    - biases: the biases (N, 3) at the rests, rad/s.
     """
 
     matrix: Array
     sensitivity: Array
     bends: Array
+    drift_rad_s: Array
     level: Array
     offset: Array
     table: Array
@@ -84,6 +94,7 @@ class GraphState:
             matrix=self.matrix + step[MATRIX].reshape(3, 3),
             sensitivity=self.sensitivity + step[GRAVITY].reshape(3, 3),
             bends=self.bends + step[BENDS],
+            drift_rad_s=self.drift_rad_s + step[DRIFT].reshape(2, 3),
             level=self.level + step[LEVEL].reshape(3, 3),
             offset=self.offset + step[OFFSET],
             table=self.table + step[TABLE],
@@ -224,10 +235,13 @@ def _move(graph: Graph, row: int) -> Factor:
     design[:, BENDS] = integrals.by_bends[row]
     design[:, first_bias] = design[:, second_bias] = integrals.by_bias[row] / 2
     design[:, first], design[:, second] = np.eye(3), -graph.between[row]
+    changes_rad_s = graph.state.biases[row + 1] - graph.state.biases[row]
     causes = {
         "noise": np.full(3, graph.walk_rad_sqrt_s * np.sqrt(integrals.durations_s[row])),
         "stamps": np.full(3, graph.stamp_std_s * integrals.changes_rad_s[row]),
         "of_angle": np.full(3, stds.of_angle * np.sqrt(QUARTER_RAD * integrals.paths_rad[row])),
+        # A bias that jumps does so at any time of the move.
+        "jump": np.full(3, np.linalg.norm(changes_rad_s) * integrals.durations_s[row] / np.sqrt(12)),
     }
     return Factor(MOVE, row, graph.residuals_rad[row], design, causes)
 
@@ -259,11 +273,16 @@ def _closure(graph: Graph, row: int) -> Factor:
 def _bias_walk(graph: Graph, row: int) -> Factor:
     session, state, stds = graph.session, graph.state, graph.stds
     first, second = session.rests[row], session.rests[row + 1]
-    apart_s = (second.start_s + second.end_s - first.start_s - first.end_s) / 2
+    apart_s = second.middle_s - first.middle_s
+    begin_s, end_s = session.rests[0].middle_s, session.rests[-1].middle_s
+    before, after = (np.array([first.middle_s, second.middle_s]) - begin_s) / (end_s - begin_s)
+    drifted = np.array([after - before, 4 * after * (1 - after) - 4 * before * (1 - before)])
     design = np.zeros((3, graph.width))
+    design[:, DRIFT] = -np.kron(drifted, np.eye(3))
     design[:, _rest_columns(row)[1]], design[:, _rest_columns(row + 1)[1]] = -np.eye(3), np.eye(3)
     causes = {"walk": np.full(3, stds.walk_rad_s_sqrt_s * np.sqrt(apart_s))}
-    return Factor(WALK, row, state.biases[row + 1] - state.biases[row], design, causes)
+    changes_rad_s = state.biases[row + 1] - state.biases[row]
+    return Factor(WALK, row, changes_rad_s - drifted @ state.drift_rad_s, design, causes)
 
 
 def _rest(graph: Graph, row: int) -> Factor:
@@ -326,6 +345,8 @@ def _priors(graph: Graph) -> Iterator[Factor]:
     yield prior("matrix", MATRIX, (state.matrix - np.eye(3)).ravel(), MATRIX_STD)
     yield prior("g-sensitivity", GRAVITY, state.sensitivity.ravel(), SENSITIVITY_STD)
     yield prior("nonlinearity", BENDS, state.bends, NONLINEARITY / HAND_RAD_S)
+    yield prior("drift", slice(DRIFT.start, DRIFT.start + 3), state.drift_rad_s[0], DRIFT_STD_RAD_S)
+    yield prior("drift", slice(DRIFT.start + 3, DRIFT.stop), state.drift_rad_s[1], CURVE_STD_RAD_S)
     yield prior("level", LEVEL, (state.level - np.eye(3)).ravel(), LEVEL_STD)
     yield prior("level", OFFSET, state.offset, OFFSET_STD_M_S2)
     yield prior("table", TABLE, state.table, TABLE_STD_RAD)

@@ -29,6 +29,10 @@ class HandRest:
     acceleration_m_s2: Array | None = None
     acceleration_noise_m_s2: Array | None = None
 
+    @property
+    def middle_s(self) -> float:
+        return (self.start_s + self.end_s) / 2
+
 
 @dataclass(frozen=True, slots=True)
 class Move:

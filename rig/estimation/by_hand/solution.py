@@ -34,7 +34,11 @@ LINES: dict[str, tuple[Literal["A", "B"], tuple[str, ...], str]] = {
         ("repeat", "closure", "box", "table", "lean", "acceleration", "along", "level", "heading", "held"),
         "how the faces lie and the turns end, against each other",
     ),
-    "bias from rest to rest": ("A", ("walk", "earth", "bias"), "scatter of the rests; the Earth's rate"),
+    "bias from rest to rest": (
+        "A",
+        ("walk", "earth", "bias", "drift", "jump"),
+        "scatter of the rests; the Earth's rate",
+    ),
     "angles of the moves": ("A", ("of_angle",), "how the moves contradict each other"),
     "nonlinearity": ("B", ("nonlinearity", "matrix"), "what is known of parts, and the moves this way and that"),
     "g-sensitivity": ("B", ("g-sensitivity",), "what is known of parts, and the rests on opposite faces"),
