@@ -155,7 +155,7 @@ def _read_contents(looked: LookedFile, column_map: ColumnMap, *, has_readings: b
         except RigError as error:
             refusals.append(error)
     if looked.layout is None and (looked.samples is not None or looked.attitudes is not None):
-        refusals = []  # a bag need not contain both
+        refusals = []  # a bag may lack the samples or the attitudes
     return replace(looked, refusals=tuple(refusals))
 
 

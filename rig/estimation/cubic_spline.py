@@ -46,7 +46,7 @@ class CubicSpline:
         offset = (flat - self._x.take(interval))[:, None]
         highest, *others = self._coefficients[derivative]
         value = highest.take(interval, axis=0)
-        for coefficient in others:  # in place, one power after the other: it waits for memory alone
+        for coefficient in others:  # Horner's scheme in place: only the access to memory takes time
             value *= offset
             value += coefficient.take(interval, axis=0)
         values: Array = value.reshape(x.shape + self._shape)

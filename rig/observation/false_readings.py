@@ -11,22 +11,24 @@ from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array, equal_runs
 from rig.observation.windows import Window, inside
 
-BEYOND, USUAL = 20.0, 0.99  # times the largest of the usual readings, which are this fraction
-CLIPPED, CLIPPED_RAD_S = 4, 1.0  # equal readings in a row at the end of an axis' readings; least range of these
-FINE = 0.5  # of the noise: steps of readings below it, so that equal ones are no chance
-GAP = 1.5  # intervals: no reading is missing
+BEYOND, USUAL = 20.0, 0.99  # largest reading relative to the quantile of usual readings; this quantile
+# equal readings in a row at the largest value that show clipping; least range of the axis
+CLIPPED, CLIPPED_RAD_S = 4, 1.0
+FINE = 0.5  # largest resolution as a fraction of the noise, at which equal readings are not chance
+GAP = 1.5  # longest step without a missing reading, in intervals
 FROZEN, COARSE = (
     50,
     10,
 )  # equal readings in a row that are a fault; length of a second such run that shows a coarse axis
 TURNED_RAD_S = 0.2  # change of another axis during them
-INNER = (0.05, 0.95)  # quantiles: single readings count for nothing
-NO_JUMP, SMOOTH = 0.8, 0.25  # of an axis' span: a jump over its end is larger, and all other steps are smaller
-SYMMETRIC = 0.1  # of the span: the ends of a signed counter differ from each other's negative by less
+INNER = (0.05, 0.95)  # quantiles that bound an axis' motion, so that single readings do not count
+# fractions of an axis' span: an overflow is larger than the first, all other steps are smaller than the second
+NO_JUMP, SMOOTH = 0.8, 0.25
+SYMMETRIC = 0.1  # largest sum of the smallest and the largest reading, relative to the span, for a signed number
 FINEST_SPAN = 100  # steps of the readings: a coarse axis that toggles has fewer
 NARROWEST = {RATE: 2.0, ACCELERATION: 25.0}  # span of the smallest range; more than gravity when a body is turned over
-RISING, OUTWARDS = 4, 4.0  # readings before and after a jump; times the typical change of a step, by which they rise
-TOGGLES = 10  # readings between a jump and the one back, of a rate close to the end of the range
+RISING, OUTWARDS = 4, 4.0  # readings before and after an overflow that must rise; the rise in noises of a step
+TOGGLES = 10  # readings between two opposite jumps that noise causes close to the end of the range
 
 
 def check_possible(readings: Array, rows: NDArray[np.intp], quantity: Quantity, where: str) -> None:

@@ -13,7 +13,7 @@ from rig.motion.by_hand import FACES, Face, HandMove, Instruction
 from rig.motion.steps import Plan
 from rig.motion.turner_state import Joints
 
-# The faces up, beginning with the one at the start.
+# The faces in the order in which they point up, beginning with the one at the start.
 ROUND: tuple[Face, ...] = ("+z", "+x", "+y", "-z", "-x", "-y", "+z", "+y", "-x", "-z", "+x", "-y")
 TURNS_FROM = 8  # flips after which the scale factor is known well enough to recognise the end of a whole turn
 AXES = ("z", "x", "y")  # axes of the requested whole turns, in this order

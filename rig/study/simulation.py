@@ -26,7 +26,7 @@ RATE_HZ = 200.0  # SIX, section III-A
 NOISE_LEVELS_RAD_S = (0.035, 0.2)
 VIBRATION_FRACTION = 0.05
 LARGEST_MISALIGNMENT = 0.1
-FAST_RAD_S = 3.0  # the speed that the published bands fit
+FAST_RAD_S = 3.0  # the speed at which simulated errors agree with the published bands
 ARM_RAD_S = np.pi / 3  # SIX, section IV: 60°/s
 SETS, RUNS = 30, 500
 

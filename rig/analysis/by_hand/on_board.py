@@ -65,7 +65,7 @@ def compare_with_board(
 
 
 def _moves(readings: BoardReadings, reports: Sequence[HandReport]) -> Iterator[BoardMove]:
-    counted = False  # the previous rest is in the solution
+    counted = False  # whether the previous rest is in the solution
     for report in reports:
         used = report.outcome == "accepted"
         if used:

@@ -23,7 +23,7 @@ Statistics = dict[str, tuple[float, float]]
 
 # The checks of one sensor, at most.
 CHECKS = ("clipping", "repeated_readings", "skewed_noise", "spikes", "stuck_axis", "stuck_bit")
-SKEWNESS = 0.15  # allowed in any case: it shifts a mean by hardly a fiftieth of the noise's standard deviation
+SKEWNESS = 0.15  # skewness that always passes: it shifts a mean by hardly a fiftieth of the noise's standard deviation
 LONGEST_RUN = 25  # equal readings of one axis: if the noise is one step, every fourth reading equals the one before
 STRETCH = 8  # readings on three axes: they have some 50 random bits if the noise is one step
 FEWEST_VALUES = 24  # different readings of an axis from which on every bit should have changed
@@ -36,7 +36,7 @@ VIBRATION_LEFT = 0.1
 HEAP = 10  # the fewest readings at one end of the range that may be clipped
 AROUND = 4  # readings before and after one that show a burst of vibration
 SETTLING = 5  # first readings of a window, during which a low-pass filter may still follow the arm
-LEAST_TO_SKEW = 0.7  # steps: smaller noise takes so few numbers that a mean between two of them makes it skewed
+LEAST_TO_SKEW = 0.7  # noise in steps: smaller noise has so few values that a mean between two of them makes it skewed
 BETWEEN_COUNTS = 1.5  # counts: readings in larger steps are not those of a converter
 
 
@@ -201,7 +201,7 @@ def _skewness(windows: Sequence[RawReadings], axes: NDArray[np.bool_], critical_
     noise = np.concatenate(parts)
     noise -= noise.mean(axis=0)
     std = np.sqrt(np.maximum(np.mean(noise**2, axis=0), 1e-12))  # an axis may stand still
-    skewness = np.mean((noise / std) ** 3, axis=0)  # by hand: scipy.stats takes half a second to import
+    skewness = np.mean((noise / std) ** 3, axis=0)  # computed here: scipy.stats takes half a second to import
     return float(np.max(np.abs(skewness[axes]))), max(SKEWNESS, critical_value * float(np.sqrt(6 / len(noise))))
 
 

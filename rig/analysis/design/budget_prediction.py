@@ -43,7 +43,7 @@ from rig.observation.average import Average
 from rig.observation.motion.even_turn import GUARD_RAD
 from rig.observation.observe import Observation, nearest_axis
 
-ROOM_C = 22.0  # constant: how much a run warms the sensor is not known beforehand
+ROOM_C = 22.0  # assumed constant, because nobody knows beforehand how much a run warms the sensor
 STEP_K = 1 / 16  # resolution of a thermometer, assumed
 REMOUNTING_S = 60.0  # duration between two stages, assumed
 # Angle between a sensor and its nominal mounting, assumed if no `uncertainty.mount_deg` states it for an item that is

@@ -77,7 +77,8 @@ def target_of(section: SixObservationSection) -> TargetUncertainty | None:
     return None if scale is bias_rad_s is None else TargetUncertainty(scale or inf, bias_rad_s or inf)
 
 
-SIZES = tuple(ReachedUncertainty.__dataclass_fields__)  # the possible targets: fields of both classes
+# names of the possible targets, which are fields of `TargetUncertainty` too
+SIZES = tuple(ReachedUncertainty.__dataclass_fields__)
 
 
 @dataclass(frozen=True, slots=True)

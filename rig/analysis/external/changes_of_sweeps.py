@@ -15,7 +15,7 @@ from rig.estimation.sensor_axes import parameter_jacobian
 from rig.observation.arm_rests import estimate_bias_drift
 from rig.observation.external.csv_import import ExternalData, stack_rows
 
-OF_RATE = 0.01  # of the sweeps' rate: without rests, a smaller step may be that of the rate
+OF_RATE = 0.01  # fraction of the sweeps' rate: without rests, a smaller step may be one of the rate itself
 
 
 def check_sweeps_steady(data: ExternalData) -> None:

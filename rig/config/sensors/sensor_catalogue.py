@@ -176,7 +176,7 @@ PARTS: Mapping[str, PartSpec] = MappingProxyType(
             g_sensitivity_deg_s_g=0.1,  # not stated; that of the MPU-6050, PS-MPU-6000A 6.1
             nonlinearity_percent=0.1,  # PS-MPU-9250A-01, table 1
             asymmetry_percent=0.02,  # not stated; assumed: a vibrating element vibrates alike in both directions
-            bias_deg_s_k=30 / 65,  # ±30 °/s from −40 to 85 °C (table 1), straight from 25 °C
+            bias_deg_s_k=30 / 65,  # ±30 °/s from −40 to 85 °C (table 1), taken as linear from 25 °C
             scale_ppm_k=4e4 / 65,  # ±4 % (table 1)
             angle_random_walk_deg_sqrt_h=0.42,  # 0.01 °/s/√Hz, one-sided (table 1): times 60 / √2
             bias_instability_deg_h=10,  # not stated; assumed, as that of the LSM9DS1
@@ -214,7 +214,8 @@ PARTS: Mapping[str, PartSpec] = MappingProxyType(
             acceleration_scale_ppm_k=20,
             acceleration_bias_instability_ug=3.6,  # data sheet, features
         ),
-        "icm42688p": PartSpec(  # DS-000347 rev. 1.8, section 14.37; slower rates pass more than half their band
+        # DS-000347 rev. 1.8, section 14.37; at lower rates the filter passes more than half the sample rate
+        "icm42688p": PartSpec(
             rates_hz=(25, 50, 100, 200, 500, 1000, 2000),
             rates_rule="25, 50, 100, 200, 500, 1000, 2000",
             ranges_deg_s=(15.625, 31.25, 62.5, 125, 250, 500, 1000, 2000),
@@ -273,7 +274,7 @@ PARTS: Mapping[str, PartSpec] = MappingProxyType(
         "kvh1775": PartSpec(  # ICD 56-0298 Rev. B, command =DR; -01 and -25 have one range of acceleration each
             rates_hz=(1, 5, 10, 25, 50, 100, 250, 500, 750, 1000, 3600, 5000),
             rates_rule="1, 5, 10, 25, 50, 100, 250, 500, 750, 1000, 3600, 5000",
-            ranges_deg_s=(490,),  # of the maker's data sheet
+            ranges_deg_s=(490,),  # from the maker's data sheet
             default_rate_hz=1000,
             default_range_deg_s=490,
             # Not stated; assumed: 1 °/h/g, because light is not sensitive to acceleration.

@@ -6,7 +6,7 @@ from pathlib import Path
 from firmware_host import computer_load
 
 STARVED = 0.5  # fraction of a tick spent waiting for a processor: above it, silence says nothing about the process
-STANDS = 0.05  # … or fraction of a tick in which a thread that is ready to run has run, at most
+STANDS = 0.05  # largest fraction of a tick for which a starved thread that is ready to run has run
 HELD_UP = ("R", "D")  # states of a thread: ready to run, or waiting for swapped memory
 NS_PER_S = 1e9
 

@@ -94,7 +94,8 @@ class Channel:
         if self.full_scale_counts is None:
             return np.zeros(len(samples), dtype=np.bool_)
         counts = self.counts(samples)
-        wide = counts.astype(np.int64) if counts.dtype.kind == "i" else counts  # the least i4 has no positive
+        # the smallest 32-bit integer has no positive counterpart
+        wide = counts.astype(np.int64) if counts.dtype.kind == "i" else counts
         beyond = np.abs(wide) >= self.full_scale_counts
         return np.asarray(beyond.reshape(len(samples), -1).any(axis=1))
 

@@ -297,7 +297,7 @@ def _whole_rows(rows: NDArray[Any]) -> NDArray[Any]:
     """Return the rows without the unwritten end, which holds zeros: a host time is never zero."""
     written = np.flatnonzero(rows["host_time_s"])
     count = int(written[-1]) + 1 if len(written) else 0
-    return rows if count == len(rows) else rows[: max(count - 1, 0)]  # the last one may be torn
+    return rows if count == len(rows) else rows[: max(count - 1, 0)]  # the last row may be incomplete
 
 
 def _check_numbers(name: str, rows: NDArray[Any], most: float) -> None:

@@ -8,8 +8,10 @@ from rig.estimation.by_hand.session_parts import HandRecording, nearest_face
 from rig.estimation.sensor_axes import nearest_rotation
 
 SIDEWAYS = 0.3  # largest cosine between the verticals before and after a quarter turn
-SAME = 0.7  # least component of a unit axis: another axis has less of it
-FEWEST, UNEXPLAINED = 5, 0.2  # flips; fraction of their rotation: with more, moves were merged or rests not found
+# least cosine between an axis of the gyroscope and the nearest one of the accelerometer, unless the frames are rotated
+SAME = 0.7
+# fewest flips; largest unexplained fraction of their rotation: above it, moves were merged or rests were missed
+FEWEST, UNEXPLAINED = 5, 0.2
 SKEWED = 0.3  # largest cosine between two axes: those of a part are nearer to a right angle
 TURNED_RAD = 1.1  # angle between the frames of gyroscope and accelerometer: no fit converges from a larger one
 OTHER_UNIT = 20.0  # ratio of scales: a whole turn that is merged with a flip reads only five times as much

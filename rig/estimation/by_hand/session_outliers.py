@@ -20,7 +20,7 @@ from rig.estimation.by_hand.graph import ACCELERATION, CLOSURE, FLAT, LEANING, M
 from rig.estimation.by_hand.session_parts import LARGEST, STATED, HandRest, HandStds
 
 A_ROW = 4.0  # decrease of χ² that is expected for each equation left out
-BY_MUCH = 16.0  # decrease of χ² beyond that: false-alarm probability 1 in 10^5
+BY_MUCH = 16.0  # further decrease of χ² that shows an outlier: false-alarm probability 1 in 10^5
 NEARLY = 0.99  # fraction of the largest size from which on a size is at its limit
 FACTORS_OF = {
     "turn_not_closed": (CLOSURE, LEANING),
@@ -29,11 +29,12 @@ FACTORS_OF = {
     "not_flat": (FLAT, ACCELERATION),
 }
 JUMP_RAD_S = 1e-3  # change of the mean reading between two rests: no bias drifts by as much
-OF_ONE, HIDING = 3.0, ("repeat_rad", "closure_rad")  # a ratio, and the standard deviations that one outlier inflates
+# the standard deviations that one outlier inflates, and the ratio to the usual from which on it does
+OF_ONE, HIDING = 3.0, ("repeat_rad", "closure_rad")
 HIDDEN = ("not_flat", "table_moved", "accelerometer_jumped", "turn_not_closed")
 FREE = 1e-9  # redundancy below which the other equations do not check an equation
 UNLIKELY = 1e-5  # probability of faces as far out of square as they seem
-AT_ONCE = 8.0  # the same during the session, in which a move can be repeated: 1 in 10^3
+AT_ONCE = 8.0  # as BY_MUCH, but during the session, in which a move can be repeated: 1 in 10^3
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,7 +24,8 @@ from rig.estimation.statistics.bias_process import walk_covariance
 from rig.estimation.statistics.variance_components import Mixed
 
 MATRIX, BIAS, CLOCK, EARTH, COMMON = slice(0, 9), slice(9, 12), 12, slice(13, 16), 16
-CLOCK_STD_S = 0.1  # prior std of the offset of a common clock: delays of a controller's reports, of cameras' exposure
+# prior std of the offset if one clock stamps readings and attitudes: delays of a controller, of cameras
+CLOCK_STD_S = 0.1
 MATRIX_PRECISION = 1.0  # prior of F's elements: keeps elements finite that no turn determines
 EARTH_PRECISION = 3 / EARTH_RATE_RAD_S**2  # its norm is known, its direction is unknown
 INTERVALS = 6  # number of intervals of a recording within which the bias is correlated

@@ -16,10 +16,12 @@ from rig.estimation.statistics.variance_components import MixedFit, MixedModel, 
 
 PRIOR_MEDIAN = 5e-3  # rad: of the half-Cauchy prior of the inclinations' standard deviation
 REACH = 0.5  # sine of the angle between two axes: those within about this angle are inclined alike
-RATIOS = np.geomspace(1e-6, 20, 120)  # of the inclinations' size to its prior's median: none exceeds 0.1 rad
-EXPLAINED = 0.05  # of the greatest response's size: smaller ones are the noise of the axes
-LEAST_IDENTIFIED = 0.05  # of the information: F imitates an inclination of which the residuals contain less
-LEAST_RAD2 = 1e-14  # of a fix's squared rotations: rounding
+# grid of the inclinations' standard deviation over its prior's median: none exceeds 0.1 rad
+RATIOS = np.geomspace(1e-6, 20, 120)
+EXPLAINED = 0.05  # fraction of the largest response: smaller ones are the noise of the axes
+# least fraction of the information that the residuals keep: F imitates an inclination with less
+LEAST_IDENTIFIED = 0.05
+LEAST_RAD2 = 1e-14  # sum of a fix's squared rotations that is rounding
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,9 +9,10 @@ from rig.estimation.external.attitude_drift import BIAS, MATRIX, FixedAttitudes,
 from rig.estimation.statistics.variance_components import MixedModel
 
 OF_BIAS_RAD_S = 5e-3  # prior standard deviation of a change of the bias
-OF_ATTITUDE_RAD = 0.2  # that of a turn of the attitudes' coordinates
-LEAST_RESET_RAD = 0.02  # least turn of the attitudes' coordinates that is named: errors of attitudes may be as large
-STAYS = 0.5  # fraction of the largest increment, of which so much is left after the last: a wild row leaves nothing
+OF_ATTITUDE_RAD = 0.2  # prior standard deviation of a rotation of the attitudes' coordinates
+# least rotation of the attitudes' coordinates that is reported: errors of attitudes may be as large
+LEAST_RESET_RAD = 0.02
+STAYS = 0.5  # least rotation over all increments, relative to the largest one: after a wild row the attitudes return
 
 
 def find_increment_change(

@@ -56,7 +56,7 @@ OUTLIER, OUTLIER_RAD = 4.0, 1e-3  # an outlier exceeds both: the ratio to the ni
 # Most outliers: number, or fraction if more; passes that leave out outliers.
 SOME_OUTLIERS, MOST_OUTLIERS, SETTINGS_ASIDE = 4, 0.1, 3
 UNTRUSTWORTHY_RAD = 0.1  # with larger errors, the attitudes are those of another body
-MOST_CLOCK = 3.0  # largest offset of a common clock, in its prior standard deviations
+MOST_CLOCK = 3.0  # largest offset if one clock stamps readings and attitudes, in prior standard deviations
 UNIDENTIFIED = 0.1  # least standard deviation of an element of F that is not identifiable
 LARGEST_STEP = 10.0  # change of F: beyond it, the fit diverges
 MAX_CONDITION = 1e4

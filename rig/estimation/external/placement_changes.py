@@ -16,8 +16,8 @@ from rig.estimation.reference.reference_model import BIAS, REFERENCE, predicted
 FEWEST = 8  # placements; fewer show no change, or take a wrong attitude for one
 EITHER_SIDE = 2  # placements at least: a single one that differs is a wrong placement
 BIAS_SIZES = (1e-3, 1e-2)  # prior standard deviations of a change of the bias, relative to the reference
-SMALL = 0.01  # errors without the change, relative to those with it: the errors' sizes may contain it
-POSSIBLE = 0.0  # least evidence
+SMALL = 0.01  # scale of the errors tried in addition to the estimate, which the change may have inflated
+POSSIBLE = 0.0  # least evidence (ln of the Bayes factor) of a change
 
 
 def find_placement_change(theta: Array, placed: Placed, starts_s: Array) -> AbruptChange | None:

@@ -15,12 +15,13 @@ from rig.estimation.external.attitude_drift import correlate_effects
 from rig.estimation.statistics.variance_components import Mixed, MixedModel
 
 OF_RATE = 1e-4  # median of the prior of the rates' relative errors, and of the axes' inclinations in rad
-POSSIBLE, LEAST_EVIDENCE = -2.0, 2.0  # of a change that counts if it is large, and of one that U is to contain
+# ln of the Bayes factor of a change that counts if it is large, and of one that U is to contain
+POSSIBLE, LEAST_EVIDENCE = -2.0, 2.0
 FEWEST_ROWS, MOST_ROWS = 6, 600  # fewer show no change; more would take too long
 EITHER_SIDE = 2  # rows at least: a single row that differs is a wrong row
 FEWEST_FOR_ONE = 8  # rows that decide between a wrong first or last row and a bias that changes there
-SMALL = 0.01  # errors without the change, relative to those with it: a few rows may take it for an error
-LARGE = 0.5  # a row shows a scale factor if it has so much of the largest reading along its axis
+SMALL = 0.01  # scale of the errors tried in addition to the estimate, which the change may have inflated
+LARGE = 0.5  # fraction of an axis' largest reading, from which on a row determines its scale factor
 
 
 def find_row_change(

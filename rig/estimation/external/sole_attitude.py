@@ -15,7 +15,7 @@ from rig.estimation.reference.reference_model import free_directions as directio
 NEAR_RAD = 0.2  # largest angle between reference directions in the body that count as one attitude
 USUAL_RAD = 0.02  # usual attitude error about each axis: an arm, or a table turned by hand
 UNDETERMINED = 0.1  # standard deviation of a scale factor, above which it counts as undetermined
-SMALLEST = 1e-9  # least eigenvalue of the information: a smaller one is none
+SMALLEST = 1e-9  # eigenvalue of the information below which it counts as zero
 
 
 def find_sole_attitude(theta: Array, placed: Placed) -> tuple[int, int] | None:

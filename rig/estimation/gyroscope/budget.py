@@ -176,7 +176,7 @@ def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributo
     clock_half_width, clock_source = unknown.clock_half_width, unknown.clock_source
     if clock_half_width is None:
         timed = evaluate_a(CLOCK, clock_source, propagate(unknown.clock_std * turned[None]), unknown.clock_dof)
-        # Kind B if only the statement about clocks determines it.
+        # Type B if only the statement about clocks determines it.
         yield timed if np.isfinite(timed.dof) else replace(timed, kind="B")
     else:
         yield evaluate_b(CLOCK, 1e6 * clock_half_width, "ppm", clock_source, clock_half_width * turned[None])

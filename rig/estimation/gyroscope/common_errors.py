@@ -26,7 +26,7 @@ from rig.estimation.gyroscope.vector_model import (
 )
 from rig.estimation.sensor_axes import angle_jacobian, parameter_jacobian
 
-PASSES = 2  # iterations: B depends on F, whose error is below one percent before the first
+PASSES = 2  # iterations: B depends on F, and the first F is already within one percent
 
 
 @dataclass(frozen=True, slots=True)

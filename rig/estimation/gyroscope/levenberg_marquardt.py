@@ -16,7 +16,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.six_observation import design, negative_square
 
 MAX_CONDITION = 40.0  # above `accumulator`'s 30: directions that contain only noise are excluded before
-VANISHED = 0.05  # ratio to the largest scale factor, below which a scale factor is that of a negative square
+VANISHED = 0.05  # ratio to the largest scale factor, below which the fit would take a negative square
 REMEDY = "Sweep every wrist in both directions; a second sweep in one direction cannot replace the other direction"
 
 

@@ -236,7 +236,8 @@ def _explain(
         inputs.means_rad_s - np.einsum("p,pni->ni", errors.sizes[: len(patterns)], patterns),
         inputs.variances_rad2_s2 + speed_squares,
         inputs.windows_s,
-        np.einsum("pni,pmi->inm", of_sensor, of_sensor) if len(of_sensor) else None,  # each acts on one axis alone
+        # each error acts on one axis alone
+        np.einsum("pni,pmi->inm", of_sensor, of_sensor) if len(of_sensor) else None,
         instability_rad_s=inputs.instability_rad_s,
     )
     solution, errors = (steady, errors) if bias.steady else solve(bias.covariance(inputs.windows_s))

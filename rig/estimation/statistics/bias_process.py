@@ -22,7 +22,7 @@ SPAN = 300.0  # ratio of the largest to the smallest standard deviation of the g
 PARTS = 24  # of a revolution, by the means of which the harmonics of flicker noise are computed, to 1 %
 CHANGED = float(np.sqrt(2))  # change by flicker between adjacent means, relative to its Allan deviation
 
-# Walk and scatter (2,) from pairs of sizes (K, 2) and their log-likelihoods (K,).
+# Random walk and scatter (2,) from pairs of sizes (K, 2) and their log-likelihoods (K,).
 Chosen = Callable[[Array, Array], Array]
 
 

@@ -13,8 +13,8 @@ import numpy as np
 
 from rig.estimation.arrays import Array
 
-WALKS = 12  # grid points of the walk
-SPAN = 100.0  # ratio of the largest to the smallest walk
+WALKS = 12  # grid points of the random walk
+SPAN = 100.0  # ratio of the largest to the smallest random walk
 SMALLEST_RAD, LARGEST_RAD, SIZES = 1e-5, 0.03, 25  # grid of δ: no arm is better than the smallest
 
 OWN_SHARES = (0.001, 0.01, 0.1, 0.5)  # fractions of δ²: between nearly all and half of an arm's errors may be constant

@@ -20,8 +20,8 @@ REPEATED, REPEATED_FRACTION = 3, 0.25
 LARGE_NOISE = 4.0  # noise in steps, from which on all rounding averages out
 MOST_READINGS = 20_000  # readings used to find the steps
 SAME = 1e-3  # fraction of a step: values closer than this are equal
-A_QUARTER = 0.25  # tolerance of a value as a fraction of a step: less than half-way to another kind of value
-NEAR = 0.2  # fraction of a unit by which a scale factor may change it
+A_QUARTER = 0.25  # tolerance in steps for whole and half-way values: they are half a step apart
+NEAR = 0.2  # largest relative change of the unit by the source's scale factor
 FEWEST_TO_TELL_ZERO = 8  # fewest different values that determine which of them is zero
 ALIKE = 0.5  # least length of the mean of unit vectors that have one direction
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 # Samples of a round of importance sampling, rounds, and degrees of freedom of the proposal, a t distribution.
 DRAWS, ROUNDS, TAILS = 40, 3, 5.0
-FLOOR, LEAST_POWER = 0.02, 0.05  # least variance of a proposal; least power, which makes weights more equal
+FLOOR, LEAST_POWER = 0.02, 0.05  # least variance of a proposal; least power of the tempered weights
 STEP = 0.1  # step of ln σ, for the curvature at the maximum
 LEAST_CURVATURE = 0.1  # least curvature of the negative log-posterior over ln σ: about that of the priors
 TOLERANCE, MOST_STEPS = 1e-2, 100  # largest gradient of the log-posterior at a maximum; most Newton steps
@@ -127,7 +127,7 @@ class MixedModel:
         """
         from scipy.optimize import minimize
 
-        newton: Any = {  # SciPy's types know no gradient beside a value together with these options
+        newton: Any = {  # SciPy's types do not allow these options if `fun` returns the gradient too
             "fun": lambda point: self._evaluate(point)[:2],
             "method": "trust-exact",
             "jac": True,

@@ -9,7 +9,7 @@ from rig.data.result_file import ResultDocument
 from rig.report.findings.history_records import HistoryRecord, Parameter
 from rig.report.kinds.kind_registry import history_records
 
-SAME = 1e-6  # difference relative to the standard uncertainty: more than by the rounding of another processor
+SAME = 1e-6  # tolerance relative to the standard uncertainty: above the rounding of another processor
 
 
 def run_row(document: ResultDocument) -> dict[str, str | bool]:

@@ -161,7 +161,7 @@ document = Table(
     Column("sha256", String(HASH), nullable=False),
 )
 
-# Every entry again, as the hash of its rows, numbered without gaps.
+# One line for each entry, numbered without gaps, with the hash of the entry's rows.
 journal = Table(
     "journal",
     metadata,

@@ -9,7 +9,7 @@ from rig.observation.by_hand.steadiness import NORMAL
 
 KNOCK = 8.0  # deviation in standard deviations, beyond which it is not noise
 COARSE = 2.0  # deviation in steps of the readings: noise below the resolution deviates by as much
-COUNTS = 0.05  # fraction of `Quantity.steady`, below which a knock is ignored
+COUNTS = 0.05  # least knock that counts, as a fraction of `Quantity.steady`
 MOST = 0.1  # largest fraction of outliers: more of them are noise of another kind
 FEWEST = 5  # fewest readings that show which of them are undisturbed
 

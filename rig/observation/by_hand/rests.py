@@ -29,9 +29,9 @@ QUIETEST, AS_QUIET = 0.1, 3.0
 COUNTS = 0.2  # fraction of `Quantity.steady`: scatter that is always allowed, because noise may be below the resolution
 TOGGLES = 0.5  # scatter of readings that alternate between two values, in steps
 FIRST = 4  # blocks in the first second
-GAP = 2.5  # in intervals: longer than one missing reading
-NEARLY = 0.5  # fraction of the blocks of the most frequent reading
-CANDIDATES = 400  # blocks whose readings are tried as that of a rest
+GAP = 2.5  # shortest gap, in intervals: longer than one missing reading
+NEARLY = 0.5  # least number of a rest's blocks, relative to the most frequent reading's
+CANDIDATES = 400  # number of blocks whose mean is tried as the reading at rest
 
 
 def find_rests(

@@ -18,9 +18,9 @@ from rig.observation.clocks.time_base import TimeBase, time_base_not_found
 from rig.observation.motion.reference_motion import KnownMotion, check_span, not_finite
 
 LONG_RUN_S = 1800.0  # the part of a recording that the coarse search uses first; it takes more only if that fails
-TURNED_RAD_S = 0.05  # RMS over a recording, of an axis that was turned
-BLOCK_S, RATES = 0.1, 5  # time over which a rate is averaged that is compared with the highest; rates in it
-MOVING = 0.02  # fraction of the highest speed, of a turner that moves
+TURNED_RAD_S = 0.05  # least RMS rate over a recording of an axis that was turned
+BLOCK_S, RATES = 0.1, 5  # duration of a block, whose mean speed is compared with the highest; number of rates in it
+MOVING = 0.02  # fraction of the highest speed, from which on the turner moves
 NEAR_MOTION_S = 0.5  # rest around motion that is used: longer than a coarse clock's error
 
 

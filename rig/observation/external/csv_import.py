@@ -55,9 +55,9 @@ STD_COLUMNS = ("angle_std_rad", "axis_std_rad")
 MIN_DURATION_S = 1e-3  # the fewest samples take longer at any data rate
 # Cosine between two axes, and between their readings; least reading relative to a sweep's speed.
 SAME_AXIS, OPPOSITE, SENSED = 0.9, -0.5, 0.25
-ROUNDING = 1e-12  # of a mean: scatter that is none
+ROUNDING = 1e-12  # scatter relative to the mean that is rounding
 QUARTER_DEG = 90.0
-LEAST_MOTION = 1e-9  # rad or rad/s: no sweep, and its square might be 0
+LEAST_MOTION = 1e-9  # rad or rad/s: a smaller motion is no sweep, and its square might underflow
 SWEEPS_MB = 1  # some ten thousand sweeps
 
 

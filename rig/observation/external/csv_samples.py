@@ -142,7 +142,7 @@ def _drop_blanks(
         if (read[quantity] != kept).any():
             raise _refuse_separate_rows(path, quantity, wanted, read)
     for quantity in read:
-        if not read[quantity][kept].all():  # it is in other rows, and not requested
+        if not read[quantity][kept].all():  # an unrequested quantity that stands in other rows
             for name in quantity.columns:
                 del columns[name]
     if len(blank := np.flatnonzero(np.isnan(time_s) & kept)):

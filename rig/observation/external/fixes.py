@@ -22,7 +22,7 @@ from rig.observation.time_stamps.sampling import find_sampling
 
 # Usual and shortest window: the errors of cameras are correlated over tenths of a second.
 WINDOW_S, SHORTEST_S = 1.0, 0.5
-WINDOWS, MOST = 40, 120  # number of windows, at least, if they can be as short; at most
+WINDOWS, MOST = 40, 120  # least number of windows, unless they would be shorter than SHORTEST_S; largest number
 GAP = 2  # missing readings that make a gap: a cubic spline through the others bridges a single one
 # Largest angle between two readings for which a cubic spline through the rates is correct to microradians.
 MAX_STEP_RAD = 0.35

@@ -21,10 +21,12 @@ from rig.observation.external.reference_rows import Turning, select_covered
 from rig.observation.external.robust_start import COARSE_S, find_start
 from rig.observation.external.table_motion import TableMotion
 
-CLEARER = 0.9  # largest ratio of the unexplained part with drift to that without, for a drift
+CLEARER = 0.9  # a drift is accepted if it reduces the unexplained fraction to this ratio or less
 CRYSTALS = 1e-4  # standard deviation of the drift between two crystals
-GAP, OF_DRIFT = 2.5, 0.2  # in intervals of the readings; in the total change by the drift
-LARGEST_DRIFT, CERTAIN = 5e-4, 6.0  # largest drift between crystals; drift in standard deviations that is no chance
+# longest step of the rows: in intervals of the readings, or as a fraction of the total change by drift
+GAP, OF_DRIFT = 2.5, 0.2
+# least drift that is no crystal's, and least drift in standard deviations that is not chance
+LARGEST_DRIFT, CERTAIN = 5e-4, 6.0
 DOUBTFUL = 0.1  # unexplained fraction, above which the rows may be inverse rotations
 EXPLAINED = 0.3  # fraction of the readings' variance that the coarse offset explains
 

@@ -14,8 +14,9 @@ MAX_STEP_S, MAX_STEP_RAD = 0.3, 2.6
 MIN_ROWS = 20
 COMPARED_S, FEWEST_PAIRS = 0.25, 12  # interval between rows whose rates and attitudes are compared; pairs of rows
 LEAST_RAD, ALIKE, MOST_PAIRS = 0.02, 0.3, 0.8  # rotation of a pair; agreement of ratios; fraction of pairs that agree
-DEGREES, NEARLY = 180 / np.pi, 0.05  # a steady turn of more than half a revolution from row to row has any other ratio
-VARIED = 2.0  # ratio of the fastest to the slowest rate: if it is larger, such turns have no ratio in common
+# °/rad, and its tolerance: this ratio is a wrong unit; any other one is a turn of over half a revolution per row
+DEGREES, NEARLY = 180 / np.pi, 0.05
+VARIED = 2.0  # ratio of the fastest to the slowest rate: above it, turns of over half a revolution have no common ratio
 # Scatter of the steps relative to their median, above which it matters in a rate; median from which on it does not.
 UNEVEN, EVEN_S = 0.2, 0.05
 

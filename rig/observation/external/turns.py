@@ -23,8 +23,8 @@ from rig.observation.windows import Window, inside
 
 REACH_S = 0.5  # longest time between the marked end of a turn and the adjacent rest
 EDGE_SAMPLES = 2  # samples on either side of an end
-STANDING = 0.25  # fraction of the mean speed: a body slower at both ends started and stopped there
-OTHER_BIAS_RAD_S = 0.1  # a body that reads more in a pause turns
+STANDING = 0.25  # fraction of the mean speed, below which the body starts or stops at an end of the turn
+OTHER_BIAS_RAD_S = 0.1  # a body whose readings in a pause exceed this rate is turning
 MOST_HIDDEN_RAD = 0.02  # largest rotation hidden by missing readings of a turn
 BY_HAND_ANGLE_RAD = float(np.radians(0.3))  # default repeatability of a body turned by hand to a stop
 BY_HAND_AXIS_RAD = 0.02  # default tilt during the turn

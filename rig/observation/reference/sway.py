@@ -11,8 +11,9 @@ from rig.observation.motion.arm_motion import ArmMotion
 from rig.observation.statistics.spectral_lines import harmonics
 
 HALF_WAVES = 8  # per fit: a faster sway is removed as a spectral line
-INDEPENDENT = 1e-9  # relative size of directions to fit: nearly dependent waves are needed near the ends
-MARGIN = 0.05  # of the turn, fitted before and after it: the curvature at the ends of a fit is mostly noise
+INDEPENDENT = 1e-9  # least relative singular value in the fit: waves that are nearly dependent are needed near the ends
+# fraction of the turn that is fitted before and after it: the curvature at the ends of a fit is mostly noise
+MARGIN = 0.05
 SHOWN = 50.0  # ratio of a sway's mean square, per column, to that of the encoders' noise
 
 

@@ -14,14 +14,14 @@ from rig.observation.statistics.tapered_weights import MAIN_LOBE, apply_window
 
 AROUND = 161  # bins of the running median
 MOST_LINES = 8  # three lines of a servo, and vibrations of the room, each of which a turning sensor may sense as two
-APART = 2.5  # least distance from a line found before, in cycles of all readings
-SAME = 1.5  # lines that are nearer to each other, in cycles of all readings, are a jerk
+APART = 2.5  # least distance from a spectral line found before, in cycles of all readings
+SAME = 1.5  # cycles of all readings: closer spectral lines are one sudden motion, not two vibrations
 SIDEBANDS_APART = 0.5  # cycles of all readings: closer sidebands of slow lines resemble the turn's own waves
 PASSES = 1
-WIDE = 4  # columns of a line, and of each of its sidebands
-BEATS = 1  # sidebands of a vibration in the room for a sensor that makes a turn
-SAMPLES_EACH = 3  # needed per column
-NEARER = 1.02  # a line is chosen instead of its prominent sideband if it explains this many times more
+WIDE = 4  # design columns of a spectral line, and of each of its sidebands
+BEATS = 1  # sidebands on either side that a turning sensor reads of a vibration in the room
+SAMPLES_EACH = 3  # samples needed per column
+NEARER = 1.02  # a sideband replaces the strongest peak if it explains this many times more
 LEAST_GAP = 1.5  # interval between samples in steps: after a longer one, samples are missing
 ROUNDING = 1e-12  # fraction of the longest column: shorter ones contain only rounding errors
 NONE: Array = np.zeros(0)

@@ -18,7 +18,8 @@ SMALLEST_RAD_S = 0.1  # over one such step a smaller one turns by less than a bo
 BEYOND = 16.0  # times the largest deviation of the readings around, but for one other spike
 SUDDEN = 3.0  # times the change of any axis between the next readings: a body that is stopped moves about all axes
 REACH, ONE = 10, 5  # readings on either side that show the usual deviation; number of these that another spike affects
-NEXT, ALIKE = -2 / 3, 0.2  # deviation of the next readings, as a fraction of the spike's, and its tolerance
+# deviation of a spike's neighbours from their cubics, relative to the spike's own; its tolerance
+NEXT, ALIKE = -2 / 3, 0.2
 PASSES = 3  # spikes that are close together hide each other
 
 

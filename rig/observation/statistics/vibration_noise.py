@@ -16,8 +16,8 @@ from rig.observation.statistics.spectral_lines import LineSearch, find_lines, fi
 from rig.observation.statistics.tapered_weights import weights
 from rig.observation.windows import Window
 
-FEWEST = 120  # readings that separate lines from noise
-BRIEF = (1, 2)  # orders that fit coloured noise, but not the remainder of a line
+FEWEST = 120  # fewest readings that separate spectral lines from noise
+BRIEF = (1, 2)  # orders of autoregression that fit coloured noise, but not the remainder of a spectral line
 
 
 def average_rest(readings: Array, time_s: Array, window: Window, steps: Steps) -> Mean:

@@ -14,7 +14,7 @@ from rig.estimation.arrays import Array, integrate_rates
 HIDDEN_RAD = 2e-3  # as large as the errors of attitude references: a gap that may hide more is not bridged
 LONGEST_S = 1.0  # longest gap that is bridged: in a longer one a body may be lifted and laid back
 STEP_STD = 12**-0.5  # standard deviation of the time of a sudden change, uniform in a gap of length 1
-REACH, FEWEST = 4, 12  # time on either side of a gap, in its lengths, and the fewest readings there
+REACH, FEWEST = 4, 12  # interval examined on either side of a gap, in gap lengths; fewest readings in it
 
 
 def hidden_angles_rad(time_s: Array, readings: Array, gaps: NDArray[np.intp]) -> Array:

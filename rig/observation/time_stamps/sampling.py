@@ -27,7 +27,7 @@ from rig.observation.time_stamps.moving_values import find_least_ahead, find_lea
 WIDTHS = (1, 2, 4, 8, 16, 32, 64, 128, 256, 512)  # readings over which the interval is tried
 MEDIAN, UNDISTURBED = 0.5, 0.1  # quantiles of the interval with which the search begins: for few losses, and for many
 LONG = (64, 512)  # readings over which the interval is estimated first: more than a burst, less than between two gaps
-LONG_STEP = 6.0  # in intervals: a longer step is a gap, a later reading was buffered if all stamps are uneven
+LONG_STEP = 6.0  # in intervals: a longer step is a gap; among uneven stamps, a reading with a longer delay was buffered
 PACKET_S = 0.5  # readings that follow each other evenly for longer have not arrived at once
 # Tolerance of a whole multiple, in intervals; fraction of differences that must be whole multiples.
 NEAR, MOSTLY = 0.25, 0.8
@@ -45,7 +45,7 @@ COUNTED = 50  # missing readings: the number in a longer gap is too uncertain to
 SEGMENTS, FARTHEST = 24, 1024  # fewest segments of a log that show a random walk; most readings of a segment
 GROWN = (2.5, 12.0)  # range of the factor by which a random walk's variance grows over four segments
 WIDEST_BURST = 16  # readings in a row, of which at least one must be on time
-POLLED = 0.045  # least fraction of steps that take one more period of polling
+POLLED = 0.045  # least fraction of steps that are one polling period longer
 WHOLE = 0.01  # tolerance of an interval that is a whole multiple of a coarse resolution
 # Ratio of variance to mean of missing readings; expected ones in a block; fewest blocks.
 BEAT, IN_BLOCK, BLOCKS = 0.35, 8, 20

@@ -69,7 +69,7 @@ def reversal_rows(entry: ReversalEntry) -> list[ReversalRow]:
 def drift_rows(entry: DriftEntry) -> list[DriftRow]:
     """Return a row for each axis of a bias drift, in its unit of drift, with U."""
     bias, std = (np.array([getattr(repeat.scale_fixed, name) for repeat in entry.repeats]) for name in ("bias", "std"))
-    total = np.hypot(std, entry.common_std)  # the common part cancels in a change
+    total = np.hypot(std, entry.common_std)  # of the bias itself: in a change of the bias the common error cancels
     change_std, slope = largest_change_std(bias, std), entry.temperature_slope
     first, last, change = (
         expanded(stds.tolist(), entry.degrees_of_freedom).widths for stds in (total[0], total[-1], change_std)

@@ -121,7 +121,7 @@ def _temperature_c(gyroscope: Corrected) -> Sequence[float]:
     return () if gyroscope.temperature_c is None else [gyroscope.temperature_c]
 
 
-# In a name, {index} is the sensor's number from 0, {number} that from 1, {later} that from 1 of all but the first.
+# In a name, {index} counts the sensors from 0 and {number} from 1; {later} is {number}, but empty for the first sensor.
 PX4: Autopilot = {
     RATE: {"CAL_GYRO{index}_{axis}OFF": lambda sensor: sensor.offset},
     ACCELERATION: {

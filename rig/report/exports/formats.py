@@ -5,7 +5,7 @@ from importlib import import_module
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Final
 
-if TYPE_CHECKING:  # the command line asks for the names alone
+if TYPE_CHECKING:  # the command line needs only the names
     from collections.abc import Sequence
     from pathlib import Path
 

@@ -14,7 +14,7 @@ from rig.data.quantity import DisplayUnit
 from rig.estimation.arrays import SMALLEST_SIZE, divide_or_infinity
 from rig.report.words.printed_values import figures, percent, power_of_ten, small
 
-NEGLIGIBLE = 0.001  # fraction of either variance, below which lines are combined in one
+NEGLIGIBLE = 0.001  # contributors below this fraction of both variances share one line
 DIGITS = 3  # digits of a combined standard uncertainty: its parts are printed to the same decimal
 
 

@@ -92,7 +92,7 @@ class Kvh1775:
         self._tests.clear()
         period_s = 1.0 / float(self.settings["DR"])  # its result follows the next message
         for wait_s in self._patience.attempts(ATTEMPTS * period_s):
-            self._write("?BIT")  # not ?BIT,2, in whose result further bytes mean "good" than the 7f that the ICD lists
+            self._write("?BIT")  # not ?BIT,2: in its result, bytes other than the 7f of the ICD mean "good" too
             if self.own_port.wait(lambda: bool(self._tests), wait_s):
                 result = self._tests[0]
                 if not result.passed:

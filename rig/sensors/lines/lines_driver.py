@@ -27,7 +27,7 @@ UNPRINTABLE = 0.05  # fraction of bytes above which the baud rate is wrong
 DAMAGED = 0.5  # fraction of rejected lines above which a stream is useless
 DAMAGED_LINES = 200  # least number of rejected lines for that
 RATE_TOLERANCE = 0.03
-ROUNDED = 2.0  # in steps of its time: the error of the interval, by both its ends
+ROUNDED = 2.0  # error of a time interval, in steps of the time stamps: one step at either end
 _CABLE = "Check its supply and cable, and whether another program has the port"
 
 # Values (n, columns) as printed, their numbers (n,) from 0, their times (n,) in µs, and the time of the read.

@@ -20,14 +20,15 @@ NAMES = {"g": "_rad_s", "a": "_m_s2", "m": "_t"}
 SENSORS = {"g": "gyroscope", "a": "accelerometer", "m": "magnetometer"}
 SI_UNITS = {"g": "rad/s", "a": "m/s2", "m": "T"}
 OPEN = "?"  # where a number is still to be stated
-LIKELY_HZ = 100.0  # of a log without times
+LIKELY_HZ = 100.0  # assumed sample rate of a log without times
 LARGEST_COUNT = 500.0  # whole numbers beyond it are steps of a converter
 # A block is at rest if its scatter is at most this many times that of the quietest tenth.
 BLOCK_S, QUIETEST, AS_QUIET = 0.25, 0.1, 3.0
 # Larger than the readings of a gyroscope in rad/s, and than its scatter at rest.
 LARGEST_RAD_S, NOISIEST_RAD_S = 40.0, 0.02
 NORM_TOLERANCE = 2e-3
-FEWEST_STEPS, MOST_RISE = 10, 0.9  # of a column that counts: its steps, and the share of those that rise
+# of a counter: the fewest steps, and the least fraction of them that rise; none may fall
+FEWEST_STEPS, MOST_RISE = 10, 0.9
 AXES = ("x", "y", "z")
 REFERENCE = {name for group in MOTIONS["attitudes"].optional for name in group} | {"start_s", "end_s"}
 QUATERNION_NAME = re.compile(r"(?:.*_)?(?:q|quat|quaternion|orientation|rot|rotation|attitude)_?([wxyz0-3])")

@@ -21,7 +21,7 @@ BEARABLE_MS = 2
 def lower_latency(port: "serial.Serial", path: str, devices: Path = DEVICES) -> None:
     """Make the adapter deliver received bytes at once. Raise Refused `servo_adapter_slow` if the timer remains long."""
     timer = devices / Path(path).resolve().name / "latency_timer"
-    with suppress(ValueError, OSError, AttributeError, NotImplementedError):  # a port that has no such thing
+    with suppress(ValueError, OSError, AttributeError, NotImplementedError):  # a port without a latency timer
         port.set_low_latency_mode(True)
     timer_ms = _read_ms(timer)
     if timer_ms is not None and timer_ms > BEARABLE_MS:

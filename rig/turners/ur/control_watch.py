@@ -111,7 +111,7 @@ class ControlWatch:
         """Return whether the pendant is in remote control; None if unknown, "gone" without an answer."""
         if self._is_x:
             return self._api.is_in_remote_control()
-        for _ in range(2):  # some close the connection with local control; ask once more
+        for _ in range(2):  # some controllers close the connection on the change to local control; ask once more
             try:
                 self._dashboard = self._dashboard or Dashboard(self._host, ANSWER_S)
                 return self._dashboard.is_in_remote_control()

@@ -18,7 +18,7 @@ KNOT_S = 0.01  # interval at which the joints follow the line exactly, with cons
 ROTATION_RADIUS_M = 0.3  # the length that a rotation by one radian counts as
 ACCURACY = 1e-9
 SLOWEST = 0.1  # smallest fraction of the requested speed that is tried
-KNOTS_A_TICK = 5  # number planned in a tick
+KNOTS_A_TICK = 5  # knots that are computed in one tick: a long line must not stop the world
 
 
 def _twist(q: Sequence[float] | Array, rotation: Array, position: Array, links: Links) -> Array:
