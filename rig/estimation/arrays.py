@@ -48,7 +48,7 @@ def interpolate(instants: Array | NDArray[np.intp], points: Array | NDArray[np.i
 
 
 def unwrap_counter(values: Array, period: float) -> Array:
-    """Return the values (n,) of a counter, in order, without its restarts at each `period`; NaN remains NaN."""
+    """Return the values (n,) of a counter as if it did not restart at each `period`; NaN remains NaN."""
     present = ~np.isnan(values)
     falls = np.diff(values[present], prepend=values[present][:1]) < -period / 2
     unwrapped = values.copy()

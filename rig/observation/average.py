@@ -36,8 +36,8 @@ class Average:
     - drift_rad2_s2 (3,): the part of the variance due to bias drift from rest to rest.
     - dof (3,): degrees of freedom of the noise's part of the variance, infinite if they were not counted.
     - lines_hz (k,): frequencies of the vibrations removed from the mean.
-    - rounding_rad2_s2, slow_lines_rad2_s2 (3,): the parts of the variance by rounding to steps, and by lines that are
-      too slow to remove.
+    - rounding_rad2_s2, slow_lines_rad2_s2 (3,): the parts of the variance due to rounding, and to spectral lines that
+      are too slow to remove.
     """
 
     mean_rad_s: Array

@@ -1,4 +1,4 @@
-"""Averages of a magnetometer's readings in dwells, with the arm's attitude, and in rests at home. Pure."""
+"""Averages of a magnetometer's readings in dwells, with the arm's attitude, and in rests at the home pose. Pure."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
@@ -78,7 +78,7 @@ def read_field_in_dwells(recording: ObservedRun, name: str) -> Iterator[tuple[Dw
 def field_tests(
     recording: ObservedRun, name: str, thresholds: ObservationThresholds, home_q_rad: Sequence[float]
 ) -> tuple[Mean, ...]:
-    """Average the magnetometer's readings, in tesla, in the rests at home, in order.
+    """Average the magnetometer's readings, in tesla, in each rest at the home pose, in the order of time.
 
     Raise Fault as `field_readings` does. Rests with fewer samples than a dwell needs are skipped: the last samples of a
     run may arrive after its end.

@@ -65,7 +65,7 @@ class SampledTurn:
 
 @dataclass(frozen=True, slots=True)
 class Lines:
-    """Lines to remove from a mean: their `cycles` (k,) in the turn; the encoders do not show the last `not_encoded`.
+    """Spectral lines to remove: their `cycles` (k,) in the turn; the encoders do not show the last `not_encoded`.
 
     - `encoded` (n, m): columns of a slow ripple that the encoders measure, its changes, and the remainder of their
       rate, mostly noise.
@@ -110,11 +110,11 @@ def _gain(weights: Array) -> float:
 
 
 def _slow_line_variance(readings: Array, turn: SampledTurn, slow: Array, change: Array, explained: Array) -> Array:
-    """Return the variance (3,) of the mean due to columns `slow` (n, k) of lines, which are poorly determined.
+    """Return the variance (3,) of the mean due to slow spectral lines, with columns `slow` (n, k).
 
-    Weights that do not remove these lines differ by `change` (n,) and give another mean. The variance is the larger of
-    two: the square of the difference, and its variance for the lines' fitted amplitudes at random phases. `explained`
-    (n, m): columns of everything else in the readings (n, 3).
+    The readings determine these lines poorly. Weights that do not remove them differ by `change` (n,) and give another
+    mean. The variance is the larger of two: the square of the difference, and its variance for the lines' fitted
+    amplitudes at random phases. `explained` (n, m): columns of everything else in the readings (n, 3).
     """
     without_ripple = fit_residuals(np.column_stack([whole(readings), turn.uneven_rad_s]), readings)
     residuals = fit_residuals(explained, readings)
@@ -133,7 +133,7 @@ def _line_variance(slow: Array, weights: Array, residuals: Array) -> Array:
 
 
 def _find_turn_lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines:
-    """Find the vibrations in readings (n, 3) apart from steady columns (n, k) and the rates that the encoders measure.
+    """Find the vibrations in readings (n, 3), beyond the steady columns (n, k) and the rates that encoders measure.
 
     Fast spectral lines of the arm's rate appear in the readings at their frequency. The residuals show the others.
     """

@@ -92,7 +92,10 @@ def _is_superseded(run: RunData, rest: Window, superseded: Collection[int]) -> b
 
 
 def _pair_events(run: RunData, begin: type[Event], end: type[Ending]) -> Iterator[tuple[Ending, Window]]:
-    """Yield every event of type `end` after one of type `begin`, with the window, if both have a controller time."""
+    """Yield each event of type `end` that follows one of type `begin`, with the window between the two.
+
+    Events without a controller time are left out.
+    """
     started_s = None
     for recorded in run.events:
         event, time_s = recorded.event, recorded.controller_time_s

@@ -125,7 +125,7 @@ class Factor:
 
 @dataclass(frozen=True)
 class Graph:
-    """A session with its faces and conditions, the current values of the unknowns, and the moves integrated by them."""
+    """A session with its faces and conditions, current values of the unknowns, and the moves integrated with these."""
 
     session: HandRecording
     faces: RestFaces

@@ -242,7 +242,7 @@ def _find_excessive_std(fit: GraphFit) -> Fault | None:
 def _find_unlikely_box(fit: GraphFit) -> Fault | None:
     """Return the fault of faces further out of square than stated, by χ² of their normals, or None.
 
-    The moves' angles may take the faces along: a scale factor that changes in mid-session looks like a skewed box.
+    A scale factor that changes in mid-session looks like a skewed box, because the faces follow the moves' angles.
     """
     from scipy.special import chdtri
 

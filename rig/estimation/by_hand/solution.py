@@ -264,7 +264,7 @@ def _find_first_face(session: HandRecording, conditions: SessionConditions, but:
 
 
 def _budget(fit: GraphFit, to_parameters: Array, clock: Array) -> Budget:
-    """Return the budget, which propagates each cause of the factors by the gain of the least-squares solution."""
+    """Return the budget: each cause of the factors' errors, propagated by the gain of the least-squares solution."""
     chosen = parameter_columns(fit)
     covariances = {name: np.zeros((6, 6)) for name in LINES}
     line_of = {cause: name for name, (_, causes, _) in LINES.items() for cause in causes}

@@ -41,7 +41,7 @@ ORIENTATIONS = 4000
 
 @dataclass(frozen=True, slots=True)
 class Identifiability:
-    """The identifiability by the attitudes: `rank` of the `needed` numbers, and the `undetermined` parameters.
+    """The identifiability in a set of attitudes: the `rank`, out of `needed`, and the `undetermined` parameters.
 
     `condition` is the condition number of the equations in g, infinite below full rank.
     """

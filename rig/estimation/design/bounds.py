@@ -14,7 +14,7 @@ from rig.estimation.sensor_axes import parameter_jacobian
 
 
 def six_observation_bound(scale: ArrayLike, rates_rad_s: ArrayLike, variances_rad2_s2: ArrayLike) -> Array:
-    """Return the bound (6, 6) for kx ky kz bx by bz if only ‖g‖ of each sweep is given: SIX (1)–(4).
+    """Return the Cramér–Rao bound (6, 6) for kx ky kz bx by bz if only ‖g‖ of each sweep is given: SIX (1)–(4).
 
     `scale` (3,); `rates_rad_s` (N, 3): true g in the sensor frame; `variances_rad2_s2` (N, 3) of the mean readings. The
     two unknown components of a sweep's direction take two of its three readings; the third determines ‖g‖², with the
@@ -28,7 +28,7 @@ def six_observation_bound(scale: ArrayLike, rates_rad_s: ArrayLike, variances_ra
 
 
 def vector_matrix_bound(rates_rad_s: ArrayLike, variances_rad2_s2: ArrayLike) -> Array:
-    """Return the bound (12, 12) for the rows of F, then c, of m = F ω + c; rates (N, 3) may be zero."""
+    """Return the Cramér–Rao bound (12, 12) for the rows of F, then c, of m = F ω + c; rates (N, 3) may be zero."""
     rates, variances = (np.asarray(a, dtype=np.float64) for a in (rates_rad_s, variances_rad2_s2))
     design = np.concatenate([rates, np.ones((len(rates), 1))], axis=1)
     bound = np.zeros((12, 12))
@@ -39,7 +39,7 @@ def vector_matrix_bound(rates_rad_s: ArrayLike, variances_rad2_s2: ArrayLike) ->
 
 
 def vector_bound(matrix: ArrayLike, rates_rad_s: ArrayLike, variances_rad2_s2: ArrayLike) -> Array:
-    """Return the bound (6, 6) for kx ky kz bx by bz if the rate is known as a vector; `matrix` (3, 3) is the true F."""
+    """Return the Cramér–Rao bound (6, 6) for kx ky kz bx by bz if rates are vectors; `matrix` (3, 3) is the true F."""
     f = np.asarray(matrix, dtype=np.float64)
     jacobian = parameter_jacobian(f, scale_of(f))
     return jacobian @ vector_matrix_bound(rates_rad_s, variances_rad2_s2) @ jacobian.T

@@ -1,4 +1,4 @@
-"""Errors of the directions about which a reference turns the body: those of an arm's joints, with wrong zeros.
+"""Errors of the axes about which a reference turns the body, such as an arm's joints with wrong zeros.
 
 An inclination δ of such an axis always changes the stated rate ω by δ × ω. If the body turns about few axes, this looks
 like a matrix F with other angles between its axes, and with other scale factors where the axes of motion are not

@@ -100,7 +100,7 @@ class _PlacementFits:
 
 
 def laid_down(theta: Array, placed: Placed, unplaced: Array, unplaced_variances: Array) -> LaidDown:
-    """Re-estimate the solution `theta` (p,) with placement errors, also by means (k, 3) in unknown attitudes."""
+    """Re-estimate the solution `theta` (p,) with placement errors; `unplaced` (k, 3) are means in unknown attitudes."""
     all_rests = _add_unplaced(theta, placed, unplaced, unplaced_variances)
     free = free_directions(theta, norm_known=all_rests.norm_known)
     linear = _Linear(
@@ -164,7 +164,10 @@ def _relate_errors(laid: LaidDown, all_rests: Placed, stated: int) -> LaidDown:
 
 
 def _find_log_prior(grid: Array, size: float) -> Array:
-    """Return the log prior (n,) of δ and ζ on a grid of their logarithms."""
+    """Return the log density (n,) of ln δ and ln ζ at `grid` (n, 2): uniform in δ, half-Cauchy in ζ.
+
+    `size` is the norm of the reference.
+    """
     delta, zeta = grid.T
     log_prior: Array = np.log(delta) + np.log(zeta) - np.log1p((zeta / (USUAL * size)) ** 2)
     return log_prior

@@ -1,4 +1,4 @@
-"""The errors of readings in known attitudes as variance components, of which one is alike in similar attitudes.
+"""The errors of readings in known attitudes as variance components, one of them correlated by attitude.
 
     v_m = F (s + φ s²) + b + E_m (ε_m + R_mᵀ γ(R_m)) + η_m + noise
 

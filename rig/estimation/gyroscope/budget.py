@@ -293,7 +293,7 @@ def split_bias_covariance(bias: BiasProcess, response: Array, windows_s: Array) 
 
 
 def _tilt_axes(inputs: VectorInputs, angle_rad: float) -> Array:
-    """Return the rate errors (2 per axis, N, 3) of an axis tilted about two perpendicular directions."""
+    """Return the errors (2 J, N, 3) of the rates if the axis of each of J joints is tilted in two directions."""
     patterns: list[Array] = []
     for joint in sorted(set(inputs.joints) - {None}, key=str):
         swept = np.array([name == joint for name in inputs.joints])

@@ -44,9 +44,9 @@ class KnownSensor:
 
 @dataclass(frozen=True, slots=True)
 class OwnError:
-    """A contributor of the budget: `patterns` (P, N, 3) rad/s in the readings for the `half_width`, which is in `unit`.
+    """A contributor of the budget: the effects `patterns` (P, N, 3), rad/s, on readings of an error of `half_width`.
 
-    `source` explains the half-width.
+    `half_width` is in `unit`; `source` explains it.
     """
 
     name: str

@@ -134,7 +134,7 @@ class _TurnsEstimate:
 def solve_turned(
     gyroscope: Gyroscope, turns: Sequence[Turn], means: Sequence[RateMean], matrix: Array, bias_rad_s: Array
 ) -> TurnedSolution:
-    """Return F, and b of g = K (m + b), by Gauss–Newton steps from `matrix` (3, 3) and `bias_rad_s` (3,).
+    """Solve the turns' equations for F and c by Gauss–Newton steps from `matrix` (3, 3) and `bias_rad_s` (3,).
 
     Raise Fault `rank_deficient`, `ill_conditioned`, `turn_not_closed`, `wrong_unit`, `mirrored_axis`.
     """

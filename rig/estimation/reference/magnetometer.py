@@ -33,8 +33,8 @@ def hard_iron(solution: TriaxialSolution) -> Array:
 class Uniformity:
     """The test of a uniform field: χ² of the residuals in all attitudes and its critical value.
 
-    `attitude_error_rad` is the assumed attitude error about each axis: residuals may include rotations of the field of
-    this size, but no change of its norm.
+    `attitude_error_rad` is the assumed attitude error about each axis. The test allows the field to seem rotated by so
+    much, but not to change its norm.
     """
 
     chi_square: float

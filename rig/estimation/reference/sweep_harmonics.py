@@ -62,7 +62,8 @@ def first_harmonic(
 
     - time_s (n,): on the arm's clock.
     - readings_m_s2 (n, 3): the specific force.
-    - angle_rad, speed_rad_s (n,): the joint's then, from the arm's states; the angle is zero in the known attitude.
+    - angle_rad, speed_rad_s (n,): the joint's at these times, from the arm's states; the angle is zero in the known
+      attitude.
     - coloured: returns the ratio of the variance of a mean of residuals (n,) to that of white noise.
     - swings: returns the columns (n, k) of spectral lines in residuals (n, 3).
 

@@ -2,9 +2,8 @@
 
 The readings are averaged over windows. A random walk of rate q (rad/s per √s) changes the bias more the longer the time
 between two windows; a scatter s has no memory; flicker noise is in between. The size of the flicker is given, because a
-few averages do not determine it; walk and scatter are estimated from the averages by restricted maximum likelihood
-(Patterson and Thompson, Biometrika 58 (1971) 545), the likelihood of the contrasts that do not depend on the fitted
-parameters.
+few averages do not determine it; q and s are estimated from the averages by restricted maximum likelihood (Patterson
+and Thompson, Biometrika 58 (1971) 545), the likelihood of the contrasts that do not depend on the fitted parameters.
 """
 
 from collections.abc import Callable
@@ -28,7 +27,7 @@ Chosen = Callable[[Array, Array], Array]
 
 @dataclass(frozen=True, slots=True)
 class BiasProcess:
-    """A drifting bias: `walk_rad_s_sqrt_s` (q) and `scatter_rad_s` (s), zero if only noise was detected.
+    """A drifting bias: random walk `walk_rad_s_sqrt_s` (q) and `scatter_rad_s` (s), zero if only noise was detected.
 
     `dof`: the number of contrasts used, `instability_rad_s`: the given Allan deviation of its flicker.
     """
@@ -145,7 +144,7 @@ def average_posterior(sizes: Array, likelihood: Array) -> Array:
 
 
 def average_walks(sizes: Array, likelihood: Array) -> Array:
-    """Return the root-mean-square (2,) of sizes (K, 2) over the posterior with a uniform prior for walks.
+    """Return the root-mean-square (2,) of sizes (K, 2) over the posterior, with a uniform prior of the random walk.
 
     The scatter has the prior of `average_posterior`. This is for parameters over a long time, such as slopes over
     temperature: their uncertainty may come mostly from a walk that the averages hardly show. So a walk is assumed to
@@ -160,7 +159,7 @@ def average_walks(sizes: Array, likelihood: Array) -> Array:
 def select_by_akaike(sizes: Array, likelihood: Array) -> Array:
     """Return the sizes (2,) of maximum likelihood of (K, 2), zero unless they reduce Akaike's information criterion.
 
-    No walk is included if noise alone explains the averages.
+    There is no random walk if noise alone explains the averages.
     """
     return np.asarray(sizes[np.argmax(likelihood - PRICE * np.count_nonzero(sizes, axis=1))], dtype=np.float64)
 
@@ -180,7 +179,7 @@ def bias_process(
     `variances_rad2_s2` (N, 3) are the variances of the noise, `windows_s` (N, 2) the averaging windows. The three axes
     have one process, since few averages determine it. `shared_rad2_s2` (3, N, N) are covariances between the averages
     in addition to their noise, `instability_rad_s` is the data sheet's bias instability, zero if unknown. `chosen`
-    selects walk and scatter by their likelihood.
+    selects random walk and scatter by their likelihood.
     """
     z, means, variances = (np.asarray(a, dtype=np.float64) for a in (design, means_rad_s, variances_rad2_s2))
     dof = 3 * (len(z) - z.shape[1])

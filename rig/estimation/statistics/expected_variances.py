@@ -25,9 +25,9 @@ LOUDEST, VOLUMES = 30.0, 8  # grid of a disturbance's size, in standard deviatio
 class ResidualInputs:
     """Residuals (n,) of a fit, its columns `slopes` (n, q), and the covariances of the errors.
 
-    - `covariance` (n, n): without arm and walk.
+    - `covariance` (n, n): without arm and random walk.
     - `effects(fraction)` (n, P): effects of the arm's errors, of which this fraction is independent in each dwell.
-    - `walk` (n, n): covariance of a walk of rate 1.
+    - `walk` (n, n): covariance of a random walk of rate 1.
     - `noise` (n,): variances of the readings' own noise.
     """
 
@@ -55,7 +55,8 @@ class ErrorSizes:
 def estimate_variances(fit: ResidualInputs, shares: Sequence[float]) -> ErrorSizes:
     """Return the posterior mean squares of the variance components.
 
-    Priors: spike-and-slab of the walk, log-uniform of its slab and of δ, equal probabilities of the `shares`.
+    Priors: spike-and-slab for the random walk, log-uniform for its slab and for δ. The `shares`, possible fractions of
+    δ² that are independent in each dwell, are equally probable.
     """
     constant = np.diag(fit.walk) > 0
     typical = np.sqrt(np.median(fit.noise[constant]) / np.median(np.diag(fit.walk)[constant]))

@@ -56,7 +56,7 @@ def _find_gaps(time_s: Array, rates: Array) -> NDArray[np.bool_]:
 
 
 def _began_still(time_s: Array, rates: Array) -> bool:
-    """Return whether the body hardly moved in the first second; otherwise a hand held it, then and perhaps later."""
+    """Return whether the body hardly moved in the first second; otherwise a hand held it at first, perhaps longer."""
     first = rates[time_s < time_s[0] + FIRST_S]
     return bool(len(first) > 1 and first.std(axis=0).max() < STILL_RAD_S)
 

@@ -42,7 +42,7 @@ def microsecond_of(sensor: RecordedSensor) -> float:
 
 
 def readings_of(sensor: RecordedSensor, samples: NDArray[np.void], from_s: float = 0.0) -> Readings:
-    """Return samples (n,) in SI units, with times on the clock that stamps them, shifted by `from_s`."""
+    """Return samples (n,) in SI units; their times, by the clock that stamps them, are shifted by `from_s`."""
     time_s = from_s + microsecond_of(sensor) * samples["board_time_us"].astype(np.float64)
     force = sensor.channel(ACCELERATION).values(samples) if sensor.measures(ACCELERATION) else None
     return time_s, sensor.channel(RATE).values(samples), force
@@ -84,7 +84,7 @@ class NotCounted:
         return shift_s + self.microsecond_s * begin_us, shift_s + self.microsecond_s * end_us
 
     def filter_session(self, session: HandRecording) -> HandRecording:
-        """Return the session without these rests; the moves before and after each become one, with a pause."""
+        """Return the session without the `rests`; the moves before and after each become one move with a pause."""
         rests, moves, through = list[HandRest](), list[Move](), list[Move]()
         for index, rest in enumerate(session.rests):
             if _middle_s(rest) < self.from_s:

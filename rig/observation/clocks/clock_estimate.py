@@ -77,7 +77,7 @@ def _check_samples(board_time_s: Array, readings: Array, motion: KnownMotion) ->
 
 
 def _turns_every_axis(motion: KnownMotion) -> bool:
-    """Return whether every sensor axis turns, however it is mounted; one that does not may repeat its reading."""
+    """Return whether every sensor axis turns in any mounting; only then must its readings change."""
     rates = motion.rate(motion.time_s[motion.covered(motion.time_s)])
     return bool(np.linalg.eigvalsh(rates.T @ rates).min() > TURNED_RAD_S**2 * len(rates))
 
@@ -149,7 +149,7 @@ class _MovingTimes:
         return cls(start_s, around >= MOVING * speed.max())
 
     def mask(self, time_s: Array) -> NDArray[np.bool_]:
-        """Return the mask of those of the times (n,) that lie in such a block."""
+        """Return a mask of the times (n,) that lie in such a block."""
         index = np.clip((time_s - self.start_s) / BLOCK_S, 0, len(self.near) - 1).astype(np.intp)
         mask: NDArray[np.bool_] = self.near[index]
         return mask

@@ -2,8 +2,8 @@
 
 Both average the same samples, with different weights. The board's weights are equal over whole blocks of readings, so
 its window begins and ends a little before or after the turn; the computer's weights cancel the spectral lines that it
-found. The arm's rotation under the board's weights and their response to the lines are subtracted. The remainder must
-agree.
+found. From the board's average, the arm's rotation and the spectral lines, both under the board's weights, are
+subtracted. The rest must agree with the computer's mean.
 """
 
 from collections.abc import Sequence
@@ -66,9 +66,10 @@ def _deviation(recording: ObservedRun, stream: Stream, turn: Observation, observ
 
 
 def _nuisance_columns(time_s: Array, turn: Observation, rates_rad_s: Array) -> Array:
-    """Return columns (n, k) whose effect the computer's mean excludes, at times (n,) with rates (n,) about the axis.
+    """Return the nuisance columns (n, k) of the computer's mean, at times (n,) with rates (n,) about the axis.
 
-    These are the turn's first two harmonics, spectral lines, and the effect of a slow ripple on a lagging sensor.
+    The weights of that mean cancel them: the turn's first two harmonics, spectral lines, and the effect of a slow
+    ripple on a lagging sensor.
     """
     average = turn.average
     fraction = (time_s - average.start_s) / average.duration_s

@@ -163,8 +163,8 @@ def _segment_revolution(
 ) -> SegmentedAverage:
     """Average a revolution or an arc in segments, without the spectral lines of the whole average.
 
-    Lines slower than `SLOW` remain, because weights that cancel them would amplify the encoders' noise; the variance of
-    each segment contains them. A vibration that the encoders measure only in part does not count as noise.
+    Spectral lines slower than `SLOW` remain, because weights that cancel them would amplify the encoders' noise; the
+    variance of each segment includes them. A vibration that the encoders measure only in part does not count as noise.
     """
     average, axis = turn.average, turn.axis_flange
     times_s = stream.time_s[slice_time(stream, average.start_s, average.end_s)]
@@ -205,10 +205,10 @@ def _segment_revolution(
 
 
 def _slow_line_variance(slow: Array, weights: Array, residuals: Array) -> Array:
-    """Return the variance (3,) of means with weights (p, n) by slow columns (n, k) of lines in residuals (n, 3).
+    """Return the variance (3,) that slow lines, columns (n, k) fitted to residuals (n, 3), add to means.
 
-    The frequencies of slow lines are uncertain. So the variance is at least the means' scatter around a straight line,
-    which would be a fault, not a vibration.
+    The means have weights (p, n). The frequencies of slow spectral lines are uncertain, so the variance is at least the
+    means' scatter around a straight line in time; that line itself would be a fault, not a vibration.
     """
     fitted = np.mean((weights @ slow @ fit_columns(slow, residuals)) ** 2, axis=0)
     if len(weights) <= FEWEST_SCATTERED:
@@ -274,7 +274,7 @@ def _average(
 ) -> tuple[Segment, ...]:
     """Return the segments with enough samples, averaged by weights (p, m): readings and the flange's rates (m, 3).
 
-    `added` (3,): the variance of each mean by slow lines.
+    `added` (3,): the variance of each mean due to slow spectral lines.
     """
     readings = division.readings_rad_s
     groups, rows = division.groups[:, division.enough], weights[list(division.enough)]

@@ -209,7 +209,7 @@ class _ReferenceRows:
 
 
 def _select_different_times(rows: Mapping[str, Array]) -> NDArray[np.intp]:
-    """Return the numbers, from 1, of all rows except rows of zero length at the time of another row."""
+    """Return the numbers, from 1, of the rows, without those of zero length at the time of another row."""
     middles_s = (rows["start_s"] + rows["end_s"]) / 2
     lasting = rows["end_s"] != rows["start_s"]
     return 1 + np.flatnonzero(lasting | ~np.isin(middles_s, middles_s[lasting]))
@@ -228,7 +228,7 @@ def _is_covered(rows_s: Array, time_s: Array) -> NDArray[np.bool_]:
 
 
 def _list_omitted(rows: _ReferenceRows, kept: _ReferenceRows, reason: str) -> Iterator[Omitted]:
-    """Yield an entry for the given rows that are not used, if any."""
+    """Yield an entry for the rows that are not `kept`, if any."""
     if lost := np.setdiff1d(rows.numbers, kept.numbers).tolist():
         window = rows.windows[rows.numbers.tolist().index(lost[0])]
         yield Omitted("rows", len(lost), len(rows.windows), reason, f"row {lost[0]}, from {window.start_s:.10g} s")

@@ -1,4 +1,4 @@
-"""Functions for all external files: samples in the order of time, and rows from one time to another."""
+"""Windows of time in an external file: the samples in each, and the gaps between these."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -148,7 +148,10 @@ def _drop_thin(fixes: Fixes) -> Fixes:
 def _find_joined(
     turning: Turning, fixes: Fixes, clock_s: float
 ) -> tuple[NDArray[np.bool_], Array, tuple[LeftOut, ...]]:
-    """Return a mask (N − 1,) of fixes joined to the next, the std of rotation in gaps, rad, and omitted increments."""
+    """Return which fixes are joined to the next, the std of the rotation hidden in between, and what is left out.
+
+    The mask and the stds, rad, have shape (N − 1,). A fix is not joined over a step that may hide too much rotation.
+    """
     count = len(fixes.placement)
     first_s = clock_s + fixes.at_s[np.searchsorted(fixes.fix, np.arange(count))]
     last_s = clock_s + fixes.at_s[np.searchsorted(fixes.fix, np.arange(count), side="right") - 1]

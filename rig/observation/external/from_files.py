@@ -35,10 +35,11 @@ NOTHING_LOST = ObservationThresholds(max_lost_fraction=0.01, max_speed_deviation
 
 @dataclass(frozen=True, slots=True)
 class Files:
-    """The two files and their item; `recorded`: None for the time at which the readings' file was last written.
+    """The files of `readings` and of their motion, and their item.
 
-    `columns` map columns with other names than the rig's. For "turns" there is no file of motion: `motion` has the
-    user's declarations, by column.
+    `recorded` is the time of recording, None for the time at which the readings' file was last written. `columns` map
+    columns with other names than the rig's. "turns" have no file of motion: `motion` holds the user's declarations, by
+    column.
     """
 
     readings: Path

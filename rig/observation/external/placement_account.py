@@ -112,7 +112,7 @@ class Account:
         return [int(row) for row in np.flatnonzero((self.rest >= 0) & self.dwells)]
 
     def _moving(self, rows: NDArray[np.bool_]) -> Iterator[Omitted]:
-        """Yield entries for the given rows with a gap, and for those in which the body moves, if any."""
+        """Yield one entry for the `rows` with a gap, and one for those in which the body moves, if any."""
         left_out, gaps_s, total = (self.rest < 0) & rows, self._find_gaps_s(rows), int(rows.sum())
         if len(lacking := np.flatnonzero(gaps_s > 0)):
             first = int(lacking[0])

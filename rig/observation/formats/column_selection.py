@@ -80,7 +80,10 @@ def _build_map(
 
 
 def unwrap_times(columns: Mapping[str, Array], mapped: Mapped | None, *, by_day: bool) -> dict[str, Array]:
-    """Return the columns with continuous times: without a counter's restarts at 0, or with `by_day` at midnight."""
+    """Return the columns with continuous times, without the restarts of counters at 0.
+
+    With `by_day`, times restart at midnight.
+    """
     unwrapped = dict(columns)
     for name in TIMES:
         period_s: float | None = DAY_S if by_day else None

@@ -1,4 +1,4 @@
-"""Files of readings and attitudes that are not tables: their readers, by name or content of the file.
+"""Files of readings and attitudes that are not text tables, and their readers, chosen by the file's name or content.
 
 A path may select a part of the file after two colons: `session::/imu/data` is a topic of a bag, `flight.ulg::1` an
 instance in PX4's log.

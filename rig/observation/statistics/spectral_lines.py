@@ -69,7 +69,7 @@ def find_lines(residuals: Array, search: LineSearch, previous: Array = NONE, fra
 
 
 def _are_too_near(cycles: Array, search: LineSearch) -> bool:
-    """Return whether lines merge, or the slowest merges with the turn's own waves.
+    """Return whether two spectral lines cannot be separated, or the slowest cannot from the turn's own waves.
 
     A refined line below the search's lowest frequency is valid only if its sidebands are apart from all others'.
     Otherwise two lines, a vibration and a ripple less than a cycle apart, would explain a part of the mean.
