@@ -65,7 +65,7 @@ def fitness(
     sweep: int | None = None,
     dwell: int | None = None,
 ) -> Check:
-    """Return a check of a sensor's quantity with a `limit` of its own.
+    """Return a check of whether a measurement is fit for use: the criterion `what` with its `value` and `limit`.
 
     If the check is about one `sweep` or `dwell` of the plan, the name contains its index.
     """

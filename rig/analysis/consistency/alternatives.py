@@ -110,7 +110,7 @@ def differences(segments: Segments, axis_rates: Array, whole: Array | None) -> d
 
 
 def single_axis_columns(segments: Segments, axis_rates: Array) -> Array:
-    """Return columns (3, N, k) for a scale factor of one axis that changes at the start of a sweep or transfer."""
+    """Return a column (3, N, k) for each axis and each start of a sweep or transfer: a change of its scale factor."""
     starts = np.unique(
         [segments.times_s[segments.sweep == sweep].min() for sweep in np.unique(segments.sweep[segments.sweep != REST])]
     )

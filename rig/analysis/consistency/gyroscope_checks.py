@@ -176,7 +176,7 @@ def _free_disturbed_transfers(
     bias: BiasProcess,
     false_alarm_probability: float,
 ) -> tuple[_Tested, Statistic | None]:
-    """Return `_inflate_transfers` with a mean of its own for each outlier among the transfers, and `axis_changed`.
+    """Return `_inflate_transfers` with a separate mean for each outlying transfer, and the test of a changed axis.
 
     A ripple at the data rate shifts the mean of one transfer. A change of a scale factor shifts all later transfers, so
     a transfer is an outlier only if its own mean explains clearly more of the residuals than any such change.

@@ -28,7 +28,7 @@ MAX_CONDITION = 100.0  # the worst of a thousand random sets of ten has 19; beyo
 
 @dataclass(frozen=True, slots=True)
 class AttitudeAccount:
-    """The identifiability by `count` attitudes of a model of this `order`, and each sensor's expected uncertainty.
+    """The identifiability of a model of this `order` in `count` attitudes, and each sensor's expected uncertainty.
 
     `first` and `second` are the identifiability of the two models; the efficiency belongs to the chosen model.
     """

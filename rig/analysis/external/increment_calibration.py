@@ -37,7 +37,7 @@ class InIncrements:
 
     @property
     def matrix(self) -> Array:
-        """F (3, 3)."""
+        """The matrix F (3, 3) of scale factors and axes."""
         return self.solution.matrix
 
     @property

@@ -20,7 +20,7 @@ class HasMatrix(Protocol):
 
     @property
     def matrix(self) -> Array:
-        """F (3, 3)."""
+        """The matrix F (3, 3) of scale factors and axes."""
         ...
 
 

@@ -78,7 +78,7 @@ class Silence:
 
 
 def _times(tasks: Path) -> _Times:
-    """Return the times, s, that each thread ran and waited for a processor; empty if the system does not tell."""
+    """Return the times, s, that each thread ran and waited for a processor; empty if the system does not state them."""
     times: _Times = {}
     try:
         for task in tasks.iterdir():

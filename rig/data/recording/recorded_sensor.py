@@ -68,7 +68,7 @@ class RecordedSensor:
 
     @property
     def temperature_words(self) -> str:
-        """The source of its temperature, for a budget; empty with a thermometer."""
+        """The source of the sensor's temperature, in words for a budget; empty if it has a thermometer."""
         if not self.measures(TEMPERATURE):
             return f"no temperature was provided or stated, a change of {UNKNOWN_CHANGE_K:g} K is assumed"
         return f"temperature stated within {self.unseen_change_k:g} K" if self.temperature_stated else ""

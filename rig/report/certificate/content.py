@@ -46,9 +46,9 @@ class CertifiedGyroscope:
 
 @dataclass(frozen=True, slots=True)
 class HeldStill:
-    """The sensors of one `kind` that were calibrated at rest, and the standard of their scale factors.
+    """The sensors of one `kind` that were calibrated at rest, and the reference standard of their scale factors.
 
-    `value` is the standard's stated value, `origin` its source by the laboratory's statement.
+    `value` is the standard's stated value, `origin` the laboratory's statement of its source.
     """
 
     kind: str

@@ -100,7 +100,7 @@ def _number_imus(calibrations: ExportedCalibrations) -> dict[str, int]:
 
 
 def symmetric(matrix: Array) -> Array:
-    """Return the symmetric P (3, 3) of matrix = R P with a rotation R, so that P changes lengths as `matrix` does."""
+    """Return the symmetric factor P (3, 3) of the polar decomposition `matrix` = R P, where R is a rotation."""
     squared, vectors = np.linalg.eigh(matrix.T @ matrix)
     root: Array = vectors @ np.diag(np.sqrt(squared)) @ vectors.T
     return root

@@ -19,7 +19,7 @@ def mount_lines(result: ResultDocument) -> Iterator[str]:
 
 
 def farthest_off(result: ResultDocument) -> Iterator[str]:
-    """Yield the line of the stage with the largest mounting error, then one with the number of the other stages."""
+    """Yield the line of the stage with the largest mounting error, then a line with the number of the other stages."""
     mounts = _significant_mounts(result)
     if not mounts:
         return

@@ -58,7 +58,7 @@ def warmth(when: ConditionsEntry, use: str = "") -> dict[str, float | None]:
 
 
 def label_source(use: str) -> str:
-    """Return the label `use`, one that `warmth` yields, followed by the temperature's source."""
+    """Return a label of `warmth` (`use`), followed by the temperature's source."""
     return use if use.endswith(AS_STATED) else f"{use}, by its own thermometer"
 
 
