@@ -188,7 +188,7 @@ class Plan:
 
 
 def closes(angle_rad: float) -> bool:
-    """Return whether an angle is a number of whole turns, which are exact because the circle closes."""
+    """Return whether an angle is a whole number of turns, which the closure of the circle makes exact."""
     turns = round(angle_rad / TURN_RAD)
     return turns > 0 and abs(angle_rad - turns * TURN_RAD) < CLOSED_RAD
 

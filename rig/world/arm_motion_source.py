@@ -82,7 +82,7 @@ class OnArm:
 
     @property
     def ideal(self) -> bool:
-        """Whether angular rate alone describes the sensed motion."""
+        """Whether `rate_at` suffices: the arm has no errors, and its ground does not turn."""
         return self.arm.ideal
 
     def step(self) -> None:

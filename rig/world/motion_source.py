@@ -29,7 +29,7 @@ class MotionSource(Protocol):
 
     @property
     def ideal(self) -> bool:
-        """Whether angular rate alone describes the sensed motion."""
+        """Whether `rate_at` suffices, because the motion has no other part than an angular rate."""
         ...
 
     def step(self) -> None:

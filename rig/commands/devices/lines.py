@@ -35,7 +35,7 @@ def add(parser: ArgumentParser) -> None:
 
 
 def add_stated(parser: ArgumentParser) -> None:
-    """Add the arguments for values that no line shows."""
+    """Add the arguments for properties that printed lines do not show: serial number and ranges."""
     parser.add_argument("--serial-number", metavar="NUMBER", help="serial number of this specimen")
     parser.add_argument(
         "--range-deg-s", metavar="DEG_S", help="full scale to which the device's program sets the gyroscope"

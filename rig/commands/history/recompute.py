@@ -70,7 +70,7 @@ def recompute_history(options: Namespace, solve: Solve = solve_task) -> int:
 
 
 def _question(options: Namespace) -> RecomputeQuestion:
-    """Return the question of the options. Raise Refused for an unusable option."""
+    """Return the program, settings and estimator of the recomputation. Raise Refused for an unusable option."""
     from rig.analysis.estimator_names import find_estimator
 
     if options.jobs < 1:

@@ -34,10 +34,10 @@ def recall_sensors(config: RigConfig, moved: frozenset[str]) -> Memory:
 def find_other_board(
     config: RigConfig, board: str, parts: Collection[str], own_serial_numbers: Collection[str], *, simulated: bool
 ) -> str | None:
-    """Return, for a message, the other serial number under which the history has a sensor on this board, and its date.
+    """Return another serial number that the history has for a sensor on this board, with its date, in words.
 
-    The number is that of the newest calibration of one of the `parts`. Return None if this is one of
-    `own_serial_numbers`, if there is none, or if the history does not answer.
+    The newest calibration of one of the `parts` is decisive. Return None if there is none, if its number is one of
+    `own_serial_numbers`, or if the history does not answer.
     """
     from rig.history.storage.address import choose_history_address
 

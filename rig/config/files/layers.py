@@ -32,7 +32,7 @@ class Layered:
 
 @dataclass(frozen=True, slots=True)
 class _Layer:
-    """One file's part."""
+    """One of the files on which a configuration is based, before merging."""
 
     data: dict[str, Any]
     places: Places

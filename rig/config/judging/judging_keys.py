@@ -37,7 +37,7 @@ def _part_default_key(what: str) -> Any:
 
 
 class ObservationKeys(BaseModel):
-    """The keys of the section `observation` in this table."""
+    """The requirements on a revolution to be averaged: the keys of the section `observation`."""
 
     model_config = JUDGES
 
@@ -60,7 +60,7 @@ class ObservationKeys(BaseModel):
 
 
 class UncertaintyKeys(BaseModel, Generic[OfSensors]):
-    """The keys of the section `uncertainty` in this table, except those of each sensor: `OfSensors`."""
+    """The stated sizes of errors: the keys of the section `uncertainty`, without those of each sensor (`OfSensors`)."""
 
     model_config = JUDGES
 

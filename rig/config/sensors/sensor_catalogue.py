@@ -13,7 +13,7 @@ RATE_TOLERANCE = 2e-4  # relative: 333.33 stands for 1000/3, and the closest two
 class Delivered:
     """The errors of a part as it is delivered: half-widths, None if its data sheet has no figure.
 
-    `rate_percent` is that of the part's own data rate, over all temperatures.
+    `rate_percent` is the error of the part's own data rate, over all temperatures.
     """
 
     bias_deg_s: float | None = None

@@ -13,7 +13,7 @@ Reason = Annotated[str, Field(pattern=r"^[a-z_0-9]+$", max_length=40)]
 
 @dataclass(frozen=True, slots=True)
 class HandAsked:
-    """A request to the operator; `again` names the error of the last move, `why` describes it."""
+    """A request to the operator; if the last move was refused, `again` names the error and `why` describes it."""
 
     instruction: Instruction
     again: Reason | None = None

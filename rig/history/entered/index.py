@@ -1,4 +1,4 @@
-"""The columns of a run that repeat values of its result, written at its entry and compared later. Pure."""
+"""The columns of a run's row that repeat values of its result: written on entry, compared later. Pure."""
 
 import hashlib
 import math

@@ -166,7 +166,7 @@ journal = Table(
     "journal",
     metadata,
     Column("number", Integer, primary_key=True, autoincrement=False),
-    Column("kind", String(40), nullable=False),  # the table
+    Column("kind", String(40), nullable=False),  # the name of the table
     Column("key", String(1000), nullable=False),  # the row's primary key, as JSON
     Column("sha256", String(HASH), nullable=False),
     Column("entered_utc", String(TIME), nullable=False),

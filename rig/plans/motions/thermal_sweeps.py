@@ -35,7 +35,7 @@ def plan_thermal(
 
 
 def _sets(arm: ArmSection, procedure: ThermalSection) -> Iterator[list[Step]]:
-    """Yield the steps of each set: one repeat of the sweeps, and the attitudes, which are numbered between sets."""
+    """Yield the steps of each set: one repeat of the sweeps, then the attitudes, numbered on from set to set."""
     sweeps = len(plan_six_observation(arm, procedure).sweeps)
     in_each, attitudes = sweeps // procedure.repeats, len(procedure.attitudes) if procedure.with_attitudes else 0
     for number in range(procedure.repeats):

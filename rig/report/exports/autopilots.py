@@ -149,7 +149,7 @@ ARDUPILOT: Autopilot = {
 
 
 def sensor_parameters(autopilot: Autopilot, index: int, sensor: Corrected) -> Iterator[tuple[str, float]]:
-    """Yield the parameters of an autopilot for its sensor of this number, from 0; none for a quantity that it lacks."""
+    """Yield the parameters for the sensor number `index`, from 0; none for a quantity without parameters."""
     numbers = {"index": index, "number": index + 1, "later": index + 1 if index else ""}
     for name, values_of in autopilot.get(sensor.quantity, {}).items():
         for axis, value in zip(AXES, values_of(sensor), strict=False):

@@ -26,7 +26,7 @@ class HostCorrected:
 
     @property
     def sensors(self) -> dict[str, RecordedSensor]:
-        """The sensors of `SampleSource`, with corrected rates in the same counts, and no accelerations."""
+        """The source's sensors; the corrected ones have rates in counts of unchanged size, and no accelerations."""
         return {
             name: describe_corrected(sensor, self.calibrations[name], sensor.channel(RATE).unit_per_count)
             if name in self.calibrations

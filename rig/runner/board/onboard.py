@@ -59,7 +59,7 @@ class BoardCalibration:
                 self.note(BoardRecalled(name, sweep))
 
     def begin(self) -> None:
-        """Make the host keep data from now on, for the time base of the first sweep."""
+        """Make the host keep samples and states from now on; the first sweep's time base is estimated from them."""
         self.acquisition.keep()
 
     def keep(self, sweep: Sweep) -> None:

@@ -80,7 +80,7 @@ class ServoBench:
 
     @property
     def ideal(self) -> bool:
-        """Whether angular rate alone describes the sensed motion."""
+        """Whether `rate_at` suffices, because the motion has no other part than an angular rate."""
         return not any(self._site.earth_rate_rad_s)
 
     def step(self) -> None:
