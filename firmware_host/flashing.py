@@ -150,6 +150,7 @@ def flash_by_probe(image: bytes, probe: Any) -> None:
 
 
 def _program(session: Any, image: bytes) -> None:
+    """Check the microcontroller at the probe, write the image, verify it, and restart."""
     from pyocd.flash.file_programmer import FileProgrammer
 
     device = session.target.read32(DEVICE_ID_REGISTER) & 0xFFF

@@ -29,6 +29,7 @@ RUNS = (
 
 
 def main(duration_s: float) -> None:
+    """Print how many times as fast as real time the emulated board runs, for each set of parts."""
     for rates_hz, accelerating in RUNS:
         truth, acceleration = GyroTruth(noise_rad_s=0.035), AccelerometerTruth(noise_m_s2=0.03)
         board = EmulatedBoard(

@@ -92,6 +92,7 @@ def table(cells: Iterable[dict[str, Any]]) -> Iterable[str]:
 
 
 def main() -> int:
+    """Try the chosen faults, record the outcome of each, and return the exit status."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--faults", nargs="+", metavar="TEXT", help="only those whose name holds one of these texts")
     parser.add_argument("--procedures", nargs="+", choices=SETUPS, default=list(SETUPS))

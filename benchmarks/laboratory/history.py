@@ -79,6 +79,7 @@ def measure_process_s(*arguments: str) -> float:
 
 
 def main() -> None:
+    """Print the times to enter and look up calibrations, to end a run, and to print the help."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--calibrations", type=int, default=10_000, metavar="N")
     count = parser.parse_args().calibrations

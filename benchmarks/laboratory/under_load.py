@@ -95,6 +95,7 @@ def busy_loops(number: int) -> Iterator[None]:
 
 
 def main() -> int:
+    """Run the demonstration alone and beside busy loops; print how runs end; return the exit status."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("config", type=Path, nargs="?", default=DEMO, help="a configuration with a world: section")
     parser.add_argument("--demos", type=int, default=40, metavar="N", help="how many runs beside the busy loops")

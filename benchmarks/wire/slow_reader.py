@@ -51,6 +51,7 @@ def measure_pace(
 
 
 def main() -> int:
+    """Print the world's pace alone and with a client that reads slowly; return the exit status."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--pace", type=float, default=4.0, metavar="N", help="how many times as fast as real")
     parser.add_argument("--reads", type=float, default=1.0, metavar="N", help="how often a second the client reads")

@@ -53,6 +53,7 @@ class EmulatedBoard:
         boot_time_s: float,
         has_crystal: bool = True,
     ) -> None:
+        """Load program and memories, connect the chip to the core, and apply power."""
         self._elf = elf
         self._clock = BoardClock(boot_time_s, crystal_ppm)
         self._timeline = Timeline()

@@ -62,6 +62,7 @@ class PageState:
     """
 
     def __init__(self, about: About) -> None:
+        """Fill every section with its content before the first event of the run."""
         self._sections: dict[str, Any] = {
             "about": asdict(about),
             "state": {"kind": "connecting", "text": "Connecting to arm and board"},

@@ -27,6 +27,7 @@ class OnArm:
     """A `MotionSource`: the `robot` to which clients talk, and the `arm` as it really moves."""
 
     def __init__(self, config: RigConfig, world: WorldSection) -> None:
+        """Build the controller and the true arm from their sections, with errors drawn by the world's seed."""
         arm = world.arm
         random = Random(world.seed)
         model = select_model(arm, config.arm.model)
@@ -82,7 +83,7 @@ class OnArm:
 
     @property
     def ideal(self) -> bool:
-        """Whether `rate_at` suffices: the arm has no errors, and its ground does not turn."""
+        """Whether `rate_at` gives all that a gyroscope senses: no errors, and ground that does not rotate."""
         return self.arm.ideal
 
     def step(self) -> None:

@@ -29,7 +29,7 @@ class MotionSource(Protocol):
 
     @property
     def ideal(self) -> bool:
-        """Whether `rate_at` suffices, because the motion has no other part than an angular rate."""
+        """Whether `rate_at` gives all that a gyroscope senses: no errors, and ground that does not rotate."""
         ...
 
     def step(self) -> None:

@@ -45,6 +45,7 @@ class Chip:
         on_clock: Callable[[], None],
         has_crystal: bool = True,
     ) -> None:
+        """Build the peripherals, connect them as the chip and the board do, and map their addresses."""
         self._on_clock = on_clock
         self.clocks = clocks = Clocks()
         self.nvic = nvic = Nvic(timeline)

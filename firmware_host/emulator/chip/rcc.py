@@ -67,6 +67,7 @@ class Rcc:
         on_clock: Callable[[], None],
         has_crystal: bool = True,
     ) -> None:
+        """Define the registers; the backup domain, with the crystal, survives resets."""
         self._timeline = timeline
         self._power = power
         self._has_crystal = has_crystal

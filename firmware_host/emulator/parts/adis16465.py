@@ -88,6 +88,10 @@ class Adis16465:
         range_deg_s: int = 500,
         ready_s: float = 0.0,
     ) -> None:
+        """Power the module, which is silent until `ready_s`.
+
+        `motion_at` returns rate, rad/s, and specific force, g, at a virtual time, s.
+        """
         self.chip_select = chip_select
         self.interrupt = interrupt
         self.fault: Fault | None = None

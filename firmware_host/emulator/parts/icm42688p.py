@@ -92,6 +92,10 @@ class Icm42688P:
         chip_select: str = WIRED.select,
         interrupt: str = WIRED.data_ready,
     ) -> None:
+        """Power the part.
+
+        `motion_at` returns rate, rad/s, and specific force, g, at a virtual time, s.
+        """
         self.chip_select = chip_select
         self.interrupt = interrupt
         self.fault: Fault | None = None
@@ -207,6 +211,7 @@ class Icm42688P:
         return self._output[address - _TEMP_DATA1]
 
     def _write(self, address: int, value: int, time_s: float) -> None:
+        """Write a register and apply its effects. Raise Violation for a write that the data sheet forbids."""
         registers = self._registers.values
         if self._bank and address != _REG_BANK_SEL:
             raise self._registers.describe_unmodelled(f"write in bank {self._bank} to", address)

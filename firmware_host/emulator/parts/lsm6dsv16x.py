@@ -189,6 +189,7 @@ class Lsm6dsv16x:
         return outputs.read(address - first, block_update=block_update)
 
     def _write(self, address: int, value: int, time_s: float) -> None:
+        """Write a register and apply its effects. Raise Violation for a write that the data sheet forbids."""
         registers = self._registers.values
         if registers[_FUNC_CFG_ACCESS] and address != _FUNC_CFG_ACCESS:
             raise self._registers.describe_unmodelled("write, with FUNC_CFG_ACCESS set, to", address)

@@ -85,6 +85,10 @@ class Mpu9250:
         chip_select: str = WIRED.select,
         interrupt: str = WIRED.data_ready,
     ) -> None:
+        """Power the die.
+
+        `motion_at` returns rate, rad/s, and specific force, g, at a virtual time, s.
+        """
         self.chip_select = chip_select
         self.interrupt = interrupt
         self.fault: Fault | None = None

@@ -62,6 +62,7 @@ def _catch_problem(
 
 
 def _check_board(configured: "Configured", tell: Tell) -> list[Problem]:
+    """Return the problems of board, firmware and sensors; `tell` gets a line for each device that answers."""
     from firmware_host.client import Board
     from rig.board.identify import (
         find_sensor,

@@ -59,6 +59,7 @@ class RunRecorder:
         turner: RecordedTurner,
         sensors: Mapping[str, RecordedSensor],
     ) -> None:
+        """Lay out the file for the given sensors and turner, and start the writer thread."""
         import h5py
 
         self.path = path

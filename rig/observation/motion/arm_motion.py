@@ -51,6 +51,7 @@ class ArmMotion:
         mount: Array | None = None,
         reading_std_rad: float = 0.0,
     ) -> None:
+        """Fit splines to the joint angles and the flange's rates; mark the times that the states cover."""
         self.kinematics, self.names, self._scatters = kinematics, names, reading_std_rad > 0
         self.mount: Array = np.eye(3) if mount is None else mount
         states = well_timed(states) if self._scatters else states

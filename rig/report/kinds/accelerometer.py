@@ -35,6 +35,7 @@ def _entries(outcome: Outcome) -> dict[str, AccelerometerEntry]:
 
 
 def _entry(outcome: Outcome, name: str, result: "AccelerometerResult") -> AccelerometerEntry:
+    """Return the entry of an accelerometer's calibration in `result.json`."""
     from rig.analysis.effective_dof import acceleration_angle_dof, second_order_dof
     from rig.analysis.measurement_conditions import accelerometer_conditions
     from rig.estimation.reference.accelerometer_model import DELAY, SECOND

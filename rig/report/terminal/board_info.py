@@ -90,6 +90,7 @@ def _info_document(board: BoardInfo) -> dict[str, Any]:
 
 
 def _print_info(board: BoardInfo) -> None:
+    """Print the board's identity and health as lines, and its sensors as a table."""
     console = Console(highlight=False)
     identity, health = board.identity, board.status
     flashed = identity.firmware == FIRMWARE_VERSION

@@ -231,7 +231,7 @@ class SmoothedClock:
         return self._time_s + steps * self._period_s
 
     def advance_to(self, numbers: NDArray[np.int64], input_s: float) -> Array:
-        """Advance the clock by samples (n,), of which the last has the time `input_s`; return their times (n,), s."""
+        """Advance the clock to the samples `numbers` (n,), the last at time `input_s`; return their times (n,), s."""
         last, time_before_s, count = int(numbers[-1]), self._time_s, int(numbers[-1]) - self.number
         if not self.is_set:
             self.number, self._time_s = last, input_s
@@ -245,7 +245,7 @@ class SmoothedClock:
         return times_s
 
     def advance_through(self, numbers: NDArray[np.int64], input_s: Array) -> Array:
-        """Advance the clock by samples (n,), each with an input time (n,), s; return their times (n,), s."""
+        """Advance the clock through the samples `numbers` (n,), at input times (n,), s; return their times (n,), s."""
         return np.array(
             [self.advance_to(numbers[index : index + 1], float(input_s[index]))[0] for index in range(len(numbers))]
         )

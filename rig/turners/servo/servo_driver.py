@@ -58,6 +58,11 @@ class Servo:
         watchdog_s: float = 0.3,
         clock: Clock = HOST,
     ) -> None:
+        """Prepare the driver; `start` opens the port.
+
+        `baud`: the speed of the servo's line. `rate_hz`: the number of states a second. `watchdog_s`: the time without
+        an instruction after which the servo stops by itself.
+        """
         self._port, self._wanted_model, self._on_state, self._clock = port, model, on_state, clock
         self._id, self._baud, self._period_s = servo_id, baud, 1 / rate_hz
         self._watchdog = max(1, min(WATCHDOG_MOST, round(watchdog_s / WATCHDOG_S)))

@@ -73,6 +73,7 @@ class Arm:
         *,
         robot_api_port: int = ROBOT_API_PORT,
     ) -> None:
+        """Prepare the child process, the stop and the supervision; `start` connects."""
         self._host = host
         self._robot_api_port = robot_api_port
         self._on_state = on_state

@@ -62,6 +62,10 @@ class SimulatedAutopilot:
         seed: int,
         time_s: float,
     ) -> None:
+        """Switch the autopilot on with its `imus` and `parameters`.
+
+        `clock_ppm`: the error of its clock, positive if fast. `uid`: its unique number, hexadecimal.
+        """
         with requiring("autopilot"):
             from pymavlink.dialects.v10 import ardupilotmega as first_version
             from pymavlink.dialects.v20 import ardupilotmega

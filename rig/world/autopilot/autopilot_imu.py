@@ -63,6 +63,10 @@ class SimulatedImu:
         seed: np.random.SeedSequence,
         faulty: SimulatedFaultySection = FAULTLESS,
     ) -> None:
+        """Build the part's gyroscope and accelerometer, and name the parameters of their corrections.
+
+        `motion_at` returns rate, rad/s, and specific force, g, at a virtual time, s.
+        """
         self._index, self._parameters, self._px4 = index, parameters, px4
         gyroscope = Gyroscope(motion_at, truth.gyro, seed, truth.temperature_c)
         self._gyroscope, self._repeats = FrozenGyroscope(gyroscope, faulty), Repeats(faulty, seed)

@@ -34,6 +34,7 @@ class SensorTruth:
         *,
         accelerometer: bool = False,
     ) -> None:
+        """Build the errors from the simulated section; the item's frame is the flange's until `remount`."""
         self.gyro = replace(_build_gyro_truth(simulated), die=part)
         self.accelerometer = (
             None

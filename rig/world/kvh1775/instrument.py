@@ -70,6 +70,10 @@ class SimulatedKvh1775:
         time_s: float,
         faulty: SimulatedFaultySection = FAULTLESS,
     ) -> None:
+        """Switch the instrument on; it streams messages at once.
+
+        `oscillator_ppm`: the error of its oscillator, positive if fast.
+        """
         self.faults = KvhFaults()
         self._truth, self._motion_at, self._memory = truth, motion_at, memory
         self._serial_number = serial_number

@@ -64,6 +64,7 @@ class Printer:
         time_s: float,
         faulty: SimulatedFaultySection = FAULTLESS,
     ) -> None:
+        """Switch the device on: it prints its boot text, then the columns of `prints`."""
         self.faults = PrinterFaults()
         self.baud_rate = baud_rate
         self._section, self._prints, self._motion_at = section, prints, motion_at

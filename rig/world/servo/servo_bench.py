@@ -33,6 +33,7 @@ class ServoBench:
     """
 
     def __init__(self, configured: ServoSection, world: WorldSection) -> None:
+        """Build the servo from its sections; the world's seed determines the phases of its encoder's errors."""
         section = world.servo
         self._began_s = time.monotonic()
         self._site = build_site(world.site)
@@ -80,7 +81,7 @@ class ServoBench:
 
     @property
     def ideal(self) -> bool:
-        """Whether `rate_at` suffices, because the motion has no other part than an angular rate."""
+        """Whether `rate_at` gives all that a gyroscope senses: the ground does not rotate."""
         return not any(self._site.earth_rate_rad_s)
 
     def step(self) -> None:

@@ -81,6 +81,7 @@ class Robot:
         model: ArmModel = MODELS["ur10e"],
         tool_rotation_rad: Vector = (0.0, 0.0, 0.0),
     ) -> None:
+        """Build a controller that is powered and ready, with its joints at rest and no program."""
         self.identity = identity
         self.model = model
         self.links = links  # the links as the controller has them, not the true ones

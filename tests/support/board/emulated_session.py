@@ -73,6 +73,7 @@ class Session:
         boot_time_s: float = 0.137,
         temperature_c: float | Temperature = 22.0,
     ) -> None:
+        """Power up a board; a count is kept of the readings of each part."""
         truth = replace(TRUTH, noise_rad_s=noise_rad_s)
         self.readings = dict.fromkeys(parts, 0)
         self.sensors: dict[str, SpiDevice] = {

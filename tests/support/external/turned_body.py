@@ -43,6 +43,7 @@ class Session:
 
 
 def turn(hand: Hand, seed: int) -> Session:
+    """Simulate a hand that turns a body about each axis in pushes; return the readings and the declared rows."""
     rng = np.random.default_rng(seed)
     pulses: list[tuple[float, float, Array]] = []  # beginning, length, angle about which axis
     now_s = REST_S

@@ -85,6 +85,7 @@ def carry_out(
 
 
 def _meet(rig_bench: Bench, fault: Fault, random: Random, cell: Cell) -> None:
+    """Cause the fault in a running laboratory, and note every deviation from what must follow."""
     rig_bench.pace(REAL)
     fault_s, fault_wall_s = rig_bench.world.state()["time_s"], time.monotonic()
     driver_pid = rig_bench.driver_pid

@@ -319,6 +319,7 @@ def _drive(rng: np.random.Generator) -> dict[str, Any]:
 
 
 def _arm(rng: np.random.Generator) -> dict[str, Any]:
+    """Draw the section `world.arm`: errors of its joints, encoders and clock."""
     vibration = draw_visible_vibration(rng)
     separate = rng.spawn(1)[0]  # later draws remain the same
     drive, has_rough_ripple = _drive(separate), bool(separate.random() < 0.3)

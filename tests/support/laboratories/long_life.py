@@ -180,6 +180,7 @@ def _wait_until(world: WorldHandle, time_s: float) -> None:
 
 
 def _run(bench: Bench, number: int) -> Calibration:
+    """Make one calibration and return it with its duration; every few runs have a process of their own."""
     out, in_station = bench.folder / f"run-{number:03}", number % OWN_EVERY != OWN_EVERY - 1
     arguments = ["run", str(bench.config), "--out", str(out), "--yes"]
     began_s = time.monotonic()

@@ -108,6 +108,7 @@ def worlds(folder: Path) -> Iterator[World]:
     running: list[WorldHandle] = []
 
     def start(changes: Mapping[str, Any] | None = None) -> WorldHandle:
+        """Start a world with an ideal arm, changed by `changes`, at an address of its own."""
         host = fresh_host()
         address = {"arm": {"host": host}, "board": {"port": f"socket://{host}:7321"}}
         document = merge(merge(ideal_document(DEMO), address), changes or {})

@@ -55,6 +55,7 @@ class AutopilotOnAWire:
         provides_temperature: bool = True,
         mavlink_version: int = 2,
     ) -> None:
+        """Listen for a client; a `dead` autopilot never answers."""
         self.parameters = Parameters(firmware, imus, stored_parameters, file)
         self._firmware, self._motion_at, self._imus = firmware, motion_at, imus
         self._on_for_s, self._armed = uptime_s, armed

@@ -41,6 +41,10 @@ class ChildLink:
         robot_api_port: int,
         log: Path | None,
     ) -> None:
+        """Prepare the child process and its threads; `start` starts them.
+
+        `log`: the file for the output of the `ur_rtde` client, None to discard it.
+        """
         self._host = host
         self._on_message = on_message
         self._on_lost = on_lost

@@ -66,6 +66,7 @@ class JointMotion:
         vibration: Vibration | None = None,
         speed_limit_rad_s: Joints = JOINT_SPEED_LIMIT_RAD_S,
     ) -> None:
+        """Place the joints at rest at `start_rad` (6,)."""
         self.speed_limit_rad_s = speed_limit_rad_s
         self.vibration = vibration
         self._ripples = tuple(ripples)

@@ -41,6 +41,7 @@ class ControlProgram:
     name = "rtde_control"
 
     def __init__(self, robot: Robot, register_offset: int, path: Sequence[ScriptMove]) -> None:
+        """Fill the table of commands by their numbers in register 0."""
         self._robot = robot
         self._registers = ProgramRegisters(robot, register_offset)
         self._path = tuple(path)
