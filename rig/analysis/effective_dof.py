@@ -29,7 +29,7 @@ def angle_dof(result: "SensorResult") -> Array | None:
         return None
     solution = explained.solution
     derivative = _angle_derivatives(solution.matrix)
-    covariance = solution.matrix_covariance[:9, :9].reshape(3, 3, 3, 3)  # of F due to the readings
+    covariance = solution.matrix_covariance[:9, :9].reshape(3, 3, 3, 3)  # covariance of F due to the readings
     readings = np.einsum("aij,ijkl,akl->a", derivative, covariance, derivative)
     walk = np.einsum("aij,ijl,ail->a", derivative, _drift_covariance(explained)[:, :3, :3], derivative)
     return _split(np.diag(solution.angles_covariance_rad2), _reading_parts(readings - walk, walk, explained), budget)

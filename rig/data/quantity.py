@@ -198,7 +198,8 @@ FIELD: Final = Quantity(
 OF_THE_RIG: Final = (RATE, ACCELERATION, FIELD)
 TEMPERATURE: Final = Scalar("temperature", "thermometer", "°C", "c", DisplayUnit("°C", 1.0))
 PRESSURE: Final = Scalar("pressure", "barometer", "Pa", "pa", DisplayUnit("hPa", 100.0))
-COLDEST_C, HOTTEST_C = -273.15, 200.0  # of a part with a thermometer that survives; kelvins and counts are beyond
+# range of the temperatures that a part survives; kelvins and counts are beyond it
+COLDEST_C, HOTTEST_C = -273.15, 200.0
 SCALARS: Final = (TEMPERATURE, PRESSURE)
 
 

@@ -34,7 +34,7 @@ from rig.history.storage.sqlite_engine import WRITES
 LONGEST = 20_000  # characters of a station's state
 NAME = 200
 MOST = 100  # stations that are read, at most
-SOONEST_S, LATEST_S = -1.0, 3e9  # plausible ages: clocks may be corrected, and no station is a century old
+SOONEST_S, LATEST_S = -1.0, 3e9  # range of plausible ages: clocks may be corrected, and no station is a century old
 metadata = MetaData()
 station = Table(
     "station",

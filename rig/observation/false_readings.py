@@ -19,7 +19,7 @@ GAP = 1.5  # longest step without a missing reading, in intervals
 FROZEN, COARSE = (
     50,
     10,
-)  # equal readings in a row that are a fault; length of a second such run that shows a coarse axis
+)  # equal readings in a row that show a frozen axis, unless a second run of COARSE shows a coarse one
 TURNED_RAD_S = 0.2  # change of another axis during them
 INNER = (0.05, 0.95)  # quantiles that bound an axis' motion, so that single readings do not count
 # fractions of an axis' span: an overflow is larger than the first, all other steps are smaller than the second
@@ -138,7 +138,8 @@ def check_unclipped(time_s: Array, readings: Array, windows: list[Window]) -> No
     """
     for axis, letter in enumerate(RATE.axes):
         column = readings[:, axis]
-        noise = float(np.median(np.abs(np.diff(column)))) / 0.954  # of white noise, from its differences
+        # standard deviation of white noise, from the median of its differences
+        noise = float(np.median(np.abs(np.diff(column)))) / 0.954
         steps = np.diff(np.unique(column))
         if not len(steps) or steps.min() > FINE * noise:
             continue

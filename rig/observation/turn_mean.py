@@ -34,7 +34,7 @@ from rig.observation.statistics.vibration_noise import BRIEF, estimate_noise
 FEWEST_READINGS = 48  # fewest readings of a turn in which spectral lines are sought: enough for two lines
 SLOW = 8.0  # cycles per revolution: slower lines are hard to separate from waves once and twice per revolution
 SHOWN = 50.0  # power of a slow ripple relative to the median of the encoders' noise, which by chance reaches 15
-MOST_GAIN = 3.0  # of the noise of the arm's angles; weights with a larger one do not remove slow lines
+MOST_GAIN = 3.0  # largest gain of the noise of the arm's angles, up to which weights remove slow spectral lines
 NOT_ENCODED = LineSearch(slowest=5.0)
 ENCODED = LineSearch(slowest=2.5, beats=0, most=5)
 

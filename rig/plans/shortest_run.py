@@ -231,7 +231,7 @@ class _TurnerSearch:
         For such small steps a longer wait is assumed to give a smaller uncertainty.
         """
         waits_s = {key: float(getattr(best.procedure, key)) for key in self.waits}
-        counts = self._counts(plan_of(self.config, best.procedure))  # those of all repeats
+        counts = self._counts(plan_of(self.config, best.procedure))  # waits of all repeats
         candidates = []
         for values_s in product(*map(_down_from, waits_s.values())):
             shorter_s = dict(zip(waits_s, values_s, strict=True))

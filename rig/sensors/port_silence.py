@@ -30,8 +30,8 @@ class PortSilence:
 
     def __init__(self) -> None:
         self._idle_reads = 0
-        self._clock_s: float | None = None  # time of the other clock at the last check,
-        self._clock_then_s: float | None = None  # … and at the last data
+        self._clock_s: float | None = None  # time of the other clock at the last check
+        self._clock_then_s: float | None = None  # time of the other clock at the last data
 
     def note(self, count: int) -> None:
         """Record a read with `count` of the awaited items."""

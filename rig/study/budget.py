@@ -35,7 +35,7 @@ STEP_S = 0.05  # step of the bias random walk
 ATTITUDES = 72  # attitudes per revolution
 MOUNTING_RAD, SKEW_RAD = np.radians(5.0), np.radians(0.25)
 SAMPLE_RATE_HZ = 238.0
-WARM_UP_S, STEP_K = 300.0, 1 / 16  # warm-up, and the resolution of the thermometer of a LSM9DS1: DocID025715, table 4
+WARM_UP_S, STEP_K = 300.0, 1 / 16  # duration of warm-up; resolution of an LSM9DS1's thermometer: DocID025715, table 4
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,7 +18,7 @@ from rig.config.files.safe_writing import open_to_append
 
 LATE_S = 0.5  # wall time of a tick that is late
 LOOK_S = 0.1  # interval of the thread's checks
-RECORDS = 40  # at most, so that a world that is always late does not fill the disk
+RECORDS = 40  # largest number of records, so that a world that is always late does not fill the disk
 NS_PER_S = 1e9
 
 

@@ -43,7 +43,7 @@ BUSY_POLL_S = 0.001  # wall time between two polls of the sockets while ticks ar
 GARBAGE = 5_000
 LEAP = 4  # ticks in one go, at most: a packet's interval at 125 Hz
 ARM_LAG_S = 0.04  # virtual time by which a reader of the arm's states may lag: five packets at 125 Hz
-SERIAL_LAG_S = 1.0  # … and a reader of a serial line, where the system buffers the bytes
+SERIAL_LAG_S = 1.0  # virtual time by which a reader of a serial line may lag: the system buffers the bytes
 ARM_PORTS: dict[int, tuple[Callable[[Robot], ClientSession], float]] = {
     dashboard_server.PORT: (dashboard_server.DashboardSession, UNPACED),
     script_socket.PRIMARY_PORT: (primary_server.PrimarySession, UNPACED),

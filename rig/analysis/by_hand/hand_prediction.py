@@ -23,7 +23,7 @@ from rig.motion.by_hand import Face, Instruction
 from rig.observation.by_hand.hand_segmentation import segment_session
 from rig.observation.by_hand.rests_and_moves import ITS_OWN_CLOCK, rotate_face
 
-FLIP_S, TURN_S = 1.5, 2.5  # a move, from rest to rest; assumed
+FLIP_S, TURN_S = 1.5, 2.5  # duration of a move from rest to rest; assumed
 ASKED_S = 1.0  # from the end of a rest to the next move: the operator reads the instruction; assumed
 SAMPLED_HZ = 60.0  # rate of the simulated readings, which have the sensor's noise density
 FIRST: Face = "+z"

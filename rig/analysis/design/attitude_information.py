@@ -60,7 +60,7 @@ def attitude_account(config: RigConfig, plan: Plan) -> AttitudeAccount | None:
     attitudes, up = _attitudes(list(seconds)), np.array(config.site.up)
     first, second = assess_identifiability(attitudes, up, 1), assess_identifiability(attitudes, up, 2)
     _check_identifiability(first if order == 1 else second, len(attitudes))
-    attitude_std_rad = radians(config.uncertainty.axis_deg) / sqrt(3)  # of a half-width
+    attitude_std_rad = radians(config.uncertainty.axis_deg) / sqrt(3)  # from a half-width
     reference, dwells_s = config.site.gravity_m_s2 * up, np.array(list(seconds.values()))
     sensors = {
         name: predict_stds(

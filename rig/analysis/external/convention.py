@@ -17,7 +17,7 @@ from rig.estimation.arrays import Array, integrate_rates, interpolate
 from rig.estimation.sensor_axes import nearest_rotation
 from rig.observation.external.csv_samples import Samples
 
-COARSE_S, FINE_S = np.arange(-0.5, 0.501, 0.02), np.arange(-0.02, 0.0201, 0.002)  # lags to try
+COARSE_S, FINE_S = np.arange(-0.5, 0.501, 0.02), np.arange(-0.02, 0.0201, 0.002)  # coarse and fine lags to try
 FEWEST, MOST = 30, 3000  # the fewest and the most pairs of rows
 LONGEST_S = 1.0  # longest time between the two rows of a pair
 LEAST_RAD_S = 0.05  # RMS of the rate: a smaller one shows nothing

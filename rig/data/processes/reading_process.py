@@ -34,7 +34,7 @@ Reader = Callable[..., Iterator[Part]]
 MOST_FILES = 10_000  # largest number of files in a folder: a bag is split into one for every minute or gigabyte
 # Largest ratio of unpacked to stored size: noisy readings unpack to a quarter of that, zeros to a thousand times.
 MAX_UNPACKED = 20
-SPARE_BYTES = 32_000_000  # … and a margin for small files
+SPARE_BYTES = 32_000_000  # margin for small files, in addition to that ratio
 # Address space, half of which the libraries take; and more per byte of the file.
 MEMORY_BYTES, MEMORY_TIMES_STORED = 320 << 20, 2
 PROCESSOR_S, PROCESSOR_S_PER_BYTE = 8.0, 1e-6  # a slow computer reads 3 MB of readings a second, packed 1 MB

@@ -19,7 +19,7 @@ from rig.estimation.statistics.variance_components import Mixed, MixedModel
 
 Changing = Literal["bias", "scale", "attitude"]
 OF_SCALE = 0.02  # prior standard deviation of a change of the scale factors
-LIKELY, CERTAIN = 5.0, 10.0  # evidence of a change that U is to contain, and of one that nothing else explains
+LIKELY, CERTAIN = 5.0, 10.0  # least evidence of a change that U must contain, and of one that nothing else explains
 WORTH_FITTING = 1.0  # least ln of the Bayes factor with the sizes of the model without a change
 
 

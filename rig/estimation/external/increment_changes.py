@@ -24,7 +24,7 @@ def find_increment_change(
     `matrix` (3, 3) is F. The time is on the attitudes' clock.
     """
     sensitivities = np.diff(averaged.sensitivities, axis=0)[fixes.joined]
-    of_rows = sensitivities[..., MATRIX].reshape(-1, 3, 3, 3)  # of F's elements, by its row and column
+    of_rows = sensitivities[..., MATRIX].reshape(-1, 3, 3, 3)  # sensitivities to F's elements, by row and column
     possible = np.repeat((np.arange(len(sensitivities)) > 0)[:, None], 3, axis=1)
     of_attitude = np.tile(OF_ATTITUDE_RAD * np.eye(3), (len(sensitivities), 1, 1))
     effects = (

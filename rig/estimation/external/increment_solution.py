@@ -52,7 +52,7 @@ from rig.estimation.statistics.variance_components import Mixed, MixedFit, Mixed
 
 PASSES, SIZED = 12, 3  # iterations of the fit; the last iteration that estimates the variances
 SETTLED = 1e-2  # largest step, relative to the standard uncertainty, at which the fit has converged
-OUTLIER, OUTLIER_RAD = 4.0, 1e-3  # an outlier exceeds both: the ratio to the ninth decile, and rad
+OUTLIER, OUTLIER_RAD = 4.0, 1e-3  # an outlier exceeds both: a ratio to the ninth decile, and an angle
 # Most outliers: number, or fraction if more; passes that leave out outliers.
 SOME_OUTLIERS, MOST_OUTLIERS, SETTINGS_ASIDE = 4, 0.1, 3
 UNTRUSTWORTHY_RAD = 0.1  # with larger errors, the attitudes are those of another body

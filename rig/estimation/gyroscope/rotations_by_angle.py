@@ -27,7 +27,7 @@ from rig.estimation.gyroscope.budget import Budget, Contributor
 from rig.estimation.gyroscope.increments import increments
 from rig.estimation.sensor_axes import SensorAxes, parameter_jacobian
 
-PASSES, SETTLED = 20, 1e-3  # iterations, and the largest step at convergence, relative to the standard uncertainty
+PASSES, SETTLED = 20, 1e-3  # most iterations; largest step at convergence, relative to the standard uncertainty
 FARTHEST_RAD = 0.02  # error of an end attitude, beyond which the stated rotation is wrong
 MAX_CONDITION = 100.0
 REMEDY = "Turn about three different axes, either way round, or let it lie still once more"

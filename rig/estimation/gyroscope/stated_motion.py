@@ -19,7 +19,8 @@ from rig.estimation.arrays import Array, bisect, perpendicular_unit_vectors
 from rig.estimation.statistics.coverage import PROBABILITY
 
 SMALLEST_OF_NOISE = 0.1  # smallest error relative to a sweep's noise: it increases the noise by half a percent
-PRIOR_KNEE, LARGEST = 1e-2, 0.1  # relative rate error, and axis error in rad: no rate table is worse than the second
+# relative rate error, or axis error in rad: knee of the prior, and its end, as no rate table is worse
+PRIOR_KNEE, LARGEST = 1e-2, 0.1
 SIZES = 20  # grid points for each kind of error
 
 

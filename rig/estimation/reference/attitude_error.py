@@ -171,9 +171,10 @@ def maximise_likelihood(
 
     def negative_logs(log_deltas: Array) -> Array:
         """Return (χ² + ln det V + ln det of the slopes' information)/2, (m,), at ln δ (m,); V = diag(1 + δ² γ)."""
-        weights = 1 / (1 + np.exp(2 * log_deltas)[:, None] * growth)  # of the residuals: V⁻¹
+        weights = 1 / (1 + np.exp(2 * log_deltas)[:, None] * growth)  # diagonal of V⁻¹
         try:
-            lower = np.linalg.cholesky((basis.T * weights[:, None, :]) @ basis)  # of the coefficients' information
+            # Cholesky factor of the coefficients' information
+            lower = np.linalg.cholesky((basis.T * weights[:, None, :]) @ basis)
         except np.linalg.LinAlgError:  # some δ is so far above the noise that rounding dominates
             if len(log_deltas) == 1:
                 return np.array([np.inf])

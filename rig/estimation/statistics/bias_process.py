@@ -18,7 +18,7 @@ from rig.estimation.arrays import Array
 STEPS = 25  # grid points of each standard deviation
 PRICE = 1.0  # cost of a parameter in the log-likelihood (Akaike, IEEE Trans. Autom. Control 19 (1974) 716)
 SPAN = 300.0  # ratio of the largest to the smallest standard deviation of the grid
-PARTS = 24  # of a revolution, by the means of which the harmonics of flicker noise are computed, to 1 %
+PARTS = 24  # parts of a revolution, whose means give the harmonics of flicker noise to 1 %
 CHANGED = float(np.sqrt(2))  # change by flicker between adjacent means, relative to its Allan deviation
 
 # Random walk and scatter (2,) from pairs of sizes (K, 2) and their log-likelihoods (K,).

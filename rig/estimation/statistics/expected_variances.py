@@ -15,10 +15,12 @@ from rig.estimation.arrays import Array
 
 WALKS = 12  # grid points of the random walk
 SPAN = 100.0  # ratio of the largest to the smallest random walk
-SMALLEST_RAD, LARGEST_RAD, SIZES = 1e-5, 0.03, 25  # grid of δ: no arm is better than the smallest
+# grid of δ: ends, the first better than any arm, and number of points
+SMALLEST_RAD, LARGEST_RAD, SIZES = 1e-5, 0.03, 25
 
 OWN_SHARES = (0.001, 0.01, 0.1, 0.5)  # fractions of δ²: between nearly all and half of an arm's errors may be constant
-LOUDEST, VOLUMES = 30.0, 8  # grid of a disturbance's size, in standard deviations of the noise
+# grid of a disturbance's size: the largest, in standard deviations of the noise, and the number of points
+LOUDEST, VOLUMES = 30.0, 8
 
 
 @dataclass(frozen=True, slots=True)

@@ -297,7 +297,7 @@ class _ParameterFits:
         solved, *_ = np.linalg.lstsq(design, means)
         self.scale: Array = 1 / np.linalg.norm(solved[:3], axis=0)
         self.zero: Array = solved[3]
-        self.inputs: Array = readings.inputs @ solved[:3]  # of each axis, as it reads
+        self.inputs: Array = readings.inputs @ solved[:3]  # inputs along each sensing axis
         self.in_scale = np.concatenate([self.scale, np.ones(3)])
         self.residuals = readings.means - self.inputs
 

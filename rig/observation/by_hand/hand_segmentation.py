@@ -23,7 +23,8 @@ MARGIN_S = 0.1  # time at either end of a rest that is assigned to the adjacent 
 GAP = 2  # missing readings, from which on there is a gap
 AT_THE_TOP = 3  # equal readings in a row at the largest value, from which on they are saturated
 NEAR_RANGE = 0.995
-FIRST_S, STILL_RAD_S = 1.0, 0.03  # beginning of a recording, and the scatter of a body in a steady hand in it
+# duration of a recording's beginning; largest scatter there of a body that no hand holds
+FIRST_S, STILL_RAD_S = 1.0, 0.03
 SETTLED_S, LOOKS_S = 1.0, 0.25  # least duration of a rest during a session; interval of the evaluations
 # A body held in the hand: least duration, largest rate; length of the blocks.
 HELD_S, HELD_RAD_S, PAUSE_S = 0.75, 0.15, 0.25

@@ -30,7 +30,7 @@ from rig.observation.clocks.clock_estimate import check_readings
 from rig.observation.clocks.time_base import NOMINAL_DRIFT
 
 BETWEEN_S = 10.0  # assumed pause between two recordings of a session, which the boards' clocks do not show
-MICROSECOND_S = 1e-6 * (1 + NOMINAL_DRIFT)  # of the board's counter, by its crystal
+MICROSECOND_S = 1e-6 * (1 + NOMINAL_DRIFT)  # true duration of a microsecond of the board's counter
 ITS_OWN_CLOCK = "the sensor's own clock, as stated: uncertainty.crystal_ppm"
 
 Readings = tuple[Array, Array, Array | None]  # times (n,), rates (n, 3), accelerations (n, 3) where they are sent

@@ -12,7 +12,7 @@ from rig.estimation.arrays import Array, interpolate
 from rig.observation.time_stamps.sampling import Sampling
 
 BLOCK_S = 1.0
-BEYOND = 6.0  # in standard deviations of the noise of a difference
+BEYOND = 6.0  # largest difference due to noise, in its standard deviations
 BRIDGED_S, FILLED = 0.25, 0.01  # longest gap at rest that is ignored; largest fraction of readings missing in such gaps
 NORMAL = 1.4826  # standard deviation over median absolute deviation
 

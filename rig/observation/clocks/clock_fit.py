@@ -22,9 +22,9 @@ SETTLED, UNDERWAY = 1e-3, 0.1
 FINE_STEPS = 400  # many: if the arm vibrates and hardly turns, a step may be nearly as long as the one before
 # Steps after which weights are kept: noise that seems correlated only at every second step would never settle.
 WEIGHED_STEPS = 60
-SLOW_S, FINE_S = 0.1, 0.02  # times over which rates are averaged, first and second
+SLOW_S, FINE_S = 0.1, 0.02  # times over which rates are averaged in the first fit and in the second
 AVERAGED, EVERY = 10, 2  # rates in one average; stride of the averages in the spline
-LEAST_GAP = 0.5  # in intervals between samples
+LEAST_GAP = 0.5  # shortest step between samples, in intervals
 # Step from which on, and interval at which, the fit extrapolates; largest number of steps it skips.
 SLOW_STEPS, LEAP_STEPS, FARTHEST = 300, 20, 100.0
 

@@ -37,7 +37,7 @@ from rig.observation.turn_mean import SLOW
 # segment would show it.
 OF_REVOLUTION, OF_REST, MOST = 6, 3, 72
 FEWEST_SAMPLES = 20  # fewest samples of a segment
-FEWEST_SCATTERED = 3  # segments: as many or fewer show no scatter around a straight line
+FEWEST_SCATTERED = 3  # number of segments up to which they do not show a scatter around a straight line
 FEWEST_AT_REST = 60  # fewest samples of a rest: fewer do not determine its noise well enough for a weight
 PREVAILS = 0.7  # fraction of the residuals' variance, below which the noise of a long mean is that at zero frequency
 AT_REST = LineSearch(stands_out=30.0, beats=0)  # noise alone exceeds this in one bin of 10⁹

@@ -40,7 +40,7 @@ CORNERS = (2 / 180) ** 0.5 / 2
 # Time over which rates are averaged against encoder noise: 24 µrad make 4 mrad/s from angles 8 ms apart.
 SMOOTHED_S = 0.05
 LOST = 0.01  # largest fraction of missing samples, by the nominal rate, which boards keep to about 1 %
-GAP = 1.5  # in intervals between samples: a longer step misses one
+GAP = 1.5  # longest step between samples, in intervals: a longer one misses a sample
 STEPS = 48
 FILTERED = range(-2, 3)  # samples that a sensor's filter combines into one reading
 WRISTS = 3  # the last joints, whose transfers count

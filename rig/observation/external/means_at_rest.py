@@ -12,7 +12,7 @@ from rig.observation.external.reference_rows import Turning
 from rig.observation.external.still_attitudes import LATE_S, STILL_RAD_S, still_windows
 from rig.observation.windows import Window, inside
 
-SHORTEST_S, AS_QUIET = 0.4, 1.5  # shortest rest with a different reading; ratio to the noise of the other rests
+SHORTEST_S, AS_QUIET = 0.4, 1.5  # shortest rest with another bias; its largest noise, relative to the other rests
 FEWEST, FEWEST_S = 2, 1.0  # fewest rests that show a scatter, and their total duration
 
 

@@ -19,8 +19,8 @@ from rig.observation.external.reference_rows import Turning
 APART_S = 0.1  # least time between the rows of a pair, or one row
 MOST_RAD, LEAST_RAD = 2.6, 0.03  # rotation of a pair: less than π, and more than the errors of most references
 MOVING = 0.2  # fraction of the ninth decile of rotations, below which a pair counts as a rest
-PAIRS, FEWEST = 600, 12  # most and fewest pairs
-REACH_S, COARSE_S, FINE_S = 0.5, 0.02, 0.004  # range of the search for τ, and its steps
+PAIRS, FEWEST = 600, 12  # largest and smallest number of pairs
+REACH_S, COARSE_S, FINE_S = 0.5, 0.02, 0.004  # half-range of the search for τ; its coarse and fine steps
 REWEIGHTINGS = 4
 # Fraction of the squared rotation about all axes: if an axis has less, F remains that of an aligned sensor about it.
 HARDLY = 1e-4

@@ -12,8 +12,10 @@ from rig.observation.motion.reference_motion import MIN_RATE_RAD_S, closely_foll
 # Longest step and largest angle between rows that show how the table turned: below half a turn.
 MAX_STEP_S, MAX_STEP_RAD = 0.3, 2.6
 MIN_ROWS = 20
-COMPARED_S, FEWEST_PAIRS = 0.25, 12  # interval between rows whose rates and attitudes are compared; pairs of rows
-LEAST_RAD, ALIKE, MOST_PAIRS = 0.02, 0.3, 0.8  # rotation of a pair; agreement of ratios; fraction of pairs that agree
+# interval between two rows whose rates and attitudes are compared; fewest such pairs
+COMPARED_S, FEWEST_PAIRS = 0.25, 12
+# least rotation of a pair; largest relative deviation from the median ratio; least fraction of pairs within it
+LEAST_RAD, ALIKE, MOST_PAIRS = 0.02, 0.3, 0.8
 # °/rad, and its tolerance: this ratio is a wrong unit; any other one is a turn of over half a revolution per row
 DEGREES, NEARLY = 180 / np.pi, 0.05
 VARIED = 2.0  # ratio of the fastest to the slowest rate: above it, turns of over half a revolution have no common ratio

@@ -15,9 +15,10 @@ from rig.estimation.arrays import Array
 
 LONGEST_STEP_S = 0.02  # between readings: in a longer one a hand starts and stops
 SMALLEST_RAD_S = 0.1  # over one such step a smaller one turns by less than a body may move at rest
-BEYOND = 16.0  # times the largest deviation of the readings around, but for one other spike
-SUDDEN = 3.0  # times the change of any axis between the next readings: a body that is stopped moves about all axes
-REACH, ONE = 10, 5  # readings on either side that show the usual deviation; number of these that another spike affects
+BEYOND = 16.0  # least ratio to the largest deviation of the readings around, one other spike left out
+SUDDEN = 3.0  # least ratio to any axis' change between the next readings: a body that is stopped moves about all axes
+# readings on either side whose deviations are the usual ones; the most of them that one other spike affects
+REACH, ONE = 10, 5
 # deviation of a spike's neighbours from their cubics, relative to the spike's own; its tolerance
 NEXT, ALIKE = -2 / 3, 0.2
 PASSES = 3  # spikes that are close together hide each other

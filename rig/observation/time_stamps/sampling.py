@@ -31,7 +31,7 @@ LONG_STEP = 6.0  # in intervals: a longer step is a gap; among uneven stamps, a 
 PACKET_S = 0.5  # readings that follow each other evenly for longer have not arrived at once
 # Tolerance of a whole multiple, in intervals; fraction of differences that must be whole multiples.
 NEAR, MOSTLY = 0.25, 0.8
-LOST = 0.6  # in intervals: a larger difference is a lost reading
+LOST = 0.6  # difference of delays, in intervals, from which on a reading is lost
 COARSE = 1 / 3  # resolution in intervals, above which the stamps are worse than `NEAR`
 # Fraction of the interval; if this fraction of steps is shorter, readings are stamped on arrival.
 SHORT, SOME_SHORT = 0.6, 0.05
@@ -40,7 +40,7 @@ MORE = 1.5  # ratio to the resolution, above which stamps are not only rounded
 # Quantile of squared normal deviates; mean of those below it, relative to the mean of all.
 SMALLER, OF_NORMAL = 0.85, 0.5204
 PASSES, SETTLED = 6, 1e-9
-DECIMALS, BITS = 7, 16  # powers of a second to which stamps may be rounded
+DECIMALS, BITS = 7, 16  # most decimals, and most binary digits, of a second to which stamps may be rounded
 COUNTED = 50  # missing readings: the number in a longer gap is too uncertain to improve the interval
 SEGMENTS, FARTHEST = 24, 1024  # fewest segments of a log that show a random walk; most readings of a segment
 GROWN = (2.5, 12.0)  # range of the factor by which a random walk's variance grows over four segments

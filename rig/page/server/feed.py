@@ -19,8 +19,8 @@ from rig.station.events import RunEvent
 
 FRAME_S = 0.1
 SIGN_OF_LIFE_S = 0.8  # interval of messages if there is no news: a browser reports silence after 2 s
-CLIENTS = 32  # browsers with the token, at most
-STRANGERS = 16  # … and without
+CLIENTS = 32  # largest number of browsers with the token
+STRANGERS = 16  # largest number of browsers without the token
 
 
 class Source(Protocol):

@@ -27,7 +27,7 @@ LAST_NEWS_S = 4.0  # time for browsers to receive the last news
 ENDING_S = 8.0
 SHORTEST_TOKEN = 22  # characters of base64, for 128 bits
 AT_ONCE = 8  # connections accepted in one cycle of the event loop
-WAITING = 128  # … and those that may wait for it
+WAITING = 128  # connections that may wait to be accepted
 IDLE_S = 3  # duration for which a browser's connection waits for another request
 LARGEST_HEADERS = 8192  # bytes of the headers
 

@@ -11,7 +11,7 @@ from signxml.util import namespaces
 
 NAMES = {"ds": namespaces.ds, "xades": namespaces.xades}
 BEFORE_PROPERTIES = "-SignedProperties"  # suffix of the Id of the signed properties, after the signature's Id
-_ENCODINGS = {  # by the first bytes: the codec, and its names in the declaration
+_ENCODINGS = {  # first bytes → the codec, and its names in the declaration
     b"\xff\xfe": ("utf-16", {"utf-16", "utf-16le"}),
     b"\xfe\xff": ("utf-16", {"utf-16", "utf-16be"}),
     b"<\0": ("utf-16-le", {"utf-16", "utf-16le"}),

@@ -21,8 +21,8 @@ class MagneticFieldReader:
 
     def __init__(self, t_per_count: float, full_scale_counts: int) -> None:
         self._gauss_per_count, self._limit = t_per_count / GAUSS_T, full_scale_counts
-        self._rows = np.zeros(0, FIELD_SAMPLE_DTYPE)  # rows of an incomplete reading, one for each axis,
-        self._axes = np.zeros(0, np.int64)  # … and the index of each axis
+        self._rows = np.zeros(0, FIELD_SAMPLE_DTYPE)  # rows of an incomplete reading, one for each axis
+        self._axes = np.zeros(0, np.int64)  # index of the axis of each row
         self._first_number: int | None = None
 
     def feed(

@@ -21,7 +21,7 @@ from rig.sensors.lines.time_steps import find_time_step_s
 from rig.sensors.own_port import OwnPort, PortFaults, closing_on_failure, open_device_port
 from rig.sensors.port_silence import USUAL, Patience
 
-LOOK_SAMPLES, LOOK_S = 50, 0.5  # samples, and duration by the device's clock, before its rate is judged
+LOOK_SAMPLES, LOOK_S = 50, 0.5  # fewest samples, and shortest time by the device's clock, from which its rate is judged
 QUOTED = 60  # characters of a quoted line
 UNPRINTABLE = 0.05  # fraction of bytes above which the baud rate is wrong
 DAMAGED = 0.5  # fraction of rejected lines above which a stream is useless

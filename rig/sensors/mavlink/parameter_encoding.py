@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from rig.sensors.mavlink.dialect import PX4
 
 REAL32 = 9  # MAV_PARAM_TYPE
-WHOLE = {1: "B", 2: "b", 3: "H", 4: "h", 5: "I", 6: "i"}  # … UINT8 to INT32
+WHOLE = {1: "B", 2: "b", 3: "H", 4: "h", 5: "I", 6: "i"}  # MAV_PARAM_TYPE from UINT8 to INT32, as struct formats
 SINGLE = struct.Struct("<f")
 
 

@@ -21,7 +21,8 @@ SLACK_S = 0.020  # return delay (0.5 ms as delivered), latency of the adapter, a
 SETTLE_MOST_S = 0.1  # the longest wait for a line to fall silent
 ATTEMPTS = 4  # a write without acknowledgement is read back, and repeated if it did not take effect
 ALERT = 0x80  # bit of the error byte: Hardware Error Status is not zero. The instruction itself has not failed
-SUCCESS, NOT_SENT = 0, (-1000, -1001, -2000)  # results of the packet handler: port busy, not sent, wrong instruction
+# results of the packet handler; not sent: port busy, failed, wrong instruction
+SUCCESS, NOT_SENT = 0, (-1000, -1001, -2000)
 DAMAGED = -3002
 ID, LENGTH, ERROR, DATA = 4, 5, 8, 9  # indices in a status packet of protocol 2.0
 WITHOUT_DATA = 4  # the length of a status packet without data: instruction, error, checksum

@@ -28,7 +28,8 @@ from rig.turners.turner import watch_nothing
 
 WATCH_S = 0.02  # the caller's watch is called at least this often
 ARRIVAL_RAD = 15 * PULSE_RAD  # 1.3°: the position error at rest of a servo without an integral gain
-SLOWNESS, SLOWNESS_S = 1.1, 1.0  # tolerance of a move's planned duration: "t4" of the manual, and settling
+# longest move: ratio to its planned duration, plus a time for settling ("t4" of the manual)
+SLOWNESS, SLOWNESS_S = 1.1, 1.0
 FIRST_STATE_S = 5.0
 STANDING_S = 3.0  # time within which states must show rest before control is taken
 UNWATCHED_S = 2.0  # time without supervision, after which a move is stopped

@@ -15,7 +15,7 @@ from rig.turners.servo.servo_preflight import hardware_problem
 from rig.turners.servo.servo_registers import HARDWARE_ERROR, STATE, TORQUE, TRIPPED, WATCHDOG
 from rig.turners.servo.servo_state import ServoState, decode
 
-LOST_MOST, SILENCE_S = 5, 0.4  # tolerated number of states lost in a row, and time without a state
+LOST_MOST, SILENCE_S = 5, 0.4  # most states lost in a row, and longest time without a state, that are tolerated
 LOOK_S = 0.1  # period of reading what the state packet lacks: torque and watchdog, alternately
 HELD_UP_S = 0.05  # a longer transaction leaves the time of the position unknown
 # Tolerance of the servo's clock relative to ours: with a larger difference the reply is late.

@@ -47,10 +47,11 @@ POSITION = Register(132, "<i", "Present Position")
 # Velocity Trajectory, Position Trajectory, Present Input Voltage, Present Temperature: one block, one packet.
 STATE = Register(120, "<HBBhhiiiiHB", "Realtime Tick … Present Temperature")
 
-WATCHDOG_FIRMWARE, TIMED_FIRMWARE, STARTUP_FIRMWARE = 38, 42, 45  # the first with Bus Watchdog, timed profile, …
+# first firmware with Bus Watchdog, with the time-based profile, with Startup Configuration
+WATCHDOG_FIRMWARE, TIMED_FIRMWARE, STARTUP_FIRMWARE = 38, 42, 45
 EXTENDED_POSITION = 4  # Operating Mode: ±256 revolutions
 TIME_BASED = 4  # Drive Mode: bit 2 alone; ccw counts up, and only Torque Enable switches torque on
-NO_SECONDARY_ID = 253  # … and above
+NO_SECONDARY_ID = 253  # IDs from this one on mean "none"
 WATCHDOG_S, WATCHDOG_MOST, TRIPPED = 0.020, 127, 255
 BY_VOLTAGE, BY_HEAT, BY_ENCODER, BY_SHOCK, BY_LOAD = 0x01, 0x04, 0x08, 0x10, 0x20  # Shutdown, Hardware Error Status
 ERROR_WORDS = {

@@ -24,7 +24,7 @@ from rig.turners.ur.identity import is_polyscope_x
 ASK_S = 0.5  # period of polling the control mode
 LOOK_S = 0.1  # time within which the thread ends after `close`
 ANSWER_S = 0.8
-GONE_S, CLOSED_S = 1.0, 0.25  # time for which states continue: it shows that only the port is gone
+GONE_S, CLOSED_S = 1.0, 0.25  # time for which states must continue to show that only the port is gone, or has closed
 
 Remote = bool | None  # None: unknown to the controller
 ControlMode = Remote | Literal["gone"]

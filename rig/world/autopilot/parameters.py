@@ -13,7 +13,7 @@ from typing import Literal
 
 FLOAT, INT8, INT32 = 9, 2, 6  # MAV_PARAM_TYPE
 Firmware = Literal["ardupilot", "px4"]
-DEVICE_ID = 2621698  # that of an ICM-42688 on SPI, to which the IMU's number is added
+DEVICE_ID = 2621698  # device number of an ICM-42688 on SPI; the IMU's number is added to it
 
 
 def build_factory_parameters(firmware: Firmware, imus: int) -> dict[str, tuple[int, float]]:

@@ -47,10 +47,10 @@ MODELS: Mapping[str, Model] = {
     "XM430-W350": Model(1020, 200, 80, (95, 160), (1920, 100, 0, 800), True, 46.0),
     "XM430-W210": Model(1030, 330, 80, (95, 160), (1920, 100, 0, 800), True, 77.0),
 }
-POSITION, EXTENDED = 3, 4  # of Operating Mode
+POSITION, EXTENDED = 3, 4  # values of Operating Mode
 TIME_BASED, REVERSE = 0x04, 0x01  # bits of Drive Mode
 TRIPPED = 255  # Bus Watchdog: −1 in its one byte
-MODES = {True: (0, 1, 3, 4, 5, 16), False: (1, 3, 4, 16)}  # with and without a current sensor
+MODES = {True: (0, 1, 3, 4, 5, 16), False: (1, 3, 4, 16)}  # values of Operating Mode with and without a current sensor
 
 
 def build_control_table(model: Model, firmware: int) -> tuple[RegisterRow, ...]:

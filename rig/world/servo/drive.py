@@ -17,7 +17,7 @@ from rig.world.servo.truth import ServoTruth
 
 PULSE_RAD = 2 * pi / 4096
 SPEED_RAD_S = 0.229 * 2 * pi / 60  # unit of velocity registers
-ACCELERATION_RAD_S2 = 214.577 * 2 * pi / 3600  # … and of Profile Acceleration: rev/min²
+ACCELERATION_RAD_S2 = 214.577 * 2 * pi / 3600  # unit of Profile Acceleration: 214.577 rev/min²
 FASTEST_RAD_S2 = 200.0  # an "infinite" acceleration
 WATCHDOG_S = 0.020
 TICKS = 32768

@@ -11,8 +11,8 @@ from rig.turners.ur.stopping.spare_descriptors import SpareDescriptors
 from rig.turners.ur.stopping.stop_paths import StopConnection, StopPath
 
 STOP_S = 0.9  # a stop is confirmed within this time, or not at all
-PATH_S = 0.8  # time-out of a port of the controller …
-LATE_S = 0.1  # … but at least this, at the end of the stop's time
+PATH_S = 0.8  # time-out of a port of the controller
+LATE_S = 0.1  # shortest time-out of a port, at the end of the stop's time
 LOOKS = 2  # reports about programs, within which a refusal would have come
 ASK_S = 0.05  # period of asking a port whether the program has ended
 ANSWERS_S = 0.3  # wait at rest for late refusals: the time of three states

@@ -20,7 +20,7 @@ STATE_HZ = 10
 ROBOT_STATE, ROBOT_MESSAGE = 16, 20
 VERSION_MESSAGE = 3
 ACCELERATION_LIMIT_RAD_S2 = 40.0  # for every joint
-NOT_CALIBRATED, CALIBRATED = 0, 2  # links in KinematicsInfo: those of the model, those of this arm
+NOT_CALIBRATED, CALIBRATED = 0, 2  # state of the links in KinematicsInfo: those of the model, or those of this arm
 PROJECT, BUILT = b"URControl", b"simulated"  # in place of a date, as at the dashboard
 
 

@@ -19,7 +19,7 @@ HEADER = struct.Struct(">HB")
 DATA_BYTES = 0xFFFF - HEADER.size - 1  # the greatest size of a recipe's values, after its number
 INPUT_RECIPES = 255  # the number is a byte, and 0 means none
 DEFAULT_HZ = 125.0  # version 1 has no frequency
-CB3_HZ, E_SERIES = 125.0, 5  # the greatest rate of controllers before the e-Series
+CB3_HZ, E_SERIES = 125.0, 5  # highest rate before the e-Series; major version of the first e-Series
 
 
 def build_package(kind: str, payload: bytes) -> bytes:

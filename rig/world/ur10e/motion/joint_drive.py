@@ -60,7 +60,7 @@ class JointDrive:
         square = v * v + SLOW_SQUARED
         size = v / square
         if a:
-            growth = (SLOW_SQUARED - v * v) / (square * square) * a  # of the size with time
+            growth = (SLOW_SQUARED - v * v) / (square * square) * a  # rate of change of the ripple's size
             bend = 2.0 * v * (v * v - 3.0 * SLOW_SQUARED) / (square * square * square) * a * a
             angle, rate = size * sines, growth * sines + size * v * cosines
             change = bend * sines + 2.0 * growth * v * cosines + size * (a * cosines - v * v * bends)

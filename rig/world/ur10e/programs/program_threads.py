@@ -12,7 +12,8 @@ from rig.world.ur10e.robot import Robot
 Steps = Iterator[None]
 
 NUMBER_MAX = 1e6  # angles, lengths, speeds and accelerations, all in SI units
-SLOWEST, SLOWEST_LINE_M_S = 1e-6, 1e-3  # the slowest moves: rad/s and m/s, and accelerations with the same numbers
+# lowest speeds of moves, rad/s and m/s; lowest accelerations have the same numbers
+SLOWEST, SLOWEST_LINE_M_S = 1e-6, 1e-3
 HAND_OVER_RAD_S2 = 4.0  # deceleration before a move that follows a killed one
 
 
