@@ -17,7 +17,7 @@ from rig.observation.observed_run import ObservedRun
 
 @dataclass(frozen=True, slots=True)
 class When:
-    """The times of readings in UTC with their mean, and their mean temperature with its range.
+    """The first, mean and last time of readings (UTC), and their mean temperature with its range.
 
     Temperatures are None without a thermometer; the range is None if the temperature was stated.
     """

@@ -26,7 +26,7 @@ FEWEST_TO_JUDGE = 20  # readings: fewer may be equal by chance
 
 @dataclass(frozen=True, slots=True)
 class AtRest:
-    """The Allan deviation of one quantity at rest in rad/s or m/s², and the noise parameters of its axes.
+    """The Allan deviation of one quantity at rest, in its SI unit, and the noise parameters of each axis.
 
     `longest_s`: the longest interval without a gap; `total_s`: the sum of all; `temperature_c`: lowest and highest,
     None without a thermometer.

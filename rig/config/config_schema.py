@@ -73,7 +73,7 @@ def _section(model: type[BaseModel]) -> dict[str, Any]:
 
 
 def _add_kind(section: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the schema of a turner, with its kind next to the keys of its section."""
+    """Return the schema of a turner's section with the key `kind` added."""
     return {**section, "properties": {"kind": {"type": "string"}, **section["properties"]}}
 
 

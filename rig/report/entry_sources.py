@@ -21,7 +21,7 @@ from rig.data.entries.earth_rate import EarthRateEntry
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """The sources of an entry: for each of its fields, the attribute of objects of `classes` that fills it."""
+    """The sources of an entry: by field, the name of the attribute of `classes` that fills it."""
 
     classes: tuple[str, ...]
     attributes: Mapping[str, str]

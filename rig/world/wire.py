@@ -80,8 +80,8 @@ class Wire:
     """The pace of one client, which may lag `lag_s` of virtual time before the world waits for it.
 
     A wait ends when a real laboratory would have continued, because otherwise other clients would regard the world as
-    dead. The world waits for a client that reads as fast as it can, even if it is slow. It waits for one that does not
-    read only until its patience ends, and then not again until that client has kept pace.
+    dead. The world waits for a client that reads as fast as it can, even if it is slow. For a client that does not
+    read, the world waits only until its patience ends, and not again before the client has kept pace.
     """
 
     def __init__(self, count_unread: Unread, lag_s: float, wall: Callable[[], float]) -> None:

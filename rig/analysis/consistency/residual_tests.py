@@ -28,8 +28,8 @@ Alternatives = Mapping[str, Array | None]  # by the check's name; None: all resi
 class FaultMode(Generic[Subject]):
     """A possible fault, the `check` that detects it, and the `unit` of its size: None for the readings' unit.
 
-    `patterns` return the readings' changes by one unit of the fault, one for each form in which it may occur. A change
-    half-way through has zero mean, as a calibration absorbs the rest.
+    `patterns` returns the changes of the readings by one unit of the fault, a column for each form that it may have. A
+    change half-way through has zero mean, as a calibration absorbs the rest.
     """
 
     what: str

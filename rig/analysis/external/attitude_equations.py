@@ -101,10 +101,10 @@ class Equations:
 
 
 def _estimate_variances(rows: Rows, reference: KnownVector) -> tuple[Array, Array]:
-    """Return the variances (N, 3) of the means, by one variance of all samples from the residuals, and their dof.
+    """Return the variances (N, 3) of the means and their dof, from one variance for all samples.
 
-    Rows are weighted equally: a model with attitude errors would take noise for such errors. Raise Fault
-    `too_few_observations` without redundant rows.
+    The residuals determine that variance. Rows are weighted equally: a model with attitude errors would take noise for
+    such errors. Raise Fault `too_few_observations` without redundant rows.
     """
     counts = rows.samples[:, None]
     quiet = np.full_like(rows.means, (1e-9 * np.abs(rows.means).max()) ** 2) / counts

@@ -86,7 +86,7 @@ def _is_certain(data: ExternalData, change: AbruptChange) -> bool:
 
 
 def _find_leverage(rates_rad_s: Array, readings_rad_s: Array, is_later: Array) -> float:
-    """Return the standard deviation, rad/s, of the step that one axis shows, for rates with a relative error of 1.
+    """Return the std, rad/s, of the bias step of one axis if all stated rates have a relative error of 1.
 
     The N rows have `rates_rad_s` (N, 3) and `readings_rad_s` (N,) of the axis; `is_later` (N,) is true after the step.
     """

@@ -1,7 +1,8 @@
 """The check that a gyroscope's bias from increments between attitudes agrees with its readings at rest.
 
-A gyroscope at rest reads its bias, and motion that the reference does not show. The uncertainty of this motion is from
-the scatter of the reference's rates in the rests, not from its errors in motion, which time stamps may cause.
+A gyroscope at rest reads its bias, and motion that the reference does not show. The uncertainty of this motion follows
+from the scatter of the reference's rates in the rests. The reference's errors in motion are not used, because time
+stamps may cause them.
 """
 
 import numpy as np

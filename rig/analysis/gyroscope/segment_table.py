@@ -87,8 +87,8 @@ def append_transfers(
 ) -> Segments:
     """Return the segments with the transfers appended, numbered downwards from `REST` − 1.
 
-    A transfer's noise is its own, or that of other segments over the same duration if larger, plus the effect of
-    vibration, estimated in the rests before and after. `windows`: the segments' windows.
+    A transfer's noise is the larger of its own noise and that of other segments over the same duration. The effect of
+    vibration is added, estimated from the rests before and after. `windows`: the segments' windows.
     """
     if not transfers:
         return segments

@@ -190,7 +190,7 @@ class SensorSection(Section):
 
     @property
     def own_port(self) -> tuple[str, str] | None:
-        """The sensor's own port, if it has one, and the key in its section that states it."""
+        """The sensor's own port and the key in its section that states the port; None without one."""
         if self.serial is not None:
             return "serial.port", self.serial.port
         return None if self.mavlink is None else ("mavlink.port", self.mavlink.port)

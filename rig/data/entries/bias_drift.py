@@ -22,7 +22,7 @@ class BiasStepEntry(Entry):
 class RepeatEntry(Entry):
     """One repeat of all attitudes: its bias with scale, axes and reference fixed, and with all of them estimated.
 
-    `time_s` is from the middle of the first repeat to that of this one.
+    `time_s` is the time from the middle of the first repeat to the middle of this repeat.
     """
 
     time_s: float

@@ -1,7 +1,7 @@
 """The solution of the graph by Gauss–Newton steps, with the hand's variance components from the residuals.
 
-A component is estimated from the factors that it affects, each with its redundancy number (Förstner 1979), together
-with the stated value as a prior of `PRIOR_DOF` degrees of freedom: a short session changes it little.
+Each component is estimated from the factors that it affects, weighted by their redundancy numbers (Förstner 1979). The
+stated value is a prior of `PRIOR_DOF` degrees of freedom, so a short session changes it little.
 """
 
 from collections.abc import Sequence

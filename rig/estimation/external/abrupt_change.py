@@ -84,11 +84,11 @@ def find_change(
         row = np.arange(len(begins_s))
         shows = (row >= first if changed.lasts else row == first)[:, None, None]
         columns = changed.of_axes * changed.possible[first] * shows
-        widened = MixedModel(_add_columns(model.mixed, columns.reshape(-1, 3)))
-        own_std = widened.find_maxima(std)[0]
-        odds = widened.evaluate_posterior(own_std) - without
+        with_change = MixedModel(_add_columns(model.mixed, columns.reshape(-1, 3)))
+        own_std = with_change.find_maxima(std)[0]
+        odds = with_change.evaluate_posterior(own_std) - without
         if odds > (least_evidence if change is None else change.evidence):
-            sizes = changed.size * widened.solve(own_std).theta[-3:]
+            sizes = changed.size * with_change.solve(own_std).theta[-3:]
             change = AbruptChange(changed.what, float(begins_s[first]), sizes, odds)
     return change
 

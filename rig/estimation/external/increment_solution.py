@@ -4,9 +4,9 @@ The reference's rates are not used: noise in the regressors would bias the scale
 between fixes (measured attitudes) is used (`attitude_drift`); the gyroscope's part of its noise grows only with the
 square root of time.
 
-The variances of the errors of fixes and gyroscope are estimated from the residuals (`variance_components`), together
-with those of the changes of matrix and bias between intervals of the recording: nonlinearity, g-sensitivity,
-temperature. Matrix and bias are their means over the intervals, with the uncertainty that follows from these variances.
+Variance components are estimated from the residuals (`variance_components`): of the errors of fixes and gyroscope, and
+of the changes of matrix and bias between intervals of the recording (by nonlinearity, g-sensitivity, temperature).
+Matrix and bias are their means over the intervals, with the uncertainty that follows from these variances.
 """
 
 from dataclasses import dataclass, replace

@@ -61,8 +61,8 @@ def find_row_change(
     model = MixedModel(mixed)
     axes = np.tile(np.eye(3), (count, 1, 1))
     either_side = EITHER_SIDE if (speeds == 0).any() or count < FEWEST_FOR_ONE else 1
-    places = np.arange(count)
-    inner = np.minimum(places, count - places) >= either_side
+    rows_before = np.arange(count)
+    inner = np.minimum(rows_before, count - rows_before) >= either_side
     large = np.abs(read) > LARGE * np.abs(read).max(axis=0)
     before = np.cumsum(large, axis=0) - large
     both_sides = np.minimum(before, large.sum(axis=0) - before) >= EITHER_SIDE

@@ -191,8 +191,8 @@ def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributo
     yield from _evaluate_mounts(explained, unknown, propagate)
     if unknown.earth_covariance_rad2_s2 is not None:
         variances, directions = np.linalg.eigh(unknown.earth_covariance_rad2_s2)
-        spread = inputs.attitudes @ (directions * np.sqrt(variances.clip(min=0.0)))  # principal axes of the errors
-        source, patterns = "found from sweeps and rests", np.moveaxis(spread, -1, 0) @ matrix.T
+        error_axes = inputs.attitudes @ (directions * np.sqrt(variances.clip(min=0.0)))  # principal axes of the errors
+        source, patterns = "found from sweeps and rests", np.moveaxis(error_axes, -1, 0) @ matrix.T
         yield evaluate_a("Earth's rate", source, propagate(patterns), unknown.earth_dof)
     elif unknown.earth_rate:
         # One pattern for each axis of the base.

@@ -106,7 +106,7 @@ def solve_attitude_weighted(start: Array, placed: Placed) -> AttitudeWeighted:
 
 
 def find_worst_attitude(start: Array, placed: Placed, fit: AttitudeWeighted) -> tuple[int, float, float]:
-    """Return the attitude that fits worst, its error in rad relative to the others, and the error to be expected.
+    """Return the index of the attitude that fits worst, its error relative to the others, and the expected error, rad.
 
     The expected error is determined without that attitude, which would inflate it.
     """

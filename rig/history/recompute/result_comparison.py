@@ -159,7 +159,7 @@ class RecomputeOutcome:
 
     @property
     def unreached(self) -> int:
-        """The number of recordings that were not reached."""
+        """The number of recordings for which no answer came."""
         return sum(comparison.answer is None for comparison in self.compared)
 
     @property

@@ -79,8 +79,8 @@ def _average_unknocked(blocks: Array, noise: Array) -> tuple[Array, Array]:
     A knock is a disturbance with equal readings before and after. Not for a gyroscope: a knock may turn the body.
     """
     before, after = np.concatenate([blocks[:1, 0], blocks[:-1, -1]]), np.concatenate([blocks[1:, 0], blocks[-1:, -1]])
-    widened = np.concatenate([before[:, None], blocks, after[:, None]], axis=1)
-    deviations = np.abs(widened - np.median(blocks, axis=1, keepdims=True))
+    extended = np.concatenate([before[:, None], blocks, after[:, None]], axis=1)
+    deviations = np.abs(extended - np.median(blocks, axis=1, keepdims=True))
     knocked: NDArray[np.bool_] = np.any(deviations > KNOCK * noise, axis=2)
     few = (knocked.sum(axis=1) <= blocks.shape[1] // 4) & ~knocked[:, 0] & ~knocked[:, -1]
     masked = np.where((knocked[:, 1:-1] & few[:, None])[..., None], np.nan, blocks)
@@ -94,7 +94,7 @@ def _find_steady_blocks(still: NDArray[np.bool_], pairs: NDArray[np.bool_]) -> N
 
 
 def _mask_blocks(times: Array, windows: Sequence[Window]) -> NDArray[np.bool_]:
-    """Return a mask (count,) of the blocks in one of the windows, by the times (count, width) of their readings."""
+    """Return a mask (count,) of the blocks inside any window; `times` (count, width) are those of their readings."""
     mask = np.zeros(len(times), dtype=np.bool_)
     for window in windows:
         first, last = np.searchsorted(times[:, 0], window.start_s), np.searchsorted(times[:, -1], window.end_s, "right")

@@ -69,7 +69,7 @@ def fit_clock(clock: TimeBase, board_time_s: Array, readings: Array, motion: Kno
 
 
 def _is_contradiction(clock: TimeBase, refined: TimeBase) -> bool:
-    """Return whether the drift of a finer fit is less certain than that of the one before it, and contradicts it.
+    """Return whether a finer fit has a less certain drift than the fit before it, and contradicts that fit.
 
     It has then found another optimum: readings without a filter show fast ripples at other frequencies (aliasing). The
     offsets may differ, as filters delay slow and fast parts differently.

@@ -1,7 +1,7 @@
 """A gyroscope's readings with the rows of a reference, and the rests among the rows.
 
-Rows that follow each other densely while the body lies still are combined in one long row, valid from the beginning of
-the rest to its end. Both the readings and the rows must show the rest.
+While the body lies still, rows that follow each other densely are combined in one long row for the whole rest. Both the
+readings and the rows must show the rest.
 """
 
 from dataclasses import dataclass, replace
@@ -50,7 +50,7 @@ def select_covered(turning: Turning, clock_s: float = 0.0) -> Turning:
 
 
 def join_rests(turning: Turning, clock_s: float) -> tuple[Turning, NDArray[np.bool_]]:
-    """Return the rows with those of each rest joined into one, and a mask (N,) of the rows that are rests."""
+    """Join the rows of each rest into one; return all rows, and a mask (N,) of those that are rests."""
     still = _find_still(turning, clock_s)
     middles_s = turning.rows_s.mean(axis=1) + clock_s
     kept = np.ones(len(middles_s), dtype=np.bool_)

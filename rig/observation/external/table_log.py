@@ -1,4 +1,4 @@
-"""The log of a rate table as attitudes: a row for each of its records, from the angles of its axes."""
+"""The log of a rate table as attitudes: each record's axis angles become one row."""
 
 from pathlib import Path
 

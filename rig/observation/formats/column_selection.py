@@ -1,4 +1,4 @@
-"""The required columns in a file of another program, by its heading or by the map that `--columns` names."""
+"""Selection of the required columns in another program's file, by its heading or by the map of `--columns`."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field

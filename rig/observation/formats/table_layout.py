@@ -226,7 +226,10 @@ def _increases_by_one(column: Sequence[str]) -> bool:
 
 
 def _time_unit(heading: str, unit: str, column: Sequence[str]) -> str:
-    """Return the time unit in the heading, or the unit for which numbers are dates or the sample rate is likely."""
+    """Return the time unit that the heading states, or else the unit in which the numbers are plausible.
+
+    They are plausible as dates, or if they give a likely sample rate.
+    """
     if unit in ALLOWED and UNITS[unit].quantity == TIME:
         return unit
     name = heading.lower()

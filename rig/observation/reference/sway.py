@@ -1,4 +1,4 @@
-"""The acceleration of sensors by joints that sway while another one makes a turn, by their encoders.
+"""The acceleration of the sensors while one joint turns and the others sway, from the encoders of all joints.
 
 A sway of about one period per turn is no spectral line: it cannot be separated from gravity, which has one period.
 """

@@ -218,8 +218,8 @@ def _is_beat(missing: NDArray[np.intp]) -> bool:
 def _interval_s(time_s: Array, missing: NDArray[np.intp], width: int) -> float:
     """Return the mean interval between readings, including the missing ones, over the whole recording.
 
-    The recording's length is the time from the least late of its first `width` readings to the least late of its last
-    `width` readings.
+    The recording lasts from the most punctual of its first `width` readings to the most punctual of its last `width`
+    readings.
     """
     steps_s, few = np.diff(time_s), missing <= COUNTED
     interval_s = float(steps_s[few].sum() / (1 + missing[few]).sum())

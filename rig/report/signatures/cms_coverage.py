@@ -18,9 +18,9 @@ WITH_PARAMETERS = "rsassa_pss"
 def find_uncovered_in_container(der: bytes) -> Iterator[str]:
     """Yield the parts of a signature's container that the signature does not cover.
 
-    `der` is the ContentInfo of a document's signature, which covers its signed attributes only. So the container must
-    equal, byte by byte, one rebuilt from these attributes, the signature's value, the certificates of the signer's
-    chain, and at most one time stamp of the same kind. Whether the certificates are genuine is not tested.
+    `der` is the ContentInfo of a document's signature, which covers its signed attributes only. A container is rebuilt
+    from these attributes, the signature's value, the certificates of the signer's chain, and at most one time stamp of
+    the same kind. The original must equal it byte by byte. Whether the certificates are genuine is not tested.
     """
     content = cms.ContentInfo.load(der, strict=True)
     (info,) = content["content"]["signer_infos"]

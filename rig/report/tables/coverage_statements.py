@@ -23,7 +23,7 @@ def joint_factor(budget: BudgetEntry) -> float:
 
 
 def coverage_sentence(budget: BudgetEntry) -> str:
-    """Return the statement on k by EA-4/02 M:2022: that of 6.4, or for few degrees of freedom that of annex E."""
+    """Return the statement on k by EA-4/02 M:2022, 6.4, or annex E for few degrees of freedom."""
     begins = (
         "The reported expanded uncertainty of measurement is the standard uncertainty of measurement multiplied by the "
         "coverage factor k"
