@@ -1,4 +1,4 @@
-"""The part of a simulated sensor's section about the autopilot that contains the sensor."""
+"""The subsection of a simulated sensor about the autopilot in which the sensor is."""
 
 from pathlib import Path
 from typing import Literal

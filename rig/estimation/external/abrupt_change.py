@@ -69,8 +69,8 @@ def find_change(
 ) -> AbruptChange | None:
     """Return the most probable change before a row, or None if its evidence is at most `least_evidence`.
 
-    The rows are in the order of time and begin at `begins_s` (n,). `starts` (s, k) are standard deviations of the
-    model's errors with which rows are compared: the most probable ones without a change, then others.
+    The rows are in the order of time and begin at `begins_s` (n,). `starts` (s, k) are sets of standard deviations of
+    the model's errors. The search for the row is made with each: the first is the most probable one without a change.
     """
     count = sum(int(effect.possible.any(axis=1).sum()) for effect in effects)
     without, change = model.evaluate_posterior(starts[0]) + float(np.log(max(count, 1))), None

@@ -15,7 +15,7 @@ from rig.estimation.arrays import Array
 
 FEWEST_LEVELS = 3  # fewest different readings of an axis that is not constant
 OCCUPIED = 0.01  # fraction of readings beyond the two most frequent values, from which on they determine the noise
-# Occurrences of a value that count as repeated; fraction of such readings from which on the readings have steps.
+# Fewest occurrences of a repeated value; least fraction of readings with repeated values that shows steps.
 REPEATED, REPEATED_FRACTION = 3, 0.25
 LARGE_NOISE = 4.0  # noise in steps, from which on all rounding averages out
 MOST_READINGS = 20_000  # readings used to find the steps

@@ -39,7 +39,7 @@ OF_REVOLUTION, OF_REST, MOST = 6, 3, 72
 FEWEST_SAMPLES = 20  # fewest samples of a segment
 FEWEST_SCATTERED = 3  # number of segments up to which they do not show a scatter around a straight line
 FEWEST_AT_REST = 60  # fewest samples of a rest: fewer do not determine its noise well enough for a weight
-PREVAILS = 0.7  # fraction of the residuals' variance, below which the noise of a long mean is that at zero frequency
+PREVAILS = 0.7  # ratio of noise at zero frequency to scatter, below which the rest of the scatter is a vibration
 AT_REST = LineSearch(stands_out=30.0, beats=0)  # noise alone exceeds this in one bin of 10⁹
 
 
@@ -252,7 +252,10 @@ def _segment_rest(stream: Stream, motion: ArmMotion, average: Average, count: in
 
 
 def _noise_at_rest(residuals: Array, segments: int, columns: int, steps: Steps) -> MeanNoise:
-    """Return the noise of readings, from the residuals (n, 3) of a fit of segment means and spectral lines."""
+    """Return the noise of readings, from the residuals (n, 3) of a fit of segment means and spectral lines.
+
+    With spectral lines, a vibration may remain in the scatter; then the noise of a long mean is that at zero frequency.
+    """
     dof = max(len(residuals) - segments - columns, 1)
     scatter = np.maximum(np.sum(residuals**2, axis=0) / dof, steps.variance)
     in_a_mean = scatter * np.array([correlation_inflation(axis) for axis in residuals.T])

@@ -28,7 +28,7 @@ from rig.observation.windows import Window, inside
 
 TURNED_RAD = 0.02  # angle between rows of one rest, beyond which the body was turned about the measured vector
 INTERRUPTED_S = 1.0  # longest knock, after which equal readings show that the body did not move
-MOSTLY = 0.5  # fraction of a dwell: if the body lies still for longer, only the remainder is left out
+MOSTLY = 0.5  # least fraction of a dwell in which the body lies still; otherwise the whole dwell is left out
 
 
 @dataclass(frozen=True, slots=True)

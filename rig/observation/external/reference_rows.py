@@ -18,7 +18,7 @@ from rig.observation.external.still_attitudes import still_windows
 # Least duration and samples of a row that may be a rest; largest difference between rests.
 STILL_S, STILL_SAMPLES, STILL_RAD_S = 0.5, 20, 5e-3
 MARGIN_S = 0.05  # time at either end of a rest in which the body may move on the reference's clock
-TURNED_RAD_S = 0.02  # rate of a rest by its rows, above which the body was turned
+TURNED_RAD_S = 0.02  # rate of the attitudes in a rest of the readings, above which the body turned
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,7 @@ from rig.observation.statistics.coloured_noise import fit_noise_factor
 
 FLANK_S = 0.5
 FLANK_SHARE = 0.125  # largest fraction of the window
-PREVAILS = 0.5  # fraction of the residuals' variance: if less remains in a long mean, the rest is a vibration
+PREVAILS = 0.5  # fraction of the scatter that remains in a long mean, below which the rest is a vibration
 BLACKMAN_HARRIS = (0.35875, -0.48829, 0.14128, -0.01168)  # Harris 1978, table 1: side lobes below −92 dB
 MAIN_LOBE = 4  # bins to either side
 NOISE_BINS = 2.0  # bins per independent power: the window's equivalent noise bandwidth, table 1

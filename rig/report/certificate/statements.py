@@ -10,7 +10,7 @@ from rig.data.run_folder import CONFIG
 from rig.errors import Refused
 from rig.errors.quoting import quote
 
-# Keys of `site` by which the result is measured.
+# Keys of `site` that determine the result; overrides cannot change them.
 MEASURED_BY = {
     *("latitude_deg", "heading_deg", "base_up", "gravity_m_s2", "gravity_uncertainty_m_s2"),
     *("magnetic_field_ut", "magnetic_field_uncertainty_ut", "magnetic_field_upwards"),

@@ -94,7 +94,7 @@ def _rebuild(container: Any, info: Any, signer: Any, version: str) -> Any:
 
 
 def _drop_parameters(algorithm: Any) -> Any:
-    """Return the algorithm with no parameters other than NULL."""
+    """Return the algorithm without parameters, or with NULL if the original has it; `WITH_PARAMETERS` keeps its own."""
     name = algorithm["algorithm"].native
     if name == WITH_PARAMETERS:
         return algorithm

@@ -53,7 +53,8 @@ EXTENDED_POSITION = 4  # Operating Mode: ±256 revolutions
 TIME_BASED = 4  # Drive Mode: bit 2 alone; ccw counts up, and only Torque Enable switches torque on
 NO_SECONDARY_ID = 253  # IDs from this one on mean "none"
 WATCHDOG_S, WATCHDOG_MOST, TRIPPED = 0.020, 127, 255
-BY_VOLTAGE, BY_HEAT, BY_ENCODER, BY_SHOCK, BY_LOAD = 0x01, 0x04, 0x08, 0x10, 0x20  # Shutdown, Hardware Error Status
+# bits of Shutdown and Hardware Error Status
+BY_VOLTAGE, BY_HEAT, BY_ENCODER, BY_SHOCK, BY_LOAD = 0x01, 0x04, 0x08, 0x10, 0x20
 ERROR_WORDS = {
     BY_VOLTAGE: "input voltage",
     BY_HEAT: "overheating",

@@ -16,7 +16,8 @@ from rig.world.ur10e.motion.vibration import Vibration
 # ROS 2 description of the UR10e, from the 5.8 manual: base and shoulder 120°/s, elbow and wrists 180°/s.
 JOINT_SPEED_LIMIT_RAD_S: Joints = (2.0943951, 2.0943951, 3.1415927, 3.1415927, 3.1415927, 3.1415927)
 JERK_TICKS = 6  # ticks in which a joint's force follows a change of its target's acceleration
-SCALING_RATE_PER_S = 4.0  # the speed fraction follows the slider, and pause and play, in at most a quarter second
+# slew rate of the speed fraction after the slider, pause or play: at most a quarter of a second in all
+SCALING_RATE_PER_S = 4.0
 
 
 @dataclass(frozen=True, slots=True)

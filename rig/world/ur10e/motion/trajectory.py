@@ -31,7 +31,7 @@ class MotionSegment:
         for joint in self._moving:
             before = qd[joint]
             qd[joint] = before + self.qdd_rad_s2[joint] * time_s
-            # The mean of the velocities at both ends, times the time.
+            # At constant acceleration the distance is the mean of both velocities times the time.
             q[joint] += (before + qd[joint]) * half
         return tuple(q), tuple(qd), self.qdd_rad_s2
 
