@@ -26,7 +26,7 @@ Noise = Literal["white", "flicker", "random_walk"]
 COVERAGE = 0.95  # probability of the confidence intervals
 # Averaging time at which random walk is read: beyond the sensor's filter, before its bias drifts.
 RANDOM_WALK_TAU_S = 1.0
-RANDOM_WALK_STD = 0.1  # relative standard deviation
+RANDOM_WALK_STD = 0.1  # largest relative standard deviation of a random walk that is stated
 SLOPE_ALLOWED = 0.05  # allowed deviation of the slope from −1/2 in addition to its uncertainty: an error of N by 5 %
 INSTABILITY_STD = 0.2
 FLICKER = float(np.sqrt(2 * np.log(2) / np.pi))  # 0.664: ratio of the least σ to the bias instability
