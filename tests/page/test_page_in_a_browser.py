@@ -72,6 +72,7 @@ def test_a_run_is_agreed_to_followed_and_stopped_on_the_page_and_resumed(
     wait_for(lambda: "0." in text(driver, "observations"), "an observation")
     laboratory.control({"do": "pace", "time_scale": 0.5})  # a sweep lasts five seconds: a slow browser misses none
     wait_for(lambda: kind(driver) == "measuring", "a sweep")
+    laboratory.control({"do": "pace", "time_scale": 0.05})  # the stop arrives in this sweep, however slow the click is
     picture(driver, "run-moving")
     swept = (out / "log.txt").read_text(encoding="utf-8").count("done: sweep")
     driver.find_element(By.ID, "halt").click()
