@@ -230,6 +230,7 @@ def _find_obstacle(files: Files, request: Elsewhere, up: str) -> str | None:
     try:
         outcome = calibrate([build_recording(files, site, request)])
     except RigError as error:
-        return f"{error.name}: {error.what}"
+        remedy = f". {error.remedy}" if isinstance(error, Refused) else ""  # something is to be stated
+        return f"{error.name}: {error.what}{remedy}"
     failed = [check.name for check in outcome.checks if not check.passed]
     return f"checks fail: {', '.join(failed)}" if failed else None

@@ -1,12 +1,13 @@
 """`rig look FILE`: the contents of another program's log, its possible solutions, and the map of its columns."""
 
+import shlex
 from argparse import ArgumentParser, Namespace
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rig.commands.config_arguments import add_columns, read_column_map
+from rig.commands.config_arguments import add_columns, find_logs, read_column_map
 from rig.errors import Refused
 from rig.errors.quoting import printable
 from rig.station.plain_text import say
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from rig.config.column_map import ColumnMap
     from rig.report.terminal.look_lines import TriedSolutions
 
+PLACEHOLDER = "columns.yaml"  # the name of a map in the commands that are printed
 HEAD = """\
 # The columns of {files}, as `rig look` found them: check the units.
 # Every command that reads these files takes it with --columns.
@@ -39,14 +41,16 @@ def add(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     """Print the content of the files and the commands that can use them; with `--write` save their column map.
 
-    Return 0. Raise Refused `bad_option`, `configuration_not_written`, and as the files' readers do.
+    Return 0. Raise Refused `bad_option`, `no_latest_run`, `configuration_not_written`, and as the files' readers do.
     """
-    from rig.analysis.log_contents import look_at
+    from rig.analysis.log_contents import is_incomplete, look_at
 
     if len(options.files) > 2:
         raise Refused("bad_option", f"{len(options.files)} files are given", "Give a log, or a log and its attitudes")
     if options.write is not None and options.columns is not None:
         raise Refused("bad_option", "--write makes a map, and --columns gives one", "Give one of them")
+    for path in options.files:
+        _refuse_run(path)
     stated = None if options.columns is None else read_column_map(options.columns)
     looks = [look_at(path, stated) for path in options.files]
     columns: dict[str, Any] = {}
@@ -55,7 +59,27 @@ def run(options: Namespace) -> int:
     _print(looks, columns, stated, options.write or options.columns)
     if options.write is not None:
         _write(options.write, looks, columns)
+    if is_incomplete(columns):
+        again = shlex.join(["rig", "look", *map(str, options.files), "--columns", str(options.write or PLACEHOLDER)])
+        print(printable(f'replace each "?" in the map, then: {again}'))
     return 0
+
+
+def _refuse_run(path: Path) -> None:
+    """Raise Refused `bad_option` for a run of this program, which needs other commands, and as `meant_run` does."""
+    from rig.data.latest_run import meant_run
+    from rig.data.run_folder import recordings
+
+    path = meant_run(path)
+    run = path if path.is_dir() else path.parent
+    if path.exists() and not find_logs(path) and recordings(run, "raw"):
+        show, solve, export = (f"rig {name} {shlex.quote(str(run))}" for name in ("show", "solve", "export"))
+        raise Refused(
+            "bad_option",
+            f"{path} is a run of this program, not a log of another one",
+            f"For its result: {show} --all; to solve it again: {solve}; for its readings as tables: {export} "
+            "--format csv",
+        )
 
 
 def _print(
@@ -81,11 +105,11 @@ def _print(
             _adopt(columns, inverse=convention.inverse, scalar_last=convention.scalar_last)
     tried = _try_solutions(log, reference, convention, stated, columns)
     needs_map = bool(columns) or stated is not None
-    name = (named or Path("columns.yaml")) if needs_map else None
+    name = (named or Path(PLACEHOLDER)) if needs_map else None
     for line in describe_solutions(log, reference, replace(tried, columns=name)):
         print(printable(line))  # not wrapped: a command must stay in one line
     if needs_map and named is None:
-        say("--write columns.yaml writes the map of these columns")
+        say(f"--write {PLACEHOLDER} writes the map of these columns")
 
 
 def _names_order(reference: "LookedFile") -> bool:

@@ -44,8 +44,9 @@ def _track_verticals(conditions: SessionConditions, integrals: MoveIntegrals) ->
     if conditions.first_face is None:
         raise Refused(
             "first_face_unknown",
-            "no accelerometer was read, and the face that was up at first is not stated (--first-face)",
-            "Say which of its axes pointed upwards: --first-face +z; or record the accelerometer too",
+            "no accelerometer was read, and the face that was up at first is not stated",
+            "Say which of its axes pointed upwards: rig solve LOG --turns --first-face +z; or record the "
+            "accelerometer too",
         )
     up = [axis_of(conditions.first_face)]
     for rotation in integrals.rotations:

@@ -14,7 +14,7 @@ from rig.errors import RigError
 from rig.errors.quoting import shorten
 from rig.observation.formats.table_layout import TableLayout
 from rig.observation.log_survey import LogSurvey
-from rig.sensors.lines.log_columns import LogColumns
+from rig.sensors.lines.log_columns import OPEN, LogColumns
 
 WIDTH = 14
 COLUMNS = (
@@ -56,7 +56,7 @@ def _describe_table(path: Path, layout: TableLayout, guess: LogColumns) -> Itera
         yield _row("note", "the rows have one cell more than the heading: columns are named by number")
     entries = {**guess.motion, **guess.samples}
     for name, *columns in COLUMNS:
-        if columns[0] in entries:
+        if columns[0] in entries and entries[columns[0]].get("unit") != OPEN:
             yield _row(name, _spell(*(entries[column] for column in columns)))
     if guess.others:
         yield _row("not read", shorten(" ".join(guess.others)))
@@ -134,7 +134,8 @@ def describe_solutions(looked: LookedFile | None, reference: LookedFile | None, 
 def _describe_sweeps(survey: LogSurvey, command: str) -> Iterator[str]:
     if turns := sum(survey.turns.values()):
         yield _row("sweeps", command)
-        yield _row("", f"SWEEPS.csv states the {turns} turns: start_s end_s axis_x axis_y axis_z angle_rad")
+        number = "1 turn" if turns == 1 else f"{turns} turns"
+        yield _row("", f"SWEEPS.csv states the {number}: start_s end_s axis_x axis_y axis_z angle_rad")
     else:
         yield _row("sweeps", "no turn from rest to rest; steady turns need a file that states them")
 

@@ -93,9 +93,13 @@ def _guess_samples(
     gaps: list[str] = []
     for group in _group_columns(layout, values, quaternion, rate_hz):
         guessed = guess_triads(group.names, group.values, group.still, rate_hz)
-        if "x_rad_s" not in samples and _may_be_gyroscope(group.names, guessed):
-            guessed = guess_triads(("gx", "gy", "gz"), group.values, group.still, rate_hz)
-            gaps.append("whether the three columns are a gyroscope: nothing contradicts it")
+        if not samples and _is_undetermined(group.names, guessed):
+            columns = [layout.name(index) for index in group.indices]
+            samples |= {
+                axis + NAMES["g"]: {"column": column, "unit": OPEN} for axis, column in zip(AXES, columns, strict=True)
+            }
+            gaps.append(_describe_undetermined(columns, group.values))
+            continue
         for kind in [kind for kind in NAMES if kind in guessed.units and f"x{NAMES[kind]}" not in samples]:
             triad, reason = _map_triad(layout, group, guessed, kind)
             samples |= triad
@@ -114,10 +118,20 @@ def _guess_samples(
     return samples, gaps
 
 
-def _may_be_gyroscope(names: Sequence[str], guessed: Guess) -> bool:
-    """Return whether three columns whose headings state neither quantity nor unit can be a gyroscope's."""
+def _is_undetermined(names: Sequence[str], guessed: Guess) -> bool:
+    """Return whether neither headings nor numbers show what three columns are; a field's size alone does not."""
     is_nameless = not any(names) or all(map(_is_axis, names)) or not guessed.units
     return is_nameless and len(names) == 3 and set(guessed.units) <= {"m"}
+
+
+def _describe_undetermined(columns: Sequence[str | int], values: Array) -> str:
+    """Return a sentence on what three columns (n, 3) may be, and how to state it."""
+    size = float(np.median(np.linalg.norm(values, axis=1)))
+    return (
+        f"what {' '.join(map(str, columns))} are: no heading says it; their size is about {size:.3g}, and the Earth's "
+        "field is 25 to 65 uT. State their unit in the map, where x_rad_s y_rad_s z_rad_s mean a gyroscope: write "
+        "x_t y_t z_t for a magnetometer, x_m_s2 y_m_s2 z_m_s2 for an accelerometer"
+    )
 
 
 def _map_triad(

@@ -1,6 +1,7 @@
 """`rig look` says what a file holds, and the map that it writes solves the file as its plain form does."""
 
 import json
+from argparse import Namespace
 from collections.abc import Callable
 from pathlib import Path
 
@@ -10,6 +11,9 @@ from scipy.io import savemat
 
 from rig.analysis.external.convention import find_convention
 from rig.analysis.log_contents import look_at
+from rig.commands.offline import look
+from rig.errors import Refused
+from rig.report.terminal.look_lines import describe_file
 from support.external.robot_log import make_log, write_log
 from support.laboratories.commands import rig_here
 from support.paths import DOCS
@@ -58,7 +62,7 @@ def telephone(folder: Path) -> Path:
     return write(folder / "log.csv", heading, [TIME_S, TIME_S - TIME_S[0], *RATES_DEG_S.T[::-1]])
 
 
-@pytest.mark.parametrize("make", [spaces, two_imus, counter, matlab, units_below, telephone])
+@pytest.mark.parametrize("make", [two_imus, counter, matlab, units_below, telephone])
 def test_the_map_that_it_writes_solves_the_file(make: Callable[[Path], Path], tmp_path: Path) -> None:
     log, columns = make(tmp_path), tmp_path / "columns.yaml"
     looked = rig_here("look", log, "--write", columns)
@@ -69,6 +73,34 @@ def test_the_map_that_it_writes_solves_the_file(make: Callable[[Path], Path], tm
     plain = rig_here("solve", PLAIN, "--sweeps", SWEEPS, "--json")
     scales = [json.loads(done.stdout)["gyroscopes"]["imu"]["scale"] for done in (solved, plain)]
     assert scales[0] == pytest.approx(scales[1], rel=1e-6)
+
+
+def test_columns_without_a_name_are_no_gyroscope_before_the_user_says_so(tmp_path: Path) -> None:
+    log, columns = spaces(tmp_path), tmp_path / "columns.yaml"
+    looked = rig_here("look", log, "--write", columns)
+    assert "UNKNOWN       what 2 3 4 are" in looked.stdout and "what it allows" not in looked.stdout
+    assert f'replace each "?" in the map, then: rig look {log} --columns {columns}' in looked.stdout
+    columns.write_text(columns.read_text(encoding="utf-8").replace("'?'", "deg/s"), encoding="utf-8")
+    looked = rig_here("look", log, "--columns", columns)
+    assert f"rig solve {log} --sweeps SWEEPS.csv --columns {columns}" in looked.stdout, looked.stderr
+
+
+def test_a_telephone_s_magnetometer_is_called_what_it_may_be(tmp_path: Path) -> None:
+    field_ut = 40 * np.column_stack([np.cos(TIME_S), np.sin(TIME_S), 0.5 + 0.01 * np.sin(3 * TIME_S)])
+    looked = look_at(write(tmp_path / "log.csv", "time,x,y,z", [TIME_S, *field_ut.T]))
+    assert looked.guess is not None and looked.samples is None
+    (gap,) = looked.guess.gaps
+    assert "size is about 44.7" in gap and "x_t y_t z_t for a magnetometer" in gap
+    assert not any(line.strip().startswith("gyroscope") for line in describe_file(looked))
+
+
+def test_a_run_is_no_log_and_its_own_commands_are_named(tmp_path: Path) -> None:
+    run = tmp_path / "my run"
+    run.mkdir()
+    (run / "run.h5").write_bytes(b"")
+    for path in (run, run / "run.h5"):
+        with pytest.raises(Refused, match=r"is a run of this program.*rig show '.*/my run' --all.*rig export"):
+            look.run(Namespace(files=[path], columns=None, write=None))
 
 
 def test_a_file_in_the_rig_s_own_words_needs_no_map(tmp_path: Path) -> None:
