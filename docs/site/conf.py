@@ -37,6 +37,7 @@ default_role = "code"
 html_theme = "furo"
 html_static_path = ["static"]
 html_css_files = ["cards.css"]
+html_js_files = [("labels.js", {"defer": "defer"})]
 html_search_scorer = str(ROOT / "docs" / "site" / "static" / "scorer.js")
 html_extra_path = [
     "index.html",

@@ -39,7 +39,9 @@ Turners = Mapping[str, type[TurnerSection]] | None  # None: the reader needs onl
 STOCK_TURNERS: Mapping[str, type[TurnerSection]] = {"ur": ArmSection, "hand": HandSection, "servo": ServoSection}
 TURNS = frozenset({"arm", "turner"})  # the sections of the turner, of which a configuration has one
 PROBLEMS_SHOWN = 25
-GIVE_CONFIGURATION = "Give a configuration; rig new FILE writes one"
+GIVE_CONFIGURATION = (
+    "Give a configuration; rig new FILE writes one, and rig demo --files . copies those of the documentation"
+)
 NOT_A_CONFIGURATION = ("cannot be read: ", "is ")  # how a problem of the whole file begins
 
 

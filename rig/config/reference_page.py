@@ -104,9 +104,9 @@ the file that contains the line. The following is the complete [repeat_lsm9ds1.y
 - The run folder's `config.yaml` contains everything together and needs no base. So a run can be resumed on a computer
   that does not have the original files.
 
-## Changing a value for one run
+## Change a value for one run: the rest, the speed
 
-Use `--set path.to.key=value`, once or several times, with the value in YAML: `--set procedure.speed_deg_s=30`,
+Use `--set path.to.key=value`, once or several times, with the value in YAML: `--set procedure.rest_s=5`,
 `--set 'sensors.gyro.mounting={{x: +y, y: -x, z: +z}}'`. It replaces what the file says at that
 place; this may be a whole section. `null` deletes it. The run folder's `config.yaml` contains the new value.
 

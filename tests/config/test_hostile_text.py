@@ -95,7 +95,8 @@ def test_a_file_that_is_missing_is_named_in_one_line(tmp_path: Path) -> None:
     with pytest.raises(ConfigurationRefused) as caught:
         load(tmp_path / "rig.yaml")
     assert str(caught.value).endswith(
-        "rig.yaml cannot be read: No such file or directory. Give a configuration; rig new FILE writes one."
+        "rig.yaml cannot be read: No such file or directory. Give a configuration; rig new FILE writes one, and "
+        "rig demo --files . copies those of the documentation."
     )
 
 

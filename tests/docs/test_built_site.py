@@ -10,7 +10,7 @@ from urllib.parse import quote
 import pytest
 from selenium.webdriver.common.by import By
 
-from support.page.browser import browser, needs_browser
+from support.page.browser import browser, needs_browser, screen
 from support.paths import DOCS, ROOT
 from support.processes.waiting import wait_for
 
@@ -44,6 +44,11 @@ def test_the_search_answers_questions_and_finds_names(site: Path) -> None:
         "export to matlab": "docs/how-to/finished-runs/export.html",
         "tab completion": "docs/commands.html#completion-by-the-tab-key",
         "calibrate by hand": "docs/how-to/without-an-arm/by-hand.html",
+        "arm does not move": "docs/how-to/start/failed.html#the-arm-does-not-move",
+        "board not found": "docs/board.html#the-board-is-not-found-or-something-else-is-wrong",
+        "change the rest": "docs/configuration.html#change-a-value-for-one-run-the-rest-the-speed",
+        "compare two runs": "docs/how-to/finished-runs/check-standards.html#compare-two-runs",
+        "temperature missing": "docs/how-to/at-the-rig/lines.html#the-temperature-is-missing",
         "resume an interrupted run": "docs/how-to/at-the-rig/resume-and-repeat.html",
         "arm_moved": "docs/errors.html#error-arm-moved",
         "scale_changed": "docs/checks.html#check-scale-changed",
@@ -60,3 +65,16 @@ def test_the_search_answers_questions_and_finds_names(site: Path) -> None:
             assert page in (first.get_attribute("href") or "").replace("?highlight=", ""), question
     for page, name in (("errors", "error-arm-moved"), ("checks", "check-bias"), ("configuration", "key-arm-host")):
         assert f'id="{name}"' in (site / "docs" / f"{page}.html").read_text(encoding="utf-8")
+
+
+@needs_browser
+@pytest.mark.parametrize("name", ["README", "docs/errors", "docs/configuration", "docs/how-to/finished-runs/export"])
+def test_a_telephone_shows_tables_without_scrolling_sideways(site: Path, name: str) -> None:
+    with browser() as driver, screen(driver, 390, 844):
+        driver.get((site / f"{name}.html").as_uri())
+        widest = "Math.max(...[...document.querySelectorAll('.table-wrapper')].map(t => t.scrollWidth - t.clientWidth))"
+        assert driver.execute_script(f"return {widest}") <= 1
+        cell = driver.find_element(By.CSS_SELECTOR, "table:has(th:nth-child(3)) td:nth-child(2)")
+        heading = driver.find_element(By.CSS_SELECTOR, "table:has(th:nth-child(3)) th:nth-child(2)")
+        before = driver.execute_script("return getComputedStyle(arguments[0], '::before').content", cell)
+        assert before.startswith(f'"{heading.get_property("textContent")}')

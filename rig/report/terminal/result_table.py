@@ -100,9 +100,9 @@ def _term_line(term: Term) -> str:
 
 
 def print_checks(result: ResultDocument, console: Console, sensor: str | None = None) -> None:
-    """Print the checks sensor by sensor, failed checks first, of all sensors or of one."""
+    """Print the checks of all sensors or of one, sensor by sensor, those with failed checks first."""
     by_sensor: dict[str | None, list[CheckEntry]] = {}
-    for check in result.checks:
+    for check in sorted(result.checks, key=lambda check: check.passed):
         by_sensor.setdefault(check.means.sensor, []).append(check)
     for name, checks in by_sensor.items():
         if sensor in (None, name):
@@ -118,7 +118,7 @@ def _checks(sensor: str | None, checks: Sequence[CheckEntry]) -> Table:
     table = Table(title=plain("checks" if sensor is None else f"checks of {sensor}"), title_justify="left")
     for heading in ("check", "value", "limit", "unit", "result"):
         table.add_column(heading, justify="right" if heading in ("value", "limit") else "left")
-    for check in sorted(checks, key=lambda check: check.passed):
+    for check in checks:
         name = check.name if sensor is None else check.name.removeprefix(f"{sensor}.")
         value = "not measured" if check.value is None else _number(check.value, check.limit)
         limit = "not set" if check.limit is None else f"{check.limit:.4g}"

@@ -100,6 +100,16 @@ def test_whole_turns_in_degrees_are_told_though_no_speed_is_unusual(tmp_path: Pa
     assert first.startswith("each sweep turns by a whole multiple of 90 rad") and "if both files are in °/s" in first
 
 
+def test_a_body_that_shakes_in_its_turns_is_no_unit_that_is_wrong(tmp_path: Path) -> None:
+    log = swept(HZ)
+    shake_rad_s = 0.2 * np.sin(2 * np.pi * 7 * log.time_s)[:, None]
+    turning = np.linalg.norm(log.readings, axis=1, keepdims=True) > 0.5
+    shaken = Log(log.time_s, log.readings + turning * shake_rad_s, log.rows)
+    assert not list(notes_on_speeds(average_files(*write_rates(tmp_path, shaken))))
+    noisy = swept(HZ, noise_rad_s=0.05)
+    assert "scatter by 0.05 rad/s" in next(notes_on_speeds(average_files(*write_rates(tmp_path, noisy))))
+
+
 def test_a_file_too_long_to_be_examined_for_changes_is_noted(tmp_path: Path) -> None:
     data = average_files(*write_rates(tmp_path, swept(HZ)))
     assert not list(notes_on_changes(data))

@@ -2,14 +2,17 @@
 
 import re
 from dataclasses import asdict
+from io import StringIO
 from pathlib import Path
 
 import pytest
+from rich.console import Console
 
 from rig.analysis.check import Check, fitness
 from rig.cli import main
 from rig.data.result_file import CheckEntry, ResultDocument, read_result
 from rig.report.entry import entry
+from rig.report.terminal.result_table import print_checks
 from rig.report.terminal.run_summary import ending
 from rig.report.words.check_words import check_words, what_failed, words_of
 from rig.report.words.checks_page import page_text
@@ -36,6 +39,16 @@ def entry_of(check: Check) -> CheckEntry:
 
 
 ALL = [check.name for check in make_three_parts().checks]
+
+
+def test_a_failed_check_is_the_first_row_of_the_checks() -> None:
+    console = Console(width=100, record=True, file=StringIO())
+    last = next(
+        check.name for check in ONE.checks if check.means.sensor is None
+    )  # of the run, behind those of a sensor
+    print_checks(fail_checks(ONE, last), console)
+    first = next(line for line in console.export_text().splitlines() if line.startswith("│"))
+    assert "FAILED" in first and last.split(".")[-1] in first
 
 
 @pytest.mark.parametrize(
