@@ -86,7 +86,7 @@ def test_how_well_the_encoders_tell_arcs_can_be_stated_anew() -> None:
     [
         (
             "observation.max_lost=0.01",
-            r"unknown_setting.*'observation\.max_lost'.*max_lost_fraction, .*limits",
+            r"unknown_setting.*'observation\.max_lost'.*Did you mean observation\.max_lost_fraction.*limits",
         ),
         ("procedure.speed_deg_s=10", "unknown_setting"),
         ("limits", "unknown_setting"),

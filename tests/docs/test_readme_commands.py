@@ -19,6 +19,7 @@ FROZEN = ROOT / "tests" / "fixtures" / "recordings" / "verified"
 ELSEWHERE = {
     "pip install '.[world]'": "tests/installation/test_wheel.py",
     "rig demo": "tests/installation/test_wheel.py",
+    "rig watch latest": "tests/page/test_page_in_a_browser.py",
     "rig run configs/imu.yaml": "tests/runner/reference/test_accelerometer_truth.py",
     "rig check my.yaml": "hardware",
     "rig run my.yaml": "hardware",

@@ -52,15 +52,19 @@ def _explain_check(name: str) -> Iterator[str]:
 
 
 def _explain_limit(name: str) -> Iterator[str]:
-    """Yield the meaning and unit of a limit of the configuration; nothing for another name."""
+    """Yield meaning and unit of a limit of the configuration, by its key or its check; nothing for another name."""
     from rig.config.judging.verdict_limits import LIMITS, Limits
+    from rig.report.words.check_words import words_of_name
 
-    key = name.removeprefix("limits.")
-    if key in LIMITS:
-        row = LIMITS[key]
+    key_name, check = name.removeprefix("limits."), words_of_name(name)
+    rows = {
+        key: row for key, row in LIMITS.items() if key == key_name or (check is not None and check.name == row.what)
+    }
+    for key, row in rows.items():
         kind = "a property of the sensor" if row.kind == "conformity" else "how good the measurement is"
         unit = "" if row.unit == "1" else f", in {row.unit}"
         yield f"limits.{key}: a limit on {kind}: {Limits.model_fields[key].description}{unit}."
+    if rows:
         yield from _refer_to("docs/configuration.md")
 
 

@@ -236,7 +236,8 @@ def _select_pasts(history: History, selection: Selection) -> list[Past]:
         raise Refused(
             "not_in_history",
             f"no calibration of {selection.serial_number} in the history matches",
-            "List all with `rig history`, or enter runs with `rig history import`",
+            "List all with `rig history`, show one by its number with `rig history show`, or enter runs with "
+            "`rig history import`",
         )
     return pasts
 

@@ -28,7 +28,7 @@ MERGE = "tag:yaml.org,2002:merge"
 OTHER_FILES = {  # files given for a configuration by mistake, and where they belong
     ".py": "a Python script, not a configuration; run a procedure of your own with `rig run CONFIG --script FILE.py`",
     ".h5": "a recording, not a configuration; solve it with `rig solve FILE.h5`",
-    ".csv": "a table of readings, not a configuration; solve it with `rig solve FILE.csv`",
+    ".csv": "a table of readings, not a configuration; `rig look FILE.csv` says how to solve it",
 }
 # Invisible characters: control, format, surrogates, breaks of lines and paragraphs.
 UNSEEN = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})

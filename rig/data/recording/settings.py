@@ -8,6 +8,7 @@ import json
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from difflib import get_close_matches
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
@@ -417,9 +418,15 @@ def find_setting(item: str) -> str:
         raise Refused(
             "unknown_setting",
             f"a recording has no setting {quote(path)} that could be changed",
-            f"Set one of {', '.join(_settable())}",
+            f"{_suggest_setting(path)}Set one of {', '.join(_settable())}",
         )
     return path
+
+
+def _suggest_setting(path: str) -> str:
+    """Return a question for the setting that a wrong path may mean, or an empty text."""
+    alike = get_close_matches(path, _settable(), n=1)
+    return f"Did you mean {alike[0]}? " if alike else ""
 
 
 def _override(settings: RunSettings, item: str) -> RunSettings:

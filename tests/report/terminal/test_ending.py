@@ -166,6 +166,7 @@ def test_the_page_of_checks_is_made_of_the_table() -> None:
         ("Sweep", "one joint turning through one revolution"),
         ("revolution", "its mean rate is 2π/T"),
         ("bias", "a check of the verdict"),
+        ("gyro.bias", "limits.bias_rad_s: a limit on a property of the sensor"),
         ("bias", "what is added to a reading before the scale factor"),
     ],
 )
