@@ -176,7 +176,8 @@ def _write(path: Path, looks: "Sequence[LookedFile]", columns: Mapping[str, Any]
     from rig.config.files.safe_writing import write_new
 
     if not columns:
-        say("no map is needed: the columns have the rig's own names")
+        is_read = any(looked.samples is not None or looked.attitudes is not None for looked in looks)
+        say("no map is needed: the columns have the rig's own names" if is_read else "not written: no column is known")
         return
     if path.exists() or path.is_symlink():
         raise Refused("configuration_not_written", f"{path} is there already", "Choose another with --write")

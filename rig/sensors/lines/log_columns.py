@@ -79,6 +79,11 @@ def guess_columns(layout: TableLayout, values: Array, time: Array | None) -> Log
     if not quaternion and (angles := _list_angles(layout)):
         names = " ".join(layout.headings[index] for index in angles)
         gaps.append(f"the order of the turns in {names}: attitudes are read as quaternions, qw qx qy qz; convert them")
+    elif not samples and not quaternion:
+        gaps.append(
+            "which columns are readings: none look like a sensor's. State them with --columns. If numbers have a "
+            "decimal comma, divide the columns by semicolons"
+        )
     timed = {} if layout.time is None else {"time_s": _time_entry(layout, time)}
     motion = {name: {"column": layout.name(index), "unit": "1"} for name, index in quaternion.items()}
     others = _list_others(layout, [*samples.values(), *motion.values(), *timed.values()])

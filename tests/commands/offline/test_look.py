@@ -94,6 +94,14 @@ def test_a_telephone_s_magnetometer_is_called_what_it_may_be(tmp_path: Path) -> 
     assert not any(line.strip().startswith("gyroscope") for line in describe_file(looked))
 
 
+def test_decimal_commas_between_commas_are_suspected(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text(
+        "t,gx,gy,gz\n" + "0,02,0,48,-0,29,0,23\n0,04,0,51,-0,27,0,18\n" * 20, encoding="utf-8"
+    )
+    guess = look_at(tmp_path / "log.csv").guess
+    assert guess is not None and "decimal comma" in guess.gaps[-1]
+
+
 def test_a_run_is_no_log_and_its_own_commands_are_named(tmp_path: Path) -> None:
     run = tmp_path / "my run"
     run.mkdir()
