@@ -15,7 +15,7 @@ from rig.notebook.calibrations import HEADINGS, U_TEXT, Calibration, Characteris
 from rig.notebook.frames import frame
 from rig.notebook.html import table
 from rig.notebook.readings import NoSuchSensor
-from rig.notebook.runs import Run
+from rig.notebook.runs import Run, load
 from rig.plans.recorded_run import judge_phases
 from rig.report.document import document_of
 from rig.report.findings.finding import Finding
@@ -125,12 +125,14 @@ class Result(Mapping[str, Calibration]):
         return calibrated + checks
 
 
-def solve(run: Run, estimator: str | None = None, **changes: float) -> Result:
+def solve(run: Run | str | Path, estimator: str | None = None, **changes: float) -> Result:
     """Solve and judge a run, as `rig solve` does, by `estimator` or that of its procedure.
 
-    `changes` are thresholds or limits to use instead of the recorded ones: `max_lost_fraction=0.01`. Raise Fault and
-    Refused as `rig solve` does; `unknown_setting` lists the possible changes.
+    `run` is loaded if it is a path. `changes` are thresholds or limits to use instead of the recorded ones:
+    `max_lost_fraction=0.01`. Raise Fault and Refused as `rig solve` does, and as `load`; `unknown_setting` lists the
+    possible changes.
     """
+    run = run if isinstance(run, Run) else load(run)
     overrides = [f"{setting(key)}={value!r}" for key, value in changes.items()]
     return Result(document_of(judge_phases(run.recorded.override_settings(overrides), estimator)))
 

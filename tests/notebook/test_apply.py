@@ -107,3 +107,5 @@ def test_a_result_that_is_loaded_is_the_one_that_is_solved() -> None:
     assert result.to_dict()["schema"] == "rig.result/1"
     with pytest.raises(Refused, match="no_result"):
         rig.load_result(Path("nowhere"))
+    with pytest.raises(Refused, match="no_run_file: there is no file nowhere"):
+        rig.solve("nowhere")
