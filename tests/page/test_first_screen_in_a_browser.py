@@ -9,6 +9,7 @@ from selenium.webdriver import Chrome
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 
+from rig.cli import main
 from rig.data.run_folder import RESULT, TRUTH
 from rig.errors import Fault
 from rig.station.events import DocumentWritten, Failed, Prompt
@@ -16,6 +17,7 @@ from support.page.browser import TABLET, kind, legible, needs_browser, picture, 
 from support.page.scripted_page import Telling, showing
 from support.page.scripted_runs import before_it_moves, judge, look, moving, plan_demo
 from support.page.scripted_six_sensors import IMU, PARTS, SIX, six_found, six_judged, six_moving
+from support.paths import RECORDINGS
 from support.processes.waiting import wait_for
 
 pytestmark = [pytest.mark.slow, needs_browser, pytest.mark.usefixtures("nothing_severe_and_nothing_from_elsewhere")]
@@ -169,6 +171,13 @@ def test_of_a_run_of_six_that_failed_the_first_screen_has_the_verdict_and_what_f
         for dark in (False, True):
             set_theme(driver, dark=dark)
             legible(driver)
+
+
+def test_a_certificate_is_no_wider_than_a_telephone(driver: Chrome, tmp_path: Path) -> None:
+    assert main(["report", str(RECORDINGS / "imu"), "--out", str(tmp_path)]) == 0
+    with screen(driver, *TELEPHONE):
+        driver.get((tmp_path / "certificate.html").as_uri())
+        assert wide(driver) == []
 
 
 @pytest.mark.one_in(2)
