@@ -178,7 +178,7 @@ FORMATS = {
     "an unknown scale, and a battery's voltage": Format(
         lambda r: text("%d,%d,%d,%d,%.3f,%.3f,%.3f,%.1f", 1e6 * r["t"], *counts(deg(r), 50.0), *si(r, "a"), 3.7),
         f"time {IMU} -", US | {"rate": {"unit": "?"}, "acceleration": {"unit": "m/s2"}},
-        ("lines.rate.unit", "the gyroscope's scale", "what column 8 is")),
+        ("lines.rate.unit", "the gyroscope's scale", "what column 8 is, about 3.7")),
 }  # fmt: skip
 
 

@@ -85,7 +85,10 @@ def guess(shape: Shape, still_until_s: float) -> Guess:
     _find_temperature(shape, result, shape.arrived_s < still_until_s)
     for index, name in enumerate(result.columns):
         if name == "-" and index not in text_columns:
-            result.gaps.append(f"what column {index + 1} is: it is not read")
+            about = f"{np.median(shape.values[:, index]):g}"
+            result.gaps.append(
+                f"what column {index + 1} is, about {about}: name it in lines.columns, or it is not read"
+            )
     for name, unit in result.units.items():
         indices = [result.columns.index(name + axis) for axis in "xyz"]
         decimals = {shape.decimals[index] for index in indices}
