@@ -67,8 +67,9 @@ def look_at(path: Path, stated: ColumnMap | None = None) -> LookedFile:
     if is_in_format(path):
         return _read_contents(LookedFile(path, None, None, {}), AS_NAMED, has_readings=True, has_attitudes=True)
     if stated is not None:
-        looked = LookedFile(path, None, None, {})
-        return _read_contents(looked, stated, has_readings=True, has_attitudes=bool(stated.motion))
+        # A reference whose columns have the rig's own names needs no map.
+        looked = _read_contents(LookedFile(path, None, None, {}), stated, has_readings=True, has_attitudes=True)
+        return looked if stated.motion else replace(looked, refusals=looked.refusals[:1])
     layout = find_layout(path, SAMPLES_MB)
     if set(layout.headings).issuperset(MOTIONS["sweeps"].needed):
         remedy = f"Give it with its log: rig solve LOG --sweeps {path}"
@@ -230,7 +231,6 @@ def _find_obstacle(files: Files, request: Elsewhere, up: str) -> str | None:
     try:
         outcome = calibrate([build_recording(files, site, request)])
     except RigError as error:
-        remedy = f". {error.remedy}" if isinstance(error, Refused) else ""  # something is to be stated
-        return f"{error.name}: {error.what}{remedy}"
+        return str(error).rstrip(".")
     failed = [check.name for check in outcome.checks if not check.passed]
     return f"checks fail: {', '.join(failed)}" if failed else None

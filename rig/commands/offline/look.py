@@ -87,6 +87,7 @@ def _print(
 ) -> None:
     """Print the files and the commands that can use them. Enter the gyroscope's convention into `columns`."""
     from rig.analysis.log_contents import count_from
+    from rig.data.quantity import RATE
     from rig.report.terminal.look_lines import describe_convention, describe_file, describe_solutions
 
     for looked in looks:
@@ -97,6 +98,7 @@ def _print(
     convention = None
     if log is not None and reference is not None:
         reference = count_from(reference, log.origin_s)
+    if log is not None and reference is not None and RATE in log.quantities:
         is_order_named = _names_order(reference)
         convention = _find_convention(log, reference, is_order_named=is_order_named)
         for line in describe_convention(convention, is_order_named=is_order_named):

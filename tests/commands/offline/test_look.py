@@ -12,6 +12,7 @@ from scipy.io import savemat
 from rig.analysis.external.convention import find_convention
 from rig.analysis.log_contents import look_at
 from rig.commands.offline import look
+from rig.config.column_map import ColumnMap
 from rig.errors import Refused
 from rig.report.terminal.look_lines import describe_file
 from support.external.robot_log import make_log, write_log
@@ -100,6 +101,12 @@ def test_decimal_commas_between_commas_are_suspected(tmp_path: Path) -> None:
     )
     guess = look_at(tmp_path / "log.csv").guess
     assert guess is not None and "decimal comma" in guess.gaps[-1]
+
+
+def test_attitudes_in_the_rig_s_own_words_need_no_part_in_the_log_s_map() -> None:
+    samples = {f"{axis}_rad_s": {"column": f"g{axis}", "unit": "deg/s"} for axis in "xyz"}
+    looked = look_at(DOCS / "examples" / "still_attitudes.csv", ColumnMap.model_validate({"samples": samples}))
+    assert looked.attitudes is not None and not looked.refusals
 
 
 def test_a_run_is_no_log_and_its_own_commands_are_named(tmp_path: Path) -> None:
