@@ -28,7 +28,9 @@ def latest_run() -> Path:
     for noted in reversed(_read_noted()):
         if (folder := Path(noted)).is_dir():
             return folder.relative_to(Path.cwd()) if folder.is_relative_to(Path.cwd()) else folder
-    raise Refused("no_latest_run", "no run folder of yours is known", "Name the run folder")
+    raise Refused(
+        "no_latest_run", "no run folder of yours is known", "Name the run folder; `rig demo` makes a first one"
+    )
 
 
 def meant_run(path: str | Path) -> Path:
