@@ -133,14 +133,15 @@ def _flicker(instability_rad_s: float, windows_s: ArrayLike) -> Array:
 
 
 def average_posterior(sizes: Array, likelihood: Array) -> Array:
-    """Return the posterior mean (2,) of sizes (K, 2), with a spike-and-slab prior, log-uniform in the slab.
+    """Return the root-mean-square (2,) of sizes (K, 2) over the posterior.
 
-    The maximum of the likelihood, and with it every uncertainty, would by chance be far too small in one run and too
-    large in another (Mitchell and Beauchamp, J. Am. Stat. Assoc. 83 (1988) 1023).
+    The prior is spike-and-slab, log-uniform in the slab. The maximum of the likelihood, and with it every uncertainty,
+    would by chance be far too small in one run and too large in another (Mitchell and Beauchamp, J. Am. Stat. Assoc. 83
+    (1988) 1023).
     """
     log_posterior = likelihood - np.log(STEPS) * np.count_nonzero(sizes, axis=1)
     weights = np.exp(log_posterior - log_posterior.max())
-    return np.asarray(weights @ sizes / weights.sum(), dtype=np.float64)
+    return np.asarray(np.sqrt(weights @ sizes**2 / weights.sum()), dtype=np.float64)
 
 
 def average_walks(sizes: Array, likelihood: Array) -> Array:

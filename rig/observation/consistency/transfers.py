@@ -170,7 +170,10 @@ def _whole_transfer(start_s: float, end_s: float, stream: Stream, motion: ArmMot
     transfer = find_transfer(motion, start_s, end_s)
     if transfer is None:
         return
-    samples = slice_time(stream, transfer.start_s, transfer.end_s)
+    # A sample stands for an interval around it. Beyond the states, the angles at its ends would be extrapolated.
+    half_s = 0.5 / stream.sensor.rate_hz
+    covered_s = motion.time_s[0] + half_s, motion.time_s[-1] - half_s
+    samples = slice_time(stream, max(transfer.start_s, covered_s[0]), min(transfer.end_s, covered_s[1]))
     time_s = stream.time_s[samples]
     if len(time_s) < 2 or np.diff(time_s).mean() > SPARSE_S:
         return
