@@ -11,7 +11,7 @@ from rig.errors import Fault
 from rig.estimation.statistics.coverage import COVERAGE_FACTOR, tail_probability
 
 # Faults of sensors that were only recorded, not to be calibrated.
-ONLY_RECORDED = ("no_attitudes", "field_strength_unknown")
+UNCALIBRATED_FAULTS = ("no_attitudes", "field_strength_unknown")
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +80,7 @@ def list_unsolved(faults: Iterable[tuple[str, str, Fault]]) -> Iterator[Check]:
     A sensor that is only recorded, such as a magnetometer in sweeps, gets no check.
     """
     for sensor, quantity, fault in faults:
-        if fault.name not in ONLY_RECORDED:
+        if fault.name not in UNCALIBRATED_FAULTS:
             yield fitness(sensor, quantity, "unsolved", 1.0, 0.0)
 
 

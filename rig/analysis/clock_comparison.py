@@ -17,12 +17,12 @@ from rig.observation.observed_run import ObservedRun
 
 # Largest relative difference between a simulated controller's clock and another one. Such a controller runs as fast as
 # it can: if its pace differs by more, the other clock does not count its seconds.
-ONE_PACE = 1e-2
-CERTAIN = 4.0  # allowed difference, in standard deviations of its measured part
+MAX_PACE_ERROR = 1e-2
+DIFFERENCE_LIMIT = 4.0  # standard deviations of the difference's measured part
 PPM = 1e-6
 
-BY_COMPUTER, BY_CRYSTAL = "the computer's clock", "the board's crystal"
-SHORT = {BY_COMPUTER: "computer", BY_CRYSTAL: "crystal"}
+COMPUTER_CLOCK, CRYSTAL_CLOCK = "the computer's clock", "the board's crystal"
+CLOCK_NAMES = {COMPUTER_CLOCK: "computer", CRYSTAL_CLOCK: "crystal"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,11 +75,11 @@ class ClockCheck:
         """Yield the difference of each pair of clocks, and its limit: the sum of both half-widths, and noise."""
         clocks = [("controller", 0.0, self.half_width, 0.0)]
         clocks += [
-            (SHORT[comparison.by], comparison.error, comparison.half_width, comparison.noise_std)
+            (CLOCK_NAMES[comparison.by], comparison.error, comparison.half_width, comparison.noise_std)
             for comparison in self.comparisons
         ]
         for (one, error, width, noise), (other, its_error, its_width, its_noise) in combinations(clocks, 2):
-            limit = width + its_width + CERTAIN * float(np.hypot(noise, its_noise))
+            limit = width + its_width + DIFFERENCE_LIMIT * float(np.hypot(noise, its_noise))
             yield ClockDifference((one, other), abs(error - its_error), limit)
 
     @property
@@ -98,8 +98,8 @@ def check_clock(recording: ObservedRun, uncertainty: Uncertainty) -> ClockCheck:
     from rig.data.recording.provenance import calls_itself_simulated
 
     compared = (_compare_to_computer(recording, uncertainty), _compare_to_crystal(recording, uncertainty))
-    pace = ONE_PACE if calls_itself_simulated(recording.run.provenance.arm_software) else np.inf
-    far = {BY_COMPUTER: pace, BY_CRYSTAL: np.inf}
+    pace = MAX_PACE_ERROR if calls_itself_simulated(recording.run.provenance.arm_software) else np.inf
+    far = {COMPUTER_CLOCK: pace, CRYSTAL_CLOCK: np.inf}
     used = [other for other in compared if other is not None and abs(other.error) < far[other.by]]
     half_width = uncertainty.controller_clock_ppm * PPM
     weights = np.array([3 / half_width**2, *(1 / other.std**2 for other in used)])
@@ -119,7 +119,7 @@ def worst_differences(clocks: Iterable[ClockCheck]) -> list[ClockDifference]:
 def _compare_to_computer(recording: ObservedRun, uncertainty: Uncertainty) -> ClockComparison:
     """Compare the controller's clock with the computer's, using the arrival times of the states."""
     rate = compare_with_computer(recording.motion)
-    return ClockComparison(BY_COMPUTER, rate.error, uncertainty.computer_clock_ppm * PPM, rate.std, rate.dof)
+    return ClockComparison(COMPUTER_CLOCK, rate.error, uncertainty.computer_clock_ppm * PPM, rate.std, rate.dof)
 
 
 def _compare_to_crystal(recording: ObservedRun, uncertainty: Uncertainty) -> ClockComparison | None:
@@ -129,4 +129,4 @@ def _compare_to_crystal(recording: ObservedRun, uncertainty: Uncertainty) -> Clo
         return None
     best = min(bases, key=lambda base: base.drift_std)
     error = (1 + best.drift) / (1 + NOMINAL_DRIFT) - 1
-    return ClockComparison(BY_CRYSTAL, error, uncertainty.crystal_ppm * PPM, best.drift_std)
+    return ClockComparison(CRYSTAL_CLOCK, error, uncertainty.crystal_ppm * PPM, best.drift_std)

@@ -10,8 +10,8 @@ from rig.observation.consistency.arm_clock import find_encoder_noise_rad, state_
 from rig.observation.observed_run import ObservedRun
 
 # Jitter of a time between two states, relative to that of one state: √(f² + (1 − f)²), averaged over the fractions f.
-BETWEEN_TWO = sqrt(2 / 3)
-BY_SPLINE = 0.935  # the same for an angle between two readings, by the cubic spline through all readings
+INTERPOLATION_JITTER_RATIO = sqrt(2 / 3)
+SPLINE_NOISE_RATIO = 0.935  # the same for an angle between two readings, by the cubic spline through all readings
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,10 +50,10 @@ def surroundings_of(recordings: Sequence[ObservedRun], settings: RunSettings) ->
         settings.site,
         uncertainty,
         clock,
-        jitter.std_s * BETWEEN_TWO,
+        jitter.std_s * INTERPOLATION_JITTER_RATIO,
         settings.extension_m,
         settings.finds_earth_rate,
         jitter.dof,
         clocks,
-        find_encoder_noise_rad(recordings) * BY_SPLINE,
+        find_encoder_noise_rad(recordings) * SPLINE_NOISE_RATIO,
     )

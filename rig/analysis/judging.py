@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from rig.analysis.check import Check, list_unsolved
-from rig.analysis.consistency.contradictions import NOTHING, ConsistencyChecks, check_references, contradictions
+from rig.analysis.consistency.contradictions import NO_CHECKS, ConsistencyChecks, check_references, contradictions
 from rig.analysis.consistency.detection_limits import DetectionLimit
 from rig.analysis.environment import surroundings_of
 from rig.analysis.estimator_names import Estimator, find_estimator
@@ -160,7 +160,7 @@ class _DwellOutcome:
     polynomials: "Polynomials"
     accelerometers: "Mapping[str, AccelerometerResult]" = field(default_factory=dict)
     magnetometers: "Attempts[str, MagnetometerResult]" = field(default_factory=Attempts)
-    contradictions: ConsistencyChecks = NOTHING
+    contradictions: ConsistencyChecks = NO_CHECKS
 
 
 def _judge_dwells(

@@ -21,7 +21,7 @@ from rig.observation.motion.arm_motion import motion_of
 from rig.observation.reference.dwell_acceleration import accelerations
 from rig.observation.time_stamps.sampling import find_sampling
 
-FEWEST_TO_JUDGE = 20  # readings: fewer may be equal by chance
+MIN_READINGS = 20  # fewer may be equal by chance
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +107,7 @@ def _summarise_noise(times_s: Sequence[Array], readings: Sequence[Array], quanti
     """Return the noise of intervals at rest with times (nᵢ,) and readings (nᵢ, 3). Raise Fault `stuck_sensor`."""
     if not readings:
         raise too_short("nothing stood still for longer than a few readings")
-    if any(not np.ptp(reading, axis=0).all() for reading in readings if len(reading) > FEWEST_TO_JUDGE):
+    if any(not np.ptp(reading, axis=0).all() for reading in readings if len(reading) > MIN_READINGS):
         raise Fault(
             "stuck_sensor",
             f"an axis repeats one {quantity} through a whole rest",

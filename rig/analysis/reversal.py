@@ -12,7 +12,7 @@ from rig.errors import Refused
 from rig.estimation.arrays import Array
 from rig.estimation.reference.reversal import Reversal, separate
 
-ALIKE = (
+REMEDY = (
     "Give runs of one magnetometer on one arm, in the same attitudes and at the same position, turned over in between"
 )
 
@@ -44,7 +44,7 @@ def reversals(runs: Sequence[tuple[str, Outcome]]) -> dict[str, MagnetometerReve
     the difference, and as `separate` does.
     """
     if len(runs) < 2:
-        raise Refused("too_few_runs", "one run cannot separate the bias from the arm's field", ALIKE)
+        raise Refused("too_few_runs", "one run cannot separate the bias from the arm's field", REMEDY)
     first = runs[0][1].magnetometers
     names = [*first.results, *first.faults]
     if not names:
@@ -59,7 +59,7 @@ def _require_calibrated(run: str, outcome: Outcome, name: str) -> AsMounted:
     if name in magnetometers.faults:
         why = f"in {run} {name} was not calibrated: {magnetometers.faults[name]}"
         raise Refused("no_magnetometer", why, "Correct that, and run again")
-    raise Refused("no_magnetometer", f"{run} has no recording of a magnetometer {name}", ALIKE)
+    raise Refused("no_magnetometer", f"{run} has no recording of a magnetometer {name}", REMEDY)
 
 
 def _reversal(runs: Sequence[AsMounted]) -> MagnetometerReversal:
@@ -68,7 +68,7 @@ def _reversal(runs: Sequence[AsMounted]) -> MagnetometerReversal:
     for other in runs[1:]:
         for what, value in _list_common(other).items():
             if value != first[what]:
-                raise Refused("runs_do_not_match", f"{runs[0].run} and {other.run} differ in {what}", ALIKE)
+                raise Refused("runs_do_not_match", f"{runs[0].run} and {other.run} differ in {what}", REMEDY)
     results = [run.result for run in runs]
     separation = separate(
         np.array([result.solution.bias for result in results]),

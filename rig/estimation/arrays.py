@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
-SMALLEST_SIZE = 1e-200  # a smaller uncertainty counts as zero: division by it would overflow
-BISECTIONS = 30
+MIN_SIZE = 1e-200  # a smaller uncertainty counts as zero: division by it would overflow
+BISECTION_STEPS = 30
 
 
 def scale_of(matrix: Array) -> Array:
@@ -60,7 +60,7 @@ def divide_or_infinity(values: ArrayLike, sizes: ArrayLike) -> Array:
     """Return values divided by sizes ≥ 0 of the same shape; infinite for a nonzero value over a negligible size."""
     value, size = np.asarray(values, dtype=np.float64), np.asarray(sizes, dtype=np.float64)
     none = np.where(value == 0, 0.0, np.copysign(np.inf, value))
-    ratio: Array = np.divide(value, size, out=none, where=size > SMALLEST_SIZE)
+    ratio: Array = np.divide(value, size, out=none, where=size > MIN_SIZE)
     return ratio
 
 
@@ -74,7 +74,7 @@ def equal_runs(values: NDArray[Any]) -> NDArray[np.intp]:
 def bisect(is_too_small: Callable[[Array], Array | NDArray[np.bool_]], highest: Array) -> Array:
     """Return the values (q,), between 0 and `highest` (q,), below which `is_too_small` is true, by bisection."""
     low, high = np.zeros_like(highest), highest
-    for _ in range(BISECTIONS):
+    for _ in range(BISECTION_STEPS):
         middle = (low + high) / 2
         small = is_too_small(middle)
         low, high = np.where(small, middle, low), np.where(small, high, middle)

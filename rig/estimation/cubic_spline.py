@@ -5,7 +5,7 @@ from numpy.typing import ArrayLike
 
 from rig.estimation.arrays import Array
 
-NEGLIGIBLE = 1e-18  # weight of a distant neighbour in a slope: far below the resolution of a double
+NEGLIGIBLE_WEIGHT = 1e-18  # of a distant neighbour in a slope: far below the resolution of a double
 
 
 class CubicSpline:
@@ -92,7 +92,7 @@ def _solve_tridiagonal(lower: Array, upper: Array, right: Array) -> Array:
     suffice for any n.
     """
     apart = 1
-    while apart < len(right) and max(np.abs(lower).max(), np.abs(upper).max()) > NEGLIGIBLE:
+    while apart < len(right) and max(np.abs(lower).max(), np.abs(upper).max()) > NEGLIGIBLE_WEIGHT:
         before, after = lower[apart:], upper[:-apart]
         size, new, new_lower, new_upper = np.ones_like(lower), right.copy(), np.zeros_like(lower), np.zeros_like(upper)
         size[apart:] -= before * upper[:-apart]

@@ -13,25 +13,25 @@ from numpy.typing import ArrayLike, NDArray
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 
-MAX_SCALE = 4.0  # largest ratio, or its inverse: a wrong unit gives more, a sensor's scale error less
-STUCK = 0.01  # fraction of the reading of the most sensitive axis, below which an axis is stuck
-MIN_ALIGNMENT = 0.7  # least cosine between an axis and its nominal direction; beyond 45° it is another axis
-CONFUSED_ANGLES = (  # ratios of reading to true value if the unit is wrong
+MAX_SCALE_RATIO = 4.0  # largest ratio, or its inverse: a wrong unit gives more, a sensor's scale error less
+STUCK_RATIO = 0.01  # to the reading of the most sensitive axis, below which an axis is stuck
+MIN_ALIGNMENT_COSINE = 0.7  # between an axis and its nominal direction; beyond 45° it is another axis
+ANGLE_UNIT_RATIOS = (  # ratios of reading to true value if the unit is wrong
     (180 / np.pi, "the readings look like degrees per second given as rad/s"),
     (np.pi / 180, "the readings look like rad/s declared as °/s, or the rates like degrees per second given as rad/s"),
 )
-CONFUSED_RATES = (  # ratios of a table's rates over those of its attitudes
+RATE_UNIT_RATIOS = (  # ratios of a table's rates over those of its attitudes
     (180 / np.pi, "they look like degrees per second given as rad/s"),
     (np.pi / 180, "they look like rad/s declared as °/s"),
 )
-CONFUSED = (
-    *CONFUSED_ANGLES,
+UNIT_RATIOS = (
+    *ANGLE_UNIT_RATIOS,
     (1 / 9.80665, "the readings look like g given as m/s²"),
     (9.80665, "the readings look like m/s² declared as g"),
 )
-MIN_SIDE = 0.05  # least cosine between the reference and the direction that determines its sign
+MIN_SIDE_COSINE = 0.05  # between the reference and the direction that determines its sign
 NO_FIT = "the readings contradict the attitudes so much that no fit converges"
-CONSISTENT = 3.0  # ratio of residuals to their standard deviations, from which on a warning is given
+MAX_CONSISTENT_RATIO = 3.0  # of residuals to their standard deviations, from which on a warning is given
 
 
 def require_shape(name: str, array: Array, shape: tuple[int, ...]) -> None:
@@ -127,7 +127,7 @@ def check_reads(matrix: Array) -> None:
     """Raise Fault `stuck_sensor` if one row of F (3, 3), an axis, is much less sensitive than the others."""
     sizes = np.linalg.norm(matrix, axis=1)
     least = int(np.argmin(sizes))
-    if sizes[least] < STUCK * sizes.max():
+    if sizes[least] < STUCK_RATIO * sizes.max():
         raise Fault(
             "stuck_sensor",
             f"the {'xyz'[least]} axis reads the same however the sensor is moved",
@@ -135,7 +135,7 @@ def check_reads(matrix: Array) -> None:
         )
 
 
-def check_unit(scale: Array, confusions: Sequence[tuple[float, str]] = CONFUSED_ANGLES) -> None:
+def check_unit(scale: Array, confusions: Sequence[tuple[float, str]] = ANGLE_UNIT_RATIOS) -> None:
     """Raise Fault `wrong_unit`, which names the likely unit if any, for a scale factor (3,) above 4 or below 1/4."""
     if not is_plausible(scale).all():
         typical = float(np.exp(np.mean(np.log(scale))))
@@ -145,13 +145,13 @@ def check_unit(scale: Array, confusions: Sequence[tuple[float, str]] = CONFUSED_
 def check_reading_ratio(ratio: float, where: str) -> None:
     """Raise Fault `wrong_unit` if the ratio of readings to the turn rate is above 4 or below 1/4."""
     if not is_plausible(ratio).all():
-        raise wrong_unit(f"in {where} the gyroscope reads {ratio:.3g} times the turn rate", ratio, CONFUSED_ANGLES)
+        raise wrong_unit(f"in {where} the gyroscope reads {ratio:.3g} times the turn rate", ratio, ANGLE_UNIT_RATIOS)
 
 
 def is_plausible(ratio: ArrayLike) -> NDArray[np.bool_]:
     """Return a mask of ratios, of reading to true value or the reverse, that a sensor can have."""
     ratios = np.asarray(ratio, dtype=np.float64)
-    return (ratios < MAX_SCALE) & (ratios > 1 / MAX_SCALE)
+    return (ratios < MAX_SCALE_RATIO) & (ratios > 1 / MAX_SCALE_RATIO)
 
 
 def wrong_unit(what: str, ratio: float, confusions: Sequence[tuple[float, str]]) -> Fault:
@@ -180,12 +180,12 @@ def check_axes(axes: Array, nominal: Array | None) -> None:
         if sorted(where) == [0, 1, 2] and np.any(where != np.arange(3)):
             swaps = ", ".join(f"{'xyz'[i]} reads {'xyz'[where[i]]}" for i in range(3) if where[i] != i)
             raise Fault("swapped_axes", f"the sensor's axes are swapped: {swaps}", remedy)
-        mirrored = [i for i in range(3) if cosines[i, i] < -MIN_ALIGNMENT]
+        mirrored = [i for i in range(3) if cosines[i, i] < -MIN_ALIGNMENT_COSINE]
         if mirrored:
             names = ", ".join("xyz"[i] for i in mirrored)
             raise Fault("mirrored_axis", f"the sensor reads {names} with the wrong sign", remedy)
         worst = int(np.argmin(np.diag(cosines)))
-        if cosines[worst, worst] < MIN_ALIGNMENT:
+        if cosines[worst, worst] < MIN_ALIGNMENT_COSINE:
             angle = float(np.degrees(np.arccos(cosines[worst, worst])))
             raise Fault(
                 "wrong_mounting", f"the sensor's {'xyz'[worst]} axis lies {angle:.0f}° off its mounting", remedy
@@ -199,7 +199,7 @@ def _describe_left_handed(axes: Array) -> str:
     cosines = axes / np.linalg.norm(axes, axis=1, keepdims=True)
     where = np.argmax(np.abs(cosines), axis=1)
     what = "the sensor's axes form a left-handed frame: "
-    if sorted(where) != [0, 1, 2] or np.abs(cosines[np.arange(3), where]).min() < MIN_ALIGNMENT:
+    if sorted(where) != [0, 1, 2] or np.abs(cosines[np.arange(3), where]).min() < MIN_ALIGNMENT_COSINE:
         return f"{what}one is mirrored or two are swapped"
     mirrored = [f"-{'xyz'[j]}" if cosines[i, j] < 0 else "xyz"[j] for i, j in enumerate(where.tolist())]
     return f"{what}x, y, z read the body's {', '.join(mirrored)}"
@@ -224,7 +224,7 @@ def check_rotations(attitudes: Array) -> None:
 
 def check_side(reference: Array, side: Array) -> None:
     """Raise Fault `sign_unknown` if a direction (3,) nearly perpendicular to v_ref (3,) leaves the sign unknown."""
-    if abs(reference @ side) < MIN_SIDE * np.linalg.norm(reference) * np.linalg.norm(side):
+    if abs(reference @ side) < MIN_SIDE_COSINE * np.linalg.norm(reference) * np.linalg.norm(side):
         raise Fault(
             "sign_unknown",
             "the reference is at right angles to the direction that should show its sign",
@@ -320,6 +320,6 @@ def warn_of_residuals(residuals: Array, variances: Array, dof: int) -> tuple[str
     if dof <= 0:
         return ()
     ratio = float(np.sqrt(np.sum(residuals**2 / variances) / dof))
-    if ratio < CONSISTENT:
+    if ratio < MAX_CONSISTENT_RATIO:
         return ()
     return (f"residuals are {ratio:.1f} times what the variances explain: the readings contain more than noise",)

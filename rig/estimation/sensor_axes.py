@@ -10,11 +10,11 @@ import numpy as np
 from rig.estimation.arrays import Array, scale_of
 
 # The pairs y z, z x, x y; the angle of each is that about the third axis.
-FIRST, SECOND = np.array([1, 2, 0]), np.array([2, 0, 1])
-PAIR = np.arange(3)
+FIRST_AXES, SECOND_AXES = np.array([1, 2, 0]), np.array([2, 0, 1])
+PAIR_INDICES = np.arange(3)
 # The other axis of pair p for axis i, as [p, i]; whether i is the second (1), the first (−1), or not in the pair (0).
-OTHER = -(PAIR[:, None] + PAIR) % 3
-ORDER = np.roll(np.eye(3), -1, axis=1) - np.roll(np.eye(3), 1, axis=1)
+OTHER_AXIS = -(PAIR_INDICES[:, None] + PAIR_INDICES) % 3
+AXIS_ORDER = np.roll(np.eye(3), -1, axis=1) - np.roll(np.eye(3), 1, axis=1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +62,7 @@ class SensorAxes:
 
 def non_orthogonality(axes: Array) -> Array:
     """Return the non-orthogonality (3,), rad: 90° minus the angles y z, z x, x y between unit rows (3, 3)."""
-    angles: Array = np.arcsin(np.clip((axes @ axes.T)[FIRST, SECOND], -1, 1))
+    angles: Array = np.arcsin(np.clip((axes @ axes.T)[FIRST_AXES, SECOND_AXES], -1, 1))
     return angles
 
 
@@ -76,7 +76,7 @@ def nearest_rotation(axes: Array) -> Array:
 def parameter_jacobian(matrix: Array, scale: Array) -> Array:
     """Return the derivative (6, 12) of k and b with respect to F, row by row, and c: δk = −k³ F_i·δF_i, δb = −δc."""
     jacobian = np.zeros((6, 12))
-    jacobian[:3, :9].reshape(3, 3, 3)[PAIR, PAIR] = -(scale**3)[:, None] * matrix
+    jacobian[:3, :9].reshape(3, 3, 3)[PAIR_INDICES, PAIR_INDICES] = -(scale**3)[:, None] * matrix
     jacobian[3:, 9:] = -np.eye(3)
     return jacobian
 
@@ -89,9 +89,9 @@ def angle_jacobian(axes: Array, scale: Array, rotation: Array) -> Array:
     """
     project = scale[:, None, None] * (np.eye(3) - axes[:, :, None] * axes[:, None, :])
     stretch = axes @ rotation.T
-    cosines = np.sqrt(1 - (axes @ axes.T)[FIRST, SECOND] ** 2)
+    cosines = np.sqrt(1 - (axes @ axes.T)[FIRST_AXES, SECOND_AXES] ** 2)
     # P_i a_j and P_i r_j of the two axes of each pair: pair, row of F, element
-    sines = (axes @ project)[PAIR, OTHER] * (np.abs(ORDER) / cosines[:, None])[..., None]
-    axial = (rotation @ project)[PAIR, OTHER] * ORDER[..., None]
+    sines = (axes @ project)[PAIR_INDICES, OTHER_AXIS] * (np.abs(AXIS_ORDER) / cosines[:, None])[..., None]
+    axial = (rotation @ project)[PAIR_INDICES, OTHER_AXIS] * AXIS_ORDER[..., None]
     turns = np.linalg.solve(stretch.trace() * np.eye(3) - stretch, axial.reshape(3, 9))
     return np.concatenate([sines.reshape(3, 9), turns])

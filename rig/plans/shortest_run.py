@@ -18,7 +18,7 @@ from pydantic import ValidationError
 from rig.analysis.by_hand.hand_prediction import duration_s, predict_hand_budgets
 from rig.analysis.design.budget_prediction import predict_budgets
 from rig.analysis.design.candidate_search import (
-    SIZES,
+    TARGET_NAMES,
     Budgets,
     Candidate,
     Planned,
@@ -34,8 +34,8 @@ from rig.config.procedures.procedure_sections import SixObservationSection, Stat
 from rig.config.section import Section
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
-from rig.estimation.by_hand.solution import LINES, REAL_HANDS
-from rig.estimation.gyroscope.budget import BIAS_DRIFT, FLICKER, NOISE, STATES
+from rig.estimation.by_hand.solution import CONTRIBUTORS, REAL_HAND_STD
+from rig.estimation.gyroscope.budget import BIAS_DRIFT, FLICKER, NOISE, STATE_TIMES
 from rig.motion.by_hand import Instruction
 from rig.motion.steps import Plan
 from rig.plans.by_hand import WantedMoves as Asked
@@ -52,7 +52,7 @@ RESTS_S = (1.0, 2.0, 3.0, 5.0, 10.0, 20.0)  # durations of a rest, and of a dwel
 # The endless run is predicted from a plan of two repeats, because in a single one noise is too large relative to the
 # errors that repeats share. Other rests and more repeats reduce its U further, but by no more than this factor.
 TWICE, HOPELESS = 2, 2.0
-PER_REPEAT = NOISE, BIAS_DRIFT, FLICKER, STATES  # the budget lines that repeats reduce, also for accelerometers
+PER_REPEAT = NOISE, BIAS_DRIFT, FLICKER, STATE_TIMES  # the budget lines that repeats reduce, also for accelerometers
 FLIPS, TURNS_BY_HAND = (8, 10, 12, 16, 24, 36, 48), (0, 3, 6)
 REST_STEP_S = 0.1  # step of the last, fine search
 
@@ -142,7 +142,7 @@ def _refuse_others(wanted: TargetUncertainty, config: RigConfig) -> None:
     kinds["accelerometer"] = config.procedure.accelerometer_order > 0 and any(
         sensor.acceleration is not None for sensor in config.to_calibrate.values()
     )
-    for (kind, calibrated), sizes in zip(kinds.items(), (SIZES[:2], SIZES[2:]), strict=True):
+    for (kind, calibrated), sizes in zip(kinds.items(), (TARGET_NAMES[:2], TARGET_NAMES[2:]), strict=True):
         if not calibrated and any(getattr(wanted, size) < inf for size in sizes):
             raise _not_predictable(f"the procedure calibrates no {kind}, so no uncertainty of one can be reached")
 
@@ -282,7 +282,7 @@ class _HandSearch:
     """Sessions by hand with different numbers of flips and turns."""
 
     config: RigConfig
-    per_repeat: Collection[str] = tuple(LINES)  # all that the readings determine
+    per_repeat: Collection[str] = tuple(CONTRIBUTORS)  # all that the readings determine
 
     def candidates(self) -> Sequence[Candidate]:
         return [self._candidate(*numbers) for numbers in product(FLIPS, TURNS_BY_HAND, RESTS_S[:4])]
@@ -309,7 +309,7 @@ class _HandSearch:
 
     def ending(self, procedure: ProcedureSection, wanted: TargetUncertainty) -> Mapping[str, float]:
         """Return the key that ends a session at the target, without the part of U that no session can reduce."""
-        remaining = wanted.scale**2 - (2 * REAL_HANDS) ** 2
+        remaining = wanted.scale**2 - (2 * REAL_HAND_STD) ** 2
         return {"target_scale_u": round(remaining**0.5, 7)} if 0 < remaining < inf else {}
 
     def _candidate(self, flips: int, turns: int, rest_s: float) -> Candidate:

@@ -15,7 +15,7 @@ import numpy as np
 from rig.estimation.arrays import Array
 from rig.estimation.earth import EARTH_RATE_RAD_S, STANDARD_GRAVITY_M_S2
 from rig.estimation.gyroscope.budget import Unknown, budget
-from rig.estimation.gyroscope.nonlinearity import CUBE_MISSED, SQUARE_MISSED
+from rig.estimation.gyroscope.nonlinearity import CUBE_DEVIATION, SQUARE_DEVIATION
 from rig.estimation.gyroscope.own_errors import KnownSensor
 from rig.estimation.gyroscope.six_observation import PARAMETERS
 from rig.estimation.gyroscope.vector_fit import VectorInputs, centripetal_m_s2, explain
@@ -182,7 +182,7 @@ def _simulate_session(effects: Effects, rng: np.random.Generator) -> Array:
 
 def _apply_nonlinearity(along_rad_s: Array, effects: Effects, rng: np.random.Generator) -> Array:
     """Return the rates (N, 3) that a nonlinear sensor indicates; at the sweeps' speed they are exact."""
-    cube, square = effects.nonlinearity / np.array([[CUBE_MISSED], [SQUARE_MISSED]]) * rng.uniform(-1, 1, (2, 3))
+    cube, square = effects.nonlinearity / np.array([[CUBE_DEVIATION], [SQUARE_DEVIATION]]) * rng.uniform(-1, 1, (2, 3))
     fraction, sweep_fraction = along_rad_s / effects.full_scale_rad_s, effects.speed_rad_s / effects.full_scale_rad_s
     curve = cube * (fraction**2 - sweep_fraction**2) + square * fraction
     return np.asarray(along_rad_s * (1 + curve), dtype=np.float64)

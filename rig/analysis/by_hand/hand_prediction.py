@@ -24,14 +24,14 @@ from rig.observation.by_hand.hand_segmentation import segment_session
 from rig.observation.by_hand.rests_and_moves import ITS_OWN_CLOCK, rotate_face
 
 FLIP_S, TURN_S = 1.5, 2.5  # duration of a move from rest to rest; assumed
-ASKED_S = 1.0  # from the end of a rest to the next move: the operator reads the instruction; assumed
-SAMPLED_HZ = 60.0  # rate of the simulated readings, which have the sensor's noise density
-FIRST: Face = "+z"
+INSTRUCTION_S = 1.0  # from the end of a rest to the next move: the operator reads the instruction; assumed
+SAMPLE_RATE_HZ = 60.0  # of the simulated readings, which have the sensor's noise density
+START_FACE: Face = "+z"
 
 
 def duration_s(moves: Sequence[Instruction], rest_s: float) -> float:
     """Return the duration of a session by hand if the operator makes no mistakes."""
-    return rest_s + sum(_move_s(move) + ASKED_S + rest_s for move in moves)
+    return rest_s + sum(_move_s(move) + INSTRUCTION_S + rest_s for move in moves)
 
 
 def predict_hand_budgets(
@@ -52,7 +52,7 @@ def predict_hand_budgets(
 
 
 def _conditions(sensor: SensorSection, uncertainty: Uncertainty, procedure: HandSettings) -> SessionConditions:
-    first = None if sensor.acceleration is not None else rotate_face(FIRST, mounting_matrix(sensor.mounting))
+    first = None if sensor.acceleration is not None else rotate_face(START_FACE, mounting_matrix(sensor.mounting))
     clock = "the board's crystal" if sensor.on_board else ITS_OWN_CLOCK
     return SessionConditions(uncertainty.crystal_ppm, clock, procedure.box_rad, first_face=first)
 
@@ -63,29 +63,29 @@ def _move_s(move: Instruction) -> float:
 
 def _session(sensor: SensorSection, moves: Sequence[Instruction], rest_s: float) -> HandRecording:
     """Simulate the readings of a session in the sensor's axes, segmented into rests and moves."""
-    no_rotation, faces = np.zeros(3), [FIRST, *(move.face for move in moves)]
-    spans = [_sample_rotation(rest_s, FIRST, no_rotation)]
+    no_rotation, faces = np.zeros(3), [START_FACE, *(move.face for move in moves)]
+    spans = [_sample_rotation(rest_s, START_FACE, no_rotation)]
     for face, move in zip(faces, moves, strict=False):
         spans += [
             _sample_rotation(_move_s(move), face, _rotation(face, move)),
-            _sample_rotation(rest_s + ASKED_S, move.face, no_rotation),
+            _sample_rotation(rest_s + INSTRUCTION_S, move.face, no_rotation),
         ]
     turning_rad_s, up = (np.concatenate(part_of_span) for part_of_span in zip(*spans, strict=True))
     part, mounting, rng = PARTS[sensor.part], mounting_matrix(sensor.mounting), np.random.default_rng(len(moves))
 
     def read(true: Array, noise_sqrt_hz: float) -> Array:
-        readings: Array = true @ mounting.T + noise_sqrt_hz * SAMPLED_HZ**0.5 * rng.standard_normal(true.shape)
+        readings: Array = true @ mounting.T + noise_sqrt_hz * SAMPLE_RATE_HZ**0.5 * rng.standard_normal(true.shape)
         return readings
 
     rates, acceleration = read(turning_rad_s, part.angle_random_walk_rad_sqrt_s), None
     if sensor.acceleration is not None:
         acceleration = read(STANDARD_GRAVITY_M_S2 * up, part.velocity_random_walk_ug_sqrt_s * MICRO_G_M_S2)
-    return segment_session(np.arange(len(rates)) / SAMPLED_HZ, rates, acceleration)
+    return segment_session(np.arange(len(rates)) / SAMPLE_RATE_HZ, rates, acceleration)
 
 
 def _sample_rotation(lasting_s: float, face: Face, rotation: Array) -> tuple[Array, Array]:
     """Return rates (n, 3) and the vertical (n, 3), both in the item's axes, during a rotation from a face."""
-    count = round(lasting_s * SAMPLED_HZ)
+    count = round(lasting_s * SAMPLE_RATE_HZ)
     fraction, up = (np.arange(count) + 0.5) / count, np.tile(axis_of(face), (count, 1))
     if rotation.any():
         progress = fraction - np.sin(2 * np.pi * fraction) / (2 * np.pi)

@@ -10,7 +10,7 @@ import numpy as np
 from rig.analysis.check import Check, fitness
 from rig.analysis.consistency import converter_tests, gyroscope_checks
 from rig.analysis.consistency.detection_limits import DetectionLimit, find_gyroscope_limits, find_reference_limits
-from rig.analysis.consistency.false_alarms import FALSE_ALARMS, NON_ORTHOGONALITY, false_alarm_per_check
+from rig.analysis.consistency.false_alarms import FALSE_ALARM_PROBABILITY, NON_ORTHOGONALITY, false_alarm_per_check
 from rig.analysis.consistency.frozen_axis import find_longest_frozen
 from rig.analysis.consistency.gyroscope_checks import DISTURBED_SWEEP
 from rig.analysis.consistency.residual_tests import Statistic
@@ -46,7 +46,7 @@ class ConsistencyChecks:
         return frozenset(check.means.sweep for check in self.checks if check.means.sweep is not None)
 
 
-NOTHING = ConsistencyChecks(())
+NO_CHECKS = ConsistencyChecks(())
 
 
 def contradictions(
@@ -56,7 +56,7 @@ def contradictions(
     surroundings: Surroundings,
     settings: RunSettings,
     *,
-    false_alarms: float = FALSE_ALARMS,
+    false_alarms: float = FALSE_ALARM_PROBABILITY,
     has_limits: bool = True,
 ) -> ConsistencyChecks:
     """Return the checks for contradictions in the gyroscopes' recordings.
@@ -151,7 +151,9 @@ def check_references(
            for name, result in accelerometers.items()},
         **{(name, FIELD): read_magnetometer(name, recordings, result, known_errors)
            for name, result in magnetometers.items()}}  # fmt: skip
-    false_alarm_probability = _false_alarm_probability(recordings[0].run, settings.to_calibrate, settings, FALSE_ALARMS)
+    false_alarm_probability = _false_alarm_probability(
+        recordings[0].run, settings.to_calibrate, settings, FALSE_ALARM_PROBABILITY
+    )
     checks: list[Check] = []
     detection_limits: dict[str, tuple[DetectionLimit, ...]] = {}
     for (name, quantity), sensor_readings in readings_of.items():

@@ -23,21 +23,21 @@ Statistics = dict[str, tuple[float, float]]
 
 # The checks of one sensor, at most.
 CHECKS = ("clipping", "repeated_readings", "skewed_noise", "spikes", "stuck_axis", "stuck_bit")
-SKEWNESS = 0.15  # skewness that always passes: it shifts a mean by hardly a fiftieth of the noise's standard deviation
-LONGEST_RUN = 25  # equal readings of one axis: if the noise is one step, every fourth reading equals the one before
-STRETCH = 8  # readings on three axes: they have some 50 random bits if the noise is one step
-FEWEST_VALUES = 24  # different readings of an axis from which on every bit should have changed
-ONE_BIT = 0.8  # fraction of the spikes with the same power of two from which on one bit causes them
-FEWEST_SPIKES = 5
-SINGLE = 21  # bits of a number in single precision that are random; the last three are rounded
-FEWEST_OF_NOISE = 4 * MEMORY  # the fewest readings of a window from which its noise is estimated
+SKEWNESS_LIMIT = 0.15  # a smaller skewness shifts a mean by hardly a fiftieth of the noise's standard deviation
+MAX_EQUAL_READINGS = 25  # in a row on one axis: if the noise is one step, every fourth reading equals the one before
+PATTERN_READINGS = 8  # readings on three axes: they have some 50 random bits if the noise is one step
+MIN_DISTINCT_VALUES = 24  # of an axis: with as many, every bit should have changed
+MIN_SAME_BIT_FRACTION = 0.8  # of the spikes with the same power of two: one bit causes them
+MIN_SPIKES = 5
+SINGLE_PRECISION_BITS = 21  # bits of a number in single precision that are random; the last three are rounded
+MIN_NOISE_READINGS = 4 * MEMORY  # of a window whose noise is estimated
 # Fraction of the arm's vibration that may remain: the sensor's filter changes it, and the arm's states show it in part.
-VIBRATION_LEFT = 0.1
-HEAP = 10  # the fewest readings at one end of the range that may be clipped
-AROUND = 4  # readings before and after one that show a burst of vibration
-SETTLING = 5  # first readings of a window, during which a low-pass filter may still follow the arm
-LEAST_TO_SKEW = 0.7  # noise in steps: smaller noise has so few values that a mean between two of them makes it skewed
-BETWEEN_COUNTS = 1.5  # counts: readings in larger steps are not those of a converter
+MAX_RESIDUAL_VIBRATION = 0.1
+MIN_CLIPPED_READINGS = 10  # at one end of the range
+BURST_READINGS = 4  # readings before and after one that show a burst of vibration
+SETTLING_READINGS = 5  # first readings of a window, during which a low-pass filter may still follow the arm
+MIN_NOISE_STEPS = 0.7  # smaller noise has so few values that a mean between two of them makes it skewed
+MAX_STEP_COUNTS = 1.5  # readings in larger steps are not those of a converter
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ class Digits:
         return self.steps.units * (2 if self.steps.cut else 1)
 
 
-COUNTS = Digits(True, Steps(1.0))
+CONVERTER_DIGITS = Digits(True, Steps(1.0))
 
 
 def find_digits(sensor: RecordedSensor, quantity: Quantity, samples: Sequence[NDArray[Any]]) -> Digits:
@@ -67,7 +67,7 @@ def find_digits(sensor: RecordedSensor, quantity: Quantity, samples: Sequence[ND
         np.concatenate([channel.values(recorded) for recorded in samples]), trusts_counts=sensor.on_board
     )
     counts = replace(steps, unit=np.maximum(steps.units / channel.unit_per_count, 1.0))
-    has_bits = not steps.cut and (sensor.on_board or bool(counts.units.max() <= BETWEEN_COUNTS))
+    has_bits = not steps.cut and (sensor.on_board or bool(counts.units.max() <= MAX_STEP_COUNTS))
     return Digits(has_bits, counts)
 
 
@@ -76,7 +76,7 @@ def judge_readings(
     windows: Sequence[RawReadings],
     false_alarm_probability: float,
     *,
-    digits: Digits = COUNTS,
+    digits: Digits = CONVERTER_DIGITS,
     frozen: int = 0,
 ) -> Statistics:
     """Return statistic and limit by the check's name, from all readings (n, 3) and the windows of each recording.
@@ -102,11 +102,11 @@ def judge_readings(
             + spike_bits
         )
         statistics = {"stuck_bit": (float(stuck), 0.0), **statistics}
-    informative = steps_of_noise >= LEAST_TO_SKEW
+    informative = steps_of_noise >= MIN_NOISE_STEPS
     if any(window.sweep < 0 for window in windows) and informative.any():
         statistics["skewed_noise"] = _skewness(at_rest, informative, critical_value)
     runs = [_longest_run(recorded[:, noisy]) for recorded in counts]
-    statistics["stuck_axis"] = float(max(frozen, *runs)), LONGEST_RUN
+    statistics["stuck_axis"] = float(max(frozen, *runs)), MAX_EQUAL_READINGS
     if noisy.all():
         statistics["repeated_readings"] = sum(map(_count_repeated, counts)), 0.0
         turning = [window for window in windows if window.sweep >= 0] or windows
@@ -121,7 +121,7 @@ def _count_constant_bits(counts: NDArray[np.int64]) -> int:
     """Count the bits, over the axes, that never change although the readings' range contains both values."""
     constant = 0
     for axis in counts.T:
-        if len(np.unique(axis)) < FEWEST_VALUES:
+        if len(np.unique(axis)) < MIN_DISTINCT_VALUES:
             continue
         bits = [bit for bit in range(16) if 2 ** (bit + 2) <= np.ptp(axis)]
         constant += sum(int(np.ptp((axis >> bit) & 1) == 0) for bit in bits)
@@ -133,7 +133,7 @@ def _count_uneven_bits(windows: Sequence[RawReadings], noise: Array, critical_va
     uneven = 0
     counts = np.concatenate([window.counts for window in windows])
     for axis in range(3):
-        first = int(np.abs(counts[:, axis]).max()).bit_length() - SINGLE
+        first = int(np.abs(counts[:, axis]).max()).bit_length() - SINGLE_PRECISION_BITS
         for bit in range(max(first, 0), 16):
             if 1.5 * 2**bit > noise[axis]:
                 break
@@ -151,18 +151,18 @@ def _find_spikes(windows: Sequence[RawReadings], step_counts: Array) -> tuple[fl
     half = step_counts / 2
     farthest, sizes = 0.0, [list[Array]() for _ in range(3)]
     deviations_by_window = [
-        (window.residual_counts - np.median(window.residual_counts, axis=0))[SETTLING:] for window in windows
+        (window.residual_counts - np.median(window.residual_counts, axis=0))[SETTLING_READINGS:] for window in windows
     ]
     noises = [np.maximum(1.4826 * np.median(np.abs(deviations), axis=0), half) for deviations in deviations_by_window]
     informative = [
         noise
         for deviations, noise in zip(deviations_by_window, noises, strict=True)
-        if len(deviations) >= FEWEST_OF_NOISE
+        if len(deviations) >= MIN_NOISE_READINGS
     ]
     least = np.min(informative or [half], axis=0)  # a short rest, such as that of an interrupted run, shows too little
     for window, deviations, noise_of_window in zip(windows, deviations_by_window, noises, strict=True):
         noise = np.maximum(noise_of_window, least)
-        deviation = np.maximum(noise, VIBRATION_LEFT * window.vibration_counts)
+        deviation = np.maximum(noise, MAX_RESIDUAL_VIBRATION * window.vibration_counts)
         scatter = np.maximum(deviation, _find_scatter_around(deviations) if window.sweep >= 0 else 0.0)
         farthest = max(farthest, float(np.max(np.abs(deviations) / scatter)))
         for axis in range(3):
@@ -177,19 +177,19 @@ def _find_spikes(windows: Sequence[RawReadings], step_counts: Array) -> tuple[fl
 
 def _find_scatter_around(deviations: Array) -> Array:
     """Return the scatter (n, 3) of the readings near each reading; within a burst of vibration it is large."""
-    sizes = np.pad(np.abs(deviations), ((AROUND, AROUND), (0, 0)), mode="reflect")
-    around = np.lib.stride_tricks.sliding_window_view(sizes, 2 * AROUND + 1, axis=0)
+    sizes = np.pad(np.abs(deviations), ((BURST_READINGS, BURST_READINGS), (0, 0)), mode="reflect")
+    around = np.lib.stride_tricks.sliding_window_view(sizes, 2 * BURST_READINGS + 1, axis=0)
     scatter: Array = 1.4826 * np.median(around, axis=-1)
     return scatter
 
 
 def _is_one_bit(powers: Array) -> bool:
     """Return whether most spikes equal the same power of two; `powers` contains −1 for spikes of other sizes."""
-    if len(powers) < FEWEST_SPIKES:
+    if len(powers) < MIN_SPIKES:
         return False
     which, often = np.unique(powers, return_counts=True)
     most = int(np.argmax(often))
-    return bool(which[most] >= 0 and often[most] >= ONE_BIT * len(powers))
+    return bool(which[most] >= 0 and often[most] >= MIN_SAME_BIT_FRACTION * len(powers))
 
 
 def _skewness(windows: Sequence[RawReadings], axes: NDArray[np.bool_], critical_value: float) -> tuple[float, float]:
@@ -202,7 +202,7 @@ def _skewness(windows: Sequence[RawReadings], axes: NDArray[np.bool_], critical_
     noise -= noise.mean(axis=0)
     std = np.sqrt(np.maximum(np.mean(noise**2, axis=0), 1e-12))  # an axis may stand still
     skewness = np.mean((noise / std) ** 3, axis=0)  # computed here: scipy.stats takes half a second to import
-    return float(np.max(np.abs(skewness[axes]))), max(SKEWNESS, critical_value * float(np.sqrt(6 / len(noise))))
+    return float(np.max(np.abs(skewness[axes]))), max(SKEWNESS_LIMIT, critical_value * float(np.sqrt(6 / len(noise))))
 
 
 def _longest_run(counts: NDArray[np.int64]) -> int:
@@ -216,7 +216,7 @@ def _longest_run(counts: NDArray[np.int64]) -> int:
 
 def _count_repeated(counts: NDArray[np.int64]) -> int:
     """Count the sequences of readings that repeat an earlier sequence."""
-    stretches = np.lib.stride_tricks.sliding_window_view(counts.astype(np.int16), STRETCH, axis=0)
+    stretches = np.lib.stride_tricks.sliding_window_view(counts.astype(np.int16), PATTERN_READINGS, axis=0)
     rows = np.ascontiguousarray(stretches.reshape(len(stretches), -1))
     return len(rows) - len(np.unique(rows.view(f"V{rows.shape[1] * 2}")))
 
@@ -227,6 +227,6 @@ def _count_heaped(counts: NDArray[np.int64], critical_value: float) -> int:
     for axis in counts.T:
         values, often = np.unique(axis, return_counts=True)
         for end, next_to_end in ((often[0], often[1]), (often[-1], often[-2])) if len(values) > 1 else ():
-            if end >= HEAP and end - next_to_end > critical_value * np.sqrt(end + next_to_end):
+            if end >= MIN_CLIPPED_READINGS and end - next_to_end > critical_value * np.sqrt(end + next_to_end):
                 heaped += int(end)
     return heaped

@@ -4,12 +4,12 @@ from rig.analysis.consistency import converter_tests, gyroscope_checks
 from rig.analysis.consistency.gyroscope_checks import DISTURBED_SWEEP
 from rig.estimation.statistics.coverage import false_alarm_of_each
 
-FALSE_ALARMS = 0.001  # probability that any of these checks, of any sensor, fails a run without a fault
+FALSE_ALARM_PROBABILITY = 0.001  # that any of these checks, of any sensor, fails a run without a fault
 NON_ORTHOGONALITY = "non_orthogonality"
 # The checks of a gyroscope, which share the false-alarm probability. Other kinds of readings have as many.
 CHECKS = (*gyroscope_checks.CHECKS, DISTURBED_SWEEP, *converter_tests.CHECKS, NON_ORTHOGONALITY)
 
 
-def false_alarm_per_check(kinds: int, *, of_all: float = FALSE_ALARMS) -> float:
+def false_alarm_per_check(kinds: int, *, of_all: float = FALSE_ALARM_PROBABILITY) -> float:
     """Return the false-alarm probability of each statistic, for a number of kinds of readings."""
     return false_alarm_of_each(of_all, len(CHECKS) * kinds)

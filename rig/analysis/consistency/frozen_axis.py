@@ -6,11 +6,11 @@ from rig.data.quantity import RATE
 from rig.estimation.arrays import Array, equal_runs
 from rig.observation.observed_run import ObservedRun
 
-FEWEST = 25  # equal readings in a row from which on the motion is examined
+MIN_EQUAL_READINGS = 25  # in a row, from which on the motion is examined
 # Time left out at either end of them: a sensor's filter lags, and the clock's offset is known to milliseconds only.
 LAG_S = 0.15
-SMOOTHED_S = 0.1
-MOVED_STEPS, MOVED_RAD_S = 10.0, 0.02  # the least change of the rate about the axis, in the nominal mounting
+SMOOTHING_S = 0.1
+MIN_CHANGE_STEPS, MIN_CHANGE_RAD_S = 10.0, 0.02  # of the rate about the axis, in the nominal mounting
 
 
 def find_longest_frozen(recording: ObservedRun, name: str) -> int:
@@ -21,11 +21,11 @@ def find_longest_frozen(recording: ObservedRun, name: str) -> int:
     stream = recording.stream(name)
     counts = stream.sensor.channel(RATE).counts(stream.raw)
     axes = np.array(stream.sensor.mounting)
-    least_rad_s = np.maximum(MOVED_STEPS * np.broadcast_to(stream.steps.unit, 3), MOVED_RAD_S)
+    least_rad_s = np.maximum(MIN_CHANGE_STEPS * np.broadcast_to(stream.steps.unit, 3), MIN_CHANGE_RAD_S)
     longest = 0
     for axis in range(3):
         for start, end in equal_runs(counts[:, axis]).tolist():
-            if end - start > max(FEWEST, longest):
+            if end - start > max(MIN_EQUAL_READINGS, longest):
                 time_s = stream.time_s[start:end]
                 inside = (time_s > time_s[0] + LAG_S) & (time_s < time_s[-1] - LAG_S)
                 if _rate_change(recording, time_s[inside], axes[axis]) > least_rad_s[axis]:
@@ -36,11 +36,11 @@ def find_longest_frozen(recording: ObservedRun, name: str) -> int:
 def _rate_change(recording: ObservedRun, time_s: Array, axis: Array) -> float:
     """Return the change of the rate along an axis (3,) of the flange over times (n,), rad/s.
 
-    Rates are averaged over `SMOOTHED_S`: between two states the noise of times would dominate.
+    Rates are averaged over `SMOOTHING_S`: between two states the noise of times would dominate.
     """
     covered_s = time_s[recording.motion.covered(time_s)] if len(time_s) else time_s
-    if len(covered_s) < FEWEST:
+    if len(covered_s) < MIN_EQUAL_READINGS:
         return 0.0
-    blocks = max(int((covered_s[-1] - covered_s[0]) / SMOOTHED_S), 1)
+    blocks = max(int((covered_s[-1] - covered_s[0]) / SMOOTHING_S), 1)
     rates = recording.motion.rate(covered_s) @ axis
     return float(np.ptp([block.mean() for block in np.array_split(rates, blocks)]))

@@ -29,7 +29,7 @@ from rig.analysis.consistency.alternatives import (
     sweep_columns,
 )
 from rig.analysis.consistency.residual_tests import (
-    ALIKE,
+    CHI_SQUARE_MARGIN,
     Alternative,
     Statistic,
     TestResults,
@@ -65,7 +65,7 @@ CHECKS = (
     "sweeps_against_rests",
 )
 
-MOST, TRIED = 16.0, 7  # largest variance inflation by a synchronous ripple; number of factors that are tried
+MAX_RIPPLE_INFLATION, INFLATION_STEPS = 16.0, 7  # of the variance by a synchronous ripple; factors tried
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,7 +193,7 @@ def _free_disturbed_transfers(
         worst, (explained, limit) = find_outliers(
             model, transfers, partial(sweep_columns, segments), false_alarm_probability
         )[0]
-        if explained <= max(limit, axis_changed[0] + ALIKE):
+        if explained <= max(limit, axis_changed[0] + CHI_SQUARE_MARGIN):
             return with_transfers, axis_changed
         disturbed.append(worst)
 
@@ -203,11 +203,12 @@ def _inflate_transfers(
 ) -> _Tested:
     """Return `_whiten_with_transfers` with the transfers' variance inflated until their χ² equals their number.
 
-    Their χ² is that of all segments minus that of the segments without transfers. The factor is at most `MOST`.
+    Their χ² is that of all segments minus that of the segments without transfers. The factor is at most
+    `MAX_RIPPLE_INFLATION`.
     """
     transfers, (segments_chi_square, segments_dof) = allowance.transfers, _residual_chi_square(segments_only)
     with_transfers = _whiten_with_transfers(matrix, allowance, bias, disturbed)
-    for ratio in np.geomspace(1.0, MOST, TRIED)[1:]:
+    for ratio in np.geomspace(1.0, MAX_RIPPLE_INFLATION, INFLATION_STEPS)[1:]:
         chi_square, dof = _residual_chi_square(with_transfers)
         if chi_square - segments_chi_square <= dof - segments_dof:
             break

@@ -10,7 +10,7 @@ from rig.estimation.statistics.rounding import Steps
 from rig.observation.consistency.dwell_halves import compare_halves
 from rig.observation.consistency.raw_dwells import RawDwell
 
-FEWEST_IN_HALF = 20  # readings: fewer do not show how their mean scatters
+MIN_HALF_READINGS = 20  # fewer do not show how their mean scatters
 
 
 def compare_dwell_halves(
@@ -25,7 +25,7 @@ def compare_dwell_halves(
     """
     from scipy.special import fdtri
 
-    long_dwells = [dwell for dwell in dwells if len(dwell.counts) >= 2 * FEWEST_IN_HALF]
+    long_dwells = [dwell for dwell in dwells if len(dwell.counts) >= 2 * MIN_HALF_READINGS]
     if not long_dwells:
         return {}
     halves = [compare_halves(dwell, steps) for dwell in long_dwells]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.analysis.consistency.converter_tests import COUNTS, Digits, find_digits, judge_readings
+from rig.analysis.consistency.converter_tests import CONVERTER_DIGITS, Digits, find_digits, judge_readings
 from rig.analysis.consistency.gyroscope_checks import DISTURBED_SWEEP
 from rig.analysis.consistency.knocked_dwells import compare_dwell_halves
 from rig.analysis.consistency.reference_alternatives import ReferenceModel
@@ -66,7 +66,7 @@ class ReferenceReadings:
     model: ReferenceModel
     segments: Sequence[SegmentName]
     flicker_counts: float = 0.0
-    digits: Digits = COUNTS
+    digits: Digits = CONVERTER_DIGITS
 
 
 @dataclass(frozen=True, slots=True)

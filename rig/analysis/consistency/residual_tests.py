@@ -13,10 +13,10 @@ import numpy as np
 
 from rig.estimation.arrays import Array
 
-INDEPENDENT = 1e-3  # least part of a unit column outside the model
-VISIBLE = 1e-6  # least projection of a fault, relative to its norm: a smaller one is rounding
+MIN_INDEPENDENT_PART = 1e-3  # of a unit column, outside the model
+MIN_VISIBLE_PART = 1e-6  # least projection of a fault, relative to its norm: a smaller one is rounding
 DETECTION_PROBABILITY = 0.95  # for a fault of the minimal detectable size
-ALIKE = 10.0  # difference of χ² to the best alternative up to which another one may also be the cause
+CHI_SQUARE_MARGIN = 10.0  # difference to the best alternative, up to which another one may also be the cause
 
 Subject = TypeVar("Subject")
 Statistic = tuple[float, float]  # a value and its critical value
@@ -91,7 +91,7 @@ def find_outliers(
         statistic = model.test(columns(worst), nuisance, per_segment) or (0.0, 0.0)
         if statistic[0] <= statistic[1]:
             return outliers or [(worst, statistic)]
-        alike = [segment for segment in remaining if chi_square_of[segment] > chi_square_of[worst] - ALIKE]
+        alike = [segment for segment in remaining if chi_square_of[segment] > chi_square_of[worst] - CHI_SQUARE_MARGIN]
         outliers += [(segment, statistic) for segment in alike]
         remaining = [segment for segment in remaining if segment not in alike]
         nuisance.append(columns(worst))
@@ -112,7 +112,7 @@ def remaining_directions(model_basis: Array, columns: Array) -> Array:
     new = columns / np.where(sizes > 0, sizes, 1.0)
     new = new - model_basis @ (model_basis.T @ new)
     directions, singular, _ = np.linalg.svd(new, full_matrices=False)
-    basis: Array = directions[:, singular > INDEPENDENT]
+    basis: Array = directions[:, singular > MIN_INDEPENDENT_PART]
     return basis
 
 
@@ -146,5 +146,5 @@ def minimal_detectable_size(model_basis: Array, patterns: Array, alternatives: I
         if count := new.shape[1]:
             size = np.sqrt(chndtrinc(limit(count), count, 1 - DETECTION_PROBABILITY))
             detected = np.maximum(detected, np.linalg.norm(new.T @ patterns, axis=0) / size)
-    is_visible = detected.min() > VISIBLE * np.linalg.norm(patterns, axis=0).max(initial=0.0)
+    is_visible = detected.min() > MIN_VISIBLE_PART * np.linalg.norm(patterns, axis=0).max(initial=0.0)
     return float(1 / detected.min()) if is_visible else float(np.inf)

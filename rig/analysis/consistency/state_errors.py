@@ -14,7 +14,7 @@ from rig.estimation.arrays import Array
 from rig.observation.consistency.raw_readings import REST
 from rig.observation.consistency.transfers import STANDS_RAD
 
-SAME_S = 1e-5  # times that differ by more belong to different edges
+TIME_TOLERANCE_S = 1e-5  # times that differ by more belong to different edges
 
 
 def build_time_patterns(segments: Segments, jitter_s: float) -> Array:
@@ -55,6 +55,6 @@ def _edges(segments: Segments, sweep: int) -> Iterator[NDArray[np.float64]]:
     """Yield (N,) for each edge of a sweep's segments: 1 for the segment that ends there, −1 for the one that begins."""
     inside = segments.sweep == sweep
     times_s = np.sort(segments.times_s[inside].ravel())
-    for time_s in times_s[np.append(True, np.diff(times_s) > SAME_S)]:
-        start, end = (np.abs(segments.times_s - time_s) < SAME_S).T & inside
+    for time_s in times_s[np.append(True, np.diff(times_s) > TIME_TOLERANCE_S)]:
+        start, end = (np.abs(segments.times_s - time_s) < TIME_TOLERANCE_S).T & inside
         yield end.astype(np.float64) - start

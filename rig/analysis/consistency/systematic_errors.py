@@ -15,12 +15,12 @@ from rig.analysis.consistency.gyroscope_checks import ErrorPatterns
 from rig.analysis.consistency.state_errors import build_reading_patterns, build_time_patterns
 from rig.analysis.environment import Surroundings
 from rig.analysis.gyroscope.segment_table import Segments
-from rig.analysis.gyroscope.vector_inputs import WAVE_FRACTION, list_uncertainties
+from rig.analysis.gyroscope.vector_inputs import WAVE_RATIO, list_uncertainties
 from rig.config.judging.judging_keys import OfSensor
 from rig.data.recording.settings import Uncertainty
 from rig.estimation.arrays import Array
 from rig.estimation.earth import EARTH_RATE_RAD_S
-from rig.estimation.gyroscope.nonlinearity import CUBE_MISSED, bending, curvature
+from rig.estimation.gyroscope.nonlinearity import CUBE_DEVIATION, bending, curvature
 from rig.estimation.gyroscope.own_errors import KnownSensor, list_own_errors, rounding_errors
 from rig.motion.geometry import AXIS_ERRORS, WAVES, WRIST_1, WRIST_2, WRIST_3
 from rig.observation.consistency.raw_readings import REST
@@ -33,14 +33,14 @@ if TYPE_CHECKING:
     from rig.estimation.gyroscope.earth_rate import EarthRate
 
 # The waves of wrist 1 rotate no axis, but change its own speed.
-ANGLES = (*AXIS_ERRORS, *(f"{wave} of wrist_1" for wave in WAVES))
-WAVES_OF = {WRIST_1: ANGLES.index("cos of wrist_1"), WRIST_2: ANGLES.index("cos of wrist_2"),
-            WRIST_3: ANGLES.index("cos of wrist_3")}  # fmt: skip
+ANGLE_ERRORS = (*AXIS_ERRORS, *(f"{wave} of wrist_1" for wave in WAVES))
+FIRST_WAVE_INDEX = {WRIST_1: ANGLE_ERRORS.index("cos of wrist_1"), WRIST_2: ANGLE_ERRORS.index("cos of wrist_2"),
+            WRIST_3: ANGLE_ERRORS.index("cos of wrist_3")}  # fmt: skip
 # The joint of each zero, counted from the last.
-ZEROS = {ANGLES.index("zero of wrist_2"): -2, ANGLES.index("zero of wrist_3"): -1}
+JOINT_OF_ZERO = {ANGLE_ERRORS.index("zero of wrist_2"): -2, ANGLE_ERRORS.index("zero of wrist_3"): -1}
 # The odd and the even part of the nonlinearity.
-CURVE: tuple[OfSensor, OfSensor] = ("nonlinearity_percent", "asymmetry_percent")
-STEPS = 24  # steps of a transfer within which directions count as constant
+NONLINEARITY_KEYS: tuple[OfSensor, OfSensor] = ("nonlinearity_percent", "asymmetry_percent")
+TRANSFER_STEPS = 24  # directions count as constant within one
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,17 +126,17 @@ def build_known_errors(
     stamp_s: float = 0.0,
 ) -> KnownErrors:
     """Return the standard uncertainties of all modelled error sources of gyroscope `name` with the given full scale."""
-    steady = np.array([angle.startswith(("twist", "zero")) for angle in ANGLES])
-    cube, square = (uncertainty.find_stated_size(what, name) / 100 / np.sqrt(3) for what in CURVE)
+    steady = np.array([angle.startswith(("twist", "zero")) for angle in ANGLE_ERRORS])
+    cube, square = (uncertainty.find_stated_size(what, name) / 100 / np.sqrt(3) for what in NONLINEARITY_KEYS)
     return KnownErrors(
-        angles_rad=np.radians(uncertainty.axis_deg) / np.sqrt(3) * np.where(steady, 1.0, WAVE_FRACTION),
+        angles_rad=np.radians(uncertainty.axis_deg) / np.sqrt(3) * np.where(steady, 1.0, WAVE_RATIO),
         repeatability_rad=uncertainty.repeatability_std_rad,
         encoder_rad=uncertainty.angle_std_rad if arcs else 0.0,
         mount_rad=float(np.radians(uncertainty.mount_deg) / np.sqrt(3)),
         jitter_s=jitter_s,
         reading_rad=reading_rad,
         earth_rad_s=earth_rad_s,
-        curve=NonlinearityPrior(float(cube / CUBE_MISSED), float(square), full_scale_rad_s, free=finds_curve),
+        curve=NonlinearityPrior(float(cube / CUBE_DEVIATION), float(square), full_scale_rad_s, free=finds_curve),
         sensor=sensor,
         temperature_times_s=temperature_times_s,
         stamp_s=stamp_s,
@@ -200,9 +200,9 @@ def patterns(segments: Segments, matrix: Array, known_errors: KnownErrors) -> Ar
 
 def _angle_patterns(segments: Segments, known_errors: KnownErrors) -> Array:
     """Return the patterns of the arm's angle errors: shared ones, and independent ones of each sweep and transfer."""
-    by_angle = np.zeros((len(ANGLES), *segments.means_rad_s.shape))
+    by_angle = np.zeros((len(ANGLE_ERRORS), *segments.means_rad_s.shape))
     repeats = []
-    for chosen, steps in ((segments.sweep > REST, 1), (segments.sweep < REST, STEPS)):
+    for chosen, steps in ((segments.sweep > REST, 1), (segments.sweep < REST, TRANSFER_STEPS)):
         parts = np.flatnonzero(chosen).tolist()
         for motion in {segments.intervals[part].motion for part in parts}:
             of_motion = [part for part in parts if segments.intervals[part].motion is motion]
@@ -213,7 +213,7 @@ def _angle_patterns(segments: Segments, known_errors: KnownErrors) -> Array:
                 repeats.append(np.zeros(segments.means_rad_s.shape))
                 unseen_rad = np.hypot(interval.unseen_rad, known_errors.encoder_rad)
                 repeats[-1][row] = np.hypot(known_errors.repeatability_rad, unseen_rad) * ends
-    for zero, joint in ZEROS.items():
+    for zero, joint in JOINT_OF_ZERO.items():
         for alike in (
             _sweeps_between_moves(segments, joint) if by_angle[zero].any() else ()
         ):  # a servo has no such joint
@@ -269,7 +269,7 @@ def _sweeps_between_moves(segments: Segments, joint: int) -> list[list[int]]:
 
 
 def rate_errors(intervals: Sequence[MotionInterval], steps: int) -> Array:
-    """Return the errors (17, n, 3) rad/s of the flange's mean rate, per radian of each of `ANGLES`.
+    """Return the errors (17, n, 3) rad/s of the flange's mean rate, per radian of each of `ANGLE_ERRORS`.
 
     The n intervals belong to one motion; each is integrated in the given number of `steps`.
     """
@@ -277,7 +277,7 @@ def rate_errors(intervals: Sequence[MotionInterval], steps: int) -> Array:
     q_rad = motion.angles(np.linspace(ends_s[:, 0], ends_s[:, 1], steps + 1, axis=1))  # (n, steps + 1, joints)
     middle, moved = (q_rad[:, 1:] + q_rad[:, :-1]) / 2, np.diff(q_rad, axis=1)
     axes = motion.axes(middle)
-    errors = np.zeros((len(intervals), len(ANGLES), 3))
+    errors = np.zeros((len(intervals), len(ANGLE_ERRORS), 3))
     for joint, first in _wave_indices(motion).items():
         moving = np.ptp(q_rad[..., joint], axis=1) >= STANDS_RAD
         if not moving.any():
@@ -290,9 +290,9 @@ def rate_errors(intervals: Sequence[MotionInterval], steps: int) -> Array:
 
 
 def _wave_indices(motion: ArmMotion) -> dict[int, int]:
-    """Return the first index in `ANGLES` of the waves of each of the last three joints: the wrists of an arm."""
+    """Return the first index in `ANGLE_ERRORS` of the waves of each of the last three joints: the wrists of an arm."""
     beyond = motion.kinematics.joints - 1 - WRIST_3
-    return {joint + beyond: first for joint, first in WAVES_OF.items() if joint + beyond >= 0}
+    return {joint + beyond: first for joint, first in FIRST_WAVE_INDEX.items() if joint + beyond >= 0}
 
 
 def _end_patterns(interval: MotionInterval) -> list[Array]:
@@ -332,7 +332,7 @@ def _nonlinearity_patterns(intervals: Sequence[MotionInterval], matrix: Array, c
     """Return the patterns (6, N, 3) of cube and square, one standard deviation each, averaged over each interval."""
     by_interval = []
     for interval in intervals:
-        edges = np.linspace(interval.start_s, interval.end_s, STEPS + 1)
+        edges = np.linspace(interval.start_s, interval.end_s, TRANSFER_STEPS + 1)
         rates = interval.motion.rate((edges[1:] + edges[:-1]) / 2)
         bent = curvature(matrix, rates) if curve.free else bending(matrix, rates, curve.full_scale_rad_s)
         by_interval.append(bent.mean(axis=1))

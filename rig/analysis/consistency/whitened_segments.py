@@ -7,7 +7,7 @@ import numpy as np
 
 from rig.analysis.consistency.alternatives import normalise_time, repeat_per_axis
 from rig.analysis.consistency.residual_tests import (
-    INDEPENDENT,
+    MIN_INDEPENDENT_PART,
     Alternative,
     Statistic,
     chi_square_of,
@@ -90,7 +90,7 @@ class WhitenedSegments:
         sizes = np.linalg.norm(new, axis=0)
         new = new - model_basis @ (model_basis.T @ new)
         lengths = np.linalg.norm(new, axis=0)
-        independent = lengths > INDEPENDENT * sizes
+        independent = lengths > MIN_INDEPENDENT_PART * sizes
         return np.asarray(new[:, independent] / lengths[independent], dtype=np.float64)
 
     def _explain(self, columns: Array | None, nuisance: Sequence[Array]) -> tuple[float, int]:

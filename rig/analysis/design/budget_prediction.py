@@ -10,9 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from rig.analysis.clock_comparison import BY_COMPUTER, BY_CRYSTAL, PPM, ClockCheck, ClockComparison
+from rig.analysis.clock_comparison import COMPUTER_CLOCK, CRYSTAL_CLOCK, PPM, ClockCheck, ClockComparison
 from rig.analysis.design.planned_motion import (
-    STANDING_S,
+    END_REST_S,
     PlannedRun,
     Timed,
     measuring_steps,
@@ -49,7 +49,7 @@ REMOUNTING_S = 60.0  # duration between two stages, assumed
 # Angle between a sensor and its nominal mounting, assumed if no `uncertainty.mount_deg` states it for an item that is
 # remounted. The larger it is, the more the axes of arm and sensor matter.
 MOUNTING_OFFSET_DEG = 5.0
-ASKING_STD_S = 0.9e-3  # standard deviation of the time of a reading within the 3 ms of a servo's reply
+READING_TIME_STD_S = 0.9e-3  # standard deviation of the time of a reading within the 3 ms of a servo's reply
 
 
 def predict_budgets(config: RigConfig, plan: Plan, turner: TurnerIdentity) -> dict[str, Budget]:
@@ -108,8 +108,8 @@ def _simulate_readings(inputs: VectorInputs, matrix: Array) -> Array:
 def _clock(uncertainty: Uncertainty, *, on_board: bool) -> ClockCheck:
     """Return the clock comparison of a run: the controller's clock, the computer's and the board's crystal."""
     stated = {
-        BY_COMPUTER: uncertainty.computer_clock_ppm,
-        **({BY_CRYSTAL: uncertainty.crystal_ppm} if on_board else {}),
+        COMPUTER_CLOCK: uncertainty.computer_clock_ppm,
+        **({CRYSTAL_CLOCK: uncertainty.crystal_ppm} if on_board else {}),
     }
     compared = tuple(ClockComparison(by, 0.0, ppm * PPM, 0.0) for by, ppm in stated.items())
     half_width = uncertainty.controller_clock_ppm * PPM
@@ -123,7 +123,7 @@ def _stages(run: PlannedRun) -> Iterator[PlannedRun]:
     for number, (first, last) in enumerate(zip(begins, [*begins[1:], len(run.plan.steps)], strict=True)):
         stage_plan = replace(run.plan, steps=run.plan.steps[first:last], stages=())
         yield replace(run, plan=stage_plan, settings=replace(run.settings, stage=number), clock_offset_s=clock_offset_s)
-        clock_offset_s += stage_plan.duration_s + 2 * STANDING_S + REMOUNTING_S
+        clock_offset_s += stage_plan.duration_s + 2 * END_REST_S + REMOUNTING_S
 
 
 def _plan_recording_part(
@@ -198,5 +198,5 @@ def _scatter(config: RigConfig, sweep: Sweep, turner: TurnerIdentity) -> float:
     ramp_rad = sweep.speed_rad_s**2 / (2 * sweep.acceleration_rad_s2) + GUARD_RAD
     whole_rad = abs(sweep.end_q_rad[sweep.joint] - sweep.start_q_rad[sweep.joint])
     repeats = (whole_rad - 2 * ramp_rad - TURN_RAD) / sweep.speed_rad_s * config.turner.state_rate_hz
-    scatter_rad = np.hypot(turner.reading_std_rad, ASKING_STD_S * sweep.speed_rad_s)
+    scatter_rad = np.hypot(turner.reading_std_rad, READING_TIME_STD_S * sweep.speed_rad_s)
     return float(scatter_rad * np.sqrt(2 / max(repeats, 1.0)) / TURN_RAD)

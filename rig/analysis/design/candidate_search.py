@@ -10,7 +10,7 @@ from rig.config.procedures.procedure_sections import SixObservationSection
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.budget import Budget
 
-NONE: Mapping[str, Budget] = MappingProxyType({})
+NO_BUDGETS: Mapping[str, Budget] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +24,7 @@ class ReachedUncertainty:
 
     @classmethod
     def worst_case(
-        cls, rates: Mapping[str, Budget], accelerations: Mapping[str, Budget] = NONE
+        cls, rates: Mapping[str, Budget], accelerations: Mapping[str, Budget] = NO_BUDGETS
     ) -> "ReachedUncertainty":
         """Return the worst U in the budgets of all gyroscopes, and of all accelerometers."""
         return cls(*_worst_expanded(rates), *_worst_expanded(accelerations))
@@ -67,7 +67,7 @@ class TargetUncertainty:
 
     def ratio_to_target(self, reached: ReachedUncertainty) -> float:
         """Return the largest ratio of reached to target uncertainty."""
-        ratios: list[float] = [getattr(reached, size) / getattr(self, size) for size in SIZES]
+        ratios: list[float] = [getattr(reached, size) / getattr(self, size) for size in TARGET_NAMES]
         return max(ratios)
 
 
@@ -77,8 +77,7 @@ def target_of(section: SixObservationSection) -> TargetUncertainty | None:
     return None if scale is bias_rad_s is None else TargetUncertainty(scale or inf, bias_rad_s or inf)
 
 
-# names of the possible targets, which are fields of `TargetUncertainty` too
-SIZES = tuple(ReachedUncertainty.__dataclass_fields__)
+TARGET_NAMES = tuple(ReachedUncertainty.__dataclass_fields__)  # fields of `TargetUncertainty` too
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +152,7 @@ class Shortest:
     @property
     def at_any_length(self) -> ReachedUncertainty:
         """The smallest value of each U that any run reaches, however long."""
-        return ReachedUncertainty(*(getattr(self.least(size).reached, size) for size in SIZES))
+        return ReachedUncertainty(*(getattr(self.least(size).reached, size) for size in TARGET_NAMES))
 
 
 def find_shortest(

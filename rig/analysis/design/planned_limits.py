@@ -12,7 +12,7 @@ from rig.analysis.consistency.gyroscope_checks import predict_detection_limits
 from rig.analysis.consistency.systematic_errors import build_error_patterns, build_known_errors, unknown_earth_rate
 from rig.analysis.design.cut_plan import PlannedSegments, plan_segments
 from rig.analysis.design.planned_motion import ENCODER_NOISE_RAD, PlannedRun, plan_run, predict_state_jitter
-from rig.analysis.environment import BY_SPLINE
+from rig.analysis.environment import SPLINE_NOISE_RATIO
 from rig.analysis.gyroscope.vector_inputs import describe_sensor
 from rig.config.models import ArmSection, RigConfig
 from rig.config.sensors.sensor_catalogue import PARTS
@@ -90,7 +90,7 @@ def _gyroscope_limits(
         finds_curve=len(speeds) > 1,
         arcs=run.settings.has_arcs,
         jitter_s=predict_state_jitter(run.plan) if by_arm else 0.0,
-        reading_rad=ENCODER_NOISE_RAD * BY_SPLINE if by_arm else 0.0,
+        reading_rad=ENCODER_NOISE_RAD * SPLINE_NOISE_RATIO if by_arm else 0.0,
         earth_rad_s=unknown_earth_rate(is_known=run.site.earth_rate_rad_s is not None or run.settings.finds_earth_rate),
         sensor=describe_sensor(run.uncertainty, name, full_scale_rad_s, np.zeros(len(times_s)), 0.0),
         temperature_times_s=times_s,

@@ -7,7 +7,7 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from rig.analysis.environment import BETWEEN_TWO
+from rig.analysis.environment import INTERPOLATION_JITTER_RATIO
 from rig.config.models import RigConfig
 from rig.data.recording.settings import RunSettings, Site, Uncertainty, settings_of, site_of, uncertainty_of
 from rig.estimation.arrays import Array
@@ -22,7 +22,7 @@ from rig.observation.motion.revolution import Revolution
 STATE_RATE_HZ = 125.0
 STATE_JITTER_S = 2e-6  # jitter of an arm's state times, as runs with real-time controllers show it
 ENCODER_NOISE_RAD = 2.4e-5  # noise of one reading of a joint's angle, as in logs of UR arms (docs/simulated-arm.md)
-STANDING_S = 1.0  # rest before the first step and after the last
+END_REST_S = 1.0  # rest before the first step and after the last
 StepT = TypeVar("StepT", Sweep, Dwell)
 StepT_co = TypeVar("StepT_co", bound=Step, covariant=True)
 
@@ -67,7 +67,7 @@ class Timed(Generic[StepT_co]):
 
 def time_steps(plan: Plan) -> Iterator[Timed[Step]]:
     """Yield every step in order with its times, assuming that sensors settle at once before a dwell."""
-    time_s, q_rad = STANDING_S, plan.start_q_rad
+    time_s, q_rad = END_REST_S, plan.start_q_rad
     for step in plan.steps:
         yield Timed(step, time_s, time_s + step.duration_s, q_rad)
         time_s += step.duration_s
@@ -91,7 +91,7 @@ def measuring_steps(plan: Plan) -> Iterator[Timed[Step]]:
 def predict_state_jitter(plan: Plan) -> float:
     """Return the jitter, s, of an arm's states that sweeps will show, including the noise of the encoders."""
     slow_s_rad = np.mean([1 / sweep.speed_rad_s**2 for sweep in plan.sweeps]) if plan.sweeps else 0.0
-    return float(np.sqrt(STATE_JITTER_S**2 + ENCODER_NOISE_RAD**2 * slow_s_rad)) * BETWEEN_TWO
+    return float(np.sqrt(STATE_JITTER_S**2 + ENCODER_NOISE_RAD**2 * slow_s_rad)) * INTERPOLATION_JITTER_RATIO
 
 
 def predict_revolution(timed_step: Timed[Sweep], arm: DenavitHartenberg, mount: Array) -> Revolution:
@@ -133,7 +133,7 @@ def _mean_attitude(first_q_rad: Joints, joint: int, turned_rad: float, arm: Dena
 
 def predict_motion(plan: Plan, arm: DenavitHartenberg) -> ArmMotion:
     """Return the motion of a chain of joints without vibration. Raise Fault `no_motion` if nothing moves."""
-    time_s = np.arange(0.0, plan.duration_s + 2 * STANDING_S, 1 / STATE_RATE_HZ)
+    time_s = np.arange(0.0, plan.duration_s + 2 * END_REST_S, 1 / STATE_RATE_HZ)
     states = np.zeros(len(time_s), state_dtype(arm.joints))
     states["time_s"] = time_s
     q_rad = np.tile(np.array(plan.start_q_rad), (len(time_s), 1))

@@ -19,7 +19,7 @@ from rig.estimation.reference.attitude_error import AttitudeError
 from rig.estimation.reference.imu_fit import covariance_bound
 from rig.estimation.reference.reference_budget import Spread, scale_and_bias
 from rig.estimation.reference.reference_model import matrix
-from rig.estimation.statistics.expected_variances import OWN_SHARES
+from rig.estimation.statistics.expected_variances import INDEPENDENT_FRACTIONS
 from rig.motion.chain import DenavitHartenberg
 from rig.motion.steps import Plan
 
@@ -63,4 +63,4 @@ def _new_fraction(stated: Uncertainty) -> float:
     fraction = stated.repeatability_deg**2 / max(
         stated.repeatability_deg**2 + stated.axis_deg**2, np.finfo(np.float64).tiny
     )
-    return float(np.clip(fraction, OWN_SHARES[0], OWN_SHARES[-1]))
+    return float(np.clip(fraction, INDEPENDENT_FRACTIONS[0], INDEPENDENT_FRACTIONS[-1]))

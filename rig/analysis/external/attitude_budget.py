@@ -18,15 +18,15 @@ from rig.estimation.reference.reference_budget import (
 )
 from rig.estimation.reference.triaxial import TriaxialSolution
 
-SOURCES: Mapping[str, tuple[Literal["A", "B"], str]] = {
+CONTRIBUTOR_SOURCES: Mapping[str, tuple[Literal["A", "B"], str]] = {
     placement.NOISE: ("A", "scatter of the readings"),
     placement.ATTITUDES: ("A", f"estimated from the residuals, {IN_U}"),
     placement.PLACEMENTS: ("A", f"scatter of the placements beyond their attitudes, {IN_U}"),
     placement.CHANGE: ("A", "half of a change that the residuals show"),
     increment_solution.DELAY: ("A", f"estimated, with the jitter of the stamps, {IN_U}"),
-    increment_solution.EARTHS_RATE: ("B", "its size, whichever way it points"),
+    increment_solution.EARTH_RATE: ("B", "its size, whichever way it points"),
     increment_solution.AXES: ("B", f"inclinations that F imitates, {IN_U}"),
-    increment_solution.STRETCHES: ("A", f"change of F and b with attitude and time, {IN_U}"),
+    increment_solution.INTERVAL_DIFFERENCES: ("A", f"change of F and b with attitude and time, {IN_U}"),
 }
 
 
@@ -47,7 +47,7 @@ def budget_by_causes(matrix: Array, causes: Mapping[str, Array], noise_dof: floa
     scale = scale_of(matrix)
     lines = []
     for name, cause in causes.items():
-        kind, source = SOURCES[name]
+        kind, source = CONTRIBUTOR_SOURCES[name]
         dof = np.inf
         if name == placement.NOISE and noise_dof is not None:
             dof = noise_dof

@@ -37,9 +37,9 @@ from rig.observation.stuck_check import check_reads
 Chosen = Method | Literal["increments"]
 METHODS: tuple[Method, ...] = (*get_args(EqualWeights), "attitude_weighted")
 CHOICES: tuple[Chosen, ...] = ("increments", *METHODS)
-TOO_LITTLE = ("too_few_observations", "rank_deficient", "ill_conditioned")
-NOT_IDENTIFIABLE = "Leave out --second-order: it would triple the uncertainty of the bias for nothing; or dwell longer"
-ROUNDING = 1e-9  # standard deviation over mean, below which all readings were the same
+TOO_LITTLE_DATA = ("too_few_observations", "rank_deficient", "ill_conditioned")
+ORDER_REMEDY = "Leave out --second-order: it would triple the uncertainty of the bias for nothing; or dwell longer"
+ROUNDING_RATIO = 1e-9  # standard deviation over mean, below which all readings were the same
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +114,7 @@ def solve_placed(
 def _check_noisy(placements: Placements, quantity: Quantity) -> None:
     """Raise Fault `stuck_sensor` if an axis reads the same value throughout a placement."""
     read = placements.read
-    nothing = read.variances[quantity] <= (ROUNDING * read.means[quantity]) ** 2
+    nothing = read.variances[quantity] <= (ROUNDING_RATIO * read.means[quantity]) ** 2
     for row, axis in np.argwhere(nothing)[:1]:
         window, reads = read.windows[row], read.means[quantity][row, axis]
         raise Fault(
@@ -168,7 +168,7 @@ def _solve_placements(
             laid = laid.add_change(change)
         solution = _replace_parameters(solution, laid)
     if solution.second_order is not None:
-        check_identifiable(solution.second_order, np.sqrt(np.diag(solution.covariance)[SECOND]), NOT_IDENTIFIABLE)
+        check_identifiable(solution.second_order, np.sqrt(np.diag(solution.covariance)[SECOND]), ORDER_REMEDY)
     if not any_mounting:
         check_mounted(solution.matrix)
     causes = {NOISE: solution.covariance} if laid is None else laid.causes
@@ -214,7 +214,7 @@ def _solve(equations: Equations, method: Method, placements: Placements) -> Tria
     try:
         return equations.solve(method)
     except Fault as fault:
-        if not placements.omitted or fault.name not in TOO_LITTLE:
+        if not placements.omitted or fault.name not in TOO_LITTLE_DATA:
             raise
         what = f"{fault.what}; left out, because only rests give a reference: {'; '.join(map(str, placements.omitted))}"
         raise Fault(fault.name, what, fault.remedy) from None

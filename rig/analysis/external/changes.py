@@ -4,13 +4,13 @@ import numpy as np
 
 from rig.data.quantity import Quantity
 from rig.errors import Fault
-from rig.estimation.external.abrupt_change import CERTAIN, AbruptChange
+from rig.estimation.external.abrupt_change import CERTAIN_EVIDENCE, AbruptChange
 
-MOST_OF_SCALE = 0.01  # a part's scale factor changes by so much over tens of kelvins
+MAX_SCALE_CHANGE = 0.01  # of a part, over tens of kelvins
 REMEDY = "Solve the parts before and after separately; look for a knock, or a range that was switched"
 
 
-def check_steady(change: AbruptChange | None, quantity: Quantity, least_evidence: float = CERTAIN) -> None:
+def check_steady(change: AbruptChange | None, quantity: Quantity, least_evidence: float = CERTAIN_EVIDENCE) -> None:
     """Raise Fault `bias_jumped` or `scale_changed` if a sensor changed by more than U covers."""
     if change is None or change.evidence < least_evidence:
         return
@@ -23,7 +23,7 @@ def check_steady(change: AbruptChange | None, quantity: Quantity, least_evidence
             f"{'more' if size > 0 else 'less'} on {name} than before: its bias has changed",
             f"{REMEDY}; let it warm up",
         )
-    if change.what == "scale" and abs(size) > MOST_OF_SCALE:
+    if change.what == "scale" and abs(size) > MAX_SCALE_CHANGE:
         raise Fault(
             "scale_changed",
             f"from {change.from_s:.6g} s on the {quantity.sensor} reads {100 * abs(size):.2g} % "

@@ -8,14 +8,14 @@ from rig.analysis.external.changes import check_steady
 from rig.data.quantity import RATE
 from rig.estimation.arrays import Array
 from rig.estimation.external.abrupt_change import AbruptChange
-from rig.estimation.external.row_changes import EITHER_SIDE, LEAST_EVIDENCE
+from rig.estimation.external.row_changes import MIN_EITHER_SIDE, MIN_EVIDENCE
 from rig.estimation.gyroscope.budget import Budget
 from rig.estimation.gyroscope.rotations_by_angle import BIAS, TurnedSolution
 from rig.estimation.sensor_axes import parameter_jacobian
 from rig.observation.arm_rests import estimate_bias_drift
 from rig.observation.external.csv_import import ExternalData, stack_rows
 
-OF_RATE = 0.01  # fraction of the sweeps' rate: without rests, a smaller step may be one of the rate itself
+MIN_STEP_RATIO = 0.01  # to the sweeps' rate: without rests, a smaller step may be one of the rate itself
 
 
 def check_sweeps_steady(data: ExternalData) -> None:
@@ -26,7 +26,7 @@ def check_sweeps_steady(data: ExternalData) -> None:
     if change.what == "scale":
         check_steady(change, RATE)
     elif _is_certain(data, change):
-        check_steady(change, RATE, LEAST_EVIDENCE)
+        check_steady(change, RATE, MIN_EVIDENCE)
 
 
 def estimate_changes(data: ExternalData, matrix: Array) -> Array:
@@ -60,7 +60,7 @@ def widen_by_changes(solution: TurnedSolution, data: ExternalData) -> TurnedSolu
 def _counts(change: AbruptChange) -> bool:
     """Return whether U must include a change: a likely one, or a possible large change of the bias."""
     is_large = change.what == "bias" and float(np.abs(change.sizes).max()) > RATE.steady
-    return is_large or change.evidence >= LEAST_EVIDENCE
+    return is_large or change.evidence >= MIN_EVIDENCE
 
 
 def _is_certain(data: ExternalData, change: AbruptChange) -> bool:
@@ -73,7 +73,7 @@ def _is_certain(data: ExternalData, change: AbruptChange) -> bool:
     size_rad_s = float(change.sizes[axis])
     averages, rates_rad_s = stack_rows(data.sweeps, data.all_rests)
     is_later = np.array([average.start_s >= change.from_s for average in averages])
-    if min(is_later.sum(), (~is_later).sum()) < EITHER_SIDE:
+    if min(is_later.sum(), (~is_later).sum()) < MIN_EITHER_SIDE:
         return False
     before = [rest.mean_rad_s[axis] for rest in data.all_rests if rest.start_s < change.from_s]
     after = [rest.mean_rad_s[axis] for rest in data.all_rests if rest.start_s >= change.from_s]
@@ -82,7 +82,7 @@ def _is_certain(data: ExternalData, change: AbruptChange) -> bool:
     readings_rad_s = np.array([average.mean_rad_s[axis] for average in averages])
     median_rad_s = float(np.median([sweep.speed_rad_s for sweep in data.sweeps]))
     usual_rad_s = max(median_rad_s, np.sqrt(2) * _find_leverage(rates_rad_s, readings_rad_s, is_later))
-    return abs(size_rad_s) > OF_RATE * usual_rad_s
+    return abs(size_rad_s) > MIN_STEP_RATIO * usual_rad_s
 
 
 def _find_leverage(rates_rad_s: Array, readings_rad_s: Array, is_later: Array) -> float:

@@ -17,13 +17,13 @@ from rig.estimation.arrays import Array, integrate_rates, interpolate
 from rig.estimation.sensor_axes import nearest_rotation
 from rig.observation.external.csv_samples import Samples
 
-COARSE_S, FINE_S = np.arange(-0.5, 0.501, 0.02), np.arange(-0.02, 0.0201, 0.002)  # coarse and fine lags to try
-FEWEST, MOST = 30, 3000  # the fewest and the most pairs of rows
-LONGEST_S = 1.0  # longest time between the two rows of a pair
-LEAST_RAD_S = 0.05  # RMS of the rate: a smaller one shows nothing
+COARSE_LAGS_S, FINE_LAGS_S = np.arange(-0.5, 0.501, 0.02), np.arange(-0.02, 0.0201, 0.002)
+MIN_PAIRS, MAX_PAIRS = 30, 3000  # of rows
+MAX_PAIR_S = 1.0  # between the two rows of a pair
+MIN_RMS_RATE_RAD_S = 0.05  # a smaller one shows nothing
 # Least fraction of the rates' variance that is explained, and its lead over the other direction.
-EXPLAINED, MARGIN = 0.7, 0.1
-UPRIGHT = 0.97  # least component of gravity along the vertical axis of the room
+MIN_EXPLAINED, MIN_LEAD = 0.7, 0.1
+MIN_VERTICAL_GRAVITY = 0.97  # component along the vertical axis of the room
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,8 +51,8 @@ def find_convention(samples: Samples, attitudes: Columns, *, is_order_named: boo
     middles_s = (attitudes["start_s"] + attitudes["end_s"]) / 2
     order = np.argsort(middles_s)
     inside = order[(middles_s[order] > samples.time_s[0] + 0.5) & (middles_s[order] < samples.time_s[-1] - 0.5)]
-    inside = inside[: MOST + 1]
-    if len(inside) <= FEWEST:
+    inside = inside[: MAX_PAIRS + 1]
+    if len(inside) <= MIN_PAIRS:
         return None
     quaternions = np.column_stack([attitudes[name][inside] for name in QUATERNION])
     conventions = []
@@ -62,7 +62,7 @@ def find_convention(samples: Samples, attitudes: Columns, *, is_order_named: boo
             for inverse in (False, True)
         ]
         best, other = sorted(fits, key=lambda fit: -fit.explained)
-        if best.explained >= max(EXPLAINED, other.explained + MARGIN):
+        if best.explained >= max(MIN_EXPLAINED, other.explained + MIN_LEAD):
             conventions.append(best)
     return max(conventions, key=lambda convention: "z" in convention.up, default=None)
 
@@ -74,9 +74,9 @@ def _fit(samples: Samples, time_s: Array, quaternions: Array, *, scalar_last: bo
     rotations = Rotation.from_quat(quaternions if scalar_last else np.roll(quaternions, -1, axis=1))
     rotations = rotations.inv() if inverse else rotations
     steps_s = np.diff(time_s)
-    close = (steps_s > 0) & (steps_s < LONGEST_S)
+    close = (steps_s > 0) & (steps_s < MAX_PAIR_S)
     rates = (rotations[:-1].inv() * rotations[1:]).as_rotvec()[close] / steps_s[close, None]
-    if len(rates) < FEWEST or np.sqrt(np.mean(rates**2)) < LEAST_RAD_S:
+    if len(rates) < MIN_PAIRS or np.sqrt(np.mean(rates**2)) < MIN_RMS_RATE_RAD_S:
         return Convention(scalar_last, inverse, 0.0, 0.0)
     readings = samples.readings[RATE]
     total = integrate_rates(samples.time_s, readings)
@@ -84,8 +84,8 @@ def _fit(samples: Samples, time_s: Array, quaternions: Array, *, scalar_last: bo
     def fit_at(lag_s: float) -> float:
         return _explain(rates, _mean_rates(samples.time_s, total, time_s + lag_s, close))[0]
 
-    coarse_s = max(COARSE_S.tolist(), key=fit_at)
-    lag_s = max((coarse_s + FINE_S).tolist(), key=fit_at)
+    coarse_s = max(COARSE_LAGS_S.tolist(), key=fit_at)
+    lag_s = max((coarse_s + FINE_LAGS_S).tolist(), key=fit_at)
     fraction, matrix = _explain(rates, _mean_rates(samples.time_s, total, time_s + lag_s, close))
     up = ""
     if ACCELERATION in samples.readings:
@@ -115,6 +115,6 @@ def _find_up(forces: Array) -> str:
     mean = forces.mean(axis=0)
     mean /= max(float(np.linalg.norm(forces, axis=1).mean()), 1e-9)
     axis = int(np.argmax(np.abs(mean)))
-    if abs(mean[axis]) < UPRIGHT:
+    if abs(mean[axis]) < MIN_VERTICAL_GRAVITY:
         return ""
     return f"{'+' if mean[axis] > 0 else '-'}{'xyz'[axis]}"

@@ -46,7 +46,7 @@ from rig.estimation.reference import triaxial
 from rig.estimation.reference.reference_budget import scale_and_bias_covariance
 from rig.estimation.reference.reference_model import BIAS as OFFSET
 from rig.estimation.reference.reference_model import F
-from rig.estimation.reference.triaxial import UNTRUSTWORTHY_RAD
+from rig.estimation.reference.triaxial import MAX_ATTITUDE_ERROR_RAD
 from rig.estimation.sensor_axes import SensorAxes
 from rig.estimation.temperature.over_temperature import OverTemperature
 from rig.observation.clocks.time_base import TimeBase
@@ -58,8 +58,8 @@ from rig.observation.external.turns import TurnedData
 from rig.observation.statistics.mean import dof_by_axis
 
 BySweeps = Estimator | Literal["increments"]
-BY_SWEEPS: tuple[BySweeps, ...] = (*ESTIMATORS, "increments")
-FROM_READINGS = "scatter of the readings"
+SWEEP_ESTIMATORS: tuple[BySweeps, ...] = (*ESTIMATORS, "increments")
+FROM_SCATTER = "scatter of the readings"
 SWEEPS, FROM_RESIDUALS = "sweeps", "contradictions of the sweeps"
 NO_SWEEPS = Fault("too_few_observations", "a file of attitudes contains no sweeps", "Give sweeps in six directions")
 
@@ -132,7 +132,7 @@ def check_external(name: str, sensor: OfSensor) -> Iterator[Check]:
         yield fitness(name, quantity.name, "condition", result.solution.condition, triaxial.MAX_CONDITION)
         if (error := result.solution.attitude_error) is not None:
             at_least = max(error.std_rad - 2 * error.uncertainty_rad, 0.0)  # a few placements determine it poorly
-            yield fitness(name, quantity.name, "attitude_error", at_least, UNTRUSTWORTHY_RAD, unit="rad")
+            yield fitness(name, quantity.name, "attitude_error", at_least, MAX_ATTITUDE_ERROR_RAD, unit="rad")
 
 
 def _solve_turns(read: ReadElsewhere, samples: Samples, name: str | None) -> OfSensor:
@@ -143,7 +143,7 @@ def _solve_turns(read: ReadElsewhere, samples: Samples, name: str | None) -> OfS
 
 def _solve_sweeps(read: ReadElsewhere, samples: Samples, name: str | None, reference_c: float | None) -> OfSensor:
     """Solve a file's sweeps and rests, corrected to `reference_c` if given; estimator `name` (None: automatic)."""
-    chosen = None if name is None else choose_estimator(BY_SWEEPS, name)
+    chosen = None if name is None else choose_estimator(SWEEP_ESTIMATORS, name)
     data, polynomials = average_sweeps(samples, read.motion), None
     if reference_c is not None and data.turned is not None:
         raise Refused(
@@ -219,7 +219,7 @@ def budget_of(solution: Estimate, data: ExternalData) -> Budget:
         dof = noise_dof(vector, data) if vector is solution else _fewest_of_means(data)
         if more is not None and vector is solution:
             covariance = covariance - more.covariance
-        noise = Contributor(NOISE, "A", "normal", None, "", FROM_READINGS, dof, covariance)
+        noise = Contributor(NOISE, "A", "normal", None, "", FROM_SCATTER, dof, covariance)
         if more is None:
             return Budget((noise,))
         return Budget((noise, Contributor(SWEEPS, "A", "normal", None, "", FROM_RESIDUALS, more.dof, more.covariance)))

@@ -19,8 +19,8 @@ from rig.observation.external.omission import Omitted
 from rig.observation.external.reference_rows import Turning, select_covered
 from rig.observation.external.robust_start import find_start
 
-CONTRADICTING = ("attitude_untrustworthy", "mirrored_axis", "wrong_unit", "ill_conditioned")
-PASSES = 3  # iterations: the clock of one determines the increments of the next
+CONTRADICTIONS = ("attitude_untrustworthy", "mirrored_axis", "wrong_unit", "ill_conditioned")
+MAX_ITERATIONS = 3  # the clock of one determines the increments of the next
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +76,7 @@ def solve_turning(turning: Turning, window_s: float | None, *, any_mounting: boo
     `check_axes` do.
     """
     solved = solve_unless_inverted(
-        turning.attitudes, lambda attitudes: _solve(replace(turning, attitudes=attitudes), window_s), CONTRADICTING
+        turning.attitudes, lambda attitudes: _solve(replace(turning, attitudes=attitudes), window_s), CONTRADICTIONS
     )
     if not any_mounting:
         matrix = solved.solution.matrix
@@ -91,11 +91,11 @@ def _solve(turning: Turning, window_s: float | None) -> InIncrements:
     start = find_start(select_covered(turning)).state
     check_unit(scale_of(start.matrix))
     gathered = gather(turning, window_s, start.clock_s)
-    for _ in range(PASSES):
+    for _ in range(MAX_ITERATIONS):
         solution = solve_known_increments(turning.time_s, turning.readings_rad_s, gathered.fixes, start)
         regathered = gather(turning, window_s, solution.clock_s)
         if np.array_equal(gathered.fixes.joined, regathered.fixes.joined):
             break
         gathered = regathered
     left_out, increments = gathered.left_out, gathered.increments
-    return InIncrements(solution, gathered.window_s, left_out, increments)  # pyrefly: ignore[unbound-name]  # PASSES > 0
+    return InIncrements(solution, gathered.window_s, left_out, increments)  # pyrefly: ignore[unbound-name]  # MAX_ITERATIONS > 0

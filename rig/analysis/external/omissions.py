@@ -10,7 +10,7 @@ from rig.analysis.installed_solvers import OfKind
 from rig.data.quantity import RATE, Quantity
 from rig.data.recording.motion_file import ReadElsewhere
 from rig.estimation.arrays import Array
-from rig.estimation.external.row_changes import MOST_ROWS
+from rig.estimation.external.row_changes import MAX_ROWS
 from rig.estimation.gyroscope.estimate import Estimate
 from rig.estimation.gyroscope.rotations_by_angle import TurnedSolution
 from rig.observation.external.attitude_import import PlacedReadings
@@ -70,16 +70,16 @@ def notes_on_speeds(data: ExternalData) -> Iterator[str]:
 def _are_whole(turned: Array, part: float) -> bool:
     """Return whether there are angles (k,), and each is a whole multiple, 1 or more, of `part`."""
     multiples = np.rint(turned / part)
-    return bool(len(turned) and (multiples > 0).all() and (np.abs(turned / part / multiples - 1) < WHOLE).all())
+    return bool(len(turned) and (multiples > 0).all() and (np.abs(turned / part / multiples - 1) < MAX_ERROR).all())
 
 
 def notes_on_changes(data: ExternalData) -> Iterator[str]:
     """Yield a note if there are too many rows to search for an abrupt change of the sensor."""
     count = len(data.sweeps) + len(data.all_rests)
-    if count > MOST_ROWS:
+    if count > MAX_ROWS:
         yield (
             f"abrupt changes of the sensor were not searched for: there are {count} rows of sweeps and rests, and the "
-            f"search takes up to {MOST_ROWS}"
+            f"search takes up to {MAX_ROWS}"
         )
 
 

@@ -17,11 +17,11 @@ from rig.estimation.statistics.coverage import false_alarm_of_each
 from rig.observation.external.means_at_rest import means_at_rest
 from rig.observation.external.reference_rows import Turning
 
-FALSE_ALARM = 1e-3  # probability for the worst of three axes, if the recording's bias is that at rest
+FALSE_ALARM_PROBABILITY = 1e-3  # for the worst of three axes, if the recording's bias is that at rest
 G_SENSITIVITY_RAD_S = 1e-3  # effect of 1 g on a MEMS gyroscope, which rests in one attitude and moves through many
-TAIL = 0.1  # fraction of the readings at either end of their range that may not belong to a rest
+TAIL_FRACTION = 0.1  # of the readings at either end of their range, which may not belong to a rest
 # Largest half of the range of the readings at rest: the body may move a little although it seems to rest.
-MOST_RAD_S = 2 * RATE.steady
+MAX_HALF_RANGE_RAD_S = 2 * RATE.steady
 
 
 def check_rests_agree(turning: Turning, solution: KnownIncrements) -> None:
@@ -35,7 +35,7 @@ def check_rests_agree(turning: Turning, solution: KnownIncrements) -> None:
         return
     readings, turned = at_rest.readings_rad_s, at_rest.rates_rad_s @ solution.matrix.T
     bias = np.median(readings, axis=0) - turned.mean(axis=0)
-    half_range = np.ptp(np.quantile(readings, (TAIL, 1 - TAIL), axis=0), axis=0) / 2
+    half_range = np.ptp(np.quantile(readings, (TAIL_FRACTION, 1 - TAIL_FRACTION), axis=0), axis=0) / 2
     _check_steady(half_range)
     other = G_SENSITIVITY_RAD_S**2 + EARTH_RATE_RAD_S**2
     std = np.sqrt(np.diag(solution.covariance)[BIAS] + half_range**2 + _motion_std_rad_s(turned) ** 2 + other)
@@ -54,7 +54,7 @@ def check_rests_agree(turning: Turning, solution: KnownIncrements) -> None:
 def _check_steady(half_range_rad_s: Array) -> None:
     """Raise Fault `bias_jumped` if half the range (3,) of the readings at rest exceeds a plausible bias drift."""
     axis = int(np.argmax(half_range_rad_s))
-    if half_range_rad_s[axis] > MOST_RAD_S:
+    if half_range_rad_s[axis] > MAX_HALF_RANGE_RAD_S:
         raise Fault(
             "bias_jumped",
             f"where the attitudes show the body at rest, the gyroscope reads {2 * half_range_rad_s[axis]:.2g} rad/s "
@@ -64,10 +64,10 @@ def _check_steady(half_range_rad_s: Array) -> None:
 
 
 def _critical_value(dof: float) -> float:
-    """Return Student's critical value for the worst of three axes, at the probability `FALSE_ALARM`."""
+    """Return Student's critical value for the worst of three axes, at the probability `FALSE_ALARM_PROBABILITY`."""
     from scipy.special import ndtri, stdtrit
 
-    tail = false_alarm_of_each(FALSE_ALARM, 2 * len(RATE.axes))
+    tail = false_alarm_of_each(FALSE_ALARM_PROBABILITY, 2 * len(RATE.axes))
     return -float(ndtri(tail) if np.isinf(dof) else stdtrit(dof, tail))
 
 

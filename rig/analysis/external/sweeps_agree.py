@@ -15,12 +15,12 @@ from rig.estimation.statistics.coverage import coverage_factors, effective_dof
 from rig.observation.external.csv_import import ExternalData, stack_rows
 from rig.observation.statistics.mean import dof_by_axis
 
-WRONG = 0.1  # leave-one-out residual relative to the sweep's rate: no rate table errs by this much, a wrong row does
-BEYOND_NOISE = 6.0  # residual in standard deviations of the sweep's mean
-LEAST_REDUNDANCY = 0.05  # least redundancy number of a row: below it, nothing can contradict the row
-SAME_AXIS = 0.9  # cosine between the axes of two rows, in either direction
-CHANCE = 4.0  # standard deviations: one of some dozens of means may deviate as much by chance
-FEWEST_FREEDOM = 3  # with fewer, rounding down to the next integer would alone increase U by half
+MAX_RESIDUAL_RATIO = 0.1  # leave-one-out, to the sweep's rate: no rate table errs by this much, a wrong row does
+MAX_RESIDUAL = 6.0  # in standard deviations of the sweep's mean
+MIN_REDUNDANCY = 0.05  # redundancy number of a row: below it, nothing can contradict the row
+SAME_AXIS_COSINE = 0.9  # between the axes of two rows, in either direction
+CHANCE_LIMIT = 4.0  # standard deviations: one of some dozens of means may deviate as much by chance
+MIN_DOF = 3  # with fewer, rounding down to the next integer would alone increase U by half
 
 
 def check_agree(data: ExternalData) -> None:
@@ -39,9 +39,9 @@ def check_agree(data: ExternalData) -> None:
     errors = np.linalg.norm(apart, axis=1) / sensitivity
     noise = np.linalg.norm(np.sqrt(variances) / redundancy, axis=1)
     sweeps = slice(len(data.sweeps))
-    fraction = np.where(errors > BEYOND_NOISE * noise, errors, 0.0)[sweeps] / np.linalg.norm(design[sweeps, :3], axis=1)
+    fraction = np.where(errors > MAX_RESIDUAL * noise, errors, 0.0)[sweeps] / np.linalg.norm(design[sweeps, :3], axis=1)
     worst = int(np.argmax(fraction))
-    if fraction[worst] > WRONG:
+    if fraction[worst] > MAX_RESIDUAL_RATIO:
         raise Refused(
             "bad_sweep",
             f"{_name_contradiction(worst, data)} by {100 * fraction[worst]:.0f} % of its rate",
@@ -53,7 +53,7 @@ def check_agree(data: ExternalData) -> None:
 def _name_contradiction(worst: int, data: ExternalData) -> str:
     """Describe which sweeps contradict each other, by their rows."""
     axis = data.sweeps[worst].axis_flange
-    about = [sweep.sweep for sweep in data.sweeps if abs(sweep.axis_flange @ axis) > SAME_AXIS]
+    about = [sweep.sweep for sweep in data.sweeps if abs(sweep.axis_flange @ axis) > SAME_AXIS_COSINE]
     if len(about) == 2:
         return f"of sweeps {about[0]} and {about[1]}, the only ones about their axis, one contradicts the other"
     return f"sweep {data.sweeps[worst].sweep} contradicts the others"
@@ -107,7 +107,7 @@ def sweep_errors(solution: VectorSolution, data: ExternalData) -> SweepErrors | 
         inflation = std / np.sqrt(np.maximum(np.diag(covariance), np.finfo(np.float64).tiny))
         return np.asarray(inflation[:, None] * covariance * inflation, dtype=np.float64)
 
-    dof = float(max(count_redundant_rows(data), FEWEST_FREEDOM))
+    dof = float(max(count_redundant_rows(data), MIN_DOF))
     changes, to_parameters = estimate_changes(data, solution.matrix), parameter_jacobian(solution.matrix, axes.scale)
     return SweepErrors(
         covariance=inflate(to_parameters, dof, noise_dof(solution, data)) + to_parameters @ changes @ to_parameters.T,
@@ -165,13 +165,13 @@ def _contradictions(stated: StatedMotion, sizes: MotionErrors, design: Array) ->
     spread = rate_variance * stated.rate_patterns**2 + axis_variance * np.sum(stated.axis_patterns**2, axis=0)
     redundancy = _redundancy_numbers(design)
     errors = np.abs(stated.residuals_rad_s) / np.sqrt(redundancy * (stated.variances_rad2_s2 + spread))
-    beyond: Array = np.where(errors.max(axis=1, keepdims=True) > CHANCE, stated.residuals_rad_s / redundancy, 0.0)
+    beyond: Array = np.where(errors.max(axis=1, keepdims=True) > CHANCE_LIMIT, stated.residuals_rad_s / redundancy, 0.0)
     return beyond
 
 
 def _redundancy_numbers(design: Array) -> Array:
     """Return the redundancy number (N, 1) of each row: the fraction of its error that its residual shows."""
-    redundancy: Array = np.maximum(1 - np.einsum("ij,ji->i", design, np.linalg.pinv(design)), LEAST_REDUNDANCY)
+    redundancy: Array = np.maximum(1 - np.einsum("ij,ji->i", design, np.linalg.pinv(design)), MIN_REDUNDANCY)
     return redundancy[:, None]
 
 

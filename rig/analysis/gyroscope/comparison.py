@@ -23,8 +23,8 @@ from rig.observation.observed_run import Delay, ObservedRun
 
 # Largest delay between the filters of two sensors: if it is larger, their time stamps do not belong together.
 MAX_DELAY_S = 0.2
-MAX_GAP = 2.5  # longest gap of the reference that is interpolated, in sampling intervals
-MIN_COVERED = 0.9  # least fraction of the samples in motion that the reference covers
+MAX_GAP_INTERVALS = 2.5  # of the reference: longer gaps are not interpolated
+MIN_COVERED_FRACTION = 0.9  # of the samples in motion, by the reference
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,7 +154,7 @@ def _align_recording(recording: ObservedRun, sensor: str, reference: Reference, 
     tested, reference_stream = recording.stream(sensor), recording.stream(reference.name)
     movement = mask_movement(recording.run, tested.time_s)
     used = movement.moving & _mask_covered(tested.time_s, reference_stream.time_s)
-    if not used.sum() > MIN_COVERED * movement.moving.sum():
+    if not used.sum() > MIN_COVERED_FRACTION * movement.moving.sum():
         raise Fault(
             "no_overlap",
             f"the reference was recorded during {used.sum()} of the sensor's {movement.moving.sum()} samples of the "
@@ -189,7 +189,7 @@ def _mask_covered(time_s: Array, by_s: Array) -> NDArray[np.bool_]:
     """Return a mask (n,) of the times that lie between the times `by_s` (m,) and not in a gap of these."""
     after = np.searchsorted(by_s, time_s)
     gaps = np.diff(by_s, prepend=-np.inf, append=np.inf)
-    close: NDArray[np.bool_] = gaps[after] <= MAX_GAP * np.median(gaps)
+    close: NDArray[np.bool_] = gaps[after] <= MAX_GAP_INTERVALS * np.median(gaps)
     return close
 
 

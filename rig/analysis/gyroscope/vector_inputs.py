@@ -21,10 +21,10 @@ from rig.observation.observe import Observation
 from rig.observation.observed_run import ObservedRun
 from rig.observation.statistics.mean import dof_by_axis
 
-ZEROS = tuple(index for index, name in enumerate(AXIS_ERRORS) if name.startswith("zero"))
-SAME_AXIS = 1 - 1e-6  # cosine between two axes: the other joints return to 1.4 mrad
+ZERO_INDICES = tuple(index for index, name in enumerate(AXIS_ERRORS) if name.startswith("zero"))
+SAME_AXIS_COSINE = 1 - 1e-6  # the other joints return to 1.4 mrad
 # Size of an encoder's error once or twice a revolution, relative to that of the joint's zero; assumed.
-WAVE_FRACTION = 0.3
+WAVE_RATIO = 0.3
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +139,7 @@ def lever_arms_m(turns: Sequence[Observation], extension_m: Array, mount: Array 
 def _axis_errors(turns: Sequence[Observation], rests: int, axis_deg: float) -> Array:
     """Return the errors (P, N, 3) of the arm's angles, with the half-width `axis_deg`, as in `VectorInputs`."""
     steady = np.array([name.startswith(("twist", "zero")) for name in AXIS_ERRORS])
-    std = np.radians(axis_deg) / np.sqrt(3) * np.where(steady, 1.0, WAVE_FRACTION)
+    std = np.radians(axis_deg) / np.sqrt(3) * np.where(steady, 1.0, WAVE_RATIO)
     errors = [std[:, None] * turn.speed_rad_s * turn.axis_errors for turn in turns if turn.axis_errors is not None]
     return np.concatenate([np.swapaxes(errors, 0, 1), np.zeros((len(std), rests, 3))], axis=1)
 
@@ -147,7 +147,7 @@ def _axis_errors(turns: Sequence[Observation], rests: int, axis_deg: float) -> A
 def _return_errors(turns: Sequence[Observation], rests: int, uncertainty: Uncertainty) -> Array:
     """Return the errors (P, N, 3) of joints that return imperfectly to a sweep's axis, as in `VectorInputs`."""
     errors = np.array([turn.speed_rad_s * turn.axis_errors for turn in turns if turn.axis_errors is not None])
-    tilts = uncertainty.repeatability_std_rad * np.swapaxes(errors[:, ZEROS], 0, 1)
+    tilts = uncertainty.repeatability_std_rad * np.swapaxes(errors[:, ZERO_INDICES], 0, 1)
     visits = np.array([np.isin(np.arange(len(turns)), visit) for visit in _group_by_axis(turns)])
     every = (visits[:, None, :, None] * tilts).reshape(-1, len(turns), 3)
     effective = every[every.any(axis=(1, 2))]
@@ -189,7 +189,7 @@ def _group_by_axis(turns: Sequence[Observation]) -> list[list[int]]:
     """Return the indices of consecutive sweeps about one axis, group by group."""
     groups: list[list[int]] = [[0]]
     for index, (last, turn) in enumerate(pairwise(turns), start=1):
-        if turn.joint_name == last.joint_name and abs(turn.axis_flange @ last.axis_flange) > SAME_AXIS:
+        if turn.joint_name == last.joint_name and abs(turn.axis_flange @ last.axis_flange) > SAME_AXIS_COSINE:
             groups[-1].append(index)
         else:
             groups.append([index])

@@ -11,7 +11,7 @@ from rig.analysis.gyroscope.calibration import SensorResult
 from rig.analysis.reference.datasheet_errors import add_errors, list_windows, mean_temperature_c, read_datasheet
 from rig.analysis.reference.reference_budgets import accelerometer_budget
 from rig.analysis.reference.triad import (
-    COMPARED,
+    COMPARED_METHODS,
     Triad,
     check_identifiable,
     check_mounted,
@@ -30,7 +30,7 @@ from rig.estimation.reference.accelerometer_model import LEVER, NO_SWEEPS, SECON
 from rig.estimation.reference.imu import ImuSolution, solve_imu
 from rig.estimation.reference.reference_model import F
 from rig.estimation.reference.triaxial import Method, TriaxialSolution, solve_triaxial
-from rig.estimation.statistics.expected_variances import OWN_SHARES
+from rig.estimation.statistics.expected_variances import INDEPENDENT_FRACTIONS
 from rig.estimation.triads import Alignment, align_triads
 from rig.observation.observed_run import ObservedRun
 from rig.observation.reference.dwell_acceleration import DwellReading
@@ -38,7 +38,7 @@ from rig.observation.reference.swept_acceleration import SweptAcceleration
 from rig.observation.statistics.mean import dof_by_axis
 
 NO_GYROSCOPES: Mapping[str, SensorResult] = MappingProxyType({})
-NOT_IDENTIFIABLE = "Set procedure.second_order: false, which makes the bias much better known; or dwell longer"
+ORDER_REMEDY = "Set procedure.second_order: false, which makes the bias much better known; or dwell longer"
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,7 +154,7 @@ def _calibrate(
         windows = list_windows(name, recordings, used)
         arm, temperature_c = recordings[0].motion.kinematics, mean_temperature_c(windows)
         movement = add_errors(movement, windows, sensor, datasheet, arm, settings=settings)
-    methods: tuple[Method, ...] = ("attitude_weighted", *COMPARED)
+    methods: tuple[Method, ...] = ("attitude_weighted", *COMPARED_METHODS)
     other_methods = attempt_each({method: partial(solve, method=method) for method in methods})
     if weighted := other_methods.results.get("attitude_weighted"):
         check_mounted(weighted.matrix)
@@ -169,11 +169,11 @@ def _calibrate(
         repeatability_rad=movement.repeatability_rad,
         sensor_errors=movement.sensor_errors,
         arm_turns=movement.arm_turns,
-        own_shares=OWN_SHARES,
+        own_shares=INDEPENDENT_FRACTIONS,
     )
     check_mounted(solution.matrix)
     if solution.second_order_s2_m is not None:
-        check_identifiable(solution.second_order_s2_m, np.sqrt(np.diag(solution.covariance)[SECOND]), NOT_IDENTIFIABLE)
+        check_identifiable(solution.second_order_s2_m, np.sqrt(np.diag(solution.covariance)[SECOND]), ORDER_REMEDY)
     return AccelerometerResult(
         sensor=sensor,
         gravity_m_s2=site.gravity_m_s2,

@@ -5,14 +5,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rig.analysis.gyroscope.vector_inputs import WAVE_FRACTION
+from rig.analysis.gyroscope.vector_inputs import WAVE_RATIO
 from rig.estimation.arrays import Array
-from rig.estimation.reference.accelerometer_model import OWN_ERRORS, SHARE, SHARED_ERRORS, TURNS, Movement, turned
+from rig.estimation.reference.accelerometer_model import (
+    OWN_ERRORS,
+    ROTATIONS,
+    SHARED_ERRORS,
+    SIZE_RATIO,
+    Movement,
+    turned,
+)
 from rig.motion.chain import DenavitHartenberg
 from rig.motion.geometry import WRIST_1, angle_waves, flange_attitude, flange_errors
 
 # Errors of each wrist; the first two are its twist and its zero, the others are waves of its angle.
-ERRORS, STEADY = 6, 2
+WRIST_ERRORS, CONSTANTS = 6, 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +60,7 @@ def list_arm_rotations(postures: Sequence[Posture], arm: DenavitHartenberg, moun
 
 def _error_fractions() -> Array:
     """Return each wrist error (18,) as a fraction of the arm's error."""
-    return np.tile(np.where(np.arange(ERRORS) < STEADY, 1.0, WAVE_FRACTION), 3)
+    return np.tile(np.where(np.arange(WRIST_ERRORS) < CONSTANTS, 1.0, WAVE_RATIO), 3)
 
 
 def _stack_rotations(postures: Sequence[Posture], arm: DenavitHartenberg, mounting: Array) -> Array:
@@ -69,11 +76,16 @@ def _rotations(posture: Posture, arm: DenavitHartenberg, mounting: Array) -> Arr
     sizes = np.zeros((*in_base.shape[:2], SHARED_ERRORS))
     for wrist in range(len(in_base)):
         distal = wrist > posture.wrist
-        sizes[wrist, :, slice(0, 3) if distal else slice(3, TURNS)] = in_flange[wrist] if distal else in_base[wrist]
-    sizes[posture.wrist, 0, :TURNS] = [*in_flange[posture.wrist, 0], 0.0, 0.0, 0.0]  # the twist is distal to its joint
-    sizes[posture.wrist, STEADY:] = 0.0
-    sizes[posture.wrist, STEADY:, TURNS:] = _shift_harmonics(float(posture.q_rad[WRIST_1 + posture.wrist]))
-    return np.asarray(sizes.reshape(-1, SHARED_ERRORS) / SHARE)
+        sizes[wrist, :, slice(0, 3) if distal else slice(3, ROTATIONS)] = in_flange[wrist] if distal else in_base[wrist]
+    sizes[posture.wrist, 0, :ROTATIONS] = [
+        *in_flange[posture.wrist, 0],
+        0.0,
+        0.0,
+        0.0,
+    ]  # the twist is distal to its joint
+    sizes[posture.wrist, CONSTANTS:] = 0.0
+    sizes[posture.wrist, CONSTANTS:, ROTATIONS:] = _shift_harmonics(float(posture.q_rad[WRIST_1 + posture.wrist]))
+    return np.asarray(sizes.reshape(-1, SHARED_ERRORS) / SIZE_RATIO)
 
 
 def _shift_harmonics(angle_rad: float) -> Array:

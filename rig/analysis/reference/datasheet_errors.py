@@ -16,7 +16,7 @@ from rig.estimation.gyroscope.budget import BIAS_DRIFT, FLICKER, Contributor
 from rig.estimation.gyroscope.own_errors import (
     BIAS_OVER_TEMPERATURE,
     NONLINEARITY,
-    OF_THE_PART,
+    PART_SOURCE,
     SCALE_OVER_TEMPERATURE,
     subtract_mean,
     unseen_k,
@@ -37,8 +37,8 @@ from rig.observation.average import Average
 from rig.observation.observed_run import ObservedRun
 from rig.observation.reference.dwell_acceleration import DwellReading
 
-STANDARD = np.sqrt(3)  # half-width over standard uncertainty of a rectangular distribution
-MILLI_G = 1000  # µg
+RECTANGULAR_RATIO = np.sqrt(3)  # half-width over standard uncertainty of a rectangular distribution
+MICRO_G_PER_MILLI_G = 1000
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,11 +131,11 @@ def list_sensor_errors(
     windows_s = np.array([window.window_s for window in windows])
     samples = np.array([window.samples for window in windows])
     return AccelerometerErrors(
-        even_s2_m=0.0 if second_order else datasheet.even_s2_m / STANDARD,
-        odd_s4_m2=datasheet.odd_s4_m2 / STANDARD,
+        even_s2_m=0.0 if second_order else datasheet.even_s2_m / RECTANGULAR_RATIO,
+        odd_s4_m2=datasheet.odd_s4_m2 / RECTANGULAR_RATIO,
         norm_m_s2=STANDARD_GRAVITY_M_S2,
-        bias_m_s2_k=MILLI_G * MICRO_G_M_S2 * datasheet.bias_mg_k / STANDARD,
-        scale_per_k=1e-6 * datasheet.scale_ppm_k / STANDARD,
+        bias_m_s2_k=MICRO_G_PER_MILLI_G * MICRO_G_M_S2 * datasheet.bias_mg_k / RECTANGULAR_RATIO,
+        scale_per_k=1e-6 * datasheet.scale_ppm_k / RECTANGULAR_RATIO,
         warmer_k=subtract_mean(np.array([window.temperature_c for window in windows]), samples),
         unseen_k=unseen_k(temperature_step_k, windows_s, samples),
         windows_s=windows_s,
@@ -169,12 +169,12 @@ def separate_sensor_errors(
         spread.response @ shared @ spread.response.T
         for shared in (find_drift_covariance(movement), flickering(movement))
     )
-    warm = "; ".join(filter(None, (OF_THE_PART, datasheet.temperature_words)))
+    warm = "; ".join(filter(None, (PART_SOURCE, datasheet.temperature_words)))
     of_range = f"% of {datasheet.over_g:.3g} g"
     by_sheet = {
         BIAS_OVER_TEMPERATURE: (datasheet.bias_mg_k, "mg/K", warm, bias_warming(movement)),
         SCALE_OVER_TEMPERATURE: (datasheet.scale_ppm_k, "ppm/K", warm, scale_warming(theta, movement)),
-        NONLINEARITY: (datasheet.nonlinearity_percent, of_range, OF_THE_PART, bending(theta, movement)),
+        NONLINEARITY: (datasheet.nonlinearity_percent, of_range, PART_SOURCE, bending(theta, movement)),
     }
     stability = f"least Allan deviation: {datasheet.bias_instability_ug:.3g} µg"
     lines = [

@@ -12,7 +12,7 @@ import numpy as np
 
 from rig.analysis.reference.accelerometer import AccelerometerResult
 from rig.analysis.reference.reference_budgets import magnetometer_budget
-from rig.analysis.reference.triad import COMPARED, Triad, check_mounted, field_reference, stack_dwells
+from rig.analysis.reference.triad import COMPARED_METHODS, Triad, check_mounted, field_reference, stack_dwells
 from rig.data.quantity import FIELD
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.settings import RunSettings
@@ -21,7 +21,7 @@ from rig.errors.attempts import Attempts, attempt_each
 from rig.estimation.gyroscope.budget import Budget
 from rig.estimation.reference.accelerometer_model import Dwells
 from rig.estimation.reference.magnetometer import FieldDrift, Uniformity, field_drift, uniformity
-from rig.estimation.reference.triaxial import UNTRUSTWORTHY_RAD, Method, TriaxialSolution, solve_triaxial
+from rig.estimation.reference.triaxial import MAX_ATTITUDE_ERROR_RAD, Method, TriaxialSolution, solve_triaxial
 from rig.observation.field_means import field_readings, field_tests, find_companion
 from rig.observation.observed_run import ObservedRun
 from rig.observation.statistics.mean import StaticReading, dof_by_axis
@@ -117,7 +117,7 @@ def _calibrate(
             field_t=reference.norm,
             noise_dof=dof_by_axis(dwell.reading.dof for dwell in dwells).ravel(),
         ),
-        other_methods=attempt_each({method: partial(solve, method=method) for method in COMPARED}),
+        other_methods=attempt_each({method: partial(solve, method=method) for method in COMPARED_METHODS}),
         dwells=dwells,
         measurements=measurements,
     )
@@ -159,7 +159,7 @@ def _attitude_error_rad(
     by = next((other for run in recordings if (other := find_companion(run, name)) in accelerometers), None)
     accelerometer = accelerometers[by] if by is not None else next(iter(accelerometers.values()))
     error = accelerometer.solution.attitude_error
-    return min(error.std_rad + 2 * error.uncertainty_rad, UNTRUSTWORTHY_RAD)
+    return min(error.std_rad + 2 * error.uncertainty_rad, MAX_ATTITUDE_ERROR_RAD)
 
 
 def _describe_nonuniformity(uniformity: Uniformity, solution: TriaxialSolution) -> str:

@@ -10,7 +10,7 @@ from rig.data.quantity import FIELD
 from rig.data.recording.settings import Site
 from rig.estimation.arrays import Array, scale_of
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
-from rig.estimation.gyroscope.budget import NOT_GIVEN, Budget, Contributor
+from rig.estimation.gyroscope.budget import NOT_GIVEN_SUFFIX, Budget, Contributor
 from rig.estimation.reference.accelerometer_model import Dwells, Movement
 from rig.estimation.reference.attitude_error import AttitudeError
 from rig.estimation.reference.imu import ImuSolution
@@ -26,10 +26,10 @@ from rig.estimation.reference.reference_budget import (
 from rig.estimation.reference.triaxial import TriaxialSolution
 
 # Half-width of gravity that is computed from latitude and height alone: anomalies by rocks and terrain, 50 mGal.
-LOCAL_GRAVITY_M_S2: Final = 0.0005
+LOCAL_GRAVITY_ERROR_M_S2: Final = 0.0005
 # Half-width about the standard value: 9.780 at the equator to 9.832 at the poles, less on mountains.
-ANY_GRAVITY_M_S2: Final = 0.03
-UNSTATED_FIELD: Final = 0.01  # relative half-width of an unstated field: that of an ordinary fluxgate
+STANDARD_GRAVITY_ERROR_M_S2: Final = 0.03
+UNSTATED_FIELD_ERROR: Final = 0.01  # relative half-width: that of an ordinary fluxgate
 UNTESTED_DRIFT_T: Final = 1e-7  # change of the field in a run: a magnetic storm, a lift some floors away
 TESTED_AXES: Final = 3  # axes of one measured change of the field: the degrees of freedom of its standard deviation
 SIZE_OF_FIELD: Final = "size of the field"
@@ -118,8 +118,8 @@ def _gravity(site: Site) -> KnownSize:
     size, source = site.gravity_m_s2, "site.gravity_uncertainty_m_s2"
     if site.gravity_expanded_m_s2 is not None:
         return KnownSize("gravity", site.gravity_expanded_m_s2 / size, True, size, "m/s²", source)
-    half_width = ANY_GRAVITY_M_S2 if size == STANDARD_GRAVITY_M_S2 else LOCAL_GRAVITY_M_S2
-    return KnownSize("gravity", half_width / size, False, size, "m/s²", f"{source} {NOT_GIVEN}")
+    half_width = STANDARD_GRAVITY_ERROR_M_S2 if size == STANDARD_GRAVITY_M_S2 else LOCAL_GRAVITY_ERROR_M_S2
+    return KnownSize("gravity", half_width / size, False, size, "m/s²", f"{source} {NOT_GIVEN_SUFFIX}")
 
 
 def _field(site: Site, field_t: float) -> KnownSize:
@@ -127,7 +127,7 @@ def _field(site: Site, field_t: float) -> KnownSize:
     if site.magnetic_field_expanded_t is not None:
         relative = site.magnetic_field_expanded_t / field_t
         return KnownSize(SIZE_OF_FIELD, relative, True, size_ut, "µT", source)
-    return KnownSize(SIZE_OF_FIELD, UNSTATED_FIELD, False, size_ut, "µT", f"{source} {NOT_GIVEN}")
+    return KnownSize(SIZE_OF_FIELD, UNSTATED_FIELD_ERROR, False, size_ut, "µT", f"{source} {NOT_GIVEN_SUFFIX}")
 
 
 def lag_pattern(movement: Movement, lag_s: float) -> Array:
@@ -159,7 +159,7 @@ def _lag(spread: Spread, movement: Movement, lag_s: float) -> Contributor:
 def _drift(spread: Spread, matrix: Array, attitudes: Array, drift: FieldDrift | None) -> Contributor:
     patterns, change_t = drift_patterns(matrix, attitudes, drift)
     if drift is None:
-        source = f"procedure.field_test_s {NOT_GIVEN}"
+        source = f"procedure.field_test_s {NOT_GIVEN_SUFFIX}"
         return type_b("drift of the field", change_t / FIELD.bias.size, "µT", source, spread.covariance_of(patterns))
     tested = spread.covariance_of(patterns)
     return Contributor("drift of the field", "A", "normal", None, "", "tests at home", float(TESTED_AXES), tested)

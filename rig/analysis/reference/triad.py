@@ -18,8 +18,8 @@ from rig.estimation.sensor_axes import SensorAxes, nearest_rotation
 from rig.observation.reference.dwell_acceleration import DwellReading
 from rig.observation.statistics.mean import StaticReading
 
-COMPARED: tuple[Method, ...] = ("maximum_likelihood", "as_published")  # reported with the chosen one
-IDENTIFIABLE = 3.0  # least size of the largest second-order term, in its standard deviations
+COMPARED_METHODS: tuple[Method, ...] = ("maximum_likelihood", "as_published")  # reported with the chosen one
+MIN_SECOND_ORDER_STDS = 3.0  # size of the largest second-order term, in its standard deviations
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +83,7 @@ def check_mounted(matrix: Array) -> None:
 def check_identifiable(second_order: Array, std: Array, remedy: str) -> None:
     """Raise Fault `second_order_not_seen` unless a term of φ (3,) is significant by its `std` (3,)."""
     largest = float(np.max(np.abs(second_order) / std))
-    if largest < IDENTIFIABLE:
+    if largest < MIN_SECOND_ORDER_STDS:
         raise Fault(
             "second_order_not_seen",
             f"the largest second-order term is only {largest:.1f} times its standard deviation",

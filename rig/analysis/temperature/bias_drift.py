@@ -24,7 +24,7 @@ from rig.observation.finished_steps import dwell_times_s
 from rig.observation.observed_run import ObservedRun
 from rig.observation.statistics.mean import dof_by_axis
 
-FEWEST_REPEATS = 2
+MIN_REPEATS = 2
 SLOPE = "over_temperature"
 
 
@@ -106,10 +106,10 @@ def estimate_bias_drifts(recordings: Sequence[ObservedRun], settings: RunSetting
 def _select_complete(means: Mapping[int, DwellMean], table: Sequence[Sequence[int]]) -> list[list[DwellMean]]:
     """Return the complete repeats, each with its attitudes in the same order. Raise Fault `not_all_attitudes`."""
     complete = [[means[index] for index in repeat] for repeat in table if means.keys() >= set(repeat)]
-    if len(complete) < FEWEST_REPEATS:
+    if len(complete) < MIN_REPEATS:
         raise Fault(
             "not_all_attitudes",
-            f"{len(complete)} of {len(table)} repeats were finished, but a drift needs {FEWEST_REPEATS}",
+            f"{len(complete)} of {len(table)} repeats were finished, but a drift needs {MIN_REPEATS}",
             "Go on with `rig resume RUN_DIR`, or run the procedure again",
         )
     return complete

@@ -32,8 +32,8 @@ from rig.observation.observe import Observation, SensorObservations
 from rig.observation.observed_run import ObservedRun
 
 CONTRIBUTOR = "polynomials over temperature"
-ASSUMED_GRADIENT_K = 0.1  # a half-width, if no configuration states it
-NOT_RECORDED = Fault(
+GRADIENT_HALF_WIDTH_K = 0.1  # assumed if no configuration states it
+NOT_RECORDED_FAULT = Fault(
     "temperature_not_recorded",
     "a calibration over temperature is requested, but the readings have no temperature",
     "Record the part's thermometer with its readings, column temperature_c",
@@ -59,7 +59,7 @@ def correct_recordings(recordings: Sequence[ObservedRun], settings: RunSettings,
     runs, polynomials = list(recordings), dict[str, dict[Quantity, OverTemperature]]()
     for name in settings.to_calibrate:
         if not recordings[0].run.sensors[name].measures(TEMPERATURE):
-            raise NOT_RECORDED
+            raise NOT_RECORDED_FAULT
         polynomials[name] = {}
         if settings.planned_dwells and recordings[0].run.sensors[name].measures(ACCELERATION):
             runs, polynomials[name][ACCELERATION] = _correct_accelerations(runs, name, surroundings, reference_c)
@@ -80,8 +80,8 @@ def correct_files(data: ExternalData, reference_c: float) -> tuple[ExternalData,
         temperature_c=np.array([average.temperature_c for average in averages]),
     )
     if np.isnan(repeated.temperature_c).any():
-        raise NOT_RECORDED
-    polynomials = fit_over_temperature(repeated, reference_c, ASSUMED_GRADIENT_K)
+        raise NOT_RECORDED_FAULT
+    polynomials = fit_over_temperature(repeated, reference_c, GRADIENT_HALF_WIDTH_K)
     means = polynomials.correct_to_reference(repeated.means, repeated.temperature_c)
     corrected = [_replace_mean(average, mean, reference_c) for average, mean in zip(averages, means, strict=True)]
     sweeps = tuple(replace(sweep, average=average) for sweep, average in zip(data.sweeps, corrected, strict=False))

@@ -31,7 +31,7 @@ from rig.config.models import RigConfig
 from rig.config.sensors.sensor_sections import SensorSection
 from rig.data.recording.hand_events import OfTheHand
 from rig.errors import Refused
-from rig.estimation.by_hand.solution import REAL_HANDS
+from rig.estimation.by_hand.solution import REAL_HAND_STD
 from rig.station.by_hand_words import hand_event_line
 from rig.station.confirm import refuse_unless_answerable, require_agreement
 from rig.station.plain_text import say
@@ -80,7 +80,7 @@ def hand(options: Namespace) -> int:
             bias_rad_s=by_board.solved.bias_rad_s,
         )
         crystal = 1e-6 * config.uncertainty.crystal_ppm / math.sqrt(3)
-        scale_u = 2 * math.hypot(by_board.solved.scale_std, REAL_HANDS, crystal)
+        scale_u = 2 * math.hypot(by_board.solved.scale_std, REAL_HAND_STD, crystal)
         if options.json:
             print(json.dumps(_document(name, by_board, calibration, scale_u), indent=2))
         else:

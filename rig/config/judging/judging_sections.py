@@ -11,7 +11,7 @@ from rig.config.section import RATIO, Section, Vector3, Words
 
 # Sine of the angle between the vertical and the axis whose heading is given: equals that of
 # `rig.estimation.gyroscope.earth_rate`, which the world must not import through a section.
-MIN_LEVEL = 0.1
+MIN_LEVEL_SINE = 0.1
 
 
 class SiteSection(Section):
@@ -104,7 +104,7 @@ class SiteSection(Section):
         """Refuse a heading without a latitude (the Earth's rate needs both), and the heading of a vertical x axis."""
         if self.heading_deg is not None and self.latitude_deg is None:
             raise ValueError("needs latitude_deg and heading_deg, or neither")
-        if self.heading_deg is not None and np.linalg.norm(np.cross(self.up, (1, 0, 0))) < MIN_LEVEL:
+        if self.heading_deg is not None and np.linalg.norm(np.cross(self.up, (1, 0, 0))) < MIN_LEVEL_SINE:
             raise ValueError("heading_deg has no meaning if the x axis of the base points up or down")
         return self
 

@@ -13,8 +13,8 @@ from rig.estimation.by_hand.fit import GraphFit, estimate_stds, solve_step
 from rig.estimation.by_hand.graph import REST, RESTS, Factor
 from rig.estimation.by_hand.session_parts import STATED
 
-RATIO = 3.0  # ratio of the bias' random walk with the creeping rests to that without them
-MOST = 0.125  # largest fraction of the rests: if more stand out, the bias itself jumps
+MAX_WALK_RATIO = 3.0  # of the bias' random walk with the creeping rests to that without them
+MAX_CREEPING_FRACTION = 0.125  # of the rests: if more stand out, the bias itself jumps
 
 
 def find_creeping_rests(fit: GraphFit) -> tuple[int, ...]:
@@ -22,19 +22,19 @@ def find_creeping_rests(fit: GraphFit) -> tuple[int, ...]:
 
     A creeping rest needs a used rest on either side: otherwise it looks like a jump of the bias.
     """
-    if fit.stds.walk_rad_s_sqrt_s <= RATIO * STATED.walk_rad_s_sqrt_s:
+    if fit.stds.walk_rad_s_sqrt_s <= MAX_WALK_RATIO * STATED.walk_rad_s_sqrt_s:
         return ()
     middles_s = np.array([(rest.start_s + rest.end_s) / 2 for rest in fit.session.rests])
     left_out: list[int] = []
     rows: Sequence[Factor] = fit.factors
-    for _ in range(max(1, int(MOST * len(middles_s)))):
+    for _ in range(max(1, int(MAX_CREEPING_FRACTION * len(middles_s)))):
         biases = fit.state.biases + solve_step(rows)[0][RESTS:].reshape(-1, 6)[:, 3:]
         distances = _distances_from_neighbours(middles_s, biases, left_out)
         if not distances.any():
             return ()
         left_out.append(int(np.argmax(distances)))
         rows = [row for row in fit.factors if row.kind != REST or row.index not in left_out]
-        if estimate_stds(rows, fit.stds)[1].walk_rad_s_sqrt_s * RATIO < fit.stds.walk_rad_s_sqrt_s:
+        if estimate_stds(rows, fit.stds)[1].walk_rad_s_sqrt_s * MAX_WALK_RATIO < fit.stds.walk_rad_s_sqrt_s:
             return tuple(sorted(left_out))
     return ()
 

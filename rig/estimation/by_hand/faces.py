@@ -8,24 +8,24 @@ from rig.estimation.by_hand.move_rotations import MoveIntegrals
 from rig.estimation.by_hand.session_parts import FACES, HandRecording, RestFaces, SessionConditions
 
 # Limit if there is an accelerometer: its offset tilts the vertical by up to 4°.
-ON_FACE = float(np.cos(np.radians(10.0)))
-RECKONED = float(np.cos(np.radians(30.0)))  # limit for dead reckoning: a scale error of 10 % makes 18° in half a turn
-MOST = 0.7  # least fraction of the rests on faces, if the body is laid on faces at all
-WHOLE_RAD = float(np.radians(40.0))  # a turn that ends so near its beginning was meant to be a whole one
-AXES = np.array([axis_of(face) for face in FACES])
+MIN_FACE_COSINE = float(np.cos(np.radians(10.0)))
+MIN_RECKONED_COSINE = float(np.cos(np.radians(30.0)))  # dead reckoning: an error of 10 % makes 18° in half a turn
+MIN_FACE_FRACTION = 0.7  # of the rests, if the body is laid on faces at all
+WHOLE_TURN_TOLERANCE_RAD = float(np.radians(40.0))  # a turn that ends so near its beginning was meant to be a whole one
+FACE_AXES = np.array([axis_of(face) for face in FACES])
 
 
 def find_faces(session: HandRecording, conditions: SessionConditions, integrals: MoveIntegrals) -> RestFaces:
     """Find the face of every rest. Raise Refused `first_face_unknown`."""
     has_level = session.acceleration is not None
     up = _read_verticals(session) if has_level else _track_verticals(conditions, integrals)
-    cosines = up @ AXES.T
+    cosines = up @ FACE_AXES.T
     best = np.argmax(cosines, axis=1)
-    near = cosines[np.arange(len(up)), best] > (ON_FACE if has_level else RECKONED)
-    if np.mean(near) < MOST:  # free attitudes, some of which happen to be near a face
+    near = cosines[np.arange(len(up)), best] > (MIN_FACE_COSINE if has_level else MIN_RECKONED_COSINE)
+    if np.mean(near) < MIN_FACE_FRACTION:  # free attitudes, some of which happen to be near a face
         near = np.zeros_like(near)
     faces = tuple(FACES[face] if on else None for face, on in zip(best.tolist(), near.tolist(), strict=True))
-    nominal = np.where(near[:, None], AXES[best], up)
+    nominal = np.where(near[:, None], FACE_AXES[best], up)
     turns = tuple(_count_turns(session, integrals, faces, nominal, row) for row in range(len(session.moves)))
     return RestFaces(faces, nominal, turns)
 
@@ -51,8 +51,8 @@ def _track_verticals(conditions: SessionConditions, integrals: MoveIntegrals) ->
     up = [axis_of(conditions.first_face)]
     for rotation in integrals.rotations:
         vertical = rotation.T @ up[-1]
-        nearest = AXES[np.argmax(AXES @ vertical)]
-        up.append(nearest if nearest @ vertical > RECKONED else vertical)
+        nearest = FACE_AXES[np.argmax(FACE_AXES @ vertical)]
+        up.append(nearest if nearest @ vertical > MIN_RECKONED_COSINE else vertical)
     return np.array(up)
 
 
@@ -64,4 +64,4 @@ def _count_turns(
         return 0
     angle = float(up[row] @ integrals.swept_rad[row])
     turns = round(angle / (2 * np.pi))
-    return turns if abs(angle - 2 * np.pi * turns) < WHOLE_RAD + 0.05 * abs(angle) else 0
+    return turns if abs(angle - 2 * np.pi * turns) < WHOLE_TURN_TOLERANCE_RAD + 0.05 * abs(angle) else 0

@@ -25,15 +25,15 @@ from rig.estimation.by_hand.graph import (
     linearise,
 )  # fmt: skip
 from rig.estimation.by_hand.move_rotations import GyroscopeModel, MoveIntegrals, integrate_moves
-from rig.estimation.by_hand.session_parts import LARGEST, STATED, HandRecording, HandStds, RestFaces, SessionConditions
+from rig.estimation.by_hand.session_parts import MAX_STDS, STATED, HandRecording, HandStds, RestFaces, SessionConditions
 
 # Iterations of the fit, many if there are few moves; iterations for the variance components in each but the first.
-PASSES, SIZED = 30, 4
-SETTLED = 1e-2  # largest step, relative to the standard uncertainty, at which the fit has converged
+MAX_ITERATIONS, VARIANCE_ITERATIONS = 30, 4
+CONVERGED_STEP_RATIO = 1e-2  # largest step, relative to the standard uncertainty
 PRIOR_DOF = 5.0  # degrees of freedom of the stated values
 # The walk of the bias at which the fit begins: from a small one, a rest that contradicts the others looks like noise.
 LOOSE_WALK_RAD_S_SQRT_S = 1e-4
-LEAST = 0.4  # least fraction of the stated value: no hand is better
+MIN_STATED_RATIO = 0.4  # to the stated value: no hand is better
 CAUSE_OF_STD = {
     "repeat_rad": (FLAT, "repeat"),
     "closure_rad": (CLOSURE, "closure"),
@@ -42,7 +42,7 @@ CAUSE_OF_STD = {
     "acceleration_m_s2": (ACCELERATION, "acceleration"),
 }
 # Not reduced: errors outside the model exist even if residuals do not show them.
-NEVER_LESS = ("of_angle", "walk_rad_s_sqrt_s")
+UNREDUCED_STDS = ("of_angle", "walk_rad_s_sqrt_s")
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +79,7 @@ def fit_session(session: HandRecording, conditions: SessionConditions, trusted: 
     integrals = integrate_moves(session, initial, np.tile([0.0, 0.0, 1.0], (len(biases), 1)))
     faces = find_faces(session, conditions, integrals)
     state, iterations, settled = _start(integrals, faces, initial), 0, False
-    while iterations < PASSES and not settled:
+    while iterations < MAX_ITERATIONS and not settled:
         rows = list(linearise(Graph(session, faces, conditions, state, integrals, stds)))
         if iterations:
             rows, stds = estimate_stds(rows, stds, trusted)
@@ -87,7 +87,7 @@ def fit_session(session: HandRecording, conditions: SessionConditions, trusted: 
         if not np.isfinite(step).all() or np.abs(step[:9]).max() > 1.0:
             raise Fault("no_fit", "the moves contradict each other so much that no fit converges", _REMEDY)
         state, iterations = state.after_step(step), iterations + 1
-        settled = iterations > 2 and bool((np.abs(step) < SETTLED * np.sqrt(np.diag(covariance))).all())
+        settled = iterations > 2 and bool((np.abs(step) < CONVERGED_STEP_RATIO * np.sqrt(np.diag(covariance))).all())
         integrals = integrate_moves(session, state.gyroscope, state.attitudes[:, 2])
     rows = list(linearise(Graph(session, faces, conditions, state, integrals, stds)))
     _, covariance = solve_step(rows)
@@ -168,7 +168,7 @@ def estimate_stds(rows: Sequence[Factor], now: HandStds, trusted: int | None = N
     They are from the residuals of the first `trusted` rests, by default of all; `now` contains the previous values.
     """
     rows = list(rows)
-    for _ in range(SIZED):
+    for _ in range(VARIANCE_ITERATIONS):
         step, covariance = solve_step(rows)
         used = [row for row in rows if trusted is None or _last_rest(row) < trusted]
         new = _stds_of_rows(used, step, covariance, now)
@@ -206,7 +206,7 @@ def _stds_of_rows(rows: Sequence[Factor], step: Array, covariance: Array, now: H
             sum_squares = np.square(residual + design @ step) - free * (1 - share)
             square += float(sum_squares.sum()) * (getattr(now, name) / stated) ** 2
             dof += float(share @ free)
-        least = stated * (1.0 if name in NEVER_LESS else LEAST)
+        least = stated * (1.0 if name in UNREDUCED_STDS else MIN_STATED_RATIO)
         size = stated * float(np.sqrt(max(square, 0.0) / dof))
-        stds[name] = min(max(least, size), getattr(LARGEST, name))
+        stds[name] = min(max(least, size), getattr(MAX_STDS, name))
     return HandStds(**stds)

@@ -7,15 +7,15 @@ from rig.estimation.arrays import Array, rotation_vectors
 from rig.estimation.by_hand.session_parts import HandRecording, nearest_face
 from rig.estimation.sensor_axes import nearest_rotation
 
-SIDEWAYS = 0.3  # largest cosine between the verticals before and after a quarter turn
+MAX_FLIP_COSINE = 0.3  # between the verticals before and after a quarter turn
 # least cosine between an axis of the gyroscope and the nearest one of the accelerometer, unless the frames are rotated
-SAME = 0.7
+MIN_ALIGNED_COSINE = 0.7
 # fewest flips; largest unexplained fraction of their rotation: above it, moves were merged or rests were missed
-FEWEST, UNEXPLAINED = 5, 0.2
-SKEWED = 0.3  # largest cosine between two axes: those of a part are nearer to a right angle
-TURNED_RAD = 1.1  # angle between the frames of gyroscope and accelerometer: no fit converges from a larger one
-OTHER_UNIT = 20.0  # ratio of scales: a whole turn that is merged with a flip reads only five times as much
-FASTEST_RAD_S = 150.0  # no gyroscope of this kind reads as much: the unit is degrees
+MIN_FLIPS, MAX_UNEXPLAINED = 5, 0.2
+MAX_SKEW_COSINE = 0.3  # between two axes: those of a part are nearer to a right angle
+MAX_FRAME_ANGLE_RAD = 1.1  # of gyroscope and accelerometer: no fit converges from a larger one
+MAX_SCALE_RATIO = 20.0  # a whole turn that is merged with a flip reads only five times as much; more is another unit
+MAX_RATE_RAD_S = 150.0  # no gyroscope of this kind reads as much: the unit is degrees
 
 
 def check_axes(session: HandRecording) -> None:
@@ -24,16 +24,16 @@ def check_axes(session: HandRecording) -> None:
     Nothing is raised if no single map from the accelerometer's axes to the gyroscope's explains all of them: then rests
     were missed, and several moves look like one.
     """
-    if max((move.peak_rad_s for move in session.moves), default=0.0) > FASTEST_RAD_S:
+    if max((move.peak_rad_s for move in session.moves), default=0.0) > MAX_RATE_RAD_S:
         raise Fault("wrong_unit", "the readings look like degrees per second given as rad/s", "Give them in rad/s")
     if session.acceleration is None:
         return
     about, swept = _quarters(session)
-    if len(about) < FEWEST or np.linalg.svd(about)[1][-1] < 0.5:
+    if len(about) < MIN_FLIPS or np.linalg.svd(about)[1][-1] < 0.5:
         return
     matrix = np.linalg.lstsq(about, swept, rcond=None)[0].T  # swept = M about
     sizes = np.linalg.norm(matrix, axis=1)
-    if sizes.max() > OTHER_UNIT or sizes.min() < 1 / OTHER_UNIT:
+    if sizes.max() > MAX_SCALE_RATIO or sizes.min() < 1 / MAX_SCALE_RATIO:
         raise Fault(
             "wrong_unit", f"a quarter of a turn reads {sizes.max():.3g} times as much", "Give the readings in rad/s"
         )
@@ -41,9 +41,9 @@ def check_axes(session: HandRecording) -> None:
     strongest = np.argmax(np.abs(unit), axis=1)
     unexplained = np.linalg.norm(swept - about @ matrix.T) / np.linalg.norm(swept)
     skew = np.abs(unit @ unit.T - np.eye(3)).max()
-    if unexplained > UNEXPLAINED or skew > SKEWED:
+    if unexplained > MAX_UNEXPLAINED or skew > MAX_SKEW_COSINE:
         return
-    if sorted(strongest.tolist()) != [0, 1, 2] or (np.abs(unit[np.arange(3), strongest]) < SAME).any():
+    if sorted(strongest.tolist()) != [0, 1, 2] or (np.abs(unit[np.arange(3), strongest]) < MIN_ALIGNED_COSINE).any():
         _check_turned(unit)
         return
     names = [nearest_face(row) for row in unit]
@@ -57,7 +57,7 @@ def check_axes(session: HandRecording) -> None:
 def _check_turned(unit: Array) -> None:
     """Raise Fault `wrong_mounting` if the gyroscope's axes, rows (3, 3), are too far off for a fit to converge."""
     angle_rad = float(np.linalg.norm(rotation_vectors(nearest_rotation(unit)[None])[0]))
-    if angle_rad > TURNED_RAD:
+    if angle_rad > MAX_FRAME_ANGLE_RAD:
         raise Fault(
             "wrong_mounting",
             f"the gyroscope's axes lie {np.degrees(angle_rad):.0f}° off the accelerometer's, which no order of "
@@ -75,7 +75,7 @@ def _quarters(session: HandRecording) -> tuple[Array, Array]:
         if not move.is_usable or first.acceleration_m_s2 is None or second.acceleration_m_s2 is None:
             continue
         start, end = (mean / np.linalg.norm(mean) for mean in (first.acceleration_m_s2, second.acceleration_m_s2))
-        if abs(start @ end) > SIDEWAYS:
+        if abs(start @ end) > MAX_FLIP_COSINE:
             continue
         axis = np.cross(end, start)  # the vertical turns the other way in the body
         inside = (session.time_s >= move.start_s) & (session.time_s <= move.end_s)

@@ -21,7 +21,7 @@ from rig.estimation.arrays import Array, axis_of, rotation_vectors
 from rig.estimation.by_hand.move_rotations import GyroscopeModel, MoveIntegrals
 from rig.estimation.by_hand.session_parts import FACES, HandRecording, HandStds, RestFaces, SessionConditions
 
-MATRIX, GRAVITY, LEVEL, OFFSET, TABLE, BOX, BENDS, DRIFT = (
+MATRIX, GRAVITY, LEVEL, OFFSET, TABLE, BOX, NONLINEARITIES, DRIFT = (
     slice(0, 9), slice(9, 18), slice(18, 27), slice(27, 30), slice(30, 32), slice(32, 44), slice(44, 50), slice(50, 56),
 )  # fmt: skip
 RESTS = 56  # index of the first rest's parameters; each rest has six: attitude, bias
@@ -35,18 +35,18 @@ BIAS_STD_RAD_S = 1.0
 # that warms up.
 DRIFT_STD_RAD_S, CURVE_STD_RAD_S = 1e-3, 3e-4
 EARTH_STD_RAD_S = 5e-5  # prior of each axis: on the same face the Earth's rate is sensed alike
-LEAN_RAD = 0.02
-HAND_RAD_S = float(np.radians(150))  # usual rate of a hand during half of a move
+AXIS_TILT_STD_RAD = 0.02
+HAND_RATE_RAD_S = float(np.radians(150))  # usual rate of a hand during half of a move
 NONLINEARITY = 7e-5  # relative error of a move's angle at that rate, even and odd, for each axis: as in data sheets
-BUT_GAPS = 0.95
+GAPLESS_FRACTION = 0.95
 # The angle to which `HandStds.of_angle` refers; the error of many pushes grows with the root of the angle.
 QUARTER_RAD = np.pi / 2
-ALONG_M_S2 = 0.1  # standard deviation of an accelerometer's own errors along the vertical
+VERTICAL_ERROR_STD_M_S2 = 0.1  # of an accelerometer's own errors
 HEADING_STD_RAD = 1.0
 # Bandwidth of a hand that holds the body; ratio to the scatter of quiet rests up to which no hand holds it.
-TREMOR_HZ, AS_QUIET = 4.0, 1.5
+TREMOR_BANDWIDTH_HZ, QUIET_SCATTER_RATIO = 4.0, 1.5
 
-MOVE, REST, WALK, FLAT, CLOSURE, LEANING, ACCELERATION, PRIOR = (
+MOVE, REST, WALK, FLAT, CLOSURE, TILT, ACCELERATION, PRIOR = (
     "move", "rest", "walk", "flat", "closure", "lean", "acceleration", "prior",
 )  # fmt: skip
 
@@ -93,7 +93,7 @@ class GraphState:
             self,
             matrix=self.matrix + step[MATRIX].reshape(3, 3),
             sensitivity=self.sensitivity + step[GRAVITY].reshape(3, 3),
-            bends=self.bends + step[BENDS],
+            bends=self.bends + step[NONLINEARITIES],
             drift_rad_s=self.drift_rad_s + step[DRIFT].reshape(2, 3),
             level=self.level + step[LEVEL].reshape(3, 3),
             offset=self.offset + step[OFFSET],
@@ -172,7 +172,7 @@ class Graph:
         like wrong stamps.
         """
         differences = np.sort(np.abs(np.diff(self.session.time_s, 2)))
-        return float(np.sqrt(np.mean(np.square(differences[: round(BUT_GAPS * len(differences))])) / 6))
+        return float(np.sqrt(np.mean(np.square(differences[: round(GAPLESS_FRACTION * len(differences))])) / 6))
 
     @cached_property
     def quiet_m_s2(self) -> float:
@@ -217,8 +217,8 @@ def reading_noise(session: HandRecording) -> float:
 
 def _hand_held_std(scatter: Array, quiet: float, lasting_s: float) -> float:
     """Return the standard deviation of the mean of a rest held in the hand, from the readings' low frequencies."""
-    beyond = float(np.mean(scatter**2)) - (AS_QUIET * quiet) ** 2
-    return float(np.sqrt(max(beyond, 0.0) / max(TREMOR_HZ * lasting_s, 1.0)))
+    beyond = float(np.mean(scatter**2)) - (QUIET_SCATTER_RATIO * quiet) ** 2
+    return float(np.sqrt(max(beyond, 0.0) / max(TREMOR_BANDWIDTH_HZ * lasting_s, 1.0)))
 
 
 def _rest_columns(row: int) -> tuple[slice, slice]:
@@ -232,7 +232,7 @@ def _move(graph: Graph, row: int) -> Factor:
     design = np.zeros((3, graph.width))
     (first, first_bias), (second, second_bias) = _rest_columns(row), _rest_columns(row + 1)
     design[:, MATRIX], design[:, GRAVITY] = integrals.by_matrix[row], integrals.by_gravity[row]
-    design[:, BENDS] = integrals.by_bends[row]
+    design[:, NONLINEARITIES] = integrals.by_bends[row]
     design[:, first_bias] = design[:, second_bias] = integrals.by_bias[row] / 2
     design[:, first], design[:, second] = np.eye(3), -graph.between[row]
     changes_rad_s = graph.state.biases[row + 1] - graph.state.biases[row]
@@ -257,8 +257,8 @@ def _tilt_factor(graph: Graph, row: int) -> Factor:
     (_, bias_before), (_, bias_after) = _rest_columns(row), _rest_columns(row + 1)
     design[:, bias_before] = design[:, bias_after] = -perpendicular * duration_s / angle_rad / 2  # b is their mean
     noise = graph.walk_rad_sqrt_s * np.sqrt(duration_s) / abs(angle_rad)
-    causes = {"lean": np.full(2, LEAN_RAD), "noise": np.full(2, noise)}
-    return Factor(LEANING, row, perpendicular @ (integral_rad / angle_rad - matrix @ normal), design, causes)
+    causes = {"lean": np.full(2, AXIS_TILT_STD_RAD), "noise": np.full(2, noise)}
+    return Factor(TILT, row, perpendicular @ (integral_rad / angle_rad - matrix @ normal), design, causes)
 
 
 def _closure(graph: Graph, row: int) -> Factor:
@@ -330,7 +330,7 @@ def _acceleration(graph: Graph, row: int) -> Factor:
         "acceleration": np.full(3, graph.stds.acceleration_m_s2),
         "acceleration noise": np.full(3, scatter),
         "held": np.full(3, _hand_held_std(rest.acceleration_noise_m_s2, graph.quiet_m_s2, rest.end_s - rest.start_s)),
-        "along": np.array([0.0, 0.0, ALONG_M_S2]),
+        "along": np.array([0.0, 0.0, VERTICAL_ERROR_STD_M_S2]),
     }
     return Factor(ACCELERATION, row, residual, axes @ design, causes)
 
@@ -344,7 +344,7 @@ def _priors(graph: Graph) -> Iterator[Factor]:
 
     yield prior("matrix", MATRIX, (state.matrix - np.eye(3)).ravel(), MATRIX_STD)
     yield prior("g-sensitivity", GRAVITY, state.sensitivity.ravel(), SENSITIVITY_STD)
-    yield prior("nonlinearity", BENDS, state.bends, NONLINEARITY / HAND_RAD_S)
+    yield prior("nonlinearity", NONLINEARITIES, state.bends, NONLINEARITY / HAND_RATE_RAD_S)
     yield prior("drift", slice(DRIFT.start, DRIFT.start + 3), state.drift_rad_s[0], DRIFT_STD_RAD_S)
     yield prior("drift", slice(DRIFT.start + 3, DRIFT.stop), state.drift_rad_s[1], CURVE_STD_RAD_S)
     yield prior("level", LEVEL, (state.level - np.eye(3)).ravel(), LEVEL_STD)

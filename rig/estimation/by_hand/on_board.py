@@ -20,10 +20,10 @@ from rig.estimation.arrays import Array, perpendicular_unit_vectors
 
 MATRIX, GRAVITY, BIAS, FACES = slice(0, 9), slice(9, 18), slice(18, 21), slice(21, 33)
 PRIOR_STD = np.repeat([0.2, 1.75e-3, 1.0, 3.5e-3], [9, 9, 3, 12])
-REPEAT_RAD, CLOSURE_RAD = 3e-4, 3e-3
-NONLINEARITY, OF_ANGLE, QUARTER_RAD = 1e-4, 1e-4, np.pi / 2
-EARTH_RAD_S, EARTH_ALONG_RAD_S = 7e-5, 3e-5
-CURVED = 0.02
+REPEATABILITY_RAD, CLOSURE_RAD = 3e-4, 3e-3
+NONLINEARITY, ANGLE_FRACTION, QUARTER_RAD = 1e-4, 1e-4, np.pi / 2
+EARTH_RAD_S, EARTH_AXIAL_RAD_S = 7e-5, 3e-5
+CURVATURE_FRACTION = 0.02
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,11 +153,11 @@ def _move_equations(centre: Array, move: BoardMove) -> Iterator[Equation]:
         row[FACES.start + 2 * move.before.face + np.arange(2)] -= lever @ up_axes
         row[FACES.start + 2 * move.after.face + np.arange(2)] += lever @ turned @ after_axes
         residual = float(axis @ np.cross(reached, up) * stretched)
-        yield row, residual, variance + (CURVED * residual**2) ** 2 + 2 * REPEAT_RAD**2
+        yield row, residual, variance + (CURVATURE_FRACTION * residual**2) ** 2 + 2 * REPEATABILITY_RAD**2
     if move.whole:
         twist = np.array([turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0], turned[1, 0] - turned[0, 1]])
         residual = -float(2 * np.arctan2(middle @ twist, 1 + np.trace(turned)) + middle @ corrected)
-        yield middle @ design, residual, variance + (CURVED * residual**2) ** 2 + CLOSURE_RAD**2
+        yield middle @ design, residual, variance + (CURVATURE_FRACTION * residual**2) ** 2 + CLOSURE_RAD**2
 
 
 def _attitudes(steps: Array) -> tuple[Array, Array]:
@@ -175,5 +175,5 @@ def _attitudes(steps: Array) -> tuple[Array, Array]:
 def _variance(move: BoardMove, path_rad: float) -> float:
     lasts_s, noise = float(move.steps_s.sum()), move.noise_rad_s**2
     samples = 1 / len(move.rates) + 0.25 / move.before.samples + 0.25 / move.after.samples
-    of_angle = path_rad * (NONLINEARITY**2 * path_rad + OF_ANGLE**2 * QUARTER_RAD)
-    return float(lasts_s**2 * (noise * samples + EARTH_ALONG_RAD_S**2) + of_angle)
+    of_angle = path_rad * (NONLINEARITY**2 * path_rad + ANGLE_FRACTION**2 * QUARTER_RAD)
+    return float(lasts_s**2 * (noise * samples + EARTH_AXIAL_RAD_S**2) + of_angle)

@@ -20,8 +20,8 @@ from rig.estimation.by_hand.solution import (
 )
 from rig.estimation.sensor_axes import SensorAxes, parameter_jacobian
 
-UNKNOWN = 0.4  # U (k = 2) of a scale factor before any measurement
-FEWEST_TO_COMPARE = 4  # number of moves from which on one of them can be compared with the others
+UNKNOWN_SCALE_U = 0.4  # k = 2, before any measurement
+MIN_COMPARABLE_MOVES = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,17 +48,17 @@ def assess_progress(session: HandRecording, conditions: SessionConditions) -> Se
 
     Raise Fault `mirrored_axis`, `swapped_axes`, `wrong_unit`; Refused `first_face_unknown`.
     """
-    unknown = np.full(3, UNKNOWN)
+    unknown = np.full(3, UNKNOWN_SCALE_U)
     if not session.rests:
         return SessionProgress(unknown, (), (), (), None, None, FACES)
     check_axes(session)
     fault_of_last = _check_last_move(session)
     last = len(session.rests) - 1
     try:
-        fitted = fit_session(session, conditions, trusted=last if last >= FEWEST_TO_COMPARE else None)
+        fitted = fit_session(session, conditions, trusted=last if last >= MIN_COMPARABLE_MOVES else None)
     except Fault as fault:
         return SessionProgress(unknown, (), (), (), None, fault_of_last or fault, FACES)
-    if fault_of_last is None and last >= FEWEST_TO_COMPARE:
+    if fault_of_last is None and last >= MIN_COMPARABLE_MOVES:
         fault_of_last = find_contradiction(fitted, since=last)
     axes, chosen = SensorAxes.from_matrix(fitted.state.matrix), parameter_columns(fitted)
     covariance = fitted.covariance[np.ix_(chosen, chosen)]
@@ -72,7 +72,7 @@ def assess_progress(session: HandRecording, conditions: SessionConditions) -> Se
         faces,
         solution.rests,
         solution.moves,
-        solution if expanded.max() < UNKNOWN / 4 else None,
+        solution if expanded.max() < UNKNOWN_SCALE_U / 4 else None,
         fault_of_last,
         tuple(face for face in FACES if face not in faces),
     )

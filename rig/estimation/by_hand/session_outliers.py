@@ -16,25 +16,25 @@ import numpy as np
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.by_hand.fit import GraphFit, estimate_stds, replace_stds, solve_step, whiten_rows
-from rig.estimation.by_hand.graph import ACCELERATION, CLOSURE, FLAT, LEANING, MOVE, OFFSET, TABLE, WALK, Factor
-from rig.estimation.by_hand.session_parts import LARGEST, STATED, HandRest, HandStds
+from rig.estimation.by_hand.graph import ACCELERATION, CLOSURE, FLAT, MOVE, OFFSET, TABLE, TILT, WALK, Factor
+from rig.estimation.by_hand.session_parts import MAX_STDS, STATED, HandRest, HandStds
 
-A_ROW = 4.0  # decrease of χ² that is expected for each equation left out
-BY_MUCH = 16.0  # further decrease of χ² that shows an outlier: false-alarm probability 1 in 10^5
-NEARLY = 0.99  # fraction of the largest size from which on a size is at its limit
+EQUATION_CHI_SQUARE_DROP = 4.0  # expected for each equation left out
+CHI_SQUARE_DROP_LIMIT = 16.0  # further decrease that shows an outlier: false-alarm probability 1 in 10^5
+AT_LIMIT_RATIO = 0.99  # to the largest size, from which on a size is at its limit
 FACTORS_OF = {
-    "turn_not_closed": (CLOSURE, LEANING),
-    "lost_in_move": (MOVE, CLOSURE, LEANING),
+    "turn_not_closed": (CLOSURE, TILT),
+    "lost_in_move": (MOVE, CLOSURE, TILT),
     "bias_jumped": (WALK,),
     "not_flat": (FLAT, ACCELERATION),
 }
 JUMP_RAD_S = 1e-3  # change of the mean reading between two rests: no bias drifts by as much
 # the standard deviations that one outlier inflates, and the ratio to the usual from which on it does
-OF_ONE, HIDING = 3.0, ("repeat_rad", "closure_rad")
-HIDDEN = ("not_flat", "table_moved", "accelerometer_jumped", "turn_not_closed")
-FREE = 1e-9  # redundancy below which the other equations do not check an equation
-UNLIKELY = 1e-5  # probability of faces as far out of square as they seem
-AT_ONCE = 8.0  # as BY_MUCH, but during the session, in which a move can be repeated: 1 in 10^3
+INFLATION_RATIO, INFLATED_STDS = 3.0, ("repeat_rad", "closure_rad")
+HIDEABLE_OUTLIERS = ("not_flat", "table_moved", "accelerometer_jumped", "turn_not_closed")
+MIN_REDUNDANCY = 1e-9  # redundancy below which the other equations do not check an equation
+MIN_SKEW_PROBABILITY = 1e-5  # of faces as far out of square as they seem
+LIVE_DROP_LIMIT = 8.0  # during the session, in which a move can be repeated: 1 in 10^3
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ class FaultHypothesis:
 def find_contradiction(fit: GraphFit, since: int | None = None) -> Fault | None:
     """Return the fault of a session, or of its part from the rest `since` on; None without one."""
     worst = max(_test_hypotheses(fit, since), key=lambda hypothesis: hypothesis.chi_square_drop, default=None)
-    if worst is not None and worst.chi_square_drop > (BY_MUCH if since is None else AT_ONCE):
+    if worst is not None and worst.chi_square_drop > (CHI_SQUARE_DROP_LIMIT if since is None else LIVE_DROP_LIMIT):
         return describe_fault(fit, worst)
     return None if since is not None else _find_excessive_std(fit) or _find_unlikely_box(fit)
 
@@ -59,13 +59,13 @@ def find_masked_fault(fit: GraphFit) -> Fault | None:
     if not _much_larger(fit.stds, STATED):
         return None
     hypotheses = sorted(_test_hypotheses(fit, None), key=lambda hypothesis: hypothesis.chi_square_drop)
-    most = {hypothesis.name: hypothesis for hypothesis in hypotheses if hypothesis.name in HIDDEN}
+    most = {hypothesis.name: hypothesis for hypothesis in hypotheses if hypothesis.name in HIDEABLE_OUTLIERS}
     re_estimated = [
         replace(hypothesis, chi_square_drop=_drop_with_new_stds(fit, hypothesis.name, hypothesis.index))
         for hypothesis in most.values()
     ]
     worst = max(re_estimated, key=lambda hypothesis: hypothesis.chi_square_drop, default=None)
-    return describe_fault(fit, worst) if worst is not None and worst.chi_square_drop > BY_MUCH else None
+    return describe_fault(fit, worst) if worst is not None and worst.chi_square_drop > CHI_SQUARE_DROP_LIMIT else None
 
 
 def _hypotheses(fit: GraphFit, since: int | None) -> Iterator[tuple[str, int]]:
@@ -101,8 +101,8 @@ def _test_hypotheses(fit: GraphFit, since: int | None) -> list[FaultHypothesis]:
     hypotheses = []
     for name, index in _hypotheses(fit, since):
         columns = remove_explained(_fault_columns(fit, name, index) / std[:, None])
-        rest = remaining - columns @ np.linalg.lstsq(columns, remaining, rcond=FREE)[0]
-        chi_square_drop = float(residual @ residual - rest @ rest) - A_ROW * columns.shape[1]
+        rest = remaining - columns @ np.linalg.lstsq(columns, remaining, rcond=MIN_REDUNDANCY)[0]
+        chi_square_drop = float(residual @ residual - rest @ rest) - EQUATION_CHI_SQUARE_DROP * columns.shape[1]
         hypotheses.append(FaultHypothesis(name, index, chi_square_drop if columns.size else 0.0))
     return hypotheses
 
@@ -118,7 +118,7 @@ def _drop_with_new_stds(fit: GraphFit, name: str, index: int) -> float:
         if not columns.size or not _much_larger(fit.stds, stds):
             return 0.0
         chi_square_drop = _minimum_chi_square(replace_stds(fit.factors, fit.stds, stds)) - _minimum_chi_square(rows)
-        return chi_square_drop - float(A_ROW * columns.shape[1])
+        return chi_square_drop - float(EQUATION_CHI_SQUARE_DROP * columns.shape[1])
     except np.linalg.LinAlgError:
         return 0.0
 
@@ -153,7 +153,7 @@ def _tilt_columns(fit: GraphFit, row: Factor, index: int) -> Array:
 
 
 def _much_larger(stds: HandStds, than: HandStds) -> bool:
-    return any(getattr(stds, name) > OF_ONE * getattr(than, name) for name in HIDING)
+    return any(getattr(stds, name) > INFLATION_RATIO * getattr(than, name) for name in INFLATED_STDS)
 
 
 def _minimum_chi_square(rows: Sequence[Factor]) -> float:
@@ -219,21 +219,21 @@ def _describe_jump(index: int, rests: Sequence[HandRest]) -> Fault:
 def _find_excessive_std(fit: GraphFit) -> Fault | None:
     """Return the fault of an impossibly large standard deviation of hand or sensor, or None."""
     stds = fit.stds
-    if stds.repeat_rad >= NEARLY * LARGEST.repeat_rad:
+    if stds.repeat_rad >= AT_LIMIT_RATIO * MAX_STDS.repeat_rad:
         what = f"the faces were not laid down as before: they differ by {1e3 * stds.repeat_rad:.1f} mrad or more"
         return Fault("not_flat", what, _REMEDY)
-    if stds.acceleration_m_s2 >= NEARLY * LARGEST.acceleration_m_s2:
+    if stds.acceleration_m_s2 >= AT_LIMIT_RATIO * MAX_STDS.acceleration_m_s2:
         what = f"the accelerometer contradicts the faces by {stds.acceleration_m_s2:.2f} m/s² or more"
         return Fault("not_flat", what, _REMEDY)
-    if stds.closure_rad >= NEARLY * LARGEST.closure_rad:
+    if stds.closure_rad >= AT_LIMIT_RATIO * MAX_STDS.closure_rad:
         what = f"the turns do not end where they began, by {1e3 * stds.closure_rad:.0f} mrad or more"
         return Fault(
             "turn_not_closed", what, "Turn against a straight edge. For a file recorded without one: --no-closure"
         )
-    if stds.of_angle >= NEARLY * LARGEST.of_angle:
+    if stds.of_angle >= AT_LIMIT_RATIO * MAX_STDS.of_angle:
         what = f"the moves contradict each other by {100 * stds.of_angle:.2f} % of a quarter turn or more"
         return Fault("lost_in_move", what, _REMEDY)
-    if stds.walk_rad_s_sqrt_s >= NEARLY * LARGEST.walk_rad_s_sqrt_s:
+    if stds.walk_rad_s_sqrt_s >= AT_LIMIT_RATIO * MAX_STDS.walk_rad_s_sqrt_s:
         what = f"the bias changes by {stds.walk_rad_s_sqrt_s:.1g} rad/s within a second"
         return Fault("bias_jumped", what, "Let it warm up, and handle it gently")
     return None
@@ -247,7 +247,7 @@ def _find_unlikely_box(fit: GraphFit) -> Fault | None:
     from scipy.special import chdtri
 
     skew_rad, stated_rad = fit.state.normals.ravel(), fit.conditions.box_rad
-    if np.sum(np.square(skew_rad / stated_rad)) < chdtri(len(skew_rad), UNLIKELY):
+    if np.sum(np.square(skew_rad / stated_rad)) < chdtri(len(skew_rad), MIN_SKEW_PROBABILITY):
         return None
     return Fault(
         "not_flat",

@@ -9,8 +9,8 @@ import numpy as np
 from rig.estimation.arrays import Array
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 
-BOX_RAD = float(np.radians(0.2))
-LONGEST_S = 10.0  # duration of a move with a pause, beyond which bias and tilt of the pause affect it
+BOX_STD_RAD = float(np.radians(0.2))
+MAX_MOVE_S = 10.0  # with a pause, beyond which bias and tilt of the pause affect it
 FACES = ("+x", "-x", "+y", "-y", "+z", "-z")
 
 
@@ -83,7 +83,7 @@ class SessionConditions:
 
     clock_ppm: float
     clock_source: str = "stated"
-    box_rad: float = BOX_RAD
+    box_rad: float = BOX_STD_RAD
     closure: bool = True
     first_face: str | None = None
     gravity_m_s2: float = STANDARD_GRAVITY_M_S2
@@ -109,7 +109,7 @@ class HandStds:
 
 STATED = HandStds()
 # The largest plausible errors of handling: beyond them, something else happened.
-LARGEST = HandStds(5e-3, 2e-2, 3e-3, 1e-3, 0.05)
+MAX_STDS = HandStds(5e-3, 2e-2, 3e-3, 1e-3, 0.05)
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,7 +140,7 @@ def merge_moves(moves: Sequence[Move]) -> Move:
 
     A long merged move is marked as left out, because the rotation during its pauses is unknown.
     """
-    long = len(moves) > 1 and moves[-1].end_s - moves[0].start_s > LONGEST_S
+    long = len(moves) > 1 and moves[-1].end_s - moves[0].start_s > MAX_MOVE_S
     return Move(
         moves[0].start_s,
         moves[-1].end_s,

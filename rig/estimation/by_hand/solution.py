@@ -15,19 +15,19 @@ from rig.estimation.by_hand.fit import PRIOR_DOF, GraphFit, fit_session, whiten_
 from rig.estimation.by_hand.flip_axes import check_axes
 from rig.estimation.by_hand.graph import CLOSURE, MOVE, Factor
 from rig.estimation.by_hand.session_outliers import find_contradiction, find_masked_fault
-from rig.estimation.by_hand.session_parts import FACES, LARGEST, STATED, HandRecording, SessionConditions, drop_rests
+from rig.estimation.by_hand.session_parts import FACES, MAX_STDS, STATED, HandRecording, SessionConditions, drop_rests
 from rig.estimation.gyroscope.budget import Budget, Contributor
 from rig.estimation.gyroscope.rotations_by_angle import TurnedSolution
 from rig.estimation.sensor_axes import SensorAxes, parameter_jacobian
 
-LOOSE = 3.0  # ratio to the stated value: faces that repeat worse may be different faces
-MOST_RESTS = 300  # their equations fill a gigabyte; a session has some twenty rests
-ENOUGH = 0.02  # U (k = 2) of the scale factor, above which there is no result
+MAX_REPEATABILITY_RATIO = 3.0  # to the stated value: faces that repeat worse may be different faces
+MAX_RESTS = 300  # their equations fill a gigabyte; a session has some twenty rests
+MAX_SCALE_U = 0.02  # k = 2: above it, there is no result
 # Standard uncertainty of the scale factor: recordings of real hands differ by as much between their parts.
-REAL_HANDS = 5e-4
+REAL_HAND_STD = 5e-4
 MOVES_LEFT_OUT = "moves left out"  # begins a warning of moves without a rotation
 CLOCK, RECORDED_HANDS = "clock", "recordings of real hands"
-LINES: dict[str, tuple[Literal["A", "B"], tuple[str, ...], str]] = {
+CONTRIBUTORS: dict[str, tuple[Literal["A", "B"], tuple[str, ...], str]] = {
     "noise": ("A", ("noise", "acceleration noise", "stamps"), "scatter at rest, and of the time stamps"),
     "placement": (
         "A",
@@ -120,7 +120,7 @@ def solve_by_hand(session: HandRecording, conditions: SessionConditions) -> Hand
     except Fault as error:
         fault = error if all(move.is_usable for move in session.moves) else insufficient_session(session, None)
     other = None
-    if fitted is None or _looseness(fitted) > LOOSE:
+    if fitted is None or _looseness(fitted) > MAX_REPEATABILITY_RATIO:
         other = _find_first_face(session, conditions, None if fault is not None else fitted)
     if (reason := other or fault) is not None or fitted is None:
         raise reason or insufficient_session(session, None)
@@ -135,8 +135,8 @@ def _check_session(session: HandRecording) -> None:
     lost = sum(move.lost or move.clipped for move in session.moves)
     if len(session.rests) < 2 or 2 * lost > len(session.moves):
         raise insufficient_session(session, None)
-    if len(session.rests) > MOST_RESTS:
-        what = f"there are {len(session.rests)} rests; no more than {MOST_RESTS} are solved together"
+    if len(session.rests) > MAX_RESTS:
+        what = f"there are {len(session.rests)} rests; no more than {MAX_RESTS} are solved together"
         raise Fault("too_many_moves", what, "Split the recording")
     if session.acceleration is not None:
         refusals.check_signal(np.array([rest.acceleration_m_s2 for rest in session.rests]))
@@ -180,7 +180,7 @@ def summarise_fit(fit: GraphFit, warnings: tuple[str, ...] = ()) -> HandSolution
         rests=tuple(RestSummary(face, _largest_residual(fit, row)) for row, face in enumerate(fit.faces.faces)),
         moves=tuple(_summarise_move(fit, row) for row in range(len(fit.session.moves))),
         stds={
-            name: (getattr(fit.stds, name), getattr(STATED, name), getattr(LARGEST, name))
+            name: (getattr(fit.stds, name), getattr(STATED, name), getattr(MAX_STDS, name))
             for name in fit.stds.__slots__
             if name != "acceleration_m_s2" or fit.session.acceleration is not None
         },
@@ -235,7 +235,7 @@ def insufficient_session(session: HandRecording, expanded: Array | None) -> Faul
 
 def _check_precision(fit: GraphFit) -> Fault | None:
     expanded = 2 * np.sqrt(np.diag(fit.covariance)[[0, 4, 8]])
-    return insufficient_session(fit.session, expanded) if expanded.max() > ENOUGH else None
+    return insufficient_session(fit.session, expanded) if expanded.max() > MAX_SCALE_U else None
 
 
 def _looseness(fit: GraphFit) -> float:
@@ -266,8 +266,8 @@ def _find_first_face(session: HandRecording, conditions: SessionConditions, but:
 def _budget(fit: GraphFit, to_parameters: Array, clock: Array) -> Budget:
     """Return the budget: each cause of the factors' errors, propagated by the gain of the least-squares solution."""
     chosen = parameter_columns(fit)
-    covariances = {name: np.zeros((6, 6)) for name in LINES}
-    line_of = {cause: name for name, (_, causes, _) in LINES.items() for cause in causes}
+    covariances = {name: np.zeros((6, 6)) for name in CONTRIBUTORS}
+    line_of = {cause: name for name, (_, causes, _) in CONTRIBUTORS.items() for cause in causes}
     for row in fit.factors:
         gain = to_parameters @ fit.covariance[chosen] @ (row.design / row.std[:, None] ** 2).T
         for cause, std in row.causes.items():
@@ -278,11 +278,11 @@ def _budget(fit: GraphFit, to_parameters: Array, clock: Array) -> Budget:
     dof = {"noise": samples} | estimated
     lines = [
         Contributor(name, kind, "normal", None, "", source, dof.get(name, np.inf), covariances[name])
-        for name, (kind, _, source) in LINES.items()
+        for name, (kind, _, source) in CONTRIBUTORS.items()
     ]
     ppm, source = fit.conditions.clock_ppm, fit.conditions.clock_source
     lines.append(Contributor(CLOCK, "B", "rectangular", ppm, "ppm", source, np.inf, clock))
-    real = np.diag([*(REAL_HANDS * scale_of(fit.state.matrix)) ** 2, 0.0, 0.0, 0.0])
+    real = np.diag([*(REAL_HAND_STD * scale_of(fit.state.matrix)) ** 2, 0.0, 0.0, 0.0])
     source = "by how much recordings of hands elsewhere disagree with themselves"
     lines.append(Contributor(RECORDED_HANDS, "B", "normal", None, "", source, np.inf, real))
     return Budget(tuple(lines))

@@ -28,15 +28,15 @@ from rig.estimation.refusals import condition_of
 
 Order = Literal[1, 2]
 PARAMETER_COUNT = {1: 14, 2: 17}
-ROUNDING = 1e-6  # least component of a unit vector in the undetermined directions: a smaller one is rounding
-PARTS = (  # the parameter of each element of θ
+ROUNDING_LENGTH = 1e-6  # least component of a unit vector in the undetermined directions: a smaller one is rounding
+PARAMETER_NAMES = (  # the parameter of each element of θ
     *("scale of x", "angle x y", "angle x z", "angle x y", "scale of y"),
     *("angle y z", "angle x z", "angle y z", "scale of z"),
     *("the vertical",) * 3,
     *("bias of x", "bias of y", "bias of z"),
     *("second order of x", "second order of y", "second order of z"),
 )
-ORIENTATIONS = 4000
+CANDIDATE_ATTITUDES = 4000
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,8 +71,8 @@ def assess_identifiability(attitudes: Array, up: Array, order: Order = 1) -> Ide
         return Identifiability(needed, needed, conditioned.condition, ())
     _, _, directions = np.linalg.svd(rows)
     loose = free_directions(_ideal(up, order), norm_known=True) @ directions[conditioned.rank :].T
-    undetermined = np.linalg.norm(loose, axis=1) > ROUNDING
-    parts = dict.fromkeys(part for part, is_loose in zip(PARTS, undetermined, strict=False) if is_loose)
+    undetermined = np.linalg.norm(loose, axis=1) > ROUNDING_LENGTH
+    parts = dict.fromkeys(part for part, is_loose in zip(PARAMETER_NAMES, undetermined, strict=False) if is_loose)
     return Identifiability(conditioned.rank, needed, float("inf"), tuple(parts))
 
 
@@ -90,7 +90,7 @@ def g_efficiency(attitudes: Array, up: Array, order: Order = 1) -> float:
     if assess_identifiability(attitudes, up, order).undetermined:
         return 0.0
     covariance = np.linalg.inv(rows.T @ rows)
-    orientations = Rotation.from_quat(_spiral(ORIENTATIONS))
+    orientations = Rotation.from_quat(_spiral(CANDIDATE_ATTITUDES))
 
     def variances(bodies: Array) -> Array:
         predicted = _equations(bodies, up, order).reshape(len(bodies), 3, -1)

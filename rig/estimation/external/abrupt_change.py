@@ -18,9 +18,9 @@ from rig.estimation.arrays import Array
 from rig.estimation.statistics.variance_components import Mixed, MixedModel
 
 Changing = Literal["bias", "scale", "attitude"]
-OF_SCALE = 0.02  # prior standard deviation of a change of the scale factors
-LIKELY, CERTAIN = 5.0, 10.0  # least evidence of a change that U must contain, and of one that nothing else explains
-WORTH_FITTING = 1.0  # least ln of the Bayes factor with the sizes of the model without a change
+SCALE_STD = 0.02  # prior of a change of the scale factors
+LIKELY_EVIDENCE, CERTAIN_EVIDENCE = 5.0, 10.0  # of a change that U must contain; of one that nothing else explains
+MIN_FITTED_EVIDENCE = 1.0  # ln of the Bayes factor with the sizes of the model without a change
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +79,7 @@ def find_change(
         evidence = [_weigh_rows(effect, inverse, innovation) for effect in effects]
         most = max(range(len(effects)), key=lambda index: float(evidence[index].max()))
         first, changed = int(np.argmax(evidence[most])), effects[most]
-        if evidence[most][first] < WORTH_FITTING:
+        if evidence[most][first] < MIN_FITTED_EVIDENCE:
             continue
         row = np.arange(len(begins_s))
         shows = (row >= first if changed.lasts else row == first)[:, None, None]

@@ -23,36 +23,36 @@ from rig.estimation.gyroscope.increments import course
 from rig.estimation.statistics.bias_process import walk_covariance
 from rig.estimation.statistics.variance_components import Mixed
 
-MATRIX, BIAS, CLOCK, EARTH, COMMON = slice(0, 9), slice(9, 12), 12, slice(13, 16), 16
+MATRIX, BIAS, CLOCK, EARTH, COMMON_PARAMETERS = slice(0, 9), slice(9, 12), 12, slice(13, 16), 16
 # prior std of the offset if one clock stamps readings and attitudes: delays of a controller, of cameras
 CLOCK_STD_S = 0.1
 MATRIX_PRECISION = 1.0  # prior of F's elements: keeps elements finite that no turn determines
 EARTH_PRECISION = 3 / EARTH_RATE_RAD_S**2  # its norm is known, its direction is unknown
-INTERVALS = 6  # number of intervals of a recording within which the bias is correlated
-FIELD, VISIT = "error with attitude", "error with attitude, of each visit"
-NEW_AT_REST, NEW_IN_MOTION = "error of each rest", "error of each fix in motion"
-JITTER, LOSSES = "jitter of the stamps", "times between the readings"
-MATRIX_CHANGES, BIAS_CHANGES, WALK = "changes of F", "changes of b", "random walk"
-SCALES = {  # medians of the half-Cauchy priors: rad, s, 1, rad/s, rad/√s
-    FIELD: 5e-3,
-    VISIT: 1e-3,
-    NEW_AT_REST: 1e-3,
-    NEW_IN_MOTION: 3e-3,
+BIAS_INTERVALS = 6  # of a recording, within which the bias is correlated
+ATTITUDE_ERROR, VISIT_ERROR = "error with attitude", "error with attitude, of each visit"
+REST_ERROR, MOTION_ERROR = "error of each rest", "error of each fix in motion"
+JITTER, LOST_TIMES = "jitter of the stamps", "times between the readings"
+MATRIX_CHANGES, BIAS_CHANGES, RANDOM_WALK = "changes of F", "changes of b", "random walk"
+PRIOR_MEDIANS = {  # medians of the half-Cauchy priors: rad, s, 1, rad/s, rad/√s
+    ATTITUDE_ERROR: 5e-3,
+    VISIT_ERROR: 1e-3,
+    REST_ERROR: 1e-3,
+    MOTION_ERROR: 3e-3,
     JITTER: 3e-3,
-    LOSSES: 1e-3,
+    LOST_TIMES: 1e-3,
     MATRIX_CHANGES: 5e-4,
     BIAS_CHANGES: 5e-5,
-    WALK: 3e-4,
+    RANDOM_WALK: 3e-4,
 }
-REACH = 1.5  # rad: correlation length of an error that depends on the attitude
-FEWEST_S = 0.5  # least total duration of the rests whose mean is the bias
-VISIT_S = 5.0  # correlation time of errors that depend on more than the attitude: an arm's elbow, its load
-WANDER = 0.1  # fraction of the jitter's variance that the samples of one fix have in common
+CORRELATION_RAD = 1.5  # correlation length of an error that depends on the attitude
+MIN_REST_TIME_S = 0.5  # total duration of the rests whose mean is the bias
+VISIT_CORRELATION_S = 5.0  # of errors that depend on more than the attitude: an arm's elbow, its load
+COMMON_JITTER_FRACTION = 0.1  # of its variance, which the samples of one fix have in common
 # Fractions of a fix's samples, at which its attitude-dependent error is averaged.
-LOOKS_AT = np.array([0.0, 0.34, 0.67])
-LEAST_RAD = 1e-7  # least error of an increment: rounding
-OUTLYING, FEWEST_SAMPLES = 6.0, 10  # ratio of an outlier to the fix's median error; fewest samples to decide
-LEAST = 1e-3  # least ratio to the usual std, for a sample that is stated to be exact
+AVERAGING_FRACTIONS = np.array([0.0, 0.34, 0.67])
+MIN_ERROR_RAD = 1e-7  # of an increment: rounding
+OUTLIER_RATIO, MIN_FIX_SAMPLES = 6.0, 10  # ratio of an outlier to the fix's median error; fewest samples to decide
+MIN_STD_RATIO = 1e-3  # to the usual std, for a sample that is stated to be exact
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,7 +160,7 @@ def _relative(fixes: Fixes) -> Array:
     """Return each sample's stated standard deviation (k,) divided by the median of all."""
     if fixes.std_rad is None or fixes.stated_std_rad is None:
         return np.ones(len(fixes.at_s))
-    return np.maximum(fixes.std_rad / fixes.stated_std_rad, LEAST)
+    return np.maximum(fixes.std_rad / fixes.stated_std_rad, MIN_STD_RATIO)
 
 
 def find_inliers(recorded: AttitudeSamples, fixes: FixedAttitudes) -> NDArray[np.bool_]:
@@ -171,7 +171,7 @@ def find_inliers(recorded: AttitudeSamples, fixes: FixedAttitudes) -> NDArray[np
     count = np.bincount(fix)
     first = np.cumsum(count) - count
     middle = deviations[order][first + count // 2]
-    kept: NDArray[np.bool_] = (count[fix] < FEWEST_SAMPLES) | (deviations <= OUTLYING * middle[fix])
+    kept: NDArray[np.bool_] = (count[fix] < MIN_FIX_SAMPLES) | (deviations <= OUTLIER_RATIO * middle[fix])
     return kept
 
 
@@ -198,7 +198,7 @@ def drift_model(averaged: FixedAttitudes, fixes: Fixes) -> DriftModel:
     sensitivities, turning = (np.tensordot(step, values, 1) for values in (averaged.sensitivities, averaged.turning))
     earth = -inverse * (step @ averaged.middles_s)[:, None, None]
     design = np.concatenate([sensitivities, turning[..., None], earth], axis=2)
-    precision = np.zeros(COMMON)
+    precision = np.zeros(COMMON_PARAMETERS)
     precision[MATRIX] = MATRIX_PRECISION
     precision[CLOCK] = CLOCK_STD_S**-2.0
     precision[EARTH] = EARTH_PRECISION
@@ -211,18 +211,18 @@ def drift_model(averaged: FixedAttitudes, fixes: Fixes) -> DriftModel:
         BIAS_CHANGES: _find_bias_changes(
             sensitivities, nearby, between @ averaged.middles_s, _weigh_bias(averaged, fixes)
         ),
-        WALK: _expand_axes(step @ walk_covariance(averaged.windows_s) @ step.T),
+        RANDOM_WALK: _expand_axes(step @ walk_covariance(averaged.windows_s) @ step.T),
     }
-    causes = tuple(name for name in SCALES if name in errors and errors[name].any())
-    scales = np.array([SCALES[name] for name in causes])
+    causes = tuple(name for name in PRIOR_MEDIANS if name in errors and errors[name].any())
+    scales = np.array([PRIOR_MEDIANS[name] for name in causes])
     if (stated_rad := fixes.stated_std_rad) is not None:
-        scales = np.where(np.isin(causes, (NEW_AT_REST, NEW_IN_MOTION)), stated_rad, scales)
+        scales = np.where(np.isin(causes, (REST_ERROR, MOTION_ERROR)), stated_rad, scales)
     blind = np.zeros(increments) if fixes.blind_rad is None else fixes.blind_rad[joined]
-    alone = np.array([fixes.walk if cause == WALK else (0.0, 0.0) for cause in causes])
+    alone = np.array([fixes.walk if cause == RANDOM_WALK else (0.0, 0.0) for cause in causes])
     mixed = Mixed(
         observed.reshape(-1),
-        design.reshape(-1, COMMON),
-        np.diag(np.repeat(np.square(blind) + LEAST_RAD**2, 3)),
+        design.reshape(-1, COMMON_PARAMETERS),
+        np.diag(np.repeat(np.square(blind) + MIN_ERROR_RAD**2, 3)),
         np.array([errors[name] for name in causes]),
         precision,
         scales,
@@ -250,15 +250,15 @@ def _list_errors(averaged: FixedAttitudes, fixes: Fixes, correlation: Array, ste
     late /= np.bincount(fixes.fix).astype(np.float64)[:, None, None]
     _, rest = np.unique(fixes.placement, return_inverse=True)  # the error does not change while the body lies still
     at_s = (np.bincount(rest, weights=averaged.middles_s) / np.bincount(rest))[rest]
-    same_visit = matern(np.abs(at_s[:, None] - at_s), VISIT_S)
+    same_visit = matern(np.abs(at_s[:, None] - at_s), VISIT_CORRELATION_S)
     together = averaged.turning[:, :, None] * averaged.turning[:, None, :]
     return {
-        FIELD: _expand_axes(step @ correlation @ step.T),
-        VISIT: _expand_axes(step @ (correlation * same_visit) @ step.T),
-        NEW_AT_REST: _expand_axes(step @ (same * at_rest * at_rest[:, None]) @ step.T),
-        NEW_IN_MOTION: _expand_axes(step @ (same * ~at_rest * ~at_rest[:, None]) @ step.T),
-        JITTER: _combine_blocks(step, late + WANDER * together),
-        LOSSES: fixes.on_arrival * _combine_blocks(np.eye(len(step)), hastened),
+        ATTITUDE_ERROR: _expand_axes(step @ correlation @ step.T),
+        VISIT_ERROR: _expand_axes(step @ (correlation * same_visit) @ step.T),
+        REST_ERROR: _expand_axes(step @ (same * at_rest * at_rest[:, None]) @ step.T),
+        MOTION_ERROR: _expand_axes(step @ (same * ~at_rest * ~at_rest[:, None]) @ step.T),
+        JITTER: _combine_blocks(step, late + COMMON_JITTER_FRACTION * together),
+        LOST_TIMES: fixes.on_arrival * _combine_blocks(np.eye(len(step)), hastened),
     }
 
 
@@ -270,13 +270,13 @@ def _correlate(fixes: Fixes) -> Array:
     """
     counts = np.bincount(fixes.fix)
     begins = np.cumsum(counts) - counts
-    looks = np.unique(begins[:, None] + (counts[:, None] * LOOKS_AT).astype(np.intp))
+    looks = np.unique(begins[:, None] + (counts[:, None] * AVERAGING_FRACTIONS).astype(np.intp))
     flat = fixes.attitudes[looks].reshape(-1, 9)
     distances = np.sqrt(np.maximum(3 - flat @ flat.T, 0.0))
     mean = np.zeros((len(counts), len(looks)))
     mean[fixes.fix[looks], np.arange(len(looks))] = 1.0
     mean /= mean.sum(axis=1, keepdims=True)
-    return np.asarray(mean @ matern(distances, REACH) @ mean.T, dtype=np.float64)
+    return np.asarray(mean @ matern(distances, CORRELATION_RAD) @ mean.T, dtype=np.float64)
 
 
 def matern(distances: Array, reach: float) -> Array:
@@ -311,7 +311,7 @@ def _weigh_bias(averaged: FixedAttitudes, fixes: Fixes) -> Array:
     joined = np.flatnonzero(fixes.joined)
     lasts_s = np.diff(averaged.middles_s)[joined]
     resting = fixes.placement[joined] == fixes.placement[joined + 1]
-    if lasts_s[resting].sum() >= FEWEST_S:
+    if lasts_s[resting].sum() >= MIN_REST_TIME_S:
         lasts_s = lasts_s * resting
     return np.asarray(lasts_s / lasts_s.sum(), dtype=np.float64)
 
@@ -322,7 +322,7 @@ def _find_bias_changes(sensitivities: Array, nearby: Array, middles_s: Array, we
     `nearby` (n, n) is the correlation by attitude, `middles_s` (n,) are the increments' middle times. Changes are
     relative to b, the mean with `weights` (n,).
     """
-    apart = np.abs(middles_s[:, None] - middles_s) / (np.ptp(middles_s) / INTERVALS + 1e-9)
+    apart = np.abs(middles_s[:, None] - middles_s) / (np.ptp(middles_s) / BIAS_INTERVALS + 1e-9)
     from_mean = np.eye(len(weights)) - weights
     changes = from_mean @ (nearby + np.exp(-apart)) @ from_mean.T / 2
     return correlate_effects(sensitivities[..., BIAS], changes)

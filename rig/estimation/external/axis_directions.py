@@ -14,14 +14,14 @@ from rig.estimation.arrays import Array, rotation_vectors
 from rig.estimation.external.attitude_drift import MATRIX, FixedAttitudes, Fixes, correlate_effects, matern
 from rig.estimation.statistics.variance_components import MixedFit, MixedModel, find_half_width
 
-PRIOR_MEDIAN = 5e-3  # rad: of the half-Cauchy prior of the inclinations' standard deviation
-REACH = 0.5  # sine of the angle between two axes: those within about this angle are inclined alike
+PRIOR_MEDIAN_RAD = 5e-3  # of the half-Cauchy prior of the inclinations' standard deviation
+CORRELATION_SINE = 0.5  # of the angle between two axes: those within about this angle are inclined alike
 # grid of the inclinations' standard deviation over its prior's median: none exceeds 0.1 rad
-RATIOS = np.geomspace(1e-6, 20, 120)
-EXPLAINED = 0.05  # fraction of the largest response: smaller ones are the noise of the axes
+STD_RATIOS = np.geomspace(1e-6, 20, 120)
+MIN_RESPONSE_RATIO = 0.05  # to the largest response: smaller ones are the noise of the axes
 # least fraction of the information that the residuals keep: F imitates an inclination with less
-LEAST_IDENTIFIED = 0.05
-LEAST_RAD2 = 1e-14  # sum of a fix's squared rotations that is rounding
+MIN_INFORMATION_FRACTION = 0.05
+MIN_ROTATION_RAD2 = 1e-14  # sum of a fix's squared rotations: less is rounding
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,9 +51,9 @@ class Inclinations:
         information = self.response.T @ unexplained
         values, directions = np.linalg.eigh((information + information.T) / 2)
         whole = np.einsum("ij,ik,kj->j", directions, self.response.T @ weighted, directions)
-        identified = values > LEAST_IDENTIFIED * whole
+        identified = values > MIN_INFORMATION_FRACTION * whole
         scores = directions.T @ (unexplained.T @ model.mixed.observed)
-        sizes_rad = self.prior_median_rad * RATIOS
+        sizes_rad = self.prior_median_rad * STD_RATIOS
         probabilities = _weigh_sizes(sizes_rad, values[identified], scores[identified])
         response = wanted @ onto_theta @ directions[:, ~identified]
         added = np.sum(response**2, axis=1)
@@ -72,7 +72,7 @@ def _weigh_sizes(sizes_rad: Array, values: Array, scores: Array) -> Array:
     variances = np.square(sizes_rad)[:, None]
     ratio = 1 + variances * values
     likelihood = 0.5 * np.sum(variances * scores**2 / ratio - np.log(ratio), axis=1)
-    relative = np.log(RATIOS)
+    relative = np.log(STD_RATIOS)
     logarithms = likelihood + relative - np.logaddexp(0, 2 * relative)
     probabilities = np.exp(logarithms - logarithms.max())
     return np.asarray(probabilities / probabilities.sum(), dtype=np.float64)
@@ -89,12 +89,12 @@ def find_inclinations(averaged: FixedAttitudes, fixes: Fixes, matrix: Array) -> 
     sensitivities = np.diff(averaged.sensitivities[..., MATRIX], axis=0)[joined]
     moments = _find_moments(fixes)
     between = moments[joined] + moments[joined + 1]
-    axes = between / (between[:, ::4].sum(axis=1, keepdims=True) + LEAST_RAD2)
-    correlation = matern(np.linalg.norm(axes[:, None] - axes, axis=2) / np.sqrt(2), REACH)
+    axes = between / (between[:, ::4].sum(axis=1, keepdims=True) + MIN_ROTATION_RAD2)
+    correlation = matern(np.linalg.norm(axes[:, None] - axes, axis=2) / np.sqrt(2), CORRELATION_SINE)
     values, vectors = np.linalg.eigh(correlate_effects(sensitivities @ changes.T, correlation))
-    explained = values > EXPLAINED**2 * values[-1]
+    explained = values > MIN_RESPONSE_RATIO**2 * values[-1]
     stated_rad = fixes.stated_std_rad
-    prior_median_rad = PRIOR_MEDIAN if stated_rad is None else min(PRIOR_MEDIAN, stated_rad)
+    prior_median_rad = PRIOR_MEDIAN_RAD if stated_rad is None else min(PRIOR_MEDIAN_RAD, stated_rad)
     return Inclinations(vectors[:, explained] * np.sqrt(values[explained]), prior_median_rad)
 
 

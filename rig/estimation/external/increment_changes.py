@@ -4,15 +4,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.estimation.arrays import Array, equal_runs, rotation_vectors
-from rig.estimation.external.abrupt_change import LIKELY, OF_SCALE, AbruptChange, PossibleChanges, find_change
+from rig.estimation.external.abrupt_change import LIKELY_EVIDENCE, SCALE_STD, AbruptChange, PossibleChanges, find_change
 from rig.estimation.external.attitude_drift import BIAS, MATRIX, FixedAttitudes, Fixes
 from rig.estimation.statistics.variance_components import MixedModel
 
-OF_BIAS_RAD_S = 5e-3  # prior standard deviation of a change of the bias
-OF_ATTITUDE_RAD = 0.2  # prior standard deviation of a rotation of the attitudes' coordinates
+BIAS_STD_RAD_S = 5e-3  # prior of a change of the bias
+ATTITUDE_STD_RAD = 0.2  # prior of a rotation of the attitudes' coordinates
 # least rotation of the attitudes' coordinates that is reported: errors of attitudes may be as large
-LEAST_RESET_RAD = 0.02
-STAYS = 0.5  # least rotation over all increments, relative to the largest one: after a wild row the attitudes return
+MIN_RESET_RAD = 0.02
+MIN_LASTING_RATIO = 0.5  # rotation over all increments to the largest one: after a wild row the attitudes return
 
 
 def find_increment_change(
@@ -26,14 +26,14 @@ def find_increment_change(
     sensitivities = np.diff(averaged.sensitivities, axis=0)[fixes.joined]
     of_rows = sensitivities[..., MATRIX].reshape(-1, 3, 3, 3)  # sensitivities to F's elements, by row and column
     possible = np.repeat((np.arange(len(sensitivities)) > 0)[:, None], 3, axis=1)
-    of_attitude = np.tile(OF_ATTITUDE_RAD * np.eye(3), (len(sensitivities), 1, 1))
+    of_attitude = np.tile(ATTITUDE_STD_RAD * np.eye(3), (len(sensitivities), 1, 1))
     effects = (
-        PossibleChanges("bias", OF_BIAS_RAD_S * sensitivities[..., BIAS], possible, OF_BIAS_RAD_S),
-        PossibleChanges("scale", OF_SCALE * np.einsum("niab,ab->nia", of_rows, matrix), possible, OF_SCALE),
-        PossibleChanges("attitude", of_attitude, possible, OF_ATTITUDE_RAD, lasts=False),
+        PossibleChanges("bias", BIAS_STD_RAD_S * sensitivities[..., BIAS], possible, BIAS_STD_RAD_S),
+        PossibleChanges("scale", SCALE_STD * np.einsum("niab,ab->nia", of_rows, matrix), possible, SCALE_STD),
+        PossibleChanges("attitude", of_attitude, possible, ATTITUDE_STD_RAD, lasts=False),
     )
     begins_s = fixes.at_s[np.searchsorted(fixes.fix, np.flatnonzero(fixes.joined))]
-    return find_change(model, std[None], effects, begins_s, LIKELY)
+    return find_change(model, std[None], effects, begins_s, LIKELY_EVIDENCE)
 
 
 def find_reset(
@@ -46,7 +46,7 @@ def find_reset(
     outliers; a `change` that the other increments show is considered too.
     """
     turned: tuple[float, float] | None = None
-    if change is not None and change.what == "attitude" and np.linalg.norm(change.sizes) > LEAST_RESET_RAD:
+    if change is not None and change.what == "attitude" and np.linalg.norm(change.sizes) > MIN_RESET_RAD:
         turned = change.from_s, float(np.linalg.norm(change.sizes))
     for start, end in equal_runs(aside).tolist():
         if not aside[start]:
@@ -55,6 +55,6 @@ def find_reset(
         singly = rotation_vectors(np.swapaxes(attitudes[:-1], -1, -2) @ attitudes[1:])
         angle_rad = float(np.linalg.norm(rotation_vectors((attitudes[0].T @ attitudes[-1])[None])))
         largest_rad = float(np.linalg.norm(singly, axis=1).max())
-        if angle_rad > max(LEAST_RESET_RAD, STAYS * largest_rad, 0.0 if turned is None else turned[1]):
+        if angle_rad > max(MIN_RESET_RAD, MIN_LASTING_RATIO * largest_rad, 0.0 if turned is None else turned[1]):
             turned = float(fixes.at_s[np.searchsorted(fixes.fix, end)]), angle_rad
     return turned

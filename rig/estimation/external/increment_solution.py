@@ -20,22 +20,22 @@ from rig.estimation import refusals
 from rig.estimation.arrays import Array, scale_of
 from rig.estimation.external.abrupt_change import AbruptChange
 from rig.estimation.external.attitude_drift import (
+    ATTITUDE_ERROR,
     BIAS,
     BIAS_CHANGES,
     CLOCK,
     CLOCK_STD_S,
     EARTH,
     EARTH_PRECISION,
-    FIELD,
     JITTER,
-    LOSSES,
+    LOST_TIMES,
     MATRIX,
     MATRIX_CHANGES,
     MATRIX_PRECISION,
-    NEW_AT_REST,
-    NEW_IN_MOTION,
-    VISIT,
-    WALK,
+    MOTION_ERROR,
+    RANDOM_WALK,
+    REST_ERROR,
+    VISIT_ERROR,
     AttitudeSamples,
     DriftModel,
     DriftState,
@@ -50,18 +50,18 @@ from rig.estimation.external.increment_changes import find_increment_change, fin
 from rig.estimation.gyroscope.earth_rate import check_earth_seen
 from rig.estimation.statistics.variance_components import Mixed, MixedFit, MixedModel
 
-PASSES, SIZED = 12, 3  # iterations of the fit; the last iteration that estimates the variances
-SETTLED = 1e-2  # largest step, relative to the standard uncertainty, at which the fit has converged
-OUTLIER, OUTLIER_RAD = 4.0, 1e-3  # an outlier exceeds both: a ratio to the ninth decile, and an angle
+MAX_ITERATIONS, LAST_VARIANCE_ITERATION = 12, 3  # of the fit, and the last that estimates the variances
+CONVERGED_STEP_RATIO = 1e-2  # largest step, relative to the standard uncertainty
+OUTLIER_RATIO, MIN_OUTLIER_RAD = 4.0, 1e-3  # an outlier exceeds both: a ratio to the ninth decile, and an angle
 # Most outliers: number, or fraction if more; passes that leave out outliers.
-SOME_OUTLIERS, MOST_OUTLIERS, SETTINGS_ASIDE = 4, 0.1, 3
-UNTRUSTWORTHY_RAD = 0.1  # with larger errors, the attitudes are those of another body
-MOST_CLOCK = 3.0  # largest offset if one clock stamps readings and attitudes, in prior standard deviations
-UNIDENTIFIED = 0.1  # least standard deviation of an element of F that is not identifiable
-LARGEST_STEP = 10.0  # change of F: beyond it, the fit diverges
+MAX_OUTLIERS, MAX_OUTLIER_FRACTION, OUTLIER_PASSES = 4, 0.1, 3
+MAX_ATTITUDE_ERROR_RAD = 0.1  # with larger errors, the attitudes are those of another body
+MAX_CLOCK_STDS = 3.0  # offset if one clock stamps readings and attitudes, in prior standard deviations
+MAX_IDENTIFIABLE_STD = 0.1  # of an element of F
+MAX_MATRIX_STEP = 10.0  # of F: beyond it, the fit diverges
 MAX_CONDITION = 1e4
 NOISE, ATTITUDES, DELAY = "noise", "attitudes", "delay between the files"
-EARTHS_RATE, STRETCHES = "Earth's rate", "differences between stretches"
+EARTH_RATE, INTERVAL_DIFFERENCES = "Earth's rate", "differences between stretches"
 AXES = "directions of the reference's axes"
 REMEDY = "Turn the body about all its axes, by a right angle and more"
 
@@ -133,7 +133,7 @@ def solve_known_increments(time_s: Array, readings: Array, fixes: Fixes, start: 
     """
     recorded = AttitudeSamples(time_s, readings, fixes, np.ones(len(fixes.at_s), dtype=np.bool_))
     settled = _settle(recorded, start)
-    for _ in range(SETTINGS_ASIDE):
+    for _ in range(OUTLIER_PASSES):
         outliers = _find_outliers(settled)
         if not outliers.any() or outliers.sum() > _limit_outliers(fixes):
             break
@@ -171,7 +171,7 @@ class _Settled:
 def _settle(recorded: AttitudeSamples, state: DriftState) -> _Settled:
     """Solve by Gauss–Newton; the variances are re-estimated in the first iterations only."""
     maxima: Array | None = None
-    for iteration in range(1, PASSES + 1):
+    for iteration in range(1, MAX_ITERATIONS + 1):
         averaged = average_fixes(recorded, state)
         if iteration == 2:
             recorded = replace(recorded, kept=find_inliers(recorded, averaged))
@@ -181,19 +181,19 @@ def _settle(recorded: AttitudeSamples, state: DriftState) -> _Settled:
         if iteration == 1:
             conditioning = _conditioning(model.mixed)
             refusals.check_conditioning(conditioning, BIAS.stop, MAX_CONDITION, "some of F and bias", REMEDY)
-        if maxima is None or iteration == SIZED:
+        if maxima is None or iteration == LAST_VARIANCE_ITERATION:
             maxima = model.find_maxima()
-        elif iteration < SIZED:
+        elif iteration < LAST_VARIANCE_ITERATION:
             maxima = model.find_maxima(maxima[0])
         solved = model.solve(maxima[0])
-        if not np.linalg.norm(solved.theta[MATRIX]) < LARGEST_STEP:
+        if not np.linalg.norm(solved.theta[MATRIX]) < MAX_MATRIX_STEP:
             raise refusals.untrustworthy_attitudes(refusals.NO_FIT)
         state = state.after_step(solved.theta)
         settled = _Settled(state, recorded.fixes, averaged, causes, model, maxima, solved, iteration)
         u = np.sqrt(np.diag(solved.covariance))[: CLOCK + 1]
-        if iteration > 2 and (np.abs(solved.theta[: CLOCK + 1]) < SETTLED * u).all():
+        if iteration > 2 and (np.abs(solved.theta[: CLOCK + 1]) < CONVERGED_STEP_RATIO * u).all():
             break
-    return settled  # pyrefly: ignore[unbound-name]  # PASSES > 0
+    return settled  # pyrefly: ignore[unbound-name]  # MAX_ITERATIONS > 0
 
 
 def _find_outliers(settled: _Settled) -> NDArray[np.bool_]:
@@ -201,13 +201,13 @@ def _find_outliers(settled: _Settled) -> NDArray[np.bool_]:
     expected = np.sqrt(np.diag(settled.model.covariance(settled.std)).reshape(-1, 3).max(axis=1))
     errors = np.abs(settled.solved.residuals.reshape(-1, 3)).max(axis=1)
     decile = float(np.quantile(errors / expected, 0.9))
-    outliers: NDArray[np.bool_] = errors > np.maximum(OUTLIER * decile * expected, OUTLIER_RAD)
+    outliers: NDArray[np.bool_] = errors > np.maximum(OUTLIER_RATIO * decile * expected, MIN_OUTLIER_RAD)
     return outliers
 
 
 def _limit_outliers(fixes: Fixes) -> float:
     """Return the greatest allowed number of outliers."""
-    return max(SOME_OUTLIERS, MOST_OUTLIERS * float(fixes.joined.sum()))
+    return max(MAX_OUTLIERS, MAX_OUTLIER_FRACTION * float(fixes.joined.sum()))
 
 
 def _conditioning(mixed: Mixed) -> refusals.Conditioning:
@@ -223,17 +223,17 @@ def _check(fixes: Fixes, remaining: Fixes, settled: _Settled) -> None:
     The Faults are `attitude_untrustworthy`, `clocks_apart`, `ill_conditioned`, `wrong_unit`, `mirrored_axis`.
     """
     rms_rad = float(np.sqrt(np.mean(settled.solved.residuals**2)))
-    if rms_rad > UNTRUSTWORTHY_RAD:
+    if rms_rad > MAX_ATTITUDE_ERROR_RAD:
         raise refusals.untrustworthy_attitudes(f"the increments of attitudes and gyroscope differ by {rms_rad:.2g} rad")
     outliers = np.concatenate(
         [np.flatnonzero(fixes.joined & ~remaining.joined), np.flatnonzero(remaining.joined)[_find_outliers(settled)]]
     )
-    if abs(settled.state.clock_s) > MOST_CLOCK * CLOCK_STD_S:
+    if abs(settled.state.clock_s) > MAX_CLOCK_STDS * CLOCK_STD_S:
         std_s = float(np.sqrt(settled.solved.covariance[CLOCK, CLOCK]))
         raise Fault(
             "clocks_apart",
             f"the estimated offset of the attitudes' clock is {1e3 * settled.state.clock_s:+.0f} ± {2e3 * std_s:.0f} "
-            f"ms, but the largest allowed offset is {1e3 * MOST_CLOCK * CLOCK_STD_S:.0f} ms",
+            f"ms, but the largest allowed offset is {1e3 * MAX_CLOCK_STDS * CLOCK_STD_S:.0f} ms",
             "Write both files by one clock, or let --estimate-clock-offset find the difference",
         )
     if len(outliers) > _limit_outliers(fixes):
@@ -249,7 +249,7 @@ def _check(fixes: Fixes, remaining: Fixes, settled: _Settled) -> None:
 def _check_identified(matrix: Array, covariance: Array) -> None:
     """Raise Fault `ill_conditioned` if the body hardly turned about an axis. The message names this axis."""
     std = np.sqrt(np.diag(covariance)[MATRIX]).reshape(3, 3).max(axis=0)
-    unknown = std > UNIDENTIFIED
+    unknown = std > MAX_IDENTIFIABLE_STD
     if not unknown.any():
         return
     names = " and ".join("xyz"[axis] for axis in np.flatnonzero(unknown))
@@ -279,7 +279,7 @@ def _build_result(settled: _Settled, aside_s: Array) -> KnownIncrements:
     change = find_increment_change(settled.model, settled.std, settled.averaged, settled.fixes, state.matrix)
     if change is not None:
         of_sensor = np.ix_(*2 * [np.r_[0:9, 12:15]])  # F and b, without the Earth's rate
-        causes[STRETCHES][of_sensor] += change.find_covariance(state.matrix)
+        causes[INTERVAL_DIFFERENCES][of_sensor] += change.find_covariance(state.matrix)
     sizes = partial(settled.causes.std_of, std=settled.std)
     return KnownIncrements(
         matrix=state.matrix,
@@ -289,8 +289,8 @@ def _build_result(settled: _Settled, aside_s: Array) -> KnownIncrements:
         earth=_earth(solved.theta[EARTH], solved.covariance[EARTH, EARTH]),
         clock_s=state.clock_s,
         clock_std_s=float(np.sqrt(solved.covariance[CLOCK, CLOCK])),
-        fix_std_rad=float(np.sqrt(sum(sizes(cause) ** 2 for cause in (FIELD, VISIT, NEW_IN_MOTION)))),
-        random_walk_rad_sqrt_s=sizes(WALK),
+        fix_std_rad=float(np.sqrt(sum(sizes(cause) ** 2 for cause in (ATTITUDE_ERROR, VISIT_ERROR, MOTION_ERROR)))),
+        random_walk_rad_sqrt_s=sizes(RANDOM_WALK),
         matrix_scatter=sizes(MATRIX_CHANGES),
         bias_scatter_rad_s=sizes(BIAS_CHANGES),
         residuals_rad=solved.residuals.reshape(-1, 3),
@@ -307,11 +307,11 @@ def _widen_by_axes(settled: _Settled, wanted: Array, covariance: Array) -> Array
     return inclinations.widen(settled.model, settled.std, settled.solved, wanted, np.diag(covariance))
 
 
-OF_CAUSES = {
-    ATTITUDES: (FIELD, VISIT, NEW_AT_REST, NEW_IN_MOTION),
-    DELAY: (JITTER, LOSSES),
-    STRETCHES: (MATRIX_CHANGES, BIAS_CHANGES),
-    NOISE: (WALK,),
+CAUSES_OF_CONTRIBUTOR = {
+    ATTITUDES: (ATTITUDE_ERROR, VISIT_ERROR, REST_ERROR, MOTION_ERROR),
+    DELAY: (JITTER, LOST_TIMES),
+    INTERVAL_DIFFERENCES: (MATRIX_CHANGES, BIAS_CHANGES),
+    NOISE: (RANDOM_WALK,),
 }
 
 
@@ -322,12 +322,13 @@ def _causes(settled: _Settled) -> dict[str, Array]:
     by_cause = dict(zip(settled.causes.causes, parts, strict=True))
     nothing = np.zeros_like(covariance)
     causes = {
-        name: np.sum([by_cause.get(cause, nothing) for cause in group], axis=0) for name, group in OF_CAUSES.items()
+        name: np.sum([by_cause.get(cause, nothing) for cause in group], axis=0)
+        for name, group in CAUSES_OF_CONTRIBUTOR.items()
     }
     causes[NOISE] = causes[NOISE] + blind
     causes[DELAY] = causes[DELAY] + np.outer(covariance[CLOCK], covariance[CLOCK]) * CLOCK_STD_S**-2.0
     causes[ATTITUDES] = causes[ATTITUDES] + covariance[:, MATRIX] * MATRIX_PRECISION @ covariance[MATRIX]
-    causes[EARTHS_RATE] = covariance[:, EARTH] * EARTH_PRECISION @ covariance[EARTH]
+    causes[EARTH_RATE] = covariance[:, EARTH] * EARTH_PRECISION @ covariance[EARTH]
     return causes
 
 

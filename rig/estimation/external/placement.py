@@ -17,13 +17,13 @@ import numpy as np
 
 from rig.estimation.arrays import Array
 from rig.estimation.external.abrupt_change import AbruptChange
-from rig.estimation.external.placement_model import MOST, USUAL, build_placement_model
+from rig.estimation.external.placement_model import ERROR_MEDIAN_RATIO, MAX_CORRELATED, build_placement_model
 from rig.estimation.reference.attitude_error import AttitudeError, Placed, effects
 from rig.estimation.reference.reference_model import BIAS, REFERENCE, F, free_directions, jacobian, predicted
 from rig.estimation.statistics.coverage import COVERAGE_FACTOR
 
-SMALLEST_RAD, LARGEST_RAD, GRID = 1e-6, 0.1, 24  # grid of δ, and of ζ relative to the reference
-ANY_RAD = 1.0  # standard deviation of an unknown attitude
+MIN_ERROR_RAD, MAX_ERROR_RAD, GRID_POINTS = 1e-6, 0.1, 24  # grid of δ, and of ζ relative to the reference
+UNKNOWN_ATTITUDE_STD_RAD = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +111,7 @@ def laid_down(theta: Array, placed: Placed, unplaced: Array, unplaced_variances:
         all_rests.attitude_std_rad,
     )
     size = float(np.linalg.norm(theta[REFERENCE]))
-    sizes = np.geomspace(SMALLEST_RAD, LARGEST_RAD, GRID)
+    sizes = np.geomspace(MIN_ERROR_RAD, MAX_ERROR_RAD, GRID_POINTS)
     grid = np.array([(delta, size * ratio) for delta in sizes for ratio in sizes])
     fits = [linear.fits(delta, size * sizes) for delta in sizes.tolist()]
     likelihood = np.concatenate([fit.likelihood for fit in fits]) + _find_log_prior(grid, size)
@@ -137,7 +137,7 @@ def laid_down(theta: Array, placed: Placed, unplaced: Array, unplaced_variances:
         placement_std=float(zeta),
         placement_uncertainty=float(stds[1]),
     )
-    return laid if len(all_rests.readings) > MOST else _relate_errors(laid, all_rests, len(placed.readings))
+    return laid if len(all_rests.readings) > MAX_CORRELATED else _relate_errors(laid, all_rests, len(placed.readings))
 
 
 def _relate_errors(laid: LaidDown, all_rests: Placed, stated: int) -> LaidDown:
@@ -169,7 +169,7 @@ def _find_log_prior(grid: Array, size: float) -> Array:
     `size` is the norm of the reference.
     """
     delta, zeta = grid.T
-    log_prior: Array = np.log(delta) + np.log(zeta) - np.log1p((zeta / (USUAL * size)) ** 2)
+    log_prior: Array = np.log(delta) + np.log(zeta) - np.log1p((zeta / (ERROR_MEDIAN_RATIO * size)) ** 2)
     return log_prior
 
 
@@ -185,7 +185,7 @@ def _add_unplaced(theta: Array, placed: Placed, unplaced: Array, variances: Arra
         variances=np.concatenate([placed.variances, variances]),
         attitudes=np.concatenate([placed.attitudes, attitudes]),
         v_bar=np.concatenate([placed.v_bar, np.zeros_like(unplaced)]),
-        attitude_std_rad=np.concatenate([placed.attitude_std_rad, np.full(len(unplaced), ANY_RAD)]),
+        attitude_std_rad=np.concatenate([placed.attitude_std_rad, np.full(len(unplaced), UNKNOWN_ATTITUDE_STD_RAD)]),
     )
 
 

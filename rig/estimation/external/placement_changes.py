@@ -8,16 +8,16 @@ The errors are those of `rig.estimation.external.placement_model`, whose sizes t
 import numpy as np
 
 from rig.estimation.arrays import Array
-from rig.estimation.external.abrupt_change import OF_SCALE, AbruptChange, PossibleChanges, find_change
-from rig.estimation.external.placement_model import MOST, build_placement_model
+from rig.estimation.external.abrupt_change import SCALE_STD, AbruptChange, PossibleChanges, find_change
+from rig.estimation.external.placement_model import MAX_CORRELATED, build_placement_model
 from rig.estimation.reference.attitude_error import Placed
 from rig.estimation.reference.reference_model import BIAS, REFERENCE, predicted
 
-FEWEST = 8  # placements; fewer show no change, or take a wrong attitude for one
-EITHER_SIDE = 2  # placements at least: a single one that differs is a wrong placement
-BIAS_SIZES = (1e-3, 1e-2)  # prior standard deviations of a change of the bias, relative to the reference
-SMALL = 0.01  # scale of the errors tried in addition to the estimate, which the change may have inflated
-POSSIBLE = 0.0  # least evidence (ln of the Bayes factor) of a change
+MIN_PLACEMENTS = 8  # fewer show no change, or take a wrong attitude for one
+MIN_EITHER_SIDE = 2  # placements: a single one that differs is a wrong placement
+BIAS_CHANGE_STD_RATIOS = (1e-3, 1e-2)  # prior, relative to the reference
+SMALL_ERROR_RATIO = 0.01  # scale of the errors tried in addition to the estimate, which the change may have inflated
+MIN_EVIDENCE = 0.0  # ln of the Bayes factor of a change
 
 
 def find_placement_change(theta: Array, placed: Placed, starts_s: Array) -> AbruptChange | None:
@@ -26,15 +26,15 @@ def find_placement_change(theta: Array, placed: Placed, starts_s: Array) -> Abru
     `theta` (p,) is the solution without a change; the placements begin at `starts_s` (N,).
     """
     count = len(starts_s)
-    if not FEWEST <= count <= MOST:
+    if not MIN_PLACEMENTS <= count <= MAX_CORRELATED:
         return None
     model = build_placement_model(theta, placed, count)
     std = model.find_maxima()[0]
     axes = np.tile(np.eye(3), (count, 1, 1))
     index = np.arange(count)
-    inner = np.repeat((np.minimum(index, count - index) >= EITHER_SIDE)[:, None], 3, axis=1)
+    inner = np.repeat((np.minimum(index, count - index) >= MIN_EITHER_SIDE)[:, None], 3, axis=1)
     size = float(np.linalg.norm(theta[REFERENCE]))
     read = predicted(theta, placed.attitudes, placed.v_bar) - theta[BIAS]
-    changes = [PossibleChanges("bias", ratio * size * axes, inner, ratio * size) for ratio in BIAS_SIZES]
-    changes.append(PossibleChanges("scale", OF_SCALE * axes * read[:, None, :], inner, OF_SCALE))
-    return find_change(model, np.array([std, SMALL * std]), changes, starts_s, POSSIBLE)
+    changes = [PossibleChanges("bias", ratio * size * axes, inner, ratio * size) for ratio in BIAS_CHANGE_STD_RATIOS]
+    changes.append(PossibleChanges("scale", SCALE_STD * axes * read[:, None, :], inner, SCALE_STD))
+    return find_change(model, np.array([std, SMALL_ERROR_RATIO * std]), changes, starts_s, MIN_EVIDENCE)

@@ -16,10 +16,10 @@ from rig.estimation.reference.attitude_error import Placed, effects
 from rig.estimation.reference.reference_model import REFERENCE, free_directions, jacobian, predicted
 from rig.estimation.statistics.variance_components import Mixed, MixedModel
 
-REACH_RAD = 1.5  # correlation length of γ: errors of joints are sines of their angles
-USUAL_RAD = 3e-3  # median of the prior of ε and γ
-MOST = 200  # placements; more are taken for independent, and not searched for a change, as this would take too long
-USUAL = 1e-3  # median of η, relative to the reference (a milli-g)
+CORRELATION_RAD = 1.5  # of γ: errors of joints are sines of their angles
+ERROR_MEDIAN_RAD = 3e-3  # of the prior of ε and γ
+MAX_CORRELATED = 200  # more placements are taken for independent and not searched for a change: it would take too long
+ERROR_MEDIAN_RATIO = 1e-3  # of η to the reference (a milli-g)
 
 
 def build_placement_model(theta: Array, placed: Placed, stated: int) -> MixedModel:
@@ -33,7 +33,7 @@ def build_placement_model(theta: Array, placed: Placed, stated: int) -> MixedMod
     tilts = effects(theta, attitudes, placed.v_bar)
     measured = np.where(is_stated, tilts, 0.0)
     cosine = (np.einsum("nij,mij->nm", attitudes, attitudes) - 1) / 2
-    alike = matern(np.arccos(np.clip(cosine, -1, 1)), REACH_RAD)
+    alike = matern(np.arccos(np.clip(cosine, -1, 1)), CORRELATION_RAD)
     size = float(np.linalg.norm(theta[REFERENCE]))
     return MixedModel(
         Mixed(
@@ -49,7 +49,7 @@ def build_placement_model(theta: Array, placed: Placed, stated: int) -> MixedMod
                 ]
             ),
             precision=np.zeros(free.shape[1]),
-            scales=np.array([USUAL_RAD, USUAL_RAD, USUAL * size]),
+            scales=np.array([ERROR_MEDIAN_RAD, ERROR_MEDIAN_RAD, ERROR_MEDIAN_RATIO * size]),
             alone=np.zeros((3, 2)),
         )
     )

@@ -10,18 +10,18 @@ from collections.abc import Sequence
 import numpy as np
 
 from rig.estimation.arrays import Array, perpendicular_unit_vectors
-from rig.estimation.external.abrupt_change import OF_SCALE, AbruptChange, PossibleChanges, find_change
+from rig.estimation.external.abrupt_change import SCALE_STD, AbruptChange, PossibleChanges, find_change
 from rig.estimation.external.attitude_drift import correlate_effects
 from rig.estimation.statistics.variance_components import Mixed, MixedModel
 
-OF_RATE = 1e-4  # median of the prior of the rates' relative errors, and of the axes' inclinations in rad
+ERROR_MEDIAN = 1e-4  # of the prior of the rates' relative errors, and of the axes' inclinations in rad
 # ln of the Bayes factor of a change that counts if it is large, and of one that U is to contain
-POSSIBLE, LEAST_EVIDENCE = -2.0, 2.0
-FEWEST_ROWS, MOST_ROWS = 6, 600  # fewer show no change; more would take too long
-EITHER_SIDE = 2  # rows at least: a single row that differs is a wrong row
-FEWEST_FOR_ONE = 8  # rows that decide between a wrong first or last row and a bias that changes there
-SMALL = 0.01  # scale of the errors tried in addition to the estimate, which the change may have inflated
-LARGE = 0.5  # fraction of an axis' largest reading, from which on a row determines its scale factor
+MIN_LARGE_EVIDENCE, MIN_EVIDENCE = -2.0, 2.0
+MIN_ROWS, MAX_ROWS = 6, 600  # fewer show no change; more would take too long
+MIN_EITHER_SIDE = 2  # rows: a single row that differs is a wrong row
+MIN_ROWS_FOR_ONE = 8  # rows that decide between a wrong first or last row and a bias that changes there
+SMALL_ERROR_RATIO = 0.01  # scale of the errors tried in addition to the estimate, which the change may have inflated
+MIN_LARGE_RATIO = 0.5  # to an axis' largest reading, from which on a row determines its scale factor
 
 
 def find_row_change(
@@ -33,14 +33,14 @@ def find_row_change(
     `starts_s` (N,). `bias_sizes` are prior standard deviations of a change of the bias.
 
     At least two rows precede and follow a change of the bias, because a single wrong row at either end looks the same.
-    One is enough if no row is a rest and there are `FEWEST_FOR_ONE` rows.
+    One is enough if no row is a rest and there are `MIN_ROWS_FOR_ONE` rows.
     """
     count = len(means)
     design = np.column_stack([rates_rad_s, np.ones(count)])
-    if not FEWEST_ROWS <= count <= MOST_ROWS or np.linalg.matrix_rank(design) < 4:
+    if not MIN_ROWS <= count <= MAX_ROWS or np.linalg.matrix_rank(design) < 4:
         return None
     speeds = np.linalg.norm(rates_rad_s, axis=1)
-    usual = np.sqrt(variances.mean(axis=1) + (OF_RATE * speeds) ** 2)[:, None]
+    usual = np.sqrt(variances.mean(axis=1) + (ERROR_MEDIAN * speeds) ** 2)[:, None]
     fitted = np.linalg.lstsq(design / usual, means / usual, rcond=None)[0]
     read = rates_rad_s @ fitted[:3]
     across, alone = np.zeros((2, count, 3)), np.eye(count)
@@ -55,25 +55,25 @@ def find_row_change(
             [correlate_effects(read[..., None], alone), correlate_effects(np.moveaxis(across, 0, -1), alone)]
         ),
         precision=np.zeros(12),
-        scales=np.array([OF_RATE, OF_RATE]),
+        scales=np.array([ERROR_MEDIAN, ERROR_MEDIAN]),
         alone=np.zeros((2, 2)),
     )
     model = MixedModel(mixed)
     axes = np.tile(np.eye(3), (count, 1, 1))
-    either_side = EITHER_SIDE if (speeds == 0).any() or count < FEWEST_FOR_ONE else 1
+    either_side = MIN_EITHER_SIDE if (speeds == 0).any() or count < MIN_ROWS_FOR_ONE else 1
     rows_before = np.arange(count)
     inner = np.minimum(rows_before, count - rows_before) >= either_side
-    large = np.abs(read) > LARGE * np.abs(read).max(axis=0)
+    large = np.abs(read) > MIN_LARGE_RATIO * np.abs(read).max(axis=0)
     before = np.cumsum(large, axis=0) - large
-    both_sides = np.minimum(before, large.sum(axis=0) - before) >= EITHER_SIDE
+    both_sides = np.minimum(before, large.sum(axis=0) - before) >= MIN_EITHER_SIDE
     std = model.find_maxima()[0]
     return find_change(
         model,
-        np.array([std, SMALL * std]),
+        np.array([std, SMALL_ERROR_RATIO * std]),
         (
             *(PossibleChanges("bias", size * axes, np.repeat(inner[:, None], 3, axis=1), size) for size in bias_sizes),
-            PossibleChanges("scale", OF_SCALE * axes * read[:, None, :], both_sides, OF_SCALE),
+            PossibleChanges("scale", SCALE_STD * axes * read[:, None, :], both_sides, SCALE_STD),
         ),
         starts_s,
-        POSSIBLE,
+        MIN_LARGE_EVIDENCE,
     )

@@ -12,17 +12,17 @@ from rig.estimation.reference.attitude_error import Placed, effects, find_whiten
 from rig.estimation.reference.reference_model import REFERENCE, F, weighted_jacobian
 from rig.estimation.reference.reference_model import free_directions as directions
 
-NEAR_RAD = 0.2  # largest angle between reference directions in the body that count as one attitude
-USUAL_RAD = 0.02  # usual attitude error about each axis: an arm, or a table turned by hand
-UNDETERMINED = 0.1  # standard deviation of a scale factor, above which it counts as undetermined
-SMALLEST = 1e-9  # eigenvalue of the information below which it counts as zero
+SAME_ATTITUDE_RAD = 0.2  # largest angle between reference directions in the body that count as one attitude
+USUAL_ERROR_RAD = 0.02  # of an attitude about each axis: an arm, or a table turned by hand
+MAX_DETERMINED_STD = 0.1  # of a scale factor
+MIN_EIGENVALUE = 1e-9  # of the information: a smaller one counts as zero
 
 
 def find_sole_attitude(theta: Array, placed: Placed) -> tuple[int, int] | None:
     """Return the axis whose scale factor depends on a single placement, and that placement; None if there is none.
 
-    Without that placement, the scale factor's standard deviation exceeds `UNDETERMINED`. None also if no attitude was
-    repeated. `theta` (p,) is the solution: SI units, scale factors about 1.
+    Without that placement, the scale factor's standard deviation exceeds `MAX_DETERMINED_STD`. None also if no attitude
+    was repeated. `theta` (p,) is the solution: SI units, scale factors about 1.
     """
     size = np.linalg.norm(theta[REFERENCE])
     verticals = np.einsum("nji,j->ni", placed.attitudes, theta[REFERENCE] / size)
@@ -30,7 +30,7 @@ def find_sole_attitude(theta: Array, placed: Placed) -> tuple[int, int] | None:
     if group.max() + 1 == len(group):
         return None
     whiteners = find_whiteners(placed.variances, effects(theta, placed.attitudes, placed.v_bar),
-                               np.hypot(placed.attitude_std_rad, USUAL_RAD))  # fmt: skip
+                               np.hypot(placed.attitude_std_rad, USUAL_ERROR_RAD))  # fmt: skip
     rows = weighted_jacobian(theta, placed.attitudes, placed.v_bar, whiteners, norm_known=placed.norm_known)
     rows = rows.reshape(len(verticals), 3, -1)
     free = directions(theta, norm_known=placed.norm_known)
@@ -42,7 +42,7 @@ def find_sole_attitude(theta: Array, placed: Placed) -> tuple[int, int] | None:
     usual = _find_std(rows, wanted)
     for number in np.flatnonzero(np.bincount(group) == 1).tolist():
         without = _find_std(rows[group != number], wanted)
-        hanging = np.flatnonzero((without > UNDETERMINED) & (usual <= UNDETERMINED))
+        hanging = np.flatnonzero((without > MAX_DETERMINED_STD) & (usual <= MAX_DETERMINED_STD))
         if len(hanging):
             return int(hanging[0]), int(np.flatnonzero(group == number)[0])
     return None
@@ -53,7 +53,7 @@ def _group(verticals: Array) -> NDArray[np.intp]:
     group = np.full(len(verticals), -1, dtype=np.intp)
     for first in range(len(verticals)):
         if group[first] < 0:
-            near = (verticals @ verticals[first] > np.cos(NEAR_RAD)) & (group < 0)
+            near = (verticals @ verticals[first] > np.cos(SAME_ATTITUDE_RAD)) & (group < 0)
             group[near] = group.max() + 1
     return group
 
@@ -65,4 +65,4 @@ def _find_std(rows: Array, wanted: Array) -> Array:
     scale = np.where(scale > 0, scale, 1.0)
     values, vectors = np.linalg.eigh((flat / scale).T @ (flat / scale))
     spread = (wanted / scale) @ vectors
-    return np.asarray(np.sqrt(np.sum(spread**2 / np.maximum(values, SMALLEST), axis=1)), dtype=np.float64)
+    return np.asarray(np.sqrt(np.sum(spread**2 / np.maximum(values, MIN_EIGENVALUE), axis=1)), dtype=np.float64)

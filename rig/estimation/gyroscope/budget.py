@@ -20,12 +20,12 @@ from rig.estimation.statistics.coverage import coverage_factors, effective_dof
 
 NOISE = "noise"
 BIAS_DRIFT, FLICKER = "bias instability", "flicker of the bias"
-STATES = "times of the arm's states"
+STATE_TIMES = "times of the arm's states"
 CLOCK = "controller clock"
 ENCODERS = "turner's encoders"
-AXES, REPEATABILITY, MOUNTS = "arm's axes", "arm's repeatability", "remounting"  # errors of directions
-STAMPS = "times of the samples"
-NOT_GIVEN = "is not given"  # ends the source of a value that the configuration does not state
+AXES, REPEATABILITY, REMOUNTING = "arm's axes", "arm's repeatability", "remounting"  # errors of directions
+SAMPLE_TIMES = "times of the samples"
+NOT_GIVEN_SUFFIX = "is not given"  # ends the source of a value that the configuration does not state
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,7 +197,7 @@ def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributo
     elif unknown.earth_rate:
         # One pattern for each axis of the base.
         base_axes = EARTH_RATE_RAD_S * np.moveaxis(inputs.attitudes, -1, 0) @ matrix.T
-        yield evaluate_b("Earth's rate", EARTH_RATE_RAD_S, "rad/s", f"site.latitude_deg {NOT_GIVEN}", base_axes)
+        yield evaluate_b("Earth's rate", EARTH_RATE_RAD_S, "rad/s", f"site.latitude_deg {NOT_GIVEN_SUFFIX}", base_axes)
     for error in inputs.list_own_errors(matrix):
         yield evaluate_b(error.name, error.half_width, error.unit, error.source, error.patterns)
     per_m_s2 = unknown.g_sensitivity_rad_s_per_g / STANDARD_GRAVITY_M_S2
@@ -232,7 +232,7 @@ def _evaluate_mounts(explained: Explained, unknown: Unknown, propagate: Propagat
     if inputs.mount_errors_rad_s is not None:
         spread = propagate(inputs.mount_errors_rad_s @ matrix.T) + propagate_mount_squares(explained)
         half_width = float(np.degrees(unknown.mount_rad))
-        yield Contributor(MOUNTS, "B", "rectangular", half_width, "°", "uncertainty.mount_deg", np.inf, spread)
+        yield Contributor(REMOUNTING, "B", "rectangular", half_width, "°", "uncertainty.mount_deg", np.inf, spread)
 
 
 def _evaluate_times(
@@ -243,12 +243,12 @@ def _evaluate_times(
     per_sweep = np.eye(len(turned))[:, :, None]
     jitter = per_sweep * ((unknown.state_jitter_s * per_s * inputs.state_gains)[:, None] * turned)[None]
     source = "scatter of the joint angles"
-    yield evaluate_a(STATES, source, propagate(jitter), unknown.state_jitter_dof)
+    yield evaluate_a(STATE_TIMES, source, propagate(jitter), unknown.state_jitter_dof)
     if unknown.stamp_std_s:
         # A window that is shifted in time has other rates at its ends, because of the ripple.
         moved = per_sweep * ((unknown.stamp_std_s * per_s * inputs.ripples)[:, None] * turned)[None]
         source, half_width = "how the lines of the sensor are timed", 1e3 * np.sqrt(3) * unknown.stamp_std_s
-        yield Contributor(STAMPS, "B", "rectangular", float(half_width), "ms", source, np.inf, propagate(moved))
+        yield Contributor(SAMPLE_TIMES, "B", "rectangular", float(half_width), "ms", source, np.inf, propagate(moved))
 
 
 def _find_noise_dof(explained: Explained) -> float:

@@ -26,7 +26,7 @@ from rig.estimation.gyroscope.vector_model import (
 )
 from rig.estimation.sensor_axes import angle_jacobian, parameter_jacobian
 
-PASSES = 2  # iterations: B depends on F, and the first F is already within one percent
+MAX_ITERATIONS = 2  # B depends on F, and the first F is already within one percent
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +87,7 @@ def solve_with_common_errors(
 
     solution = solve(np.zeros_like(means))
     speed_noise, error_patterns, gain, errors = estimate(solution.matrix)
-    for _ in range(1, PASSES):
+    for _ in range(1, MAX_ITERATIONS):
         solution = solve(errors.readings_rad_s)
         speed_noise, error_patterns, gain, errors = estimate(solution.matrix)
     solution = solve(errors.readings_rad_s)

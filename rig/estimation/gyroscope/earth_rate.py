@@ -35,9 +35,9 @@ from rig.estimation.gyroscope.vector_model import MAX_CONDITION, VectorSolution,
 from rig.estimation.statistics.bias_process import bias_process
 
 PRIOR_STD_RAD_S = 100 * EARTH_RATE_RAD_S  # so wide that only the readings determine the rate
-LEAST_RATIO = 10.0  # least ratio of the estimate to its largest standard deviation
+MIN_SIGNAL_RATIO = 10.0  # of the estimate to its largest standard deviation
 MAX_DEVIATION = 4.0  # largest deviation from the Earth's rate, in standard deviations
-MIN_LEVEL = 0.1  # least sine of the angle between the vertical and the base's x axis
+MIN_LEVEL_SINE = 0.1  # of the angle between the vertical and the base's x axis
 REMEDY = "Add rests in attitudes turned about two axes (procedure imu), or leave procedure.earth_rate at known"
 
 
@@ -122,7 +122,7 @@ class EarthRate:
         """Return two level unit vectors: the projected x axis of the base, and to its left; None if x is vertical."""
         ahead = np.array([1.0, 0.0, 0.0]) - self.up[0] * self.up
         size = float(np.linalg.norm(ahead))
-        return None if size < MIN_LEVEL else (ahead / size, np.cross(self.up, ahead / size))
+        return None if size < MIN_LEVEL_SINE else (ahead / size, np.cross(self.up, ahead / size))
 
     def _std(self, slope: Array) -> float:
         return float(np.sqrt(slope @ self.covariance_rad2_s2 @ slope))
@@ -263,7 +263,7 @@ def check_earth_seen(
     """
     free = float(np.linalg.norm(free_rad_s))
     worst = float(np.sqrt(np.linalg.eigvalsh(covariance_rad2_s2)[-1]))
-    if free < LEAST_RATIO * worst:
+    if free < MIN_SIGNAL_RATIO * worst:
         raise Fault(
             "earth_rate_not_observable",
             f"the gyroscope finds {component} to be {free / DEG_H:.3g} deg/h, u {worst / DEG_H:.2g} deg/h, "

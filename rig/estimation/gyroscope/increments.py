@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from rig.estimation.arrays import Array
 
 PARAMETERS = 12  # F row by row, b
-BLOCK = 1 << 16  # readings processed at once: 20 MB, whatever the recording's length
+BLOCK_READINGS = 1 << 16  # processed at once: 20 MB, whatever the recording's length
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,8 +119,8 @@ def increments(time_s: Array, readings: Array, matrix: Array, bias: Array, windo
 def _split_into_blocks(time_s: Array, at_s: Array) -> Iterator[tuple[slice, slice]]:
     """Yield readings in blocks, each with its instants; a block begins with the last reading of the previous one."""
     first = 0
-    for start in range(0, len(time_s) - 1, BLOCK):
-        stop = min(start + BLOCK + 1, len(time_s))
+    for start in range(0, len(time_s) - 1, BLOCK_READINGS):
+        stop = min(start + BLOCK_READINGS + 1, len(time_s))
         last = len(at_s) if stop == len(time_s) else int(np.searchsorted(at_s, time_s[stop - 1]))
         yield slice(start, stop), slice(first, last)
         first = last

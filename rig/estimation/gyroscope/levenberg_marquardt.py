@@ -16,7 +16,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.six_observation import design, negative_square
 
 MAX_CONDITION = 40.0  # above `accumulator`'s 30: directions that contain only noise are excluded before
-VANISHED = 0.05  # ratio to the largest scale factor, below which the fit would take a negative square
+MIN_SCALE_RATIO = 0.05  # to the largest scale factor: below it, the fit would take a negative square
 REMEDY = "Sweep every wrist in both directions; a second sweep in one direction cannot replace the other direction"
 
 
@@ -89,7 +89,7 @@ def solve_levenberg_marquardt(
         )
     theta = np.concatenate([np.abs(minimum.x[:3]), minimum.x[3:]])  # only k² is identifiable
     weakest = int(np.argmin(theta[:3]))
-    if theta[weakest] < VANISHED * theta[:3].max():
+    if theta[weakest] < MIN_SCALE_RATIO * theta[:3].max():
         raise negative_square(weakest)  # the best k² is negative, so the fit ends at its bound k = 0
     refusals.check_unit(theta[:3])
     weighted_jacobian = slope(theta)

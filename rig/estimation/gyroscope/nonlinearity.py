@@ -11,9 +11,9 @@ import numpy as np
 
 from rig.estimation.arrays import Array
 
-FREE_PER_RAD_S = 1.0  # prior far above any sensor's nonlinearity, so that only the sweeps determine it
-CUBE_MISSED, SQUARE_MISSED = 0.25, 0.5  # largest distance of x³ and x² from their best line for |x| ≤ 1
-DISTINCT = 1.05  # ratio from which on two speeds count as different
+PRIOR_STD_PER_RAD_S = 1.0  # far above any sensor's nonlinearity, so that only the sweeps determine it
+CUBE_DEVIATION, SQUARE_DEVIATION = 0.25, 0.5  # largest distance of x³ and x² from their best line for |x| ≤ 1
+DISTINCT_SPEED_RATIO = 1.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,19 +29,19 @@ class Nonlinearity:
 def distinct_speeds(speeds_rad_s: Array) -> tuple[float, ...]:
     """Return the mean of each group of speeds (n,) that differ only because of the arm's timing, slowest first."""
     ordered = np.sort(speeds_rad_s)
-    steps = np.flatnonzero(ordered[1:] > DISTINCT * ordered[:-1]) + 1
+    steps = np.flatnonzero(ordered[1:] > DISTINCT_SPEED_RATIO * ordered[:-1]) + 1
     return tuple(float(group.mean()) for group in np.split(ordered, steps))
 
 
 def curvature(matrix: Array, rates_rad_s: Array) -> Array:
     """Return the effects (6, N, 3) on readings of the odd parts of x, y, z, then of the even parts.
 
-    Each part has the size `FREE_PER_RAD_S`. `rates_rad_s` (N, 3) are mean rates in the flange's frame; F (3, 3).
+    Each part has the size `PRIOR_STD_PER_RAD_S`. `rates_rad_s` (N, 3) are mean rates in the flange's frame; F (3, 3).
     """
     readings = rates_rad_s @ matrix.T
     projected = readings / np.linalg.norm(matrix, axis=1)
     gains = (np.abs(projected) * readings, projected * readings)
-    return FREE_PER_RAD_S * np.array([gain * axis for gain in gains for axis in np.eye(3)])
+    return PRIOR_STD_PER_RAD_S * np.array([gain * axis for gain in gains for axis in np.eye(3)])
 
 
 def bending(matrix: Array, rates_rad_s: Array, full_scale_rad_s: float, true_at_rad_s: float = 0.0) -> Array:
@@ -57,6 +57,6 @@ def bending(matrix: Array, rates_rad_s: Array, full_scale_rad_s: float, true_at_
 
 def nonlinearity(sizes: Array, covariance: Array) -> Nonlinearity:
     """Return the nonlinearity from the estimated sizes (6,) of the `curvature` columns and their covariance (6, 6)."""
-    std = FREE_PER_RAD_S * np.sqrt(np.diag(covariance))
-    odd, even = np.split(FREE_PER_RAD_S * sizes, 2)
+    std = PRIOR_STD_PER_RAD_S * np.sqrt(np.diag(covariance))
+    odd, even = np.split(PRIOR_STD_PER_RAD_S * sizes, 2)
     return Nonlinearity(odd, even, std[:3], std[3:])

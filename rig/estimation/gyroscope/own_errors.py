@@ -11,13 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig.estimation.arrays import Array
-from rig.estimation.gyroscope.nonlinearity import CUBE_MISSED, SQUARE_MISSED, bending
+from rig.estimation.gyroscope.nonlinearity import CUBE_DEVIATION, SQUARE_DEVIATION, bending
 
 NONLINEARITY = "nonlinearity"
 BIAS_OVER_TEMPERATURE, SCALE_OVER_TEMPERATURE = "bias over temperature", "scale over temperature"
-OF_THE_PART = "stated properties of the part"
+PART_SOURCE = "stated properties of the part"
 ROUNDING = "rounding of the readings"
-NEGLIGIBLE = 1e-3  # fraction of a mean's variance below which a common rounding error is ignored
+NEGLIGIBLE_FRACTION = 1e-3  # fraction of a mean's variance below which a common rounding error is ignored
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ class OwnError:
     half_width: float
     unit: str
     patterns: Array
-    source: str = OF_THE_PART
+    source: str = PART_SOURCE
 
 
 def list_own_errors(
@@ -66,10 +66,10 @@ def list_own_errors(
     """
     if len(speeds_rad_s) == 1:
         curved = bending(matrix, turns_rad_s, sensor.full_scale_rad_s, speeds_rad_s[0])
-        sizes = sensor.nonlinearity / np.repeat([CUBE_MISSED, SQUARE_MISSED], 3)[:, None, None]
+        sizes = sensor.nonlinearity / np.repeat([CUBE_DEVIATION, SQUARE_DEVIATION], 3)[:, None, None]
         yield OwnError(NONLINEARITY, 100 * sensor.nonlinearity, "% of full scale", sizes * curved)
     duration_s = np.diff(windows_s)[:, 0]
-    source = "; ".join(filter(None, (OF_THE_PART, sensor.temperature_words)))
+    source = "; ".join(filter(None, (PART_SOURCE, sensor.temperature_words)))
     warmer_k = _temperature_deviations_k(sensor, windows_s, duration_s)
     patterns = sensor.bias_rad_s_per_k * np.einsum("kn,ij->kinj", warmer_k, np.eye(3))
     by_k = float(np.degrees(sensor.bias_rad_s_per_k))
@@ -86,7 +86,7 @@ def rounding_errors(means_rad_s: Array, roundings_rad_s: Array | float, variance
     The variances (N, 3) contain the independent part of rounding. Negligible errors are omitted.
     """
     roundings = np.broadcast_to(roundings_rad_s, means_rad_s.shape)
-    matters = roundings**2 > NEGLIGIBLE * variances_rad2_s2
+    matters = roundings**2 > NEGLIGIBLE_FRACTION * variances_rad2_s2
     patterns = []
     for axis in np.flatnonzero(matters.any(axis=0)):
         half_widths = np.sqrt(3) * roundings[:, axis]

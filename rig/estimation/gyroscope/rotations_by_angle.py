@@ -27,8 +27,8 @@ from rig.estimation.gyroscope.budget import Budget, Contributor
 from rig.estimation.gyroscope.increments import increments
 from rig.estimation.sensor_axes import SensorAxes, parameter_jacobian
 
-PASSES, SETTLED = 20, 1e-3  # most iterations; largest step at convergence, relative to the standard uncertainty
-FARTHEST_RAD = 0.02  # error of an end attitude, beyond which the stated rotation is wrong
+MAX_ITERATIONS, CONVERGED_STEP_RATIO = 20, 1e-3  # step relative to the standard uncertainty
+MAX_END_ERROR_RAD = 0.02  # of an end attitude: beyond, the stated rotation is wrong
 MAX_CONDITION = 100.0
 REMEDY = "Turn about three different axes, either way round, or let it lie still once more"
 NOISE, BIAS, ENDS, AXES = "noise", "bias from rest to rest", "ends of the turns", "axes of the turns"
@@ -140,15 +140,15 @@ def solve_turned(
     """
     state = _TurnsEstimate(matrix, -bias_rad_s)
     iterations, settled = 0, False
-    while not settled and iterations < PASSES:
+    while not settled and iterations < MAX_ITERATIONS:
         equations = _equate(gyroscope, turns, means, state)
         if not iterations:
             _conditioning(equations)
         step, covariance = _solve(equations)
         state, iterations = state.after_step(step), iterations + 1
-        settled = bool((np.abs(step) < SETTLED * np.sqrt(np.diag(covariance))).all())
+        settled = bool((np.abs(step) < CONVERGED_STEP_RATIO * np.sqrt(np.diag(covariance))).all())
     equations = _equate(gyroscope, turns, means, state)
-    ratio, dof = _find_birge_ratio(equations[len(means) :], covariance)  # pyrefly: ignore[unbound-name]  # PASSES > 0
+    ratio, dof = _find_birge_ratio(equations[len(means) :], covariance)  # pyrefly: ignore[unbound-name]  # MAX_ITERATIONS > 0
     _check_closed(turns, equations[len(means) :], ratio)
     equations = [equation.inflate(ratio) for equation in equations]
     step, covariance = _solve(equations)
@@ -275,9 +275,9 @@ def _find_birge_ratio(turns: Sequence[_NormalEquations], covariance: Array) -> t
 
 
 def _check_closed(turns: Sequence[Turn], equations: Sequence[_NormalEquations], ratio: float) -> None:
-    """Raise Fault `turn_not_closed` if the rotations contradict their stated angles by more than `FARTHEST_RAD`."""
+    """Raise Fault `turn_not_closed` if rotations contradict their stated angles by more than `MAX_END_ERROR_RAD`."""
     miss_rad = ratio * float(np.median([turn.angle_std_rad for turn in turns]))
-    if miss_rad <= FARTHEST_RAD:
+    if miss_rad <= MAX_END_ERROR_RAD:
         return
     missed = [
         float(np.linalg.norm(equation.observed[:3])) * (turn.end_s - turn.start_s)

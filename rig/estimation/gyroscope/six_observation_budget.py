@@ -12,7 +12,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.accumulator import Solution
 from rig.estimation.gyroscope.budget import (
     AXES,
-    MOUNTS,
+    REMOUNTING,
     REPEATABILITY,
     Budget,
     Contributor,
@@ -23,7 +23,7 @@ from rig.estimation.gyroscope.budget import (
 from rig.estimation.gyroscope.six_observation import design
 from rig.estimation.gyroscope.vector_fit import Explained, VectorInputs
 
-NOT_SQUARE = "angles between the axes"
+AXIS_ANGLES = "angles between the axes"
 
 
 def six_observation_budget(explained: Explained, six: Solution, unknown: Unknown, axes_rad: float) -> Budget:
@@ -50,9 +50,11 @@ def six_observation_budget(explained: Explained, six: Solution, unknown: Unknown
         "qni,kni->kq", response, _tilt_axes(inputs.turns_rad_s @ solution.mounting.T, six.scale, axes_rad) / np.sqrt(3)
     )
     half_width, source = float(np.degrees(axes_rad)), "stated properties of the part"
-    square = Contributor(NOT_SQUARE, "B", "rectangular", half_width, "°", source, np.inf, effects.T @ effects)
+    square = Contributor(AXIS_ANGLES, "B", "rectangular", half_width, "°", source, np.inf, effects.T @ effects)
     contributors = [
-        contributor for contributor in of_readings.contributors if contributor.name not in (AXES, REPEATABILITY, MOUNTS)
+        contributor
+        for contributor in of_readings.contributors
+        if contributor.name not in (AXES, REPEATABILITY, REMOUNTING)
     ]
     return replace(of_readings, contributors=(*contributors, square))
 

@@ -6,9 +6,9 @@
 determine a variance badly: the restricted maximum likelihood is often at zero, and its U covers the true value in only
 60 to 85 of 100 cases. So the result averages over all pairs of sizes, weighted by the restricted likelihood (Harville,
 J. Am. Stat. Assoc. 72 (1977) 320) and a prior: log-uniform from a tenth of the noise, below which a size changes
-nothing, to `PRIOR_KNEE`; beyond, it falls as 1/size. If the sweeps determine the size, U approaches that of Student's t
-with the dof of the redundant sweeps (Box and Tiao, Bayesian Inference in Statistical Analysis, 1973, 5.2; Gelman,
-Bayesian Analysis 1 (2006) 515).
+nothing, to `PRIOR_KNEE_ERROR`; beyond, it falls as 1/size. If the sweeps determine the size, U approaches that of
+Student's t with the dof of the redundant sweeps (Box and Tiao, Bayesian Inference in Statistical Analysis, 1973, 5.2;
+Gelman, Bayesian Analysis 1 (2006) 515).
 """
 
 from dataclasses import dataclass
@@ -18,10 +18,10 @@ import numpy as np
 from rig.estimation.arrays import Array, bisect, perpendicular_unit_vectors
 from rig.estimation.statistics.coverage import PROBABILITY
 
-SMALLEST_OF_NOISE = 0.1  # smallest error relative to a sweep's noise: it increases the noise by half a percent
+MIN_NOISE_RATIO = 0.1  # of an error to a sweep's noise, which it increases by half a percent
 # relative rate error, or axis error in rad: knee of the prior, and its end, as no rate table is worse
-PRIOR_KNEE, LARGEST = 1e-2, 0.1
-SIZES = 20  # grid points for each kind of error
+PRIOR_KNEE_ERROR, MAX_ERROR = 1e-2, 0.1
+GRID_POINTS = 20  # for each kind of error
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,13 +97,15 @@ class MotionErrors:
 
 def motion_errors(motion: StatedMotion) -> MotionErrors:
     """Return the posterior sizes of the errors of the stated motion, from the residuals of sweeps and rests."""
-    smallest = min(SMALLEST_OF_NOISE * motion.relative_noise, LARGEST / 10)
-    sizes = np.geomspace(smallest, LARGEST, SIZES)
-    prior = -np.log(np.maximum(sizes / PRIOR_KNEE, 1.0))
+    smallest = min(MIN_NOISE_RATIO * motion.relative_noise, MAX_ERROR / 10)
+    sizes = np.geomspace(smallest, MAX_ERROR, GRID_POINTS)
+    prior = -np.log(np.maximum(sizes / PRIOR_KNEE_ERROR, 1.0))
     logarithms = prior[:, None] + prior + np.array([_likelihoods(motion, axis_rad, sizes) for axis_rad in sizes])
     weights = np.exp(logarithms - logarithms.max())
     return MotionErrors(
-        rate=np.tile(sizes, SIZES), axis_rad=np.repeat(sizes, SIZES), weights=weights.ravel() / weights.sum()
+        rate=np.tile(sizes, GRID_POINTS),
+        axis_rad=np.repeat(sizes, GRID_POINTS),
+        weights=weights.ravel() / weights.sum(),
     )
 
 

@@ -22,9 +22,9 @@ from rig.estimation.gyroscope.vector_model import VectorSolution, check_identifi
 from rig.estimation.statistics.bias_process import BiasProcess, bias_process
 
 # Faults of a design with too many columns.
-UNIDENTIFIABLE = ("rank_deficient", "ill_conditioned", "too_few_observations")
+DESIGN_FAULTS = ("rank_deficient", "ill_conditioned", "too_few_observations")
 # Fraction of the largest rate: a smaller one has less than a sixteenth of its weight in the scale factor.
-LEAST_LOAD = 0.25
+MIN_RATE_RATIO = 0.25
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,7 +157,7 @@ class Explained:
         """The smallest and largest rates (3, 2) along x, y, z, without sign, of the sweeps that determine the scale."""
         sensed = np.abs(self.inputs.turns_rad_s @ (self.solution.matrix * self.solution.scale[:, None]).T)
         largest = sensed.max(axis=0)
-        smallest = np.where(sensed >= LEAST_LOAD * largest, sensed, np.inf).min(axis=0)
+        smallest = np.where(sensed >= MIN_RATE_RATIO * largest, sensed, np.inf).min(axis=0)
         loads: Array = np.column_stack([smallest, largest])
         return loads
 
@@ -180,7 +180,7 @@ def explain(inputs: VectorInputs, nominal_mounting: Array, process: BiasProcess 
         check_identifiable(inputs.rates_rad_s, inputs.gravity_m_s2)
         return fit
     except Fault as fault:
-        if fault.name not in UNIDENTIFIABLE:
+        if fault.name not in DESIGN_FAULTS:
             raise
     return _explain(inputs, nominal_mounting, None, process)
 

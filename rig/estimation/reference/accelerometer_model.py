@@ -37,10 +37,10 @@ PARAMETERS = 22
 OWN_ERRORS = 3  # errors of a dwell: a small rotation of the flange
 # Errors of a station: a small rotation in the flange's frame, one in the base's, four waves of the angle.
 SHARED_ERRORS = 10
-TURNS = 6  # the first six of these ten: both rotations
-OWN_SHARE = 0.2  # fraction of δ² for errors independent in each dwell; the rest is for constant errors of the wrists
+ROTATIONS = 6  # the first six of these ten: both rotations
+INDEPENDENT_FRACTION = 0.2  # of δ², for errors independent in each dwell; the rest is for constant errors of the wrists
 CROSS = np.swapaxes(np.cross(np.eye(3)[:, None], np.eye(3)), 1, 2)  # [v]× of the axes
-SHARE = 0.5**0.5  # size of both rotations together, and of all waves, relative to δ: each equals a dwell's error
+SIZE_RATIO = 0.5**0.5  # of both rotations together, and of all waves, to δ: each equals a dwell's error
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +108,7 @@ class Movement:
     repeatability_rad: float = 0.0
     sensor_errors: AccelerometerErrors | None = None
     arm_turns: Array | None = None
-    own_share: float = OWN_SHARE
+    own_share: float = INDEPENDENT_FRACTION
 
     def omit(self, dwell: int) -> "Movement":
         """Return the movement without the dwell of index `dwell`."""
@@ -279,7 +279,9 @@ def turned(theta: Array, movement: Movement) -> Array:
     for dwell, columns in enumerate(cross(s[:count])):
         changes[dwell, :, OWN_ERRORS * dwell : OWN_ERRORS * (dwell + 1)] = columns
     in_base, apparent = gravity[count:] @ cross(theta[REFERENCE]), gravity[count:] @ theta[REFERENCE]
-    shared = SHARE * np.concatenate([cross(s[count:]), in_base, _differentiate_angle(apparent, theta, sweeps)], axis=2)
+    shared = SIZE_RATIO * np.concatenate(
+        [cross(s[count:]), in_base, _differentiate_angle(apparent, theta, sweeps)], axis=2
+    )
     for row, index in enumerate(np.repeat(indices, 3)):
         first = OWN_ERRORS * count + SHARED_ERRORS * index
         changes[count + row, :, first : first + SHARED_ERRORS] = shared[row]

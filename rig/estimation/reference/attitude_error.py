@@ -26,10 +26,10 @@ from rig.estimation.reference.reference_model import (
 )
 from rig.estimation.reference.reference_model import matrix as matrix_of
 
-SMALLEST_RAD, LARGEST_RAD = 1e-7, 0.3  # range of the attitude errors
-GRID = 40
-PASSES = 20
-SETTLED = 1e-3  # relative change of δ at convergence
+MIN_ERROR_RAD, MAX_ERROR_RAD = 1e-7, 0.3  # range of the attitude errors
+GRID_POINTS = 40
+MAX_ITERATIONS = 20
+CONVERGED_CHANGE_RATIO = 1e-3  # of δ
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,15 +86,15 @@ def solve_attitude_weighted(start: Array, placed: Placed) -> AttitudeWeighted:
     """Return θ and δ of maximum likelihood from `start` (p,), by alternating steps until δ converges."""
     r, v_bar, norm_known = placed.attitudes, placed.v_bar, placed.norm_known
     theta, steps, delta, last = start, 0, 0.0, np.inf
-    for _ in range(PASSES):
+    for _ in range(MAX_ITERATIONS):
         rotations = effects(theta, r, v_bar)
         whiteners = find_whiteners(placed.variances, rotations, np.hypot(placed.attitude_std_rad, delta))
         theta, iterations = most_likely(theta, placed.readings, r, v_bar, whiteners, norm_known=norm_known)
         steps += iterations
-        if abs(delta - last) <= SETTLED * delta:
+        if abs(delta - last) <= CONVERGED_CHANGE_RATIO * delta:
             break
         last, delta = delta, _estimate_std(theta, placed)
-    fit = weighted_jacobian(theta, r, v_bar, whiteners, norm_known=norm_known)  # pyrefly: ignore[unbound-name]  # PASSES > 0
+    fit = weighted_jacobian(theta, r, v_bar, whiteners, norm_known=norm_known)  # pyrefly: ignore[unbound-name]  # MAX_ITERATIONS > 0
     whitened = whiteners @ rotations  # pyrefly: ignore[unbound-name]  # as above
     return AttitudeWeighted(
         theta,
@@ -187,12 +187,12 @@ def maximise_likelihood(
     def negative_log(log_delta: float) -> float:
         return float(negative_logs(np.array([log_delta]))[0])
 
-    grid = np.linspace(np.log(SMALLEST_RAD), np.log(LARGEST_RAD), GRID)
+    grid = np.linspace(np.log(MIN_ERROR_RAD), np.log(MAX_ERROR_RAD), GRID_POINTS)
     values = negative_logs(grid)
     best = int(np.argmin(values))
     if best == 0 or values[0] - values[best] < 1e-6:
         return 0.0, negative_log(-np.inf)  # attitude errors are not more likely than exact attitudes
-    bounds = grid[best - 1], grid[min(best + 1, GRID - 1)]
+    bounds = grid[best - 1], grid[min(best + 1, GRID_POINTS - 1)]
     minimum = minimize_scalar(negative_log, bounds=bounds, method="bounded", options={"xatol": 1e-5})
     return float(np.exp(minimum.x)), float(minimum.fun)
 

@@ -17,10 +17,10 @@ from rig.estimation.arrays import Array, scale_of
 from rig.estimation.reference.accelerometer_errors import AccelerometerErrors
 from rig.estimation.reference.accelerometer_model import (
     DELAY,
+    INDEPENDENT_FRACTION,
     LEVER,
     NO_DWELLS,
     NO_SWEEPS,
-    OWN_SHARE,
     PARAMETERS,
     SECOND,
     Dwells,
@@ -85,7 +85,7 @@ class ImuSolution:
     iterations: int
     warnings: tuple[str, ...]
     sensor_errors: AccelerometerErrors | None = None
-    own_share: float = OWN_SHARE
+    own_share: float = INDEPENDENT_FRACTION
 
     @property
     def theta(self) -> Array:
@@ -109,7 +109,7 @@ def solve_imu(
     repeatability_rad: float = 0.0,
     sensor_errors: AccelerometerErrors | None = None,
     arm_turns: Array | None = None,
-    own_shares: Sequence[float] = (OWN_SHARE,),
+    own_shares: Sequence[float] = (INDEPENDENT_FRACTION,),
 ) -> ImuSolution:
     """Calibrate from dwells, sweeps or both.
 
@@ -137,7 +137,7 @@ def solve_imu(
         covariance, response = fit.covariance(), fit.response()
         _check_attitudes(start, movement, fixed, fit)
     f = matrix(fit.theta)
-    refusals.check_unit(scale_of(f), refusals.CONFUSED)
+    refusals.check_unit(scale_of(f), refusals.UNIT_RATIOS)
     refusals.check_handedness(f)
     residuals = movement.readings() - predicted(fit.theta, movement)
     whitened = fit.readings.whitener(fit.std_rad) @ residuals.ravel()

@@ -20,14 +20,14 @@ from rig.estimation.reference.accelerometer_model import (
     predicted,
     split_effects,
 )
-from rig.estimation.reference.attitude_error import PASSES, SETTLED
+from rig.estimation.reference.attitude_error import CONVERGED_CHANGE_RATIO, MAX_ITERATIONS
 from rig.estimation.reference.reading_errors import noise, select_sweeps, walking
 from rig.estimation.reference.reference_model import REFERENCE, STEP_LIMIT, STEP_TOLERANCE, free_directions
 from rig.estimation.reference.shared_errors import Decorrelation, decorrelate, estimate_common_error
 from rig.estimation.statistics.expected_variances import ResidualInputs, estimate_disturbances, estimate_variances
 
 # Prior odds that one dwell or sweep of a run is disturbed, or that all sweeps have another bias, against neither.
-ODDS = 1 / 19
+DISTURBANCE_ODDS = 1 / 19
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,10 +86,10 @@ def most_likely(start: Array, movement: Movement, fixed: list[int], attitude_std
     theta, steps = start, 0
     delta, last = attitude_std_rad or 0.0, np.inf
     readings = decorrelate(noise(theta, movement), effects(theta, movement))
-    for _ in range(PASSES):
+    for _ in range(MAX_ITERATIONS):
         theta, iterations = _least_squares(theta, movement, fixed, readings.whitener(delta))
         steps += iterations
-        if attitude_std_rad is not None or abs(delta - last) <= SETTLED * delta:
+        if attitude_std_rad is not None or abs(delta - last) <= CONVERGED_CHANGE_RATIO * delta:
             break
         slopes = jacobian(theta, movement) @ find_free_directions(theta, fixed)
         residuals = (movement.readings() - predicted(theta, movement)).ravel()
@@ -128,7 +128,7 @@ def refit_with_components(
     unit = float(np.sqrt(np.median(variances)))
     separate = [np.diag(np.sqrt(variances))[:, segment] for segment in movement.segments()]
     causes = [*separate, unit * select_sweeps(movement)]
-    odds = [*np.full(len(separate), ODDS / len(separate)), ODDS]
+    odds = [*np.full(len(separate), DISTURBANCE_ODDS / len(separate)), DISTURBANCE_ODDS]
     *louder, turning = estimate_disturbances(scattered, components, causes, odds)
     disturbed = replace(
         sensor, walk_m_s2_sqrt_s=components.walk, louder=np.array(louder), turning_m_s2=float(np.sqrt(turning)) * unit

@@ -20,8 +20,8 @@ from rig.estimation.refusals import convergence_required
 from rig.estimation.statistics.coverage import false_alarm_of_each
 
 MODEL = "m_m = F Rᵀ m + b"
-FREE = 14  # parameters: F, b, and the field's direction, as its size is given
-FALSE_ALARM = 1e-3  # probability that a steady, uniform field fails one of the two tests
+PARAMETERS = 14  # F, b, and the field's direction, as its size is given
+FALSE_ALARM_PROBABILITY = 1e-3  # of one of the two tests, for a steady, uniform field
 
 
 def hard_iron(solution: TriaxialSolution) -> Array:
@@ -69,8 +69,10 @@ def uniformity(
         whiteners = find_whiteners(v, effects(start, r, v_bar), np.full(len(m), attitude_error_rad))
         theta, _ = most_likely(start, m, r, v_bar, whiteners, norm_known=True)
     whitened_residuals = whitened(whiteners, m - predicted(theta, r, v_bar))
-    dof = whitened_residuals.size - FREE
-    return Uniformity(float(np.sum(whitened_residuals**2)), dof, float(chdtri(dof, FALSE_ALARM)), attitude_error_rad)
+    dof = whitened_residuals.size - PARAMETERS
+    return Uniformity(
+        float(np.sum(whitened_residuals**2)), dof, float(chdtri(dof, FALSE_ALARM_PROBABILITY)), attitude_error_rad
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,5 +105,5 @@ def field_drift(means_t: ArrayLike, variances_t2: ArrayLike, repeatability_rad: 
     stds = np.sqrt(v[1:] + v[0] + 2 * (repeatability_rad * np.linalg.norm(m[0])) ** 2)
     squares = np.sum((changes / stds) ** 2, axis=1)
     worst = int(np.argmax(squares))
-    limit = float(chdtri(3, false_alarm_of_each(FALSE_ALARM, len(changes))))
+    limit = float(chdtri(3, false_alarm_of_each(FALSE_ALARM_PROBABILITY, len(changes))))
     return FieldDrift(changes[worst], stds[worst], float(squares[worst]), limit)

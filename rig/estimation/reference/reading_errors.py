@@ -13,9 +13,9 @@ from rig.estimation.arrays import Array
 from rig.estimation.reference.accelerometer_errors import AccelerometerErrors
 from rig.estimation.reference.accelerometer_model import (
     OWN_ERRORS,
-    SHARE,
+    ROTATIONS,
     SHARED_ERRORS,
-    TURNS,
+    SIZE_RATIO,
     Movement,
     find_force,
     turned,
@@ -23,7 +23,7 @@ from rig.estimation.reference.accelerometer_model import (
 from rig.estimation.reference.reference_model import matrix
 from rig.estimation.statistics.bias_process import flicker_covariance, flicker_harmonic_covariance, walk_covariance
 
-ANGLES = 72  # angles of a revolution at which nonlinear functions of the acceleration are averaged
+ANGLES_PER_REVOLUTION = 72  # at which nonlinear functions of the acceleration are averaged
 
 
 def noise(theta: Array, movement: Movement) -> Array:
@@ -139,7 +139,7 @@ def project_errors(theta: Array, movement: Movement, change: Callable[[Array], A
     dwells, axes = len(movement.dwells.readings_m_s2), matrix(theta)
     felt_along = find_force(theta, movement) @ (axes / np.linalg.norm(axes, axis=1, keepdims=True)).T
     mean, cos, sin = np.moveaxis(felt_along[dwells:].reshape(-1, 3, 3), 1, 0)
-    angle = 2 * np.pi * np.arange(ANGLES)[:, None, None] / ANGLES
+    angle = 2 * np.pi * np.arange(ANGLES_PER_REVOLUTION)[:, None, None] / ANGLES_PER_REVOLUTION
     turning = change(mean + cos * np.cos(angle) + sin * np.sin(angle))
     waves = [turning.mean(axis=0), *(2 * (turning * wave(angle)).mean(axis=0) for wave in (np.cos, np.sin))]
     return per_axis(np.concatenate([change(felt_along[:dwells]), np.stack(waves, axis=1).reshape(-1, 3)]))
@@ -153,5 +153,7 @@ def _not_repeated(theta: Array, movement: Movement) -> Array:
     rotations = turned(theta, replace(movement, sweeps=sweeps.alone()))[
         :, OWN_ERRORS * len(movement.dwells.readings_m_s2) :
     ]
-    turns = rotations[:, np.arange(rotations.shape[1]) % SHARED_ERRORS < TURNS] * (movement.repeatability_rad / SHARE)
+    turns = rotations[:, np.arange(rotations.shape[1]) % SHARED_ERRORS < ROTATIONS] * (
+        movement.repeatability_rad / SIZE_RATIO
+    )
     return np.asarray(turns @ turns.T, dtype=np.float64)

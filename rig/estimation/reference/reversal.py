@@ -17,9 +17,9 @@ import numpy as np
 
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
-from rig.estimation.reference.magnetometer import FALSE_ALARM
+from rig.estimation.reference.magnetometer import FALSE_ALARM_PROBABILITY
 
-SAME = 1e-6  # tolerance of mountings, which are nominal and exact
+MOUNTING_TOLERANCE = 1e-6  # mountings are nominal and exact
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +64,7 @@ def separate(biases_t: Array, covariances_t2: Array, matrices: Array, mountings:
     estimate = inverse @ (whiteners @ biases_t[..., None]).reshape(-1)
     residuals = (whiteners @ (biases_t - design @ estimate)[..., None]).reshape(-1)
     chi_square, dof = float(residuals @ residuals), len(residuals) - (6 - common.shape[1])
-    limit = float(chdtri(dof, FALSE_ALARM))
+    limit = float(chdtri(dof, FALSE_ALARM_PROBABILITY))
     if chi_square > limit:
         raise Fault(
             "reversal_contradicts",
@@ -75,7 +75,7 @@ def separate(biases_t: Array, covariances_t2: Array, matrices: Array, mountings:
         )
     to_axes = np.block([[np.eye(3), np.zeros((3, 3))], [np.zeros((3, 3)), mountings[0]]])
     covariance = to_axes @ (inverse @ inverse.T) @ to_axes.T
-    inseparable = np.abs(mountings[0] @ common).max(axis=1, initial=0.0) > SAME
+    inseparable = np.abs(mountings[0] @ common).max(axis=1, initial=0.0) > MOUNTING_TOLERANCE
     x, y, z = inseparable.tolist()
     return Reversal(estimate[:3], mountings[0] @ estimate[3:], covariance, (x, y, z), chi_square, dof, limit)
 
@@ -85,5 +85,5 @@ def _find_common_directions(mountings: Array) -> Array:
     differences = (mountings[1:] - mountings[0]).reshape(-1, 3)
     _, sizes, rows = np.linalg.svd(differences)
     alike = np.ones(3, dtype=np.bool_)
-    alike[: len(sizes)] = sizes < SAME
+    alike[: len(sizes)] = sizes < MOUNTING_TOLERANCE
     return np.asarray(rows[alike].T, dtype=np.float64)

@@ -19,11 +19,11 @@ from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.refusals import check_finite, require_shape
 
-WHOLE_TURN = 0.05  # allowed deviation of the samples from one revolution
-WAVES = 3  # harmonics of the angle; only the first is used
-VIBRATION_WAVES = 100  # harmonics per revolution: up to 17 Hz at 60°/s
+REVOLUTION_TOLERANCE = 0.05  # of the samples' angle, in revolutions
+HARMONICS = 3  # of the angle; only the first is used
+VIBRATION_HARMONICS = 100  # per revolution: up to 17 Hz at 60°/s
 MIN_SAMPLES = 50
-EMPTY = 1e-9  # relative size below which a column is zero, as for an arm without vibration
+EMPTY_COLUMN_RATIO = 1e-9  # relative size below which a column is zero, as for an arm without vibration
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,14 +78,14 @@ def first_harmonic(
     check_finite(time=t, readings=m, angle=angle, speed=speed)
     mean_speed = _mean_speed(t, angle)
     uneven = _smooth(t, speed, mean_speed)
-    columns = np.hstack([_fourier_columns(angle, WAVES), _list_vibration(uneven, angle, mean_speed)])
+    columns = np.hstack([_fourier_columns(angle, HARMONICS), _list_vibration(uneven, angle, mean_speed)])
     columns = np.hstack([columns, swings(_regression(columns, m)[1])])
     inverse, residuals = _regression(columns, m)
     size = np.linalg.norm(columns, axis=0)
-    rank = np.linalg.matrix_rank(columns / np.where(size > 0, size, 1.0), rtol=EMPTY)
+    rank = np.linalg.matrix_rank(columns / np.where(size > 0, size, 1.0), rtol=EMPTY_COLUMN_RATIO)
     scatter = residuals.T @ residuals / (count - rank)
     gain: Array = inverse[:3]
-    vibration = columns[:, 1 + 2 * WAVES :] @ (inverse[1 + 2 * WAVES :] @ m)
+    vibration = columns[:, 1 + 2 * HARMONICS :] @ (inverse[1 + 2 * HARMONICS :] @ m)
     long_run = _find_long_run_covariance(residuals, scatter, coloured)
     return FirstHarmonic(
         harmonic_m_s2=gain @ m,
@@ -110,7 +110,7 @@ def _regression(columns: Array, readings: Array) -> tuple[Array, Array]:
     """Return the map (p, n) from readings (n, 3) to the coefficients of `columns` (n, p), and the residuals (n, 3)."""
     size = np.linalg.norm(columns, axis=0)
     size = np.where(size > 0, size, 1.0)
-    inverse = np.linalg.pinv(columns / size, rcond=EMPTY) / size[:, None]
+    inverse = np.linalg.pinv(columns / size, rcond=EMPTY_COLUMN_RATIO) / size[:, None]
     return inverse, readings - columns @ (inverse @ readings)
 
 
@@ -130,7 +130,7 @@ def _mean_speed(time_s: Array, angle_rad: Array) -> float:
     """Return the mean speed of a revolution, which vibration does not change. Raise Fault `incomplete_revolution`."""
     travel = angle_rad[-1] - angle_rad[0] if len(angle_rad) else 0.0
     covered_rad = abs(travel) * len(angle_rad) / max(len(angle_rad) - 1, 1)  # with the last sample's interval
-    if len(angle_rad) < MIN_SAMPLES or abs(covered_rad / (2 * np.pi) - 1) > WHOLE_TURN:
+    if len(angle_rad) < MIN_SAMPLES or abs(covered_rad / (2 * np.pi) - 1) > REVOLUTION_TOLERANCE:
         raise Fault(
             "incomplete_revolution",
             f"{len(angle_rad)} samples cover {np.degrees(covered_rad):.0f}° and not one whole revolution",
@@ -165,12 +165,12 @@ def _smooth(time_s: Array, speed_rad_s: Array, mean_speed_rad_s: float) -> _Unev
     Differences of encoder steps are noise, so the speed is smoothed by harmonics of the revolution and then
     differentiated.
     """
-    waves = _fourier_columns(mean_speed_rad_s * (time_s - time_s[0]), min(VIBRATION_WAVES, len(time_s) // 4))
+    waves = _fourier_columns(mean_speed_rad_s * (time_s - time_s[0]), min(VIBRATION_HARMONICS, len(time_s) // 4))
     normal = waves.T @ waves  # nearly diagonal: over a turn the waves are orthogonal
     excess = np.asarray(np.linalg.solve(normal, waves.T @ (speed_rad_s - mean_speed_rad_s)), dtype=np.float64)
     fast = excess.copy()
     # Multiplied by cos θ, these slow waves would become the mean or a harmonic of the model.
-    fast[: 1 + 2 * (WAVES + 1)] = 0.0
+    fast[: 1 + 2 * (HARMONICS + 1)] = 0.0
     derivatives = [fast]
     for _ in range(3):
         derivatives.append(mean_speed_rad_s * _differentiate(derivatives[-1]))

@@ -50,11 +50,11 @@ EqualWeights = Literal["as_published", "maximum_likelihood"]
 Method = EqualWeights | Literal["attitude_weighted"]
 
 MAX_CONDITION = 1e4
-NOTICEABLE = 0.5  # √N σ/v_rms, above which the noise biases the published method noticeably
-UNTRUSTWORTHY_RAD = 5e-3  # with larger attitude errors, the model is wrong
-BY_GYROSCOPE = "; or calibrate only a gyroscope by them, which needs no exact attitudes"
-SUSPICIOUS_RAD = 5e-4  # attitude error above which a single wrong attitude is searched for
-OUTLIER = 6.0  # ratio to the other attitudes' error
+MIN_NOISE_BIAS_RATIO = 0.5  # √N σ/v_rms, above which the noise biases the published method noticeably
+MAX_ATTITUDE_ERROR_RAD = 5e-3  # with larger attitude errors, the model is wrong
+GYROSCOPE_REMEDY = "; or calibrate only a gyroscope by them, which needs no exact attitudes"
+SUSPICIOUS_ERROR_RAD = 5e-4  # attitude error above which a single wrong attitude is searched for
+OUTLIER_RATIO = 6.0  # to the other attitudes' error
 REMEDY = "Take more attitudes, turned about at least two different axes"
 
 
@@ -214,7 +214,7 @@ def _check(m: Array, r: Array, v: Array, prior: ReferencePrior, parameters: int)
 def _check_size(m: Array, norm: float) -> None:
     """Raise Fault `wrong_unit` if readings are smaller than the reference, or differ more than attitudes explain."""
     size, spread = (float(np.sqrt(np.mean(np.sum(vectors**2, axis=1)))) for vectors in (m, m - m.mean(axis=0)))
-    refusals.check_unit(np.full(3, norm / np.clip(norm, spread, size)), refusals.CONFUSED)
+    refusals.check_unit(np.full(3, norm / np.clip(norm, spread, size)), refusals.UNIT_RATIOS)
 
 
 def _check_scale(scale: Array, m: Array, prior: ReferencePrior) -> None:
@@ -228,7 +228,7 @@ def _check_scale(scale: Array, m: Array, prior: ReferencePrior) -> None:
             raise refusals.untrustworthy_attitudes(
                 "the readings have the size of the reference, but the attitudes do not fit them with any scale factors"
             )
-    refusals.check_unit(scale, refusals.CONFUSED if isinstance(prior, KnownNorm) else refusals.CONFUSED_ANGLES)
+    refusals.check_unit(scale, refusals.UNIT_RATIOS if isinstance(prior, KnownNorm) else refusals.ANGLE_UNIT_RATIOS)
 
 
 def _conditioning(scaled: Array, m: Array, v: Array, needed: int) -> refusals.Conditioning:
@@ -239,7 +239,7 @@ def _conditioning(scaled: Array, m: Array, v: Array, needed: int) -> refusals.Co
 
 def _errors_in_x(m: Array, v: Array, method: Method) -> tuple[str, ...]:
     """Return a warning if noise in X biases the published estimate by more than its standard deviation."""
-    if method != "as_published" or len(m) * v.mean() < NOTICEABLE**2 * np.mean(m**2):
+    if method != "as_published" or len(m) * v.mean() < MIN_NOISE_BIAS_RATIO**2 * np.mean(m**2):
         return ()
     return ("noise in the readings biases the published estimate; maximum_likelihood does not suffer from it",)
 
@@ -257,12 +257,12 @@ def check_trustworthy(error_rad: float, furthest: Callable[[], tuple[int, float,
     attitude, its error in rad relative to the others, and the others' error.
     """
     message = f"the readings show that each attitude is off by {1e3 * error_rad:.2g} mrad"
-    if error_rad > SUSPICIOUS_RAD and enough:
+    if error_rad > SUSPICIOUS_ERROR_RAD and enough:
         worst, worst_rad, expected = furthest()
-        if worst_rad > max(UNTRUSTWORTHY_RAD, OUTLIER * expected):
+        if worst_rad > max(MAX_ATTITUDE_ERROR_RAD, OUTLIER_RATIO * expected):
             error_rad = worst_rad
             by_others = f"but the others by {1e3 * expected:.2g} mrad"
             message = f"attitude {worst + 1} is off by {1e3 * worst_rad:.2g} mrad, {by_others}"
-    if error_rad > UNTRUSTWORTHY_RAD:
-        limit = f"the limit is {1e3 * UNTRUSTWORTHY_RAD:.0f} mrad"
-        raise refusals.untrustworthy_attitudes(f"{message}; {limit}", BY_GYROSCOPE)
+    if error_rad > MAX_ATTITUDE_ERROR_RAD:
+        limit = f"the limit is {1e3 * MAX_ATTITUDE_ERROR_RAD:.0f} mrad"
+        raise refusals.untrustworthy_attitudes(f"{message}; {limit}", GYROSCOPE_REMEDY)

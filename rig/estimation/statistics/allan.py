@@ -26,14 +26,14 @@ Noise = Literal["white", "flicker", "random_walk"]
 COVERAGE = 0.95  # probability of the confidence intervals
 # Averaging time at which random walk is read: beyond the sensor's filter, before its bias drifts.
 RANDOM_WALK_TAU_S = 1.0
-RANDOM_WALK_STD = 0.1  # largest relative standard deviation of a random walk that is stated
-SLOPE_ALLOWED = 0.05  # allowed deviation of the slope from −1/2 in addition to its uncertainty: an error of N by 5 %
-INSTABILITY_STD = 0.2
-FLICKER = float(np.sqrt(2 * np.log(2) / np.pi))  # 0.664: ratio of the least σ to the bias instability
-BEYOND = 3.0  # standard deviations by which the least σ must exceed that of white noise alone
-FEWEST = 3  # fewest readings of an interval
-ENOUGH_S = 40.0  # duration from which on white noise determines a random walk to `RANDOM_WALK_STD`
-ENOUGH_FOR_A_FLOOR_S = 600.0  # few gyroscopes reach their least deviation sooner
+MAX_RANDOM_WALK_STD = 0.1  # relative, of a random walk that is stated
+SLOPE_TOLERANCE = 0.05  # deviation from −1/2 in addition to the slope's uncertainty: an error of N by 5 %
+MAX_INSTABILITY_STD = 0.2
+FLICKER_RATIO = float(np.sqrt(2 * np.log(2) / np.pi))  # 0.664: ratio of the least σ to the bias instability
+MIN_EXCESS_STDS = 3.0  # by which the least σ must exceed that of white noise alone
+MIN_READINGS = 3  # of an interval
+MIN_DURATION_S = 40.0  # from which on white noise determines a random walk to `MAX_RANDOM_WALK_STD`
+MIN_FLOOR_DURATION_S = 600.0  # few gyroscopes reach their least deviation sooner
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,9 +81,9 @@ def allan_curve(stretches: Sequence[Array], interval_s: float) -> AllanCurve:
     τ takes values near powers of two, including 1 s. Raise Fault `not_finite`, and `recording_too_short` if no interval
     has three readings.
     """
-    used = [np.asarray(stretch, dtype=np.float64) for stretch in stretches if len(stretch) >= FEWEST]
+    used = [np.asarray(stretch, dtype=np.float64) for stretch in stretches if len(stretch) >= MIN_READINGS]
     if not used:
-        raise too_short(f"no interval at rest has {FEWEST} readings without a gap")
+        raise too_short(f"no interval at rest has {MIN_READINGS} readings without a gap")
     for stretch in used:
         check_finite(readings=stretch)
     phases = [np.vstack([np.zeros(3), np.cumsum(stretch - stretch.mean(axis=0), axis=0)]) for stretch in used]
@@ -109,7 +109,7 @@ def read_axis(curve: AllanCurve, axis: int) -> AllanAxis:
     return AllanAxis(walk, _instability(curve, axis, walk))
 
 
-def too_short(what: str, enough_s: float = ENOUGH_S) -> Fault:
+def too_short(what: str, enough_s: float = MIN_DURATION_S) -> Fault:
     """Return the error for a recording too short for a value; about `enough_s` would suffice."""
     return Fault("recording_too_short", what, f"Record at rest for {enough_s:.0f} s or more without interruption")
 
@@ -177,15 +177,15 @@ def _random_walk(curve: AllanCurve, axis: int) -> AllanReading | Fault:
     tau_s, relative_std = float(curve.tau_s[index]), float(curve.relative_std[index, axis])
     if abs(tau_s - RANDOM_WALK_TAU_S) > RANDOM_WALK_TAU_S / 2:
         what = f"no interval at rest reaches {RANDOM_WALK_TAU_S:g} s, the averaging time at which random walk is read"
-        if curve.total_s >= ENOUGH_S:
+        if curve.total_s >= MIN_DURATION_S:
             what = f"readings are missing so often that {what}"
             return Fault("lost_samples", what, "See that the sensor's link loses nothing, and record again")
         return too_short(what)
-    if relative_std > RANDOM_WALK_STD:
+    if relative_std > MAX_RANDOM_WALK_STD:
         worst = float(curve.relative_std[index].max())  # one sentence for all axes
         return too_short(
-            f"random walk would be known to {100 * worst:.0f} %; the limit is {100 * RANDOM_WALK_STD:.0f} %",
-            max(ENOUGH_S, curve.total_s * (worst / RANDOM_WALK_STD) ** 2),
+            f"random walk would be known to {100 * worst:.0f} %; the limit is {100 * MAX_RANDOM_WALK_STD:.0f} %",
+            max(MIN_DURATION_S, curve.total_s * (worst / MAX_RANDOM_WALK_STD) ** 2),
         )
     # A factor of about two to either side, so that the slope does not depend on one point.
     below, above = (int(np.argmin(np.abs(np.log(curve.tau_s / (tau_s * by))))) for by in (0.5, 2.0))
@@ -194,7 +194,7 @@ def _random_walk(curve: AllanCurve, axis: int) -> AllanReading | Fault:
     run = np.log(curve.tau_s[above] / curve.tau_s[below])
     slope = float(np.log(curve.deviation[above, axis] / curve.deviation[below, axis]) / run)
     slope_std = float(np.hypot(*curve.relative_std[[below, above], axis]) / run)
-    if abs(slope + 0.5) > SLOPE_ALLOWED + 3 * slope_std:
+    if abs(slope + 0.5) > SLOPE_TOLERANCE + 3 * slope_std:
         return Fault(
             "not_white_noise",
             f"at {tau_s:.2g} s the deviation changes with the power {slope:+.2f} of τ, not −0.5",
@@ -208,9 +208,9 @@ def _random_walk(curve: AllanCurve, axis: int) -> AllanReading | Fault:
 def _instability(curve: AllanCurve, axis: int, walk: AllanReading | Fault) -> AllanReading | Fault:
     """Return B from the minimum of σ, if that lies in the well-determined part of the curve."""
     relative_std = curve.relative_std[:, axis]
-    usable = np.flatnonzero(relative_std <= INSTABILITY_STD)
+    usable = np.flatnonzero(relative_std <= MAX_INSTABILITY_STD)
     if not len(usable):
-        return too_short(f"no point of the curve is known to {100 * INSTABILITY_STD:.0f} %", ENOUGH_FOR_A_FLOOR_S)
+        return too_short(f"no point of the curve is known to {100 * MAX_INSTABILITY_STD:.0f} %", MIN_FLOOR_DURATION_S)
     last = int(usable[-1])
     least = int(usable[np.argmin(curve.deviation[usable, axis])])
     tau_s, deviation = float(curve.tau_s[least]), float(curve.deviation[least, axis])
@@ -221,10 +221,10 @@ def _instability(curve: AllanCurve, axis: int, walk: AllanReading | Fault) -> Al
             "Look at the curve: something moves or vibrates, or the readings are filtered over that time",
         )
     by_noise = walk.value / np.sqrt(tau_s) if isinstance(walk, AllanReading) else 0.0
-    if least == last or deviation < by_noise * (1 + BEYOND * relative_std[least]):
+    if least == last or deviation < by_noise * (1 + MIN_EXCESS_STDS * relative_std[least]):
         return too_short(
             f"the deviation still falls at {curve.tau_s[last]:.3g} s, the longest known to "
-            f"{100 * INSTABILITY_STD:.0f} %",
-            max(ENOUGH_FOR_A_FLOOR_S, 2 * curve.total_s),
+            f"{100 * MAX_INSTABILITY_STD:.0f} %",
+            max(MIN_FLOOR_DURATION_S, 2 * curve.total_s),
         )
-    return AllanReading(deviation / FLICKER, deviation / FLICKER * float(relative_std[least]), tau_s)
+    return AllanReading(deviation / FLICKER_RATIO, deviation / FLICKER_RATIO * float(relative_std[least]), tau_s)

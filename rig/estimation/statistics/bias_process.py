@@ -15,11 +15,11 @@ from numpy.typing import ArrayLike
 
 from rig.estimation.arrays import Array
 
-STEPS = 25  # grid points of each standard deviation
-PRICE = 1.0  # cost of a parameter in the log-likelihood (Akaike, IEEE Trans. Autom. Control 19 (1974) 716)
-SPAN = 300.0  # ratio of the largest to the smallest standard deviation of the grid
-PARTS = 24  # parts of a revolution, whose means give the harmonics of flicker noise to 1 %
-CHANGED = float(np.sqrt(2))  # change by flicker between adjacent means, relative to its Allan deviation
+GRID_POINTS = 25  # of each standard deviation
+PARAMETER_COST = 1.0  # in the log-likelihood (Akaike, IEEE Trans. Autom. Control 19 (1974) 716)
+GRID_RATIO = 300.0  # of the largest to the smallest standard deviation of the grid
+REVOLUTION_PARTS = 24  # whose means give the harmonics of flicker noise to 1 %
+FLICKER_CHANGE_RATIO = float(np.sqrt(2))  # change by flicker between adjacent means, relative to its Allan deviation
 
 # Random walk and scatter (2,) from pairs of sizes (K, 2) and their log-likelihoods (K,).
 Chosen = Callable[[Array, Array], Array]
@@ -55,7 +55,7 @@ class BiasProcess:
 
     def drift_std_rad_s(self, duration_s: float) -> float:
         """Return the standard deviation of the change of the bias in `duration_s`."""
-        flickered_rad_s = CHANGED * self.instability_rad_s
+        flickered_rad_s = FLICKER_CHANGE_RATIO * self.instability_rad_s
         return float(
             np.hypot(self.walk_rad_s_sqrt_s * np.sqrt(duration_s), np.hypot(self.scatter_rad_s, flickered_rad_s))
         )
@@ -97,9 +97,9 @@ def flicker_harmonic_covariance() -> Array:
     It does not depend on the revolution's duration, except for the mean's variance, which is 0 here: see
     `flicker_covariance`.
     """
-    ends = np.linspace(0, 1, PARTS + 1)
+    ends = np.linspace(0, 1, REVOLUTION_PARTS + 1)
     angle_rad = np.pi * (ends[:-1] + ends[1:])
-    waves = np.stack([np.ones(PARTS), 2 * np.cos(angle_rad), 2 * np.sin(angle_rad)]) / PARTS
+    waves = np.stack([np.ones(REVOLUTION_PARTS), 2 * np.cos(angle_rad), 2 * np.sin(angle_rad)]) / REVOLUTION_PARTS
     covariance: Array = waves @ _flicker_means(np.stack([ends[:-1], ends[1:]], axis=1)) @ waves.T
     covariance[0, 0] = 0.0
     return covariance
@@ -139,7 +139,7 @@ def average_posterior(sizes: Array, likelihood: Array) -> Array:
     would by chance be far too small in one run and too large in another (Mitchell and Beauchamp, J. Am. Stat. Assoc. 83
     (1988) 1023).
     """
-    log_posterior = likelihood - np.log(STEPS) * np.count_nonzero(sizes, axis=1)
+    log_posterior = likelihood - np.log(GRID_POINTS) * np.count_nonzero(sizes, axis=1)
     weights = np.exp(log_posterior - log_posterior.max())
     return np.asarray(np.sqrt(weights @ sizes**2 / weights.sum()), dtype=np.float64)
 
@@ -152,7 +152,7 @@ def average_walks(sizes: Array, likelihood: Array) -> Array:
     exist, with a uniform prior (Gelman, Bayesian Analysis 1 (2006) 515), and the covariance is the posterior mean.
     Sizes are on a geometric grid, so a size's prior is proportional to the step to the next.
     """
-    log_posterior = likelihood - np.log(STEPS) * np.count_nonzero(sizes[:, 1:], axis=1)
+    log_posterior = likelihood - np.log(GRID_POINTS) * np.count_nonzero(sizes[:, 1:], axis=1)
     weights = sizes[:, 0] * np.exp(log_posterior - log_posterior.max())
     return np.asarray(np.sqrt(weights @ sizes**2 / weights.sum()), dtype=np.float64)
 
@@ -162,7 +162,7 @@ def select_by_akaike(sizes: Array, likelihood: Array) -> Array:
 
     There is no random walk if noise alone explains the averages.
     """
-    return np.asarray(sizes[np.argmax(likelihood - PRICE * np.count_nonzero(sizes, axis=1))], dtype=np.float64)
+    return np.asarray(sizes[np.argmax(likelihood - PARAMETER_COST * np.count_nonzero(sizes, axis=1))], dtype=np.float64)
 
 
 def bias_process(
@@ -190,7 +190,7 @@ def bias_process(
     unit = walk_covariance(windows_s)
     flicker = _flicker(instability_rad_s, windows_s) if instability_rad_s else np.zeros(unit.shape)
     typical = float(np.median(variances))
-    grid = np.concatenate([[0.0], typical * np.geomspace(SPAN**-0.5, SPAN, STEPS) ** 2])
+    grid = np.concatenate([[0.0], typical * np.geomspace(GRID_RATIO**-0.5, GRID_RATIO, GRID_POINTS) ** 2])
     walks = grid / float(np.median(np.diag(unit)))
     squares = np.array([(walk, scatter) for walk in walks for scatter in grid])
     likelihood = np.zeros(len(squares))

@@ -16,7 +16,7 @@ from rig.estimation.arrays import Array
 COVERAGE_FACTOR = 2.0  # for ν → ∞, and if ν is not given
 PROBABILITY = math.erf(COVERAGE_FACTOR / math.sqrt(2))
 ELLIPSOID_PROBABILITY = 0.95
-ROUNDING = 1e-9  # tolerance of ν, which would be an integer without rounding
+DOF_TOLERANCE = 1e-9  # ν would be an integer without rounding
 
 
 def coverage_factors(dof: ArrayLike) -> Array:
@@ -107,5 +107,5 @@ def effective_dof(variances: ArrayLike, dof: ArrayLike) -> Array:
 
 def _round_down(dof: ArrayLike) -> Array:
     """Return ν as tabulated: the next lower whole number (JCGM 100, G.6.4), at least one."""
-    rounded: Array = np.floor(np.maximum(np.asarray(dof, dtype=np.float64) * (1 + ROUNDING), 1.0))
+    rounded: Array = np.floor(np.maximum(np.asarray(dof, dtype=np.float64) * (1 + DOF_TOLERANCE), 1.0))
     return rounded

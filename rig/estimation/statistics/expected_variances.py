@@ -13,14 +13,14 @@ import numpy as np
 
 from rig.estimation.arrays import Array
 
-WALKS = 12  # grid points of the random walk
-SPAN = 100.0  # ratio of the largest to the smallest random walk
+WALK_POINTS = 12
+WALK_SPAN = 100.0  # ratio of the largest to the smallest random walk
 # grid of δ: ends, the first better than any arm, and number of points
-SMALLEST_RAD, LARGEST_RAD, SIZES = 1e-5, 0.03, 25
+MIN_ERROR_RAD, MAX_ERROR_RAD, ERROR_GRID_POINTS = 1e-5, 0.03, 25
 
-OWN_SHARES = (0.001, 0.01, 0.1, 0.5)  # fractions of δ²: between nearly all and half of an arm's errors may be constant
+INDEPENDENT_FRACTIONS = (0.001, 0.01, 0.1, 0.5)  # of δ²: between nearly all and half of an arm's errors may be constant
 # grid of a disturbance's size: the largest, in standard deviations of the noise, and the number of points
-LOUDEST, VOLUMES = 30.0, 8
+MAX_DISTURBANCE_RATIO, DISTURBANCE_GRID_POINTS = 30.0, 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,8 +62,8 @@ def estimate_variances(fit: ResidualInputs, shares: Sequence[float]) -> ErrorSiz
     """
     constant = np.diag(fit.walk) > 0
     typical = np.sqrt(np.median(fit.noise[constant]) / np.median(np.diag(fit.walk)[constant]))
-    walks = np.concatenate([[0.0], typical * np.geomspace(SPAN**-0.5, SPAN**0.5, WALKS)])
-    sizes = np.geomspace(SMALLEST_RAD, LARGEST_RAD, SIZES)
+    walks = np.concatenate([[0.0], typical * np.geomspace(WALK_SPAN**-0.5, WALK_SPAN**0.5, WALK_POINTS)])
+    sizes = np.geomspace(MIN_ERROR_RAD, MAX_ERROR_RAD, ERROR_GRID_POINTS)
     columns = fit.slopes.shape[1]
     free = np.linalg.qr(fit.slopes, mode="complete")[0][:, columns:].T  # contrasts, free of the columns
     residuals, covariance, walk = (free @ fit.residuals, free @ fit.covariance @ free.T, free @ fit.walk @ free.T)
@@ -72,7 +72,7 @@ def estimate_variances(fit: ResidualInputs, shares: Sequence[float]) -> ErrorSiz
     log_posterior = np.array(
         [[_find_likelihoods(residuals, whitener, effects, sizes) for whitener in whiteners] for effects in of_arm]
     )
-    log_posterior[:, 1:] -= np.log(WALKS)
+    log_posterior[:, 1:] -= np.log(WALK_POINTS)
     weights = np.exp(log_posterior - log_posterior.max())
     weights /= weights.sum()
     walk_square, attitude_square = weights.sum(axis=(0, 2)) @ walks**2, weights.sum(axis=1) @ sizes**2
@@ -92,8 +92,8 @@ def estimate_disturbances(
     basis = np.linalg.qr(whitener @ fit.slopes)[0]
     residuals = whitener @ fit.residuals
     residuals = residuals - basis @ (basis.T @ residuals)
-    volumes = np.geomspace(1.0, LOUDEST, VOLUMES) ** 2
-    log_posterior = np.zeros((len(causes), VOLUMES))
+    volumes = np.geomspace(1.0, MAX_DISTURBANCE_RATIO, DISTURBANCE_GRID_POINTS) ** 2
+    log_posterior = np.zeros((len(causes), DISTURBANCE_GRID_POINTS))
     for row, columns in enumerate(causes):
         projected = whitener @ columns
         projected = projected - basis @ (basis.T @ projected)
@@ -101,7 +101,7 @@ def estimate_disturbances(
         components = np.square(directions.T @ (projected.T @ residuals))
         grown = 1 + volumes[:, None] * growth.clip(min=0.0)
         log_likelihood = 0.5 * np.sum(volumes[:, None] * components / grown - np.log(grown), axis=1)
-        log_posterior[row] = np.log(odds[row] / VOLUMES) + log_likelihood
+        log_posterior[row] = np.log(odds[row] / DISTURBANCE_GRID_POINTS) + log_likelihood
     most = max(float(log_posterior.max()), 0.0)
     weights = np.exp(log_posterior - most)
     expected: Array = weights @ volumes / (weights.sum() + np.exp(-most))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rig.estimation.arrays import Array
 
-ALIKE = 1e-2  # unit columns whose difference is smaller are collinear
+TOLERANCE = 1e-2  # unit columns whose difference is smaller are collinear
 
 
 def mean_weights(groups: Array, nuisance: Array) -> Array:
@@ -27,7 +27,7 @@ def mean_weights(groups: Array, nuisance: Array) -> Array:
     sizes = np.linalg.norm(nuisance, axis=0)
     sizes = np.where(sizes > 0, sizes, np.inf)
     within = (nuisance - groups @ means) / sizes
-    inverse = np.linalg.pinv(within.T @ within, rcond=ALIKE**2, hermitian=True)
+    inverse = np.linalg.pinv(within.T @ within, rcond=TOLERANCE**2, hermitian=True)
     weights: Array = averages - (means / sizes) @ (inverse @ within.T)
     return weights
 

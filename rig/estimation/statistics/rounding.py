@@ -13,17 +13,17 @@ from numpy.typing import NDArray
 
 from rig.estimation.arrays import Array
 
-FEWEST_LEVELS = 3  # fewest different readings of an axis that is not constant
-OCCUPIED = 0.01  # fraction of readings beyond the two most frequent values, from which on they determine the noise
+MIN_LEVELS = 3  # different readings of an axis that is not constant
+MIN_OTHER_FRACTION = 0.01  # of readings beyond the two most frequent values, from which on they determine the noise
 # Fewest occurrences of a repeated value; least fraction of readings with repeated values that shows steps.
-REPEATED, REPEATED_FRACTION = 3, 0.25
-LARGE_NOISE = 4.0  # noise in steps, from which on all rounding averages out
-MOST_READINGS = 20_000  # readings used to find the steps
-SAME = 1e-3  # fraction of a step: values closer than this are equal
-A_QUARTER = 0.25  # tolerance in steps for whole and half-way values: they are half a step apart
-NEAR = 0.2  # largest relative change of the unit by the source's scale factor
-FEWEST_TO_TELL_ZERO = 8  # fewest different values that determine which of them is zero
-ALIKE = 0.5  # least length of the mean of unit vectors that have one direction
+MIN_REPEATS, MIN_REPEATED_FRACTION = 3, 0.25
+LARGE_NOISE_STEPS = 4.0  # from which on all rounding averages out
+MAX_READINGS = 20_000  # readings used to find the steps
+SAME_VALUE_STEPS = 1e-3  # values closer than this are equal
+HALF_STEP_TOLERANCE = 0.25  # in steps: whole and half-way values are half a step apart
+MAX_UNIT_CHANGE = 0.2  # relative, by the source's scale factor
+MIN_ZERO_VALUES = 8  # different values that determine which of them is zero
+MIN_MEAN_LENGTH = 0.5  # of unit vectors that have one direction
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +63,7 @@ class Steps:
         if not np.isfinite(zero):
             return np.ones(len(readings), dtype=np.bool_)
         beyond = readings / self.units[axis] - zero
-        result: NDArray[np.bool_] = np.abs(beyond - np.rint(beyond)) < A_QUARTER
+        result: NDArray[np.bool_] = np.abs(beyond - np.rint(beyond)) < HALF_STEP_TOLERANCE
         return result
 
 
@@ -74,13 +74,13 @@ def cut_steps(readings: Array, unit: float) -> Steps:
     lie half a unit off the integers relative to zero, which shows where zero is.
     """
     steps = find_steps(readings)
-    units = np.where(np.abs(steps / unit - 1) < NEAR, steps, unit)
+    units = np.where(np.abs(steps / unit - 1) < MAX_UNIT_CHANGE, steps, unit)
     zero = np.full(3, np.nan)
     for axis in range(3):
         levels = np.unique(readings[:, axis]) / units[axis]
-        if len(levels) >= FEWEST_TO_TELL_ZERO:
+        if len(levels) >= MIN_ZERO_VALUES:
             halves = np.mean(np.exp(2j * np.pi * levels))
-            zero[axis] = float(np.angle(halves) / (2 * np.pi)) + 0.5 if abs(halves) > ALIKE else np.nan
+            zero[axis] = float(np.angle(halves) / (2 * np.pi)) + 0.5 if abs(halves) > MIN_MEAN_LENGTH else np.nan
     return Steps(units, cut=True, zero=zero)
 
 
@@ -90,9 +90,9 @@ def find_steps(readings: Array) -> Array:
     If noise is much larger than a step, hardly any number repeats: steps cannot be found and do not matter. A nearly
     constant axis shows too few numbers, and gets the steps of the others.
     """
-    stride = max(len(readings) // MOST_READINGS, 1)
+    stride = max(len(readings) // MAX_READINGS, 1)
     units = np.array([_find_unit(axis) for axis in readings[::stride].T])
-    still = np.array([len(np.unique(axis)) < FEWEST_LEVELS for axis in readings[::stride].T])
+    still = np.array([len(np.unique(axis)) < MIN_LEVELS for axis in readings[::stride].T])
     return np.where(still, np.maximum(units, units.max()), units)
 
 
@@ -104,11 +104,11 @@ def bound_rounding_variance(readings: Array, steps: Steps, smooth: Array, scatte
     determine their noise, which may be zero.
     """
     units = steps.units
-    coarse, bounds = np.flatnonzero((units > 0) & (scatter <= (LARGE_NOISE * units) ** 2)), np.zeros(3)
+    coarse, bounds = np.flatnonzero((units > 0) & (scatter <= (LARGE_NOISE_STEPS * units) ** 2)), np.zeros(3)
     widths = steps.widths(readings) if len(coarse) else units
     for axis in coarse.tolist():
         shares = np.sort(_count_fractions(readings[:, axis], units[axis]))
-        if shares[:-2].sum() < OCCUPIED:
+        if shares[:-2].sum() < MIN_OTHER_FRACTION:
             # Readings change from one value to the next half-way between them. A mean of p times one value and 1 - p
             # times the other errs by less than p - 1/2 of a step; if there is only one value, by at most half a step.
             half = 0.5 if widths[axis] > units[axis] else float(shares[-1]) - 0.5
@@ -126,8 +126,8 @@ def bound_rounding_variance(readings: Array, steps: Steps, smooth: Array, scatte
 def _find_unit(axis: Array) -> float:
     """Return the median distance between adjacent repeated numbers of readings (n,); zero if few numbers repeat."""
     values, often = np.unique(axis, return_counts=True)
-    values, often = values[often >= REPEATED], often[often >= REPEATED]
-    if len(values) < FEWEST_LEVELS or often.sum() < REPEATED_FRACTION * len(axis):
+    values, often = values[often >= MIN_REPEATS], often[often >= MIN_REPEATS]
+    if len(values) < MIN_LEVELS or often.sum() < MIN_REPEATED_FRACTION * len(axis):
         return 0.0
     gaps, weights = np.diff(values), np.minimum(often[:-1], often[1:])
     order = np.argsort(gaps)
@@ -137,7 +137,7 @@ def _find_unit(axis: Array) -> float:
 
 def _count_fractions(axis: Array, unit: float) -> Array:
     """Return the fraction of readings (n,) at each distinct value."""
-    values, often = np.unique(np.rint(axis / (SAME * unit)), return_counts=True)
+    values, often = np.unique(np.rint(axis / (SAME_VALUE_STEPS * unit)), return_counts=True)
     first = np.flatnonzero(np.diff(values, prepend=-np.inf) > 2)  # a record's rounding changes no value by more
     shares: Array = np.add.reduceat(often, first) / len(axis)
     return shares
@@ -154,6 +154,6 @@ def _bound_zero_error(steps: Steps, axis: int, readings: Array) -> float:
     if zeros.all():
         return float(3**-0.5)
     units = (readings - np.median(readings[zeros])) / steps.units[axis]
-    lower, upper = (int(np.count_nonzero(np.abs(units - side * 1.5) < A_QUARTER)) for side in (-1, 1))
+    lower, upper = (int(np.count_nonzero(np.abs(units - side * 1.5) < HALF_STEP_TOLERANCE)) for side in (-1, 1))
     slope = abs(float(np.log((upper + 0.5) / (lower + 0.5)))) / 3
     return float(np.mean(zeros)) * min(slope / 3, float(3**-0.5))

@@ -22,18 +22,18 @@ if TYPE_CHECKING:
     from scipy.optimize import OptimizeResult
 
 # Samples of a round of importance sampling, rounds, and degrees of freedom of the proposal, a t distribution.
-DRAWS, ROUNDS, TAILS = 40, 3, 5.0
-FLOOR, LEAST_POWER = 0.02, 0.05  # least variance of a proposal; least power of the tempered weights
-STEP = 0.1  # step of ln σ, for the curvature at the maximum
-LEAST_CURVATURE = 0.1  # least curvature of the negative log-posterior over ln σ: about that of the priors
-TOLERANCE, MOST_STEPS = 1e-2, 100  # largest gradient of the log-posterior at a maximum; most Newton steps
-LONGEST_STEP = 4.0  # longest step of ln σ
-BEYOND, APART = 3.5, 2.0  # starting points of ln σ: one cause above the median of its prior, all others below theirs
-FEW = 240  # residuals: with more of them there is only one maximum
+SAMPLES, SAMPLING_ROUNDS, T_DOF = 40, 3, 5.0
+MIN_PROPOSAL_VARIANCE, MIN_WEIGHT_POWER = 0.02, 0.05  # power of the tempered weights
+CURVATURE_STEP = 0.1  # of ln σ, at the maximum
+MIN_CURVATURE = 0.1  # of the negative log-posterior over ln σ: about that of the priors
+GRADIENT_TOLERANCE, MAX_NEWTON_STEPS = 1e-2, 100  # of the log-posterior at a maximum
+MAX_STEP = 4.0  # of ln σ
+RISE, DROP = 3.5, 2.0  # starting points of ln σ: one cause above the median of its prior, all others below theirs
+SINGLE_MAXIMUM_RESIDUALS = 240  # with more of them there is only one maximum
 # Least distance of two maxima in ln σ; a maximum lower than the greatest by more than this is ignored.
-DISTINCT, NEGLIGIBLE = 1.0, 5.0
+MIN_MAXIMUM_DISTANCE, NEGLIGIBLE_DROP = 1.0, 5.0
 FIRST_STEPS = 6  # Newton steps from each starting point: only the likely ones are continued
-UNLIKELY = 1e30  # negative log-posterior if it cannot be computed
+FAILED_LOG_POSTERIOR = 1e30  # negative, if it cannot be computed
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,25 +101,25 @@ class MixedModel:
 
         With few residuals there may be several maxima, at which different causes explain the largest residuals. Without
         a `start` the search begins at the priors' medians and at points where one cause exceeds all others. Maxima less
-        probable than the first by more than `NEGLIGIBLE` are left out.
+        probable than the first by more than `NEGLIGIBLE_DROP` are left out.
         """
         if start is not None:
             return np.exp([self._climb(np.log(start)).x])
         middle = np.log(self.mixed.scales)
-        if len(self.mixed.observed) > FEW:
+        if len(self.mixed.observed) > SINGLE_MAXIMUM_RESIDUALS:
             return np.exp([self._climb(middle).x])
-        begun = [self._climb(middle - APART + step, FIRST_STEPS) for step in (BEYOND + APART) * np.eye(len(middle))]
-        likely = min(optimum.fun for optimum in begun) + 2 * NEGLIGIBLE  # most of them are nearly at a maximum
+        begun = [self._climb(middle - DROP + step, FIRST_STEPS) for step in (RISE + DROP) * np.eye(len(middle))]
+        likely = min(optimum.fun for optimum in begun) + 2 * NEGLIGIBLE_DROP  # most of them are nearly at a maximum
         optima = [self._climb(point) for point in (middle, *(begin.x for begin in begun if begin.fun < likely))]
         optima.sort(key=lambda optimum: float(optimum.fun))
         distinct: list[Array] = []
         for optimum in optima:
-            is_new = all(np.abs(optimum.x - other).max() > DISTINCT for other in distinct)
-            if is_new and optimum.fun < optima[0].fun + NEGLIGIBLE:
+            is_new = all(np.abs(optimum.x - other).max() > MIN_MAXIMUM_DISTANCE for other in distinct)
+            if is_new and optimum.fun < optima[0].fun + NEGLIGIBLE_DROP:
                 distinct.append(optimum.x)
         return np.exp(distinct)
 
-    def _climb(self, logarithms: Array, most_steps: int = MOST_STEPS) -> "OptimizeResult":
+    def _climb(self, logarithms: Array, most_steps: int = MAX_NEWTON_STEPS) -> "OptimizeResult":
         """Return the maximum of the posterior of ln σ (k,) near a point.
 
         Newton's method in a trust region, whose curvature is the average information (Gilmour, Thompson and Cullis,
@@ -132,7 +132,7 @@ class MixedModel:
             "method": "trust-exact",
             "jac": True,
             "hess": lambda point: self._evaluate(point)[2],
-            "options": {"gtol": TOLERANCE, "maxiter": most_steps, "max_trust_radius": LONGEST_STEP},
+            "options": {"gtol": GRADIENT_TOLERANCE, "maxiter": most_steps, "max_trust_radius": MAX_STEP},
         }
         optimum: OptimizeResult = minimize(x0=logarithms, **newton)
         return optimum
@@ -214,7 +214,7 @@ class MixedModel:
         try:
             lower, _, _, information, likelihood = self._whiten(np.exp(logarithms))
         except np.linalg.LinAlgError:  # ratios so large that rounding dominates
-            return UNLIKELY, np.zeros(len(logarithms)), np.eye(len(logarithms))
+            return FAILED_LOG_POSTERIOR, np.zeros(len(logarithms)), np.eye(len(logarithms))
         projected, innovation = self._project(lower, information)
         squares = np.exp(2 * logarithms)
         shape = np.tanh(logarithms - np.log(self.mixed.scales))
@@ -228,9 +228,10 @@ class MixedModel:
 
     def _curvature(self, logarithms: Array) -> Array:
         """Return the curvature (k, k) of the negative log-posterior."""
-        steps = STEP * np.eye(len(logarithms))
+        steps = CURVATURE_STEP * np.eye(len(logarithms))
         rows = [
-            (self._evaluate(logarithms + step)[1] - self._evaluate(logarithms - step)[1]) / (2 * STEP) for step in steps
+            (self._evaluate(logarithms + step)[1] - self._evaluate(logarithms - step)[1]) / (2 * CURVATURE_STEP)
+            for step in steps
         ]
         return np.asarray((np.array(rows) + np.array(rows).T) / 2, dtype=np.float64)
 
@@ -249,10 +250,12 @@ def sample_adaptively(log_density: Callable[[Array], float], begins: Sequence[tu
     for middle, curvature in begins:
         first_sample, first_proposal = len(points), len(proposals)
         values, directions = np.linalg.eigh(curvature)
-        proposal = (middle, directions / np.sqrt(np.maximum(values, LEAST_CURVATURE)))
-        for _ in range(ROUNDS):
+        proposal = (middle, directions / np.sqrt(np.maximum(values, MIN_CURVATURE)))
+        for _ in range(SAMPLING_ROUNDS):
             proposals.append(proposal)
-            normal = rng.standard_normal((DRAWS // 2, size)) * np.sqrt(TAILS / rng.chisquare(TAILS, (DRAWS // 2, 1)))
+            normal = rng.standard_normal((SAMPLES // 2, size)) * np.sqrt(
+                T_DOF / rng.chisquare(T_DOF, (SAMPLES // 2, 1))
+            )
             drawn = proposal[0] + np.concatenate([normal, -normal]) @ proposal[1].T
             points = np.concatenate([points, drawn])
             logs = np.concatenate([logs, [log_density(point) for point in drawn]])
@@ -265,7 +268,7 @@ def _adapt(points: Array, logs: Array, proposals: Sequence[tuple[Array, Array]])
     tempered = _temper(_find_weights(points, logs, proposals), 2 * points.shape[1])
     mean = tempered @ points
     deviations = points - mean
-    spread = (deviations * tempered[:, None]).T @ deviations + FLOOR * np.eye(len(mean))
+    spread = (deviations * tempered[:, None]).T @ deviations + MIN_PROPOSAL_VARIANCE * np.eye(len(mean))
     return mean, np.asarray(np.linalg.cholesky(spread), dtype=np.float64)
 
 
@@ -275,8 +278,8 @@ def _find_weights(points: Array, logs: Array, proposals: Sequence[tuple[Array, A
     for middle, root in proposals:
         standard = np.linalg.solve(root, (points - middle).T)
         squares = np.sum(standard**2, axis=0)
-        tail = (TAILS + len(middle)) / 2
-        densities.append(-np.linalg.slogdet(root)[1] - tail * np.log1p(squares / TAILS))
+        tail = (T_DOF + len(middle)) / 2
+        densities.append(-np.linalg.slogdet(root)[1] - tail * np.log1p(squares / T_DOF))
     weights = logs - np.logaddexp.reduce(densities, axis=0)
     weights = np.exp(weights - weights.max())
     return np.asarray(weights / weights.sum(), dtype=np.float64)
@@ -286,7 +289,7 @@ def _temper(weights: Array, fewest: float) -> Array:
     """Return the weights (s,) raised to a power ≤ 1 that makes the effective number of samples at least `fewest`."""
     power = 1.0
     tempered = weights
-    while 1 / float(np.sum(tempered**2)) < fewest and power > LEAST_POWER:
+    while 1 / float(np.sum(tempered**2)) < fewest and power > MIN_WEIGHT_POWER:
         power *= 0.8
         tempered = weights**power / np.sum(weights**power)
     return tempered

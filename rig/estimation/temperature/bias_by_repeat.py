@@ -17,7 +17,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.refusals import check_count, check_finite, check_variances, require_shape
 from rig.estimation.statistics.coverage import false_alarm_of_each
 
-FALSE_ALARM = 0.02  # probability for a run whose bias is steady
+FALSE_ALARM_PROBABILITY = 0.02  # for a run whose bias is steady
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,7 +118,7 @@ def _find_steps(bias: Array, std: Array, start: int, end: int, candidates: int) 
     """Yield the steps of the bias from `start` to `end`, in a run with `candidates` possible steps."""
     from scipy.special import ndtri
 
-    sure = -float(ndtri(false_alarm_of_each(FALSE_ALARM, 2 * 3 * candidates)))
+    sure = -float(ndtri(false_alarm_of_each(FALSE_ALARM_PROBABILITY, 2 * 3 * candidates)))
     best, largest = None, sure
     for first in range(start + 1, end):
         before, after = _mean(bias[start:first], std[start:first]), _mean(bias[first:end], std[first:end])

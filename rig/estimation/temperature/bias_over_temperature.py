@@ -15,7 +15,7 @@ from rig.estimation.refusals import check_count
 
 MIN_RANGE_C = 3.0
 MAX_CORRELATION = 0.9  # correlation of temperature and time, beyond which it more than doubles the slope's σ
-FEWEST = 4  # fewest repeats, for three parameters
+MIN_REPEATS = 4  # for three parameters
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +39,7 @@ def bias_over_temperature(bias: Array, std: Array, temperature_c: Array, time_s:
     Larger residuals increase the deviations (Birge ratio). Raise Fault `too_few_observations`,
     `temperature_not_recorded`, `temperature_range_too_small`, `temperature_and_time_confounded`.
     """
-    check_count(len(bias), FEWEST, 3)
+    check_count(len(bias), MIN_REPEATS, 3)
     if np.isnan(temperature_c).any():
         raise Fault(
             "temperature_not_recorded",

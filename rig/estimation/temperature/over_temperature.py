@@ -26,15 +26,15 @@ from rig.estimation.refusals import check_finite
 from rig.estimation.statistics.bias_process import BiasProcess, average_walks, bias_process
 from rig.estimation.statistics.coverage import coverage_factors, effective_dof
 
-HIGHEST = 3  # highest order, as in autopilots
-FEWEST = 4  # fewest repeats of a pose
+MAX_ORDER = 3  # as in autopilots
+MIN_REPEATS = 4
 MIN_RANGE_C = 10.0
 LAG_STD_S = 10.0  # prior of a thermometer's lag; assumed
-EACH_WAY = 0.2  # least fraction of the observations during warming, and during cooling, that determine a hysteresis
-STANDING_K_S = 0.1 / 60  # a slower change counts as one in the previous direction
-AS_GOOD_AS_EQUAL = 0.03  # largest difference between inputs of one pose, relative to the largest input
-STEPS = 6  # Gauss–Newton steps: the model is linear except for products of small numbers
-COEFFICIENTS = 6 * (HIGHEST + 1)  # scale of order 0 xyz, of order 1 xyz, …, then the bias in the same order
+MIN_FRACTION = 0.2  # of the observations during warming, and during cooling, that determine a hysteresis
+MIN_CHANGE_K_S = 0.1 / 60  # a slower change counts as one in the previous direction
+INPUT_TOLERANCE = 0.03  # largest difference between inputs of one pose, relative to the largest input
+GAUSS_NEWTON_STEPS = 6  # the model is linear except for products of small numbers
+COEFFICIENT_COUNT = 6 * (MAX_ORDER + 1)  # scale of order 0 xyz, of order 1 xyz, …, then the bias in the same order
 
 NOISE, ORDER, LAG = "noise and bias drift", "order of the polynomials", "thermometer's lag"
 HYSTERESIS, GRADIENT = "warming against cooling", "temperature gradient"
@@ -132,7 +132,7 @@ class OverTemperature:
 
     def changes(self, temperature_c: Array) -> tuple[Array, Array]:
         """Return k divided by its value at the reference temperature, and c minus its value there, (N, 3) each."""
-        rows = np.vander(temperature_c - self.reference_c, HIGHEST + 1, increasing=True)
+        rows = np.vander(temperature_c - self.reference_c, MAX_ORDER + 1, increasing=True)
         return rows @ (self.scale / self.scale[0]), rows[:, 1:] @ self.bias[1:]
 
 
@@ -149,7 +149,7 @@ def check_inside(range_c: tuple[float, float], temperature_c: float) -> None:
 
 def powers_at(difference_k: float) -> Array:
     """Return the matrix (6, 24) from the coefficients to k and c at a difference from the reference temperature."""
-    rows = np.kron(np.eye(2), np.kron(difference_k ** np.arange(HIGHEST + 1), np.eye(3)))
+    rows = np.kron(np.eye(2), np.kron(difference_k ** np.arange(MAX_ORDER + 1), np.eye(3)))
     return np.asarray(rows, dtype=np.float64)
 
 
@@ -187,7 +187,7 @@ def fit_over_temperature(readings: RepeatedMeans, reference_c: float, gradient_k
     without_lag, loop = chosen.without_lag, chosen.loop
     scale = np.concatenate([np.ones((1, 3)), chosen.relative]) * fits.scale
     bias = np.concatenate([_constant(chosen.bias, centre[1])[None], chosen.bias])
-    among_orders = sum((w * np.outer(d, d) for w, d in differences), np.zeros((COEFFICIENTS, COEFFICIENTS)))
+    among_orders = sum((w * np.outer(d, d) for w, d in differences), np.zeros((COEFFICIENT_COUNT, COEFFICIENT_COUNT)))
     by_lag = fits.covariance(chosen.covariance - without_lag, centre)
     scatter = fits.covariance(without_lag, centre)
     lines = [
@@ -216,12 +216,12 @@ def combine_with_reference(
     """
     scale, bias = polynomials.scale * values[:3] / polynomials.scale[0], polynomials.bias.copy()
     bias[0] = values[3:]
-    ratio = np.concatenate([np.tile(values[:3] / polynomials.scale[0], HIGHEST + 1), np.ones(COEFFICIENTS // 2)])
+    ratio = np.concatenate([np.tile(values[:3] / polynomials.scale[0], MAX_ORDER + 1), np.ones(COEFFICIENT_COUNT // 2)])
     kept = tuple(replace(line, covariance=np.outer(ratio, ratio) * line.covariance) for line in polynomials.lines)
-    first = np.r_[0:3, COEFFICIENTS // 2 : COEFFICIENTS // 2 + 3]
+    first = np.r_[0:3, COEFFICIENT_COUNT // 2 : COEFFICIENT_COUNT // 2 + 3]
 
     def whole(line: TemperatureLine) -> TemperatureLine:
-        covariance = np.zeros((COEFFICIENTS, COEFFICIENTS))
+        covariance = np.zeros((COEFFICIENT_COUNT, COEFFICIENT_COUNT))
         covariance[np.ix_(first, first)] = line.covariance
         return replace(line, covariance=covariance)
 
@@ -239,7 +239,7 @@ def heating_rate(windows_s: Array, temperature_c: Array) -> tuple[Array, Array]:
         rate[order[position]] = since @ (temperature_c[near] - temperature_c[near].mean()) / (since @ since)
     direction, last = np.empty(len(times)), 0.0
     for position in order:
-        last = float(np.sign(rate[position])) if abs(rate[position]) > STANDING_K_S else last
+        last = float(np.sign(rate[position])) if abs(rate[position]) > MIN_CHANGE_K_S else last
         direction[position] = last
     return rate, direction
 
@@ -266,13 +266,13 @@ class _ParameterFits:
         self.span = max(abs(limit_c - reference_c) for limit_c in range_c)
         poses = np.eye(int(readings.poses.max()) + 1)[readings.poses]
         self.repeats = int(poses.sum(axis=0).min())
-        self.highest = min(HIGHEST, self.repeats - 2)
-        self.powers = np.vander((readings.temperature_c - reference_c) / self.span, HIGHEST + 1, increasing=True)
-        slopes = np.column_stack([n * self.powers[:, n - 1] / self.span for n in range(1, HIGHEST + 1)])
+        self.highest = min(MAX_ORDER, self.repeats - 2)
+        self.powers = np.vander((readings.temperature_c - reference_c) / self.span, MAX_ORDER + 1, increasing=True)
+        slopes = np.column_stack([n * self.powers[:, n - 1] / self.span for n in range(1, MAX_ORDER + 1)])
         rate, direction = heating_rate(readings.windows_s, readings.temperature_c)
         self.slopes = slopes * rate[:, None]
         within = (readings.temperature_c - range_c[0]) / (range_c[1] - range_c[0])
-        self.both_ways = min(np.mean(direction > 0), np.mean(direction < 0)) >= EACH_WAY
+        self.both_ways = min(np.mean(direction > 0), np.mean(direction < 0)) >= MIN_FRACTION
         self.loop = (direction * 4 * within * (1 - within))[:, None]
         self._fit_inputs(readings, readings.means)
         self.process = self._process(readings, poses)
@@ -287,7 +287,7 @@ class _ParameterFits:
 
     def refer(self, readings: RepeatedMeans, fit: "_TemperatureFit") -> None:
         """Recompute the inputs from the readings at the reference temperature instead of at the mean temperature."""
-        powers = self.powers[:, 1:] * self.span ** np.arange(1.0, HIGHEST + 1)
+        powers = self.powers[:, 1:] * self.span ** np.arange(1.0, MAX_ORDER + 1)
         self._fit_inputs(
             readings, readings.means - powers @ fit.bias + (1 - 1 / (1 + powers @ fit.relative)) * self.inputs
         )
@@ -332,7 +332,7 @@ class _ParameterFits:
         values = np.zeros(3 * per_axis + 1)  # by axis, then the lag
         prior = np.zeros((1, len(values)))
         prior[0, -1] = 1 / LAG_STD_S
-        for _ in range(STEPS):
+        for _ in range(GAUSS_NEWTON_STEPS):
             rows, rests = zip(*(self._rows(axis, orders, values) for axis in range(3)), strict=True)
             design = np.vstack(
                 [
@@ -346,7 +346,7 @@ class _ParameterFits:
             values = values + step
         residuals = [self._rows(axis, orders, values)[1] for axis in range(3)]
         square = float(sum(rest @ rest for rest in residuals) + (values[-1] / LAG_STD_S) ** 2)
-        information = design.T @ design  # pyrefly: ignore[unbound-name]  # STEPS > 0
+        information = design.T @ design  # pyrefly: ignore[unbound-name]  # GAUSS_NEWTON_STEPS > 0
         covariance = np.asarray(np.linalg.inv(information + prior.T @ prior), dtype=np.float64)
         fixed = np.zeros_like(covariance)
         if len(values) > 1:
@@ -381,16 +381,16 @@ class _ParameterFits:
         of_scale, of_bias = orders
         per_axis = (len(values) - 1) // 3
         by_axis = values[:-1].reshape(3, per_axis)
-        relative, bias = np.zeros((2, HIGHEST, 3))
-        size = self.span ** -np.arange(1.0, HIGHEST + 1)
+        relative, bias = np.zeros((2, MAX_ORDER, 3))
+        size = self.span ** -np.arange(1.0, MAX_ORDER + 1)
         relative[:of_scale] = by_axis[:, :of_scale].T * size[:of_scale, None]
         bias[:of_bias] = by_axis[:, of_scale : of_scale + of_bias].T * size[:of_bias, None]
-        take = np.zeros((6 * HIGHEST, len(values)))
+        take = np.zeros((6 * MAX_ORDER, len(values)))
         for axis in range(3):
             for n in range(of_scale):
                 take[3 * n + axis, axis * per_axis + n] = size[n]
             for n in range(of_bias):
-                take[3 * HIGHEST + 3 * n + axis, axis * per_axis + of_scale + n] = size[n]
+                take[3 * MAX_ORDER + 3 * n + axis, axis * per_axis + of_scale + n] = size[n]
         loop = None
         if self.both_ways:  # a fraction of the reading equals one of k with the opposite sign
             stds = np.sqrt(np.diag(covariance))[:-1].reshape(3, per_axis)[:, -2:]
@@ -401,7 +401,7 @@ class _ParameterFits:
 
     def centre(self, fit: _TemperatureFit) -> Array:
         """Return the weighted mean powers (2, 3, 3) of T − reference, by the weights of k and of c."""
-        powers = self.powers[:, 1:] * self.span ** np.arange(1.0, HIGHEST + 1)
+        powers = self.powers[:, 1:] * self.span ** np.arange(1.0, MAX_ORDER + 1)
         centre: Array = np.einsum("qan,np->qpa", self.weights, powers) / self.weights.sum(axis=2)[:, None, :]
         return centre
 
@@ -412,7 +412,7 @@ class _ParameterFits:
 
     def rescale(self, covariance: Array) -> Array:
         """Return the covariance (24, 24) for absolute instead of relative k."""
-        size = np.concatenate([np.tile(self.scale, HIGHEST + 1), np.ones(COEFFICIENTS // 2)])
+        size = np.concatenate([np.tile(self.scale, MAX_ORDER + 1), np.ones(COEFFICIENT_COUNT // 2)])
         scaled: Array = np.outer(size, size) * covariance
         return scaled
 
@@ -422,10 +422,10 @@ def _coefficients_from_changes(centre: Array, which: int) -> Array:
 
     An overestimated change makes the value at the reference too small, hence the negative mean power.
     """
-    matrix = np.zeros((3 * (HIGHEST + 1), 6 * HIGHEST))
-    first = 3 * HIGHEST * which
-    matrix[3:, first : first + 3 * HIGHEST] = np.eye(3 * HIGHEST)
-    for n in range(HIGHEST):
+    matrix = np.zeros((3 * (MAX_ORDER + 1), 6 * MAX_ORDER))
+    first = 3 * MAX_ORDER * which
+    matrix[3:, first : first + 3 * MAX_ORDER] = np.eye(3 * MAX_ORDER)
+    for n in range(MAX_ORDER):
         matrix[:3, first + 3 * n : first + 3 * n + 3] = -np.diag(centre[which, n])
     return matrix
 
@@ -443,9 +443,9 @@ def _centre_coefficients(fit: _TemperatureFit, centre: Array) -> Array:
 
 def _loop_covariance(size: Array, std: Array) -> Array:
     """Return the covariance (24, 24) of values within the hysteresis loop, beyond that due to noise."""
-    variances = np.zeros(COEFFICIENTS)
+    variances = np.zeros(COEFFICIENT_COUNT)
     half = np.maximum(size**2 - std**2, 0.0) / 3
-    variances[:3], variances[COEFFICIENTS // 2 : COEFFICIENTS // 2 + 3] = half[:3], half[3:]
+    variances[:3], variances[COEFFICIENT_COUNT // 2 : COEFFICIENT_COUNT // 2 + 3] = half[:3], half[3:]
     return np.diag(variances)
 
 
@@ -456,7 +456,7 @@ def _gradient(polynomials: OverTemperature, half_width_k: float) -> TemperatureL
     part has opposite signs at the ends of the range, as a heater's power and the loss to the air grow with temperature.
     """
     both = np.array([polynomials.scale, polynomials.bias])
-    steep = np.arange(1, HIGHEST + 1)[:, None] * both[:, 1:]
+    steep = np.arange(1, MAX_ORDER + 1)[:, None] * both[:, 1:]
     low, high = polynomials.range_c
     middle_k, half_k = (low + high) / 2 - polynomials.reference_c, (high - low) / 2
     even, tilted = np.zeros((2, *both.shape))
@@ -471,13 +471,13 @@ def _gradient(polynomials: OverTemperature, half_width_k: float) -> TemperatureL
 def _drop_rare_poses(readings: RepeatedMeans) -> RepeatedMeans:
     """Return the readings of poses with enough repeats. Raise Fault `too_few_observations`."""
     numbers, counts = np.unique(readings.poses, return_counts=True)
-    often = numbers[counts >= FEWEST]
+    often = numbers[counts >= MIN_REPEATS]
     kept = np.isin(readings.poses, often)
     turned = np.linalg.matrix_rank(readings.inputs[kept]) if kept.any() else 0
     if turned < 3:
         raise Fault(
             "too_few_observations",
-            f"poses that determine three axes were repeated less than {FEWEST} times while the temperature moved",
+            f"poses that determine three axes were repeated less than {MIN_REPEATS} times while the temperature moved",
             "Repeat the same sweeps, rests and attitudes at several temperatures",
         )
     again = np.searchsorted(often, readings.poses[kept])
@@ -498,7 +498,7 @@ def group_by_input(inputs: Array, conditions: Array) -> NDArray[np.intp]:
     rows = np.column_stack([*scale_columns(inputs), *scale_columns(conditions)])
     poses, distinct = np.empty(len(rows), dtype=np.intp), list[Array]()
     for i, row in enumerate(rows):
-        near = [k for k, other in enumerate(distinct) if np.abs(row - other).max() < AS_GOOD_AS_EQUAL]
+        near = [k for k, other in enumerate(distinct) if np.abs(row - other).max() < INPUT_TOLERANCE]
         if not near:
             distinct.append(row)
         poses[i] = near[0] if near else len(distinct) - 1

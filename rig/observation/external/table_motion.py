@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from rig.errors import Fault
 from rig.estimation.arrays import Array, integrate_rates, rotation_vectors
 from rig.estimation.cubic_spline import CubicSpline
-from rig.estimation.refusals import CONFUSED_RATES, is_plausible, wrong_unit
+from rig.estimation.refusals import RATE_UNIT_RATIOS, is_plausible, wrong_unit
 from rig.observation.motion.reference_motion import MIN_RATE_RAD_S, closely_followed
 
 # Longest step and largest angle between rows that show how the table turned: below half a turn.
@@ -88,7 +88,7 @@ def check_rates_agree(middles_s: Array, attitudes: Array, rates_rad_s: Array) ->
         return
     slowest_rad, fastest_rad = np.quantile(turned_rad[moving], (0.1, 0.9))
     if ratio < 1 or fastest_rad > VARIED * slowest_rad or abs(ratio / DEGREES - 1) < NEARLY:
-        raise wrong_unit(f"the table's rates are {ratio:.3g} times those of its attitudes", ratio, CONFUSED_RATES)
+        raise wrong_unit(f"the table's rates are {ratio:.3g} times those of its attitudes", ratio, RATE_UNIT_RATIOS)
 
 
 def _thin(time_s: Array) -> NDArray[np.intp]:

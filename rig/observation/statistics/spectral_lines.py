@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig.estimation.arrays import Array
-from rig.estimation.statistics.mean_weights import ALIKE
+from rig.estimation.statistics.mean_weights import TOLERANCE
 from rig.observation.statistics.tapered_weights import MAIN_LOBE, apply_window
 
 AROUND = 161  # bins of the running median
@@ -122,9 +122,9 @@ def unit_columns(columns: Array) -> Array:
 def fit_columns(columns: Array, values: Array) -> Array:
     """Return the least-squares coefficients (k, m) of values (n, m) by columns (n, k), some nearly collinear.
 
-    The normal equations take a third of the time. Their precision suffices for columns that `ALIKE` separates.
+    The normal equations take a third of the time. Their precision suffices for columns that `TOLERANCE` separates.
     """
-    return np.asarray(np.linalg.lstsq(columns.T @ columns, columns.T @ values, rcond=ALIKE**2)[0], dtype=np.float64)
+    return np.asarray(np.linalg.lstsq(columns.T @ columns, columns.T @ values, rcond=TOLERANCE**2)[0], dtype=np.float64)
 
 
 def fit_residuals(columns: Array, values: Array) -> Array:

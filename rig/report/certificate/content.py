@@ -7,7 +7,7 @@ from datetime import date, datetime
 from types import MappingProxyType
 from typing import Any
 
-from rig.analysis.clock_comparison import BY_COMPUTER
+from rig.analysis.clock_comparison import COMPUTER_CLOCK
 from rig.data.absent import NO_ARM
 from rig.data.entries.budget import BudgetEntry
 from rig.data.entries.magnetometer import MagnetometerEntry, ReversalEntry
@@ -333,7 +333,7 @@ def _traceable(result: ResultDocument, stated: StatedFacts) -> bool:
     Arcs are not traceable, because encoders measure their angles.
     """
     compared = result.clock is not None and any(
-        comparison.clock == BY_COMPUTER for comparison in result.clock.comparisons
+        comparison.clock == COMPUTER_CLOCK for comparison in result.clock.comparisons
     )
     measured = bool(result.gyroscopes) and not is_simulated(result, stated)
     whole = all(map(closes, _angles_rad(result)))

@@ -6,7 +6,7 @@ from rig.data.entries.temperature import AtTemperatureEntry, OverTemperatureEntr
 from rig.data.quantity import Quantity
 from rig.data.recording.motion_file import Item
 from rig.data.recording.recorded_sensor import RecordedSensor
-from rig.estimation.temperature.over_temperature import COEFFICIENTS, OverTemperature, powers_at
+from rig.estimation.temperature.over_temperature import COEFFICIENT_COUNT, OverTemperature, powers_at
 from rig.report.entry import entry, finite_or_none
 
 ROWS = 17  # rows of the table; a certificate shows every fourth
@@ -17,7 +17,7 @@ def temperature_entry(
 ) -> OverTemperatureEntry:
     """Return a sensor's polynomials of temperature in SI units; for a gyroscope b = −c, as in g = K (m + b)."""
     signs = np.array(quantity.parameter_signs)
-    of_coefficients = np.repeat(signs, COEFFICIENTS // len(signs))
+    of_coefficients = np.repeat(signs, COEFFICIENT_COUNT // len(signs))
     powers = powers_at(0.0)
     return entry(
         OverTemperatureEntry, polynomials,

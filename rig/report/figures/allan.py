@@ -12,7 +12,7 @@ from rich.table import Table
 from rig.analysis.rest_noise import AtRest, SensorAtRest
 from rig.data.quantity import Quantity
 from rig.errors import Fault
-from rig.estimation.statistics.allan import FLICKER, AllanReading
+from rig.estimation.statistics.allan import FLICKER_RATIO, AllanReading
 from rig.report.figures.verification import save
 from rig.station.plain_text import build_number_table, plain
 from rig.study.style import use_style
@@ -139,7 +139,7 @@ def _draw(axes: "Axes", quantity: Quantity, result: AtRest) -> None:
             axes.loglog(curve.tau_s, line, ":", lw=0.8, color=f"C{i}")
         if isinstance(figures.bias_instability, AllanReading):
             floor = figures.bias_instability
-            axes.plot(floor.tau_s, floor.value * FLICKER / size, "v", color=f"C{i}")
+            axes.plot(floor.tau_s, floor.value * FLICKER_RATIO / size, "v", color=f"C{i}")
     axes.set(xlabel="τ s", ylabel=f"Allan deviation   {quantity.drift.name}", title=quantity.name)
     axes.plot([], [], "k:", lw=0.8, label="random walk")
     axes.legend(frameon=False, ncols=2, fontsize=8)

@@ -42,7 +42,7 @@ def _entries(outcome: Outcome) -> Mapping[str, Mapping[str, DriftEntry]]:
 def drift_entry(quantity: Quantity, drift: "BiasDrift", sensor: "RecordedSensor") -> DriftEntry:
     """Return the bias of a sensor by repeat, in SI units."""
     from rig.analysis.temperature.bias_drift import SLOPE
-    from rig.estimation.temperature.bias_by_repeat import FALSE_ALARM
+    from rig.estimation.temperature.bias_by_repeat import FALSE_ALARM_PROBABILITY
 
     scale_fixed, slope = drift.scale_fixed, drift.over_temperature
     full_scale = sensor.channel(quantity).range
@@ -67,7 +67,7 @@ def drift_entry(quantity: Quantity, drift: "BiasDrift", sensor: "RecordedSensor"
             )
             for move in scale_fixed.moves
         ),
-        false_alarm_probability=FALSE_ALARM,
+        false_alarm_probability=FALSE_ALARM_PROBABILITY,
         largest_change=_vector(scale_fixed.largest_change),
         temperature_slope=error_entry(drift.faults[SLOPE])
         if slope is None

@@ -24,10 +24,10 @@ def heading_of(factors: Sequence[float]) -> str:
 
 def list_assumptions(budget: BudgetEntry) -> Iterator[str]:
     """Yield the assumptions for values that the configuration does not give."""
-    from rig.estimation.gyroscope.budget import NOT_GIVEN
+    from rig.estimation.gyroscope.budget import NOT_GIVEN_SUFFIX
 
     for line in budget.contributors:
-        if line.half_width is not None and line.source.endswith(NOT_GIVEN):
+        if line.half_width is not None and line.source.endswith(NOT_GIVEN_SUFFIX):
             yield f"{line.name}: ± {line.half_width:.3g} {line.unit} is assumed: {line.source}"
 
 

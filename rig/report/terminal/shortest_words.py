@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from rig.analysis.design.candidate_search import (
-    SIZES,
+    TARGET_NAMES,
     Budgets,
     Planned,
     ReachedUncertainty,
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from rig.estimation.arrays import Array
 
 LINES = 3  # contributors that are listed for each sensor
-# Possible targets by their names in `SIZES`: unit and words.
+# Possible targets by their names in `TARGET_NAMES`: unit and words.
 SHOWN = {
     "scale": ("", "the scale factors"),
     "bias_rad_s": (" rad/s", "the biases"),
@@ -81,7 +81,7 @@ def shortest_document(shortest: Shortest, section: ProcedureSection) -> dict[str
     return {
         "schema": "rig.shortest/1",
         "target_uncertainty": {
-            **{size: _finite(getattr(shortest.wanted, size)) for size in SIZES},
+            **{size: _finite(getattr(shortest.wanted, size)) for size in TARGET_NAMES},
             "max_duration_s": _finite(shortest.wanted.at_most_s),
         },
         "reached": shortest.best is not None,
@@ -109,7 +109,7 @@ def _plan_entry(planned: Planned, section: ProcedureSection) -> dict[str, Any]:
 
 def _sizes_entry(reached: ReachedUncertainty) -> dict[str, float | None]:
     """Return the uncertainties; null for sensors that are not calibrated."""
-    return {size: getattr(reached, size) or None for size in SIZES}
+    return {size: getattr(reached, size) or None for size in TARGET_NAMES}
 
 
 def _verdict(shortest: Shortest) -> str:
@@ -124,7 +124,7 @@ def _verdict(shortest: Shortest) -> str:
 
 def wish_words(wanted: TargetUncertainty) -> str:
     """Return the target as `U ≤ 0.0005 of the scale factors`."""
-    sizes = {size: getattr(wanted, size) for size in SIZES}
+    sizes = {size: getattr(wanted, size) for size in TARGET_NAMES}
     return " and ".join(
         f"U ≤ {value:.3g}{SHOWN[size][0]} of {SHOWN[size][1]}" for size, value in sizes.items() if value < inf
     )
@@ -187,7 +187,7 @@ def _describe_floor(shortest: Shortest) -> str:
     parts = []
     for index, (size, (unit, what)) in enumerate(SHOWN.items()):
         least = shortest.least(size)
-        of_kind = Budgets(least.rates) if index < len(SIZES) // 2 else Budgets({}, least.accelerations)
+        of_kind = Budgets(least.rates) if index < len(TARGET_NAMES) // 2 else Budgets({}, least.accelerations)
         by_sensor = [lines for lines in _main_contributors(of_kind).values() if lines]
         largest = sorted({max(lines, key=lambda line: line[1 + index % 2])[0] for lines in by_sensor})
         value = getattr(least.reached, size)

@@ -11,7 +11,7 @@ import numpy as np
 
 from rig.data.entries.budget import IN_U, BudgetEntry, ContributorEntry
 from rig.data.quantity import DisplayUnit
-from rig.estimation.arrays import SMALLEST_SIZE, divide_or_infinity
+from rig.estimation.arrays import MIN_SIZE, divide_or_infinity
 from rig.report.words.printed_values import figures, percent, power_of_ten, small
 
 NEGLIGIBLE = 0.001  # contributors below this fraction of both variances share one line
@@ -90,7 +90,7 @@ class _Size:
 
     @classmethod
     def choose(cls, std: float, per_unit: float, unit: str) -> "_Size":
-        if not std > SMALLEST_SIZE:
+        if not std > MIN_SIZE:
             return cls(unit or "1", per_unit, 0)
         power = 3 * math.floor(math.log10(std * per_unit) / 3)
         factor = per_unit * 10.0**-power

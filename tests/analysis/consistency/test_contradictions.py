@@ -9,7 +9,7 @@ from rig.analysis.analyses import calibrate
 from rig.analysis.check import Check
 from rig.analysis.consistency.contradictions import contradicting_sweeps, contradictions
 from rig.analysis.consistency.converter_tests import judge_readings
-from rig.analysis.consistency.false_alarms import FALSE_ALARMS
+from rig.analysis.consistency.false_alarms import FALSE_ALARM_PROBABILITY
 from rig.analysis.environment import surroundings_of
 from rig.analysis.gyroscope.calibration import observe_recordings, solve_observed
 from rig.data.recording.run_data import RunData
@@ -197,7 +197,7 @@ def test_an_undamaged_run_raises_no_alarm(thorough: bool) -> None:
         walk = (0.0, 1e-5, 3e-5, 1e-4)[place % 4]
         alarms.append(failed(judged((wandering(seen, walk) if walk else seen).recording())[0]))
     assert sum(map(bool, alarms)) <= 1, alarms
-    assert FALSE_ALARMS == 0.001
+    assert FALSE_ALARM_PROBABILITY == 0.001
 
 
 @pytest.mark.slow
@@ -244,7 +244,9 @@ def test_an_arm_that_vibrates_under_a_quiet_sensor_is_no_stuck_bit(rms_counts: f
             swing = rms_counts * np.sqrt(2) * np.sin(2 * np.pi * 14 * time_s + rng.uniform(0, 2 * np.pi, 3))
             counts = np.round(rng.uniform(-50, 50, 3) + swing + 1.03 * rng.standard_normal((len(time_s), 3)))
             windows.append(RawReadings(sweep, counts.astype(np.int64), counts - counts.mean(axis=0), np.zeros(3)))
-        stuck, _ = judge_readings([window.counts for window in windows], windows, FALSE_ALARMS / 10)["stuck_bit"]
+        stuck, _ = judge_readings([window.counts for window in windows], windows, FALSE_ALARM_PROBABILITY / 10)[
+            "stuck_bit"
+        ]
         assert stuck == 0, seed
 
 
@@ -253,7 +255,7 @@ def test_a_low_bit_that_is_stuck_is_found_under_vibration_too() -> None:
     swing = 12 * np.sin(2 * np.pi * 14 * np.arange(520)[:, None] / 200)
     counts = np.round(swing + 5 * rng.standard_normal((520, 3))).astype(np.int64) & ~1
     window = RawReadings(0, counts, counts - counts.mean(axis=0), np.zeros(3))
-    stuck, _ = judge_readings([counts], [window], FALSE_ALARMS / 10)["stuck_bit"]
+    stuck, _ = judge_readings([counts], [window], FALSE_ALARM_PROBABILITY / 10)["stuck_bit"]
     assert stuck >= 3
 
 
@@ -263,10 +265,15 @@ def test_a_rest_of_few_readings_is_held_against_the_noise_of_longer_ones() -> No
     windows = [RawReadings(sweep, *_noisy(rng, 280), np.zeros(3)) for sweep in range(6)]
     short = np.where(np.arange(20)[:, None] % 4, 0.1, 3.0) * _noisy(rng, 20)[1]
     windows.append(RawReadings(-1, np.round(short).astype(np.int64), short, np.zeros(3)))
-    spikes, limit = judge_readings([window.counts for window in windows], windows, FALSE_ALARMS / 10)["spikes"]
+    spikes, limit = judge_readings([window.counts for window in windows], windows, FALSE_ALARM_PROBABILITY / 10)[
+        "spikes"
+    ]
     assert spikes < limit
     short[7] = 9 * 15
-    assert judge_readings([window.counts for window in windows], windows, FALSE_ALARMS / 10)["spikes"][0] > limit
+    assert (
+        judge_readings([window.counts for window in windows], windows, FALSE_ALARM_PROBABILITY / 10)["spikes"][0]
+        > limit
+    )
 
 
 def test_a_rest_in_which_an_axis_stands_still_makes_no_sensor_without_noise() -> None:
@@ -274,7 +281,7 @@ def test_a_rest_in_which_an_axis_stands_still_makes_no_sensor_without_noise() ->
     windows = [RawReadings(-1, *_noisy(rng, 280), np.zeros(3)) for _ in range(6)]
     windows[2].counts[:, 0] = windows[2].counts[0, 0]
     counts = [np.concatenate([window.counts for window in windows])]
-    longest, limit = judge_readings(counts, windows, FALSE_ALARMS / 10)["stuck_axis"]
+    longest, limit = judge_readings(counts, windows, FALSE_ALARM_PROBABILITY / 10)["stuck_axis"]
     assert longest >= 280 > limit
 
 
@@ -285,7 +292,7 @@ def test_what_a_number_in_single_precision_rounds_is_no_stuck_bit() -> None:
     counts = np.asarray(np.round(said * 2**30 / 10), dtype=np.int64)
     assert np.mean(counts & 1) < 0.45  # which it would be taken for
     window = RawReadings(-1, counts, counts - counts.mean(axis=0), np.zeros(3))
-    assert judge_readings([counts], [window], FALSE_ALARMS / 10)["stuck_bit"][0] == 0
+    assert judge_readings([counts], [window], FALSE_ALARM_PROBABILITY / 10)["stuck_bit"][0] == 0
 
 
 def _noisy(rng: np.random.Generator, readings: int) -> tuple[np.ndarray, np.ndarray]:
@@ -301,7 +308,12 @@ def test_a_burst_of_vibration_in_a_turn_is_no_spike() -> None:
     residuals = windows[2].residual_counts
     scatter = residuals.std()
     residuals[100:106] += scatter * np.array([-4, 10, -7, 8, 11, -6])[:, None]
-    spikes, limit = judge_readings([window.counts for window in windows], windows, FALSE_ALARMS / 10)["spikes"]
+    spikes, limit = judge_readings([window.counts for window in windows], windows, FALSE_ALARM_PROBABILITY / 10)[
+        "spikes"
+    ]
     assert spikes < limit
     residuals[200] = 11 * scatter
-    assert judge_readings([window.counts for window in windows], windows, FALSE_ALARMS / 10)["spikes"][0] > limit
+    assert (
+        judge_readings([window.counts for window in windows], windows, FALSE_ALARM_PROBABILITY / 10)["spikes"][0]
+        > limit
+    )

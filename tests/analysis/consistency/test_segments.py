@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rig.analysis.consistency.state_errors import build_reading_patterns
-from rig.analysis.environment import BY_SPLINE, surroundings_of
+from rig.analysis.environment import SPLINE_NOISE_RATIO, surroundings_of
 from rig.analysis.gyroscope.calibration import observe_recordings, solve_observed
 from rig.analysis.gyroscope.segment_table import Segments, stack_segments
 from rig.data.recording.run_data import RunData
@@ -100,7 +100,7 @@ def test_what_the_encoders_noise_makes_of_rates_across_the_swept_axis_is_stated(
     segments, exact = (
         segments_of(swinging(synthetic_run(setup))) for setup in (noisy, replace(noisy, encoder_noise_rad=0.0))
     )
-    patterns = build_reading_patterns(segments, BY_SPLINE * NOISE_RAD)
+    patterns = build_reading_patterns(segments, SPLINE_NOISE_RATIO * NOISE_RAD)
     turning = segments.sweep >= 0
     off = (segments.rates_rad_s - exact.rates_rad_s)[turning]
     across = np.abs(segments.rates_rad_s[turning]) < 0.1

@@ -13,7 +13,7 @@ from rig.data.quantity import RATE, TEMPERATURE
 from rig.data.recording.run_data import RunData
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.budget import Budget
-from rig.estimation.gyroscope.nonlinearity import SQUARE_MISSED
+from rig.estimation.gyroscope.nonlinearity import SQUARE_DEVIATION
 from rig.estimation.gyroscope.own_errors import KnownSensor, list_own_errors
 from support.recordings.synthetic_run import Setup, synthetic_run
 
@@ -22,7 +22,7 @@ pytestmark = pytest.mark.slow
 PER_RAD_S = PARTS["lsm9ds1"].nonlinearity_percent / 100 / np.radians(245)
 SIX_AXES = (("axes", "6"),)
 ODD = Setup(noise_rad_s=3e-4, odd_per_rad_s=PER_RAD_S, procedure=SIX_AXES)
-EVEN = Setup(noise_rad_s=3e-4, even_per_rad_s=PER_RAD_S / SQUARE_MISSED)
+EVEN = Setup(noise_rad_s=3e-4, even_per_rad_s=PER_RAD_S / SQUARE_DEVIATION)
 SPEED_RAD_S = np.pi / 3
 
 

@@ -8,8 +8,8 @@ import pytest
 from rig.analysis.analyses import calibrate
 from rig.analysis.outcome import Outcome
 from rig.estimation.arrays import Array
-from rig.estimation.gyroscope.budget import AXES, MOUNTS
-from rig.estimation.gyroscope.six_observation_budget import NOT_SQUARE
+from rig.estimation.gyroscope.budget import AXES, REMOUNTING
+from rig.estimation.gyroscope.six_observation_budget import AXIS_ANGLES
 from support.motions.drawn_servo import drawn_servo
 
 pytestmark = pytest.mark.slow
@@ -53,7 +53,7 @@ def test_a_run_errs_by_what_it_says_and_the_turning_adds_next_to_nothing() -> No
     assert result.solution.estimator == "newton" and result.explained is not None, "the vector model stands beside it"
     assert result.uncertainty is not None
     names = {contributor.name for contributor in result.uncertainty.contributors}
-    assert NOT_SQUARE in names and not names & {AXES, MOUNTS}
+    assert AXIS_ANGLES in names and not names & {AXES, REMOUNTING}
     failed = [check.name for check in found.outcome.checks if not check.passed]
     assert all(name.startswith("gyro.board_") for name in failed), failed  # no board was there
 

@@ -5,7 +5,7 @@ import pytest
 
 from rig.estimation.arrays import Array
 from rig.estimation.external.abrupt_change import AbruptChange
-from rig.estimation.external.row_changes import LEAST_EVIDENCE, find_row_change
+from rig.estimation.external.row_changes import MIN_EVIDENCE, find_row_change
 
 SIX_WAYS = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], dtype=float)
 WITH_RESTS = np.insert(SIX_WAYS, range(6), 0, axis=0)
@@ -72,14 +72,14 @@ def test_sound_rows_and_wrong_rates_show_no_change(wrong_rates: float, thorough:
     for seed in range(10 if thorough else 3):
         for rates in (SIX_WAYS, WITH_RESTS, np.tile(SIX_WAYS, (2, 1))):
             change = found(means(rates, seed, wrong_rates), rates)
-            assert change is None or change.evidence < LEAST_EVIDENCE
+            assert change is None or change.evidence < MIN_EVIDENCE
 
 
 def test_one_wrong_row_is_no_change() -> None:
     read = means(WITH_RESTS, 1)
     read[-1] *= 1.02
     change = found(read, WITH_RESTS)
-    assert change is None or change.evidence < LEAST_EVIDENCE
+    assert change is None or change.evidence < MIN_EVIDENCE
 
 
 def test_too_few_rows_and_rows_about_two_axes_show_no_change() -> None:

@@ -83,7 +83,7 @@ def test_blocks_of_a_long_recording_join(monkeypatch: pytest.MonkeyPatch) -> Non
     time_s = np.arange(1001) / 200
     readings, at_s = tumbling(time_s)[1], np.linspace(0, 5, 77)
     whole = course(time_s, readings, MATRIX, BIAS, at_s)
-    monkeypatch.setattr(module, "BLOCK", 64)
+    monkeypatch.setattr(module, "BLOCK_READINGS", 64)
     parts = course(time_s, readings, MATRIX, BIAS, at_s)
     assert parts.attitudes == pytest.approx(whole.attitudes, abs=1e-12)
     assert parts.sensitivities == pytest.approx(whole.sensitivities, abs=1e-11)

@@ -6,7 +6,7 @@ import pytest
 from rig.analysis.gyroscope.vector_inputs import list_mount_rotations
 from rig.config.procedures.stage_section import rotation_by
 from rig.estimation.arrays import Array
-from rig.estimation.gyroscope.budget import MOUNTS, Budget, Unknown, budget
+from rig.estimation.gyroscope.budget import REMOUNTING, Budget, Unknown, budget
 from rig.estimation.gyroscope.vector_fit import VectorInputs, explain
 
 MOUNT_DEG, SPEED_RAD_S, NOISE_RAD_S = 1.0, 1.0, 1e-7
@@ -51,7 +51,7 @@ def drawn(axes: Array, matrix: Array, count: int) -> tuple[float, float, float]:
     errors = []
     for _ in range(count):
         error, found = solved(np.radians(MOUNT_DEG) * rng.uniform(-1, 1, (len(axes), 3)), axes, matrix)
-        ratios.append(error / found.std_of(MOUNTS)[:3])
+        ratios.append(error / found.std_of(REMOUNTING)[:3])
         errors.append(error)
     rms, off_ppm = (float(np.sqrt(np.mean(np.square(each)))) for each in (ratios, errors))
     return rms, float(np.abs(ratios).max()), 1e6 * off_ppm
@@ -78,4 +78,4 @@ def test_of_a_sensor_askew_both_orders_count(thorough: bool) -> None:
 
 def test_mounts_that_the_sweeps_tell_leave_no_square() -> None:
     _, found = solved(np.radians([[0.0, 0.0, 0.0], [1.0, -0.5, 0.8]]), np.tile(np.eye(3), (2, 1, 1)), np.eye(3))
-    assert found.std_of(MOUNTS)[:3] == pytest.approx(np.zeros(3), abs=2e-6)
+    assert found.std_of(REMOUNTING)[:3] == pytest.approx(np.zeros(3), abs=2e-6)

@@ -17,7 +17,7 @@ from rig.estimation.reference.accelerometer_model import (
     NO_DWELLS,
     NO_SWEEPS,
     SECOND,
-    SHARE,
+    SIZE_RATIO,
     Dwells,
     Movement,
     Sweeps,
@@ -178,7 +178,7 @@ def test_the_effects_of_an_arm_s_errors_are_those_of_such_an_arm(error: int) -> 
     right, wrong = (
         record_sweeps(truth, each, (sweep,), 1e-9, np.random.default_rng(1)) for each in (flange_pose, poses)
     )
-    told_change = SHARE * (wrong.harmonics_m_s2 - right.harmonics_m_s2).ravel() / size
+    told_change = SIZE_RATIO * (wrong.harmonics_m_s2 - right.harmonics_m_s2).ravel() / size
     expected = effects(truth.theta(), Movement(NO_DWELLS, right))[:, error]
     np.testing.assert_allclose(told_change, expected, atol=0.06 if error < 3 else 6e-3)  # r does not turn with a flange
     assert np.abs(expected).max() > 0.05

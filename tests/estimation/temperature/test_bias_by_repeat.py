@@ -5,7 +5,7 @@ import pytest
 
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.estimation.temperature.bias_by_repeat import FALSE_ALARM, BiasByRepeat, bias_by_repeat
+from rig.estimation.temperature.bias_by_repeat import FALSE_ALARM_PROBABILITY, BiasByRepeat, bias_by_repeat
 from rig.estimation.temperature.bias_over_temperature import bias_over_temperature
 
 REPEATS, ATTITUDES, STD = 10, 10, 1.0
@@ -48,7 +48,7 @@ def test_a_jump_is_named_at_its_repeat() -> None:
 @pytest.mark.slow
 def test_a_steady_bias_is_hardly_ever_said_to_have_moved() -> None:
     moved = [bool(found(np.zeros((REPEATS, 3)), 1000 + seed).moves) for seed in range(450)]
-    assert np.mean(moved) <= FALSE_ALARM
+    assert np.mean(moved) <= FALSE_ALARM_PROBABILITY
 
 
 def test_what_the_arm_is_wrong_by_in_every_repeat_moves_nothing() -> None:

@@ -273,4 +273,4 @@ def test_what_is_not_a_number_is_degenerate() -> None:
 
 def test_board_and_host_refuse_the_same_scale_factors() -> None:
     """The estimators know no board, so each end has its own constant."""
-    assert MAX_SCALE == refusals.MAX_SCALE
+    assert MAX_SCALE == refusals.MAX_SCALE_RATIO

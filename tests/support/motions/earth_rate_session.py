@@ -11,7 +11,7 @@ from functools import cache
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from rig.analysis.gyroscope.vector_inputs import WAVE_FRACTION
+from rig.analysis.gyroscope.vector_inputs import WAVE_RATIO
 from rig.config.procedures.attitude_sets import EIGHTEEN
 from rig.estimation.arrays import Array
 from rig.estimation.earth import DEG_H
@@ -131,7 +131,7 @@ def record(session: Session, seed: int) -> tuple[VectorInputs, Truth]:
     pulled = attitudes @ -UP @ np.reshape(session.g_sensitivity_rad_s_g, (3, 3)).T
     means = rates @ GYRO_MATRIX.T + pulled + GYRO_BIAS_RAD_S + wandered
     variances = np.repeat((session.part.density**2 / lengths)[:, None], 3, axis=1)
-    std = ARM_RAD * np.array([1.0 if name.startswith(("twist", "zero")) else WAVE_FRACTION for name in AXIS_ERRORS])
+    std = ARM_RAD * np.array([1.0 if name.startswith(("twist", "zero")) else WAVE_RATIO for name in AXIS_ERRORS])
     if session.vibration_rad_s:
         noise, variances, windows = _vibrating(session, windows, turns, rng)
     else:

@@ -4,14 +4,14 @@ from collections.abc import Sequence
 
 from rig.analysis.check import Check
 from rig.analysis.consistency.contradictions import contradictions
-from rig.analysis.consistency.false_alarms import CHECKS, FALSE_ALARMS
+from rig.analysis.consistency.false_alarms import CHECKS, FALSE_ALARM_PROBABILITY
 from rig.analysis.environment import Surroundings, surroundings_of
 from rig.analysis.gyroscope.calibration import SensorResult, observe_recordings, solve_observed
 from rig.data.recording.run_data import RunData
 from rig.observation.observed_run import ObservedRun
 
 STATISTICS = len(CHECKS)  # of a gyroscope
-RATE = FALSE_ALARMS / STATISTICS  # of each
+RATE = FALSE_ALARM_PROBABILITY / STATISTICS  # of each
 
 Solved = tuple[tuple[ObservedRun, ...], dict[str, SensorResult], Surroundings]
 

@@ -9,8 +9,8 @@ from rig.analysis.consistency.reference_alternatives import ReferenceModel
 from rig.analysis.consistency.reference_checks import check_reference
 from rig.analysis.reference.arm_patterns import Posture, StatedArm, arm_patterns, list_arm_rotations
 from rig.analysis.reference.datasheet_errors import (
-    MILLI_G,
-    STANDARD,
+    MICRO_G_PER_MILLI_G,
+    RECTANGULAR_RATIO,
     Datasheet,
     ReferenceWindow,
     list_sensor_errors,
@@ -26,7 +26,7 @@ from rig.estimation.reference.accelerometer_model import Movement, find_force
 from rig.estimation.reference.imu import ImuSolution, solve_imu
 from rig.estimation.reference.reading_errors import per_axis, project_errors, repeat_by_segment
 from rig.estimation.statistics.bias_process import flicker_covariance
-from rig.estimation.statistics.expected_variances import OWN_SHARES
+from rig.estimation.statistics.expected_variances import INDEPENDENT_FRACTIONS
 from rig.motion.geometry import NOMINAL, WRIST_1
 from support.motions.arm_attitudes import draw_true_arm, joints_rad
 from support.motions.arm_sweeps import DWELL_S, Truth, joints_at, plan_sweeps, record_dwells, record_sweeps
@@ -117,7 +117,7 @@ def drawn(
     straight = Movement(
         record_dwells(truth, arm, JOINTS, walk_ug, rng), record_sweeps(truth, arm, turned, walk_ug, rng)
     )
-    even, odd, bias_k = sheet.even_s2_m, sheet.odd_s4_m2, MILLI_G * MICRO_G_M_S2 * sheet.bias_mg_k
+    even, odd, bias_k = sheet.even_s2_m, sheet.odd_s4_m2, MICRO_G_PER_MILLI_G * MICRO_G_M_S2 * sheet.bias_mg_k
     start_s = BETWEEN_S * np.concatenate([len(turned) + np.arange(len(JOINTS)), np.arange(len(turned))])
     length_s = np.repeat([DWELL_S, SWEEP_S], [len(JOINTS), len(turned)])
     warm_c = 22 + warmer_k * np.sin(start_s / 60 + rng.uniform(0, 2 * np.pi))
@@ -134,7 +134,9 @@ def drawn(
     session = Session(part, truth, movement, _parameters(truth, np.zeros(3)), arm_rad)
 
     def within(half_width: float) -> Array:
-        return rng.uniform(-half_width, half_width, 3) if evenly else half_width / STANDARD * rng.normal(size=3)
+        return (
+            rng.uniform(-half_width, half_width, 3) if evenly else half_width / RECTANGULAR_RATIO * rng.normal(size=3)
+        )
 
     chi, theta = within(odd), truth.theta()
     warm = repeat_by_segment(sensor_errors.warmer_k + rng.uniform(-1, 1) * sensor_errors.unseen_k, movement)
@@ -157,7 +159,7 @@ def solve_session(session: Session) -> tuple[ImuSolution, Budget, Array]:
         gravity_m_s2=GRAVITY,
         sensor_errors=movement.sensor_errors,
         arm_turns=movement.arm_turns,
-        own_shares=OWN_SHARES,
+        own_shares=INDEPENDENT_FRACTIONS,
     )
     dof = np.full(movement.readings().size, AVERAGED)
     budget = accelerometer_budget(solution, movement, SITE, 0.0, datasheet=sheet_of(session.part), noise_dof=dof)
@@ -173,7 +175,7 @@ def read_of(session: Session, solution: ImuSolution) -> ReferenceModel:
         *(Posture(joints_at(sweep, np.zeros(1))[0], sweep.joint - WRIST_1) for sweep in turned),
     ]
     stated = StatedArm(
-        NOMINAL, float(np.degrees(STANDARD * session.arm_rad)), np.eye(3), solution.attitude_error.std_rad
+        NOMINAL, float(np.degrees(RECTANGULAR_RATIO * session.arm_rad)), np.eye(3), solution.attitude_error.std_rad
     )
     patterns = arm_patterns(solution.theta, session.movement, stood, stated)
     return ReferenceModel(solution.theta, session.movement, patterns, session.times_s, second_order=False)

@@ -18,7 +18,7 @@ from rig.data.recording.run_data import RunData
 from rig.data.recording.settings import Uncertainty
 from rig.estimation.arrays import Array
 from rig.estimation.earth import EARTH_RATE_RAD_S, STANDARD_GRAVITY_M_S2
-from rig.estimation.gyroscope.nonlinearity import CUBE_MISSED
+from rig.estimation.gyroscope.nonlinearity import CUBE_DEVIATION
 from rig.motion.chain import DenavitHartenberg
 from rig.motion.geometry import NOMINAL, flange_attitude, flange_pose, flange_rate
 from rig.motion.steps import Sweep, Transfer
@@ -232,7 +232,7 @@ def _sense(turned: Array, pull: Array, kind: Kind, rng: np.random.Generator, spe
     most_rad = np.radians(part.non_orthogonality_deg) / 2  # the other axis of an angle may lean as far
     leaning = np.eye(3) + np.clip(rng.normal(0, np.sqrt(2) / 3 * most_rad, (3, 3)), -most_rad, most_rad)
     rates = rates @ leaning
-    cube = part.nonlinearity_percent / 100 / CUBE_MISSED / kind.sensor.range_rad_s**2 * rng.uniform(-1, 1, 3)
+    cube = part.nonlinearity_percent / 100 / CUBE_DEVIATION / kind.sensor.range_rad_s**2 * rng.uniform(-1, 1, 3)
     to_gravity = np.radians(part.g_sensitivity_deg_s_g) / STANDARD_GRAVITY_M_S2 * rng.uniform(-1, 1, (3, 3))
     scale = rng.uniform(0.9, 1.1, 3)
     even = part.asymmetry_percent / 100 / kind.sensor.range_rad_s * rng.uniform(-1, 1, 3)
