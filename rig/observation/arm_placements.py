@@ -16,7 +16,7 @@ from rig.observation.reference.dwell_acceleration import check_complete, trim_dw
 from rig.observation.statistics.mean import Mean, even_mean
 from rig.observation.windows import Dwelt, Window, dwelt, inside
 
-NO_REST = Rested({}, {}, {}, (), ())
+NO_RESTS = Rested({}, {}, {}, (), ())
 
 
 def placements_on_arm(
@@ -47,7 +47,7 @@ def placements_on_arm(
         windows,
         tuple(mean.samples for mean in means),
     )
-    return Placements(rested, np.array(attitudes), None, NO_REST, 0)
+    return Placements(rested, np.array(attitudes), None, NO_RESTS, 0)
 
 
 def _average_dwell(

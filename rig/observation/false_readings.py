@@ -11,24 +11,24 @@ from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array, equal_runs
 from rig.observation.windows import Window, inside
 
-BEYOND, USUAL = 20.0, 0.99  # largest reading relative to the quantile of usual readings; this quantile
+MAX_RATIO, USUAL_QUANTILE = 20.0, 0.99  # of the largest reading to this quantile
 # equal readings in a row at the largest value that show clipping; least range of the axis
-CLIPPED, CLIPPED_RAD_S = 4, 1.0
-FINE = 0.5  # largest resolution as a fraction of the noise, at which equal readings are not chance
-GAP = 1.5  # longest step without a missing reading, in intervals
-FROZEN, COARSE = (
+MIN_CLIPPED_READINGS, MIN_CLIPPED_RANGE_RAD_S = 4, 1.0
+MAX_FINE_RATIO = 0.5  # of the resolution to the noise, at which equal readings are not chance
+MAX_STEP_INTERVALS = 1.5  # without a missing reading
+MIN_FROZEN_READINGS, COARSE_READINGS = (
     50,
     10,
-)  # equal readings in a row that show a frozen axis, unless a second run of COARSE shows a coarse one
-TURNED_RAD_S = 0.2  # change of another axis during them
-INNER = (0.05, 0.95)  # quantiles that bound an axis' motion, so that single readings do not count
+)  # equal readings in a row that show a frozen axis, unless a second run of COARSE_READINGS shows a coarse one
+MIN_OTHER_CHANGE_RAD_S = 0.2  # of another axis during them
+MOTION_QUANTILES = (0.05, 0.95)  # which bound an axis' motion, so that single readings do not count
 # fractions of an axis' span: an overflow is larger than the first, all other steps are smaller than the second
-NO_JUMP, SMOOTH = 0.8, 0.25
-SYMMETRIC = 0.1  # largest sum of the smallest and the largest reading, relative to the span, for a signed number
-FINEST_SPAN = 100  # steps of the readings: a coarse axis that toggles has fewer
-NARROWEST = {RATE: 2.0, ACCELERATION: 25.0}  # span of the smallest range; more than gravity when a body is turned over
-RISING, OUTWARDS = 4, 4.0  # readings before and after an overflow that must rise; the rise in noises of a step
-TOGGLES = 10  # readings between two opposite jumps that noise causes close to the end of the range
+OVERFLOW_SPAN_FRACTION, SMOOTH_SPAN_FRACTION = 0.8, 0.25
+MAX_ASYMMETRY = 0.1  # sum of the smallest and the largest reading, relative to the span, for a signed number
+MIN_SPAN_STEPS = 100  # of the readings: a coarse axis that toggles has fewer
+MIN_SPAN = {RATE: 2.0, ACCELERATION: 25.0}  # span of the smallest range; more than gravity when a body is turned over
+RISE, MIN_RISE_NOISES = 4, 4.0  # readings before and after an overflow that must rise; the rise in noises of a step
+TOGGLE_READINGS = 10  # readings between two opposite jumps that noise causes close to the end of the range
 
 
 def check_possible(readings: Array, rows: NDArray[np.intp], quantity: Quantity, where: str) -> None:
@@ -40,7 +40,7 @@ def check_possible(readings: Array, rows: NDArray[np.intp], quantity: Quantity, 
     if quantity.mistaken is None or not len(readings):
         return
     sizes = np.abs(readings).max(axis=1)
-    limit = max(quantity.mistaken.unusual, BEYOND * float(np.quantile(sizes, USUAL, method="lower")))
+    limit = max(quantity.mistaken.unusual, MAX_RATIO * float(np.quantile(sizes, USUAL_QUANTILE, method="lower")))
     wrong = np.flatnonzero(sizes > limit)
     if len(wrong):
         axis = int(np.argmax(np.abs(readings[wrong[0]])))
@@ -72,10 +72,10 @@ def check_unwrapped(time_s: Array, readings: Array, rows: NDArray[np.intp], quan
     A number of too few bits overflows, a signed one of 16 bits after 32767. Arguments: see `check_possible`; times
     (n,).
     """
-    if quantity not in NARROWEST or len(readings) < 2:
+    if quantity not in MIN_SPAN or len(readings) < 2:
         return
     for axis, name in enumerate(quantity.columns):
-        jumps = _find_overflows(time_s, readings[:, axis], NARROWEST[quantity])
+        jumps = _find_overflows(time_s, readings[:, axis], MIN_SPAN[quantity])
         if not len(jumps):
             continue
         first = jumps[0]
@@ -97,22 +97,20 @@ def _find_overflows(time_s: Array, axis: Array, narrowest: float) -> NDArray[np.
     """
     none = np.zeros(0, dtype=np.intp)
     span, steps, steps_s = float(np.ptp(axis)), np.diff(axis), np.diff(time_s)
-    large = np.abs(steps) > NO_JUMP * span
-    if span < narrowest or not large.any() or abs(axis.max() + axis.min()) > SYMMETRIC * span:
+    large = np.abs(steps) > OVERFLOW_SPAN_FRACTION * span
+    if span < narrowest or not large.any() or abs(axis.max() + axis.min()) > MAX_ASYMMETRY * span:
         return none
-    jumps = np.flatnonzero(large & (steps_s <= GAP * np.median(steps_s)))
+    jumps = np.flatnonzero(large & (steps_s <= MAX_STEP_INTERVALS * np.median(steps_s)))
     others = np.abs(steps[~large])
-    if not len(jumps) or others.max(initial=0.0) > SMOOTH * span:
+    if not len(jumps) or others.max(initial=0.0) > SMOOTH_SPAN_FRACTION * span:
         return none
-    if span < FINEST_SPAN * float(np.diff(np.unique(axis)).min()):
+    if span < MIN_SPAN_STEPS * float(np.diff(np.unique(axis)).min()):
         return none
     noise = float(np.median(np.abs(np.diff(steps))))
-    inner = jumps[(jumps >= RISING) & (jumps + RISING + 1 < len(axis))]
-    rise = np.minimum(
-        *(np.sign(-steps[inner]) * (axis[end] - axis[end - RISING]) for end in (inner, inner + 1 + RISING))
-    )
-    goes_on = bool((rise > OUTWARDS * noise).any())
-    returns = bool(((np.diff(jumps) <= TOGGLES) & (np.diff(np.sign(steps[jumps])) != 0)).any())
+    inner = jumps[(jumps >= RISE) & (jumps + RISE + 1 < len(axis))]
+    rise = np.minimum(*(np.sign(-steps[inner]) * (axis[end] - axis[end - RISE]) for end in (inner, inner + 1 + RISE)))
+    goes_on = bool((rise > MIN_RISE_NOISES * noise).any())
+    returns = bool(((np.diff(jumps) <= TOGGLE_READINGS) & (np.diff(np.sign(steps[jumps])) != 0)).any())
     return jumps if goes_on or returns else none
 
 
@@ -123,11 +121,11 @@ def find_clipped(readings: Array) -> NDArray[np.bool_]:
     """
     clipped = np.zeros(len(readings), dtype=np.bool_)
     for axis in readings.T:
-        if np.ptp(axis) < CLIPPED_RAD_S:
+        if np.ptp(axis) < MIN_CLIPPED_RANGE_RAD_S:
             continue
         starts, ends = equal_runs(axis).T
         at_end = np.isin(axis[starts], [axis.min(), axis.max()])
-        clipped |= np.repeat(at_end & (ends - starts >= CLIPPED), ends - starts)
+        clipped |= np.repeat(at_end & (ends - starts >= MIN_CLIPPED_READINGS), ends - starts)
     return clipped
 
 
@@ -141,7 +139,7 @@ def check_unclipped(time_s: Array, readings: Array, windows: list[Window]) -> No
         # standard deviation of white noise, from the median of its differences
         noise = float(np.median(np.abs(np.diff(column)))) / 0.954
         steps = np.diff(np.unique(column))
-        if not len(steps) or steps.min() > FINE * noise:
+        if not len(steps) or steps.min() > MAX_FINE_RATIO * noise:
             continue
         clipped = find_clipped(column[:, None])
         for row, window in enumerate(windows, start=1):
@@ -165,11 +163,11 @@ def check_frozen(time_s: Array, readings: Array) -> None:
         longest = int(np.argmax(lengths))
         run = slice(*runs[longest].tolist())
         value = column[run.start]
-        is_coarse = len(lengths) > 1 and int(np.delete(lengths, longest).max()) > COARSE
-        if lengths[longest] < FROZEN or is_coarse or value in {column.max(), column.min()}:
+        is_coarse = len(lengths) > 1 and int(np.delete(lengths, longest).max()) > COARSE_READINGS
+        if lengths[longest] < MIN_FROZEN_READINGS or is_coarse or value in {column.max(), column.min()}:
             continue
-        low, high = np.quantile(np.delete(readings[run], axis, axis=1), INNER, axis=0)
-        if (high - low).max() > TURNED_RAD_S:
+        low, high = np.quantile(np.delete(readings[run], axis, axis=1), MOTION_QUANTILES, axis=0)
+        if (high - low).max() > MIN_OTHER_CHANGE_RAD_S:
             raise Fault(
                 "stuck_sensor",
                 f"from {time_s[run.start]:.6g} to {time_s[run.stop - 1]:.6g} s the gyroscope always reads {value:.6g} "

@@ -18,7 +18,7 @@ from rig.observation.reference.dwell_acceleration import DwellReading, check_com
 from rig.observation.statistics.mean import Mean, StaticReading, even_mean
 from rig.observation.windows import Window, inside, iterate_rests
 
-AT_HOME_RAD = 1e-3  # angle from home, of any joint
+HOME_TOLERANCE_RAD = 1e-3  # angle from home, of any joint
 SETTLING_S = 0.2  # time removed at either end of a rest
 
 
@@ -100,7 +100,7 @@ def field_tests(
 
 def _is_at_home(recording: ObservedRun, rest: Window, home_q_rad: Sequence[float]) -> bool:
     away_rad = recording.motion.max_distance_rad(rest, home_q_rad)
-    return away_rad is not None and away_rad < AT_HOME_RAD
+    return away_rad is not None and away_rad < HOME_TOLERANCE_RAD
 
 
 def _mean(run: RunData, name: str, samples: NDArray[Any], where: str, thresholds: ObservationThresholds) -> Mean:

@@ -13,8 +13,8 @@ from rig.observation.external.csv_samples import Samples
 from rig.observation.time_stamps.sampling import Sampling, find_sampling
 from rig.observation.windows import Window, inside
 
-LEAST_TURN_RAD = 0.3  # angle between two rests: a smaller one is no turn
-MOSTLY = 0.9  # fraction of a turn's angle about one axis
+MIN_TURN_RAD = 0.3  # between two rests
+MIN_AXIS_FRACTION = 0.9  # of a turn's angle about one axis
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,10 +72,10 @@ def _count_turns(time_s: Array, rates: Array, rests: Sequence[Window]) -> dict[s
         turned = rates[cut] - bias
         angles = ((turned[1:] + turned[:-1]) / 2 * np.diff(time_s[cut])[:, None]).sum(axis=0)
         size = float(np.linalg.norm(angles))
-        if size < LEAST_TURN_RAD:
+        if size < MIN_TURN_RAD:
             continue
         axis = int(np.argmax(np.abs(angles)))
-        is_about_one = abs(angles[axis]) >= MOSTLY * size
+        is_about_one = abs(angles[axis]) >= MIN_AXIS_FRACTION * size
         name = f"{'+' if angles[axis] > 0 else '-'}{'xyz'[axis]}" if is_about_one else "other"
         counts[name] = counts.get(name, 0) + 1
     return dict(sorted(counts.items(), key=lambda item: (item[0][-1], item[0])))

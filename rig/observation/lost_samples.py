@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.errors import Fault
 
-ON_THE_BOARD = "Check the cable to the board and the load of this computer"
+BOARD_REMEDY = "Check the cable to the board and the load of this computer"
 # Keyed by the part of a sensor that has a port of its own.
-ON_OWN_PORT: Mapping[str, str] = MappingProxyType(
+PORT_REMEDIES: Mapping[str, str] = MappingProxyType(
     {
         "mavlink": "See that no ground station has changed how often the autopilot sends this message, and that no "
         "other program reads the same port; check its line and the load of this computer",
@@ -33,5 +33,5 @@ def lost_samples(sensor: RecordedSensor, samples: NDArray[Any], where: str, what
     steps = np.diff(samples["sequence"].astype(np.int64))
     stride = int(np.median(steps)) if len(steps) else 1
     evenly = f": one of {stride} comes, about {sensor.rate_hz / stride:.4g} a second" if stride > 1 else ""
-    look_at = ON_THE_BOARD if sensor.on_board else ON_OWN_PORT.get(sensor.part, ON_THE_BOARD)
+    look_at = BOARD_REMEDY if sensor.on_board else PORT_REMEDIES.get(sensor.part, BOARD_REMEDY)
     return Fault("lost_samples", f"in {where} {what}{evenly}", f"{look_at}; then {then}")

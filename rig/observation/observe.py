@@ -30,15 +30,15 @@ from rig.observation.motion.arm_motion import ArmMotion, is_sparse
 from rig.observation.motion.revolution import Revolution, arm_states_lost, describe
 from rig.observation.reference.dwell_acceleration import DwellReading, dwell_readings
 from rig.observation.reference.swept_acceleration import SweptAcceleration, swept_acceleration
-from rig.observation.statistics.spectral_lines import BEATS, harmonics
+from rig.observation.statistics.spectral_lines import SIDEBANDS, harmonics
 from rig.observation.stuck_check import check_dwells, check_other_direction, check_rests
 from rig.observation.turn_mean import SampledTurn, turn_mean
 from rig.observation.windows import FinishedSweep, Window, swept
 
-ABOUT_ALL_AXES = 0.05  # least singular value, relative to the design's norm, for which a response is fitted
+MIN_SINGULAR_RATIO = 0.05  # to the design's norm, for which a response is fitted
 STUCK_REPEATS = 10  # equal readings in a row of a sensor whose noise exceeds one count
-FROZEN = 0.5  # fraction of a sweep's rate: an axis with equal readings is stuck if its error is larger
-MISREAD = {"wrong_axis", "wrong_sign", "wrong_unit"}  # a stuck sensor causes these faults too
+MAX_ERROR_RATIO = 0.5  # to a sweep's rate: an axis with equal readings is stuck if its error is larger
+MISREADING_FAULTS = {"wrong_axis", "wrong_sign", "wrong_unit"}  # a stuck sensor causes these faults too
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +76,7 @@ class Observation:
     angle_rad: float | None = None
     arc_rad: tuple[float, float] | None = None
     ripple: float = 0.0
-    beats: int = BEATS
+    beats: int = SIDEBANDS
     state_gain: float = 1.0
 
 
@@ -112,7 +112,7 @@ def observe_sensor(
         try:
             revolutions.append(_observe_revolution(run, stream, motion, finished, settings))
         except Fault as fault:
-            if fault.name in MISREAD:
+            if fault.name in MISREADING_FAULTS:
                 rests = average_rests(run, stream, motion, fit_response(stream, revolutions), superseded)
                 check_response(run, rests, ())
                 check_other_direction(finished.sweep, [turn.joint_name for turn in revolutions], fault)
@@ -172,7 +172,7 @@ def fit_response(stream: Stream, turns: Sequence[Observation]) -> Array:
     Return the nominal mounting if the turns do not cover all axes.
     """
     design = np.array([(*(turn.speed_rad_s * turn.axis_flange), 1.0) for turn in turns]).reshape(-1, 4)
-    if np.linalg.matrix_rank(design, tol=ABOUT_ALL_AXES * np.linalg.norm(design)) < 4:
+    if np.linalg.matrix_rank(design, tol=MIN_SINGULAR_RATIO * np.linalg.norm(design)) < 4:
         return np.array(stream.sensor.mounting)
     coefficients, *_ = np.linalg.lstsq(design, np.array([turn.average.mean_rad_s for turn in turns]), rcond=None)
     return np.asarray(coefficients[:3].T, dtype=np.float64)
@@ -297,7 +297,7 @@ def _check_frozen(readings: Array, rate_read: Array, expected_rad_s: Array, wher
     Coarse resolution alone does not raise it.
     """
     still = np.ptp(readings, axis=0) == 0
-    misread = np.abs(rate_read - expected_rad_s) > FROZEN * np.linalg.norm(expected_rad_s)
+    misread = np.abs(rate_read - expected_rad_s) > MAX_ERROR_RATIO * np.linalg.norm(expected_rad_s)
     for axis in np.flatnonzero(still & misread):
         raise Fault(
             "stuck_axis",

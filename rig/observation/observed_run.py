@@ -22,7 +22,7 @@ from rig.observation.observe import SensorObservations, observe_sensor
 if TYPE_CHECKING:
     from rig.estimation.temperature.over_temperature import OverTemperature
 
-AS_STATED: Mapping[int, Array] = MappingProxyType({})  # every stage is mounted as its settings say
+NO_ROTATIONS: Mapping[int, Array] = MappingProxyType({})  # every stage is mounted as its settings say
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +107,7 @@ def observe_run(
     return ObservedRun(run, motion, sensors)
 
 
-def observe_runs(runs: Sequence[RunData], corrections: Mapping[int, Array] = AS_STATED) -> tuple[ObservedRun, ...]:
+def observe_runs(runs: Sequence[RunData], corrections: Mapping[int, Array] = NO_ROTATIONS) -> tuple[ObservedRun, ...]:
     """Observe each recording of a run with a finished sweep or dwell; if a step was repeated, the last is used.
 
     The first recording's thresholds apply to all. `corrections`: by the procedure's stage, as in `observe_run`. Raise

@@ -7,8 +7,8 @@ from rig.estimation.arrays import Array
 MAX_TRAVEL_AT_REST_RAD = 1e-3  # largest travel of a joint that does not move
 # Cycles in a window. A slower oscillation cannot be distinguished from a joint that creeps; 0.75 cycles leave half of a
 # creep.
-SLOWEST, FASTEST, STEP = 0.75, 12.0, 0.05
-FEWEST_OF_SWING = 8  # fewest angles; the oscillation itself takes three parameters for each joint
+MIN_CYCLES, MAX_CYCLES, CYCLE_STEP = 0.75, 12.0, 0.05
+MIN_OSCILLATION_ANGLES = 8  # fewest angles; the oscillation itself takes three parameters for each joint
 
 
 def remove_oscillation(q_rad: Array) -> Array:
@@ -18,8 +18,8 @@ def remove_oscillation(q_rad: Array) -> Array:
     frequencies (Lomb's periodogram with a floating mean). Steps and creep are preserved.
     """
     time = np.arange(len(q_rad)) / len(q_rad)
-    fastest = min(FASTEST, len(q_rad) / 4)
-    residuals = [_fit_residuals(cycles, time, q_rad) for cycles in np.arange(SLOWEST, fastest, STEP)]
+    fastest = min(MAX_CYCLES, len(q_rad) / 4)
+    residuals = [_fit_residuals(cycles, time, q_rad) for cycles in np.arange(MIN_CYCLES, fastest, CYCLE_STEP)]
     return min(residuals, key=lambda residual: float(np.sum(residual**2)), default=q_rad)
 
 

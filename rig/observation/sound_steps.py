@@ -14,7 +14,7 @@ from rig.observation.observe import check_response, observe_each_sweep
 from rig.observation.reference.dwell_acceleration import read_each_dwell
 from rig.observation.windows import Window
 
-SPIKE = 8.0  # standard deviations of the readings: normal noise exceeds it once in 1e15 readings
+SPIKE_STDS = 8.0  # normal noise exceeds it once in 1e15 readings
 
 
 def sound_sweeps(run: RunData, settings: ObservationThresholds) -> frozenset[int]:
@@ -65,4 +65,4 @@ def _has_spike(stream: Stream, window: Window) -> bool:
     if not len(counts):
         return False
     deviation = np.abs(counts - np.median(counts, axis=0))
-    return bool(np.any(deviation > SPIKE * np.maximum(1.4826 * np.median(deviation, axis=0), 0.5)))
+    return bool(np.any(deviation > SPIKE_STDS * np.maximum(1.4826 * np.median(deviation, axis=0), 0.5)))

@@ -13,10 +13,10 @@ from rig.motion.steps import Sweep
 from rig.observation.average import Average
 from rig.observation.reference.dwell_acceleration import DwellReading
 
-OF_A_SWEEP = 0.5  # fraction of the slowest sweep's speed: no bias changes by as much from rest to rest
-TURNED = 0.5  # fraction of gravity: the least difference between two consecutive attitudes that is judged
-SENSED = 0.05  # fraction of the expected difference; readings in g that are declared as m/s² show twice as much
-WITHOUT_NOISE = 0.01  # fraction of the noise of the other axes
+MAX_BIAS_CHANGE_RATIO = 0.5  # to the slowest sweep's speed, from rest to rest
+MIN_TURN_FRACTION = 0.5  # of gravity: the difference between two consecutive attitudes that is judged
+MIN_SENSED_FRACTION = 0.05  # of the expected difference; readings in g that are declared as m/s² show twice as much
+MIN_NOISE_RATIO = 0.01  # to the noise of the other axes
 REMEDY = "Check the sensor's supply and its bus wiring, then repeat the run"
 
 
@@ -26,9 +26,9 @@ def check_rests(rests: Sequence[Average], slowest_rad_s: float) -> None:
         return
     apart = np.ptp([rest.mean_rad_s for rest in rests], axis=0)
     axis = int(np.argmax(apart))
-    if apart[axis] > OF_A_SWEEP * slowest_rad_s:
+    if apart[axis] > MAX_BIAS_CHANGE_RATIO * slowest_rad_s:
         noise = np.min([rest.noise_rad_s for rest in rests], axis=0)
-        alone = noise[axis] < WITHOUT_NOISE * np.delete(noise, axis).min()
+        alone = noise[axis] < MIN_NOISE_RATIO * np.delete(noise, axis).min()
         which = f"the {'xyz'[axis]} axis of the gyroscope" if alone else "the gyroscope"
         raise Fault(
             "stuck_axis" if alone else "stuck_sensor",
@@ -49,7 +49,7 @@ def check_dwells(dwells: Sequence[DwellReading], site: Site) -> None:
     for one, other in pairwise(dwells):
         differ = float(np.linalg.norm((one.attitude - other.attitude) @ site.up))
         sensed_m_s2 = float(np.linalg.norm(one.reading.mean - other.reading.mean))
-        if differ > TURNED and sensed_m_s2 < SENSED * differ * site.gravity_m_s2:
+        if differ > MIN_TURN_FRACTION and sensed_m_s2 < MIN_SENSED_FRACTION * differ * site.gravity_m_s2:
             raise Fault("stuck_sensor", f"the accelerometer reads the same in {one.name} and {other.name}", REMEDY)
 
 

@@ -14,10 +14,10 @@ import numpy as np
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.mean_weights import mean_weights
 from rig.estimation.statistics.rounding import Steps
-from rig.observation.statistics.coloured_noise import MEMORIES
+from rig.observation.statistics.coloured_noise import ORDERS
 from rig.observation.statistics.mean import Mean, compute_weighted_means, whole
 from rig.observation.statistics.spectral_lines import (
-    NONE,
+    EMPTY,
     LineSearch,
     column_count,
     find_lines,
@@ -29,14 +29,14 @@ from rig.observation.statistics.spectral_lines import (
     waves,
 )
 from rig.observation.statistics.tapered_weights import MAIN_LOBE, apply_window
-from rig.observation.statistics.vibration_noise import BRIEF, estimate_noise
+from rig.observation.statistics.vibration_noise import SHORT_ORDERS, estimate_noise
 
-FEWEST_READINGS = 48  # fewest readings of a turn in which spectral lines are sought: enough for two lines
-SLOW = 8.0  # cycles per revolution: slower lines are hard to separate from waves once and twice per revolution
-SHOWN = 50.0  # power of a slow ripple relative to the median of the encoders' noise, which by chance reaches 15
-MOST_GAIN = 3.0  # largest gain of the noise of the arm's angles, up to which weights remove slow spectral lines
-NOT_ENCODED = LineSearch(slowest=5.0)
-ENCODED = LineSearch(slowest=2.5, beats=0, most=5)
+MIN_LINE_READINGS = 48  # fewest readings of a turn in which spectral lines are sought: enough for two lines
+SLOW_CYCLES = 8.0  # per revolution: slower lines are hard to separate from waves once and twice per revolution
+MIN_POWER_RATIO = 50.0  # of a slow ripple to the median of the encoders' noise, which by chance reaches 15
+MAX_NOISE_GAIN = 3.0  # of the arm's angles, up to which weights remove slow spectral lines
+SENSOR_SEARCH = LineSearch(slowest=5.0)
+ENCODER_SEARCH = LineSearch(slowest=2.5, beats=0, most=5)
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,18 +88,18 @@ def turn_mean(readings: Array, steps: Steps, turn: SampledTurn) -> tuple[Mean, A
     vibration = waves(lines.cycles, turn.share, turn.beats)
     weights = mean_weights(ones, np.column_stack([turn.passing, lines.rate, vibration]))
     added = np.zeros(3)
-    is_slow = np.repeat(lines.cycles < SLOW, column_count(turn.beats))
+    is_slow = np.repeat(lines.cycles < SLOW_CYCLES, column_count(turn.beats))
     if is_slow.any():
         nuisance = np.column_stack([turn.passing, lines.rate, vibration[:, ~is_slow]])
         without_slow = mean_weights(ones, nuisance)
         change, explained = (weights - without_slow)[0], np.column_stack([ones, nuisance, lines.encoded])
         added = _slow_line_variance(readings, turn, vibration[:, is_slow], change, explained)
-        weights = without_slow if _gain(weights) > MOST_GAIN else weights
+        weights = without_slow if _gain(weights) > MAX_NOISE_GAIN else weights
     # The noise is the residual of a fit of all that is not noise.
     columns = unit_columns(np.column_stack([steady, lines.rate, vibration, lines.encoded]))
     coefficients, _, rank, _ = np.linalg.lstsq(columns, readings, rcond=1e-6)
     smooth = columns @ coefficients
-    noise = estimate_noise(readings - smooth, int(rank), steps, BRIEF if lines.not_encoded else MEMORIES)
+    noise = estimate_noise(readings - smooth, int(rank), steps, SHORT_ORDERS if lines.not_encoded else ORDERS)
     (mean,) = compute_weighted_means(readings, ones, weights, smooth=smooth, noise=noise, steps=steps)
     return replace(mean, variance=mean.variance + added, slow_lines=added, cycles=lines.cycles), weights[0]
 
@@ -139,8 +139,8 @@ def _find_turn_lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines
     """
     uneven = turn.uneven_rad_s[:, None]
     none = uneven[:, :0]
-    if len(readings) < FEWEST_READINGS:
-        return Lines(NONE, 0, none, uneven)
+    if len(readings) < MIN_LINE_READINGS:
+        return Lines(EMPTY, 0, none, uneven)
     if not turn.complete:
         fixed = np.column_stack([steady, uneven])
         cycles = find_lines(
@@ -151,19 +151,19 @@ def _find_turn_lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines
     if not turn.encoders_true:
         cycles = find_lines(residuals, LineSearch(beats=turn.beats), fraction=turn.share)
         return Lines(cycles, len(cycles), ripple_rate, none)
-    search = LineSearch(ENCODED.stands_out, ENCODED.slowest, ENCODED.beats, ENCODED.most, floor=median_power(residuals))
+    search = replace(ENCODER_SEARCH, floor=median_power(residuals))
     ripple = find_lines(ripple_rate, search, fraction=turn.share)
-    columns = waves(ripple, turn.share, ENCODED.beats)
+    columns = waves(ripple, turn.share, ENCODER_SEARCH.beats)
     sizes = fit_columns(columns, ripple_rate)
-    fast = np.repeat(ripple >= SLOW, column_count(ENCODED.beats))
+    fast = np.repeat(ripple >= SLOW_CYCLES, column_count(ENCODER_SEARCH.beats))
     slow = ripple_rate - columns[:, fast] @ sizes[fast]
     smooth = _find_slow_ripple(slow, turn.share)
     late = _changes(smooth) if turn.closed else none  # over an arc it resembles encoder errors
     encoded = np.column_stack([smooth, late, slow - _fit_slow_part(slow, turn.share)])
     explained = np.column_stack([steady, encoded, columns[:, fast]])
     residuals = fit_residuals(explained, readings)
-    encoded_lines = ripple[ripple >= SLOW]
-    cycles = find_lines(residuals, NOT_ENCODED, encoded_lines, turn.share)
+    encoded_lines = ripple[ripple >= SLOW_CYCLES]
+    cycles = find_lines(residuals, SENSOR_SEARCH, encoded_lines, turn.share)
     return Lines(cycles, len(cycles) - len(encoded_lines), encoded, late)
 
 
@@ -180,21 +180,21 @@ def _changes(slow: Array) -> Array:
 
 
 def _find_slow_ripple(rate: Array, share: Array) -> Array:
-    """Return the part (n, 1) of a rate (n, 1) with less than `SLOW` cycles per turn, or no column if it is noise.
+    """Return the part (n, 1) of a rate (n, 1) with less than `SLOW_CYCLES` per turn, or no column if it is noise.
 
     `share` (n,) is elapsed time. The encoders' noise is white in the angle, the sum of the rate.
     """
     powers = np.abs(np.fft.rfft(apply_window(np.cumsum(rate, axis=0))[:, 0])) ** 2
-    slow_bins = int(SLOW) + MAIN_LOBE
+    slow_bins = int(SLOW_CYCLES) + MAIN_LOBE
     noise = np.median(powers[slow_bins:])
-    return _fit_slow_part(rate, share) if powers[1:slow_bins].max() > SHOWN * noise else rate[:, :0]
+    return _fit_slow_part(rate, share) if powers[1:slow_bins].max() > MIN_POWER_RATIO * noise else rate[:, :0]
 
 
 def _fit_slow_part(rate: Array, share: Array) -> Array:
-    """Return the part of a rate (n, 1) with less than `SLOW` cycles per turn, by waves of half a turn.
+    """Return the part of a rate (n, 1) with less than `SLOW_CYCLES` cycles per turn, by waves of half a turn.
 
     A vibration is not periodic in the turn.
     """
-    halves = harmonics(np.pi * share, int(2 * SLOW))
+    halves = harmonics(np.pi * share, int(2 * SLOW_CYCLES))
     slow: Array = halves @ fit_columns(halves, rate)
     return slow

@@ -8,8 +8,8 @@ import pytest
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.rounding import Steps
 from rig.observation.statistics.mean import Mean
-from rig.observation.statistics.spectral_lines import BEATS, harmonics
-from rig.observation.turn_mean import SLOW, SampledTurn, turn_mean
+from rig.observation.statistics.spectral_lines import SIDEBANDS, harmonics
+from rig.observation.turn_mean import SLOW_CYCLES, SampledTurn, turn_mean
 from support.recordings.drawn_ripple import Ripple, drawn_ripple
 
 AXIS = np.array([0.6, 0.0, 0.8])
@@ -64,8 +64,8 @@ def sampled(
         share=share,
         rates_rad_s=rates,
         uneven_rad_s=rates @ AXIS - SPEED_RAD_S,
-        passing=harmonics(2 * np.pi * share, 2 * BEATS),
-        beats=BEATS,
+        passing=harmonics(2 * np.pi * share, 2 * SIDEBANDS),
+        beats=SIDEBANDS,
         closed=True,
         encoders_true=encoders_true,
         complete=complete,
@@ -127,7 +127,7 @@ def test_weights_that_would_amplify_the_noise_of_the_arms_angles_leave_slow_line
     for seed in range(4):
         made = sampled(ripple, seed)
         found, weights = turn_mean(made.readings, Steps(STEP_RAD_S), made.turn)
-        assert (found.cycles < SLOW).any() and len(found.cycles) >= 2
+        assert (found.cycles < SLOW_CYCLES).any() and len(found.cycles) >= 2
         assert np.linalg.norm(np.diff(weights, prepend=0, append=0)) * len(weights) < 5 * np.sqrt(2)
         assert np.abs(error(found, weights, made.turn)).max() < 3
 

@@ -21,7 +21,7 @@ from rig.estimation.earth import MICRO_G_M_S2, STANDARD_GRAVITY_M_S2
 from rig.estimation.gyroscope.budget import Budget
 from rig.motion.by_hand import Face, Instruction
 from rig.observation.by_hand.hand_segmentation import segment_session
-from rig.observation.by_hand.rests_and_moves import ITS_OWN_CLOCK, rotate_face
+from rig.observation.by_hand.rests_and_moves import OWN_CLOCK_SOURCE, rotate_face
 
 FLIP_S, TURN_S = 1.5, 2.5  # duration of a move from rest to rest; assumed
 INSTRUCTION_S = 1.0  # from the end of a rest to the next move: the operator reads the instruction; assumed
@@ -53,7 +53,7 @@ def predict_hand_budgets(
 
 def _conditions(sensor: SensorSection, uncertainty: Uncertainty, procedure: HandSettings) -> SessionConditions:
     first = None if sensor.acceleration is not None else rotate_face(START_FACE, mounting_matrix(sensor.mounting))
-    clock = "the board's crystal" if sensor.on_board else ITS_OWN_CLOCK
+    clock = "the board's crystal" if sensor.on_board else OWN_CLOCK_SOURCE
     return SessionConditions(uncertainty.crystal_ppm, clock, procedure.box_rad, first_face=first)
 
 

@@ -16,8 +16,8 @@ from rig.data.quantity import Quantity
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.rounding import Steps
-from rig.observation.consistency.raw_readings import MEMORY, RawReadings, innovation_std
-from rig.observation.sound_steps import SPIKE
+from rig.observation.consistency.raw_readings import PREDICTOR_ORDER, RawReadings, innovation_std
+from rig.observation.sound_steps import SPIKE_STDS
 
 Statistics = dict[str, tuple[float, float]]
 
@@ -30,7 +30,7 @@ MIN_DISTINCT_VALUES = 24  # of an axis: with as many, every bit should have chan
 MIN_SAME_BIT_FRACTION = 0.8  # of the spikes with the same power of two: one bit causes them
 MIN_SPIKES = 5
 SINGLE_PRECISION_BITS = 21  # bits of a number in single precision that are random; the last three are rounded
-MIN_NOISE_READINGS = 4 * MEMORY  # of a window whose noise is estimated
+MIN_NOISE_READINGS = 4 * PREDICTOR_ORDER  # of a window whose noise is estimated
 # Fraction of the arm's vibration that may remain: the sensor's filter changes it, and the arm's states show it in part.
 MAX_RESIDUAL_VIBRATION = 0.1
 MIN_CLIPPED_READINGS = 10  # at one end of the range
@@ -94,7 +94,7 @@ def judge_readings(
     steps_of_noise = noise / digits.step_counts
     noisy = steps_of_noise >= 1
     spikes, spike_bits = _find_spikes(windows, digits.step_counts)
-    statistics = {"spikes": (spikes, SPIKE)}
+    statistics = {"spikes": (spikes, SPIKE_STDS)}
     if digits.has_bits:
         stuck = (
             _count_constant_bits(np.concatenate(counts))
@@ -166,7 +166,7 @@ def _find_spikes(windows: Sequence[RawReadings], step_counts: Array) -> tuple[fl
         scatter = np.maximum(deviation, _find_scatter_around(deviations) if window.sweep >= 0 else 0.0)
         farthest = max(farthest, float(np.max(np.abs(deviations) / scatter)))
         for axis in range(3):
-            beyond = np.abs(deviations[:, axis]) > SPIKE * deviation[axis]
+            beyond = np.abs(deviations[:, axis]) > SPIKE_STDS * deviation[axis]
             power = np.round(np.log2(np.maximum(np.abs(deviations[beyond, axis]), 1)))
             near = np.abs(np.abs(deviations[beyond, axis]) - 2**power) < np.maximum(
                 3 * deviation[axis], 0.05 * 2**power

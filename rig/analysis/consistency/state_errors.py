@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rig.analysis.gyroscope.segment_table import Segments
 from rig.estimation.arrays import Array
 from rig.observation.consistency.raw_readings import REST
-from rig.observation.consistency.transfers import STANDS_RAD
+from rig.observation.consistency.transfers import STILL_RAD
 
 TIME_TOLERANCE_S = 1e-5  # times that differ by more belong to different edges
 
@@ -40,7 +40,7 @@ def build_reading_patterns(segments: Segments, noise_rad: float) -> Array:
         counted = np.ones(len(first.motion.names), dtype=np.bool_)
         if sweep > REST:
             q_rad = first.motion.angles(np.array([first.start_s, last.end_s]))
-            counted = first.motion.is_moving(first.start_s, last.end_s) & (np.abs(q_rad[1] - q_rad[0]) < STANDS_RAD)
+            counted = first.motion.is_moving(first.start_s, last.end_s) & (np.abs(q_rad[1] - q_rad[0]) < STILL_RAD)
         for share in _edges(segments, sweep):
             interval = segments.intervals[np.flatnonzero(share)[0]]
             at_s = interval.end_s if share[share != 0][0] > 0 else interval.start_s

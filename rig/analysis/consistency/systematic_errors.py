@@ -25,7 +25,7 @@ from rig.estimation.gyroscope.own_errors import KnownSensor, list_own_errors, ro
 from rig.motion.geometry import AXIS_ERRORS, WAVES, WRIST_1, WRIST_2, WRIST_3
 from rig.observation.consistency.raw_readings import REST
 from rig.observation.consistency.segments import MotionInterval
-from rig.observation.consistency.transfers import STANDS_RAD
+from rig.observation.consistency.transfers import STILL_RAD
 from rig.observation.motion.arm_motion import ArmMotion
 
 if TYPE_CHECKING:
@@ -260,7 +260,7 @@ def _sweeps_between_moves(segments: Segments, joint: int) -> list[list[int]]:
     for first in sorted(firsts[sweeps != REST], key=lambda first: float(segments.times_s[first, 0])):
         interval = segments.intervals[first]
         start_rad, end_rad = interval.motion.angles(np.array([interval.start_s, interval.end_s]))[:, joint]
-        stands = max(abs(start_rad - stood_rad), abs(end_rad - start_rad)) < STANDS_RAD
+        stands = max(abs(start_rad - stood_rad), abs(end_rad - start_rad)) < STILL_RAD
         if not stands or interval.motion is not motion:
             between_moves.append([])
         between_moves[-1].append(int(segments.sweep[first]))
@@ -279,7 +279,7 @@ def rate_errors(intervals: Sequence[MotionInterval], steps: int) -> Array:
     axes = motion.axes(middle)
     errors = np.zeros((len(intervals), len(ANGLE_ERRORS), 3))
     for joint, first in _wave_indices(motion).items():
-        moving = np.ptp(q_rad[..., joint], axis=1) >= STANDS_RAD
+        moving = np.ptp(q_rad[..., joint], axis=1) >= STILL_RAD
         if not moving.any():
             continue
         by_axis = np.moveaxis(motion.axis_errors(middle[moving], joint), 1, -2)  # (n, 13, steps, 3)
@@ -299,7 +299,7 @@ def _end_patterns(interval: MotionInterval) -> list[Array]:
     """Return the rate errors (3,), rad/s per rad, of a transfer by angle errors of its moved joints at either end."""
     q_rad = interval.motion.angles(np.array([interval.start_s, interval.end_s]))
     axes = interval.motion.axes(q_rad) / (interval.end_s - interval.start_s)
-    moved = [joint for joint in _wave_indices(interval.motion) if np.ptp(q_rad[:, joint]) >= STANDS_RAD]
+    moved = [joint for joint in _wave_indices(interval.motion) if np.ptp(q_rad[:, joint]) >= STILL_RAD]
     return [end[:, joint] for joint in moved for end in axes]
 
 

@@ -12,7 +12,7 @@ from rig.estimation.arrays import Array
 from rig.motion.steps import Plan, Sweep
 from rig.observation.consistency.raw_readings import REST
 from rig.observation.consistency.segments import MotionInterval, segment_counts
-from rig.observation.consistency.transfers import SPARSE_S, find_transfer, is_by_wrists, mean_specific_force_m_s2
+from rig.observation.consistency.transfers import MAX_STEP_S, find_transfer, is_by_wrists, mean_specific_force_m_s2
 from rig.observation.motion.arm_motion import ArmMotion
 
 
@@ -34,7 +34,7 @@ class PlannedSegments:
             return replace(segments, means_rad_s=segments.rates_rad_s @ matrix.T, variances_rad2_s2=variances)
 
         return PlannedSegments(
-            read(self.segments), read(self.with_transfers if 1 / rate_hz <= SPARSE_S else self.segments)
+            read(self.segments), read(self.with_transfers if 1 / rate_hz <= MAX_STEP_S else self.segments)
         )
 
 

@@ -29,7 +29,7 @@ from rig.observation.average import Average
 from rig.observation.clocks.time_base import TimeBase
 from rig.observation.finished_steps import complete_sweeps
 from rig.observation.observe import Observation
-from rig.observation.observed_run import AS_STATED, ObservedRun, observe_runs
+from rig.observation.observed_run import NO_ROTATIONS, ObservedRun, observe_runs
 
 if TYPE_CHECKING:
     from rig.estimation.by_hand import HandSolution
@@ -108,7 +108,9 @@ class SensorResult:
         return float(np.average([a.temperature_c for a in averages], weights=[a.samples for a in averages]))
 
 
-def observe_recordings(runs: Sequence[RunData], rotations: Mapping[int, Array] = AS_STATED) -> tuple[ObservedRun, ...]:
+def observe_recordings(
+    runs: Sequence[RunData], rotations: Mapping[int, Array] = NO_ROTATIONS
+) -> tuple[ObservedRun, ...]:
     """Return the observations of all recordings of one calibration, without those that have no finished sweep.
 
     The first recording's thresholds apply to all; `rotations` are the `corrections` of `observe_runs`. Raise Refused

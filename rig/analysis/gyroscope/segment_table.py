@@ -10,7 +10,7 @@ from rig.data.recording.settings import Site
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.vector_fit import Explained
 from rig.observation.consistency.raw_readings import REST, RawReadings
-from rig.observation.consistency.segments import FEWEST_AT_REST, MotionInterval, SegmentedAverage
+from rig.observation.consistency.segments import MIN_REST_SAMPLES, MotionInterval, SegmentedAverage
 from rig.observation.consistency.transfers import WristTransfer
 
 
@@ -131,7 +131,7 @@ def _vibration_changes(windows: Sequence[SegmentedAverage], explained: Explained
     rests = [
         (time_s, window.readings.swing_rad2)
         for window, time_s in zip(windows, explained.inputs.windows_s.mean(axis=1), strict=True)
-        if window.readings.sweep == REST and window.average.samples >= FEWEST_AT_REST  # fewer show no vibration
+        if window.readings.sweep == REST and window.average.samples >= MIN_REST_SAMPLES  # fewer show no vibration
     ]
     if not rests:
         return np.zeros((len(times_s), 3))

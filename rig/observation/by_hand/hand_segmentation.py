@@ -14,20 +14,20 @@ from numpy.typing import NDArray
 from rig.data.quantity import RATE
 from rig.estimation.arrays import Array, equal_runs
 from rig.estimation.by_hand.session_parts import HandRecording, HandRest, Move
-from rig.observation.by_hand.rests import ROUNDING, find_rests
+from rig.observation.by_hand.rests import ROUNDING_TOLERANCE, find_rests
 from rig.observation.time_stamps.gaps import find_hiding_gaps
 from rig.observation.time_stamps.sampling import find_sampling
 from rig.observation.windows import Window
 
 MARGIN_S = 0.1  # time at either end of a rest that is assigned to the adjacent moves
-GAP = 2  # missing readings, from which on there is a gap
-AT_THE_TOP = 3  # equal readings in a row at the largest value, from which on they are saturated
-NEAR_RANGE = 0.995
+MIN_GAP_READINGS = 2  # missing readings, from which on there is a gap
+MIN_SATURATED = 3  # equal readings in a row at the largest value
+SATURATION_FRACTION = 0.995
 # duration of a recording's beginning; largest scatter there of a body that no hand holds
-FIRST_S, STILL_RAD_S = 1.0, 0.03
-SETTLED_S, LOOKS_S = 1.0, 0.25  # least duration of a rest during a session; interval of the evaluations
+BEGINNING_S, MAX_STILL_SCATTER_RAD_S = 1.0, 0.03
+MIN_REST_S, EVALUATION_S = 1.0, 0.25  # during a session; interval of the evaluations
 # A body held in the hand: least duration, largest rate; length of the blocks.
-HELD_S, HELD_RAD_S, PAUSE_S = 0.75, 0.15, 0.25
+MIN_HELD_S, MAX_HELD_RATE_RAD_S, BLOCK_S = 0.75, 0.15, 0.25
 
 
 def segment_session(
@@ -51,15 +51,15 @@ def _find_gaps(time_s: Array, rates: Array) -> NDArray[np.bool_]:
     """Return a mask (n,) of the readings before a gap in which the body may have turned unobserved."""
     mask = np.zeros(len(time_s), dtype=np.bool_)
     if len(time_s) > 1:
-        steps = np.flatnonzero(find_sampling(time_s).gaps(time_s, GAP))
+        steps = np.flatnonzero(find_sampling(time_s).gaps(time_s, MIN_GAP_READINGS))
         mask[find_hiding_gaps(time_s, rates, steps)] = True
     return mask
 
 
 def _began_still(time_s: Array, rates: Array) -> bool:
     """Return whether the body hardly moved in the first second; otherwise a hand held it at first, perhaps longer."""
-    first = rates[time_s < time_s[0] + FIRST_S]
-    return bool(len(first) > 1 and first.std(axis=0).max() < STILL_RAD_S)
+    first = rates[time_s < time_s[0] + BEGINNING_S]
+    return bool(len(first) > 1 and first.std(axis=0).max() < MAX_STILL_SCATTER_RAD_S)
 
 
 def _margin_s(window: Window) -> float:
@@ -88,13 +88,13 @@ def _find_clipped(rates: Array, range_rad_s: float | None) -> NDArray[np.bool_]:
     If the range is unknown, long series of equal readings count as clipped.
     """
     if range_rad_s is not None:
-        return np.asarray((np.abs(rates) >= NEAR_RANGE * range_rad_s).any(axis=1))
+        return np.asarray((np.abs(rates) >= SATURATION_FRACTION * range_rad_s).any(axis=1))
     size = np.abs(rates)
     same = ((size >= size.max(axis=0) * (1 - 1e-9)) & (size > 0)).astype(np.intp)
     ahead = np.cumsum(np.vstack([np.zeros((1, 3), np.intp), same]), axis=0)
     top = np.zeros(len(rates), dtype=np.bool_)
-    for first in np.flatnonzero((ahead[AT_THE_TOP:] - ahead[:-AT_THE_TOP] == AT_THE_TOP).any(axis=1)):
-        top[first : first + AT_THE_TOP] = True
+    for first in np.flatnonzero((ahead[MIN_SATURATED:] - ahead[:-MIN_SATURATED] == MIN_SATURATED).any(axis=1)):
+        top[first : first + MIN_SATURATED] = True
     return top
 
 
@@ -102,20 +102,20 @@ def _find_held_intervals(time_s: Array, rates: Array, rests: tuple[HandRest, ...
     """Return the intervals in which a hand held the body: it turned more slowly than in a move, faster than at rest."""
     if not rests:
         return ()
-    width = max(2, int(np.ceil(PAUSE_S / find_sampling(time_s).interval_s - ROUNDING)))
+    width = max(2, int(np.ceil(BLOCK_S / find_sampling(time_s).interval_s - ROUNDING_TOLERANCE)))
     count = len(time_s) // width
     bias = np.median([rest.mean_rad_s for rest in rests], axis=0)
     blocks = (rates[: count * width] - bias).reshape(count, width, 3)
     times = time_s[: count * width].reshape(count, width)
-    slow = np.linalg.norm(blocks.mean(axis=1), axis=1) < HELD_RAD_S
-    slow &= np.abs(blocks).max(axis=(1, 2)) < 4 * HELD_RAD_S
+    slow = np.linalg.norm(blocks.mean(axis=1), axis=1) < MAX_HELD_RATE_RAD_S
+    slow &= np.abs(blocks).max(axis=(1, 2)) < 4 * MAX_HELD_RATE_RAD_S
     for rest in rests:
-        slow &= (times[:, -1] < rest.start_s - PAUSE_S) | (times[:, 0] > rest.end_s + PAUSE_S)
+        slow &= (times[:, -1] < rest.start_s - BLOCK_S) | (times[:, 0] > rest.end_s + BLOCK_S)
     runs = equal_runs(slow)
     intervals = (
         (float(times[first, 0]), float(times[last - 1, -1])) for first, last in runs[slow[runs[:, 0]]].tolist()
     )
-    return tuple((start_s, end_s) for start_s, end_s in intervals if end_s - start_s >= HELD_S)
+    return tuple((start_s, end_s) for start_s, end_s in intervals if end_s - start_s >= MIN_HELD_S)
 
 
 State = Literal["starting", "resting", "moving", "held"]
@@ -135,7 +135,7 @@ class Live:
 class Segmenter:
     """A segmentation in progress. At any time its result equals that of `segment_session` for the readings so far.
 
-    A rest is settled after `SETTLED_S`. `range_rad_s` is the range of the gyroscope, None if unknown.
+    A rest is settled after `MIN_REST_S`. `range_rad_s` is the range of the gyroscope, None if unknown.
     """
 
     def __init__(self, range_rad_s: float | None = None) -> None:
@@ -150,13 +150,13 @@ class Segmenter:
         if not len(time_s):
             return ()
         self._blocks.append((time_s, rates, acceleration))
-        if time_s[-1] < self._looked_s + LOOKS_S:
+        if time_s[-1] < self._looked_s + EVALUATION_S:
             return ()
         self._looked_s = float(time_s[-1])
         self._session = segment_session(*self._all(), range_rad_s=self._range_rad_s)
         settled: list[HandRest | Move] = []
         for row, rest in enumerate(self._session.rests):
-            if rest.end_s - rest.start_s < SETTLED_S - 2 * MARGIN_S or rest.start_s < self._given_s + LOOKS_S:
+            if rest.end_s - rest.start_s < MIN_REST_S - 2 * MARGIN_S or rest.start_s < self._given_s + EVALUATION_S:
                 continue
             if row:
                 settled.append(self._session.moves[row - 1])
@@ -166,10 +166,10 @@ class Segmenter:
 
     @property
     def handled(self) -> HandRecording:
-        """The recording's rests and moves up to the last rest of `SETTLED_S`."""
+        """The recording's rests and moves up to the last rest of `MIN_REST_S`."""
         session = self._session
         count = len(session.rests)
-        while count and session.rests[count - 1].end_s - session.rests[count - 1].start_s < SETTLED_S - 2 * MARGIN_S:
+        while count and session.rests[count - 1].end_s - session.rests[count - 1].start_s < MIN_REST_S - 2 * MARGIN_S:
             count -= 1
         return replace(session, rests=session.rests[:count], moves=session.moves[: max(count - 1, 0)])
 
@@ -180,12 +180,12 @@ class Segmenter:
         if not session.rests:
             return Live(self._looked_s, "starting", self._looked_s, np.zeros(3), 0.0)
         last, now_s = session.rests[-1], self._looked_s
-        if now_s - last.end_s < MARGIN_S + 2 * PAUSE_S:
+        if now_s - last.end_s < MARGIN_S + 2 * BLOCK_S:
             return Live(now_s, "resting", last.start_s - MARGIN_S, np.zeros(3), 0.0)
         moving = session.time_s > last.end_s
         rates = session.rates[moving] - last.mean_rad_s
         turned_rad = np.asarray(np.trapezoid(rates, session.time_s[moving], axis=0), dtype=np.float64)
-        span = next((span for span in session.held_in_air_s if span[1] > now_s - 2 * PAUSE_S), None)
+        span = next((span for span in session.held_in_air_s if span[1] > now_s - 2 * BLOCK_S), None)
         state: State = "moving" if span is None else "held"
         since_s = last.end_s if span is None else span[0]
         return Live(now_s, state, since_s, turned_rad, float(np.abs(rates).max()))

@@ -5,26 +5,26 @@ from numpy.typing import NDArray
 
 from rig.data.quantity import Quantity
 from rig.estimation.arrays import Array
-from rig.observation.by_hand.steadiness import NORMAL
+from rig.observation.by_hand.steadiness import MAD_TO_STD
 
-KNOCK = 8.0  # deviation in standard deviations, beyond which it is not noise
-COARSE = 2.0  # deviation in steps of the readings: noise below the resolution deviates by as much
-COUNTS = 0.05  # least knock that counts, as a fraction of `Quantity.steady`
-MOST = 0.1  # largest fraction of outliers: more of them are noise of another kind
-FEWEST = 5  # fewest readings that show which of them are undisturbed
+KNOCK_STDS = 8.0  # deviation beyond which it is not noise
+COARSE_STEPS = 2.0  # deviation in steps of the readings: noise below the resolution deviates by as much
+MIN_KNOCK_FRACTION = 0.05  # of `Quantity.steady`
+MAX_OUTLIER_FRACTION = 0.1  # more of them are noise of another kind
+MIN_READINGS = 5  # that show which of them are undisturbed
 
 
 def mask_knocks(readings: Array, quantity: Quantity) -> NDArray[np.bool_]:
     """Return a mask (n,) of the readings (n, 3) at rest that are free of knocks."""
     kept: NDArray[np.bool_] = np.ones(len(readings), dtype=np.bool_)
-    if len(readings) < FEWEST:
+    if len(readings) < MIN_READINGS:
         return kept
     deviations = np.abs(readings - np.median(readings, axis=0))
-    typical = NORMAL * np.median(deviations, axis=0)
-    limit = np.maximum(KNOCK * typical, COUNTS * quantity.steady)
-    limit = np.maximum(limit, COARSE * smallest_steps(readings))
+    typical = MAD_TO_STD * np.median(deviations, axis=0)
+    limit = np.maximum(KNOCK_STDS * typical, MIN_KNOCK_FRACTION * quantity.steady)
+    limit = np.maximum(limit, COARSE_STEPS * smallest_steps(readings))
     kept = ~np.any(deviations > limit, axis=1)
-    return kept if np.count_nonzero(~kept) <= MOST * len(kept) else np.ones(len(kept), dtype=np.bool_)
+    return kept if np.count_nonzero(~kept) <= MAX_OUTLIER_FRACTION * len(kept) else np.ones(len(kept), dtype=np.bool_)
 
 
 def smallest_steps(readings: Array) -> Array:

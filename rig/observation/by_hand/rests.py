@@ -17,20 +17,20 @@ from numpy.typing import NDArray
 from rig.data.installed_kinds import quantities
 from rig.data.quantity import RATE, Quantity
 from rig.estimation.arrays import Array, equal_runs
-from rig.observation.by_hand.knocks import KNOCK, smallest_steps
-from rig.observation.by_hand.steadiness import BEYOND
+from rig.observation.by_hand.knocks import KNOCK_STDS, smallest_steps
+from rig.observation.by_hand.steadiness import MAX_NOISE_STDS
 from rig.observation.time_stamps.sampling import find_sampling
 from rig.observation.windows import Window
 
-BLOCK_S, FEWEST = 0.25, 5  # duration of a block, and the fewest samples in it
-ROUNDING = 1e-6  # tolerance of a whole number of intervals
+BLOCK_S, MIN_BLOCK_SAMPLES = 0.25, 5
+ROUNDING_TOLERANCE = 1e-6  # tolerance of a whole number of intervals
 # Fraction of the blocks that determine the noise; ratio to that noise up to which a block is at rest.
-QUIETEST, AS_QUIET = 0.1, 3.0
-COUNTS = 0.2  # fraction of `Quantity.steady`: scatter that is always allowed, because noise may be below the resolution
-TOGGLES = 0.5  # scatter of readings that alternate between two values, in steps
-FIRST = 4  # blocks in the first second
-GAP = 2.5  # shortest gap, in intervals: longer than one missing reading
-NEARLY = 0.5  # least number of a rest's blocks, relative to the most frequent reading's
+QUIETEST_FRACTION, QUIET_RATIO = 0.1, 3.0
+MIN_SCATTER_FRACTION = 0.2  # of `Quantity.steady`: always allowed, because noise may be below the resolution
+TOGGLE_STEPS = 0.5  # scatter of readings that alternate between two values
+FIRST_BLOCKS = 4  # blocks in the first second
+MIN_GAP_INTERVALS = 2.5  # longer than one missing reading
+MIN_BLOCK_RATIO = 0.5  # of a rest's blocks to the most frequent reading's
 CANDIDATES = 400  # number of blocks whose mean is tried as the reading at rest
 
 
@@ -43,25 +43,25 @@ def find_rests(
     still for at least a part of each.
     """
     quantity = next(quantity for quantity in quantities().values() if quantity in readings)
-    if len(time_s) < 2 * FEWEST:
+    if len(time_s) < 2 * MIN_BLOCK_SAMPLES:
         return ()
     interval_s = find_sampling(time_s).interval_s
-    width = max(FEWEST, int(np.ceil(BLOCK_S / interval_s - ROUNDING)))
+    width = max(MIN_BLOCK_SAMPLES, int(np.ceil(BLOCK_S / interval_s - ROUNDING_TOLERANCE)))
     count = len(time_s) // width
     if count < 2:
         return ()
     times = time_s[: count * width].reshape(count, width)
     blocks = readings[quantity][: count * width].reshape(count, width, -1)
     means, scatter = blocks.mean(axis=1), blocks.std(axis=1)
-    least = np.maximum(COUNTS * quantity.steady, TOGGLES * smallest_steps(readings[quantity]))
-    noise = np.maximum(np.quantile(scatter, QUIETEST, axis=0), least)
+    least = np.maximum(MIN_SCATTER_FRACTION * quantity.steady, TOGGLE_STEPS * smallest_steps(readings[quantity]))
+    noise = np.maximum(np.quantile(scatter, QUIETEST_FRACTION, axis=0), least)
     if still_at_first:
-        noise = np.maximum(noise, np.median(scatter[:FIRST], axis=0))
+        noise = np.maximum(noise, np.median(scatter[:FIRST_BLOCKS], axis=0))
     if quantity != RATE:
         means, scatter = _average_unknocked(blocks, noise)
-    tolerance = quantity.steady + BEYOND * noise * np.sqrt(2 / width)
-    gap_s = max(GAP * interval_s, BLOCK_S)  # a body is not moved away and back within a shorter gap
-    still = (scatter <= AS_QUIET * noise).all(axis=1) & (np.diff(times, axis=1).max(axis=1) <= gap_s)
+    tolerance = quantity.steady + MAX_NOISE_STDS * noise * np.sqrt(2 / width)
+    gap_s = max(MIN_GAP_INTERVALS * interval_s, BLOCK_S)  # a body is not moved away and back within a shorter gap
+    still = (scatter <= QUIET_RATIO * noise).all(axis=1) & (np.diff(times, axis=1).max(axis=1) <= gap_s)
     follows = (times[1:, 0] - times[:-1, -1] <= gap_s) & (np.abs(np.diff(means, axis=0)) <= tolerance).all(axis=1)
     pairs = still[:-1] & still[1:] & follows
     if quantity == RATE and still.any():
@@ -81,7 +81,7 @@ def _average_unknocked(blocks: Array, noise: Array) -> tuple[Array, Array]:
     before, after = np.concatenate([blocks[:1, 0], blocks[:-1, -1]]), np.concatenate([blocks[1:, 0], blocks[-1:, -1]])
     extended = np.concatenate([before[:, None], blocks, after[:, None]], axis=1)
     deviations = np.abs(extended - np.median(blocks, axis=1, keepdims=True))
-    knocked: NDArray[np.bool_] = np.any(deviations > KNOCK * noise, axis=2)
+    knocked: NDArray[np.bool_] = np.any(deviations > KNOCK_STDS * noise, axis=2)
     few = (knocked.sum(axis=1) <= blocks.shape[1] // 4) & ~knocked[:, 0] & ~knocked[:, -1]
     masked = np.where((knocked[:, 1:-1] & few[:, None])[..., None], np.nan, blocks)
     return np.nanmean(masked, axis=1), np.nanstd(masked, axis=1)
@@ -112,7 +112,7 @@ def _find_unturned(
     often = np.array(
         [np.count_nonzero((np.abs(pool - candidate) <= tolerance).all(axis=1)) for candidate in candidates]
     )
-    frequent = candidates[often == often.max() if declared.any() else often >= NEARLY * often.max()]
+    frequent = candidates[often == often.max() if declared.any() else often >= MIN_BLOCK_RATIO * often.max()]
     middle = frequent[np.argmin(np.linalg.norm(frequent, axis=1))]
     at_rest = np.median(pool[(np.abs(pool - middle) <= tolerance).all(axis=1)], axis=0)
     agreeing: NDArray[np.bool_] = (np.abs(means - at_rest) <= tolerance).all(axis=1)

@@ -29,9 +29,9 @@ from rig.observation.by_hand.hand_segmentation import Segmenter
 from rig.observation.clocks.clock_estimate import check_readings
 from rig.observation.clocks.time_base import NOMINAL_DRIFT
 
-BETWEEN_S = 10.0  # assumed pause between two recordings of a session, which the boards' clocks do not show
+RECORDING_PAUSE_S = 10.0  # assumed between two recordings of a session: the boards' clocks do not show it
 MICROSECOND_S = 1e-6 * (1 + NOMINAL_DRIFT)  # true duration of a microsecond of the board's counter
-ITS_OWN_CLOCK = "the sensor's own clock, as stated: uncertainty.crystal_ppm"
+OWN_CLOCK_SOURCE = "the sensor's own clock, as stated: uncertainty.crystal_ppm"
 
 Readings = tuple[Array, Array, Array | None]  # times (n,), rates (n, 3), accelerations (n, 3) where they are sent
 
@@ -125,9 +125,9 @@ def replay_runs(runs: Sequence[RunData], name: str) -> tuple[Segmenter, NotCount
         if not len(samples):
             continue
         board_s = microsecond_s * samples["board_time_us"][[0, -1]].astype(np.float64)
-        shift_s = 0.0 if ends_s is None else ends_s + BETWEEN_S - board_s[0]
+        shift_s = 0.0 if ends_s is None else ends_s + RECORDING_PAUSE_S - board_s[0]
         if ends_s is not None:
-            refused.seams.append(ends_s + BETWEEN_S / 2)
+            refused.seams.append(ends_s + RECORDING_PAUSE_S / 2)
         readings = readings_of(run.sensors[name], samples, shift_s)
         time_s, *measured = readings
         check_readings(time_s, np.column_stack([values for values in measured if values is not None]))
@@ -156,7 +156,7 @@ def collect_inputs(settings: RunSettings, provenance: Provenance, sensor: Record
     first = None if sensor.measures(ACCELERATION) else rotate_face(FACES[0], np.array(sensor.mounting))
     return SessionConditions(
         clock_ppm=uncertainty.crystal_ppm,
-        clock_source="the board's crystal" if sensor.on_board else ITS_OWN_CLOCK,
+        clock_source="the board's crystal" if sensor.on_board else OWN_CLOCK_SOURCE,
         box_rad=by_hand.box_rad,
         first_face=first,
         gravity_m_s2=settings.site.gravity_m_s2,

@@ -12,9 +12,9 @@ from rig.estimation.arrays import Array, interpolate
 from rig.observation.time_stamps.sampling import Sampling
 
 BLOCK_S = 1.0
-BEYOND = 6.0  # largest difference due to noise, in its standard deviations
-BRIDGED_S, FILLED = 0.25, 0.01  # longest gap at rest that is ignored; largest fraction of readings missing in such gaps
-NORMAL = 1.4826  # standard deviation over median absolute deviation
+MAX_NOISE_STDS = 6.0  # difference due to noise
+MAX_GAP_S, MAX_GAP_FRACTION = 0.25, 0.01  # at rest: longer gaps are not ignored; readings missing in such gaps
+MAD_TO_STD = 1.4826  # standard deviation over median absolute deviation
 
 
 def contiguous_slices(time_s: Array, sampling: Sampling) -> Iterator[slice]:
@@ -23,8 +23,8 @@ def contiguous_slices(time_s: Array, sampling: Sampling) -> Iterator[slice]:
     A few missing readings are not a gap: `fill_missing` interpolates them, which hardly reduces the noise.
     """
     gaps = sampling.gaps(time_s)
-    short = gaps & (np.diff(time_s) <= BRIDGED_S)
-    if sampling.missing[short].sum() <= FILLED * len(time_s) and sampling.late is None:
+    short = gaps & (np.diff(time_s) <= MAX_GAP_S)
+    if sampling.missing[short].sum() <= MAX_GAP_FRACTION * len(time_s) and sampling.late is None:
         gaps &= ~short
     yield from (slice(start, end) for start, end in pairwise([0, *(1 + np.flatnonzero(gaps)).tolist(), len(time_s)]))
 
@@ -43,9 +43,9 @@ def check_at_rest(time_s: Array, readings: Array, quantity: Quantity) -> None:
     block = np.unique(block, return_inverse=True)[1]  # none is empty
     count = np.bincount(block)
     means = np.column_stack([np.bincount(block, weights=axis) / count for axis in readings.T])
-    noise = NORMAL * np.median(np.abs(np.diff(readings, axis=0)), axis=0) / np.sqrt(2)
+    noise = MAD_TO_STD * np.median(np.abs(np.diff(readings, axis=0)), axis=0) / np.sqrt(2)
     fewest = np.minimum(count[1:], count[:-1])[:, None]
-    excess = np.abs(np.diff(means, axis=0)) - BEYOND * noise * np.sqrt(2 / fewest)
+    excess = np.abs(np.diff(means, axis=0)) - MAX_NOISE_STDS * noise * np.sqrt(2 / fewest)
     if len(excess) and (worst := float(excess.max())) > quantity.steady:
         at_s = float(time_s[np.searchsorted(block, int(excess.max(axis=1).argmax()) + 1)])
         raise Fault(

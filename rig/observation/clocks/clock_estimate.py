@@ -18,9 +18,9 @@ from rig.observation.clocks.time_base import TimeBase, time_base_not_found
 from rig.observation.motion.reference_motion import KnownMotion, check_span, not_finite
 
 LONG_RUN_S = 1800.0  # the part of a recording that the coarse search uses first; it takes more only if that fails
-TURNED_RAD_S = 0.05  # least RMS rate over a recording of an axis that was turned
-BLOCK_S, RATES = 0.1, 5  # duration of a block, whose mean speed is compared with the highest; number of rates in it
-MOVING = 0.02  # fraction of the highest speed, from which on the turner moves
+MIN_TURN_RATE_RAD_S = 0.05  # RMS over a recording, of an axis that was turned
+BLOCK_S, BLOCK_RATES = 0.1, 5  # whose mean speed is compared with the highest; number of rates in it
+MOVING_SPEED_RATIO = 0.02  # to the highest speed, from which on the turner moves
 NEAR_MOTION_S = 0.5  # rest around motion that is used: longer than a coarse clock's error
 
 
@@ -79,7 +79,7 @@ def _check_samples(board_time_s: Array, readings: Array, motion: KnownMotion) ->
 def _turns_every_axis(motion: KnownMotion) -> bool:
     """Return whether every sensor axis turns in any mounting; only then must its readings change."""
     rates = motion.rate(motion.time_s[motion.covered(motion.time_s)])
-    return bool(np.linalg.eigvalsh(rates.T @ rates).min() > TURNED_RAD_S**2 * len(rates))
+    return bool(np.linalg.eigvalsh(rates.T @ rates).min() > MIN_TURN_RATE_RAD_S**2 * len(rates))
 
 
 def check_readings(board_time_s: Array, readings: Array) -> None:
@@ -138,15 +138,15 @@ class _MovingTimes:
 
     @classmethod
     def find(cls, motion: KnownMotion) -> "_MovingTimes":
-        """Return the blocks in or near which the speed is at least `MOVING` of the highest."""
+        """Return the blocks in or near which the speed is at least `MOVING_SPEED_RATIO` of the highest."""
         start_s, end_s = motion.time_s[[0, -1]].tolist()
         count = int((end_s - start_s) / BLOCK_S) + 1
-        middle_s = start_s + BLOCK_S * (np.arange(count)[:, None] + (np.arange(RATES) + 0.5) / RATES)
+        middle_s = start_s + BLOCK_S * (np.arange(count)[:, None] + (np.arange(BLOCK_RATES) + 0.5) / BLOCK_RATES)
         rates = motion.rate(np.minimum(middle_s, end_s).ravel()).reshape(count, -1, 3)
         speed = np.linalg.norm(rates.mean(axis=1), axis=1)
         edge = round(NEAR_MOTION_S / BLOCK_S)
         around = np.lib.stride_tricks.sliding_window_view(np.pad(speed, edge), 2 * edge + 1).max(axis=1)
-        return cls(start_s, around >= MOVING * speed.max())
+        return cls(start_s, around >= MOVING_SPEED_RATIO * speed.max())
 
     def mask(self, time_s: Array) -> NDArray[np.bool_]:
         """Return a mask of the times (n,) that lie in such a block."""

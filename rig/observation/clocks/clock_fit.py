@@ -14,19 +14,19 @@ from rig.observation.motion.reference_motion import KnownMotion
 from rig.observation.statistics.coloured_noise import correlation_inflation
 
 MIN_SAMPLES = 100
-CONTRADICTION = 6.0  # standard deviations between the drifts of two fits
+MAX_DRIFT_DIFFERENCE = 6.0  # standard deviations between the drifts of two fits
 # Ratio to the square of the fastest axis: a body that turns about one axis shows only rounding about others.
-NO_TURNING = 1e-12
+MIN_ROTATION_RATIO = 1e-12
 # Steps in standard deviations; an offset may turn around with a small step while the drift still changes.
-SETTLED, UNDERWAY = 1e-3, 0.1
-FINE_STEPS = 400  # many: if the arm vibrates and hardly turns, a step may be nearly as long as the one before
+CONVERGED_OFFSET, CONVERGED_DRIFT = 1e-3, 0.1
+MAX_FINE_STEPS = 400  # many: if the arm vibrates and hardly turns, a step may be nearly as long as the one before
 # Steps after which weights are kept: noise that seems correlated only at every second step would never settle.
-WEIGHED_STEPS = 60
-SLOW_S, FINE_S = 0.1, 0.02  # times over which rates are averaged in the first fit and in the second
-AVERAGED, EVERY = 10, 2  # rates in one average; stride of the averages in the spline
-LEAST_GAP = 0.5  # shortest step between samples, in intervals
+MAX_WEIGHING_STEPS = 60
+SLOW_AVERAGE_S, FINE_AVERAGE_S = 0.1, 0.02  # over which rates are averaged in the first fit and in the second
+MEAN_RATES, STRIDE = 10, 2  # rates in one average; stride of the averages in the spline
+MIN_STEP_INTERVALS = 0.5  # between samples
 # Step from which on, and interval at which, the fit extrapolates; largest number of steps it skips.
-SLOW_STEPS, LEAP_STEPS, FARTHEST = 300, 20, 100.0
+FIRST_LEAP_STEP, LEAP_INTERVAL, MAX_LEAP_STEPS = 300, 20, 100.0
 
 
 class _SlowMotion:
@@ -34,18 +34,18 @@ class _SlowMotion:
 
     def __init__(self, motion: KnownMotion, over_s: float, start_s: float, end_s: float) -> None:
         self.time_s, self.covered = motion.time_s, motion.covered
-        step_s = over_s / AVERAGED
+        step_s = over_s / MEAN_RATES
         times_s = np.arange(max(start_s, self.time_s[0]), min(end_s, self.time_s[-1]), step_s)
         rates = np.cumsum(motion.rate(times_s), axis=0)
-        means = (rates[AVERAGED:] - rates[:-AVERAGED]) / AVERAGED
-        self.rate = CubicSpline(times_s[AVERAGED::EVERY] - (AVERAGED - 1) / 2 * step_s, means[::EVERY])
+        means = (rates[MEAN_RATES:] - rates[:-MEAN_RATES]) / MEAN_RATES
+        self.rate = CubicSpline(times_s[MEAN_RATES::STRIDE] - (MEAN_RATES - 1) / 2 * step_s, means[::STRIDE])
 
 
 def _average_samples(time_s: Array, readings: Array, count: int) -> tuple[Array, Array]:
     """Return times (m,) and readings (m, 3) averaged over `count` samples that follow each other without a gap."""
     starts = np.arange(0, len(time_s) - count + 1, count)
     lasting_s = time_s[starts + count - 1] - time_s[starts]
-    starts = starts[lasting_s <= (count - 1 + LEAST_GAP) * float(np.median(np.diff(time_s)))]
+    starts = starts[lasting_s <= (count - 1 + MIN_STEP_INTERVALS) * float(np.median(np.diff(time_s)))]
     inside = starts[:, None] + np.arange(count)
     return time_s[inside].mean(axis=1), readings[inside].mean(axis=1)
 
@@ -75,7 +75,7 @@ def _is_contradiction(clock: TimeBase, refined: TimeBase) -> bool:
     offsets may differ, as filters delay slow and fast parts differently.
     """
     difference, std = abs(refined.drift - clock.drift), float(np.hypot(refined.drift_std, clock.drift_std))
-    return refined.drift_std > clock.drift_std and difference > CONTRADICTION * std
+    return refined.drift_std > clock.drift_std and difference > MAX_DRIFT_DIFFERENCE * std
 
 
 def _list_stages(
@@ -84,13 +84,13 @@ def _list_stages(
     """Yield times, readings and motion for each fit: averaged over long times, over short times, and not averaged."""
     start_s, end_s = clock.controller_time_s(board_time_s[[0, -1]]).tolist()
     step_s = float(np.median(np.diff(board_time_s)))
-    for over_s in (SLOW_S, FINE_S):
+    for over_s in (SLOW_AVERAGE_S, FINE_AVERAGE_S):
         count = round(over_s / step_s)
         if count < 2 or len(board_time_s) < MIN_SAMPLES * count:
             continue
         slow = _SlowMotion(motion, count * step_s, start_s - 1.0, end_s + 1.0)
         yield *_average_samples(board_time_s, readings, count), slow
-        if over_s == FINE_S:
+        if over_s == FINE_AVERAGE_S:
             return
     yield board_time_s, readings, motion
 
@@ -98,14 +98,14 @@ def _list_stages(
 def _iterate_clock(clock: TimeBase, board_time_s: Array, readings: Array, motion: KnownMotion) -> TimeBase:
     """Refine the clock until it settles, with leaps if steps shrink slowly. Raise Fault `time_base_not_found`."""
     moved, inflation = np.zeros(2), None
-    for number in range(1, FINE_STEPS + 1):
+    for number in range(1, MAX_FINE_STEPS + 1):
         before, last = clock, moved
-        settled = inflation if number > WEIGHED_STEPS else None
+        settled = inflation if number > MAX_WEIGHING_STEPS else None
         clock, inflation = _refine_clock(clock, board_time_s, readings, motion, settled)
         moved = np.array([clock.offset_s - before.offset_s, clock.drift - before.drift])
-        if abs(moved[0]) < SETTLED * clock.offset_std_s and abs(moved[1]) < UNDERWAY * clock.drift_std:
+        if abs(moved[0]) < CONVERGED_OFFSET * clock.offset_std_s and abs(moved[1]) < CONVERGED_DRIFT * clock.drift_std:
             return clock
-        if number >= SLOW_STEPS and number % LEAP_STEPS == 0:
+        if number >= FIRST_LEAP_STEP and number % LEAP_INTERVAL == 0:
             further = moved * _remaining_steps(float(moved[0] / last[0]))
             clock = replace(clock, offset_s=clock.offset_s + further[0], drift=clock.drift + further[1])
     raise time_base_not_found("the fit of the board's clock does not settle")
@@ -113,7 +113,7 @@ def _iterate_clock(clock: TimeBase, board_time_s: Array, readings: Array, motion
 
 def _remaining_steps(ratio: float) -> float:
     """Return the sum of all further steps as a multiple of the last step, if steps shrink by `ratio` (Aitken's Δ²)."""
-    return min(ratio / (1 - ratio), FARTHEST) if 0 < ratio < 1 else 0.0
+    return min(ratio / (1 - ratio), MAX_LEAP_STEPS) if 0 < ratio < 1 else 0.0
 
 
 def _refine_clock(
@@ -126,7 +126,7 @@ def _refine_clock(
     """
     t, since = clock.controller_time_s(board_time_s), board_time_s - clock.reference_s
     columns = np.column_stack([motion.rate(t), np.ones(len(t))])
-    inverse = np.linalg.pinv(columns.T @ columns, rcond=NO_TURNING, hermitian=True) @ columns.T
+    inverse = np.linalg.pinv(columns.T @ columns, rcond=MIN_ROTATION_RATIO, hermitian=True) @ columns.T
     fitted = inverse @ readings
     residual = readings - columns @ fitted
     by_offset = motion.rate(t, 1) @ fitted[:3]

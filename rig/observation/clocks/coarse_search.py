@@ -16,8 +16,8 @@ from rig.observation.motion.reference_motion import KnownMotion
 
 COARSE_STEP_S = 0.02  # far shorter than the ramps of a sweep, so that the fine fit converges
 COARSE_REACH_S = 0.15  # largest clock error at either end of the data from which the fine fit converges
-FINER_DRIFTS = 5  # drifts between those of the first search, for the second
-CANDIDATES = 12  # peaks of the correlation that are tried: six equal sweeps make eleven
+DRIFT_SUBDIVISION = 5  # drifts between those of the first search, for the second
+CANDIDATE_PEAKS = 12  # peaks of the correlation that are tried: six equal sweeps make eleven
 MIN_EXPLAINED = 0.5  # fraction of the readings' variance that the arm's motion must explain
 MAX_DRIFT = 0.03  # an oscillator without a crystal is within 2 %
 MAX_DRIFT_LONG_RUN = 1e-3  # one with a crystal is within 600 ppm
@@ -36,7 +36,7 @@ def find_coarse_clock(board_time_s: Array, readings: Array, motion: KnownMotion)
         return max(zip(matches, drifts.tolist(), strict=True))
 
     _, drift = search(spacing * np.arange(-count, count + 1))
-    match, drift = search(drift + spacing * np.linspace(-0.5, 0.5, FINER_DRIFTS))
+    match, drift = search(drift + spacing * np.linspace(-0.5, 0.5, DRIFT_SUBDIVISION))
     if match.fraction < MIN_EXPLAINED:
         raise time_base_not_found(f"the arm's motion explains {100 * match.fraction:.0f} % of what the gyroscope reads")
     return TimeBase(float(match.offset_s - reference), drift, float(reference), np.zeros((2, 2)), np.zeros(3))
@@ -92,7 +92,7 @@ def _coarse_offset(time_s: Array, readings: Array, arm_rate: Callable[[float], t
     squares = sum(np.fft.irfft(one * other, size) ** 2 for one in spectra[0] for other in spectra[1])
     correlation = np.roll(squares, len(filled))[:count]
     peaks = np.flatnonzero((correlation[1:-1] > correlation[:-2]) & (correlation[1:-1] >= correlation[2:])) + 1
-    best = peaks[np.argsort(correlation[peaks])[::-1][:CANDIDATES]] - len(filled)
+    best = peaks[np.argsort(correlation[peaks])[::-1][:CANDIDATE_PEAKS]] - len(filled)
 
     shares, fractions = _compute_explained_shares(turning, filled, moving, best)
     # Bin j of the board, whose middle lies half a step after its start, corresponds to point j + lag of the arm's grid.

@@ -14,8 +14,8 @@ from rig.observation.statistics.coloured_noise import correlation_inflation
 from rig.observation.windows import inside, swept
 
 ORDER = 6
-SQUARED = comb(2 * ORDER, ORDER)  # variance of a difference of this order, relative to that of one reading
-EVEN_S = 1e-4  # states count as evenly spaced if their time steps differ by less
+VARIANCE_RATIO = comb(2 * ORDER, ORDER)  # of a difference of this order to the variance of one reading
+EVENNESS_S = 1e-4  # states whose time steps differ by less count as evenly spaced
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,11 +61,11 @@ def state_jitter(recordings: Sequence[ObservedRun]) -> Jitter:
     for sweep, steps_rad in _difference_sweeps(recordings):
         steps = steps_rad[:, sweep.joint]
         if len(steps):
-            scatter.append(np.mean(steps**2) / SQUARED / sweep.speed_rad_s**2)
+            scatter.append(np.mean(steps**2) / VARIANCE_RATIO / sweep.speed_rad_s**2)
             count += len(steps)
     if not scatter:
         return Jitter(0.0, np.inf)
-    return Jitter(float(np.sqrt(np.mean(scatter))), count * SQUARED**2 / comb(4 * ORDER, 2 * ORDER))
+    return Jitter(float(np.sqrt(np.mean(scatter))), count * VARIANCE_RATIO**2 / comb(4 * ORDER, 2 * ORDER))
 
 
 def find_encoder_noise_rad(recordings: Sequence[ObservedRun]) -> float:
@@ -79,7 +79,7 @@ def find_encoder_noise_rad(recordings: Sequence[ObservedRun]) -> float:
         for sweep, steps_rad in _difference_sweeps([run for run in recordings if run.motion.has_accurate_angles])
         if steps_rad.shape[0] and steps_rad.shape[1] > 1
     ]
-    return float(np.sqrt(np.mean(squares) / SQUARED)) if squares else 0.0
+    return float(np.sqrt(np.mean(squares) / VARIANCE_RATIO)) if squares else 0.0
 
 
 def _difference_sweeps(recordings: Sequence[ObservedRun]) -> Iterator[tuple[Sweep, Array]]:
@@ -90,4 +90,4 @@ def _difference_sweeps(recordings: Sequence[ObservedRun]) -> Iterator[tuple[Swee
             time_s = motion.time_s[inside(motion.time_s, finished.window)]
             steps_rad = np.diff(motion.angles(time_s), n=ORDER, axis=0)
             even = np.ptp(np.lib.stride_tricks.sliding_window_view(np.diff(time_s), ORDER), axis=1)
-            yield finished.sweep, steps_rad[even < EVEN_S]
+            yield finished.sweep, steps_rad[even < EVENNESS_S]

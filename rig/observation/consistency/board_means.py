@@ -18,7 +18,7 @@ from rig.observation.observed_run import ObservedRun
 from rig.observation.statistics.spectral_lines import fit_columns, harmonics, waves
 from rig.observation.turn_mean import lag_columns
 
-NEXT_S = 1e-7  # rounding of a sample's time, at most
+TIME_ROUNDING_S = 1e-7  # at most
 
 
 def compare_board_means(sensor: str, recordings: Sequence[ObservedRun]) -> dict[int, float]:
@@ -52,7 +52,7 @@ def _deviation(recording: ObservedRun, stream: Stream, turn: Observation, observ
     across = np.array(stream.sensor.mounting) @ (np.eye(3) - np.outer(axis, axis))
     by_rate = np.outer(average.mean_rad_s - zero, axis) / turn.speed_rad_s + across
     edges = np.searchsorted(stream.time_s, [average.start_s, average.end_s])
-    boards = np.searchsorted(stream.board_time_s, np.array([board.start_us, board.end_us]) * 1e-6 - NEXT_S)
+    boards = np.searchsorted(stream.board_time_s, np.array([board.start_us, board.end_us]) * 1e-6 - TIME_ROUNDING_S)
     first, last = int(min(edges[0], boards[0])), int(max(edges[1], boards[1]))
     of_turn, of_board = slice(*(edges - first).tolist()), slice(*(boards - first).tolist())
     time_s = stream.time_s[first:last]

@@ -12,8 +12,8 @@ from rig.observation.average import Stream
 from rig.observation.statistics.coloured_noise import innovations
 
 REST = -1  # instead of the index of a revolution
-MEMORY = 12  # earlier readings from which a reading is predicted
-NORMAL = 1.4826  # standard deviation over median absolute deviation
+PREDICTOR_ORDER = 12  # earlier readings from which a reading is predicted
+MAD_TO_STD = 1.4826  # standard deviation over median absolute deviation
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ def innovation_std(counts: NDArray[np.int64]) -> Array:
 
 
 def _innovation_std(readings: Array) -> float:
-    """Return the standard deviation of the error of predicting readings (n,) from `MEMORY` earlier ones."""
-    if len(readings) < 4 * MEMORY:
+    """Return the standard deviation of the error of predicting readings (n,) from `PREDICTOR_ORDER` earlier ones."""
+    if len(readings) < 4 * PREDICTOR_ORDER:
         return float(np.std(np.diff(readings)) / np.sqrt(2)) if len(readings) > 1 else 0.0
-    return float(NORMAL * np.median(np.abs(innovations(readings, MEMORY))))
+    return float(MAD_TO_STD * np.median(np.abs(innovations(readings, PREDICTOR_ORDER))))

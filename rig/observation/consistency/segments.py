@@ -31,22 +31,22 @@ from rig.observation.statistics.spectral_lines import (
     waves,
 )
 from rig.observation.statistics.tapered_weights import noise_at_zero
-from rig.observation.turn_mean import SLOW
+from rig.observation.turn_mean import SLOW_CYCLES
 
 # Not four segments: one of an encoder's waves with two periods per revolution is zero at the ends of quarters, and no
 # segment would show it.
-OF_REVOLUTION, OF_REST, MOST = 6, 3, 72
-FEWEST_SAMPLES = 20  # fewest samples of a segment
-FEWEST_SCATTERED = 3  # number of segments up to which they do not show a scatter around a straight line
-FEWEST_AT_REST = 60  # fewest samples of a rest: fewer do not determine its noise well enough for a weight
-PREVAILS = 0.7  # ratio of noise at zero frequency to scatter, below which the rest of the scatter is a vibration
-AT_REST = LineSearch(stands_out=30.0, beats=0)  # noise alone exceeds this in one bin of 10⁹
+REVOLUTION_SEGMENTS, REST_SEGMENTS, MAX_SEGMENTS = 6, 3, 72
+MIN_SAMPLES = 20  # of a segment
+MIN_SCATTER_SEGMENTS = 3  # number of segments up to which they do not show a scatter around a straight line
+MIN_REST_SAMPLES = 60  # fewer do not determine a rest's noise well enough for a weight
+MAX_NOISE_RATIO = 0.7  # of noise at zero frequency to scatter, below which the rest of the scatter is a vibration
+REST_SEARCH = LineSearch(stands_out=30.0, beats=0)  # noise alone exceeds this in one bin of 10⁹
 
 
 def segment_counts(revolutions: int) -> tuple[int, int]:
     """Return the number of segments of each of the `revolutions`, then of each rest."""
-    segments = max(1, min(OF_REVOLUTION, MOST // max(revolutions, 1)))
-    return segments, max(1, segments // OF_REST)
+    segments = max(1, min(REVOLUTION_SEGMENTS, MAX_SEGMENTS // max(revolutions, 1)))
+    return segments, max(1, segments // REST_SEGMENTS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,10 +148,10 @@ def _divide(stream: Stream, average: Average, usable: NDArray[np.bool_], count: 
     """Divide the `usable` samples (n,) of an average into `count` segments, or fewer for few samples."""
     inside = slice_time(stream, average.start_s, average.end_s)
     time_s = stream.time_s[inside]
-    count = max(1, min(count, int(usable.sum()) // FEWEST_SAMPLES))
+    count = max(1, min(count, int(usable.sum()) // MIN_SAMPLES))
     ends_s = np.linspace(average.start_s, average.end_s, count + 1)
     index = np.where(usable, np.clip(np.searchsorted(ends_s, time_s, side="right") - 1, 0, count - 1), -1)
-    enough = tuple(segment for segment in range(count) if np.sum(index == segment) >= FEWEST_SAMPLES / 2)
+    enough = tuple(segment for segment in range(count) if np.sum(index == segment) >= MIN_SAMPLES / 2)
     used = np.isin(index, enough)
     readings = stream.readings_rad_s[inside][used]
     groups = even_groups(index[used], count)
@@ -163,8 +163,8 @@ def _segment_revolution(
 ) -> SegmentedAverage:
     """Average a revolution or an arc in segments, without the spectral lines of the whole average.
 
-    Spectral lines slower than `SLOW` remain, because weights that cancel them would amplify the encoders' noise; the
-    variance of each segment includes them. A vibration that the encoders measure only in part does not count as noise.
+    Spectral lines slower than `SLOW_CYCLES` remain, because weights that cancel them would amplify the encoders' noise;
+    the variance of each segment includes them. A vibration that the encoders measure only in part is no noise.
     """
     average, axis = turn.average, turn.axis_flange
     times_s = stream.time_s[slice_time(stream, average.start_s, average.end_s)]
@@ -180,7 +180,7 @@ def _segment_revolution(
     vibrating = vibration @ np.linalg.lstsq(vibration, residual, rcond=None)[0]
     noise_alone = residual - vibrating
     noise = MeanNoise(average.noise_rad_s**2, average.noise_rad2_s2 * average.samples, average.dof)
-    is_slow = np.repeat(average.lines_hz * average.duration_s < SLOW, column_count(turn.beats))
+    is_slow = np.repeat(average.lines_hz * average.duration_s < SLOW_CYCLES, column_count(turn.beats))
     weights = mean_weights(division.groups, lines[:, ~is_slow])
     added: Array | float = 0.0
     if is_slow.any():
@@ -211,7 +211,7 @@ def _slow_line_variance(slow: Array, weights: Array, residuals: Array) -> Array:
     means' scatter around a straight line in time; that line itself would be a fault, not a vibration.
     """
     fitted = np.mean((weights @ slow @ fit_columns(slow, residuals)) ** 2, axis=0)
-    if len(weights) <= FEWEST_SCATTERED:
+    if len(weights) <= MIN_SCATTER_SEGMENTS:
         return np.asarray(fitted, dtype=np.float64)
     means, straight = weights @ residuals, np.vander(np.linspace(-1, 1, len(weights)), 2)
     around = fit_residuals(straight, means)
@@ -226,8 +226,8 @@ def _segment_rest(stream: Stream, motion: ArmMotion, average: Average, count: in
     readings = division.readings_rad_s - motion.rates_at_samples(division.time_s) @ response.T
     division = replace(division, readings_rad_s=readings)
     fraction = (division.time_s - average.start_s) / average.duration_s
-    cycles = find_lines(readings - readings.mean(axis=0), AT_REST, fraction=fraction)
-    lines = waves(cycles, fraction, AT_REST.beats)
+    cycles = find_lines(readings - readings.mean(axis=0), REST_SEARCH, fraction=fraction)
+    lines = waves(cycles, fraction, REST_SEARCH.beats)
     weights = mean_weights(division.groups, lines)
     residuals = division.subtract_means(readings, weights)
     residuals = residuals - lines @ fit_columns(lines, residuals)
@@ -248,7 +248,7 @@ def _segment_rest(stream: Stream, motion: ArmMotion, average: Average, count: in
         vibration_counts=np.zeros(3),
         swing_rad2=line_swing(vibrating, lines, cycles / average.duration_s),
     )
-    return SegmentedAverage(average, segments if average.samples >= FEWEST_AT_REST else (), raw)
+    return SegmentedAverage(average, segments if average.samples >= MIN_REST_SAMPLES else (), raw)
 
 
 def _noise_at_rest(residuals: Array, segments: int, columns: int, steps: Steps) -> MeanNoise:
@@ -261,7 +261,7 @@ def _noise_at_rest(residuals: Array, segments: int, columns: int, steps: Steps) 
     in_a_mean = scatter * np.array([correlation_inflation(axis) for axis in residuals.T])
     if columns:
         at_zero = np.maximum(noise_at_zero(residuals), steps.variance)
-        in_a_mean = np.where(at_zero < PREVAILS * scatter, at_zero, in_a_mean)
+        in_a_mean = np.where(at_zero < MAX_NOISE_RATIO * scatter, at_zero, in_a_mean)
     return MeanNoise(scatter, in_a_mean, float(dof))
 
 

@@ -30,22 +30,22 @@ from rig.observation.statistics.spectral_lines import unit_columns
 from rig.observation.statistics.tapered_weights import noise_at_zero
 from rig.observation.windows import iterate_rests, swept
 
-BEYOND_S = 0.1  # time before and after the motion: an arm at this speed may still be moving
-SHORTEST_S, LONGEST_S = 0.5, 30.0
-SPARSE_S = 0.0105  # longest interval of samples that show the servo's vibration while it accelerates
+MARGIN_S = 0.1  # before and after the motion: an arm at this speed may still be moving
+MIN_TRANSFER_S, MAX_TRANSFER_S = 0.5, 30.0
+MAX_STEP_S = 0.0105  # of samples that show the servo's vibration while it accelerates
 # The sum of samples equals a transfer except at the corners of its rate: each adds its change of slope times dt² B₂(x)
 # / 2, at the fraction x of an interval (Euler and Maclaurin). B₂, the second Bernoulli polynomial, has the RMS
 # √(1/180); either end has two corners.
-CORNERS = (2 / 180) ** 0.5 / 2
+CORNER_RMS = (2 / 180) ** 0.5 / 2
 # Time over which rates are averaged against encoder noise: 24 µrad make 4 mrad/s from angles 8 ms apart.
-SMOOTHED_S = 0.05
-LOST = 0.01  # largest fraction of missing samples, by the nominal rate, which boards keep to about 1 %
-GAP = 1.5  # longest step between samples, in intervals: a longer one misses a sample
-STEPS = 48
-FILTERED = range(-2, 3)  # samples that a sensor's filter combines into one reading
+SMOOTHING_S = 0.05
+MAX_LOST_FRACTION = 0.01  # of samples, by the nominal rate, which boards keep to about 1 %
+MIN_GAP_INTERVALS = 1.5  # a longer step between samples misses a sample
+TIME_STEPS = 48
+FILTER_SAMPLES = range(-2, 3)  # which a sensor's filter combines into one reading
 WRISTS = 3  # the last joints, whose transfers count
-STANDS_RAD = 1e-3  # apparent rotation of a joint that does not move
-LOW = 0.0  # fraction of the data rate: as few low frequencies as possible, because a servo's vibration is near
+STILL_RAD = 1e-3  # largest apparent rotation of a joint that does not move
+LOW_FRACTION = 0.0  # of the data rate: as few low frequencies as possible, because a servo's vibration is near
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,28 +106,28 @@ def find_transfer(motion: ArmMotion, start_s: float, end_s: float) -> MotionInte
     moving = motion.time_s[inside][(rates > MIN_RATE_RAD_S) & (smoothed > MIN_RATE_RAD_S / 2)]
     if not len(moving):
         return None
-    return MotionInterval(motion, max(start_s, float(moving[0]) - BEYOND_S), min(end_s, float(moving[-1]) + BEYOND_S))
+    return MotionInterval(motion, max(start_s, float(moving[0]) - MARGIN_S), min(end_s, float(moving[-1]) + MARGIN_S))
 
 
 def _rate_norms(motion: ArmMotion, time_s: Array) -> tuple[Array, Array]:
-    """Return norms (n,), rad/s, of the flange's rate at times (n,), and of its mean over `SMOOTHED_S` around each."""
-    half_s = SMOOTHED_S / 2
+    """Return norms (n,), rad/s, of the flange's rate at times (n,), and of its mean over `SMOOTHING_S` around each."""
+    half_s = SMOOTHING_S / 2
     within_s = np.clip(time_s, motion.time_s[0] + half_s, motion.time_s[-1] - half_s)
-    rates, smoothed = motion.rate(time_s), motion.mean_rates(within_s, SMOOTHED_S)
+    rates, smoothed = motion.rate(time_s), motion.mean_rates(within_s, SMOOTHING_S)
     return np.linalg.norm(rates, axis=1), np.linalg.norm(smoothed, axis=1)
 
 
 def is_by_wrists(interval: MotionInterval) -> bool:
     """Return whether a transfer is of suitable duration and moves the wrists only."""
     before = max(interval.motion.kinematics.joints - WRISTS, 0)  # of any chain the last three joints are its wrists
-    others = interval.motion.angles(np.linspace(interval.start_s, interval.end_s, STEPS))[:, :before]
+    others = interval.motion.angles(np.linspace(interval.start_s, interval.end_s, TIME_STEPS))[:, :before]
     rotated_rad = np.ptp(others, axis=0).max(initial=0.0)
-    return bool(SHORTEST_S < interval.end_s - interval.start_s < LONGEST_S and rotated_rad < STANDS_RAD)
+    return bool(MIN_TRANSFER_S < interval.end_s - interval.start_s < MAX_TRANSFER_S and rotated_rad < STILL_RAD)
 
 
 def mean_specific_force_m_s2(interval: MotionInterval, down_m_s2: Array, extension_m: Array) -> Array:
     """Return the mean (3,) of gravity minus the acceleration at the sensors' position, in the flange's frame."""
-    time_s, step_s = np.linspace(interval.start_s, interval.end_s, STEPS, retstep=True)
+    time_s, step_s = np.linspace(interval.start_s, interval.end_s, TIME_STEPS, retstep=True)
     pose = flange_pose(interval.motion.angles(time_s), interval.motion.kinematics)
     position_m = pose[:, :3, 3] + pose[:, :3, :3] @ extension_m
     acceleration = np.diff(position_m, n=2, axis=0) / step_s**2
@@ -142,11 +142,11 @@ def _scatter(readings: Array, time_s: Array, motion: ArmMotion, down_m_s2: Array
     the data rate counts as noise.
     """
     step_s = float(np.median(np.diff(time_s)))
-    rates = [motion.rates_at_samples(time_s + shift * step_s) for shift in FILTERED]
+    rates = [motion.rates_at_samples(time_s + shift * step_s) for shift in FILTER_SAMPLES]
     gravity = flange_attitude(motion.angles(time_s), motion.kinematics) @ down_m_s2
     columns = unit_columns(np.column_stack([np.ones(len(time_s)), *rates, gravity]))
     residuals = readings - columns @ np.linalg.lstsq(columns, readings, rcond=None)[0]
-    variance: Array = noise_at_zero(residuals, LOW) / len(readings)
+    variance: Array = noise_at_zero(residuals, LOW_FRACTION) / len(readings)
     return variance
 
 
@@ -175,14 +175,14 @@ def _whole_transfer(start_s: float, end_s: float, stream: Stream, motion: ArmMot
     covered_s = motion.time_s[0] + half_s, motion.time_s[-1] - half_s
     samples = slice_time(stream, max(transfer.start_s, covered_s[0]), min(transfer.end_s, covered_s[1]))
     time_s = stream.time_s[samples]
-    if len(time_s) < 2 or np.diff(time_s).mean() > SPARSE_S:
+    if len(time_s) < 2 or np.diff(time_s).mean() > MAX_STEP_S:
         return
     step_s = float(time_s[-1] - time_s[0]) / (len(time_s) - 1)
     turning = motion.time_s[(motion.time_s >= transfer.start_s) & (motion.time_s <= transfer.end_s)]
-    unseen_rad = float(np.linalg.norm(motion.rate(turning, 1), axis=1).max() * CORNERS * step_s**2)
+    unseen_rad = float(np.linalg.norm(motion.rate(turning, 1), axis=1).max() * CORNER_RMS * step_s**2)
     transfer = MotionInterval(motion, float(time_s[0]) - step_s / 2, float(time_s[-1]) + step_s / 2, unseen_rad)
-    complete = len(time_s) >= (1 - LOST) * (transfer.end_s - transfer.start_s) * stream.sensor.rate_hz
-    complete &= bool(np.diff(time_s).max() < GAP * step_s)
+    complete = len(time_s) >= (1 - MAX_LOST_FRACTION) * (transfer.end_s - transfer.start_s) * stream.sensor.rate_hz
+    complete &= bool(np.diff(time_s).max() < MIN_GAP_INTERVALS * step_s)
     ends = np.minimum(*_rate_norms(motion, np.array([transfer.start_s, transfer.end_s])))
     in_range = not stream.sensor.channel(RATE).is_saturated(stream.raw[samples]).any()
     stands = ends.max() < 3 * MIN_RATE_RAD_S

@@ -38,7 +38,7 @@ from rig.observation.external.csv_windows import (
 )
 from rig.observation.external.omission import Omitted
 from rig.observation.external.placement_account import AttitudeRows
-from rig.observation.external.placements import MOSTLY, Placements, find_placements
+from rig.observation.external.placements import MIN_STILL_FRACTION, Placements, find_placements
 from rig.observation.external.reference_clock import check_one_clock, find_reference_clock
 from rig.observation.external.reference_rows import Turning
 from rig.observation.external.table_motion import check_rates_agree
@@ -161,7 +161,7 @@ def average_placements(samples: Samples, table: Mapping[str, Array], *, find_clo
     sampling = find_sampling(time_s)
     expected = sampling.count_expected(time_s, rows_found.rows_s)
     counts = np.diff(np.searchsorted(time_s, rows_found.rows_s), axis=1)[:, 0]
-    mostly = (counts > 0) & (counts >= MOSTLY * expected - 1)
+    mostly = (counts > 0) & (counts >= MIN_STILL_FRACTION * expected - 1)
     sampled = rows_found.select(np.flatnonzero(mostly))
     covered = rows_found.select(np.flatnonzero(mostly | _is_covered(rows_found.rows_s, time_s)))
     whole = rows_found.select(_find_complete(rows_found, counts, expected))

@@ -54,10 +54,10 @@ AXIS_COLUMNS = ("axis_x", "axis_y", "axis_z")
 STD_COLUMNS = ("angle_std_rad", "axis_std_rad")
 MIN_DURATION_S = 1e-3  # the fewest samples take longer at any data rate
 # Cosine between two axes, and between their readings; least reading relative to a sweep's speed.
-SAME_AXIS, OPPOSITE, SENSED = 0.9, -0.5, 0.25
-ROUNDING = 1e-12  # scatter relative to the mean that is rounding
+SAME_AXIS_COSINE, OPPOSITE_COSINE, MIN_READING_RATIO = 0.9, -0.5, 0.25
+ROUNDING_RATIO = 1e-12  # scatter relative to the mean that is rounding
 QUARTER_DEG = 90.0
-LEAST_MOTION = 1e-9  # rad or rad/s: a smaller motion is no sweep, and its square might underflow
+MIN_MOTION = 1e-9  # rad or rad/s: a smaller motion is no sweep, and its square might underflow
 SWEEPS_MB = 1  # some ten thousand sweeps
 
 
@@ -237,7 +237,7 @@ def _speeds(sweeps: Mapping[str, Array]) -> Array:
             what = f"lasts {duration:g} s, which is too short for a sweep"
         elif moved < 0:
             what = "turns by a negative amount"
-        elif 0 < moved < LEAST_MOTION:
+        elif 0 < moved < MIN_MOTION:
             what = f"turns by {moved:.0e}, which is too little; a rest has 0"
         elif moved > 0 and abs(norm - 1) > 1e-3:
             what = f"has an axis of length {norm:.3g}"
@@ -271,7 +271,7 @@ def _observation(row: int, mean: Average, speed_rad_s: float, axis: Array) -> Ob
 
 def _check_noisy(mean: Average, row: int) -> None:
     """Raise Fault `stuck_sensor` if an axis has one value throughout a row, so that its mean is uncertain by a step."""
-    quiet = np.flatnonzero(mean.noise_rad_s <= ROUNDING * np.abs(mean.mean_rad_s))
+    quiet = np.flatnonzero(mean.noise_rad_s <= ROUNDING_RATIO * np.abs(mean.mean_rad_s))
     if len(quiet):
         axis = int(quiet[0])
         raise Fault(
@@ -300,10 +300,10 @@ def _check_directions(turns: Sequence[Observation], rests: Sequence[Average]) ->
     rates = means - np.mean([rest.mean_rad_s for rest in rests] if rests else means, axis=0)
     sizes = np.linalg.norm(rates, axis=1)
     axes = np.array([turn.axis_flange for turn in turns])
-    sensed = sizes > SENSED * np.array([turn.speed_rad_s for turn in turns])
+    sensed = sizes > MIN_READING_RATIO * np.array([turn.speed_rad_s for turn in turns])
     cosines = axes @ axes.T
     agreement = np.sign(cosines) * (rates @ rates.T) / np.maximum(np.outer(sizes, sizes), np.finfo(float).tiny)
-    contradicting = (np.abs(cosines) > SAME_AXIS) & (agreement < OPPOSITE) & np.outer(sensed, sensed)
+    contradicting = (np.abs(cosines) > SAME_AXIS_COSINE) & (agreement < OPPOSITE_COSINE) & np.outer(sensed, sensed)
     if contradicting.any():
         worst = int(np.argmax(contradicting.sum(axis=1)))
         others = np.flatnonzero(contradicting[worst])

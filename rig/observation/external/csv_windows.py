@@ -17,7 +17,7 @@ from rig.observation.windows import Window, inside
 
 MIN_SAMPLES = 20
 MAX_LOST_FRACTION = 0.01
-MOSTLY = 0.5  # least fraction of a row's readings that determines its mean
+MIN_READ_FRACTION = 0.5  # of a row's readings: fewer do not determine its mean
 
 
 def check_times(time_s: Array, where: str = "the samples") -> None:
@@ -109,7 +109,7 @@ class RowGaps:
     @property
     def is_usable(self) -> bool:
         """Whether enough readings are present to determine the row's mean, and no gap hides too much rotation."""
-        mostly = self.count >= max(MIN_SAMPLES, MOSTLY * self.expected)
+        mostly = self.count >= max(MIN_SAMPLES, MIN_READ_FRACTION * self.expected)
         return is_complete(self.count, self.expected) or (mostly and bool(np.isfinite(self.hidden_rad)))
 
 
@@ -134,7 +134,7 @@ def is_losing(rows: Sequence[RowGaps]) -> bool:
     return sum(row.gaps for row in rows) > MAX_LOST_FRACTION * sum(row.count for row in rows)
 
 
-ONE_CLOCK = "Check that both files use one clock in seconds, and that no samples are missing"
+CLOCK_REMEDY = "Check that both files use one clock in seconds, and that no samples are missing"
 
 
 def check_complete(count: int, expected: float, window: Window, where: str, least: int = MIN_SAMPLES) -> None:
@@ -145,7 +145,7 @@ def check_complete(count: int, expected: float, window: Window, where: str, leas
     wanted = f"{expected:.0f} are expected from {window.start_s:.10g} to {window.end_s:.10g} s"
     if expected < least:
         wanted = f"at least {least} are needed; it lasts {lasts_s:.3g} s at {expected / lasts_s:.3g} Hz"
-    raise Fault("lost_samples", f"{where} has {count} samples, but {wanted}", ONE_CLOCK)
+    raise Fault("lost_samples", f"{where} has {count} samples, but {wanted}", CLOCK_REMEDY)
 
 
 def is_complete(count: int, expected: float, least: int = MIN_SAMPLES) -> bool:

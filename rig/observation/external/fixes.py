@@ -20,17 +20,16 @@ from rig.observation.false_readings import find_clipped
 from rig.observation.time_stamps.gaps import hidden_angles_rad
 from rig.observation.time_stamps.sampling import find_sampling
 
-# Usual and shortest window: the errors of cameras are correlated over tenths of a second.
-WINDOW_S, SHORTEST_S = 1.0, 0.5
-WINDOWS, MOST = 40, 120  # least number of windows, unless they would be shorter than SHORTEST_S; largest number
-GAP = 2  # missing readings that make a gap: a cubic spline through the others bridges a single one
+WINDOW_S, MIN_WINDOW_S = 1.0, 0.5  # the errors of cameras are correlated over tenths of a second
+MIN_WINDOWS, MAX_WINDOWS = 40, 120  # unless they would be shorter than MIN_WINDOW_S
+MIN_GAP_READINGS = 2  # missing ones: a cubic spline through the others bridges a single one
 # Largest angle between two readings for which a cubic spline through the rates is correct to microradians.
 MAX_STEP_RAD = 0.35
 # Std of a hidden rotation, above which there is no increment; std of an unknown one.
-MOST_HIDDEN_RAD, UNKNOWN_RAD = 0.05, 10.0
-BATCH_S = 0.1  # length of means at rest, over which correlated noise averages out
-FEWEST = 6  # increments in motion: 18 numbers for 12 parameters
-THIN = 0.25  # least fraction of a fix's usual number of rows
+MAX_HIDDEN_STD_RAD, UNKNOWN_STD_RAD = 0.05, 10.0
+BATCH_MEAN_S = 0.1  # at rest, over which correlated noise averages out
+MIN_MOVING_INCREMENTS = 6  # 18 numbers for 12 parameters
+MIN_ROW_RATIO = 0.25  # to a fix's usual number of rows
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +75,7 @@ def gather(turning: Turning, window_s: float | None = None, clock_s: float = 0.0
     joined, blind_rad, left_out = _find_joined(turning, fixes, clock_s)
     moving = fixes.placement[1:] != fixes.placement[:-1]
     moving_count = int((joined & moving).sum())
-    if moving_count < FEWEST or moving_count < int((~joined & moving).sum()):
+    if moving_count < MIN_MOVING_INCREMENTS or moving_count < int((~joined & moving).sum()):
         raise _all_lost(moving_count, int(moving.sum()), left_out)
     walk = _measure_walk(turning, rows.rows_s[still] + clock_s)
     fixes = replace(fixes, joined=joined, blind_rad=blind_rad, walk=walk, on_arrival=turning.on_arrival)
@@ -84,7 +83,7 @@ def gather(turning: Turning, window_s: float | None = None, clock_s: float = 0.0
 
 
 def _suitable_s(span_s: float) -> float:
-    return max(min(WINDOW_S, max(SHORTEST_S, span_s / WINDOWS)), span_s / MOST)
+    return max(min(WINDOW_S, max(MIN_WINDOW_S, span_s / MIN_WINDOWS)), span_s / MAX_WINDOWS)
 
 
 def _fixes(turning: Turning, still: NDArray[np.bool_], window_s: float) -> Fixes:
@@ -111,14 +110,14 @@ def _fixes(turning: Turning, still: NDArray[np.bool_], window_s: float) -> Fixes
 
 
 def _measure_walk(turning: Turning, rests_s: Array) -> tuple[float, float]:
-    """Return the angle random walk in rests (k, 2), from means over `BATCH_S`: sum of squares, rad²/s, and its dof.
+    """Return the angle random walk in rests (k, 2) from means over `BATCH_MEAN_S`: sum of squares, rad²/s, and its dof.
 
     Batch means are used because the readings' noise may be coloured over a few samples.
     """
     squares, dof = 0.0, 0.0
     for start_s, end_s in rests_s.tolist():
         first, last = np.searchsorted(turning.time_s, [start_s, end_s])
-        size = max(int(np.ceil(BATCH_S * (last - first) / (end_s - start_s))), 1)
+        size = max(int(np.ceil(BATCH_MEAN_S * (last - first) / (end_s - start_s))), 1)
         count = int(last - first) // size
         if count > 1:
             batches = turning.readings_rad_s[first : first + count * size].reshape(count, size, 3).mean(axis=1)
@@ -132,7 +131,7 @@ def _drop_thin(fixes: Fixes) -> Fixes:
     """Return the fixes, except for moving ones made of far fewer rows than usual."""
     counts = np.bincount(fixes.fix)
     moving = fixes.placement >= 0
-    kept = ~moving | (counts >= THIN * np.median(counts[moving] if moving.any() else counts))
+    kept = ~moving | (counts >= MIN_ROW_RATIO * np.median(counts[moving] if moving.any() else counts))
     rows = kept[fixes.fix]
     number = np.cumsum(kept) - 1
     return Fixes(
@@ -163,7 +162,7 @@ def _find_joined(
         from_step, to_step = np.searchsorted(ends, first_s[:-1], side="right"), np.searchsorted(begins, last_s[1:])
         squares = np.concatenate([[0.0], np.cumsum(np.square(hidden_rad))])
         amount = np.maximum(squares[np.maximum(to_step, from_step)] - squares[from_step], 0.0)
-        lost = np.flatnonzero((amount > MOST_HIDDEN_RAD**2) & joined)
+        lost = np.flatnonzero((amount > MAX_HIDDEN_STD_RAD**2) & joined)
         joined[lost] = False
         hidden += np.where(joined, amount, 0.0)
         if len(lost):
@@ -182,12 +181,12 @@ def _find_unknown_steps(turning: Turning) -> Iterator[tuple[str, NDArray[np.intp
     angle_rad = np.linalg.norm(readings[:-1] - np.median(readings, axis=0), axis=1) * steps_s
     clipped = np.flatnonzero(find_clipped(readings))
     adjacent = np.unique(np.clip(np.concatenate([clipped - 1, clipped]), 0, len(steps_s) - 1))
-    lost = find_sampling(turning.time_s).gaps(turning.time_s, GAP)
+    lost = find_sampling(turning.time_s).gaps(turning.time_s, MIN_GAP_READINGS)
     gaps = np.flatnonzero(lost)
     fast = np.flatnonzero((angle_rad > MAX_STEP_RAD) & ~lost)
-    yield "lost_samples", gaps, np.minimum(hidden_angles_rad(turning.time_s, readings, gaps), UNKNOWN_RAD)
-    yield "saturation", adjacent, np.full(len(adjacent), UNKNOWN_RAD)
-    yield "turned_too_fast", fast, np.full(len(fast), UNKNOWN_RAD)
+    yield "lost_samples", gaps, np.minimum(hidden_angles_rad(turning.time_s, readings, gaps), UNKNOWN_STD_RAD)
+    yield "saturation", adjacent, np.full(len(adjacent), UNKNOWN_STD_RAD)
+    yield "turned_too_fast", fast, np.full(len(fast), UNKNOWN_STD_RAD)
 
 
 def _all_lost(count: int, total: int, left_out: tuple[LeftOut, ...]) -> Fault:
@@ -211,5 +210,7 @@ def _all_lost(count: int, total: int, left_out: tuple[LeftOut, ...]) -> Fault:
 
 def _too_few(what: str) -> Fault:
     return Fault(
-        "too_few_observations", f"{what}; at least {FEWEST} increments are needed", "Record longer, in more attitudes"
+        "too_few_observations",
+        f"{what}; at least {MIN_MOVING_INCREMENTS} increments are needed",
+        "Record longer, in more attitudes",
     )

@@ -24,13 +24,13 @@ from rig.observation.external.table_log import read_table_log
 from rig.observation.formats.column_selection import map_motion, map_samples
 from rig.observation.formats.sample_files import entry_of, whole
 
-UNNAMED = Item("imu")
-USED: Mapping[MotionKind, tuple[str, ...]] = {  # the sensors that the solution uses; all, if none is named
+UNNAMED_ITEM = Item("imu")
+USED_SENSORS: Mapping[MotionKind, tuple[str, ...]] = {  # the sensors that the solution uses; all, if none is named
     "sweeps": (RATE.sensor,),
     "turns": (RATE.sensor, ACCELERATION.sensor),
     "attitudes": (),
 }
-NOTHING_LOST = ObservationThresholds(max_lost_fraction=0.01, max_speed_deviation=0.01, max_axis_deviation_deg=10.0)
+THRESHOLDS = ObservationThresholds(max_lost_fraction=0.01, max_speed_deviation=0.01, max_axis_deviation_deg=10.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +60,7 @@ def build_recording(
     column_map = files.columns
     needed = () if files.tells == "attitudes" else [RATE]
     mapped = map_samples(column_map)
-    table = read_sample_table(files.readings, needed, mapped, request.only or USED[files.tells])
+    table = read_sample_table(files.readings, needed, mapped, request.only or USED_SENSORS[files.tells])
     samples = samples_in(table.columns, str(files.readings))  # as the solution will use them
     if missing := [
         sensor for sensor in request.only if sensor not in {quantity.sensor for quantity in samples.readings}
@@ -81,7 +81,7 @@ def build_recording(
         RunSettings(
             procedure=files.tells,
             then_verify=False,
-            observation=NOTHING_LOST,
+            observation=THRESHOLDS,
             limits=None,
             to_calibrate=(files.item.name,),
             reference=None,
@@ -102,7 +102,7 @@ def build_recording(
     )
 
 
-def read_log(path: Path, columns: ColumnMap = AS_NAMED, item: Item = UNNAMED) -> RunData:
+def read_log(path: Path, columns: ColumnMap = AS_NAMED, item: Item = UNNAMED_ITEM) -> RunData:
     """Return the readings of a file without motion, as `rig solve` reads them, to be shown or exported.
 
     Raise Refused as `read_sample_table` and `samples_in` do.
@@ -114,7 +114,7 @@ def read_log(path: Path, columns: ColumnMap = AS_NAMED, item: Item = UNNAMED) ->
     settings = RunSettings(
         procedure="turns",
         then_verify=False,
-        observation=NOTHING_LOST,
+        observation=THRESHOLDS,
         limits=None,
         to_calibrate=(),
         reference=None,

@@ -9,11 +9,11 @@ from rig.data.quantity import RATE
 from rig.estimation.arrays import Array, rotation_vectors
 from rig.observation.by_hand.rests import find_rests
 from rig.observation.external.reference_rows import Turning
-from rig.observation.external.still_attitudes import LATE_S, STILL_RAD_S, still_windows
+from rig.observation.external.still_attitudes import MAX_STILL_RATE_RAD_S, MAX_TIME_ERROR_S, still_windows
 from rig.observation.windows import Window, inside
 
-SHORTEST_S, AS_QUIET = 0.4, 1.5  # shortest rest with another bias; its largest noise, relative to the other rests
-FEWEST, FEWEST_S = 2, 1.0  # fewest rests that show a scatter, and their total duration
+MIN_REST_S, MAX_NOISE_RATIO = 0.4, 1.5  # rest with another bias; its noise, relative to the other rests
+MIN_RESTS, MIN_TOTAL_S = 2, 1.0  # that show a scatter, and their total duration
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,11 +41,11 @@ def means_at_rest(turning: Turning, clock_s: float) -> MeansAtRest | None:
             continue
         rows = rows[np.argsort(rows_s[rows])]
         rate = _rate_rad_s(rows_s[rows], turning.attitudes[rows])
-        if np.linalg.norm(rate) <= STILL_RAD_S:
+        if np.linalg.norm(rate) <= MAX_STILL_RATE_RAD_S:
             readings.append(turning.readings_rad_s[inside(turning.time_s, rest)].mean(axis=0))
             rates.append(rate)
             lasting_s += rest.end_s - rest.start_s
-    if len(rates) < FEWEST or lasting_s < FEWEST_S:
+    if len(rates) < MIN_RESTS or lasting_s < MIN_TOTAL_S:
         return None
     return MeansAtRest(np.array(readings), np.array(rates))
 
@@ -60,13 +60,13 @@ def find_rests_otherwise(
     if not rests:
         return []
     noise = np.median([readings[inside(time_s, rest)].std(axis=0) for rest in rests], axis=0)
-    inner = [Window(window.start_s + LATE_S, window.end_s - LATE_S) for window in lying]
+    inner = [Window(window.start_s + MAX_TIME_ERROR_S, window.end_s - MAX_TIME_ERROR_S) for window in lying]
     return [
         window
         for window in inner
-        if window.end_s - window.start_s >= SHORTEST_S
+        if window.end_s - window.start_s >= MIN_REST_S
         and all(rest.end_s <= window.start_s or rest.start_s >= window.end_s for rest in rests)
-        and (readings[inside(time_s, window)].std(axis=0) <= AS_QUIET * noise).all()
+        and (readings[inside(time_s, window)].std(axis=0) <= MAX_NOISE_RATIO * noise).all()
     ]
 
 

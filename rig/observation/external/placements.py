@@ -17,18 +17,18 @@ from rig.data.quantity import RATE, Quantity
 from rig.estimation.arrays import Array
 from rig.estimation.sensor_axes import nearest_rotation
 from rig.observation.by_hand.knocks import mask_knocks
-from rig.observation.by_hand.rests import BLOCK_S, COUNTS, find_rests
-from rig.observation.by_hand.steadiness import BEYOND
+from rig.observation.by_hand.rests import BLOCK_S, MIN_SCATTER_FRACTION, find_rests
+from rig.observation.by_hand.steadiness import MAX_NOISE_STDS
 from rig.observation.external.csv_windows import MIN_SAMPLES, scatter_of
 from rig.observation.external.omission import Omitted
 from rig.observation.external.placement_account import Account, AttitudeRows
-from rig.observation.external.still_attitudes import DWELL_S, LATE_S, still_windows
+from rig.observation.external.still_attitudes import MAX_TIME_ERROR_S, MIN_DWELL_S, still_windows
 from rig.observation.statistics.mean import Mean
 from rig.observation.windows import Window, inside
 
-TURNED_RAD = 0.02  # angle between rows of one rest, beyond which the body was turned about the measured vector
-INTERRUPTED_S = 1.0  # longest knock, after which equal readings show that the body did not move
-MOSTLY = 0.5  # least fraction of a dwell in which the body lies still; otherwise the whole dwell is left out
+MAX_REST_ANGLE_RAD = 0.02  # between rows of one rest, beyond which the body was turned about the measured vector
+MAX_KNOCK_S = 1.0  # after which equal readings show that the body did not move
+MIN_STILL_FRACTION = 0.5  # of a dwell in which the body lies still; otherwise the whole dwell is left out
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +89,7 @@ def find_placements(time_s: Array, readings: Mapping[Quantity, Array], rows: Att
 
     Raise Fault `not_at_rest` if the body moves in every row, or in more than half of the dwells.
     """
-    dwells = np.array([window.end_s - window.start_s >= DWELL_S for window in rows.windows])
+    dwells = np.array([window.end_s - window.start_s >= MIN_DWELL_S for window in rows.windows])
     windows_s = np.array([(window.start_s, window.end_s) for window in rows.windows])
     lying = still_windows(windows_s, rows.attitudes)
     joined = _join_rests(time_s, readings, find_rests(time_s, readings, lying=lying))
@@ -145,7 +145,7 @@ def _same_rest(time_s: Array, readings: Mapping[Quantity, Array], before: Window
     between = _closed_slice(time_s, Window(before.end_s, after.start_s))
     gap_s = float(np.diff(time_s[between]).max())
     has_gap = gap_s > BLOCK_S
-    if after.start_s - before.end_s > INTERRUPTED_S + (gap_s if has_gap else 0.0):
+    if after.start_s - before.end_s > MAX_KNOCK_S + (gap_s if has_gap else 0.0):
         return False
     cuts = (_closed_slice(time_s, before), _closed_slice(time_s, after))
     first, *others = (quantity for quantity in quantities().values() if quantity in readings)
@@ -157,14 +157,14 @@ def _same_rest(time_s: Array, readings: Mapping[Quantity, Array], before: Window
         return bool(others) and all(_reads_alike(readings[quantity], quantity, *cuts) for quantity in others)
     bias = readings[RATE][cuts[0]].mean(axis=0)
     turned_rad = np.trapezoid(readings[RATE][between] - bias, time_s[between], axis=0)
-    return bool(np.linalg.norm(turned_rad) <= TURNED_RAD)
+    return bool(np.linalg.norm(turned_rad) <= MAX_REST_ANGLE_RAD)
 
 
 def _reads_alike(read: Array, quantity: Quantity, before: NDArray[np.intp], after: NDArray[np.intp]) -> bool:
     """Return whether two parts of readings (n, 3) at rest have the same mean within their noise."""
     one, other = read[before], read[after]
-    noise = np.maximum(np.minimum(one.std(axis=0), other.std(axis=0)), COUNTS * quantity.steady)
-    tolerance = quantity.steady + BEYOND * noise * np.sqrt(1 / len(one) + 1 / len(other))
+    noise = np.maximum(np.minimum(one.std(axis=0), other.std(axis=0)), MIN_SCATTER_FRACTION * quantity.steady)
+    tolerance = quantity.steady + MAX_NOISE_STDS * noise * np.sqrt(1 / len(one) + 1 / len(other))
     return bool((np.abs(one.mean(axis=0) - other.mean(axis=0)) <= tolerance).all())
 
 
@@ -187,10 +187,10 @@ def _find_rest(time_s: Array, window: Window, rests: Sequence[_PlacedRest]) -> t
             return rest.number, cut
         met.append((rest.number, overlap_s, cut))
     lasts_s = window.end_s - window.start_s
-    if lasts_s < DWELL_S or sum(overlap_s > BLOCK_S for _, overlap_s, _ in met) != 1:
+    if lasts_s < MIN_DWELL_S or sum(overlap_s > BLOCK_S for _, overlap_s, _ in met) != 1:
         return -1, nothing
     number, overlap_s, cut = max(met, key=lambda match: match[1])
-    return (number, cut) if overlap_s >= MOSTLY * lasts_s else (-1, nothing)
+    return (number, cut) if overlap_s >= MIN_STILL_FRACTION * lasts_s else (-1, nothing)
 
 
 def _mask_inner(rest: NDArray[np.intp], windows_s: Array, starts_s: Array, ends_s: Array) -> NDArray[np.bool_]:
@@ -200,7 +200,7 @@ def _mask_inner(rest: NDArray[np.intp], windows_s: Array, starts_s: Array, ends_
     """
     at_rest = np.flatnonzero(rest >= 0)
     middles_s, number = windows_s[at_rest].mean(axis=1), rest[at_rest]
-    is_inner = (middles_s >= starts_s[number] + LATE_S) & (middles_s <= ends_s[number] - LATE_S)
+    is_inner = (middles_s >= starts_s[number] + MAX_TIME_ERROR_S) & (middles_s <= ends_s[number] - MAX_TIME_ERROR_S)
     inner = np.zeros(len(rest), dtype=np.bool_)
     inner[at_rest] = is_inner | ~np.isin(number, number[is_inner])
     return inner
@@ -212,7 +212,7 @@ def _group_by_placement(rest: NDArray[np.intp], attitudes: Array) -> list[NDArra
     last: dict[int, list[int]] = {}
     for row in np.flatnonzero(rest >= 0).tolist():
         before = last.get(int(rest[row]))
-        if before is not None and _angle_between_rad(attitudes[before[0]], attitudes[row]) <= TURNED_RAD:
+        if before is not None and _angle_between_rad(attitudes[before[0]], attitudes[row]) <= MAX_REST_ANGLE_RAD:
             before.append(row)
             continue
         groups.append([row])

@@ -21,14 +21,14 @@ from rig.observation.external.reference_rows import Turning, select_covered
 from rig.observation.external.robust_start import COARSE_S, find_start
 from rig.observation.external.table_motion import TableMotion
 
-CLEARER = 0.9  # a drift is accepted if it reduces the unexplained fraction to this ratio or less
-CRYSTALS = 1e-4  # standard deviation of the drift between two crystals
+MAX_UNEXPLAINED_RATIO = 0.9  # a drift is accepted if it reduces the unexplained fraction to this ratio or less
+CRYSTAL_DRIFT_STD = 1e-4  # between two crystals
 # longest step of the rows: in intervals of the readings, or as a fraction of the total change by drift
-GAP, OF_DRIFT = 2.5, 0.2
+MAX_STEP_INTERVALS, MAX_STEP_DRIFT_FRACTION = 2.5, 0.2
 # least drift that is no crystal's, and least drift in standard deviations that is not chance
-LARGEST_DRIFT, CERTAIN = 5e-4, 6.0
-DOUBTFUL = 0.1  # unexplained fraction, above which the rows may be inverse rotations
-EXPLAINED = 0.3  # fraction of the readings' variance that the coarse offset explains
+MIN_DRIFT, MIN_DRIFT_STDS = 5e-4, 6.0
+MAX_UNEXPLAINED = 0.1  # fraction, above which the rows may be inverse rotations
+MIN_EXPLAINED = 0.3  # fraction of the readings' variance, by the coarse offset
 
 
 def find_reference_clock(turning: Turning, rates_rad_s: Array | None) -> TimeBase:
@@ -42,11 +42,11 @@ def find_reference_clock(turning: Turning, rates_rad_s: Array | None) -> TimeBas
     if rates_rad_s is not None:
         return _raise_fault(estimated)
     steady, unexplained = _find_steady_clock(turning, motion)
-    if unexplained > DOUBTFUL:
+    if unexplained > MAX_UNEXPLAINED:
         _check_not_inverted(turning, unexplained)
     if not isinstance(estimated, Fault):
         aligned = replace(turning, time_s=estimated.controller_time_s(time_s))
-        if find_start(select_covered(aligned)).unexplained <= CLEARER * unexplained:
+        if find_start(select_covered(aligned)).unexplained <= MAX_UNEXPLAINED_RATIO * unexplained:
             return estimated
     if unexplained < 1.0:
         return steady
@@ -66,12 +66,12 @@ def check_one_clock(turning: Turning, rates_rad_s: Array | None) -> None:
     drift = 0.0
     for find in (_estimate_clock, find_reference_clock):  # the first is fast, and shows that nothing is wrong
         clock = or_fault(partial(find, turning, rates_rad_s))
-        if isinstance(clock, Fault) or abs(clock.drift) < max(LARGEST_DRIFT, CERTAIN * clock.drift_std):
+        if isinstance(clock, Fault) or abs(clock.drift) < max(MIN_DRIFT, MIN_DRIFT_STDS * clock.drift_std):
             return
         drift = clock.drift
     lasts_s = float(turning.time_s[-1] - turning.time_s[0])
     steps_s = np.diff(turning.time_s)
-    if steps_s.max() > max(GAP * np.median(steps_s), OF_DRIFT * abs(drift) * lasts_s):
+    if steps_s.max() > max(MAX_STEP_INTERVALS * np.median(steps_s), MAX_STEP_DRIFT_FRACTION * abs(drift) * lasts_s):
         return
     raise Fault(
         "clocks_apart",
@@ -86,10 +86,10 @@ def _find_steady_clock(turning: Turning, motion: TableMotion) -> tuple[TimeBase,
     time_s = turning.time_s
     explained, offset_s = estimate_coarse_offset(time_s, turning.readings_rad_s, motion)
     unexplained, bias_rad_s = 1.0, np.zeros(3)
-    if explained >= EXPLAINED:
+    if explained >= MIN_EXPLAINED:
         start = find_start(select_covered(replace(turning, time_s=time_s + offset_s)))
         offset_s, unexplained, bias_rad_s = offset_s - start.state.clock_s, start.unexplained, start.state.bias
-    covariance = np.diag([COARSE_S**2, CRYSTALS**2])
+    covariance = np.diag([COARSE_S**2, CRYSTAL_DRIFT_STD**2])
     return TimeBase(offset_s, 0.0, float(time_s[0] + time_s[-1]) / 2, covariance, bias_rad_s), unexplained
 
 

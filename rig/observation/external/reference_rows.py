@@ -16,9 +16,9 @@ from rig.observation.by_hand.rests import find_rests
 from rig.observation.external.still_attitudes import still_windows
 
 # Least duration and samples of a row that may be a rest; largest difference between rests.
-STILL_S, STILL_SAMPLES, STILL_RAD_S = 0.5, 20, 5e-3
+MIN_STILL_S, MIN_STILL_SAMPLES, MAX_REST_DIFFERENCE_RAD_S = 0.5, 20, 5e-3
 MARGIN_S = 0.05  # time at either end of a rest in which the body may move on the reference's clock
-TURNED_RAD_S = 0.02  # rate of the attitudes in a rest of the readings, above which the body turned
+MAX_STILL_RATE_RAD_S = 0.02  # of the attitudes in a rest of the readings, above which the body turned
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +61,7 @@ def join_rests(turning: Turning, clock_s: float) -> tuple[Turning, NDArray[np.bo
         if (
             not len(inner)
             or still[rows].any()
-            or _find_rate_rad_s(turning.attitudes[inner], middles_s[inner]) > TURNED_RAD_S
+            or _find_rate_rad_s(turning.attitudes[inner], middles_s[inner]) > MAX_STILL_RATE_RAD_S
         ):
             continue
         kept[rows] = False
@@ -109,15 +109,15 @@ def _find_still(turning: Turning, clock_s: float) -> NDArray[np.bool_]:
     """Return a mask (N,) of rows in which the body lay still: long rows with equal means and only noise."""
     rows_s = turning.rows_s
     start, end = np.searchsorted(turning.time_s, rows_s.T + clock_s)
-    still: NDArray[np.bool_] = (rows_s[:, 1] - rows_s[:, 0] >= STILL_S) & (end - start >= STILL_SAMPLES)
+    still: NDArray[np.bool_] = (rows_s[:, 1] - rows_s[:, 0] >= MIN_STILL_S) & (end - start >= MIN_STILL_SAMPLES)
     long = np.flatnonzero(still)
     if not len(long):
         return still
     cuts = [turning.readings_rad_s[start[row] : end[row]] for row in long]
     # White noise by differences of successive readings, in the quietest row.
     noise = min(float(np.diff(cut, axis=0).std(axis=0).max()) for cut in cuts) / np.sqrt(2)
-    quiet = np.array([cut.std(axis=0).max() for cut in cuts]) <= 2 * noise + STILL_RAD_S
+    quiet = np.array([cut.std(axis=0).max() for cut in cuts]) <= 2 * noise + MAX_REST_DIFFERENCE_RAD_S
     means = np.array([cut.mean(axis=0) for cut in cuts])
     deviation = np.abs(means - np.median(means[quiet] if quiet.any() else means, axis=0)).max(axis=1)
-    still[long] = quiet & (deviation <= STILL_RAD_S + 4 * noise / np.sqrt(end[long] - start[long]))
+    still[long] = quiet & (deviation <= MAX_REST_DIFFERENCE_RAD_S + 4 * noise / np.sqrt(end[long] - start[long]))
     return still

@@ -16,15 +16,15 @@ from rig.estimation.arrays import Array, integrate_rates, interpolate, rotation_
 from rig.estimation.external.attitude_drift import DriftState
 from rig.observation.external.reference_rows import Turning
 
-APART_S = 0.1  # least time between the rows of a pair, or one row
-MOST_RAD, LEAST_RAD = 2.6, 0.03  # rotation of a pair: less than π, and more than the errors of most references
-MOVING = 0.2  # fraction of the ninth decile of rotations, below which a pair counts as a rest
-PAIRS, FEWEST = 600, 12  # largest and smallest number of pairs
-REACH_S, COARSE_S, FINE_S = 0.5, 0.02, 0.004  # half-range of the search for τ; its coarse and fine steps
+MIN_PAIR_S = 0.1  # between the rows of a pair, or one row
+MAX_PAIR_RAD, MIN_PAIR_RAD = 2.6, 0.03  # rotation of a pair: less than π, and more than the errors of most references
+MIN_ROTATION_RATIO = 0.2  # to the ninth decile of rotations, below which a pair counts as a rest
+PAIRS, MIN_PAIRS = 600, 12  # largest number, smallest number
+MAX_OFFSET_S, COARSE_S, FINE_S = 0.5, 0.02, 0.004  # range of the search for τ on either side, and its steps
 REWEIGHTINGS = 4
 # Fraction of the squared rotation about all axes: if an axis has less, F remains that of an aligned sensor about it.
-HARDLY = 1e-4
-EXPLAINED = 0.5  # least fraction of the readings' variance that F explains
+MIN_ROTATION_FRACTION = 1e-4
+MIN_EXPLAINED = 0.5  # fraction of the readings' variance, by F
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +48,7 @@ def find_start(turning: Turning) -> RobustStart:
     """Return initial values of F, b and τ; without suitable rows those of an aligned sensor on the same clock."""
     aligned = RobustStart(DriftState(np.eye(3), np.zeros(3), 0.0), 1.0)
     pairs = _find_pairs(turning)
-    if len(pairs.begin_s) < FEWEST:
+    if len(pairs.begin_s) < MIN_PAIRS:
         return aligned
     time_s, readings = turning.time_s, turning.readings_rad_s
     total = integrate_rates(time_s, readings)
@@ -56,15 +56,15 @@ def find_start(turning: Turning) -> RobustStart:
     def fit(clock_s: float) -> tuple[float, Array]:
         begin_s, end_s = pairs.begin_s + clock_s, pairs.end_s + clock_s
         some = (begin_s >= time_s[0]) & (end_s <= time_s[-1])
-        if some.sum() < FEWEST:
+        if some.sum() < MIN_PAIRS:
             return np.inf, np.zeros((4, 3))
         turned = interpolate(end_s[some], time_s, total) - interpolate(begin_s[some], time_s, total)
         return _fit(np.column_stack([pairs.rotations[some], (end_s - begin_s)[some]]), turned)
 
-    best_s = min(np.arange(-REACH_S, REACH_S + COARSE_S / 2, COARSE_S), key=lambda clock_s: fit(clock_s)[0])
+    best_s = min(np.arange(-MAX_OFFSET_S, MAX_OFFSET_S + COARSE_S / 2, COARSE_S), key=lambda clock_s: fit(clock_s)[0])
     best_s = min(best_s + np.arange(-COARSE_S, COARSE_S + FINE_S / 2, FINE_S), key=lambda clock_s: fit(clock_s)[0])
     unexplained, solution = fit(float(best_s))
-    if unexplained > 1 - EXPLAINED:
+    if unexplained > 1 - MIN_EXPLAINED:
         return aligned
     return RobustStart(
         DriftState(np.asarray(solution[:3].T, dtype=np.float64), solution[3], float(best_s)), unexplained
@@ -74,19 +74,19 @@ def find_start(turning: Turning) -> RobustStart:
 def _find_pairs(turning: Turning) -> _Pairs:
     """Return pairs of rows in close succession: all pairs with motion between the rows, and as many pairs at rest."""
     middles_s = turning.rows_s.mean(axis=1)
-    later = np.searchsorted(middles_s, middles_s + APART_S)
+    later = np.searchsorted(middles_s, middles_s + MIN_PAIR_S)
     later = np.maximum(later, np.arange(len(middles_s)) + 1)
     first = np.flatnonzero(later < len(middles_s))
     last = later[first]
     rotations = rotation_vectors(np.swapaxes(turning.attitudes[first], -1, -2) @ turning.attitudes[last])
     angles = np.linalg.norm(rotations, axis=1)
     usual_s = np.median(middles_s[last] - middles_s[first]) if len(first) else 0.0
-    near = (middles_s[last] - middles_s[first] <= 2 * usual_s) & (angles < MOST_RAD)
+    near = (middles_s[last] - middles_s[first] <= 2 * usual_s) & (angles < MAX_PAIR_RAD)
     if not near.any():
         return _Pairs(np.zeros(0), np.zeros(0), np.zeros((0, 3)))
-    moving = near & (angles >= max(MOVING * float(np.quantile(angles[near], 0.9)), LEAST_RAD))
+    moving = near & (angles >= max(MIN_ROTATION_RATIO * float(np.quantile(angles[near], 0.9)), MIN_PAIR_RAD))
     chosen = np.concatenate([_select_evenly(np.flatnonzero(part)) for part in (moving, near & ~moving)])
-    if moving.sum() < FEWEST:
+    if moving.sum() < MIN_PAIRS:
         chosen = np.zeros(0, dtype=np.intp)
     return _Pairs(middles_s[first[chosen]], middles_s[last[chosen]], rotations[chosen])
 
@@ -104,7 +104,7 @@ def _fit(design: Array, turned: Array) -> tuple[float, Array]:
     for _ in range(REWEIGHTINGS):
         weighted = design * weight[:, None]
         information = weighted.T @ design
-        ridge = np.diag([HARDLY * float(np.trace(information[:3, :3]))] * 3 + [1e-12])
+        ridge = np.diag([MIN_ROTATION_FRACTION * float(np.trace(information[:3, :3]))] * 3 + [1e-12])
         solution = np.linalg.solve(information + ridge, weighted.T @ turned + ridge @ aligned)
         residuals = np.linalg.norm(turned - design @ solution, axis=1)
         weight = 1 / np.maximum(residuals, 0.1 * max(float(np.median(residuals)), 1e-9))

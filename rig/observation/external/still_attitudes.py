@@ -5,10 +5,10 @@ import numpy as np
 from rig.estimation.arrays import Array, rotation_vectors
 from rig.observation.windows import Window
 
-DWELL_S = 0.5  # duration from which on a row declares that the body lay still
-APART_S = 0.5  # time between two short rows that show whether it did
-LATE_S = 0.2  # largest time error of a row's attitude
-STILL_RAD_S = 0.02  # largest rate between them; a camera's errors amount to half of it
+MIN_DWELL_S = 0.5  # from which on a row declares that the body lay still
+MIN_APART_S = 0.5  # between two short rows that show whether it did
+MAX_TIME_ERROR_S = 0.2  # of a row's attitude
+MAX_STILL_RATE_RAD_S = 0.02  # between them; a camera's errors amount to half of it
 
 
 def still_windows(windows_s: Array, attitudes: Array) -> list[Window]:
@@ -16,21 +16,21 @@ def still_windows(windows_s: Array, attitudes: Array) -> list[Window]:
 
     Rows have windows (N, 2), in any order, and `attitudes` (N, 3, 3), body to table coordinates.
     """
-    long = windows_s[:, 1] - windows_s[:, 0] >= DWELL_S
+    long = windows_s[:, 1] - windows_s[:, 0] >= MIN_DWELL_S
     windows = [Window(start_s, end_s) for start_s, end_s in windows_s[long].tolist()]
     short = np.flatnonzero(~long)
     short = short[np.argsort(windows_s[short, 0])]
     middles_s = windows_s[short].mean(axis=1)
-    later = np.searchsorted(middles_s, middles_s + APART_S)
+    later = np.searchsorted(middles_s, middles_s + MIN_APART_S)
     first = np.flatnonzero(later < len(short))
     last = later[first]
     lasts_s = middles_s[last] - middles_s[first]
-    near = lasts_s <= 2 * APART_S  # else rows are missing in between
+    near = lasts_s <= 2 * MIN_APART_S  # else rows are missing in between
     first, last, lasts_s = first[near], last[near], lasts_s[near]
     if not len(first):
         return windows
     turned = rotation_vectors(np.swapaxes(attitudes[short[first]], -1, -2) @ attitudes[short[last]])
-    still = np.linalg.norm(turned, axis=1) <= STILL_RAD_S * lasts_s
+    still = np.linalg.norm(turned, axis=1) <= MAX_STILL_RATE_RAD_S * lasts_s
     # Pairs of rows that overlap are one time.
     for begin, end in zip(middles_s[first[still]].tolist(), middles_s[last[still]].tolist(), strict=True):
         if windows and windows[-1].start_s <= begin <= windows[-1].end_s:

@@ -13,14 +13,14 @@ from rig.observation.motion.reference_motion import MIN_RATE_RAD_S, closely_foll
 MAX_STEP_S, MAX_STEP_RAD = 0.3, 2.6
 MIN_ROWS = 20
 # interval between two rows whose rates and attitudes are compared; fewest such pairs
-COMPARED_S, FEWEST_PAIRS = 0.25, 12
+PAIR_INTERVAL_S, MIN_PAIRS = 0.25, 12
 # least rotation of a pair; largest relative deviation from the median ratio; least fraction of pairs within it
-LEAST_RAD, ALIKE, MOST_PAIRS = 0.02, 0.3, 0.8
+MIN_PAIR_RAD, MAX_RATIO_DEVIATION, MIN_PAIR_FRACTION = 0.02, 0.3, 0.8
 # °/rad, and its tolerance: this ratio is a wrong unit; any other one is a turn of over half a revolution per row
-DEGREES, NEARLY = 180 / np.pi, 0.05
-VARIED = 2.0  # ratio of the fastest to the slowest rate: above it, turns of over half a revolution have no common ratio
+DEG_PER_RAD, DEG_TOLERANCE = 180 / np.pi, 0.05  # a wrong unit; any other ratio: turns of over half a revolution
+MAX_SPEED_RATIO = 2.0  # fastest to slowest: above it, turns of over half a revolution have no common ratio
 # Scatter of the steps relative to their median, above which it matters in a rate; median from which on it does not.
-UNEVEN, EVEN_S = 0.2, 0.05
+STEP_SCATTER, COARSE_STEP_S = 0.2, 0.05
 
 
 class TableMotion:
@@ -71,7 +71,7 @@ def check_rates_agree(middles_s: Array, attitudes: Array, rates_rad_s: Array) ->
     """
     order = np.argsort(middles_s)
     time_s, rates = middles_s[order], rates_rad_s[order]
-    later = np.maximum(np.searchsorted(time_s, time_s + COMPARED_S), np.arange(len(time_s)) + 1)
+    later = np.maximum(np.searchsorted(time_s, time_s + PAIR_INTERVAL_S), np.arange(len(time_s)) + 1)
     first = np.flatnonzero(later < len(time_s))
     last = later[first]
     first, last = (rows[time_s[last] - time_s[first] <= 2 * MAX_STEP_S] for rows in (first, last))
@@ -79,15 +79,15 @@ def check_rates_agree(middles_s: Array, attitudes: Array, rates_rad_s: Array) ->
     stated_rad = np.linalg.norm(swept[last] - swept[first], axis=1)
     turned = rotation_vectors(np.swapaxes(attitudes[order[first]], -1, -2) @ attitudes[order[last]])
     turned_rad = np.linalg.norm(turned, axis=1)
-    moving = (turned_rad > LEAST_RAD) & (turned_rad < MAX_STEP_RAD)
-    if moving.sum() < FEWEST_PAIRS:
+    moving = (turned_rad > MIN_PAIR_RAD) & (turned_rad < MAX_STEP_RAD)
+    if moving.sum() < MIN_PAIRS:
         return
     ratios = stated_rad[moving] / turned_rad[moving]
     ratio = float(np.median(ratios))
-    if is_plausible(ratio).all() or np.mean(np.abs(ratios - ratio) < ALIKE * ratio) < MOST_PAIRS:
+    if is_plausible(ratio).all() or np.mean(np.abs(ratios - ratio) < MAX_RATIO_DEVIATION * ratio) < MIN_PAIR_FRACTION:
         return
     slowest_rad, fastest_rad = np.quantile(turned_rad[moving], (0.1, 0.9))
-    if ratio < 1 or fastest_rad > VARIED * slowest_rad or abs(ratio / DEGREES - 1) < NEARLY:
+    if ratio < 1 or fastest_rad > MAX_SPEED_RATIO * slowest_rad or abs(ratio / DEG_PER_RAD - 1) < DEG_TOLERANCE:
         raise wrong_unit(f"the table's rates are {ratio:.3g} times those of its attitudes", ratio, RATE_UNIT_RATIOS)
 
 
@@ -95,12 +95,12 @@ def _thin(time_s: Array) -> NDArray[np.intp]:
     """Return the indices of rows at rising times (n,) far enough apart that time-stamp errors hardly change a rate."""
     steps_s = np.diff(time_s)
     median_s = float(np.median(steps_s)) if len(steps_s) else 0.0
-    if median_s >= EVEN_S or not len(steps_s) or np.abs(steps_s - median_s).mean() <= UNEVEN * median_s:
+    if median_s >= COARSE_STEP_S or not len(steps_s) or np.abs(steps_s - median_s).mean() <= STEP_SCATTER * median_s:
         return np.arange(len(time_s))
     last_s = -np.inf
     kept = []
     for row, row_s in enumerate(time_s.tolist()):
-        if row_s - last_s >= EVEN_S:
+        if row_s - last_s >= COARSE_STEP_S:
             kept.append(row)
             last_s = row_s
     return np.array(kept)

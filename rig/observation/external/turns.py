@@ -21,11 +21,11 @@ from rig.observation.time_stamps.gaps import hidden_angles_rad
 from rig.observation.time_stamps.sampling import find_sampling
 from rig.observation.windows import Window, inside
 
-REACH_S = 0.5  # longest time between the marked end of a turn and the adjacent rest
+MAX_REST_DISTANCE_S = 0.5  # between the marked end of a turn and the adjacent rest
 EDGE_SAMPLES = 2  # samples on either side of an end
-STANDING = 0.25  # fraction of the mean speed, below which the body starts or stops at an end of the turn
-OTHER_BIAS_RAD_S = 0.1  # a body whose readings in a pause exceed this rate is turning
-MOST_HIDDEN_RAD = 0.02  # largest rotation hidden by missing readings of a turn
+STANDING_SPEED_RATIO = 0.25  # to the mean speed, below which the body starts or stops at an end of the turn
+MAX_BIAS_RAD_S = 0.1  # a body whose readings in a pause exceed this rate is turning
+MAX_HIDDEN_RAD = 0.02  # by missing readings of a turn
 BY_HAND_ANGLE_RAD = float(np.radians(0.3))  # default repeatability of a body turned by hand to a stop
 BY_HAND_AXIS_RAD = 0.02  # default tilt during the turn
 
@@ -85,7 +85,7 @@ def find_turns(
             continue
         within = gaps[(time_s[gaps + 1] > window.start_s) & (time_s[gaps] < window.end_s)]
         hidden_rad = float(np.linalg.norm(hidden_angles_rad(time_s, readings, within)))
-        if hidden_rad > MOST_HIDDEN_RAD:
+        if hidden_rad > MAX_HIDDEN_RAD:
             hiding.append(sweep.sweep)
             continue
         angle_std = BY_HAND_ANGLE_RAD if declared.angle_std_rad is None else float(declared.angle_std_rad[row])
@@ -121,7 +121,7 @@ def _find_other_bias(
         for pause in pauses
     ]
     for window in find_rests_otherwise(time_s, rates, middles, lying):
-        if np.linalg.norm(rates[inside(time_s, window)].mean(axis=0)) < OTHER_BIAS_RAD_S:
+        if np.linalg.norm(rates[inside(time_s, window)].mean(axis=0)) < MAX_BIAS_RAD_S:
             yield window
 
 
@@ -145,8 +145,8 @@ def _find_pauses(time_s: Array, sweeps: Sequence[Observation]) -> list[Window]:
 def _enclosing_window(sweep: Observation, lying: Sequence[Window]) -> Window | None:
     """Return the window from the rest before a sweep to the rest after it; None if either rest is far away."""
     start_s, end_s = sweep.average.start_s, sweep.average.end_s
-    before = [rest for rest in lying if rest.start_s < start_s and rest.end_s >= start_s - REACH_S]
-    after = [rest for rest in lying if rest.end_s > end_s and rest.start_s <= end_s + REACH_S]
+    before = [rest for rest in lying if rest.start_s < start_s and rest.end_s >= start_s - MAX_REST_DISTANCE_S]
+    after = [rest for rest in lying if rest.end_s > end_s and rest.start_s <= end_s + MAX_REST_DISTANCE_S]
     if not before or not after or before[-1] is after[0]:
         return None
     return Window(min(before[-1].end_s, start_s), max(after[0].start_s, end_s))
@@ -157,6 +157,6 @@ def _starts_and_stops(time_s: Array, rates: Array, sweep: Observation) -> bool:
     for at_s in (sweep.average.start_s, sweep.average.end_s):
         index = int(np.searchsorted(time_s, at_s))
         around = rates[max(index - EDGE_SAMPLES, 0) : index + EDGE_SAMPLES]
-        if np.linalg.norm(around.mean(axis=0)) > STANDING * sweep.speed_rad_s:
+        if np.linalg.norm(around.mean(axis=0)) > STANDING_SPEED_RATIO * sweep.speed_rad_s:
             return False
     return True

@@ -15,7 +15,7 @@ TIME_OF_DAY = re.compile(
     r"(?:(?P<date>\d{4}[-/]\d\d[-/]\d\d)[T ])?\s*(?:(?P<h>\d{1,2}):)?(?P<m>\d{1,2}):(?P<s>\d{1,2}(?:[.,]\d+)?)"
     r"\s*(?P<half>[AaPp][Mm])?\s*(?P<zone>Z|[+-]\d\d:?\d\d)?"
 )
-LONG_AGO_S = 1e6  # a clock with a larger time started long before the recording: a float may lose microseconds
+MAX_FLOAT_TIME_S = 1e6  # a clock with a larger time started long before the recording: a float may lose microseconds
 SPELLINGS = (("^", ""), ("sec", "s"), ("²", "2"))  # spellings of units, in addition to those of the table
 
 
@@ -63,7 +63,7 @@ def seconds_of(cell: str, factor: float) -> Decimal:
 def origin_of(times_s: Iterable[float]) -> int:
     """Return the origin of times, in whole seconds, from the first time; 0 for a clock that starts near 0."""
     first_s = next(iter(times_s), 0.0)
-    return int(first_s) if abs(first_s) >= LONG_AGO_S else 0
+    return int(first_s) if abs(first_s) >= MAX_FLOAT_TIME_S else 0
 
 
 def since(cell: str, factor: float, origin_s: int) -> float:

@@ -16,10 +16,10 @@ from rig.config.files.regular_file import UnfitFile, open_regular_file
 from rig.errors import Refused
 from rig.observation.formats.csv_cells import is_value
 
-HARMLESS_BYTES = 1_000_000  # some ten thousand rows, which take four times as much memory
-LONGEST_LINE = 10_000  # characters: enough for a hundred columns, of which there are at most twenty
+MAX_HARMLESS_BYTES = 1_000_000  # some ten thousand rows, which take four times as much memory
+MAX_LINE = 10_000  # characters: enough for a hundred columns, of which there are at most twenty
 GZIP, UTF_16 = b"\x1f\x8b", (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
-MARKS = ";\t"
+SEPARATORS = ";\t"
 COMMENT_MARKS = "#%"  # characters before the heading of a table by NumPy or MATLAB
 
 
@@ -30,7 +30,7 @@ def read_rows(path: Path, largest_mb: int, skipped: int = 0) -> Iterator[list[st
         first = next(islice(lines, skipped, None), "")
         second = next(lines, "")
         first = first.lstrip(f"{COMMENT_MARKS} ") or first
-        delimiter = next((mark for mark in MARKS if mark in first and (mark in second or "," not in first)), None)
+        delimiter = next((mark for mark in SEPARATORS if mark in first and (mark in second or "," not in first)), None)
         if delimiter is None and is_divided_by_spaces(second):
             yield from (line.split() for line in chain([first, second], lines))
             return
@@ -43,13 +43,13 @@ def read_rows(path: Path, largest_mb: int, skipped: int = 0) -> Iterator[list[st
 def is_divided_by_spaces(line: str) -> bool:
     """Return whether a line of readings holds values separated by spaces alone."""
     cells = line.split()
-    return len(cells) > 1 and not any(mark in line for mark in f"{MARKS},") and all(map(is_value, cells))
+    return len(cells) > 1 and not any(mark in line for mark in f"{SEPARATORS},") and all(map(is_value, cells))
 
 
 def is_harmless(path: Path, largest_mb: int) -> bool:
     """Return whether a file is short and not packed. Raise Refused `no_file`, also if it is too large."""
     with _raise_no_file(path), open_regular_file(path, largest_mb * 1_000_000) as file:
-        return os.fstat(file.fileno()).st_size <= HARMLESS_BYTES and not _read_beginning(file).startswith(GZIP)
+        return os.fstat(file.fileno()).st_size <= MAX_HARMLESS_BYTES and not _read_beginning(file).startswith(GZIP)
 
 
 @contextmanager
@@ -83,17 +83,17 @@ def _text(file: BinaryIO | GzipFile) -> TextIOWrapper:
 
 
 def _read_beginning(file: BinaryIO | GzipFile) -> bytes:
-    begin = file.read(LONGEST_LINE)
+    begin = file.read(MAX_LINE)
     file.seek(0)
     return begin
 
 
 def _lines(text: TextIOWrapper, most: int) -> Iterator[str]:
     """Yield the lines, of limited length and sum: a packed file may hold a thousand times its size."""
-    while line := text.readline(LONGEST_LINE):
+    while line := text.readline(MAX_LINE):
         most -= len(line)
-        if len(line) == LONGEST_LINE:
-            raise UnfitFile(f"a line is longer than {LONGEST_LINE} characters")
+        if len(line) == MAX_LINE:
+            raise UnfitFile(f"a line is longer than {MAX_LINE} characters")
         if most < 0:
             raise UnfitFile("its unpacked content is too long")
         yield line

@@ -20,10 +20,10 @@ from rig.observation.formats.column_selection import Mapped
 
 SUFFIX = ".mat"
 HDF5_HEADER = b"MATLAB 7.3"
-DEEPEST = 4  # depth of structs inside structs
-MOST_COLUMNS = 1000
+MAX_DEPTH = 4  # of structs inside structs
+MAX_COLUMNS = 1000
 BLOCK_ROWS = 8192  # rows whose cells are in memory at a time
-OBJECT = ("s0", "s1", "s2", "arr")  # fields by which SciPy represents a MATLAB object
+OBJECT_FIELDS = ("s0", "s1", "s2", "arr")  # fields by which SciPy represents a MATLAB object
 
 
 def is_mat(path: Path) -> bool:
@@ -73,8 +73,8 @@ def read_mat_columns(path: Path) -> dict[str, Array]:
     for name, values in _read_hdf5(path, objects) if is_hdf5 else _read_classic(path, objects):
         for column, numbers in _split(name, values):
             columns[column] = numbers
-            if len(columns) > MOST_COLUMNS:
-                raise ValueError(f"it holds more than {MOST_COLUMNS} columns")
+            if len(columns) > MAX_COLUMNS:
+                raise ValueError(f"it holds more than {MAX_COLUMNS} columns")
     if not columns:
         what = (
             f"holds numbers only in objects, which only MATLAB can read: {listing(map(shorten, objects))}"
@@ -115,9 +115,9 @@ def _find_matrices(name: str, value: Any, objects: list[str], depth: int = 0) ->
     if fields is None:
         if isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and value.ndim == 2 and value.size > 1:
             yield name, value.astype(np.float64)
-    elif fields == OBJECT:
+    elif fields == OBJECT_FIELDS:
         objects.append(str(value["s0"].flat[0].decode()) if name == "None" else name)
-    elif value.size == 1 and depth < DEEPEST:
+    elif value.size == 1 and depth < MAX_DEPTH:
         for field in fields:
             yield from _find_matrices(f"{name}.{field}", value[field].flat[0], objects, depth + 1)
 
@@ -141,7 +141,7 @@ def _walk_group(group: Any, prefix: str, objects: list[str], depth: int = 0) -> 
         if "MATLAB_object_decode" in member.attrs:
             objects.append(full_name)
         elif isinstance(member, h5py.Group):
-            if depth < DEEPEST:
+            if depth < MAX_DEPTH:
                 yield from _walk_group(member, f"{full_name}.", objects, depth + 1)
         elif (
             isinstance(member, h5py.Dataset)

@@ -20,8 +20,8 @@ from rig.observation.formats.bag_samples import bag_of, is_bag
 from rig.observation.formats.table_parts import columns_of, count_omitted_rows, note_of, parts_read_apart
 from rig.observation.formats.ulog_samples import is_ulog
 
-INSIDE = "::"
-LONGEST_MOMENT_S = 0.4  # a row of attitudes with a longer duration declares a rest
+MEMBER_SEPARATOR = "::"
+MAX_MOMENT_S = 0.4  # a row of attitudes with a longer duration declares a rest
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +63,7 @@ def is_in_format(path: Path) -> bool:
 
 def whole(path: Path) -> Path:
     """Return the path of the file or folder, without the part inside that it may select."""
-    return Path(str(path).partition(INSIDE)[0])
+    return Path(str(path).partition(MEMBER_SEPARATOR)[0])
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +117,7 @@ def rows_around(time_s: Array, path: Path) -> dict[str, Array]:
     if len(rising_s) < 2:
         raise Refused("no_attitudes", f"{path} holds one pose", "Record the poses while the sensor is turned")
     steps_s = np.diff(rising_s)
-    most_s = min(LONGEST_MOMENT_S, float(np.median(steps_s))) / 2
+    most_s = min(MAX_MOMENT_S, float(np.median(steps_s))) / 2
     before_s = np.minimum(np.append(steps_s[:1], steps_s) / 2, most_s)
     after_s = np.minimum(np.append(steps_s, steps_s[-1:]) / 2, most_s)
     half_s = np.zeros(len(time_s))
@@ -134,7 +134,7 @@ def entry_of(path: Path) -> FileEntry:
         with file.open("rb") as stream:
             while block := stream.read(1 << 20):
                 digest.update(block)
-    name = path.name if INSIDE not in str(path) else source.name
+    name = path.name if MEMBER_SEPARATOR not in str(path) else source.name
     return FileEntry(name=printable(name), sha256=digest.hexdigest())  # a name that is not UTF-8 fits into no document
 
 
@@ -161,4 +161,4 @@ def _format(path: Path) -> Format | None:
 
 
 def _part_inside(path: Path) -> str | None:
-    return str(path).partition(INSIDE)[2] or None
+    return str(path).partition(MEMBER_SEPARATOR)[2] or None

@@ -19,17 +19,17 @@ from rig.observation.formats.csv_text import is_harmless, read_rows
 from rig.observation.formats.mat_table import is_mat, read_mat_columns
 from rig.observation.formats.table_parts import parts_read_apart
 
-MOST_SKIPPED = 100  # lines before the heading, at most
+MAX_SKIPPED_LINES = 100  # before the heading
 SAMPLED_ROWS = 400
-MISSING = frozenset({"NaN", "nan", "NAN", "NA", "N/A", "null", "None", "-", "--"})
+MISSING_WORDS = frozenset({"NaN", "nan", "NAN", "NA", "N/A", "null", "None", "-", "--"})
 TIME_NAME = re.compile(
     r"(sys|sample|sensor|elapsed|header|gps)?_?(time|timestamp|t|ts|stamp|millis|micros|sec|seconds)_?\w{0,3}"
 )
-IN_BRACKETS = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]\s*$")
-AFTER_UNDERSCORE = re.compile(r"_(deg_s|dps|mdps|rad_s|m_s2|mg|g|ms|us|ns|s|deg|rad|t|ut|c)$", re.IGNORECASE)
-UNDERSCORED = {"deg_s": "deg/s", "rad_s": "rad/s", "m_s2": "m/s2", "t": "T", "ut": "uT", "c": "C"}
-LIKELY_HZ = 100.0  # the sample rate by which a unit of time is chosen
-EPOCH_S = (9e8, 4.2e9)  # seconds since 1970: from 1998 to 2103
+BRACKETED_UNIT = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]\s*$")
+UNDERSCORED_UNIT = re.compile(r"_(deg_s|dps|mdps|rad_s|m_s2|mg|g|ms|us|ns|s|deg|rad|t|ut|c)$", re.IGNORECASE)
+SPELLED_UNITS = {"deg_s": "deg/s", "rad_s": "rad/s", "m_s2": "m/s2", "t": "T", "ut": "uT", "c": "C"}
+ASSUMED_RATE_HZ = 100.0  # the sample rate by which a unit of time is chosen
+EPOCH_RANGE_S = (9e8, 4.2e9)  # seconds since 1970: from 1998 to 2103
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +106,7 @@ def layout_parts(path: Path, largest_mb: int) -> Iterator[Part]:
             units = [cell.strip() for cell in row]
             continue
         count += 1
-        missing |= MISSING.intersection(map(str.strip, row))
+        missing |= MISSING_WORDS.intersection(map(str.strip, row))
         if len(sampled) < SAMPLED_ROWS:
             sampled.append(row)
     width = max([len(heading), *(len(row) for row in sampled[:2])])
@@ -125,7 +125,7 @@ def _have_nan(columns: Any) -> bool:
 
 def _find_beginning(path: Path, largest_mb: int) -> tuple[int, list[str]]:
     """Return the number of lines to skip, and the heading, which may be empty. Raise Refused `wrong_columns`."""
-    for skip in range(MOST_SKIPPED):
+    for skip in range(MAX_SKIPPED_LINES):
         rows = [*islice(read_rows(path, largest_mb, skip), 6)]
         if len(rows) < 3:
             break
@@ -140,7 +140,7 @@ def _find_beginning(path: Path, largest_mb: int) -> tuple[int, list[str]]:
             return skip, head
     raise Refused(
         "wrong_columns",
-        f"{path} has no rows of numbers below a heading in its first {MOST_SKIPPED} lines",
+        f"{path} has no rows of numbers below a heading in its first {MAX_SKIPPED_LINES} lines",
         "Give a table: a row for each reading, numbers in columns",
     )
 
@@ -181,11 +181,11 @@ def _select_indices(columns: Sequence[Sequence[str]], accept: Callable[[str], bo
 
 def unit_in(heading: str) -> str:
     """Return the unit that a heading states in brackets or at its end, as `UNITS` spells it, or ""."""
-    if (match := IN_BRACKETS.search(heading)) is not None:
+    if (match := BRACKETED_UNIT.search(heading)) is not None:
         text = re.sub(r"\s*(s)\^?-(\d)", lambda power: f"/s{power[2] if power[2] != '1' else ''}", match[1])
         return next((name for name in (text, text.replace("^", "")) if name in UNITS), "")
-    if (match := AFTER_UNDERSCORE.search(heading)) is not None:
-        return UNDERSCORED.get(match[1].lower(), match[1].lower())
+    if (match := UNDERSCORED_UNIT.search(heading)) is not None:
+        return SPELLED_UNITS.get(match[1].lower(), match[1].lower())
     return ""
 
 
@@ -202,7 +202,7 @@ def _find_time(
     """
     rising = [index for index in times if _rises(columns[index])]
     for index in rising:
-        name = re.sub(r"\W+", "_", IN_BRACKETS.sub("", headings[index]).strip().lower()).strip("_")
+        name = re.sub(r"\W+", "_", BRACKETED_UNIT.sub("", headings[index]).strip().lower()).strip("_")
         if TIME_NAME.fullmatch(name.rpartition(".")[2]) or (
             units[index] in UNITS and UNITS[units[index]].quantity == TIME
         ):
@@ -246,8 +246,8 @@ def _time_unit(heading: str, unit: str, column: Sequence[str]) -> str:
     values = np.array([float(cell) for cell in column])
     sizes = {name: UNITS[name].size for name in ("s", "ms", "us", "ns")}
     for name, size in sizes.items():
-        if EPOCH_S[0] < values[0] * size < EPOCH_S[1]:
+        if EPOCH_RANGE_S[0] < values[0] * size < EPOCH_RANGE_S[1]:
             return name
     steps = np.diff(values)
     step = float(np.mean(steps[steps >= 0]))
-    return min(sizes, key=lambda name: abs(np.log(max(step, 1e-12) * sizes[name] * LIKELY_HZ)))
+    return min(sizes, key=lambda name: abs(np.log(max(step, 1e-12) * sizes[name] * ASSUMED_RATE_HZ)))

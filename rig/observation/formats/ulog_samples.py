@@ -25,15 +25,15 @@ from rig.observation.formats.table_parts import NOTE
 
 SUFFIX = ".ulg"
 TOPICS: dict[str, Quantity] = {"sensor_gyro": RATE, "sensor_accel": ACCELERATION}
-COMBINED = "sensor_combined"
+COMBINED_TOPIC = "sensor_combined"
 COMBINED_FIELDS = {RATE: "gyro_rad", ACCELERATION: "accelerometer_m_s2"}
 # Fraction of the rate of `sensor_combined`: a raw topic with a lower rate contains only some of the readings.
-RARE = 0.5
+MIN_RATE_RATIO = 0.5
 COMBINED_NOTE = (
     "sensor_combined of PX4: the selected sensor, which may change in flight, averaged, and corrected by the "
     "autopilot's own calibration (CAL_GYRO, CAL_ACC): the result is relative to that"
 )
-MICRO = 1e-6
+MICROSECOND_S = 1e-6
 
 
 def is_ulog(path: Path) -> bool:
@@ -51,10 +51,10 @@ def ulog_readings(path: Path, inside: str | None = None) -> Iterator[Part]:
     except ImportError as error:
         raise missing_extra(error, "ulog") from error
     with path.open("rb") as file:
-        log = ULog(file, [*TOPICS, COMBINED])
+        log = ULog(file, [*TOPICS, COMBINED_TOPIC])
     topics = {(topic.name, topic.multi_id): topic.data for topic in log.data_list}
     if _is_combined(path, topics, inside):
-        columns, note = _read_combined(topics[COMBINED, 0]), COMBINED_NOTE
+        columns, note = _read_combined(topics[COMBINED_TOPIC, 0]), COMBINED_NOTE
     else:
         columns, note = _read_raw(topics, int(inside or "0")), ""
     yield np.column_stack(list(columns.values()))
@@ -67,15 +67,15 @@ def _is_combined(path: Path, topics: Mapping[tuple[str, int], Any], inside: str 
     Raise Refused `ulog_topic` if the log does not hold the named topic.
     """
     rates_hz = {topic: _rate_hz(data) for topic, data in topics.items()}
-    combined_hz = rates_hz.get((COMBINED, 0))
+    combined_hz = rates_hz.get((COMBINED_TOPIC, 0))
     number = inside or "0"
     raw_hz = rates_hz.get(("sensor_gyro", int(number))) if number.isdecimal() else None
-    is_better = combined_hz is not None and (raw_hz is None or raw_hz < RARE * combined_hz)
-    if combined_hz is not None and (inside == COMBINED or (inside is None and is_better)):
+    is_better = combined_hz is not None and (raw_hz is None or raw_hz < MIN_RATE_RATIO * combined_hz)
+    if combined_hz is not None and (inside == COMBINED_TOPIC or (inside is None and is_better)):
         return True
     if raw_hz is None:
         logged = [f"{name} {instance} at {rate_hz:.3g} Hz" for (name, instance), rate_hz in sorted(rates_hz.items())]
-        wanted = COMBINED if inside == COMBINED else f"sensor_gyro {shorten(number)}"
+        wanted = COMBINED_TOPIC if inside == COMBINED_TOPIC else f"sensor_gyro {shorten(number)}"
         raise Refused(
             "ulog_topic",
             f"{path} holds no {wanted}; of sensor_gyro, sensor_accel and sensor_combined it holds {listing(logged)}",
@@ -87,12 +87,12 @@ def _is_combined(path: Path, topics: Mapping[tuple[str, int], Any], inside: str 
 def _rate_hz(data: Any) -> float:
     time_us = np.asarray(data["timestamp"], dtype=np.int64)
     span_us = int(time_us[-1] - time_us[0]) if len(time_us) else 0
-    return float((len(time_us) - 1) / (span_us * MICRO)) if span_us > 0 else 0.0
+    return float((len(time_us) - 1) / (span_us * MICROSECOND_S)) if span_us > 0 else 0.0
 
 
 def _read_raw(topics: Mapping[tuple[str, int], Any], instance: int) -> dict[str, Array]:
     time_us, rates = _read_topic("sensor_gyro", topics["sensor_gyro", instance])
-    columns = {TIME: (time_us - time_us[0]) * MICRO, **dict(zip(RATE.columns, rates.T, strict=True))}
+    columns = {TIME: (time_us - time_us[0]) * MICROSECOND_S, **dict(zip(RATE.columns, rates.T, strict=True))}
     if ("sensor_accel", instance) in topics:
         other_us, forces = _read_topic("sensor_accel", topics["sensor_accel", instance])
         accelerations = [np.interp(time_us, other_us, topic) for topic in forces.T]
@@ -103,9 +103,9 @@ def _read_raw(topics: Mapping[tuple[str, int], Any], instance: int) -> dict[str,
 def _read_combined(data: Any) -> dict[str, Array]:
     """Return the columns of `sensor_combined`. Raise ValueError if it lacks a field."""
     fields = [f"{field}[{axis}]" for field in COMBINED_FIELDS.values() for axis in range(3)]
-    time_us, readings = _read_topic(COMBINED, data, fields)
+    time_us, readings = _read_topic(COMBINED_TOPIC, data, fields)
     names = [name for quantity in COMBINED_FIELDS for name in quantity.columns]
-    return {TIME: (time_us - time_us[0]) * MICRO, **dict(zip(names, readings.T, strict=True))}
+    return {TIME: (time_us - time_us[0]) * MICROSECOND_S, **dict(zip(names, readings.T, strict=True))}
 
 
 def _read_topic(topic: str, data: Any, fields: Sequence[str] = tuple("xyz")) -> tuple[Array, Array]:

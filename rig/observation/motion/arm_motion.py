@@ -15,10 +15,10 @@ from rig.motion.chain import DenavitHartenberg
 from rig.motion.geometry import NOMINAL, axis_errors, flange_arm, flange_attitude, flange_axes, flange_rate
 from rig.motion.steps import Sweep
 from rig.motion.turner_state import JOINT_NAMES
-from rig.observation.motion.even_turn import SMOOTHED_S, find_even_turn, fit_lines, well_timed
+from rig.observation.motion.even_turn import SMOOTHING_S, find_even_turn, fit_lines, well_timed
 from rig.observation.motion.reference_motion import MIN_RATE_RAD_S, check_span, closely_followed, not_finite
 from rig.observation.motion.revolution import MAX_STATE_STEP_S, Revolution, find_revolution
-from rig.observation.oscillation import FEWEST_OF_SWING, MAX_TRAVEL_AT_REST_RAD, remove_oscillation
+from rig.observation.oscillation import MAX_TRAVEL_AT_REST_RAD, MIN_OSCILLATION_ANGLES, remove_oscillation
 from rig.observation.windows import Window
 
 if TYPE_CHECKING:
@@ -27,9 +27,9 @@ if TYPE_CHECKING:
 # Shortest step of a rate from joint angles: a shorter one shows the encoders' noise more than the rate.
 RATE_STEP_S = 0.008
 KNOT_S = 0.004  # interval between the knots of the rate: a ripple too fast for them would alias to a slower one
-SPARSE_S = 0.025  # samples that are farther apart alias a ripple of the servo
-PARTS = 5  # parts of a rest: if single readings scatter, the parts' means show whether a joint moved
-SWINGS = 8.0  # range relative to the difference of adjacent angles: noise of ten thousand readings has a smaller range
+MAX_STEP_S = 0.025  # samples that are farther apart alias a ripple of the servo
+REST_PARTS = 5  # if single readings scatter, the parts' means show whether a joint moved
+MAX_RANGE_RATIO = 8.0  # to the difference of adjacent angles: noise of ten thousand readings has a smaller range
 ATTITUDES = 72  # attitudes in a mean: over whole turns the part perpendicular to the axis averages out
 
 
@@ -76,7 +76,7 @@ class ArmMotion:
         if not np.linalg.norm(rates, axis=1).max() > MIN_RATE_RAD_S:
             raise Fault("no_motion", "the arm is at rest in the whole recording", "Record a run with sweeps")
         self.rate = CubicSpline(times_s, rates)
-        close = np.diff(self.time_s) <= (SMOOTHED_S / 3 if self._scatters else MAX_STATE_STEP_S)
+        close = np.diff(self.time_s) <= (SMOOTHING_S / 3 if self._scatters else MAX_STATE_STEP_S)
         self._covered = close & np.append(close[1:], True) & np.append(True, close[:-1])
 
     @property
@@ -121,12 +121,12 @@ class ArmMotion:
         The oscillation of an arm at rest is excluded, because means are corrected for it.
         """
         q_rad = self._q_rad(window)
-        if self._scatters and len(q_rad) >= PARTS:
-            q_rad = np.array([part.mean(axis=0) for part in np.array_split(q_rad, PARTS)])
+        if self._scatters and len(q_rad) >= REST_PARTS:
+            q_rad = np.array([part.mean(axis=0) for part in np.array_split(q_rad, REST_PARTS)])
         if len(q_rad) < 2:
             return None
         travel_rad = float(np.ptp(q_rad, axis=0).max())
-        if travel_rad > MAX_TRAVEL_AT_REST_RAD and len(q_rad) >= FEWEST_OF_SWING:
+        if travel_rad > MAX_TRAVEL_AT_REST_RAD and len(q_rad) >= MIN_OSCILLATION_ANGLES:
             travel_rad = float(np.ptp(remove_oscillation(q_rad), axis=0).max())
         return travel_rad
 
@@ -230,7 +230,7 @@ class ArmMotion:
         if len(q_rad) < 2:
             return np.full(len(self.names), np.nan)
         noise_rad = np.sqrt(np.mean(np.diff(q_rad, axis=0) ** 2, axis=0))
-        return np.where(np.ptp(q_rad, axis=0) > SWINGS * noise_rad, np.nan, q_rad.mean(axis=0))
+        return np.where(np.ptp(q_rad, axis=0) > MAX_RANGE_RATIO * noise_rad, np.nan, q_rad.mean(axis=0))
 
     def _q_rad(self, window: Window) -> Array:
         q_rad: Array = self._states["q_rad"][(self.time_s >= window.start_s) & (self.time_s <= window.end_s)]
@@ -244,7 +244,7 @@ def _averaging_time(time_s: Array) -> float:
 
 def is_sparse(time_s: Array) -> bool:
     """Return whether samples at times (n,) are too sparse for the arm's mean rates between them."""
-    return float(np.median(np.diff(time_s))) > SPARSE_S
+    return float(np.median(np.diff(time_s))) > MAX_STEP_S
 
 
 def motion_of(run: RunData, correction: Array | None = None) -> ArmMotion:

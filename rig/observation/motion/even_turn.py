@@ -16,13 +16,13 @@ from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.motion.steps import TURN_RAD, Sweep
 from rig.observation.motion.revolution import MAX_STATE_GAP_S, Ends, arm_states_lost, check_constant, describe
-from rig.observation.motion.turn_speed import FEWEST_PAIRS, turn_speed
+from rig.observation.motion.turn_speed import MIN_PAIRS, turn_speed
 
-SMOOTHED_S = 0.12  # window in which a straight line fits the angle: shorter than the gear's ripple
-FEWEST = 5
+SMOOTHING_S = 0.12  # a straight line fits the angle in it: shorter than the gear's ripple
+MIN_ANGLES = 5
 # Quantile of the requests' durations that is usual; a delayed request takes this many times longer.
-USUAL, HELD_UP = 0.25, 4.0
-KNOTS = 3  # stride of the smoothed angles that are knots of a spline: adjacent ones share nearly all readings
+USUAL_QUANTILE, DELAY_RATIO = 0.25, 4.0
+KNOT_STRIDE = 3  # of the smoothed angles, as adjacent ones share nearly all readings
 GUARD_RAD = float(np.radians(1.5))  # angle left out next to the ramps: the shaft's lag and its encoder's error
 
 
@@ -30,17 +30,17 @@ def well_timed(states: NDArray[Any]) -> NDArray[Any]:
     """Return the states whose requests were fast: in a slow one the servo measures at an unknown moment."""
     if "took_s" not in (states.dtype.names or ()) or not len(states):
         return states
-    in_time: NDArray[Any] = states[states["took_s"] <= HELD_UP * np.quantile(states["took_s"], USUAL)]
+    in_time: NDArray[Any] = states[states["took_s"] <= DELAY_RATIO * np.quantile(states["took_s"], USUAL_QUANTILE)]
     return in_time
 
 
 def fit_lines(time_s: Array, q_rad: Array) -> tuple[Array, Array, Array]:
     """Return times (k,), angles (k, n) and rates (k, n) by straight lines through windows of readings (m, n)."""
-    count = max(FEWEST, round(SMOOTHED_S / float(np.median(np.diff(time_s)))))
+    count = max(MIN_ANGLES, round(SMOOTHING_S / float(np.median(np.diff(time_s)))))
     half = count // 2
     windows = np.lib.stride_tricks.sliding_window_view
-    times = windows(np.pad(time_s, half, mode="edge"), 2 * half + 1)[::KNOTS]
-    angles = windows(np.pad(q_rad, ((half, half), (0, 0)), mode="edge"), 2 * half + 1, axis=0)[::KNOTS]
+    times = windows(np.pad(time_s, half, mode="edge"), 2 * half + 1)[::KNOT_STRIDE]
+    angles = windows(np.pad(q_rad, ((half, half), (0, 0)), mode="edge"), 2 * half + 1, axis=0)[::KNOT_STRIDE]
     middles_s = times.mean(axis=1)
     offset_s = times - middles_s[:, None]
     rates = np.einsum("km,knm->kn", offset_s, angles) / np.sum(offset_s**2, axis=1)[:, None]
@@ -73,8 +73,8 @@ def find_even_turn(states: NDArray[Any], sweep: Sweep, settings: ObservationThre
     if gap > MAX_STATE_GAP_S:
         raise arm_states_lost(where, f"for {gap:.2f} s")
     if (
-        np.sum(travelled < travelled[-1] - TURN_RAD) < FEWEST_PAIRS
-        or np.sum(travelled > travelled[0] + TURN_RAD) < FEWEST_PAIRS
+        np.sum(travelled < travelled[-1] - TURN_RAD) < MIN_PAIRS
+        or np.sum(travelled > travelled[0] + TURN_RAD) < MIN_PAIRS
     ):
         raise arm_states_lost(where, "where the turn begins or where it ends")
     rates = fit_lines(time_s, travelled[:, None])[2][:, 0]

@@ -10,7 +10,7 @@ from rig.data.recording.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.motion.steps import TURN_RAD, Sweep, closes, turn_words
-from rig.observation.statistics.spectral_lines import BEATS
+from rig.observation.statistics.spectral_lines import SIDEBANDS
 
 MAX_STATE_STEP_S = 0.02  # longest interval of arm states that show the servo's vibration
 SMOOTHING_S = 0.05  # time over which the joint's rate is averaged before it is judged constant or not
@@ -49,7 +49,7 @@ class Revolution:
 
         A bad encoder errs once and twice a turn; products of these errors come up to four times a turn.
         """
-        return 2 if self.uneven else BEATS
+        return 2 if self.uneven else SIDEBANDS
 
     @property
     def closed(self) -> bool:

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from rig.errors import Fault
 
 TURN_RAD = 2 * np.pi
-FEWEST_PAIRS = 20
-STEPS = 50  # steps of the search for the period by secants; three or four are enough
-CLOSE = 1e-12  # relative change of the period between two steps, at convergence
+MIN_PAIRS = 20
+MAX_STEPS = 50  # of the search for the period by secants; three or four are enough
+CONVERGED_STEP_RATIO = 1e-12  # of the period
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,9 +34,9 @@ def turn_speed(time_s: NDArray[np.float64], q_rad: NDArray[np.float64]) -> TurnS
     between readings one turn apart. A quarter of a turn more, read at 100 Hz at 60°/s by a 12-bit encoder with a noise
     of 0.06°, determines T to 2e-5. Its standard deviation follows from the scatter of these differences and their
     correlation, for white noise of the single readings. Raise Fault `turn_too_short` unless readings cover a turn and
-    `FEWEST_PAIRS` readings more, or if the shaft stands still.
+    `MIN_PAIRS` readings more, or if the shaft stands still.
     """
-    far_rad = abs(float(q_rad[-1] - q_rad[0])) if len(q_rad) > FEWEST_PAIRS else 0.0
+    far_rad = abs(float(q_rad[-1] - q_rad[0])) if len(q_rad) > MIN_PAIRS else 0.0
     if far_rad <= TURN_RAD:
         raise _too_short(far_rad)
     direction = float(np.sign(q_rad[-1] - q_rad[0]))
@@ -44,7 +44,7 @@ def turn_speed(time_s: NDArray[np.float64], q_rad: NDArray[np.float64]) -> TurnS
     rate_rad_s = float(np.polyfit(time_s - time_s[0], angle_rad, 1)[0])
     period_s = TURN_RAD / rate_rad_s
     pairs = int(np.searchsorted(time_s, time_s[-1] - period_s, side="right"))
-    if pairs < FEWEST_PAIRS:
+    if pairs < MIN_PAIRS:
         raise _too_short(far_rad)
     first_s, first_rad = time_s[:pairs], angle_rad[:pairs]
 
@@ -53,10 +53,10 @@ def turn_speed(time_s: NDArray[np.float64], q_rad: NDArray[np.float64]) -> TurnS
         ahead: NDArray[np.float64] = np.interp(first_s + period_s, time_s, angle_rad) - first_rad - TURN_RAD
         return ahead
 
-    for _ in range(STEPS):
+    for _ in range(MAX_STEPS):
         step_s = float(excess_rad(period_s).mean()) / rate_rad_s
         period_s -= step_s
-        if abs(step_s) < CLOSE * period_s:
+        if abs(step_s) < CONVERGED_STEP_RATIO * period_s:
             break
     std_s = _std_of_mean(first_s + period_s, time_s, excess_rad(period_s)) / rate_rad_s
     speed_rad_s = TURN_RAD / period_s

@@ -11,10 +11,10 @@ from rig.observation.motion.arm_motion import ArmMotion
 from rig.observation.statistics.spectral_lines import harmonics
 
 HALF_WAVES = 8  # per fit: a faster sway is removed as a spectral line
-INDEPENDENT = 1e-9  # least relative singular value in the fit: waves that are nearly dependent are needed near the ends
+MIN_SINGULAR_RATIO = 1e-9  # waves that are nearly dependent are needed near the ends
 # fraction of the turn that is fitted before and after it: the curvature at the ends of a fit is mostly noise
-MARGIN = 0.05
-SHOWN = 50.0  # ratio of a sway's mean square, per column, to that of the encoders' noise
+MARGIN_FRACTION = 0.05
+MIN_POWER_RATIO = 50.0  # of a sway's mean square, per column, to that of the encoders' noise
 
 
 def sway_acceleration(
@@ -28,7 +28,7 @@ def sway_acceleration(
     The position's deviation is fitted by waves, whose second derivative is the acceleration. It is zero if the encoders
     show noise only.
     """
-    margin_s = MARGIN * (window_s[1] - window_s[0])
+    margin_s = MARGIN_FRACTION * (window_s[1] - window_s[0])
     start_s, end_s = window_s[0] - margin_s, window_s[1] + margin_s
     states_s = motion.time_s[(motion.time_s >= start_s) & (motion.time_s <= end_s)]
     angles_rad = motion.angles(states_s)
@@ -36,10 +36,10 @@ def sway_acceleration(
     steady_rad[:, joint] = angles_rad[:, joint]
     swayed_m = _positions_m(motion, angles_rad, extension_m) - _positions_m(motion, steady_rad, extension_m)
     columns = _half_waves((states_s - start_s) / (end_s - start_s))
-    coefficients = np.linalg.lstsq(columns, swayed_m, rcond=INDEPENDENT)[0]
+    coefficients = np.linalg.lstsq(columns, swayed_m, rcond=MIN_SINGULAR_RATIO)[0]
     smooth_m = columns @ coefficients
     noise_m2 = np.sum((swayed_m - smooth_m) ** 2) / (len(columns) - columns.shape[1])
-    if np.sum(smooth_m**2) <= SHOWN * columns.shape[1] * noise_m2:
+    if np.sum(smooth_m**2) <= MIN_POWER_RATIO * columns.shape[1] * noise_m2:
         return np.zeros((len(time_s), 3))
     orders = np.r_[0, np.repeat(np.arange(1, HALF_WAVES + 1), 2)]
     curvatures = -_half_waves((time_s - start_s) / (end_s - start_s)) * (np.pi * orders / (end_s - start_s)) ** 2

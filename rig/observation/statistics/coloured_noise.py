@@ -8,10 +8,10 @@ import numpy as np
 from rig.estimation.arrays import Array
 
 LAGS = 20
-WHITE = 45.3  # χ² of 20 degrees of freedom at 0.999
-MEMORIES = (1, 2, 4, 8, 16, 32)  # orders of the autoregression; 32 cover a whole wave of 7 Hz at 238 Hz
-SAMPLES_EACH = 12  # samples needed for each coefficient
-PREDICTED = 1e-12  # fraction of the sum of squares: less remains only if residuals repeat; then 1 − Σ a is as small
+WHITENESS_LIMIT = 45.3  # χ² of 20 degrees of freedom at 0.999
+ORDERS = (1, 2, 4, 8, 16, 32)  # of the autoregression; 32 cover a whole wave of 7 Hz at 238 Hz
+COEFFICIENT_SAMPLES = 12  # samples needed for each coefficient
+MIN_UNPREDICTED = 1e-12  # fraction of the sum of squares; less remains if residuals repeat; then 1 − Σ a is as small
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +41,7 @@ def fit_noise_factor(residuals: Array) -> float:
     return fit_autoregression(residuals).factor
 
 
-def fit_autoregression(residuals: Array, memories: Sequence[int] = MEMORIES) -> VarianceInflation:
+def fit_autoregression(residuals: Array, memories: Sequence[int] = ORDERS) -> VarianceInflation:
     """Return the factor of `fit_noise_factor`, and the degrees of freedom of the resulting variance.
 
     For n white residuals these are n − 1. For others they are 2 / v (JCGM 100, G.4.2), where v is the relative variance
@@ -50,7 +50,7 @@ def fit_autoregression(residuals: Array, memories: Sequence[int] = MEMORIES) -> 
     if _correlations(residuals) is None:
         return VarianceInflation(1.0, max(len(residuals) - 1.0, 1.0))
     centred = residuals - residuals.mean()
-    memories = [memory for memory in memories if memory * SAMPLES_EACH <= len(centred)]
+    memories = [memory for memory in memories if memory * COEFFICIENT_SAMPLES <= len(centred)]
     products, count = _products(centred, memories[-1]), len(centred) - memories[-1]
     criterion, spectrum_at_zero, memory = min(_autoregression(products, count, memory) for memory in memories)
     if np.isinf(criterion) and criterion > 0:
@@ -76,7 +76,7 @@ def _autoregression(products: Array, count: int, memory: int) -> tuple[float, fl
     likelihood = count * float(np.log(power / count)) if power else -np.inf
     criterion = likelihood + 2 * memory
     damped = (1 - float(coefficients.sum())) ** 2
-    if power <= PREDICTED * products[-1, -1] and damped <= PREDICTED:
+    if power <= MIN_UNPREDICTED * products[-1, -1] and damped <= MIN_UNPREDICTED:
         return np.inf, np.nan, memory
     # A process that never returns has no mean.
     return criterion, power / (count - memory) / damped if damped else np.inf, memory
@@ -113,4 +113,4 @@ def _correlations(residuals: Array) -> Array | None:
     if count <= 2 * LAGS or power == 0:
         return None
     rho: Array = np.array([centred[lag:] @ centred[:-lag] for lag in range(1, LAGS + 1)]) / power
-    return rho if count * float(rho @ rho) > WHITE else None
+    return rho if count * float(rho @ rho) > WHITENESS_LIMIT else None

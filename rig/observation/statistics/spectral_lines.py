@@ -12,19 +12,19 @@ from rig.estimation.arrays import Array
 from rig.estimation.statistics.mean_weights import TOLERANCE
 from rig.observation.statistics.tapered_weights import MAIN_LOBE, apply_window
 
-AROUND = 161  # bins of the running median
-MOST_LINES = 8  # three lines of a servo, and vibrations of the room, each of which a turning sensor may sense as two
-APART = 2.5  # least distance from a spectral line found before, in cycles of all readings
-SAME = 1.5  # cycles of all readings: closer spectral lines are one sudden motion, not two vibrations
-SIDEBANDS_APART = 0.5  # cycles of all readings: closer sidebands of slow lines resemble the turn's own waves
+BINS = 161  # of the running median
+MAX_LINES = 8  # three of a servo, and vibrations of the room, each of which a turning sensor may sense as two
+MIN_DISTANCE = 2.5  # from a spectral line found before, in cycles of all readings
+MIN_LINE_CYCLES = 1.5  # closer spectral lines are one sudden motion, not two vibrations
+MIN_SIDEBAND_CYCLES = 0.5  # closer sidebands of slow lines resemble the turn's own waves
 PASSES = 1
-WIDE = 4  # design columns of a spectral line, and of each of its sidebands
-BEATS = 1  # sidebands on either side that a turning sensor reads of a vibration in the room
-SAMPLES_EACH = 3  # samples needed per column
-NEARER = 1.02  # a sideband replaces the strongest peak if it explains this many times more
-LEAST_GAP = 1.5  # interval between samples in steps: after a longer one, samples are missing
-ROUNDING = 1e-12  # fraction of the longest column: shorter ones contain only rounding errors
-NONE: Array = np.zeros(0)
+LINE_COLUMNS = 4  # of the design, for a line and for each of its sidebands
+SIDEBANDS = 1  # sidebands on either side that a turning sensor reads of a vibration in the room
+COLUMN_SAMPLES = 3  # needed per column
+MIN_GAIN = 1.02  # a sideband replaces the strongest peak if it explains this many times more
+MIN_GAP_STEPS = 1.5  # after a longer interval between samples, samples are missing
+ROUNDING_RATIO = 1e-12  # to the longest column: shorter ones contain only rounding errors
+EMPTY: Array = np.zeros(0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,20 +39,20 @@ class LineSearch:
 
     stands_out: float = 16.0  # one false line in seventy recordings costs nothing
     slowest: float = 8.0  # slower lines are hard to separate from waves once and twice per revolution
-    beats: int = BEATS
-    most: int = MOST_LINES
+    beats: int = SIDEBANDS
+    most: int = MAX_LINES
     floor: float = 0.0
 
 
-def find_lines(residuals: Array, search: LineSearch, previous: Array = NONE, fraction: Array | None = None) -> Array:
+def find_lines(residuals: Array, search: LineSearch, previous: Array = EMPTY, fraction: Array | None = None) -> Array:
     """Return the numbers of cycles (k,) of the spectral lines in the residuals (n, axes); k may be zero.
 
-    `fraction` (n,): elapsed fraction of the time at each reading, by default even. Lines are at least `APART` from each
-    other; a line that merges with another is dropped. `previous` lines are returned unchanged.
+    `fraction` (n,): elapsed fraction of the time at each reading, by default even. Lines are at least `MIN_DISTANCE`
+    from each other; a line that merges with another is dropped. `previous` lines are returned unchanged.
     """
-    count, merged, fixed = len(residuals), NONE, len(previous)
+    count, merged, fixed = len(residuals), EMPTY, len(previous)
     cycles = previous
-    most = min(search.most, count // (column_count(search.beats) * SAMPLES_EACH))
+    most = min(search.most, count // (column_count(search.beats) * COLUMN_SAMPLES))
     fraction = np.arange(count) / count if fraction is None else fraction
     while len(cycles) < most and len(merged) < most:
         columns = waves(cycles, fraction, search.beats)
@@ -76,9 +76,9 @@ def _are_too_near(cycles: Array, search: LineSearch) -> bool:
     """
     ordered = np.sort(cycles)
     gaps = np.diff(ordered)
-    if gaps.min(initial=np.inf) < SAME or ordered[0] < 1.0:
+    if gaps.min(initial=np.inf) < MIN_LINE_CYCLES or ordered[0] < 1.0:
         return True
-    return bool(ordered[0] < search.slowest and gaps.size and gaps[0] < 2 * search.beats + SIDEBANDS_APART)
+    return bool(ordered[0] < search.slowest and gaps.size and gaps[0] < 2 * search.beats + MIN_SIDEBAND_CYCLES)
 
 
 def median_power(residuals: Array) -> float:
@@ -88,10 +88,10 @@ def median_power(residuals: Array) -> float:
 
 def column_count(beats: int) -> int:
     """Return the number of columns of `waves` per spectral line."""
-    return WIDE * (1 + beats)
+    return LINE_COLUMNS * (1 + beats)
 
 
-def waves(cycles: Array, fraction: Array, beats: int = BEATS) -> Array:
+def waves(cycles: Array, fraction: Array, beats: int = SIDEBANDS) -> Array:
     """Return cosine and sine columns (n, w k) of k lines at elapsed fractions (n,) of the time, w = `column_count`.
 
     A line also has two linearly growing columns, for a vibration that begins or ends, and sidebands up to `beats`
@@ -116,7 +116,7 @@ def unit_columns(columns: Array) -> Array:
     Scaled up, rounding errors, which differ between processors, would look like real columns.
     """
     sizes = np.linalg.norm(columns, axis=0)
-    return columns / np.where(sizes > ROUNDING * sizes.max(initial=0.0), sizes, np.inf)
+    return columns / np.where(sizes > ROUNDING_RATIO * sizes.max(initial=0.0), sizes, np.inf)
 
 
 def fit_columns(columns: Array, values: Array) -> Array:
@@ -150,7 +150,7 @@ def line_swing(residuals: Array, columns: Array, lines_hz: Array) -> Array:
 def _sampling_step(fraction: Array) -> float:
     """Return the interval between samples as a fraction of the whole time; samples may be missing."""
     steps = np.diff(fraction)
-    return float(steps[steps < LEAST_GAP * np.median(steps)].mean())
+    return float(steps[steps < MIN_GAP_STEPS * np.median(steps)].mean())
 
 
 def _find_strongest(residuals: Array, previous: Array, fraction: Array, search: LineSearch) -> float | None:
@@ -159,11 +159,11 @@ def _find_strongest(residuals: Array, previous: Array, fraction: Array, search: 
 
     powers = np.abs(np.fft.rfft(apply_window(residuals).T)) ** 2
     powers[:, :MAIN_LOBE] = powers[:, MAIN_LOBE, None]
-    around = np.array([median_filter(axis, AROUND) for axis in powers])  # one-dimensional: it takes a tenth of the time
+    around = np.array([median_filter(axis, BINS) for axis in powers])  # one-dimensional: it takes a tenth of the time
     powers /= np.maximum(around, search.floor) + np.finfo(np.float64).tiny  # noise may have a colour
     bins, last = np.arange(powers.shape[1]), powers.shape[1] - 1
     cycles = bins / len(fraction) / _sampling_step(fraction)
-    free = (cycles >= search.slowest) & (bins < last) & (np.abs(cycles - previous[:, None]) > APART).all(axis=0)
+    free = (cycles >= search.slowest) & (bins < last) & (np.abs(cycles - previous[:, None]) > MIN_DISTANCE).all(axis=0)
     best = int(np.argmax(np.where(free, powers.max(axis=0), 0.0)))
     axis = int(np.argmax(powers[:, best]))
     if not (free[best] and powers[axis, best] > search.stands_out):
@@ -182,13 +182,13 @@ def _choose_middle(peak: float, residuals: Array, previous: Array, fraction: Arr
     """
     whitened = residuals / (residuals.std(axis=0) + np.finfo(np.float64).tiny)
     sidebands = [peak + shift for shift in (-1.0, 1.0) if search.slowest <= peak + shift]
-    sidebands = [cycles for cycles in sidebands if not (np.abs(cycles - previous) <= SAME).any()]
+    sidebands = [cycles for cycles in sidebands if not (np.abs(cycles - previous) <= MIN_LINE_CYCLES).any()]
     explained = []
     for cycles in (peak, *sidebands):
         columns = waves(np.array([cycles]), fraction, search.beats)
         explained.append(float(np.sum((columns @ fit_columns(columns, whitened)) ** 2)))
     best = int(np.argmax(explained))
-    return (peak, *sidebands)[best] if explained[best] > NEARER * explained[0] else peak
+    return (peak, *sidebands)[best] if explained[best] > MIN_GAIN * explained[0] else peak
 
 
 def _refine(cycles: Array, residuals: Array, fixed: int, fraction: Array, beats: int) -> Array:
@@ -200,7 +200,7 @@ def _refine(cycles: Array, residuals: Array, fixed: int, fraction: Array, beats:
     for _ in range(PASSES):
         sizes = fit_columns(waves(cycles, fraction, beats), residuals).reshape(len(cycles), column_count(beats), -1)
         cosine, sine, cosine_grown, sine_grown = np.moveaxis(sizes, 1, 0)[:4]
-        power = np.sum(sizes[:, :2] ** 2, axis=(1, 2)) + np.sum(sizes[:, WIDE:] ** 2, axis=(1, 2))
+        power = np.sum(sizes[:, :2] ** 2, axis=(1, 2)) + np.sum(sizes[:, LINE_COLUMNS:] ** 2, axis=(1, 2))
         late = np.sum(cosine_grown * sine - sine_grown * cosine, axis=1) / (power + np.finfo(np.float64).tiny)
         cycles = cycles + np.where(np.arange(len(cycles)) < fixed, 0.0, np.clip(late / np.pi, -0.5, 0.5))
     return cycles

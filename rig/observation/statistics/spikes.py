@@ -13,21 +13,21 @@ from numpy.typing import NDArray
 
 from rig.estimation.arrays import Array
 
-LONGEST_STEP_S = 0.02  # between readings: in a longer one a hand starts and stops
-SMALLEST_RAD_S = 0.1  # over one such step a smaller one turns by less than a body may move at rest
-BEYOND = 16.0  # least ratio to the largest deviation of the readings around, one other spike left out
-SUDDEN = 3.0  # least ratio to any axis' change between the next readings: a body that is stopped moves about all axes
+MAX_STEP_S = 0.02  # between readings: in a longer one a hand starts and stops
+MIN_SPIKE_RAD_S = 0.1  # over one such step a smaller one turns by less than a body may move at rest
+MIN_DEVIATION_RATIO = 16.0  # to the largest deviation of the readings around, one other spike left out
+MIN_CHANGE_RATIO = 3.0  # to any axis' change between the next readings: a body that is stopped moves about all axes
 # readings on either side whose deviations are the usual ones; the most of them that one other spike affects
-REACH, ONE = 10, 5
+SIDE_READINGS, SPIKE_READINGS = 10, 5
 # deviation of a spike's neighbours from their cubics, relative to the spike's own; its tolerance
-NEXT, ALIKE = -2 / 3, 0.2
+NEIGHBOUR_RATIO, NEIGHBOUR_TOLERANCE = -2 / 3, 0.2
 PASSES = 3  # spikes that are close together hide each other
 
 
 def find_spikes(time_s: Array, rates: Array) -> NDArray[np.intp]:
     """Return the indices (k,) of the spikes in rates (n, 3), rad/s, at rising times (n,)."""
     none = np.zeros(0, dtype=np.intp)
-    if len(rates) < 2 * REACH + 1 or np.median(np.diff(time_s)) > LONGEST_STEP_S:
+    if len(rates) < 2 * SIDE_READINGS + 1 or np.median(np.diff(time_s)) > MAX_STEP_S:
         return none
     spikes, bridged = none, rates
     for _ in range(PASSES):
@@ -65,15 +65,15 @@ def _find_lone(axis: Array, changes: Array) -> NDArray[np.intp]:
     # The deviation from the cubic through the two readings before and the two after.
     before, after = axis[:-4] + axis[4:], axis[1:-3] + axis[3:-1]
     deviation[2:-2] = axis[2:-2] - (4 * after - before) / 6
-    candidates = np.flatnonzero(np.abs(deviation) > np.maximum(SMALLEST_RAD_S, SUDDEN * changes))
+    candidates = np.flatnonzero(np.abs(deviation) > np.maximum(MIN_SPIKE_RAD_S, MIN_CHANGE_RATIO * changes))
     size = deviation[candidates]
     alone = np.ones(len(candidates), dtype=np.bool_)
     # A lone spike deflects the cubics of its neighbours by a known fraction; a motion does not.
     for side in (-1, 1):
         of_next = deviation[np.clip(candidates + side, 0, len(axis) - 1)]
-        alone &= np.abs(of_next - NEXT * size) < ALIKE * np.abs(size)
+        alone &= np.abs(of_next - NEIGHBOUR_RATIO * size) < NEIGHBOUR_TOLERANCE * np.abs(size)
     candidates, size = candidates[alone], size[alone]
-    farther = np.r_[-REACH:-2, 3 : REACH + 1]
+    farther = np.r_[-SIDE_READINGS:-2, 3 : SIDE_READINGS + 1]
     around = np.abs(deviation[np.clip(candidates[:, None] + farther, 0, len(axis) - 1)])
-    usual = np.sort(around, axis=1)[:, -1 - ONE]
-    return candidates[np.abs(size) > BEYOND * usual]
+    usual = np.sort(around, axis=1)[:, -1 - SPIKE_READINGS]
+    return candidates[np.abs(size) > MIN_DEVIATION_RATIO * usual]

@@ -14,25 +14,25 @@ from rig.estimation.arrays import Array
 from rig.observation.statistics.coloured_noise import fit_noise_factor
 
 FLANK_S = 0.5
-FLANK_SHARE = 0.125  # largest fraction of the window
-PREVAILS = 0.5  # fraction of the scatter that remains in a long mean, below which the rest is a vibration
+MAX_FLANK_FRACTION = 0.125  # of the window
+MAX_NOISE_RATIO = 0.5  # of the scatter that remains in a long mean, below which the rest is a vibration
 BLACKMAN_HARRIS = (0.35875, -0.48829, 0.14128, -0.01168)  # Harris 1978, table 1: side lobes below −92 dB
 MAIN_LOBE = 4  # bins to either side
 NOISE_BINS = 2.0  # bins per independent power: the window's equivalent noise bandwidth, table 1
-LOW = 0.1  # fraction of the data rate, below which the noise is that at zero, apart from the arm's vibrations
-FEWEST_BINS = 16
+LOW_FRACTION = 0.1  # of the data rate, below which the noise is that at zero, apart from the arm's vibrations
+MIN_BINS = 16
 
 
 def vibrates(readings: Array) -> bool:
     """Return whether most of the scatter of readings (n, 3) at rest is a vibration, on any axis."""
     return len(readings) > 2 * _count_low_bins(len(readings)) and any(
-        fit_noise_factor(axis) < PREVAILS for axis in readings.T
+        fit_noise_factor(axis) < MAX_NOISE_RATIO for axis in readings.T
     )
 
 
 def flank_s(duration_s: float) -> float:
     """Return the duration of a rising or falling flank of the weights."""
-    return min(FLANK_S, FLANK_SHARE * duration_s)
+    return min(FLANK_S, MAX_FLANK_FRACTION * duration_s)
 
 
 def weights(time_s: Array, start_s: float, end_s: float) -> Array:
@@ -43,11 +43,11 @@ def weights(time_s: Array, start_s: float, end_s: float) -> Array:
     return normalized
 
 
-def noise_at_zero(readings: Array, low: float = LOW) -> Array:
+def noise_at_zero(readings: Array, low: float = LOW_FRACTION) -> Array:
     """Return the variance (3,) per reading for a long mean: the spectrum near zero without its lines.
 
     The median over low frequencies, which lines do not shift, is divided by the median of χ² with two degrees of
-    freedom. Low frequencies reach up to the fraction `low` of the data rate, in at least `FEWEST_BINS` bins.
+    freedom. Low frequencies reach up to the fraction `low` of the data rate, in at least `MIN_BINS` bins.
     """
     powers = np.abs(np.fft.rfft(apply_window(readings), axis=0)[MAIN_LOBE : _count_low_bins(len(readings), low)]) ** 2
     medians: Array = np.median(powers, axis=0) / np.log(2)
@@ -77,6 +77,6 @@ def dof_at_zero(count: int) -> float:
     return float(2 * np.log(2) ** 2 * (_count_low_bins(count) - MAIN_LOBE) / NOISE_BINS)
 
 
-def _count_low_bins(count: int, low: float = LOW) -> int:
+def _count_low_bins(count: int, low: float = LOW_FRACTION) -> int:
     """Return the number of frequency bins that count as low."""
-    return max(round(low * count), MAIN_LOBE + FEWEST_BINS)
+    return max(round(low * count), MAIN_LOBE + MIN_BINS)

@@ -10,14 +10,14 @@ import numpy as np
 
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.rounding import Steps
-from rig.observation.statistics.coloured_noise import MEMORIES, fit_autoregression
+from rig.observation.statistics.coloured_noise import ORDERS, fit_autoregression
 from rig.observation.statistics.mean import Mean, MeanNoise, compute_weighted_means, mean_at_rest, whole
 from rig.observation.statistics.spectral_lines import LineSearch, find_lines, fit_columns, waves
 from rig.observation.statistics.tapered_weights import weights
 from rig.observation.windows import Window
 
-FEWEST = 120  # fewest readings that separate spectral lines from noise
-BRIEF = (1, 2)  # orders of autoregression that fit coloured noise, but not the remainder of a spectral line
+MIN_READINGS = 120  # that separate spectral lines from noise
+SHORT_ORDERS = (1, 2)  # orders of autoregression that fit coloured noise, but not the remainder of a spectral line
 
 
 def average_rest(readings: Array, time_s: Array, window: Window, steps: Steps) -> Mean:
@@ -26,7 +26,7 @@ def average_rest(readings: Array, time_s: Array, window: Window, steps: Steps) -
     shaking = _columns(residuals, LineSearch(beats=0))
     columns = np.column_stack([np.ones(len(residuals)), shaking])
     smooth = columns @ fit_columns(columns, residuals)
-    noise = estimate_noise(residuals - smooth, columns.shape[1], steps, BRIEF if shaking.size else MEMORIES)
+    noise = estimate_noise(residuals - smooth, columns.shape[1], steps, SHORT_ORDERS if shaking.size else ORDERS)
     tapered = weights(time_s, window.start_s, window.end_s)[None]
     (mean,) = compute_weighted_means(readings, whole(readings), tapered, smooth=smooth, noise=noise, steps=steps)
     return mean
@@ -35,7 +35,7 @@ def average_rest(readings: Array, time_s: Array, window: Window, steps: Steps) -
 def average_standstill(readings: Array, time_s: Array, window: Window, steps: Steps) -> tuple[Mean, Window]:
     """Return the mean of readings (n, 3) of an arm at rest, and the window that it represents."""
     mean, averaged_window = mean_at_rest(readings, time_s, window, steps)
-    if len(readings) >= FEWEST and averaged_window != window:
+    if len(readings) >= MIN_READINGS and averaged_window != window:
         mean = average_rest(readings, time_s, window, steps)
     return mean, averaged_window
 
@@ -47,7 +47,7 @@ def line_columns(residuals: Array) -> Array:
 
 def fit_inflation(residuals: Array) -> float:
     """Return the factor of `fit_noise_factor` for residuals (n,) that may still contain a part of a spectral line."""
-    return fit_autoregression(residuals, BRIEF).factor
+    return fit_autoregression(residuals, SHORT_ORDERS).factor
 
 
 def _columns(residuals: Array, search: LineSearch) -> Array:

@@ -6,7 +6,7 @@ from rig.estimation.arrays import Array
 from rig.observation.time_stamps.moving_values import average_around, find_least_around
 from rig.observation.time_stamps.sampling import Sampling
 
-AVERAGED = 32  # readings whose time stamps err in either direction
+AVERAGED_READINGS = 32  # whose time stamps err in either direction
 
 
 def find_taken_times(time_s: Array, sampling: Sampling) -> Array:
@@ -26,7 +26,7 @@ def find_taken_times(time_s: Array, sampling: Sampling) -> Array:
         # Moving averages of a moving maximum: the least lateness, without steps.
         smooth_s = average_around(find_least_around(late_s, width), width)
     else:
-        smooth_s = average_around(late_s, max(width, AVERAGED))
+        smooth_s = average_around(late_s, max(width, AVERAGED_READINGS))
     return _separate(np.asarray(numbers + smooth_s, dtype=np.float64))
 
 

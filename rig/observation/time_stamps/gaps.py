@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from rig.estimation.arrays import Array, integrate_rates
 
-HIDDEN_RAD = 2e-3  # as large as the errors of attitude references: a gap that may hide more is not bridged
-LONGEST_S = 1.0  # longest gap that is bridged: in a longer one a body may be lifted and laid back
+MAX_HIDDEN_RAD = 2e-3  # as large as the errors of attitude references: a gap that may hide more is not bridged
+MAX_GAP_S = 1.0  # that is bridged: in a longer one a body may be lifted and laid back
 STEP_STD = 12**-0.5  # standard deviation of the time of a sudden change, uniform in a gap of length 1
-REACH, FEWEST = 4, 12  # interval examined on either side of a gap, in gap lengths; fewest readings in it
+SIDE_LENGTHS, MIN_SIDE_READINGS = 4, 12  # examined on either side of a gap, in gap lengths
 
 
 def hidden_angles_rad(time_s: Array, readings: Array, gaps: NDArray[np.intp]) -> Array:
@@ -29,17 +29,17 @@ def hidden_angles_rad(time_s: Array, readings: Array, gaps: NDArray[np.intp]) ->
 
 def find_hiding_gaps(time_s: Array, readings: Array, gaps: NDArray[np.intp]) -> NDArray[np.intp]:
     """Return the `gaps` (k,) that cannot be interpolated. Arguments are as for `hidden_angles_rad`."""
-    return np.asarray(gaps[hidden_angles_rad(time_s, readings, gaps) > HIDDEN_RAD], dtype=np.intp)
+    return np.asarray(gaps[hidden_angles_rad(time_s, readings, gaps) > MAX_HIDDEN_RAD], dtype=np.intp)
 
 
 def _hidden_rad(time_s: Array, readings: Array, turned: Array, gap: int) -> float:
     """Return the standard deviation, rad, of the rotation over the step `gap`; see `hidden_angles_rad`."""
     lasts_s = float(time_s[gap + 1] - time_s[gap])
-    if lasts_s > LONGEST_S:
+    if lasts_s > MAX_GAP_S:
         return np.inf
-    size = REACH * lasts_s
-    first = min(int(np.searchsorted(time_s, time_s[gap] - size)), gap - FEWEST)
-    last = max(int(np.searchsorted(time_s, time_s[gap + 1] + size)), gap + 1 + FEWEST)
+    size = SIDE_LENGTHS * lasts_s
+    first = min(int(np.searchsorted(time_s, time_s[gap] - size)), gap - MIN_SIDE_READINGS)
+    last = max(int(np.searchsorted(time_s, time_s[gap + 1] + size)), gap + 1 + MIN_SIDE_READINGS)
     sides = (slice(max(first, 0), gap + 1), slice(gap + 1, min(last, len(time_s))))
     bridged = [_bridge(time_s[side], readings[side], turned[side], lasts_s) for side in sides]
     errors = [side for side in bridged if side is not None]

@@ -25,30 +25,30 @@ from rig.estimation.arrays import Array
 from rig.observation.time_stamps.moving_values import find_least_ahead, find_least_around, find_least_behind
 
 WIDTHS = (1, 2, 4, 8, 16, 32, 64, 128, 256, 512)  # readings over which the interval is tried
-MEDIAN, UNDISTURBED = 0.5, 0.1  # quantiles of the interval with which the search begins: for few losses, and for many
-LONG = (64, 512)  # readings over which the interval is estimated first: more than a burst, less than between two gaps
-LONG_STEP = 6.0  # in intervals: a longer step is a gap; among uneven stamps, a reading with a longer delay was buffered
+MEDIAN, LOW_QUANTILE = 0.5, 0.1  # quantiles of the interval with which the search begins: for few losses, and for many
+LONG_WIDTHS = (64, 512)  # over which the interval is estimated first: more than a burst, less than between two gaps
+LONG_STEP_INTERVALS = 6.0  # a longer step is a gap; among uneven stamps, a reading with a longer delay was buffered
 PACKET_S = 0.5  # readings that follow each other evenly for longer have not arrived at once
 # Tolerance of a whole multiple, in intervals; fraction of differences that must be whole multiples.
-NEAR, MOSTLY = 0.25, 0.8
-LOST = 0.6  # difference of delays, in intervals, from which on a reading is lost
-COARSE = 1 / 3  # resolution in intervals, above which the stamps are worse than `NEAR`
+MULTIPLE_TOLERANCE, MIN_FIT = 0.25, 0.8
+MIN_LOSS_INTERVALS = 0.6  # difference of delays from which on a reading is lost
+COARSE_RATIO = 1 / 3  # resolution in intervals, above which the stamps are worse than `MULTIPLE_TOLERANCE`
 # Fraction of the interval; if this fraction of steps is shorter, readings are stamped on arrival.
-SHORT, SOME_SHORT = 0.6, 0.05
-LATE = 0.1  # ratio of short steps to long ones, above which readings were late and not lost
-MORE = 1.5  # ratio to the resolution, above which stamps are not only rounded
+SHORT_STEP, MIN_SHORT_FRACTION = 0.6, 0.05
+MAX_SHORT_RATIO = 0.1  # of short steps to long ones, above which readings were late and not lost
+MAX_ROUNDING_RATIO = 1.5  # to the resolution, above which stamps are not only rounded
 # Quantile of squared normal deviates; mean of those below it, relative to the mean of all.
-SMALLER, OF_NORMAL = 0.85, 0.5204
-PASSES, SETTLED = 6, 1e-9
-DECIMALS, BITS = 7, 16  # most decimals, and most binary digits, of a second to which stamps may be rounded
-COUNTED = 50  # missing readings: the number in a longer gap is too uncertain to improve the interval
-SEGMENTS, FARTHEST = 24, 1024  # fewest segments of a log that show a random walk; most readings of a segment
-GROWN = (2.5, 12.0)  # range of the factor by which a random walk's variance grows over four segments
-WIDEST_BURST = 16  # readings in a row, of which at least one must be on time
-POLLED = 0.045  # least fraction of steps that are one polling period longer
-WHOLE = 0.01  # tolerance of an interval that is a whole multiple of a coarse resolution
+TRIMMED_QUANTILE, TRIMMED_MEAN_RATIO = 0.85, 0.5204
+MAX_ITERATIONS, CONVERGED = 6, 1e-9
+MAX_DECIMALS, MAX_BITS = 7, 16  # and binary digits, of a second to which stamps may be rounded
+MAX_COUNTED_LOSS = 50  # missing readings: the number in a longer gap is too uncertain to improve the interval
+MIN_SEGMENTS, MAX_SEGMENT = 24, 1024  # of a log that shows a random walk; readings of a segment
+WALK_GROWTH = (2.5, 12.0)  # range of the factor by which a random walk's variance grows over four segments
+MAX_BURST = 16  # readings in a row, of which at least one must be on time
+MIN_POLLED_FRACTION = 0.045  # of steps that are one polling period longer
+WHOLE_TOLERANCE = 0.01  # of an interval that is a whole multiple of a coarse resolution
 # Ratio of variance to mean of missing readings; expected ones in a block; fewest blocks.
-BEAT, IN_BLOCK, BLOCKS = 0.35, 8, 20
+MAX_DISPERSION, BLOCK_LOSSES, MIN_BLOCKS = 0.35, 8, 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +78,7 @@ class Sampling:
         """
         if self.late is None:
             return np.asarray(self.missing >= fewest)
-        long = np.diff(time_s) > max(fewest + 1, LONG_STEP) * self.interval_s
+        long = np.diff(time_s) > max(fewest + 1, LONG_STEP_INTERVALS) * self.interval_s
         return np.asarray(long | self.late[1:] | self.late[:-1])
 
     @classmethod
@@ -122,10 +122,10 @@ class _PeriodCandidate:
 def find_sampling(time_s: Array) -> Sampling:
     """Return the sampling of readings at rising times (n ≥ 2,)."""
     typical_s, rounded_s = find_typical_interval_s(time_s), find_resolution_s(time_s)
-    is_uneven = float(np.quantile(np.diff(time_s), SOME_SHORT)) < SHORT * typical_s
+    is_uneven = float(np.quantile(np.diff(time_s), MIN_SHORT_FRACTION)) < SHORT_STEP * typical_s
     single = _count_missing(time_s, 1, MEDIAN)
     is_credible = not (_is_misleading(time_s, typical_s, rounded_s) or _is_beat(single.missing))
-    is_good = is_credible and single.fit >= MOSTLY and not _has_late(time_s, single)
+    is_good = is_credible and single.fit >= MIN_FIT and not _has_late(time_s, single)
     if is_good and (not is_uneven or single.median_run_s(time_s) > PACKET_S):
         return Sampling(single.interval_s, single.missing, 0.0, 1, on_arrival=False)
     best = _select_candidate([*([single] if is_credible else []), *_list_wider(time_s)], typical_s)
@@ -138,19 +138,19 @@ def find_sampling(time_s: Array) -> Sampling:
 def _is_misleading(time_s: Array, interval_s: float, resolution_s: float) -> bool:
     """Return whether all steps are whole multiples of a wrong interval because of coarse resolution."""
     # Equal steps are as coarse as their resolution, and good.
-    is_coarse = resolution_s > COARSE * interval_s and float(np.ptp(np.diff(time_s))) > SETTLED * interval_s
-    return is_coarse and abs(interval_s / resolution_s - round(interval_s / resolution_s)) > WHOLE
+    is_coarse = resolution_s > COARSE_RATIO * interval_s and float(np.ptp(np.diff(time_s))) > CONVERGED * interval_s
+    return is_coarse and abs(interval_s / resolution_s - round(interval_s / resolution_s)) > WHOLE_TOLERANCE
 
 
 def _has_late(time_s: Array, single: _PeriodCandidate) -> bool:
     """Return whether readings were late rather than lost: the step after a late one is short."""
-    return bool(np.count_nonzero(np.diff(time_s) < SHORT * single.interval_s) > LATE * single.gap_count)
+    return bool(np.count_nonzero(np.diff(time_s) < SHORT_STEP * single.interval_s) > MAX_SHORT_RATIO * single.gap_count)
 
 
 def _list_wider(time_s: Array) -> list[_PeriodCandidate]:
     """Return the candidates that span several readings, narrowest first, except those with a beat (`_is_beat`)."""
     widths = takewhile(lambda width: 4 * width <= len(time_s), WIDTHS[1:])
-    wider = (_count_missing(time_s, width, quantile) for width in widths for quantile in (MEDIAN, UNDISTURBED))
+    wider = (_count_missing(time_s, width, quantile) for width in widths for quantile in (MEDIAN, LOW_QUANTILE))
     return [candidate for candidate in wider if not _is_beat(candidate.missing)]
 
 
@@ -158,7 +158,7 @@ def _select_candidate(candidates: Sequence[_PeriodCandidate], typical_s: float) 
     """Return the narrowest candidate that fits with few gaps, or None. Wide candidates hide losses."""
     # The steps inside a burst would make the time between bursts look like a gap.
     fitting = [
-        candidate for candidate in candidates if candidate.fit >= MOSTLY and candidate.interval_s > typical_s / 2
+        candidate for candidate in candidates if candidate.fit >= MIN_FIT and candidate.interval_s > typical_s / 2
     ]
     fewest = min((candidate.gap_count for candidate in fitting), default=0)
     return next((candidate for candidate in fitting if candidate.gap_count <= 2 * fewest + 1), None)
@@ -167,13 +167,13 @@ def _select_candidate(candidates: Sequence[_PeriodCandidate], typical_s: float) 
 def _exceeds_rounding(time_s: Array, sampling: Sampling, resolution_s: float) -> bool:
     """Return whether some stamps (n,) are later than rounding to `resolution_s` explains."""
     late_s = time_s - sampling.interval_s * sampling.numbers
-    allowed_s = max(resolution_s, NEAR * sampling.interval_s)
-    return float(np.max(late_s - find_least_around(late_s, sampling.width))) > MORE * allowed_s
+    allowed_s = max(resolution_s, MULTIPLE_TOLERANCE * sampling.interval_s)
+    return float(np.max(late_s - find_least_around(late_s, sampling.width))) > MAX_ROUNDING_RATIO * allowed_s
 
 
 def find_typical_interval_s(time_s: Array) -> float:
     """Return the typical interval between readings at increasing times (n ≥ 2,); some may be missing or late."""
-    return min(_interval_quantile(time_s, apart) for apart in LONG)
+    return min(_interval_quantile(time_s, apart) for apart in LONG_WIDTHS)
 
 
 def _count_missing(time_s: Array, width: int, quantile: float) -> _PeriodCandidate:
@@ -181,19 +181,19 @@ def _count_missing(time_s: Array, width: int, quantile: float) -> _PeriodCandida
     steps_s, numbers = np.diff(time_s), np.arange(len(time_s))
     interval_s, last_s = _interval_quantile(time_s, max(8, 4 * width), quantile), 0.0
     missing, fit = np.zeros(len(steps_s), dtype=np.intp), 0.0
-    for _ in range(PASSES):
+    for _ in range(MAX_ITERATIONS):
         late_s = time_s - interval_s * numbers
         if interval_s <= 0:  # most stamps are equal
             break
         later_s = find_least_ahead(late_s, width)[1:] - find_least_behind(late_s, width)[:-1]
-        whole = np.rint(later_s / interval_s) * (later_s > LOST * interval_s)
-        fit = float(np.mean(np.abs(later_s - interval_s * whole) < NEAR * interval_s))
+        whole = np.rint(later_s / interval_s) * (later_s > MIN_LOSS_INTERVALS * interval_s)
+        fit = float(np.mean(np.abs(later_s - interval_s * whole) < MULTIPLE_TOLERANCE * interval_s))
         missing = whole.astype(np.intp)
         if width > 1:
             ending = missing[-width:]
             ending[ending <= width] = 0  # the last packet may be incomplete
             missing = _merge_at_longest(missing, steps_s)
-        if abs(interval_s - last_s) <= SETTLED * interval_s:
+        if abs(interval_s - last_s) <= CONVERGED * interval_s:
             break
         last_s, interval_s = interval_s, _interval_s(time_s, missing, width)
     return _PeriodCandidate(width, interval_s, missing, fit)
@@ -207,12 +207,12 @@ def _is_beat(missing: NDArray[np.intp]) -> bool:
     """
     missing = np.minimum(missing, 1)  # a gap counts once
     lost = int(missing.sum())
-    size = max(len(missing) * IN_BLOCK // lost, 1) if lost else len(missing) + 1
+    size = max(len(missing) * BLOCK_LOSSES // lost, 1) if lost else len(missing) + 1
     blocks = len(missing) // size
-    if blocks < BLOCKS or lost < POLLED * len(missing):
+    if blocks < MIN_BLOCKS or lost < MIN_POLLED_FRACTION * len(missing):
         return False
     counts = missing[: blocks * size].reshape(blocks, size).sum(axis=1)
-    return bool(counts.var() < BEAT * counts.mean())
+    return bool(counts.var() < MAX_DISPERSION * counts.mean())
 
 
 def _interval_s(time_s: Array, missing: NDArray[np.intp], width: int) -> float:
@@ -221,7 +221,7 @@ def _interval_s(time_s: Array, missing: NDArray[np.intp], width: int) -> float:
     The recording lasts from the most punctual of its first `width` readings to the most punctual of its last `width`
     readings.
     """
-    steps_s, few = np.diff(time_s), missing <= COUNTED
+    steps_s, few = np.diff(time_s), missing <= MAX_COUNTED_LOSS
     interval_s = float(steps_s[few].sum() / (1 + missing[few]).sum())
     numbers = np.concatenate([[0], np.cumsum(1 + missing)])
     if width == 1 or not few.all() or numbers[-1] <= width:
@@ -239,16 +239,16 @@ def _estimate_unlocated_losses(time_s: Array) -> Sampling:
     grows much more.
     """
     mean_s = float(time_s[-1] - time_s[0]) / (len(time_s) - 1)
-    apart = min(len(time_s) // SEGMENTS, FARTHEST)
+    apart = min(len(time_s) // MIN_SEGMENTS, MAX_SEGMENT)
     width = max((width for width in WIDTHS if 4 * width <= apart), default=1)
     least_s = find_least_ahead(time_s - mean_s * np.arange(len(time_s)), width)[: len(time_s) - width]
     near, far = (_walk_variance(least_s, steps) for steps in (max(apart // 4, 1), max(apart, 1)))
-    lost = width >= WIDEST_BURST and GROWN[0] * near < far < GROWN[1] * near
+    lost = width >= MAX_BURST and WALK_GROWTH[0] * near < far < WALK_GROWTH[1] * near
     nowhere = np.zeros(len(time_s) - 1, dtype=np.intp)
     scattered = far / (apart * mean_s**2) if lost else 0.0
     usual_s = find_typical_interval_s(time_s)
     late_s = time_s - usual_s * np.arange(len(time_s))
-    late = late_s - find_least_ahead(late_s, LONG[0]) > LONG_STEP * usual_s
+    late = late_s - find_least_ahead(late_s, LONG_WIDTHS[0]) > LONG_STEP_INTERVALS * usual_s
     return Sampling(_interval_s(time_s, nowhere, width), nowhere, scattered, width, on_arrival=False, late=late)
 
 
@@ -260,7 +260,7 @@ def _walk_variance(walk: Array, apart: int) -> float:
     bends = (walk[2 * apart :] - 2 * walk[apart:-apart] + walk[: -2 * apart]) ** 2
     if not len(bends):
         return 0.0
-    return float(np.mean(bends[bends <= np.quantile(bends, SMALLER)]) / (2 * OF_NORMAL))
+    return float(np.mean(bends[bends <= np.quantile(bends, TRIMMED_QUANTILE)]) / (2 * TRIMMED_MEAN_RATIO))
 
 
 def _merge_at_longest(missing: NDArray[np.intp], steps_s: Array) -> NDArray[np.intp]:
@@ -284,7 +284,7 @@ def _interval_quantile(time_s: Array, apart: int, quantile: float = MEDIAN) -> f
 
 def find_resolution_s(time_s: Array) -> float:
     """Return the resolution of the stamps: a power of ten of a second, or of two (float32); 0 if none is found."""
-    units = sorted((*(10.0**-decimals for decimals in range(DECIMALS)), *(2.0**-bits for bits in range(BITS))))
+    units = sorted((*(10.0**-decimals for decimals in range(MAX_DECIMALS)), *(2.0**-bits for bits in range(MAX_BITS))))
     since_s = time_s - time_s[0]
     for unit_s in reversed(units):
         scaled = since_s / unit_s

@@ -19,10 +19,10 @@ from rig.estimation.arrays import Array, unwrap_counter
 from rig.observation.time_stamps.even_times import find_taken_times
 from rig.observation.time_stamps.moving_values import find_least_ahead
 from rig.observation.time_stamps.sampling import (
-    COARSE,
-    LONG,
-    LONG_STEP,
-    NEAR,
+    COARSE_RATIO,
+    LONG_STEP_INTERVALS,
+    LONG_WIDTHS,
+    MULTIPLE_TOLERANCE,
     Sampling,
     find_resolution_s,
     find_sampling,
@@ -31,18 +31,18 @@ from rig.observation.time_stamps.sampling import (
 
 # Periods after which counters restart: 16, 24 and 32 bits of ms and µs; a day and the GPS week.
 WRAPS_S = (*(2.0**bits * unit_s for unit_s in (1e-3, 1e-6) for bits in (16, 24, 32)), 86_400.0, 604_800.0)
-LONGEST_STEP = 0.25  # fraction of a counter's period: a longer step over its end is no restart
-FIRST_ROWS = 5  # rows of zeros before the first reading, at most
-REPEATS = 0.01  # largest fraction of adjacent readings that are equal, for which a repeat is no chance
-DENSER = 1.5  # readings per interval, above which two parts of a log overlap; below, rows are in another order
-FARTHEST_S = 1.0  # largest time by which a row is out of order; beyond, a clock was set back
-STALE_S, FASTER = 0.1, 0.8  # least delay of a stale reading; largest step of stale readings, in intervals
-ON_TIME = 1.0  # largest delay of a punctual reading, in intervals
-USUAL = 3.0  # largest usual delay, in medians of the delay
-EXACT = 1e-6  # tolerance of a whole multiple of a resolution, for which rounding makes no equal stamps
-FEW_EQUAL = 2  # pairs of equal coarse stamps: rounding makes more
-WAITING = 0.5  # fraction of the readings of a long step that come after it, if they were delayed and not lost
-REACH = 6  # number of readings, in lengths of the step, within which a link has caught up after a stall
+MAX_STEP_FRACTION = 0.25  # of a counter's period: a longer step over its end is no restart
+MAX_ZERO_ROWS = 5  # before the first reading
+MAX_REPEAT_FRACTION = 0.01  # of adjacent readings that are equal, for which a repeat is no chance
+MAX_DENSITY = 1.5  # readings per interval, above which two parts of a log overlap; below, rows are in another order
+MAX_DISORDER_S = 1.0  # by which a row is out of order; beyond, a clock was set back
+MIN_STALE_DELAY_S, MAX_STALE_STEP = 0.1, 0.8  # of a stale reading; step of stale readings, in intervals
+MAX_DELAY = 1.0  # of a punctual reading, in intervals
+DELAY_RATIO = 3.0  # of the largest usual delay to the median
+ROUNDING = 1e-6  # tolerance of a whole multiple of a resolution, for which rounding makes no equal stamps
+MAX_EQUAL = 2  # pairs of coarse stamps: rounding makes more
+MIN_DELAYED_FRACTION = 0.5  # of the readings of a long step that come after it, if they were delayed and not lost
+CATCH_UP_STEPS = 6  # number of readings, in lengths of the step, within which a link has caught up after a stall
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +129,7 @@ def _drop_zeros(log: _UnorderedLog) -> _UnorderedLog:
     zero = (log.readings == 0).all(axis=1)
     first = int(np.argmin(zero)) if not zero.all() else 0
     kept = np.ones(len(zero), dtype=np.bool_)
-    if first <= FIRST_ROWS and not zero[first:].any():
+    if first <= MAX_ZERO_ROWS and not zero[first:].any():
         kept[:first] = False
     return log.select(kept, "they are zeros before the first reading")
 
@@ -142,7 +142,7 @@ def _unwrap(log: _UnorderedLog) -> _UnorderedLog:
         return log
     for period_s in WRAPS_S:
         over_s = steps_s[backward_steps] + period_s
-        if ((over_s >= 0) & (over_s <= LONGEST_STEP * period_s)).all() and np.ptp(log.stamps_s) <= period_s:
+        if ((over_s >= 0) & (over_s <= MAX_STEP_FRACTION * period_s)).all() and np.ptp(log.stamps_s) <= period_s:
             stamps_s = unwrap_counter(log.stamps_s, period_s)
             reason = f"their counter restarts after {period_s:.10g} s, which are added"
             return log.restamp(stamps_s, stamps_s > log.stamps_s, reason)
@@ -163,7 +163,7 @@ def _drop_repeated(log: _UnorderedLog) -> _UnorderedLog:
     later = np.diff(log.stamps_s) > 0
     equal = (np.diff(log.readings, axis=0) == 0).all(axis=1)[later]
     others = len(shared) - len(np.unique(rows[:, 0])) - np.count_nonzero(repeated)  # second readings of one stamp
-    if others and len(equal) and equal.mean() > REPEATS:
+    if others and len(equal) and equal.mean() > MAX_REPEAT_FRACTION:
         return log
     kept = np.ones(len(log.rows), dtype=np.bool_)
     kept[shared[repeated]] = False
@@ -187,7 +187,7 @@ def _sort(log: _UnorderedLog) -> _UnorderedLog:
     for row in np.flatnonzero(np.diff(log.stamps_s) < 0):
         first, last = np.searchsorted(stamps_s, (log.stamps_s[row + 1], log.stamps_s[row]))
         overlap_s = log.stamps_s[row] - log.stamps_s[row + 1]
-        if overlap_s > FARTHEST_S or last - first > DENSER * overlap_s / interval_s + 2:
+        if overlap_s > MAX_DISORDER_S or last - first > MAX_DENSITY * overlap_s / interval_s + 2:
             return log
     ordered = _UnorderedLog(log.rows[order], stamps_s, log.readings[order], log.findings)
     return ordered.restamp(stamps_s, early[order], "they stand after later ones, and are put in order")
@@ -214,14 +214,14 @@ def _drop_stale(log: _UnorderedLog) -> _UnorderedLog:
     """Return the log without old readings at its start, which come faster than they were taken."""
     interval_s = find_typical_interval_s(log.stamps_s)
     late_s = log.stamps_s - interval_s * np.arange(len(log.stamps_s))
-    delays_s = late_s - find_least_ahead(late_s, LONG[-1])
+    delays_s = late_s - find_least_ahead(late_s, LONG_WIDTHS[-1])
     usual_s = _estimate_usual_delay_s(late_s, interval_s)
-    first = int(np.argmax(delays_s <= np.median(delays_s) + NEAR * interval_s))
+    first = int(np.argmax(delays_s <= np.median(delays_s) + MULTIPLE_TOLERANCE * interval_s))
     delay_s = float(late_s[0] - late_s[first])
     kept = np.ones(len(late_s), dtype=np.bool_)
-    if delay_s > max(STALE_S, LONG_STEP * interval_s, 2 * usual_s):
+    if delay_s > max(MIN_STALE_DELAY_S, LONG_STEP_INTERVALS * interval_s, 2 * usual_s):
         step_s = float(log.stamps_s[first] - log.stamps_s[0]) / first
-        kept[:first] = step_s >= FASTER * interval_s
+        kept[:first] = step_s >= MAX_STALE_STEP * interval_s
         return log.select(kept, f"they had waited in a buffer: they come every {1e3 * step_s:.2g} ms")
     return log
 
@@ -235,16 +235,16 @@ def _spread_stalled(log: _UnorderedLog) -> _UnorderedLog:
     steps_s = np.diff(stamps_s)
     usual_s = _estimate_usual_delay_s(stamps_s - interval_s * np.arange(len(stamps_s)), interval_s)
     waited, lost = np.zeros(len(stamps_s), dtype=np.bool_), np.zeros(len(stamps_s), dtype=np.bool_)
-    for last in np.flatnonzero(steps_s > LONG_STEP * interval_s + usual_s).tolist():
-        reach = int(REACH * steps_s[last] / interval_s)
+    for last in np.flatnonzero(steps_s > LONG_STEP_INTERVALS * interval_s + usual_s).tolist():
+        reach = int(CATCH_UP_STEPS * steps_s[last] / interval_s)
         ahead_s = log.stamps_s[last + 1 : last + 1 + reach] - log.stamps_s[last]
         late_s = ahead_s - interval_s * np.arange(1, len(ahead_s) + 1)
-        caught_up = int(np.argmax(late_s <= late_s.min() + ON_TIME * interval_s))
+        caught_up = int(np.argmax(late_s <= late_s.min() + MAX_DELAY * interval_s))
         missing = max(round(float(late_s[caught_up]) / interval_s), 0)
-        if not caught_up or missing > (1 - WAITING) * steps_s[last] / interval_s or waited[last]:
+        if not caught_up or missing > (1 - MIN_DELAYED_FRACTION) * steps_s[last] / interval_s or waited[last]:
             continue
         late = slice(last + 1, last + 1 + caught_up)
-        if missing * interval_s > usual_s + ON_TIME * interval_s:
+        if missing * interval_s > usual_s + MAX_DELAY * interval_s:
             lost[late] = True
             continue
         waited[late] = True
@@ -269,7 +269,7 @@ def _separate_equal(log: _UnorderedLog) -> _UnorderedLog:
     sampling = find_sampling(log.stamps_s)
     interval_s, rounded_s = find_typical_interval_s(log.stamps_s), find_resolution_s(log.stamps_s)
     uneven_s = abs(interval_s - rounded_s * round(interval_s / rounded_s)) if rounded_s else 0.0
-    slips = rounded_s > COARSE * interval_s and (uneven_s > EXACT * rounded_s or len(equal) > FEW_EQUAL)
+    slips = rounded_s > COARSE_RATIO * interval_s and (uneven_s > ROUNDING * rounded_s or len(equal) > MAX_EQUAL)
     if sampling.width > 1 or sampling.on_arrival or slips:
         return log
     before = np.append(np.inf, steps_s)[equal] > 1.5 * sampling.interval_s
@@ -286,4 +286,4 @@ def _separate_equal(log: _UnorderedLog) -> _UnorderedLog:
 
 def _estimate_usual_delay_s(late_s: Array, interval_s: float) -> float:
     """Return the delay, s, behind the least late of the following readings, that only buffered readings exceed."""
-    return USUAL * float(np.median(late_s - find_least_ahead(late_s, LONG[-1]))) + ON_TIME * interval_s
+    return DELAY_RATIO * float(np.median(late_s - find_least_ahead(late_s, LONG_WIDTHS[-1]))) + MAX_DELAY * interval_s

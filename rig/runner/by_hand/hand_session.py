@@ -32,7 +32,7 @@ from rig.estimation.by_hand.session_parts import HandRest, Move, SessionConditio
 from rig.motion.by_hand import FACES, Face, HandMove, Instruction
 from rig.observation.by_hand.hand_segmentation import Segmenter
 from rig.observation.by_hand.rests_and_moves import (
-    BETWEEN_S,
+    RECORDING_PAUSE_S,
     NotCounted,
     microsecond_of,
     range_of,
@@ -94,8 +94,8 @@ class HandSession:
             self._not_counted = NotCounted(microsecond_s=microsecond_of(self.sensor))
             return
         self._segmenter, self._not_counted, ends_s = replay_runs(self.earlier, self.name)
-        self._not_counted.seams.append(ends_s + BETWEEN_S / 2)
-        self._begins_s = self._judged_s = ends_s + BETWEEN_S
+        self._not_counted.seams.append(ends_s + RECORDING_PAUSE_S / 2)
+        self._begins_s = self._judged_s = ends_s + RECORDING_PAUSE_S
         for event in (recorded.event for run in self.earlier for recorded in run.events):
             if isinstance(event, HandMoveAccepted):
                 self._accepted.append(HandMove(event.kind, event.from_face, event.to_face, event.turns))
