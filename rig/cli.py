@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple, NoReturn
 from rig.commands.command_signals import end_by_interrupt, ignore_endings
 from rig.commands.standard_streams import keep_streams_usable, output_lost
 from rig.data.version import VERSION
-from rig.errors import INTERRUPTED, Fault, RigError, Unprinted
+from rig.errors import INTERRUPTED_STATUS, Fault, RigError, Unprinted
 from rig.errors.quoting import printable, printable_lines
 from rig.station.plain_text import format_for_file, say_on_terminal
 
@@ -263,7 +263,7 @@ def run_guarded(command: Callable[[], int]) -> int:
         ignore_endings()  # all is stopped: an impatient second Ctrl-C has nothing to end
         if sys.stdin.isatty() and sys.stderr.isatty():
             print(file=sys.stderr)  # the terminal shows ^C behind what stood in the line
-        return _print_ending(str(interrupt) or "interrupted", INTERRUPTED)
+        return _print_ending(str(interrupt) or "interrupted", INTERRUPTED_STATUS)
     except OSError as error:
         return _print_ending(
             str(Fault("system", f"the system refused ({error})", "Correct that, then try again")), FAULT

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from rig.analysis.analyses import calibrate
-from rig.config.column_map import AS_NAMED, TIMES, ColumnMap
+from rig.config.column_map import STANDARD_NAMES, TIMES, ColumnMap
 from rig.config.units import UNITS
 from rig.data.quantity import RATE, Quantity
 from rig.data.recording.motion_file import MOTIONS, TIME, Columns, Header, Item
@@ -65,7 +65,7 @@ def look_at(path: Path, stated: ColumnMap | None = None) -> LookedFile:
     Raise Refused `bad_option` for a file of sweeps, and as `find_layout` does for a file that is not a table.
     """
     if is_in_format(path):
-        return _read_contents(LookedFile(path, None, None, {}), AS_NAMED, has_readings=True, has_attitudes=True)
+        return _read_contents(LookedFile(path, None, None, {}), STANDARD_NAMES, has_readings=True, has_attitudes=True)
     if stated is not None:
         # A reference whose columns have the rig's own names needs no map.
         looked = _read_contents(LookedFile(path, None, None, {}), stated, has_readings=True, has_attitudes=True)

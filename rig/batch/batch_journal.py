@@ -14,7 +14,7 @@ from rig.data.validation import parse_json, validate
 from rig.errors import Refused
 
 JOURNAL = "batch.jsonl"
-LARGEST_BYTES = 16_000_000
+MAX_BYTES = 16_000_000
 _KINDS: dict[str, type[Entry]] = {
     "batch_begun": Begun,
     "part_begun": PartBegun,
@@ -67,7 +67,7 @@ def resume_journal(folder: Path) -> Journal:
     """Return the journal in `folder` without an incomplete last line. Raise Refused `no_batch` or for a link."""
     path = folder / JOURNAL
     try:
-        text = read_regular_file(path, LARGEST_BYTES, follow_links=False)
+        text = read_regular_file(path, MAX_BYTES, follow_links=False)
         complete = text[: text.rfind(b"\n") + 1]
         batch = state_of(_entries(complete))
         if len(complete) < len(text):

@@ -18,8 +18,8 @@ from rig.page.server.sections import Sections
 from rig.page.server.serving import Page, PageAddress, serving
 from rig.station.questions import Question
 
-LONGEST = 200  # largest number of characters of an answer
-LOOK_S = 0.5  # interval of checking that the page still exists
+MAX_ANSWER = 200  # characters
+CHECK_INTERVAL_S = 0.5  # of whether the page still exists
 
 
 class OnPage:
@@ -45,7 +45,7 @@ class OnPage:
             self._sections.put(asked={"number": self._number, **asdict(question), "choices": choices})
             try:
                 while self._open and not self._control.gone:
-                    self._changed.wait(LOOK_S)
+                    self._changed.wait(CHECK_INTERVAL_S)
                 return None if self._open else self._text
             finally:
                 self._open = False
@@ -69,7 +69,7 @@ class OnPage:
                 number, text = json.loads(content)["number"], json.loads(content)["text"]
             except (ValueError, TypeError, KeyError):
                 number, text = None, None
-            if type(number) is not int or not isinstance(text, str) or len(text) > LONGEST or not text.isprintable():
+            if type(number) is not int or not isinstance(text, str) or len(text) > MAX_ANSWER or not text.isprintable():
                 return PlainTextResponse('expected: {"number": 1, "text": "the answer"}\n', 400)
             if not self.takes(number, text):
                 return PlainTextResponse("this question is not open any more\n", 409)

@@ -7,14 +7,14 @@ from pathlib import Path
 from rig.config.files.regular_file import UnfitFile, read_regular_file
 from rig.errors import Refused
 
-LARGEST_BYTES = 1_000_000
+MAX_BYTES = 1_000_000
 HEADING = "serial_number"
 
 
 def numbers_in(path: Path) -> tuple[str, ...]:
     """Return a CSV file's column `serial_number`, or else its first column. Raise Refused `parts_file`."""
     try:
-        text = read_regular_file(path, LARGEST_BYTES).decode("utf-8-sig")
+        text = read_regular_file(path, MAX_BYTES).decode("utf-8-sig")
         rows = [row for row in csv.reader(text.splitlines()) if any(cell.strip() for cell in row)]
     except (OSError, UnfitFile, UnicodeDecodeError, csv.Error) as error:
         raise _unfit(path, str(error)) from error

@@ -24,8 +24,8 @@ from rig.station.events import (
 )
 
 State = Literal["waiting", "checking", "asking", "running", "solving", "refused", "fault", "stopped", "ended"]
-NEWEST = 60  # parts in the status: a tray has fewer
-ENDINGS = ("fault", "stopped", "ended")  # final states of a station
+MAX_PARTS = 60  # the newest, in the status: a tray has fewer
+FINAL_STATES = ("fault", "stopped", "ended")  # of a station
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,13 +122,13 @@ def update_by_batch(now: Now, batch: Batch) -> Now:
         operator=batch.begun.operator,
         work_order=batch.begun.work_order,
         counts=counts,
-        parts=tuple((part.serial, part.state) for part in batch.parts[-NEWEST:]),
+        parts=tuple((part.serial, part.state) for part in batch.parts[-MAX_PARTS:]),
     )
 
 
 def last(now: Now) -> Now:
     """Return the last state. A batch that ended neither by itself nor by a fault gets the state "stopped"."""
-    return replace(now, state=now.state if now.state in ENDINGS else "stopped", left_s=None, over=True)
+    return replace(now, state=now.state if now.state in FINAL_STATES else "stopped", left_s=None, over=True)
 
 
 def after(now: Now, event: RunEvent) -> Now:

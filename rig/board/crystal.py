@@ -4,8 +4,8 @@ import time
 
 from firmware_host.client import Board
 
-STARTS_S = 2.0  # start-up time of a 32768 Hz crystal, t_SU(LSE) in the data sheet DS11451
-ASK_AGAIN_S = 0.1
+STARTUP_S = 2.0  # of a 32768 Hz crystal, t_SU(LSE) in the data sheet DS11451
+POLL_S = 0.1
 
 
 def follows_crystal(board: Board) -> bool:
@@ -15,6 +15,6 @@ def follows_crystal(board: Board) -> bool:
     """
     while True:
         status = board.status()
-        if status.clock_locked or status.uptime_s > STARTS_S:
+        if status.clock_locked or status.uptime_s > STARTUP_S:
             return status.clock_locked
-        time.sleep(ASK_AGAIN_S)
+        time.sleep(POLL_S)

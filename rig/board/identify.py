@@ -10,7 +10,7 @@ from rig.config.models import BoardSection, SensorsConfig
 from rig.config.sensors.sensor_sections import ConfiguredSensor, SensorSection
 from rig.errors import Fault, Refused, raise_as
 
-UNDRIVEN = (0x00, 0xFF, 0x0000, 0xFFFF)  # an SPI bus reads this if no part drives it
+UNDRIVEN_BYTES = (0x00, 0xFF, 0x0000, 0xFFFF)  # an SPI bus reads this if no part drives it
 
 
 refusing = partial(raise_as, Refused)  # before anything has moved
@@ -52,7 +52,7 @@ def find_sensor(identity: BoardIdentity, name: str, section: ConfiguredSensor) -
     info = sensor_entry(identity, name, section)
     if info.present:
         return info
-    if info.who_am_i in UNDRIVEN:
+    if info.who_am_i in UNDRIVEN_BYTES:
         raise _missing(name, section, f"nothing answers: its identity reads 0x{info.who_am_i:02x}")
     raise Refused(
         "sensor_mismatch",

@@ -71,10 +71,10 @@ def add_columns(parser: _ActionsContainer) -> None:
 
 def read_column_map(path: Path | None) -> "ColumnMap":
     """Return the map that `--columns` names; an empty one without the option. Raise as `load_as` does."""
-    from rig.config.column_map import AS_NAMED, GIVE_MAP, ColumnMap
+    from rig.config.column_map import MAP_REMEDY, STANDARD_NAMES, ColumnMap
     from rig.config.load import load_as
 
-    return AS_NAMED if path is None else load_as(ColumnMap, path, GIVE_MAP)
+    return STANDARD_NAMES if path is None else load_as(ColumnMap, path, MAP_REMEDY)
 
 
 def find_logs(path: Path) -> list[Path]:

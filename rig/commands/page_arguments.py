@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 Answer = Callable[[Sequence[str], str], bool]
 TOKEN_VARIABLE = "RIG_PAGE_TOKEN"
-LONGEST_TOKEN = 1000  # bytes of the file that contains the token
+MAX_TOKEN_BYTES = 1000  # of the file that contains the token
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +94,7 @@ def read_page_token(options: argparse.Namespace) -> str | None:
     try:
         if os.name == "posix" and stat.S_IMODE(path.stat().st_mode) & (stat.S_IRWXG | stat.S_IRWXO):
             raise UnfitFile("others than you can read or write it")
-        return read_regular_file(path, LONGEST_TOKEN).decode("utf-8", errors="replace").strip()
+        return read_regular_file(path, MAX_TOKEN_BYTES).decode("utf-8", errors="replace").strip()
     except (OSError, UnfitFile) as error:
         raise Refused(
             "page_address",

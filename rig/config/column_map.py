@@ -8,7 +8,7 @@ from rig.config.section import Positive, Section
 from rig.config.units import ACCELERATION, ANGLE, FIELD, NUMBER, PRESSURE, RATE, TEMPERATURE, TIME, UNITS
 
 # Files contain no pressure, and their columns are only multiplied: units with an offset, such as °F, are excluded.
-ALLOWED = tuple(name for name, unit in UNITS.items() if unit.quantity != PRESSURE and not unit.zero)
+ALLOWED_UNITS = tuple(name for name, unit in UNITS.items() if unit.quantity != PRESSURE and not unit.zero)
 TIMES = ("time_s", "start_s", "end_s")
 SUFFIXES = (
     ("_rad_s", RATE),
@@ -18,7 +18,7 @@ SUFFIXES = (
     ("_t", FIELD),
     ("_c", TEMPERATURE),
 )
-LEAST_FACTOR = 1e-15
+MIN_FACTOR = 1e-15
 AxisDirection = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 
 
@@ -48,16 +48,16 @@ class ColumnSection(Section):
     @classmethod
     def refuse_unknown_unit(cls, value: str | None) -> str | None:
         """Refuse a unit that is not in the table."""
-        if value is not None and value not in ALLOWED:
-            raise ValueError(f"this unit is not known; allowed: {', '.join(ALLOWED)}")
+        if value is not None and value not in ALLOWED_UNITS:
+            raise ValueError(f"this unit is not known; allowed: {', '.join(ALLOWED_UNITS)}")
         return value
 
     @field_validator("factor", "lsb_per_unit")
     @classmethod
     def refuse_zero(cls, value: float | None) -> float | None:
         """Refuse zero, and numbers that are impossible as the size of a sensor's unit."""
-        if value is not None and not LEAST_FACTOR < abs(value) < 1 / LEAST_FACTOR:
-            raise ValueError(f"must be between {LEAST_FACTOR:g} and {1 / LEAST_FACTOR:g}, of either sign")
+        if value is not None and not MIN_FACTOR < abs(value) < 1 / MIN_FACTOR:
+            raise ValueError(f"must be between {MIN_FACTOR:g} and {1 / MIN_FACTOR:g}, of either sign")
         return value
 
     @model_validator(mode="after")
@@ -149,8 +149,8 @@ class ColumnMap(Section):
         return self
 
 
-AS_NAMED = ColumnMap()  # every column has the rig's name
-GIVE_MAP = "Give a map of the columns; rig look LOG --write FILE writes one"
+STANDARD_NAMES = ColumnMap()  # every column has the rig's name
+MAP_REMEDY = "Give a map of the columns; rig look LOG --write FILE writes one"
 
 
 def _fit(name: str, column: ColumnSection, wanted: str) -> None:

@@ -12,15 +12,15 @@ from typing import Any
 from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
-from rig.config.files.layers import BASE
+from rig.config.files.layers import BASE_KEY
 from rig.config.load import STOCK_TURNERS
 from rig.config.models import RigConfig
 from rig.config.procedures.procedure_sections import STOCK_SECTIONS
 from rig.config.procedures.shortest_procedure import SHORTEST, TargetUncertaintySection
 from rig.config.world.laboratory import WorldSection
 
-LEFT_OUT = ("title", "required", "default")
-NOTHING = {"type": "null"}  # value of a key that the section does not know: it removes what the base states
+OMITTED_KEYS = ("title", "required", "default")
+NULL_SCHEMA = {"type": "null"}  # value of a key that the section does not know: it removes what the base states
 OBJECT = ["object", "null"]
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
@@ -42,7 +42,7 @@ def config_schema() -> dict[str, Any]:
     turners = {kind: _add_kind(definitions[section.__name__]) for kind, section in STOCK_TURNERS.items()}
     procedures = {name: _section(section) for name, section in STOCK_SECTIONS.items()}
     own_sections = {
-        BASE: {"type": "string", "description": "file on which this one builds; this one states what differs"},
+        BASE_KEY: {"type": "string", "description": "file on which this one builds; this one states what differs"},
         "arm": _section(STOCK_TURNERS["ur"]),
         "turner": _chosen("kind", turners, "what turns the sensors, if it is not an arm"),
         "procedure": _chosen("name", {**procedures, SHORTEST: SHORTEST_SECTION}, "what is done"),
@@ -58,7 +58,7 @@ def config_schema() -> dict[str, Any]:
         "description": "One file is one repeatable calibration.",
         "type": "object",
         "properties": properties,
-        "additionalProperties": NOTHING,
+        "additionalProperties": NULL_SCHEMA,
         "$defs": definitions,
     }
 
@@ -93,11 +93,11 @@ def _file_schema(schema: Any) -> Any:
         return [_file_schema(item) for item in schema]
     if not isinstance(schema, dict):
         return schema
-    written = {key: _file_schema(value) for key, value in schema.items() if key not in LEFT_OUT}
+    written = {key: _file_schema(value) for key, value in schema.items() if key not in OMITTED_KEYS}
     if "properties" in schema:  # its keys are names of a section, which may equal a word of the schema
         written["properties"] = {key: _file_schema(value) for key, value in schema["properties"].items()}
     if schema.get("additionalProperties") is False:
-        written["additionalProperties"] = NOTHING
+        written["additionalProperties"] = NULL_SCHEMA
     if "const" in schema:
         written["enum"] = [written.pop("const")]
     if "enum" in written:

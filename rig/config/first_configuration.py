@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
-from rig.config.sensors.lines_section import GAP
+from rig.config.sensors.lines_section import UNDETERMINED
 
 Turner = Literal["hand", "arm", "servo"]
 Source = Literal["board", "lines", "autopilot", "kvh1775"]
@@ -45,9 +45,9 @@ class Answers:
     turner: Turner
     source: Source
     port: str
-    serial_number: str = GAP
-    range_deg_s: str = GAP
-    range_g: str = GAP
+    serial_number: str = UNDETERMINED
+    range_deg_s: str = UNDETERMINED
+    range_g: str = UNDETERMINED
     part: str = "lsm9ds1"
     sensors: str | None = None
     arm_host: str = "192.168.1.102"
@@ -169,4 +169,4 @@ def _limits(answers: Answers) -> Iterator[str]:
 
 def _text(value: str) -> str:
     """Return a value as YAML text; a placeholder for a missing value is quoted."""
-    return f'"{value}"' if value == GAP else value
+    return f'"{value}"' if value == UNDETERMINED else value

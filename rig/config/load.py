@@ -14,7 +14,7 @@ from urllib.parse import urlsplit
 import yaml
 from pydantic import BaseModel, ValidationError
 
-from rig.config.files.layers import BASE, SET, Layered, Places, merge_layers, read_layers
+from rig.config.files.layers import BASE_KEY, SET, Layered, Places, merge_layers, read_layers
 from rig.config.files.verbatim_text import take_text_as_written
 from rig.config.files.yaml_text import Location, Unreadable, format_path
 from rig.config.models import ArmSection, ProcedureSection, RigConfig, SensorsConfig, StatementConfig, TurnerSection
@@ -69,7 +69,7 @@ class Loaded:
 class ConfigurationRefused(Refused):
     """An invalid configuration: its `problems`, one line each, and `give`, the remedy for an unreadable file."""
 
-    def __init__(self, source: str, problems: Sequence[str], give: str = GIVE_CONFIGURATION) -> None:
+    def __init__(self, source: str, problems: Sequence[str], give: str = CONFIGURATION_REMEDY) -> None:
         self.problems = tuple(printable(problem) for problem in problems)
         if self._is_unreadable:
             what, remedy = self.problems[0], give
@@ -81,13 +81,13 @@ class ConfigurationRefused(Refused):
 
     @property
     def _is_unreadable(self) -> bool:
-        return len(self.problems) == 1 and self.problems[0].startswith(NOT_A_CONFIGURATION)
+        return len(self.problems) == 1 and self.problems[0].startswith(WHOLE_FILE_PROBLEMS)
 
     def __str__(self) -> str:
         if self._is_unreadable:
             return super().__str__()
-        more = len(self.problems) - PROBLEMS_SHOWN
-        shown = [*self.problems[:PROBLEMS_SHOWN], *([f"and {more} more"] if more > 0 else [])]
+        more = len(self.problems) - MAX_PROBLEMS
+        shown = [*self.problems[:MAX_PROBLEMS], *([f"and {more} more"] if more > 0 else [])]
         return "\n".join([super().__str__(), *(f"  {problem}" for problem in shown)])
 
 
@@ -115,8 +115,8 @@ def load_sensors(path: str | Path, overrides: Sequence[str] = ()) -> tuple[Senso
     if "world" in layered.document:
         loaded = _validate_all(layered, str(path), None, None)
         return loaded.config, loaded.text
-    rest = {key: value for key, value in layered.document.items() if key not in TURNS}
-    turner_keys = TURNS & layered.document.keys()
+    rest = {key: value for key, value in layered.document.items() if key not in TURNER_SECTIONS}
+    turner_keys = TURNER_SECTIONS & layered.document.keys()
     _, turner_problems = _validate_turner(layered.document, None, layered) if turner_keys else (None, [])
     return _require(SensorsConfig, rest, layered, str(path), turner_problems), None
 
@@ -152,7 +152,7 @@ def parse(
 
 
 @contextmanager
-def _refusing_unreadable(source: str, give: str = GIVE_CONFIGURATION) -> Iterator[None]:
+def _refusing_unreadable(source: str, give: str = CONFIGURATION_REMEDY) -> Iterator[None]:
     """Raise `ConfigurationRefused` for a text that cannot be read at all; `give` is then the remedy."""
     try:
         yield
@@ -291,7 +291,7 @@ def _explain(model: type[BaseModel], item: Any, prefix: Location, layered: Layer
     if kind == "extra_forbidden":
         whole = not prefix and len(location) == 1
         arm = ["arm"] if whole and issubclass(model, SensorsConfig) else []
-        allowed = [*arm, *_keys_at(model, location[:-1]), *(["world", BASE] if whole else [])]
+        allowed = [*arm, *_keys_at(model, location[:-1]), *(["world", BASE_KEY] if whole else [])]
         return f"{where}: unknown key{_nearest(str(location[-1]), allowed)}; allowed: {', '.join(allowed)}"
     if kind == "missing":
         return f"{where}: missing{_hint_at_override((*prefix, *location[:-1]), layered)}"

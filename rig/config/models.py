@@ -30,7 +30,7 @@ from rig.config.sensors.mavlink_section import autopilots_over_budget
 from rig.config.sensors.sensor_catalogue import MAGNETOMETERS
 from rig.config.sensors.sensor_sections import ConfiguredSensor, MagnetometerSection, SensorSection
 
-HOMES = "`[0, -90, 90, -90, -90, 0]`, of a `ur3e` `[0, -90, 90, -90, -60, 0]`"
+HOME_POSES = "`[0, -90, 90, -90, -90, 0]`, of a `ur3e` `[0, -90, 90, -90, -60, 0]`"
 
 
 class TurnerSection(Section):
@@ -87,7 +87,7 @@ class ArmSection(TurnerSection):
         default=None,
         description="joint angles, base to wrist 3, of the home pose, around which the wrists turn; wrist 2 must be "
         "near ±90°, so that the axes of the three wrists point in three different directions",
-        json_schema_extra={"usual": HOMES},
+        json_schema_extra={"usual": HOME_POSES},
     )
     transfer_speed_deg_s: float = Field(
         default=120.0, ge=0.1, le=SPEED_RANGE_DEG_S, description="speed of the movements between sweeps"

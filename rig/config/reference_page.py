@@ -99,7 +99,7 @@ the file that contains the line. The following is the complete [repeat_lsm9ds1.y
 - `null` deletes a key of the base. `world: null` takes the simulated laboratory away, so the rig uses hardware.
   `range_deg_s: null` returns to the usual range. If the base does not have the key, `null` is an error like any other
   wrong value.
-- A base may have a base itself, up to {layers.FILES_MAX} files in all. A circle is refused.
+- A base may have a base itself, up to {layers.MAX_FILES} files in all. A circle is refused.
 - An error names its file and its line: `arm.payload_kg (demo.yaml, line 4)`.
 - The run folder's `config.yaml` contains everything together and needs no base. So a run can be resumed on a computer
   that does not have the original files.
@@ -112,9 +112,9 @@ place; this may be a whole section. `null` deletes it. The run folder's `config.
 
 ## What a file may contain
 
-Plain YAML in UTF-8, in a regular file of at most {yaml_text.SIZE_MAX_BYTES // 1024} KiB. It may have at most
-{yaml_text.NODES_MAX} keys and values (an alias counts as everything that it replaces), and at most
-{yaml_text.DEPTH_MAX} sections or lists inside each other. Keys are words. Tags (`!!…`), control characters and a key
+Plain YAML in UTF-8, in a regular file of at most {yaml_text.MAX_BYTES // 1024} KiB. It may have at most
+{yaml_text.MAX_NODES} keys and values (an alias counts as everything that it replaces), and at most
+{yaml_text.MAX_DEPTH} sections or lists inside each other. Keys are words. Tags (`!!…`), control characters and a key
 that is there twice are refused.
 """
 

@@ -5,7 +5,7 @@ from functools import cache
 from types import MappingProxyType
 from typing import Any, Protocol
 
-from rig.data.quantity import OF_THE_RIG, SCALARS, Quantity, Scalar
+from rig.data.quantity import RIG_QUANTITIES, SCALARS, Quantity, Scalar
 from rig.errors import Refused
 from rig.errors.installed import load_entry_points
 
@@ -42,7 +42,7 @@ def _not_loaded(what: str, remedy: str) -> Refused:
 @cache
 def quantities() -> Mapping[str, Quantity]:
     """Return every quantity by its name, including those of installed kinds of sensors."""
-    every = (*OF_THE_RIG, *(kind.quantity for kind in installed_kinds()))
+    every = (*RIG_QUANTITIES, *(kind.quantity for kind in installed_kinds()))
     return MappingProxyType({quantity.name: quantity for quantity in every})
 
 

@@ -9,7 +9,7 @@ from rig.config.files.user_folder import rig_folder
 from rig.errors import Refused
 
 LATEST = "latest"
-KEPT = 20  # number of folders: the newest may be removed
+MAX_FOLDERS = 20  # the newest may be removed
 _LIST_MAX_BYTES = 1_000_000
 
 
@@ -20,7 +20,7 @@ def note_run(folder: Path) -> None:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         new = str(folder.resolve())
         earlier = [noted for noted in _read_noted() if noted != new]
-        write_new(path, "".join(f"{noted}\n" for noted in [*earlier, new][-KEPT:]))
+        write_new(path, "".join(f"{noted}\n" for noted in [*earlier, new][-MAX_FOLDERS:]))
 
 
 def latest_run() -> Path:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 # °C: no inertial sensor works outside. Drivers of thermometers report a fault by such values: -127, -273.15, 327.67.
-POSSIBLE_C = (-100.0, 200.0)
+RANGE_C = (-100.0, 200.0)
 
 
 @dataclass(frozen=True, slots=True)

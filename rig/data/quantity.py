@@ -12,7 +12,7 @@ from typing import Final
 from rig.estimation.earth import MICRO_G_M_S2
 
 DEG_H: Final = pi / 180 / 3600  # rad/s
-MINUTE_S: Final = 60.0  # √(3600 s): from √s to √h
+ROOT_HOUR: Final = 60.0  # √(3600 s): from √s to √h
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +153,7 @@ RATE: Final = Quantity(
     residuals=(DisplayUnit("mrad/s", 1e-3), DisplayUnit("µrad/s", 1e-6)),
     walk="angle random walk",
     walk_suffix="rad_sqrt_s",
-    walk_unit=DisplayUnit("°/√h", pi / 180 / MINUTE_S),
+    walk_unit=DisplayUnit("°/√h", pi / 180 / ROOT_HOUR),
     steady=5e-3,
     d_si=r"\radian\second\tothe{-1}",
     mistaken=Mistaken("°/s", "numpy.radians(readings)", 400.0),
@@ -171,7 +171,7 @@ ACCELERATION: Final = Quantity(
     residuals=(DisplayUnit("m/s²", 1.0), DisplayUnit("mm/s²", 1e-3), DisplayUnit("µm/s²", 1e-6)),
     walk="velocity random walk",
     walk_suffix="m_s_sqrt_s",
-    walk_unit=DisplayUnit("m/s/√h", 1 / MINUTE_S),
+    walk_unit=DisplayUnit("m/s/√h", 1 / ROOT_HOUR),
     steady=0.05,
     d_si=r"\metre\second\tothe{-2}",
     towards="up",
@@ -195,11 +195,11 @@ FIELD: Final = Quantity(
     towards="the field",
     mistaken=Mistaken("µT or gauss", "1e-6 * readings for readings in µT, 1e-4 for gauss", 0.1),
 )
-OF_THE_RIG: Final = (RATE, ACCELERATION, FIELD)
+RIG_QUANTITIES: Final = (RATE, ACCELERATION, FIELD)
 TEMPERATURE: Final = Scalar("temperature", "thermometer", "°C", "c", DisplayUnit("°C", 1.0))
 PRESSURE: Final = Scalar("pressure", "barometer", "Pa", "pa", DisplayUnit("hPa", 100.0))
 # range of the temperatures that a part survives; kelvins and counts are beyond it
-COLDEST_C, HOTTEST_C = -273.15, 200.0
+MIN_TEMPERATURE_C, MAX_TEMPERATURE_C = -273.15, 200.0
 SCALARS: Final = (TEMPERATURE, PRESSURE)
 
 

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 CONFIG, SCRIPT, RESULT, CERTIFICATE = "config.yaml", "script.py", "result.json", "certificate.html"
 SCRIPT_IDENTITY = "script.json"
-TRUTH = "truth.json"  # a file of a simulated laboratory, for people; no estimator reads it
-WORLD_LATE = "world_late.txt"  # the causes of late steps of the simulated laboratory
+TRUTH_FILE = "truth.json"  # a file of a simulated laboratory, for people; no estimator reads it
+LATENESS_FILE = "world_late.txt"  # the causes of late steps of the simulated laboratory
 LOG, ARM_LOG = "log.txt", "arm_client.log"
 IDENTITY_MAX_BYTES = 10_000
 _BEGINNINGS = {"raw": "run", "calibrated": "verify"}  # beginnings of the names of recordings, by what is streamed
@@ -48,7 +48,7 @@ def new_folder(out: Path | None, loaded: "Loaded", script: str, identity: Script
 
 def discard(folder: Path) -> None:
     """Remove a new run folder without measurements, unless it holds other files."""
-    begun = [folder / name for name in (CONFIG, SCRIPT, SCRIPT_IDENTITY, WORLD_LATE, TRUTH, LOG, ARM_LOG)]
+    begun = [folder / name for name in (CONFIG, SCRIPT, SCRIPT_IDENTITY, LATENESS_FILE, TRUTH_FILE, LOG, ARM_LOG)]
     with suppress(OSError):
         for path in [*begun, *(file for readings in _BEGINNINGS for file in recordings(folder, readings))]:
             path.unlink(missing_ok=True)

@@ -18,11 +18,11 @@ OfJoints = Annotated[tuple[Finite, ...], Field(max_length=MAX_JOINTS)]  # beginn
 Kind = TypeVar("Kind")
 Document = TypeVar("Document", bound=BaseModel)
 # Values in a file: the largest of a run has 3,000; the message about each wrong one takes a kilobyte.
-MOST_VALUES = 200_000
-MOST_RECORDED = 50_000  # values in a text or an event of a recording, with the same cost
+MAX_VALUES = 200_000
+MAX_RECORDED_VALUES = 50_000  # in a text or an event of a recording, with the same cost
 SEPARATORS = (b",", b"[", b"{")  # characters before a value in JSON
-LARGEST_NUMBER = 1e100  # in SI units: larger than any measured value; the square of a larger one might overflow
-UNSEEN = re.compile("[\\x00-\\x1f\\x7f-\\x9f\\u061c\\u200e\\u200f\\u2028-\\u202e\\u2066-\\u2069\\ud800-\\udfff]")
+MAX_NUMBER = 1e100  # in SI units: larger than any measured value; the square of a larger one might overflow
+INVISIBLE = re.compile("[\\x00-\\x1f\\x7f-\\x9f\\u061c\\u200e\\u200f\\u2028-\\u202e\\u2066-\\u2069\\ud800-\\udfff]")
 _adapters: dict[type[Any], TypeAdapter[Any]] = {}
 
 
@@ -40,7 +40,7 @@ def validate(kind: type[Kind], document: Any, where: str) -> Kind:
 def read_document(kind: type[Document], file: Path, limit_bytes: int, *, what: str, remedy: str) -> Document:
     """Return a JSON file as type `kind`, in messages a result of `what`. Raise Refused `no_result`, `not_a_result`."""
     try:
-        return kind.model_validate(parse_json(read_regular_file(file, limit_bytes), MOST_VALUES))
+        return kind.model_validate(parse_json(read_regular_file(file, limit_bytes), MAX_VALUES))
     except (UnfitFile, OSError) as error:
         why = error.strerror if isinstance(error, OSError) else error
         raise Refused("no_result", f"{file} cannot be read: {why}", remedy) from error
@@ -61,7 +61,7 @@ def read_document(kind: type[Document], file: Path, limit_bytes: int, *, what: s
         raise Refused("not_a_result", f"{file} is not a result of {what}: {error}", remedy) from error
 
 
-def parse_json(content: str | bytes, most: int = MOST_RECORDED) -> Any:
+def parse_json(content: str | bytes, most: int = MAX_RECORDED_VALUES) -> Any:
     """Return the value of a JSON text from any source, with its strings made printable.
 
     Raise ValueError for a number that no measurement can yield (not finite, or too large), a duplicate key, or more
@@ -92,7 +92,7 @@ def refuse_duplicate_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 def _parse_number(text: str) -> int | float:
     """Return a number of a JSON file. Raise ValueError for a number that no measurement has."""
     value = float(text)
-    if not abs(value) <= LARGEST_NUMBER:
+    if not abs(value) <= MAX_NUMBER:
         raise ValueError(f"{quote(text)} is not a number that can be measured")
     return value if set(text) & set(".eE") else int(text)
 
@@ -100,7 +100,7 @@ def _parse_number(text: str) -> int | float:
 def sanitize(value: Any) -> Any:
     """Return a JSON value with hidden characters made visible, for any kind of output. Raise RecursionError."""
     if isinstance(value, str):
-        return UNSEEN.sub(lambda match: printable(match[0]), value)
+        return INVISIBLE.sub(lambda match: printable(match[0]), value)
     if isinstance(value, list):
         return [sanitize(item) for item in value]
     if isinstance(value, dict):

@@ -11,7 +11,7 @@ from firmware_host.problem import Problem, ProblemError
 
 __all__ = ["Fault", "Problem", "ProblemError", "Refused", "RigError", "Unprinted", "or_fault", "raise_as", "refuse"]
 Result = TypeVar("Result")
-INTERRUPTED = 130  # exit status of an interrupted command: 128 + SIGINT, as in a shell
+INTERRUPTED_STATUS = 130  # exit status of an interrupted command: 128 + SIGINT, as in a shell
 
 
 class RigError(ProblemError):

@@ -6,8 +6,8 @@ from typing import Any
 from firmware_host.problem import printable
 
 __all__ = ["listing", "printable", "printable_lines", "quote", "shorten"]
-SHOWN_CHARACTERS = 60
-SHOWN_NAMES = 12
+MAX_CHARACTERS = 60
+MAX_NAMES = 12
 
 
 def printable_lines(text: str) -> str:
@@ -17,8 +17,8 @@ def printable_lines(text: str) -> str:
 
 def shorten(text: str) -> str:
     """Return the beginning of a long text in printable form, with the text's length."""
-    shown = printable(text[:SHOWN_CHARACTERS])
-    return shown if len(text) <= SHOWN_CHARACTERS else f"{shown}… ({len(text)} characters)"
+    shown = printable(text[:MAX_CHARACTERS])
+    return shown if len(text) <= MAX_CHARACTERS else f"{shown}… ({len(text)} characters)"
 
 
 def quote(value: Any) -> str:
@@ -29,5 +29,5 @@ def quote(value: Any) -> str:
 def listing(names: Iterable[str]) -> str:
     """Return the first of many names, which are already shortened, and the number of the others."""
     every = list(names)
-    more = len(every) - SHOWN_NAMES
-    return (", ".join(every[:SHOWN_NAMES]) + (f", and {more} more" if more > 0 else "")) or "none"
+    more = len(every) - MAX_NAMES
+    return (", ".join(every[:MAX_NAMES]) + (f", and {more} more" if more > 0 else "")) or "none"

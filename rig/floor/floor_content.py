@@ -5,19 +5,19 @@ from dataclasses import asdict
 from datetime import date, timedelta
 from typing import Any
 
-from rig.batch.status import NEWEST, Now
+from rig.batch.status import MAX_PARTS, Now
 from rig.data.validation import parse_json, validate
 from rig.errors.quoting import shorten
 from rig.history.series import rig_states, subjects, trends
-from rig.history.stations import LONGEST, StationState
-from rig.history.stations import MOST as MOST_RIGS
+from rig.history.stations import MAX_STATE, StationState
+from rig.history.stations import MAX_STATIONS as MOST_RIGS
 from rig.history.store import Past
 
-DEAD_S = 3.5  # time without a heartbeat, which comes every second
-RECALLED_AHEAD = timedelta(days=30)
-MOST = 200  # rows of a table, at most
-LONGEST_DOING = 300  # characters: an error with its remedy
-MOST_STATES = 12  # counted states of parts, at most; there are six
+MAX_SILENCE_S = 3.5  # of a rig's heartbeat, which comes every second
+RECALL_NOTICE = timedelta(days=30)
+MAX_ROWS = 200  # of a table
+MAX_DOING = 300  # characters: an error with its remedy
+MAX_STATES = 12  # counted states of parts; there are six
 UNITS_OF_AGE = ((86_400, "days"), (3600, "h"), (60, "min"), (1, "s"))
 
 
@@ -36,7 +36,7 @@ def rigs(stations: Iterable[StationState], more: int = 0) -> dict[str, Any]:
 def _card(station: StationState) -> dict[str, Any]:
     fields = _read(station.state)
     state = str(fields.get("state", "unread"))
-    if not fields.get("over") and (station.age_s is None or station.age_s > DEAD_S):
+    if not fields.get("over") and (station.age_s is None or station.age_s > MAX_SILENCE_S):
         state = "dead"
     names = {"rig": fields.get("rig") or station.rig, "at": station.rig, "computer": station.computer}
     age = _age(station.age_s) if state == "dead" else ""
@@ -67,7 +67,7 @@ def todays(pasts: Iterable[Past], today: date) -> list[dict[str, Any]]:
         for past in pasts
         if past.started_utc[:10] == day
     ]
-    return rows[::-1][:MOST]
+    return rows[::-1][:MAX_ROWS]
 
 
 def standards(pasts: Sequence[Past]) -> list[dict[str, Any]]:
@@ -76,9 +76,9 @@ def standards(pasts: Sequence[Past]) -> list[dict[str, Any]]:
     for state in rig_states(pasts):
         out = [name for name, chart in state.charts.items() if chart.alarm.size and chart.out_of_control]
         control = "too few" if not state.charts else "out" if out else "in"
-        standards = [shorten(standard) for standard in state.standards[:MOST]]
-        rows.append({"rig": shorten(state.rig), "standards": standards, "control": control, "out": out[:MOST]})
-    return rows[:MOST]
+        standards = [shorten(standard) for standard in state.standards[:MAX_ROWS]]
+        rows.append({"rig": shorten(state.rig), "standards": standards, "control": control, "out": out[:MAX_ROWS]})
+    return rows[:MAX_ROWS]
 
 
 def recalls(pasts: Sequence[Past], today: date) -> list[dict[str, Any]]:
@@ -87,22 +87,22 @@ def recalls(pasts: Sequence[Past], today: date) -> list[dict[str, Any]]:
     for (part, serial, quantity, _, simulated), series in subjects(pasts).items():
         due = [(trend.recall, name) for name, trend in trends(series).items() if trend.recall is not None]
         day, name = min(due, default=(None, ""))
-        if day is not None and day <= today + RECALLED_AHEAD:
+        if day is not None and day <= today + RECALL_NOTICE:
             row = {"day": day.isoformat(), "overdue": day < today, "parameter": name, "simulated": simulated}
             rows.append({**row, "serial": shorten(serial), "sensor": shorten(f"{part}, {quantity}")})
-    return sorted(rows, key=lambda row: str(row["day"]))[:MOST]
+    return sorted(rows, key=lambda row: str(row["day"]))[:MAX_ROWS]
 
 
 def _read(text: str) -> dict[str, Any]:
     """Return a station's state, shortened for a card; empty for an invalid text."""
     try:
-        if len(text) > LONGEST:
-            raise ValueError(f"it is longer than {LONGEST} characters")
+        if len(text) > MAX_STATE:
+            raise ValueError(f"it is longer than {MAX_STATE} characters")
         now = validate(Now, parse_json(text), "state")
     except (ValueError, RecursionError):
         return {}
-    counts = {shorten(state): count for state, count in [*(now.counts or {}).items()][:MOST_STATES]}
-    parts = [(shorten(serial), shorten(state)) for serial, state in now.parts[-NEWEST:]]
+    counts = {shorten(state): count for state, count in [*(now.counts or {}).items()][:MAX_STATES]}
+    parts = [(shorten(serial), shorten(state)) for serial, state in now.parts[-MAX_PARTS:]]
     words = {name: shorten(getattr(now, name)) for name in ("part", "operator", "work_order", "rig")}
     own_page = {"verdict": None, "why": "", "truth": "", "sensors": ()}  # only the station's own page shows them
-    return {**asdict(now), **words, **own_page, "doing": now.doing[:LONGEST_DOING], "counts": counts, "parts": parts}
+    return {**asdict(now), **words, **own_page, "doing": now.doing[:MAX_DOING], "counts": counts, "parts": parts}

@@ -18,7 +18,7 @@ from rig.history.storage.address import HistoryAddress
 from rig.history.store import History, open_history
 from rig.page.server.sections import Sections
 
-LOOK_S = 0.5  # a dead rig (3.5 s) must be shown as such within 5 s
+POLL_S = 0.5  # a dead rig (3.5 s) must be shown as such within 5 s
 
 
 @contextmanager
@@ -32,7 +32,7 @@ def looking(address: HistoryAddress) -> Iterator[Sections]:
         yield feed
     finally:
         over.set()
-        thread.join(LOOK_S)
+        thread.join(POLL_S)
 
 
 def _watch_history(address: HistoryAddress, feed: Sections, over: threading.Event) -> None:
@@ -45,7 +45,7 @@ def _watch_history(address: HistoryAddress, feed: Sections, over: threading.Even
         except Exception as error:  # the page shows it, and the thread tries again
             why = error.what if isinstance(error, Refused) else f"{type(error).__name__}: {shorten(str(error))}"
             feed.put(history={"label": address.label, "silent": why})
-            over.wait(LOOK_S)
+            over.wait(POLL_S)
 
 
 def _follow(history: History, feed: Sections, over: threading.Event) -> None:
@@ -58,7 +58,7 @@ def _follow(history: History, feed: Sections, over: threading.Event) -> None:
         if version != before:  # trends of a long history take longer than a second
             before = version
             feed.put(**_read_past(history, today))
-        over.wait(LOOK_S)
+        over.wait(POLL_S)
 
 
 def _read_past(history: History, today: date) -> dict[str, Any]:

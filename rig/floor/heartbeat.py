@@ -17,9 +17,9 @@ from rig.history.store import open_history
 if TYPE_CHECKING:
     from sqlalchemy import Engine
 
-BEAT_S = 1.0
+HEARTBEAT_S = 1.0
 RETRY_S = 5.0  # wait after a history that did not answer
-LAST_BEAT_S = 2.0  # time for writing the last state
+LAST_STATE_S = 2.0  # time for writing the last state
 
 
 class Heartbeat:
@@ -47,7 +47,7 @@ class Heartbeat:
         self._now = last(self._now)
         self._over.set()
         self._changed.set()
-        self._thread.join(LAST_BEAT_S)
+        self._thread.join(LAST_STATE_S)
 
     def _beat(self) -> None:
         """Write the state until it is the last one; open the history again after an error."""
@@ -69,7 +69,7 @@ class Heartbeat:
             stations.tell(engine, self._rig, platform.node(), self._now.json())
             if over:
                 return True
-            self._changed.wait(BEAT_S)
+            self._changed.wait(HEARTBEAT_S)
 
 
 @contextmanager

@@ -14,7 +14,7 @@ from rig.history.store import Past
 from rig.report.findings.history_records import Parameter
 
 SCHEMA = "rig.history/1"
-FORMULA = ("=", "+", "-", "@")  # first characters of a formula in common spreadsheets, even after white space
+FORMULA_STARTS = ("=", "+", "-", "@")  # of a formula in common spreadsheets, even after white space
 FIELDS = (  # of a calibration, in the order of its document
     "started_utc", "rig", "arm_serial_number", "board_unique_id", "sensor", "part", "serial_number", "quantity",
     "full_scale", "simulated", "estimator", "temperature_c", "verdict", "fit", "check_standard", "operator", "note",
@@ -154,7 +154,7 @@ def cell(value: object) -> object:
     if not isinstance(value, str):
         return value
     line = " ".join(value.splitlines())
-    return f"'{line}" if line[:1].isspace() or line.startswith(FORMULA) else line
+    return f"'{line}" if line[:1].isspace() or line.startswith(FORMULA_STARTS) else line
 
 
 def _numbers(values: np.ndarray) -> list[float | None]:

@@ -20,8 +20,8 @@ from rig.station.words import calibrations_in_words
 
 State = Literal["ok", "changed", "missing", "elsewhere", "unknown"]
 STATES: Sequence[State] = get_args(State)
-WRONG: Sequence[State] = ("changed", "missing", "unknown")
-MOST_TOLD = 3  # contradictions of a run that are reported, at most
+WRONG_STATES: Sequence[State] = ("changed", "missing", "unknown")
+MAX_SHOWN = 3  # of a run that are reported
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,9 +67,9 @@ def _contradictions(run: Kept, pasts: Sequence[Past]) -> Iterator[str]:
         return
     rows = [f"{name} is {run.row[name]}" for name, value in run_row(document).items() if run.row[name] != value]
     differences = [*rows, *unlike(document, list(map(_record, pasts)))]
-    yield from differences[:MOST_TOLD]
-    if len(differences) > MOST_TOLD:
-        yield f"and {len(differences) - MOST_TOLD} more"
+    yield from differences[:MAX_SHOWN]
+    if len(differences) > MAX_SHOWN:
+        yield f"and {len(differences) - MAX_SHOWN} more"
 
 
 def _record(past: Past) -> HistoryRecord:

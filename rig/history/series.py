@@ -12,20 +12,20 @@ from rig.data.absent import NO_ARM
 from rig.data.installed_kinds import quantities
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.coverage import effective_dof, joint_factors
-from rig.history.statistics.charts import FEWEST, Chart, chart, merge_charts
+from rig.history.statistics.charts import MIN_RESULTS, Chart, chart, merge_charts
 from rig.history.statistics.random_effects import CONFIDENCE, Fitted, fit
 from rig.history.statistics.rig_effects import RigEffect, rig_effects
 from rig.history.store import Past
 from rig.report.findings.history_records import Parameter, is_scale, nominal
 
-HORIZON_DAYS = 3653  # ten years: a drift cannot be extrapolated further
+MAX_HORIZON_DAYS = 3653  # ten years: a drift cannot be extrapolated further
 
 YEAR_DAYS = 365.25
 # The probability that no change is reported for an unchanged sensor. The comparisons of a part's calibrations share
 # results: at 95 %, more than 5 of the 105 among 15 are significant in a third of all cases; at 98 % in 7 of 100.
-UNCHANGED = 0.98
+NO_CHANGE_PROBABILITY = 0.98
 # Least span from the first result to the last: a shorter one would give a drift per year that is only scatter.
-DRIFT_DAYS = 10.0
+MIN_DRIFT_DAYS = 10.0
 DAY_S = 86400.0
 
 Subject = tuple[str, str, str, float, bool]
@@ -57,7 +57,7 @@ class Trend:
     @property
     def enough(self) -> bool:
         """Whether there are enough results for conclusions over time."""
-        return self.count >= FEWEST
+        return self.count >= MIN_RESULTS
 
     @property
     def days(self) -> Array:
@@ -82,7 +82,7 @@ class Trend:
     @cached_property
     def line(self) -> Fitted | None:
         """The straight line over time: value at the first result and slope per day; None with few results or days."""
-        if not self.enough or np.ptp(self.days) < DRIFT_DAYS:
+        if not self.enough or np.ptp(self.days) < MIN_DRIFT_DAYS:
             return None
         return fit(np.stack([np.ones(self.count), self.days], axis=1), self.values, self.std)
 
@@ -132,14 +132,14 @@ class Change:
 
     @property
     def limit(self) -> float:
-        """The limit of E_n: with the probability `UNCHANGED`, all unchanged values of a comparison are below it.
+        """The limit of E_n: all unchanged values of a comparison are below it with `NO_CHANGE_PROBABILITY`.
 
         By Student's t for the effective degrees of freedom of the difference, and Bonferroni's inequality, because a
         history does not store correlations between parameters.
         """
         both = (self.before, self.now)
         dof = effective_dof([parameter.std**2 for parameter in both], [parameter.dof for parameter in both])
-        factor = float(joint_factors(self.compared, dof, UNCHANGED))
+        factor = float(joint_factors(self.compared, dof, NO_CHANGE_PROBABILITY))
         return factor * math.hypot(self.before.std, self.now.std) / math.hypot(self.before.expanded, self.now.expanded)
 
     @property
@@ -248,7 +248,7 @@ def days_to_limit(line: Fitted, last_days: float, expanded: float, max_deviation
     None means more than ten years. `line` is value = c₀ + c₁ t, t in days like `last_days`. U combines the line's
     uncertainty at that time, the scatter between runs, and the `expanded` uncertainty of the last result.
     """
-    ahead = np.arange(HORIZON_DAYS + 1.0)
+    ahead = np.arange(MAX_HORIZON_DAYS + 1.0)
     value, std = line.predict(np.stack([np.ones_like(ahead), last_days + ahead], axis=-1))
     line_expanded = line.coverage_factor * np.hypot(std, line.between_std)
     reached = np.abs(value - nominal) + np.hypot(line_expanded, expanded) >= max_deviation

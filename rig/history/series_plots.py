@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 # Fractions of the figure's width and height. An automatic layout takes as long as the drawing itself.
 MARGINS = {"left": 0.07, "right": 0.985, "bottom": 0.06, "top": 0.93, "wspace": 0.3, "hspace": 0.25}
-ACROSS = 3
+PLOT_COLUMNS = 3
 
 
 def draw_trends(subjects: Mapping[Subject, Mapping[str, Trend]], folder: Path) -> list[Path]:
@@ -39,11 +39,11 @@ def draw_trends(subjects: Mapping[Subject, Mapping[str, Trend]], folder: Path) -
         if not shown:
             continue
         with use_style():
-            down = 2 * math.ceil(len(shown) / ACROSS)
-            figure = Figure(figsize=(4.6 * ACROSS, 2.6 * down))
-            rows = figure.subplots(down, ACROSS, sharex=True, squeeze=False, gridspec_kw=MARGINS)
+            down = 2 * math.ceil(len(shown) / PLOT_COLUMNS)
+            figure = Figure(figsize=(4.6 * PLOT_COLUMNS, 2.6 * down))
+            rows = figure.subplots(down, PLOT_COLUMNS, sharex=True, squeeze=False, gridspec_kw=MARGINS)
             for i, trend in enumerate(shown):
-                row, column = 2 * (i // ACROSS), i % ACROSS
+                row, column = 2 * (i // PLOT_COLUMNS), i % PLOT_COLUMNS
                 _draw_values(rows[row, column], trend)
                 _draw_chart(rows[row + 1, column], trend)
             figure.suptitle(f"{title_of(subject)}; bars are U, the band holds the line with 95 %")

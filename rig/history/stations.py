@@ -29,20 +29,20 @@ from sqlalchemy import (
 )
 from sqlalchemy.exc import IntegrityError, ProgrammingError
 
-from rig.history.storage.sqlite_engine import WRITES
+from rig.history.storage.sqlite_engine import WRITE_OPTION
 
-LONGEST = 20_000  # characters of a station's state
-NAME = 200
-MOST = 100  # stations that are read, at most
-SOONEST_S, LATEST_S = -1.0, 3e9  # range of plausible ages: clocks may be corrected, and no station is a century old
+MAX_STATE = 20_000  # characters of a station
+MAX_NAME = 200
+MAX_STATIONS = 100  # that are read
+MIN_AGE_S, MAX_AGE_S = -1.0, 3e9  # clocks may be corrected, and no station is a century old
 metadata = MetaData()
 station = Table(
     "station",
     metadata,
-    Column("rig", String(NAME), primary_key=True),
-    Column("computer", String(NAME), primary_key=True),
+    Column("rig", String(MAX_NAME), primary_key=True),
+    Column("computer", String(MAX_NAME), primary_key=True),
     Column("heard_s", Float, nullable=False),  # seconds since 1970, by the database's clock
-    Column("told", String(LONGEST), nullable=False),  # JSON
+    Column("told", String(MAX_STATE), nullable=False),  # JSON
 )
 _NOW: Mapping[str, str] = {
     "postgresql": "extract(epoch from clock_timestamp())::double precision",
@@ -78,8 +78,8 @@ def make_table(engine: Engine) -> None:
 def tell(engine: Engine, rig: str, computer: str, state: str) -> None:
     """Store the station's state in place of its previous one. Raise SQLAlchemyError."""
     with _writing(engine) as connection, connection.begin():
-        row: dict[str, Any] = {"heard_s": _now(connection), "told": state[:LONGEST]}
-        key = {"rig": rig[:NAME], "computer": computer[:NAME]}
+        row: dict[str, Any] = {"heard_s": _now(connection), "told": state[:MAX_STATE]}
+        key = {"rig": rig[:MAX_NAME], "computer": computer[:MAX_NAME]}
         own_row = update(station).where(*(station.c[name] == value for name, value in key.items()))
         if connection.execute(own_row.values(**row)).rowcount == 0:
             connection.execute(insert(station).values(**key, **row))
@@ -88,15 +88,15 @@ def tell(engine: Engine, rig: str, computer: str, state: str) -> None:
 def heard(engine: Engine) -> tuple[list[StationState], int]:
     """Return the last states of stations, sorted by rig, and the number of further stations.
 
-    At most `MOST` stations, the latest, are returned.
+    At most `MAX_STATIONS` stations, the latest, are returned.
     """
     if not inspect(engine).has_table(station.name):
         return [], 0
     with engine.connect() as connection:
         age = _now(connection) - station.c.heard_s
         texts = (_text(connection, column, most) for column, most in _LENGTHS)
-        implausible = case((age.between(SOONEST_S, LATEST_S), 0), else_=1)
-        question = select(*texts, age).order_by(implausible, age, *station.primary_key).limit(MOST)
+        implausible = case((age.between(MIN_AGE_S, MAX_AGE_S), 0), else_=1)
+        question = select(*texts, age).order_by(implausible, age, *station.primary_key).limit(MAX_STATIONS)
         rows: list[tuple[Any, ...]] = [tuple(row) for row in connection.execute(question)]
         every = connection.scalar(select(func.count()).select_from(station)) or 0
     states = [
@@ -105,7 +105,7 @@ def heard(engine: Engine) -> tuple[list[StationState], int]:
     return sorted(states, key=lambda state: (state.rig, state.computer)), max(every - len(states), 0)
 
 
-_LENGTHS = ((station.c.rig, NAME), (station.c.computer, NAME), (station.c.told, LONGEST + 1))
+_LENGTHS = ((station.c.rig, MAX_NAME), (station.c.computer, MAX_NAME), (station.c.told, MAX_STATE + 1))
 
 
 def _text(connection: Connection, column: ColumnElement[str], most: int) -> ColumnElement[Any]:
@@ -123,11 +123,11 @@ def _age_s(value: Any) -> float | None:
         age_s = float(value)
     except (TypeError, ValueError):
         return None
-    return max(age_s, 0.0) if SOONEST_S <= age_s <= LATEST_S else None
+    return max(age_s, 0.0) if MIN_AGE_S <= age_s <= MAX_AGE_S else None
 
 
 def _writing(engine: Engine) -> Connection:
-    return engine.connect().execution_options(**{WRITES: True})
+    return engine.connect().execution_options(**{WRITE_OPTION: True})
 
 
 def _now(connection: Connection) -> ColumnElement[float]:

@@ -23,7 +23,7 @@ from rig.history.entered.issued_certificate import Issued
 from rig.history.storage import journal, read_back, row_numbers, schema, triggers
 from rig.history.storage.address import HistoryAddress, resolve_address
 from rig.history.storage.engine import connection_apart, engine_of
-from rig.history.storage.sqlite_engine import WRITES
+from rig.history.storage.sqlite_engine import WRITE_OPTION
 from rig.report.findings.characteristics import every_characteristic
 from rig.report.findings.history_records import BIASES, SCALES, Parameter
 
@@ -251,7 +251,7 @@ class History:
     @contextmanager
     def _writing(self) -> Iterator[Connection]:
         """Begin a transaction that enters rows, and read the rows back after it."""
-        with self.engine.connect().execution_options(**{WRITES: True}) as connection, connection.begin():
+        with self.engine.connect().execution_options(**{WRITE_OPTION: True}) as connection, connection.begin():
             journal.alone(connection)
             before = journal.head(connection)
             yield connection

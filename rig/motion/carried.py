@@ -7,7 +7,7 @@ if TYPE_CHECKING:
     from rig.config.models import ArmSection
 
 Position = tuple[float, float, float]
-FLANGE: Position = (0.0, 0.0, 0.0)
+FLANGE_CENTRE: Position = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,8 +15,8 @@ class FlangeLoad:
     """The payload's mass, and the positions, in the flange's frame, of its centre and of an extension's end."""
 
     payload_kg: float
-    centre_m: Position = FLANGE
-    extension_m: Position = FLANGE
+    centre_m: Position = FLANGE_CENTRE
+    extension_m: Position = FLANGE_CENTRE
 
 
 def read_load(arm: "ArmSection") -> FlangeLoad:

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from rig.estimation.arrays import Array
 from rig.motion.chain import DenavitHartenberg
 
-ROUNDING = 1e-15
+ROUNDING_ERROR = 1e-15
 WRIST_1, WRIST_2, WRIST_3 = 3, 4, 5
 WAVES = ("cos", "sin", "cos 2", "sin 2")  # an eccentric or tilted encoder disc errs once and twice per revolution
 AXIS_ERRORS = (  # all errors that change the angles between the wrists' axes
@@ -92,7 +92,7 @@ def angle_waves(angle_rad: Array | float) -> Array:
 def _twists(arm: DenavitHartenberg) -> tuple[Array, Array]:
     """Return cosines and sines (n,) of the links' twists, exact for quarter turns."""
     waves = np.cos(arm.alpha_rad), np.sin(arm.alpha_rad)
-    cos, sin = (np.where(np.abs(wave) < ROUNDING, 0.0, wave) for wave in waves)
+    cos, sin = (np.where(np.abs(wave) < ROUNDING_ERROR, 0.0, wave) for wave in waves)
     return cos, sin
 
 

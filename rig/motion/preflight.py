@@ -3,7 +3,7 @@
 import math
 
 from rig.errors import Problem
-from rig.motion.steps import SAME_PLACE_RAD, Motion, Plan, travel
+from rig.motion.steps import POSE_TOLERANCE_RAD, Motion, Plan, travel
 from rig.motion.turner_state import Joints
 
 
@@ -45,4 +45,4 @@ def find_travel_to_home(plan: Plan, q_rad: Joints) -> Joints:
 def travels(motion: Motion) -> bool:
     """Return whether a motion moves a joint."""
     travel_rad = travel(motion.start_q_rad, motion.target_q_rad)
-    return all(map(math.isfinite, travel_rad)) and max(map(abs, travel_rad)) > SAME_PLACE_RAD
+    return all(map(math.isfinite, travel_rad)) and max(map(abs, travel_rad)) > POSE_TOLERANCE_RAD

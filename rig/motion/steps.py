@@ -11,9 +11,9 @@ from rig.config.section import Direction, Vector3
 from rig.motion.turner_state import Joints
 
 # Joint angles closer than this are equal: well above the encoder's step, well below any relevant difference.
-SAME_PLACE_RAD = 1e-4
+POSE_TOLERANCE_RAD = 1e-4
 TURN_RAD = 2 * math.pi
-CLOSED_RAD = 1e-6  # tolerance of a whole turn, for rounding
+CLOSURE_TOLERANCE_RAD = 1e-6  # of a whole turn, for rounding
 
 
 class Motion(Protocol):
@@ -190,7 +190,7 @@ class Plan:
 def closes(angle_rad: float) -> bool:
     """Return whether an angle is a whole number of turns, which the closure of the circle makes exact."""
     turns = round(angle_rad / TURN_RAD)
-    return turns > 0 and abs(angle_rad - turns * TURN_RAD) < CLOSED_RAD
+    return turns > 0 and abs(angle_rad - turns * TURN_RAD) < CLOSURE_TOLERANCE_RAD
 
 
 def turn_words(angle_rad: float) -> str:

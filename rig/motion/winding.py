@@ -6,8 +6,8 @@ from math import ceil, degrees, pi
 from rig.motion.steps import Plan
 from rig.motion.turner_state import Joints
 
-SLACK_RAD = pi / 2  # a smaller rotation needs no warning
-OTHER_TURN_RAD = pi  # angle from home, beyond which a joint is in another revolution than when its cable was laid
+MAX_SLACK_RAD = pi / 2  # a smaller rotation needs no warning
+MAX_HOME_ANGLE_RAD = pi  # from home, beyond which a joint is in another revolution than when its cable was laid
 
 
 def windings_rad(plan: Plan, q_rad: Joints) -> list[tuple[float, float]]:
@@ -27,13 +27,13 @@ def cable_words(plan: Plan, q_rad: Joints, names: Sequence[str]) -> list[str]:
     travels = [
         f"{name} by {_round_up_deg(-low)}° one way (-) and {_round_up_deg(high)}° the other (+)"
         for name, (low, high) in zip(names, windings_rad(plan, q_rad), strict=True)
-        if max(-low, high) > SLACK_RAD
+        if max(-low, high) > MAX_SLACK_RAD
     ]
     wound = [
         f"{name} is {degrees(now - home):+.0f}° from home: its cable may be wound by as much already, and is "
         "unwound on the way."
         for name, now, home in zip(names, q_rad, plan.home_q_rad, strict=True)
-        if abs(now - home) > OTHER_TURN_RAD
+        if abs(now - home) > MAX_HOME_ANGLE_RAD
     ]
     if not travels:
         return wound

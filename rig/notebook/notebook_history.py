@@ -21,7 +21,7 @@ from rig.report.kinds.kind_registry import history_records
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-ABOUT = tuple(name for name in COLUMNS[: COLUMNS.index("parameter")] if name != "calibration")
+DESCRIPTION = tuple(name for name in COLUMNS[: COLUMNS.index("parameter")] if name != "calibration")
 HEADINGS = ("parameter", "before ± U", "now ± U", "E_n")
 
 
@@ -38,7 +38,7 @@ class Calibrations(Sequence[Past]):
         units, NaN if a calibration lacks it. Raise Refused `missing_extra`.
         """
         names = dict.fromkeys(name for past in self.pasts for name in past.parameters)
-        columns: dict[str, Any] = {name: [_property_of(past, name) for past in self.pasts] for name in ABOUT}
+        columns: dict[str, Any] = {name: [_property_of(past, name) for past in self.pasts] for name in DESCRIPTION}
         for name in names:
             parameters = [past.parameters.get(name) for past in self.pasts]
             columns[name] = [float("nan") if p is None else p.value for p in parameters]

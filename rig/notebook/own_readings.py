@@ -7,7 +7,7 @@ from rig.data.quantity import ACCELERATION, Quantity
 from rig.errors import Refused
 from rig.estimation.arrays import Array
 
-BEYOND = 2.0  # ratio to the nominal range: a part may exceed its range, but not twice
+MAX_RANGE_RATIO = 2.0  # a part may exceed its range, but not twice
 
 
 def convert_own_readings(readings: ArrayLike, quantity: Quantity, limit: float | None, whose: str) -> Array:
@@ -40,7 +40,7 @@ def convert_own_readings(readings: ArrayLike, quantity: Quantity, limit: float |
 def _refuse_other_units(values: Array, quantity: Quantity, limit: float | None, whose: str) -> None:
     """Raise Refused `wrong_unit` if readings exceed the sensor's range, or look like g."""
     mistaken = quantity.mistaken
-    most = BEYOND * limit if limit is not None else np.inf if mistaken is None else mistaken.most
+    most = MAX_RANGE_RATIO * limit if limit is not None else np.inf if mistaken is None else mistaken.most
     largest = float(np.abs(values[~np.isnan(values)]).max(initial=0.0))
     other_unit = "another unit" if mistaken is None else mistaken.unit
     remedy = f"Give them in {quantity.unit}" + ("" if mistaken is None else f": {mistaken.mend}")

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from rig.analysis.outcome import Outcome
-from rig.config.column_map import AS_NAMED, GIVE_MAP, ColumnMap
+from rig.config.column_map import MAP_REMEDY, STANDARD_NAMES, ColumnMap
 from rig.config.load import load_as
 from rig.data.latest_run import meant_run
 from rig.data.recording.provenance import Provenance
@@ -106,7 +106,7 @@ def read_log(path: str | Path, columns: str | Path | None = None) -> Readings:
     Values are in SI units. `columns` is the file of `--columns` for other names and units. Raise Refused as `rig
     solve`.
     """
-    column_map = AS_NAMED if columns is None else load_as(ColumnMap, columns, GIVE_MAP)
+    column_map = STANDARD_NAMES if columns is None else load_as(ColumnMap, columns, MAP_REMEDY)
     recording = read_external_log(Path(path), column_map)
     ((name, sensor),) = recording.sensors.items()
     return Readings(name, sensor, [recording])

@@ -6,7 +6,7 @@ Examples are a logger's mark of a missing value, a frozen axis, and the end of a
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.data.quantity import ACCELERATION, COLDEST_C, HOTTEST_C, RATE, Quantity
+from rig.data.quantity import ACCELERATION, MAX_TEMPERATURE_C, MIN_TEMPERATURE_C, RATE, Quantity
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array, equal_runs
 from rig.observation.windows import Window, inside
@@ -56,7 +56,7 @@ def check_possible(readings: Array, rows: NDArray[np.intp], quantity: Quantity, 
 
 def check_temperatures(temperature_c: Array, rows: NDArray[np.intp], where: str) -> None:
     """Raise Refused `wrong_unit` for a temperature (n,) too low or high for a laboratory; see `check_possible`."""
-    wrong = np.flatnonzero((temperature_c < COLDEST_C) | (temperature_c > HOTTEST_C))
+    wrong = np.flatnonzero((temperature_c < MIN_TEMPERATURE_C) | (temperature_c > MAX_TEMPERATURE_C))
     if len(wrong):
         raise Refused(
             "wrong_unit",

@@ -16,9 +16,9 @@ from rig.page.server.feed import Feed
 from rig.station.events import PhaseStarted, RunEvent, StepFinished
 from rig.station.plain_text import say
 
-WRITTEN_S = 0.6  # delay until an event is written to the file
-FRACTION = 0.1  # largest fraction of the time for analysis: a recording of hours takes long to read
-ENDING_S = 5.0
+WRITING_DELAY_S = 0.6  # until an event is written to the file
+MAX_TIME_FRACTION = 0.1  # for analysis: a recording of hours takes long to read
+MAX_EXIT_S = 5.0
 
 
 class Lookout:
@@ -64,7 +64,7 @@ def looking_out(folder: Path, feed: Feed) -> Iterator[Lookout]:
         lookout.wanted.set()
         process.kill()
         process.wait()
-        thread.join(ENDING_S)
+        thread.join(MAX_EXIT_S)
         for pipe in pipes:
             with suppress(OSError):  # the last question may not have been sent
                 pipe.close()
@@ -87,7 +87,7 @@ def _say_that_it_ended(why: str) -> None:
 
 def _follow(questions: TextIO, answers: TextIO, lookout: Lookout, feed: Feed) -> None:
     """Request an analysis whenever one is due; return at the end, or if no answer comes."""
-    while lookout.wanted.wait() and not lookout.over.wait(WRITTEN_S):
+    while lookout.wanted.wait() and not lookout.over.wait(WRITING_DELAY_S):
         lookout.wanted.clear()
         start_s = time.monotonic()
         questions.write("\n")
@@ -98,5 +98,5 @@ def _follow(questions: TextIO, answers: TextIO, lookout: Lookout, feed: Feed) ->
         document = json.loads(line)
         if "observations" in document:
             feed.look(Look(**document))
-        if lookout.over.wait((time.monotonic() - start_s) * (1 / FRACTION - 1)):
+        if lookout.over.wait((time.monotonic() - start_s) * (1 / MAX_TIME_FRACTION - 1)):
             return

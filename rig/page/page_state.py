@@ -10,7 +10,7 @@ from rig.data.quantity import TEMPERATURE, DisplayUnit, Quantity, Scalar, select
 from rig.data.recording.hand_events import HandAsked, OfTheHand
 from rig.data.recording.recorded_events import BoardNotObserved, BoardObserved
 from rig.data.result_file import ResultDocument, read_result
-from rig.data.run_folder import CERTIFICATE, RESULT, TRUTH
+from rig.data.run_folder import CERTIFICATE, RESULT, TRUTH_FILE
 from rig.motion.geometry import NOMINAL
 from rig.motion.steps import Dwell, Rest, Step, Sweep
 from rig.page import by_hand
@@ -50,8 +50,8 @@ from rig.station.events import (
 )
 from rig.station.words import line
 
-LINES = 40  # newest lines of the log that are shown
-ENDINGS = (VerdictReached, Failed, Interrupted, Crashed)
+LOG_LINES = 40  # the newest, which are shown
+ENDING_EVENTS = (VerdictReached, Failed, Interrupted, Crashed)
 
 
 class PageState:
@@ -158,7 +158,7 @@ class PageState:
 
     def _add_line(self, event: RunEvent) -> None:
         if (text := line(event)) is not None:
-            self.put("lines", [*self.sections["lines"], text][-LINES:])
+            self.put("lines", [*self.sections["lines"], text][-LOG_LINES:])
 
     def look(self, look: Look) -> None:
         """Show the analysis of the recordings so far: each sweep's observation or refusal, and the parameters."""
@@ -244,7 +244,7 @@ class PageState:
                 self.put("outcome", outcome_rows(result, self._parts))
                 self.put("mounts", list(mount_lines(result)))
                 self._solved = True
-            case DocumentWritten(path) if path.name == TRUTH and self._result is not None:
+            case DocumentWritten(path) if path.name == TRUTH_FILE and self._result is not None:
                 truth = truth_rows(path.parent, self._result)
                 self.put("outcome", outcome_rows(self._result, self._parts, truth))
             case Failed(error):
@@ -255,7 +255,7 @@ class PageState:
                 self._state("fault", f"A defect of the program: {traceback.strip().splitlines()[-1]}")
             case Advice(_, command, repeats):
                 self.put("next", after_fault(command, repeats=repeats))
-        if isinstance(event, ENDINGS):
+        if isinstance(event, ENDING_EVENTS):
             self.ended = True
             self.put("hand", None)
             self.put("prompt", None)

@@ -7,7 +7,7 @@ from typing import Any
 
 SPAN_S = 60.0
 STEP_S = 0.1  # interval of the points, in the controller's time
-SOON_S = 0.95 * STEP_S  # shorter, so that a rounded time does not look too early
+MIN_STEP_S = 0.95 * STEP_S  # shorter, so that a rounded time does not look too early
 POINTS = round(SPAN_S / STEP_S)
 
 Values = Mapping[str, tuple[float, ...]]  # by the name of a curve, such as "gyro.rate"
@@ -27,7 +27,7 @@ class PageHistory:
 
     def due(self, time_s: float) -> bool:
         """Return whether to store a point of this time: enough time has passed, or time has run backwards."""
-        return not self._points or not 0 <= time_s - self._points[-1][0] < SOON_S
+        return not self._points or not 0 <= time_s - self._points[-1][0] < MIN_STEP_S
 
     def add(self, time_s: float, values: Values) -> None:
         """Add a point if one is due; if time has run backwards, start again."""

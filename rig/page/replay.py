@@ -36,7 +36,7 @@ from rig.station.events import (
 )
 
 FRAME_S = 0.1  # interval of the frames, in the recording's time
-NEWEST = 8  # samples in a displayed mean
+MEAN_SAMPLES = 8  # the newest, in a displayed mean
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,7 +175,7 @@ class _ReplayedSamples:
 
     def until(self, host_time_s: float) -> SensorSamples:
         count = int(np.searchsorted(self._samples["host_time_s"], host_time_s, side="right"))
-        newest = self._samples[max(0, count - NEWEST) : count]
+        newest = self._samples[max(0, count - MEAN_SAMPLES) : count]
         if count == 0:
             return SensorSamples(self._name, 0, 0, {})
         return SensorSamples(self._name, count, int(newest["sequence"][-1]) + 1 - count, self._sensor.means(newest))

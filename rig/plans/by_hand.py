@@ -14,9 +14,9 @@ from rig.motion.steps import Plan
 from rig.motion.turner_state import Joints
 
 # The faces in the order in which they point up, beginning with the one at the start.
-ROUND: tuple[Face, ...] = ("+z", "+x", "+y", "-z", "-x", "-y", "+z", "+y", "-x", "-z", "+x", "-y")
-TURNS_FROM = 8  # flips after which the scale factor is known well enough to recognise the end of a whole turn
-AXES = ("z", "x", "y")  # axes of the requested whole turns, in this order
+FACE_ORDER: tuple[Face, ...] = ("+z", "+x", "+y", "-z", "-x", "-y", "+z", "+y", "-x", "-z", "+x", "-y")
+MIN_FLIPS_BEFORE_TURNS = 8  # the scale factor is then known well enough to recognise the end of a whole turn
+TURN_AXES = ("z", "x", "y")  # of the requested whole turns, in this order
 
 Pair = tuple[Face, Face]
 
@@ -38,13 +38,13 @@ class WantedMoves:
     @property
     def pairs(self) -> tuple[Pair, ...]:
         """The flips in the order of the requests, if the operator makes no other move between them."""
-        count = len(ROUND)
-        return tuple((ROUND[index % count], ROUND[(index + 1) % count]) for index in range(self.flips))
+        count = len(FACE_ORDER)
+        return tuple((FACE_ORDER[index % count], FACE_ORDER[(index + 1) % count]) for index in range(self.flips))
 
     @property
     def about(self) -> tuple[tuple[str, int], ...]:
         """The whole turns: axis and direction, +1 or -1; a second turn about an axis has the opposite direction."""
-        return tuple((AXES[index % 3], -1 if index // 3 % 2 else 1) for index in range(self.turns))
+        return tuple((TURN_AXES[index % 3], -1 if index // 3 % 2 else 1) for index in range(self.turns))
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,9 +83,9 @@ def still_open(wanted: WantedMoves, moves: Sequence[HandMove], faces_up: Sequenc
 def next_instruction(remaining: Open, face: Face | None) -> Instruction | None:
     """Return the next request for an item with side `face` up (None if unknown), or None at the end."""
     if remaining.done or face is None:
-        return None if remaining.done else Instruction("lay", ROUND[0])
+        return None if remaining.done else Instruction("lay", FACE_ORDER[0])
     turn = next((candidate for candidate in remaining.turns if candidate[0] == face[1]), None)
-    if turn is not None and remaining.flips_done >= TURNS_FROM:
+    if turn is not None and remaining.flips_done >= MIN_FLIPS_BEFORE_TURNS:
         return Instruction("turn", face, turn[1])
     if (pair := next((candidate for candidate in remaining.pairs if face in candidate), None)) is not None:
         return Instruction("lay", pair[1] if pair[0] == face else pair[0])

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rig.errors import ProblemError, Refused
 
-ENDING = 'Do not let it end the program: put what runs it alone below `if __name__ == "__main__":`'
+ENDING_REMEDY = 'Do not let it end the program: put what runs it alone below `if __name__ == "__main__":`'
 
 
 @contextmanager
@@ -21,7 +21,7 @@ def script_errors(what: str, remedy: str = "Correct the script") -> Iterator[Non
     except ProblemError:
         raise
     except SystemExit as ended:
-        raise Refused("script_failed", f"{what} ({_reason(ended)})", ENDING) from ended
+        raise Refused("script_failed", f"{what} ({_reason(ended)})", ENDING_REMEDY) from ended
     except Exception as error:
         raise Refused("script_failed", f"{what} ({_reason(error)})", remedy) from error
 

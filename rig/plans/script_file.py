@@ -19,7 +19,7 @@ from rig.plans.script_errors import script_errors
 
 SIZE_MAX_BYTES = 1_000_000  # the longest procedure shipped has 3,000
 REMEDY = "Give a Python file that defines PROCEDURE, as procedures/six_observation.py does"
-IMPORTABLE = "Correct the script; it may import what is installed, but no file of its folder"
+IMPORT_REMEDY = "Correct the script; it may import what is installed, but no file of its folder"
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +107,7 @@ def _execute(path: Path, name: str, text: str) -> ScriptFile:
     module = module_from_spec(spec)
     module.__file__ = str(path)
     sys.modules[spec.name] = module  # where dataclasses and models look up their annotations
-    with script_errors(f"the script {path} cannot be loaded", IMPORTABLE):
+    with script_errors(f"the script {path} cannot be loaded", IMPORT_REMEDY):
         exec(compile(text, str(path), "exec"), module.__dict__)
     procedure = getattr(module, "PROCEDURE", None)
     if not isinstance(procedure, Procedure):

@@ -4,14 +4,14 @@ from collections.abc import Iterator, Mapping
 from itertools import product
 
 from rig.config.models import RigConfig
-from rig.config.procedures.attitude_sets import SETS
-from rig.config.procedures.procedure_sections import LONGEST_SWEEP_S, AttitudesSection, SixSweepsSection
-from rig.config.procedures.servo_procedure import SPEED_TO_RANGE
+from rig.config.procedures.attitude_sets import ATTITUDE_SETS
+from rig.config.procedures.procedure_sections import MAX_SWEEP_S, AttitudesSection, SixSweepsSection
+from rig.config.procedures.servo_procedure import RANGE_RATIO
 
 SPEEDS_DEG_S = (15.0, 30.0, 45.0, 60.0, 90.0, 120.0, 150.0)
 ARCS_DEG = (90.0, 180.0, 270.0)  # arcs that are tried if the encoders' uncertainty is stated
 TURNS_DEG = (360.0, 720.0, 1080.0)
-BEYOND_DEG = (45.0, 90.0, 180.0)  # overtravels of a servo that are tried
+OVERTRAVELS_DEG = (45.0, 90.0, 180.0)  # of a servo that are tried
 
 # Family, angle in degrees, and keys of the procedure.
 Motion = tuple[tuple[object, ...], float, Mapping[str, object]]
@@ -31,7 +31,7 @@ def vary_arm(config: RigConfig) -> Iterator[Motion]:
         speeds = [(min(several), {})]
     turned = TURNS_DEG if config.uncertainty.angle_std_deg is None or config.magnetometers else (*ARCS_DEG, *TURNS_DEG)
     for count, (slowest, keys), arc_deg in product(axes, speeds, turned):
-        if arc_deg / slowest <= LONGEST_SWEEP_S:
+        if arc_deg / slowest <= MAX_SWEEP_S:
             closed = arc_deg % 360 == 0
             yield (count, *keys.values(), closed), arc_deg, {**keys, "axes": count, "arc_deg": arc_deg}
 
@@ -40,7 +40,7 @@ def vary_attitudes(config: RigConfig) -> Iterator[Motion]:
     """Yield the file's attitudes and the named sets of attitudes; with magnetometers only the file's."""
     procedure = config.procedure
     assert isinstance(procedure, AttitudesSection)
-    sets = [procedure.attitudes, *(() if config.magnetometers else SETS.values())]
+    sets = [procedure.attitudes, *(() if config.magnetometers else ATTITUDE_SETS.values())]
     for attitudes in dict.fromkeys(sets):
         yield (attitudes,), 0.0, {"attitudes": attitudes}
 
@@ -54,10 +54,10 @@ def vary_imu(config: RigConfig) -> Iterator[Motion]:
 
 def vary_servo(config: RigConfig) -> Iterator[Motion]:
     """Yield turns of a servo with different speeds and overtravels."""
-    for speed_deg_s, overtravel_deg in product(_speeds_deg_s(config), BEYOND_DEG):
+    for speed_deg_s, overtravel_deg in product(_speeds_deg_s(config), OVERTRAVELS_DEG):
         yield (speed_deg_s,), overtravel_deg, {"speed_deg_s": speed_deg_s, "overtravel_deg": overtravel_deg}
 
 
 def _speeds_deg_s(config: RigConfig) -> list[float]:
-    fastest = min(sensor.range_deg_s for sensor in config.sensors.values()) / SPEED_TO_RANGE
+    fastest = min(sensor.range_deg_s for sensor in config.sensors.values()) / RANGE_RATIO
     return [speed for speed in SPEEDS_DEG_S if speed <= fastest]

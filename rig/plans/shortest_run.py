@@ -47,13 +47,13 @@ from rig.turners.turner_registry import kind_of
 
 SectionT = TypeVar("SectionT", bound=Section)
 REPEATS = (1, 2, 3, 4, 6, 8, 12, 16)
-MOST = 100  # sweeps or dwells of one plan, at most
+MAX_SIZE = 100  # sweeps or dwells of one plan
 RESTS_S = (1.0, 2.0, 3.0, 5.0, 10.0, 20.0)  # durations of a rest, and of a dwell, that are tried
 # The endless run is predicted from a plan of two repeats, because in a single one noise is too large relative to the
 # errors that repeats share. Other rests and more repeats reduce its U further, but by no more than this factor.
-TWICE, HOPELESS = 2, 2.0
-PER_REPEAT = NOISE, BIAS_DRIFT, FLICKER, STATE_TIMES  # the budget lines that repeats reduce, also for accelerometers
-FLIPS, TURNS_BY_HAND = (8, 10, 12, 16, 24, 36, 48), (0, 3, 6)
+PREDICTED_REPEATS, MAX_U_REDUCTION = 2, 2.0
+REPEAT_CAUSES = NOISE, BIAS_DRIFT, FLICKER, STATE_TIMES  # the budget lines that repeats reduce, also for accelerometers
+FLIP_COUNTS, TURN_COUNTS = (8, 10, 12, 16, 24, 36, 48), (0, 3, 6)
 REST_STEP_S = 0.1  # step of the last, fine search
 
 
@@ -78,9 +78,9 @@ class RunSearch(Protocol):
 def shortest_run(config: RigConfig, wanted: TargetUncertainty) -> Shortest:
     """Return the shortest run of this configuration whose predicted uncertainty meets the target.
 
-    A family is skipped if its endless run misses the target by more than the factor `HOPELESS`. If all are, only the
-    longest run of the best family is evaluated. Raise Refused `not_predictable` if the uncertainty of the procedure or
-    of the target's quantity is not predicted.
+    A family is skipped if its endless run misses the target by more than the factor `MAX_U_REDUCTION`. If all are, only
+    the longest run of the best family is evaluated. Raise Refused `not_predictable` if the uncertainty of the procedure
+    or of the target's quantity is not predicted.
     """
     what = find_search(config)
     _refuse_others(wanted, config)
@@ -90,7 +90,7 @@ def shortest_run(config: RigConfig, wanted: TargetUncertainty) -> Shortest:
         for candidate in what.select_endless(candidates)
         if (once := what.predict(candidate)) is not None
     ]
-    able = {family for family, floor in floors if wanted.ratio_to_target(floor.reached) <= HOPELESS}
+    able = {family for family, floor in floors if wanted.ratio_to_target(floor.reached) <= MAX_U_REDUCTION}
     least = min(floors, key=lambda floor: wanted.ratio_to_target(floor[1].reached))[0]
     hopeful = [run for run in candidates if run.family in able] or _longest(candidates, least, wanted.at_most_s)
     coarse = find_shortest(hopeful, what.predict, wanted)
@@ -191,7 +191,7 @@ class _TurnerSearch:
     motions: Callable[[RigConfig], Iterator[Motion]]
     waits: tuple[str, ...]
     config: RigConfig
-    per_repeat: Collection[str] = PER_REPEAT
+    per_repeat: Collection[str] = REPEAT_CAUSES
 
     def candidates(self) -> Sequence[Candidate]:
         """Return all possible runs: each motion with coarse choices of repeats and waits, and its duration."""
@@ -203,7 +203,7 @@ class _TurnerSearch:
             if kind_of(self.config.turner).problems([plan], self.config.turner, None):
                 continue
             counts, again_s = self._counts(plan), plan_of(self.config, twice).duration_s - plan.duration_s
-            some = [number for number in REPEATS if number * len(plan.sweeps or plan.dwells) <= MOST or number == 1]
+            some = [number for number in REPEATS if number * len(plan.sweeps or plan.dwells) <= MAX_SIZE or number == 1]
             if any(twice.problems(self.config)):
                 some = [1]
             for repeats, *values_s in product(some, *[RESTS_S] * len(self.waits)):
@@ -221,7 +221,7 @@ class _TurnerSearch:
         selected = {
             (candidate.family, candidate.rests_s): candidate
             for candidate in sorted(candidates, key=lambda candidate: candidate.sizes)
-            if set(candidate.rests_s) <= {RESTS_S[0], RESTS_S[-1]} and candidate.sizes[1] <= TWICE
+            if set(candidate.rests_s) <= {RESTS_S[0], RESTS_S[-1]} and candidate.sizes[1] <= PREDICTED_REPEATS
         }
         return list(selected.values())
 
@@ -285,7 +285,7 @@ class _HandSearch:
     per_repeat: Collection[str] = tuple(CONTRIBUTORS)  # all that the readings determine
 
     def candidates(self) -> Sequence[Candidate]:
-        return [self._candidate(*numbers) for numbers in product(FLIPS, TURNS_BY_HAND, RESTS_S[:4])]
+        return [self._candidate(*numbers) for numbers in product(FLIP_COUNTS, TURN_COUNTS, RESTS_S[:4])]
 
     def select_endless(self, candidates: Sequence[Candidate]) -> Sequence[Candidate]:
         """Return the candidate with the most flips, fewest turns and shortest rests, which is best without noise."""
@@ -294,7 +294,7 @@ class _HandSearch:
     def finer(self, best: Candidate) -> Sequence[Candidate]:
         """Return the candidates with fewer flips, down to the next coarse number."""
         flips, turns, rest_s = best.sizes
-        below = max((number for number in FLIPS if number < flips), default=int(flips))
+        below = max((number for number in FLIP_COUNTS if number < flips), default=int(flips))
         return [self._candidate(number, int(turns), rest_s) for number in range(below + 1, int(flips))]
 
     def duration_s(self, procedure: ProcedureSection) -> float:

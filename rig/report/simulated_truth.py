@@ -9,7 +9,7 @@ from rig.config.files.regular_file import UnfitFile, read_regular_file
 from rig.config.section import SensorName
 from rig.data.quantity import ACCELERATION, RATE
 from rig.data.result_file import ResultDocument
-from rig.data.run_folder import TRUTH
+from rig.data.run_folder import TRUTH_FILE
 from rig.data.validation import Finite, parse_json, validate
 from rig.report.findings.result_kind import AxisValues, DisplayRow
 from rig.report.kinds.kind_registry import shown
@@ -74,7 +74,7 @@ class TruthRow:
 def truth_rows(folder: Path, result: ResultDocument) -> list[TruthRow]:
     """Return the rows of the simulated truth in a run folder; empty without a valid file."""
     try:
-        document = parse_json(read_regular_file(folder / TRUTH, SIZE_MAX_BYTES))
+        document = parse_json(read_regular_file(folder / TRUTH_FILE, SIZE_MAX_BYTES))
         truth = validate(_TruthFile, document, "truth")
     except (OSError, UnfitFile, ValueError, RecursionError):
         return []

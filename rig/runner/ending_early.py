@@ -16,7 +16,7 @@ from rig.analysis.design.reached_uncertainty import assess_reached
 from rig.data.recording.run_data import RunData
 from rig.data.recording.run_file import read_run
 from rig.errors import RigError
-from rig.motion.steps import SAME_PLACE_RAD, Motion, Plan, Sweep, Transfer
+from rig.motion.steps import POSE_TOLERANCE_RAD, Motion, Plan, Sweep, Transfer
 from rig.motion.turner_state import Joints
 from rig.station.events import UncertaintySoFar
 
@@ -126,4 +126,4 @@ class EndingEarly:
 
 
 def _are_equal(one: Joints, other: Joints) -> bool:
-    return all(abs(mine - its) < SAME_PLACE_RAD for mine, its in zip(one, other, strict=True))
+    return all(abs(mine - its) < POSE_TOLERANCE_RAD for mine, its in zip(one, other, strict=True))

@@ -25,7 +25,7 @@ from rig.motion.steps import Plan
 from rig.observation.reference.dwell_acceleration import DwellReading
 from rig.observation.statistics.mean import QuantityInDwell, ReadAtRest, StaticReading
 from rig.plans.phase import Phase
-from rig.plans.script_errors import ENDING
+from rig.plans.script_errors import ENDING_REMEDY
 from rig.plans.script_file import ScriptFile, find_installed_script
 from rig.report.writers import write_outcome
 from rig.runner.announcement import mounting
@@ -229,7 +229,7 @@ class Run:
             raise fault from error
         except SystemExit as ended:
             what = _add_notes(f"the script {self.script.name} ended the program (SystemExit: {ended})", ended)
-            fault = Fault("script_failed", what, ENDING)
+            fault = Fault("script_failed", what, ENDING_REMEDY)
             fault.__cause__ = ended
             self._report_failure(fault, advice)
             raise fault from ended

@@ -17,7 +17,7 @@ from rig.batch.operators import Operator
 from rig.batch.page_operator import open_page
 from rig.batch.status import Now, Present
 from rig.motion.steps import Rest
-from rig.page.server.control import STOPPED
+from rig.page.server.control import STOP_REASON
 from rig.page.server.serving import PageAddress
 from rig.station.events import Interrupted, Progress, SamplesTaken, SensorSamples
 from support.page.browser import legible, needs_browser, picture, screen, set_theme, text, type_line
@@ -141,7 +141,7 @@ def test_after_a_stop_the_page_says_that_and_not_that_there_is_no_news(driver: C
             present.event(Interrupted(f"{interrupt} between two parts"))
             raise
     wait_for(lambda: text(driver, "link-words") == "the page has ended", "that the line is closed")
-    assert text(driver, "state") == "■ stopped" and text(driver, "doing") == f"{STOPPED} between two parts"
+    assert text(driver, "state") == "■ stopped" and text(driver, "doing") == f"{STOP_REASON} between two parts"
     shown = [each for each in ("stale", "halt", "ask") if driver.find_element(By.ID, each).is_displayed()]
     assert not shown
     picture(driver, "station-stopped")

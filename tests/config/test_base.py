@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from rig.config.files.layers import FILES_MAX, merge
+from rig.config.files.layers import MAX_FILES, merge
 from rig.config.load import ConfigurationRefused, load, parse
 from rig.data.run_folder import ScriptIdentity, new_folder
 from rig.world.world_section import read_world_section
@@ -135,11 +135,11 @@ def test_a_circle_through_another_file_is_refused(folder: Path) -> None:
 
 
 def test_a_chain_that_is_too_long_is_refused(folder: Path) -> None:
-    for number in range(FILES_MAX):
+    for number in range(MAX_FILES):
         written(folder, f"base: {number + 1}.yaml\n", f"{number}.yaml")
-    shutil.copy(DEMO, folder / f"{FILES_MAX}.yaml")
+    shutil.copy(DEMO, folder / f"{MAX_FILES}.yaml")
     (found,) = problems_of(folder / "0.yaml")
-    assert f"more than {FILES_MAX} files one on another" in found
+    assert f"more than {MAX_FILES} files one on another" in found
     load(folder / "1.yaml")
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from rig.config.files.yaml_text import DEPTH_MAX, SIZE_MAX_BYTES
+from rig.config.files.yaml_text import MAX_BYTES, MAX_DEPTH
 from rig.config.load import ConfigurationRefused, load, parse
 from rig.config.section import check_host
 from support.laboratories.commands import rig
@@ -74,7 +74,7 @@ def test_an_alias_to_itself_is_refused() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("text", ["[" * 3000, "a: " + "[" * 3000 + "]" * 3000, "{a: " * 3000, "- " * 3000, "? " * 3000])
 def test_deep_nesting_is_refused(text: str) -> None:
-    assert f"more than {DEPTH_MAX} sections or lists within one another" in refusal(text)
+    assert f"more than {MAX_DEPTH} sections or lists within one another" in refusal(text)
 
 
 @pytest.mark.slow
@@ -88,7 +88,7 @@ def test_a_file_of_comments_is_refused_unread(tmp_path: Path) -> None:
     with path.open("wb") as file:
         for _ in range(100):
             file.write(b"# comment\n" * 100_000)
-    assert f"longer than {SIZE_MAX_BYTES} bytes" in refusal_of(path)
+    assert f"longer than {MAX_BYTES} bytes" in refusal_of(path)
 
 
 def test_a_file_that_is_missing_is_named_in_one_line(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import yaml
 from jsonschema import Draft202012Validator
 
 from rig.config.config_schema import config_schema, schema_text
-from rig.config.procedures.attitude_sets import SETS
+from rig.config.procedures.attitude_sets import ATTITUDE_SETS
 from support.paths import CONFIGS, DOCS
 
 PAGE = DOCS / "config.schema.json"
@@ -63,6 +63,6 @@ def test_what_an_editor_marks(place: tuple[str, ...], value: object) -> None:
 
 
 def test_each_set_of_attitudes_is_a_word_of_the_schema() -> None:
-    for name in SETS:
+    for name in ATTITUDE_SETS:
         assert validator().is_valid({"procedure": {"name": "static_attitudes", "attitudes": name}})
     assert not validator().is_valid({"procedure": {"name": "static_attitudes", "attitudes": "nineteen"}})

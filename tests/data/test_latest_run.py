@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from rig.cli import main
-from rig.data.latest_run import KEPT, latest_run, meant_run, note_run
+from rig.data.latest_run import MAX_FOLDERS, latest_run, meant_run, note_run
 from rig.errors import Refused
 
 
@@ -25,7 +25,7 @@ def test_it_is_the_newest_that_is_still_there(tmp_path: Path) -> None:
     assert latest_run() == Path("runs/1")
     first.rmdir()
     assert latest_run() == Path("runs/2")
-    for number in range(KEPT):
+    for number in range(MAX_FOLDERS):
         note_run(tmp_path / f"gone-{number}")
     with pytest.raises(Refused, match="no run folder of yours"):
         latest_run()

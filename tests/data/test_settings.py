@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from rig.config.judging.judging_keys import OF_SENSORS
+from rig.config.judging.judging_keys import SENSOR_KEYS
 from rig.config.load import load, parse
 from rig.config.procedures.procedure_sections import SixSweepsSection
 from rig.config.sensors.sensor_catalogue import PARTS
@@ -35,7 +35,7 @@ def test_a_sensor_s_stated_properties_are_recorded_and_its_part_s_by_default() -
     """So that a catalogue of tomorrow changes no recording."""
     said = settings("uncertainty: {acceleration_bias_mg_k: 0.7}\n" + VERIFIED).uncertainty
     assert said is not None
-    for what in OF_SENSORS:
+    for what in SENSOR_KEYS:
         part = getattr(PARTS["adis16465"], what)
         assert getattr(said, what)["reference"] == (0.7 if what == "acceleration_bias_mg_k" else part)
     assert said.find_stated_size("acceleration_bias_instability_ug", "reference") == 3.6

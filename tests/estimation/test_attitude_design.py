@@ -5,7 +5,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from rig.config.procedures.attitude_sets import EIGHTEEN, FACES, WristAngles
+from rig.config.procedures.attitude_sets import FACE_ATTITUDES, OPTIMAL_ATTITUDES, WristAngles
 from rig.estimation.arrays import Array
 from rig.estimation.design.attitude_design import (
     ExpectedStds,
@@ -38,14 +38,14 @@ def reached(wrists_deg: tuple[WristAngles, ...], error_rad: float, order: Order 
 @pytest.mark.parametrize(
     ("wrists_deg", "error_rad", "scale_ppm", "angle_mrad", "bias_ug"),
     [
-        (EIGHTEEN, 0.0, 15.5, 0.022, 8.9),
-        (EIGHTEEN, 1e-4, 19.5, 0.033, 13.8),
-        (EIGHTEEN, 1e-3, 20.6, 0.036, 15.3),
-        (EIGHTEEN, 3e-3, 20.6, 0.036, 15.4),
-        (FACES, 0.0, 18.8, 0.027, 10.9),
-        (FACES, 1e-4, 18.8, 0.076, 16.8),
-        (FACES, 1e-3, 18.8, 0.708, 18.8),
-        (FACES, 3e-3, 18.8, 2.12, 18.8),
+        (OPTIMAL_ATTITUDES, 0.0, 15.5, 0.022, 8.9),
+        (OPTIMAL_ATTITUDES, 1e-4, 19.5, 0.033, 13.8),
+        (OPTIMAL_ATTITUDES, 1e-3, 20.6, 0.036, 15.3),
+        (OPTIMAL_ATTITUDES, 3e-3, 20.6, 0.036, 15.4),
+        (FACE_ATTITUDES, 0.0, 18.8, 0.027, 10.9),
+        (FACE_ATTITUDES, 1e-4, 18.8, 0.076, 16.8),
+        (FACE_ATTITUDES, 1e-3, 18.8, 0.708, 18.8),
+        (FACE_ATTITUDES, 3e-3, 18.8, 2.12, 18.8),
     ],
 )
 def test_faces_are_best_on_an_exact_table_and_lose_the_angles_on_a_real_arm(
@@ -60,7 +60,7 @@ def test_faces_are_best_on_an_exact_table_and_lose_the_angles_on_a_real_arm(
 
 @pytest.mark.slow
 def test_condition_and_efficiency_are_those_of_the_best_designs() -> None:
-    faces, eighteen = flange_to_base(FACES), flange_to_base(EIGHTEEN)
+    faces, eighteen = flange_to_base(FACE_ATTITUDES), flange_to_base(OPTIMAL_ATTITUDES)
     assert assess_identifiability(faces, UP).condition == pytest.approx(np.sqrt(3))
     assert assess_identifiability(faces, UP, 2).condition == pytest.approx(1 + np.sqrt(2))
     assert [g_efficiency(faces, UP, order) for order in (1, 2)] == pytest.approx([1.0, 1.0], abs=1e-6)
@@ -69,10 +69,10 @@ def test_condition_and_efficiency_are_those_of_the_best_designs() -> None:
 
 
 def test_second_order_terms_triple_the_uncertainty_of_the_bias() -> None:
-    first, second = (reached(EIGHTEEN, 1e-3, order) for order in (1, 2))
+    first, second = (reached(OPTIMAL_ATTITUDES, 1e-3, order) for order in (1, 2))
     assert first.second_order_std_s2_m is None and second.second_order_std_s2_m == pytest.approx(6.1e-6, rel=0.02)
     assert 2.5 < second.bias_std_m_s2 / first.bias_std_m_s2 < 3
-    assert reached(EIGHTEEN, 0.0, 2).second_order_std_s2_m == pytest.approx(2.9e-6, rel=0.02)
+    assert reached(OPTIMAL_ATTITUDES, 0.0, 2).second_order_std_s2_m == pytest.approx(2.9e-6, rel=0.02)
 
 
 @pytest.mark.slow
@@ -86,8 +86,8 @@ def test_no_other_eighteen_of_the_grid_are_noticeably_better() -> None:
     rows = weighted_jacobian(theta, attitudes, still, white, norm_known=True).reshape(len(grid), 3, -1)
     each = information(rows)
     best = log_determinant(each, exchange_search(each, 18, np.random.default_rng(0), starts=10))
-    shipped = log_determinant(each, [grid.index(wrists) for wrists in EIGHTEEN])
-    faces = log_determinant(each, [grid.index(wrists) for wrists in FACES])
+    shipped = log_determinant(each, [grid.index(wrists) for wrists in OPTIMAL_ATTITUDES])
+    faces = log_determinant(each, [grid.index(wrists) for wrists in FACE_ATTITUDES])
     assert np.exp((best - shipped) / 14) < 1.001
     assert np.exp((best - faces) / 14) > 1.3  # the search would tell
 
@@ -97,7 +97,7 @@ def test_no_other_eighteen_of_the_grid_are_noticeably_better() -> None:
     [
         (tuple((0.0, -90.0, float(third)) for third in range(-180, 180, 30)), 9, {"bias of z", "scale of z"}),
         (tuple((float(first), -90.0, 0.0) for first in range(-180, 180, 30)), 9, {"bias of x", "scale of x"}),
-        (EIGHTEEN[:4], 9, {"bias of z", "angle y z", "the vertical"}),
+        (OPTIMAL_ATTITUDES[:4], 9, {"bias of z", "angle y z", "the vertical"}),
     ],
 )
 def test_attitudes_about_one_axis_or_too_few_are_said_to_tell_too_little(
@@ -110,13 +110,13 @@ def test_attitudes_about_one_axis_or_too_few_are_said_to_tell_too_little(
 
 
 def test_full_rank_leaves_nothing_undetermined() -> None:
-    assert assess_identifiability(flange_to_base(EIGHTEEN), UP, 2).undetermined == ()
-    faces = assess_identifiability(flange_to_base(FACES), UP)
+    assert assess_identifiability(flange_to_base(OPTIMAL_ATTITUDES), UP, 2).undetermined == ()
+    faces = assess_identifiability(flange_to_base(FACE_ATTITUDES), UP)
     assert (faces.rank, faces.undetermined) == (14, ())
 
 
 def test_what_is_expected_is_what_a_fit_reaches() -> None:
-    attitudes, rng = flange_to_base(EIGHTEEN), np.random.default_rng(5)
+    attitudes, rng = flange_to_base(OPTIMAL_ATTITUDES), np.random.default_rng(5)
     std = MPU9250 / np.sqrt(3)
     felt = G * attitudes[:, 2]
     off = []

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from rig.estimation.statistics.coverage import coverage_factors
-from rig.history.series import UNCHANGED, changes_in
+from rig.history.series import NO_CHANGE_PROBABILITY, changes_in
 from rig.report.findings.history_records import Parameter
 
 pytestmark = pytest.mark.slow
 
-ALARMS = 1 - UNCHANGED
+ALARMS = 1 - NO_CHANGE_PROBABILITY
 PAIRS = 1500
 # How many values a sensor has, and their degrees of freedom.
 SENSORS = {

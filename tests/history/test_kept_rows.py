@@ -14,10 +14,10 @@ from sqlalchemy.exc import DBAPIError
 from rig.cli import main
 from rig.history.entered.finished_run import content_sha256, read_finished_run
 from rig.history.entered.issued_certificate import Issued
-from rig.history.integrity import WRONG, examine_history
+from rig.history.integrity import WRONG_STATES, examine_history
 from rig.history.storage import journal, schema
 from rig.history.storage.journal import Head
-from rig.history.storage.sqlite_engine import WRITES
+from rig.history.storage.sqlite_engine import WRITE_OPTION
 from rig.history.storage.triggers import create_triggers
 from rig.history.store import History, open_history
 from rig.report.certificate.certificate_page import certificate_page
@@ -61,7 +61,7 @@ def test_no_row_is_changed_taken_away_or_replaced(place: str) -> None:
             for attempt in attempts:
                 with (
                     pytest.raises(DBAPIError, match="a history keeps its rows"),
-                    history.engine.connect().execution_options(**{WRITES: True}) as connection,
+                    history.engine.connect().execution_options(**{WRITE_OPTION: True}) as connection,
                     connection.begin(),
                 ):
                     connection.execute(text(attempt))
@@ -121,7 +121,7 @@ def test_a_file_that_is_not_what_was_entered_is_named(
         history.enter(read_finished_run(folder))
         assert {each.state for each in examine_history(history)} == {"ok"}
         attack(folder)
-        assert [(each.state, each.what) for each in examine_history(history) if each.state in WRONG] == [
+        assert [(each.state, each.what) for each in examine_history(history) if each.state in WRONG_STATES] == [
             (state, str(folder / name))
         ]
 
@@ -154,7 +154,7 @@ def test_a_row_that_is_not_what_was_entered_is_named(statements: list[str], name
     forge(file, *statements)
     with open_history(file) as history:
         assert named in "\n".join(
-            f"{each.what}: {each.why}" for each in examine_history(history) if each.state in WRONG
+            f"{each.what}: {each.why}" for each in examine_history(history) if each.state in WRONG_STATES
         )
 
 
@@ -166,7 +166,7 @@ def test_a_journal_that_was_written_anew_or_cut_short_is_told_by_who_knows_its_e
         known = history.head()
         history.enter(finish_run(7))
         assert history.holds(known) and history.holds(history.head()) and known.number < history.head().number
-        with history.engine.connect().execution_options(**{WRITES: True}) as connection, connection.begin():
+        with history.engine.connect().execution_options(**{WRITE_OPTION: True}) as connection, connection.begin():
             drop_triggers(connection)
             connection.execute(text("DELETE FROM voided"))
             connection.execute(text("DELETE FROM journal"))
@@ -190,7 +190,7 @@ def test_a_result_that_was_changed_with_its_own_hash_is_named(tmp_path: Path) ->
     other = run.text.replace("1.01", "1.02")
     forge(file, "UPDATE run SET result = ?, content_sha256 = ?", values=(other, content_sha256(other)))
     with open_history(file) as history:
-        found = "\n".join(f"{each.what}: {each.why}" for each in examine_history(history) if each.state in WRONG)
+        found = "\n".join(f"{each.what}: {each.why}" for each in examine_history(history) if each.state in WRONG_STATES)
     assert (
         "run [1]: its rows have changed since their entry" in found
         and "run 1, calibration 1: k 1, stated 1.00333333, of gyro" in found
@@ -218,11 +218,11 @@ def test_a_run_that_was_deleted_with_all_its_rows_is_named(tmp_path: Path) -> No
 
 
 def wrong(history: History) -> list[tuple[str, str]]:
-    return [(each.state, each.what) for each in examine_history(history) if each.state in WRONG]
+    return [(each.state, each.what) for each in examine_history(history) if each.state in WRONG_STATES]
 
 
 def carried_out(history: History, *statements: str) -> None:
-    with history.engine.connect().execution_options(**{WRITES: True}) as connection, connection.begin():
+    with history.engine.connect().execution_options(**{WRITE_OPTION: True}) as connection, connection.begin():
         for statement in statements:
             connection.execute(text(statement))
 
@@ -268,7 +268,7 @@ def test_a_run_that_was_taken_away_leaves_its_numbers_though_the_journal_was_wri
         for day in range(4):
             history.enter(finish_run(day))
         assert wrong(history) == []
-        with history.engine.connect().execution_options(**{WRITES: True}) as connection, connection.begin():
+        with history.engine.connect().execution_options(**{WRITE_OPTION: True}) as connection, connection.begin():
             drop_triggers(connection)
             for number in (2, 3):
                 connection.execute(text(f"DELETE FROM parameter WHERE calibration_id = {number}"))
@@ -276,7 +276,7 @@ def test_a_run_that_was_taken_away_leaves_its_numbers_though_the_journal_was_wri
                     connection.execute(text(f"DELETE FROM {table} WHERE run_id = {number}"))
                 connection.execute(text(f"DELETE FROM run WHERE id = {number}"))
             connection.execute(text("DELETE FROM journal"))
-            for entered in journal.ENTERED.values():
+            for entered in journal.ENTRY_TABLES.values():
                 for key in connection.execute(select(*entered.primary_key).order_by(*entered.primary_key)).all():
                     journal.note(connection, entered, *key)
             create_triggers(connection)

@@ -8,7 +8,7 @@ from sqlalchemy import Connection, text
 
 from rig.errors import Refused
 from rig.history.storage import migrations, schema
-from rig.history.storage.sqlite_engine import WRITES
+from rig.history.storage.sqlite_engine import WRITE_OPTION
 from rig.history.store import open_history
 from support.history.kept_rows import drop_triggers, forget_histories
 from support.history.past_runs import enter_many, finish_run
@@ -75,7 +75,7 @@ def test_a_later_version_has_one_place_for_its_migration(url: str, monkeypatch: 
 def test_a_server_s_history_from_before_version_1_is_refused(url: str) -> None:
     with (
         open_history(url) as history,
-        history.engine.connect().execution_options(**{WRITES: True}) as connection,
+        history.engine.connect().execution_options(**{WRITE_OPTION: True}) as connection,
         connection.begin(),
     ):
         drop_triggers(connection)

@@ -6,7 +6,7 @@ from scipy import stats
 
 from rig.estimation.arrays import Array
 from rig.history.series import Change, days_to_limit
-from rig.history.statistics.charts import FEWEST, Chart, chart
+from rig.history.statistics.charts import MIN_RESULTS, Chart, chart
 from rig.history.statistics.random_effects import fit
 from rig.history.statistics.rig_effects import RigEffect, rig_effects
 from rig.report.findings.history_records import Parameter
@@ -72,11 +72,11 @@ def test_too_few_values_determine_nothing() -> None:
 def test_deviations_are_those_of_student_from_the_results_before() -> None:
     values = random(6).normal(size=15)
     found = chart(values, np.full(15, 0.2)).deviation
-    for i in range(FEWEST - 1, 15):
+    for i in range(MIN_RESULTS - 1, 15):
         before = values[:i]
         student = (values[i] - before.mean()) / (before.std(ddof=1) * np.sqrt(1 + 1 / i))
         assert found[i] == pytest.approx(stats.norm.ppf(stats.t.cdf(student, i - 1)), abs=1e-9)
-    assert np.isnan(found[: FEWEST - 1]).all()
+    assert np.isnan(found[: MIN_RESULTS - 1]).all()
 
 
 def test_one_bad_run_is_one_alarm() -> None:
@@ -115,7 +115,7 @@ def test_false_alarms_are_300_runs_apart(thorough: bool, equal: bool) -> None:
     shape, rng = (1000 if thorough else 250, 250), random(9)
     std = np.full(shape, 0.5) if equal else rng.uniform(0.5, 1.0, shape)
     found = chart(rng.normal(size=shape) * np.hypot(std, 0.8), std)
-    runs, alarms = runs_to_alarm(found, FEWEST - 1), found.alarm.any(axis=1).sum()
+    runs, alarms = runs_to_alarm(found, MIN_RESULTS - 1), found.alarm.any(axis=1).sum()
     apart = runs.sum() / alarms
     print(f"{apart:.0f} runs between false alarms, {alarms} alarms")
     assert apart >= (300 if thorough else 240)  # of 170 alarms an eighth, 2σ, is chance

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from rig.config import ranges
-from rig.config.models import HOMES, ArmSection
-from rig.config.procedures.attitude_sets import EIGHTEEN, SETS
+from rig.config.models import HOME_POSES, ArmSection
+from rig.config.procedures.attitude_sets import ATTITUDE_SETS, OPTIMAL_ATTITUDES
 from rig.config.procedures.procedure_sections import SixObservationSection, StaticAttitudesSection
 from rig.config.ranges import ModelName
 from rig.motion.carried import read_load
@@ -72,7 +72,7 @@ def test_a_configuration_ranges_as_far_as_any_of_them() -> None:
     }
     for name in TWO_HOMES:
         home_deg = np.degrees(load_turner_model(name).home_rad).round(9)
-        assert str([int(angle) for angle in home_deg]) in HOMES
+        assert str([int(angle) for angle in home_deg]) in HOME_POSES
 
 
 def test_what_was_recorded_without_a_model_was_a_ur10e() -> None:
@@ -93,7 +93,7 @@ def test_every_model_can_make_the_six_sweeps_about_its_home(name: ModelName, cen
 
 
 @pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("attitudes", SETS)
+@pytest.mark.parametrize("attitudes", ATTITUDE_SETS)
 def test_attitudes_are_possible_or_refused_with_the_distance(name: ModelName, attitudes: str) -> None:
     """A UR3e's flange would come to 0.09 m of its upper arm: its forearm is no longer than that takes."""
     section = arm(name)
@@ -107,7 +107,9 @@ def test_attitudes_are_possible_or_refused_with_the_distance(name: ModelName, at
 
 def test_a_ur3e_can_stand_in_attitudes_with_wrist_2_away_from_its_arm() -> None:
     section = arm("ur3e")
-    away = StaticAttitudesSection.model_validate({"attitudes": [(one, -60, three) for one, _, three in EIGHTEEN]})
+    away = StaticAttitudesSection.model_validate(
+        {"attitudes": [(one, -60, three) for one, _, three in OPTIMAL_ATTITUDES]}
+    )
     assert problems(section, plan_static_attitudes(section, away)) == []
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rig.config.models import ArmSection
-from rig.config.procedures.attitude_sets import EIGHTEEN, FACES
+from rig.config.procedures.attitude_sets import FACE_ATTITUDES, OPTIMAL_ATTITUDES
 from rig.config.procedures.procedure_sections import SixObservationSection, StaticAttitudesSection
 from rig.errors import Problem, Refused, refuse
 from rig.motion.carried import FlangeLoad
@@ -332,7 +332,7 @@ def test_the_way_from_where_the_arm_stands_is_judged() -> None:
     assert "from the pendant" in problem.remedy
 
 
-@pytest.mark.parametrize("made", [attitudes(*EIGHTEEN), attitudes(*FACES)])
+@pytest.mark.parametrize("made", [attitudes(*OPTIMAL_ATTITUDES), attitudes(*FACE_ATTITUDES)])
 def test_the_stock_attitudes_keep_clear_of_the_forearm(made: Plan) -> None:
     """0.174 m, the length of the link before wrist 2, is the least there is with wrist 2 at -90°."""
     assert plan_problems(made, LIGHT) == []

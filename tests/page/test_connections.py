@@ -12,7 +12,7 @@ import pytest
 
 from rig.page.about import About
 from rig.page.page_state import PageState
-from rig.page.server.connections import STRANGERS, TRUSTED, Connections
+from rig.page.server.connections import MAX_STRANGERS, MAX_TRUSTED, Connections
 from rig.page.server.control import Control
 from rig.page.server.feed import Feed
 from rig.page.server.serving import PageAddress, serving
@@ -40,7 +40,7 @@ def test_half_requests_hold_few_descriptors_and_the_page_answers_all_the_same(tm
     with ExitStack() as held:
         url = held.enter_context(page(tmp_path))
         many = [held.enter_context(half_a_request(url)) for _ in range(400)]
-        wait_for(lambda: sum(map(alive, many)) <= STRANGERS, "that only so many are left")
+        wait_for(lambda: sum(map(alive, many)) <= MAX_STRANGERS, "that only so many are left")
         assert alive(many[-1])
         token = {"Authorization": f"Bearer {urlsplit(url).fragment}"}
         assert (status(url, "GET", "/"), status(url, "POST", "/stop", **token)) == (200, 409)
@@ -51,8 +51,8 @@ def test_an_address_that_opens_many_loses_its_own_and_no_others(tmp_path: Path) 
     with ExitStack() as held:
         url = held.enter_context(page(tmp_path))
         other = held.enter_context(half_a_request(url, source="127.0.0.9"))
-        many = [held.enter_context(half_a_request(url)) for _ in range(2 * STRANGERS)]
-        wait_for(lambda: sum(map(alive, many)) < STRANGERS, "that only so many are left")
+        many = [held.enter_context(half_a_request(url)) for _ in range(2 * MAX_STRANGERS)]
+        wait_for(lambda: sum(map(alive, many)) < MAX_STRANGERS, "that only so many are left")
         assert alive(other)
 
 
@@ -64,8 +64,8 @@ def test_a_stream_with_the_token_outlives_any_number_of_strangers(tmp_path: Path
         operator = held.enter_context(open_request(url, "/events", token))
         operator.settimeout(PATIENCE_S)
         assert b" 200 " in operator.recv(4096)
-        many = [held.enter_context(half_a_request(url)) for _ in range(2 * STRANGERS + TRUSTED)]
-        wait_for(lambda: sum(map(alive, many)) <= STRANGERS, "that only so many are left")
+        many = [held.enter_context(half_a_request(url)) for _ in range(2 * MAX_STRANGERS + MAX_TRUSTED)]
+        wait_for(lambda: sum(map(alive, many)) <= MAX_STRANGERS, "that only so many are left")
         assert alive(operator)
 
 

@@ -134,8 +134,8 @@ def test_no_column_of_a_result_is_hidden_beside_its_previous_one_and_the_simulat
         "gyroscopes": {"lsm9ds1": true},
         "accelerometers": {},
     }
-    (tmp_path / TRUTH).write_text(json.dumps(document), encoding="utf-8")
-    six(*six_judged(tmp_path), DocumentWritten(tmp_path / TRUTH))
+    (tmp_path / TRUTH_FILE).write_text(json.dumps(document), encoding="utf-8")
+    six(*six_judged(tmp_path), DocumentWritten(tmp_path / TRUTH_FILE))
     wait_for(lambda: "E_n" in text(driver, "found"), "the comparison")
     driver.find_element(By.CSS_SELECTOR, "#found summary").send_keys(Keys.ENTER)
     wait_for(lambda: "simulated truth" in text(driver, "found"), "the truth")

@@ -18,7 +18,7 @@ from rig.commands.station.watch import read_last_words
 from rig.errors import Refused
 from rig.page.about import About
 from rig.page.page_state import PageState
-from rig.page.server.control import STOPPED, Control
+from rig.page.server.control import STOP_REASON, Control
 from rig.page.server.feed import Feed
 from rig.page.server.guard import Door
 from rig.page.server.serving import PageAddress, serving
@@ -224,7 +224,7 @@ def test_an_answer_counts_once_and_for_the_question_that_is_asked(tmp_path: Path
 def test_a_stop_interrupts_the_run_and_nothing_after_it(tmp_path: Path) -> None:
     control = Control(may_answer=False)
     with server(tmp_path, control) as asking:
-        with pytest.raises(KeyboardInterrupt, match=STOPPED), control.stoppable():
+        with pytest.raises(KeyboardInterrupt, match=STOP_REASON), control.stoppable():
             threading.Thread(target=asking, args=("POST", "/stop")).start()
             threading.Event().wait(PATIENCE_S)
         assert asking("POST", "/stop")[0] == 409

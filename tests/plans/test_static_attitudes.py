@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from rig.config.load import load
 from rig.config.models import ArmSection
-from rig.config.procedures.attitude_sets import EIGHTEEN, FACES
+from rig.config.procedures.attitude_sets import FACE_ATTITUDES, OPTIMAL_ATTITUDES
 from rig.config.procedures.procedure_sections import ImuSection, StaticAttitudesSection
 from rig.errors import Refused
 from rig.estimation.arrays import Array
@@ -57,7 +57,7 @@ def stands_where_it_came(made: Plan) -> bool:
 
 def test_every_attitude_is_held_once_with_base_shoulder_and_elbow_at_home() -> None:
     made = plan()
-    assert sorted(map(wrists_deg, made.dwells)) == sorted(EIGHTEEN)
+    assert sorted(map(wrists_deg, made.dwells)) == sorted(OPTIMAL_ATTITUDES)
     assert {dwell.q_rad[:3] for dwell in made.dwells} == {HOME[:3]}
     assert [dwell.index for dwell in made.dwells] == list(range(18))
     assert {(dwell.duration_s, dwell.settle_s) for dwell in made.dwells} == {(3.0, 5.0)}
@@ -76,7 +76,7 @@ def test_a_field_test_is_a_rest_at_home_before_and_after() -> None:
 
 def test_faces_are_held_by_their_name() -> None:
     made = plan(attitudes="faces", dwell_s=10, settle_s=2)
-    assert sorted(map(wrists_deg, made.dwells)) == sorted(FACES)
+    assert sorted(map(wrists_deg, made.dwells)) == sorted(FACE_ATTITUDES)
     assert (made.settling_s, sum(dwell.duration_s for dwell in made.dwells)) == (24, 120)
 
 
@@ -125,7 +125,7 @@ def test_one_attitude_has_a_way_too() -> None:
 
 
 def test_repeats_are_counted_on_and_what_is_done_is_left_out() -> None:
-    section = StaticAttitudesSection(attitudes=FACES, repeats=2)
+    section = StaticAttitudesSection(attitudes=FACE_ATTITUDES, repeats=2)
     whole = plan_static_attitudes(ARM, section)
     assert [dwell.index for dwell in whole.dwells] == list(range(24))
     assert [dwell.q_rad for dwell in whole.dwells[12:]] == [dwell.q_rad for dwell in whole.dwells[:12]]

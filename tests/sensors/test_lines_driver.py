@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel
 
 from rig.config.sensors.lines_section import (
-    GAP,
+    UNDETERMINED,
     LineAccelerationSection,
     LineFieldSection,
     LineRateSection,
@@ -105,7 +105,7 @@ def test_a_column_that_nothing_describes_is_refused(columns: Any, scalars: Any, 
 
 def units_of(section: type[BaseModel]) -> set[str]:
     """What the units that a section allows are units of."""
-    return {UNITS[unit].quantity for unit in get_args(section.model_fields["unit"].annotation) if unit != GAP}
+    return {UNITS[unit].quantity for unit in get_args(section.model_fields["unit"].annotation) if unit != UNDETERMINED}
 
 
 def test_every_unit_of_a_column_is_of_a_quantity_that_is_known() -> None:

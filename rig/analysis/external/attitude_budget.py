@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 
 from rig.analysis.external.attitude_equations import Equations
-from rig.data.entries.budget import IN_U
+from rig.data.entries.budget import INCLUDED_IN_U
 from rig.estimation.arrays import Array, scale_of
 from rig.estimation.external import increment_solution, placement
 from rig.estimation.gyroscope.budget import Budget, Contributor
@@ -20,13 +20,13 @@ from rig.estimation.reference.triaxial import TriaxialSolution
 
 CONTRIBUTOR_SOURCES: Mapping[str, tuple[Literal["A", "B"], str]] = {
     placement.NOISE: ("A", "scatter of the readings"),
-    placement.ATTITUDES: ("A", f"estimated from the residuals, {IN_U}"),
-    placement.PLACEMENTS: ("A", f"scatter of the placements beyond their attitudes, {IN_U}"),
+    placement.ATTITUDES: ("A", f"estimated from the residuals, {INCLUDED_IN_U}"),
+    placement.PLACEMENTS: ("A", f"scatter of the placements beyond their attitudes, {INCLUDED_IN_U}"),
     placement.CHANGE: ("A", "half of a change that the residuals show"),
-    increment_solution.DELAY: ("A", f"estimated, with the jitter of the stamps, {IN_U}"),
+    increment_solution.DELAY: ("A", f"estimated, with the jitter of the stamps, {INCLUDED_IN_U}"),
     increment_solution.EARTH_RATE: ("B", "its size, whichever way it points"),
-    increment_solution.AXES: ("B", f"inclinations that F imitates, {IN_U}"),
-    increment_solution.INTERVAL_DIFFERENCES: ("A", f"change of F and b with attitude and time, {IN_U}"),
+    increment_solution.AXES: ("B", f"inclinations that F imitates, {INCLUDED_IN_U}"),
+    increment_solution.INTERVAL_DIFFERENCES: ("A", f"change of F and b with attitude and time, {INCLUDED_IN_U}"),
 }
 
 
@@ -52,7 +52,7 @@ def budget_by_causes(matrix: Array, causes: Mapping[str, Array], noise_dof: floa
         if name == placement.NOISE and noise_dof is not None:
             dof = noise_dof
         elif name == placement.NOISE:
-            source = f"{source}, {IN_U}"
+            source = f"{source}, {INCLUDED_IN_U}"
         lines.append(
             Contributor(name, kind, "normal", None, "", source, dof, scale_and_bias_covariance(matrix, scale, cause))
         )

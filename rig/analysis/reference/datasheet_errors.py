@@ -7,7 +7,7 @@ import numpy as np
 
 from rig.analysis.reference.arm_patterns import Posture, list_arm_rotations
 from rig.config.judging.judging_keys import OfSensor
-from rig.data.entries.budget import IN_U
+from rig.data.entries.budget import INCLUDED_IN_U
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.settings import RunSettings, Uncertainty
 from rig.estimation.arrays import Array
@@ -178,7 +178,7 @@ def separate_sensor_errors(
     }
     stability = f"least Allan deviation: {datasheet.bias_instability_ug:.3g} µg"
     lines = [
-        Contributor(BIAS_DRIFT, "A", "normal", None, "", f"how the readings scatter, {IN_U}", np.inf, drift),
+        Contributor(BIAS_DRIFT, "A", "normal", None, "", f"how the readings scatter, {INCLUDED_IN_U}", np.inf, drift),
         Contributor(FLICKER, "B", "normal", None, "", stability, np.inf, flicker),
         *(
             Contributor(name, "B", "rectangular", half_width, unit, source, np.inf, spread.covariance_of(patterns))

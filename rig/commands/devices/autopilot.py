@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from rig.sensors.mavlink.autopilot_link import AutopilotLink
     from rig.sensors.mavlink.parameter_journal import ParameterChange
 
-BEYOND = {
+RISKS = {
     "gyroscope": "scale factors and axes of gyroscopes: no parameter holds them",
     "accelerometer": "axes and second order of accelerometers: no parameter holds them",
 }
@@ -76,7 +76,7 @@ def _store(options: Namespace) -> int:
         planned.keep()
         say(f"the old parameters are kept in {planned.backup}")
         _change(link, planned, "new")
-        for line in BEYOND.values():
+        for line in RISKS.values():
             say(f"not stored: {line}")
     return 0
 

@@ -39,8 +39,8 @@ from rig.station.plain_text import say
 if TYPE_CHECKING:
     from rig.runner.by_hand.on_board import CalibratedByBoard
 
-MOVES = range(8, 201)
-UNCHECKED = "the board's own result: its readings are not stored, so double precision cannot check it"
+MOVE_RANGE = range(8, 201)
+UNCHECKED_NOTE = "the board's own result: its readings are not stored, so double precision cannot check it"
 
 
 def hand(options: Namespace) -> int:
@@ -49,11 +49,11 @@ def hand(options: Namespace) -> int:
     Raise Refused `bad_option`, `no_such_sensor`, `not_confirmed`, `another_sensor`, `another_range`, and as
     `calibrate_by_board` and `read_kept_solution` do; Fault as `calibrate_by_board` does.
     """
-    if options.moves not in MOVES or not 0 < options.scale_std < 1:
+    if options.moves not in MOVE_RANGE or not 0 < options.scale_std < 1:
         raise Refused(
             "bad_option",
             f"--moves {options.moves} --scale-std {options.scale_std:g}",
-            f"Give {MOVES.start} to {MOVES.stop - 1} moves, and a standard uncertainty between 0 and 1",
+            f"Give {MOVE_RANGE.start} to {MOVE_RANGE.stop - 1} moves, and a standard uncertainty between 0 and 1",
         )
     if options.write:
         refuse_unless_answerable(options.yes)
@@ -87,7 +87,7 @@ def hand(options: Namespace) -> int:
             for line in _describe(name, by_board, calibration, scale_u):
                 say(line)
         if options.write:
-            unchecked = [f"  {UNCHECKED}"] if by_board.agreement is None else []
+            unchecked = [f"  {UNCHECKED_NOTE}"] if by_board.agreement is None else []
             require_agreement([f"On the board {board.identity.unique_id}: {name}", *unchecked], "store", options.yes)
             with changing():
                 if options.fetch:  # a record needs a configured sensor
@@ -183,7 +183,7 @@ def _describe(name: str, by_board: "CalibratedByBoard", calibration: Calibration
     yield f"  scale  {scale}, U (k = 2) {scale_u:.1e}, of which {2 * std:.1e} by this session"
     yield f"  bias   {bias} rad/s"
     if agreement is None:
-        yield f"  {UNCHECKED}"
+        yield f"  {UNCHECKED_NOTE}"
     else:
         yield (
             f"  double precision differs by {agreement.matrix_difference:.1e} of scale, "

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from rig.report.terminal.kvh_info import KvhInfo
     from rig.sensors.kvh1775.kvh_messages import Format
 
-LOOK_S = 1.0
-LEAST_MESSAGES = 3
+LISTEN_S = 1.0
+MIN_MESSAGES = 3
 
 
 def add(parser: ArgumentParser) -> None:
@@ -87,7 +87,7 @@ def _query_instrument(name: str, port: str, baud: int) -> "KvhInfo":
             info = replace(info, built_in_test=kvh.test().values.hex(" "))
             rate_hz = float(kvh.settings["DR"])
             kvh.start(Kvh1775Settings(rate_hz, cast("Format", kvh.settings["OUTPUTFMT"]), "rate"))
-            kvh.listen(LOOK_S + LEAST_MESSAGES / rate_hz)
+            kvh.listen(LISTEN_S + MIN_MESSAGES / rate_hz)
         except SensorError as error:
             info = replace(info, problem=str(error))
         if not batches:

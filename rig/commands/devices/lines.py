@@ -12,7 +12,7 @@ from rig.station.plain_text import say
 if TYPE_CHECKING:
     from rig.sensors.lines.guessed_section import StatedProperties
 
-SECONDS = (4.0, 6.0)
+DURATIONS_S = (4.0, 6.0)
 
 
 def add(parser: ArgumentParser) -> None:
@@ -24,7 +24,7 @@ def add(parser: ArgumentParser) -> None:
         "--seconds",
         type=float,
         nargs=2,
-        default=SECONDS,
+        default=DURATIONS_S,
         metavar=("STILL", "TURNED"),
         help="duration at rest, and of the turns that follow (default: 4 6)",
     )

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rig.commands.devices.configuration_writing import refuse_existing, write_checked
-from rig.commands.devices.lines import SECONDS, add_stated, ask_stated, look_at_device, positive_number
+from rig.commands.devices.lines import DURATIONS_S, add_stated, ask_stated, look_at_device, positive_number
 from rig.commands.devices.terminal_questions import ask, ask_choice
 from rig.errors import RigError
 from rig.station.plain_text import say
@@ -26,7 +26,7 @@ SOURCES: "Mapping[Source, str]" = {
     "autopilot": "the IMU of an autopilot (ArduPilot, PX4)",
     "kvh1775": "a KVH 1775 on its own port",
 }
-ANOTHER = "another"
+ANOTHER_PART = "another"
 
 
 def add(parser: ArgumentParser) -> None:
@@ -119,7 +119,7 @@ def _lines_answers(options: Namespace, port: str, *, by_hand: bool) -> dict[str,
     user_values = ask_stated(options, by_hand=by_hand)
     if ask_choice("Look at the device now?", "--listen", choices, options.listen) == "yes":
         try:
-            return {"sensors": look_at_device(port, None, "imu", SECONDS, user_values)}
+            return {"sensors": look_at_device(port, None, "imu", DURATIONS_S, user_values)}
         except RigError as error:
             say(f"{error}\nThe file contains an example in its place; `rig lines {port}` writes it later.", sys.stderr)
     stated_here = {key: getattr(user_values, key) for key in ("serial_number", "range_deg_s", "range_g")}
@@ -144,7 +144,7 @@ def _port(question: str, option: str, chosen_port: str | None) -> str:
             raise ValueError("; ".join(filter(None, [str(error), describe_ports()]))) from None
 
     if chosen_port is None and (ports := find_ports()):
-        choice = ask_choice(question, option, {**ports, ANOTHER: "another, or one that is not plugged in yet"})
-        if choice != ANOTHER:
+        choice = ask_choice(question, option, {**ports, ANOTHER_PART: "another, or one that is not plugged in yet"})
+        if choice != ANOTHER_PART:
             return choice
     return ask("port, such as /dev/ttyUSB0, COM3 or socket://host:port", option, valid, value=chosen_port)

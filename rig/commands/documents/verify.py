@@ -17,13 +17,13 @@ if TYPE_CHECKING:
 
 SIZE_MAX_BYTES = 256_000_000
 SCHEMA = "rig.verification/1"
-WRONG, NOT_TRUSTED = 1, 4
+ALTERED, UNTRUSTED = 1, 4
 # Problems of a file that is unchanged, but whose signer is not trusted.
 TRUST_PROBLEMS = {"not_signed", "signer_unknown", "signer_not_trusted"}
 STATUSES = (
     "exit status: 0 every file is valid: unchanged, and signed by a signer that --trust and --signer accept, or "
-    f"attached to such a file, or in the history that --history names; {WRONG} a file is not valid: altered, or "
-    f"the history contradicts it; {NOT_TRUSTED} no trusted signer has signed a file: not signed, signed by another, "
+    f"attached to such a file, or in the history that --history names; {ALTERED} a file is not valid: altered, or "
+    f"the history contradicts it; {UNTRUSTED} no trusted signer has signed a file: not signed, signed by another, "
     "or there is no --trust; 2 there is no answer: a file or the history cannot be read"
 )
 
@@ -89,7 +89,7 @@ def run(options: Namespace) -> int:
         for file in files:
             _print_file(file)
     problems = {problem.name for document in files for problem in document.problems}
-    return WRONG if problems - TRUST_PROBLEMS else NOT_TRUSTED if problems else 0
+    return ALTERED if problems - TRUST_PROBLEMS else UNTRUSTED if problems else 0
 
 
 def _read_content(file: Path) -> bytes:

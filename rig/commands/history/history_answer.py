@@ -17,12 +17,12 @@ T = TypeVar("T")
 
 # docs/how-to/finished-runs/shared-history.md promises the verdict within five seconds. A file uses this computer's
 # processors, so on a busy computer it is given longer.
-ANSWER_S = 4.0
+MAX_ANSWER_S = 4.0
 # Modules that are imported before the time starts, because the import alone is slow on a busy computer: for any
 # question, and to enter a run.
-TO_ASK = ("rig.history.store",)
-TO_ENTER = ("rig.history.entered.index", "rig.report.kinds.kind_registry", "rig.history.series", "scipy.special")
-TO_CONNECT = {
+QUESTION_MODULES = ("rig.history.store",)
+ENTRY_MODULES = ("rig.history.entered.index", "rig.report.kinds.kind_registry", "rig.history.series", "scipy.special")
+DRIVER_MODULES = {
     "file": ("sqlalchemy.dialects.sqlite.pysqlite",),
     "server": ("psycopg", "sqlalchemy.dialects.postgresql.psycopg"),
 }
@@ -34,12 +34,12 @@ def ask_history(address: "HistoryAddress", work: Callable[[], T], modules: Seque
     The history's modules, and `modules`, are imported before the time limit begins.
     """
     is_file = isinstance(address.where, Path)
-    for name in (*TO_ASK, *modules):
+    for name in (*QUESTION_MODULES, *modules):
         import_module(name)
     with suppress(ImportError):  # the history itself then names the missing extra
-        for name in TO_CONNECT["file" if is_file else "server"]:
+        for name in DRIVER_MODULES["file" if is_file else "server"]:
             import_module(name)
-    within_s = ANSWER_S * (load_factor() if is_file else 1.0)
+    within_s = MAX_ANSWER_S * (load_factor() if is_file else 1.0)
     try:
         return await_answer(work, within_s)
     except TimeoutError:

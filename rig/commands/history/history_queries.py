@@ -34,7 +34,7 @@ from rig.history.terminal.history_tables import (
 )
 from rig.station.plain_text import plain, say
 
-DISAGREE = 1
+DISAGREEMENT_STATUS = 1
 
 
 def list_calibrations(options: Namespace) -> int:
@@ -112,7 +112,7 @@ def rigs(options: Namespace) -> int:
     alarmed = any(chart.out_of_control for state in states for chart in state.charts.values() if chart.alarm.size)
     if options.json:
         print(json.dumps(rigs_document(states, rig_effects), indent=2, allow_nan=False))
-        return DISAGREE if alarmed else 0
+        return DISAGREEMENT_STATUS if alarmed else 0
     console = Console(highlight=False)
     if any(state.charts for state in states):
         console.print(states_table(states))
@@ -122,7 +122,7 @@ def rigs(options: Namespace) -> int:
         console.print(effects_table(rig_effects))
     else:
         console.print("no two rigs have calibrated the same sensors often enough to be compared")
-    return DISAGREE if alarmed else 0
+    return DISAGREEMENT_STATUS if alarmed else 0
 
 
 def import_runs(options: Namespace) -> int:
@@ -146,12 +146,12 @@ def import_runs(options: Namespace) -> int:
                 reason = f"its {PAGE} is not the one this version writes of its result, and was not entered"
                 say(f"{folder}: {reason}; rig report writes it again", sys.stderr)
     say(f"{new} entered, {existing} already there, {refused} refused")
-    return DISAGREE if refused else 0
+    return DISAGREEMENT_STATUS if refused else 0
 
 
 def verify(options: Namespace) -> int:
     """Compare rows with journal and results, and files with hashes; print differences; return 1 if there are any."""
-    from rig.history.integrity import STATES, WRONG, examine_history
+    from rig.history.integrity import STATES, WRONG_STATES, examine_history
 
     counts = dict.fromkeys(STATES, 0)
     with open_named_history(options) as history:
@@ -162,7 +162,7 @@ def verify(options: Namespace) -> int:
         end = history.head()
     say(f"journal: entry {end.number}, chained to all before by SHA-256 {end.sha256}")
     say(", ".join(f"{count} {state}" for state, count in counts.items()))
-    return DISAGREE if any(counts[state] for state in WRONG) else 0
+    return DISAGREEMENT_STATUS if any(counts[state] for state in WRONG_STATES) else 0
 
 
 def compare(options: Namespace) -> int:
@@ -268,7 +268,7 @@ def _recompute_finished(folder: Path, history: History, *, solve: bool) -> Finis
                 "Import the folder with its recordings",
             )
     from rig.history.entered.recomputed_result import not_given
-    from rig.history.integrity import MOST_TOLD
+    from rig.history.integrity import MAX_SHOWN
     from rig.plans.recorded_run import judge_phases, open_run
     from rig.report.document import document_of
 
@@ -277,10 +277,10 @@ def _recompute_finished(folder: Path, history: History, *, solve: bool) -> Finis
     if claimed is not None and not differing:
         return claimed
     if not solve:
-        more = f", and {len(differing) - MOST_TOLD} more" if len(differing) > MOST_TOLD else ""
+        more = f", and {len(differing) - MAX_SHOWN} more" if len(differing) > MAX_SHOWN else ""
         raise Refused(
             "result_not_of_recording",
-            f"the {RESULT} in {folder} does not agree with its recordings: {'; '.join(differing[:MOST_TOLD])}{more}",
+            f"the {RESULT} in {folder} does not agree with its recordings: {'; '.join(differing[:MAX_SHOWN])}{more}",
             "Enter the result of the recordings by `rig history import --solve DIR`; a result of an older "
             "version may differ too",
         )

@@ -31,8 +31,8 @@ from rig.history.recompute.selection import list_stated_results
 from rig.history.store import Selection
 from rig.station.plain_text import say
 
-CHANGED = 1
-MOST_SHOWN = 20  # lines on the terminal; the page has them all
+CHANGED_STATUS = 1
+MAX_LINES = 20  # on the terminal; the page has them all
 
 
 def recompute_history(options: Namespace, solve: Solve = solve_task) -> int:
@@ -66,7 +66,7 @@ def recompute_history(options: Namespace, solve: Solve = solve_task) -> int:
     _print(outcome, out)
     if lost is not None:
         raise lost
-    return 0 if outcome.same else CHANGED
+    return 0 if outcome.same else CHANGED_STATUS
 
 
 def _question(options: Namespace) -> RecomputeQuestion:
@@ -146,10 +146,10 @@ def _track_progress(answers_by_task: Iterable[SolvedTask], total: int) -> Iterab
 
 def _print(outcome: RecomputeOutcome, out: Path) -> None:
     if outcome.notable:
-        Console(highlight=False).print(notable_table(outcome, MOST_SHOWN))
+        Console(highlight=False).print(notable_table(outcome, MAX_LINES))
     count = sum(max(1, len(row.stated.calibrations)) for row in outcome.notable)
-    if count > MOST_SHOWN:
-        say(f"and {count - MOST_SHOWN} more in {out / PAGE}")
+    if count > MAX_LINES:
+        say(f"and {count - MAX_LINES} more in {out / PAGE}")
     for line in counts(outcome):
         say(line)
     for name in (CSV, PAGE):

@@ -12,8 +12,8 @@ from rig.history.entered.finished_run import EnteredRecording, recording_of
 from rig.history.recompute.result_comparison import Answer, RecomputedResult, State, Unsolved
 
 # Refusals that do not judge a recording: it has no such setting or estimator, or this computer cannot solve it.
-UNJUDGED = ("unknown_setting", "wrong_setting", "unknown_estimator")
-NOT_HERE = ("missing_extra", "another_script", "no_script", "not_a_script", "script_failed", "temporary_folder_full")
+NO_JUDGEMENT = ("unknown_setting", "wrong_setting", "unknown_estimator")
+LOCAL_ONLY = ("missing_extra", "another_script", "no_script", "not_a_script", "script_failed", "temporary_folder_full")
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +81,7 @@ def _solve(folder: Path, task: Task) -> Answer:
     try:
         outcome = judge_phases(recorded.override_settings(task.overrides), task.estimator)
     except RigError as error:
-        state: State = "unjudged" if error.name in UNJUDGED else "failed" if error.name in NOT_HERE else "refused"
+        state: State = "unjudged" if error.name in NO_JUDGEMENT else "failed" if error.name in LOCAL_ONLY else "refused"
         return Unsolved(state, f"{folder}: {error}")
     document = document_of(outcome)
     return RecomputedResult(

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rig.commands.history.history_answer import TO_ENTER, ask_history, explain_failure
+from rig.commands.history.history_answer import ENTRY_MODULES, ask_history, explain_failure
 from rig.errors import RigError
 from rig.station.events import NotRemembered, Remembered, RunEvent, Since
 
@@ -58,7 +58,7 @@ def _enter_run(
             return None, ()
         label = address.label
         run = read_finished_run(folder)
-        numbers, comparisons = ask_history(address, lambda: _enter(address, run), TO_ENTER)
+        numbers, comparisons = ask_history(address, lambda: _enter(address, run), ENTRY_MODULES)
     except Exception as error:  # whatever it is, the run is finished and its result is written
         return NotRemembered(folder, f"{label}: {explain_failure(error)}"), ()
     return Remembered(label, numbers, tuple(map(_since_event, comparisons)), usual=_is_usual(address)), comparisons

@@ -22,9 +22,9 @@ from rig.history.recompute.result_comparison import Answer, Unsolved
 if TYPE_CHECKING:
     from distributed import Client
 
-LOOK_S = 1.0  # between two polls of a cluster that does not answer
-WITHOUT_WORKERS_S = 30.0  # time to start new ones
-AHEAD = 2  # recordings per thread of a cluster: one in progress, and one that waits
+POLL_S = 1.0  # of a cluster that does not answer
+NEW_WORKERS_S = 30.0  # time to start new ones
+THREAD_RECORDINGS = 2  # for each thread of a cluster: one in progress, and one that waits
 
 Solve = Callable[[Task], Answer]
 SolvedTask = tuple[Task, Answer]
@@ -99,7 +99,7 @@ class Processes(AbstractContextManager["Processes"]):
 
     def answers(self) -> Iterator[SolvedTask]:
         """Yield the answers that have arrived; a process that died is replaced by a new one."""
-        for future in wait(self._in_hand, timeout=LOOK_S, return_when=FIRST_COMPLETED).done:
+        for future in wait(self._in_hand, timeout=POLL_S, return_when=FIRST_COMPLETED).done:
             task, pool = self._in_hand.pop(future)
             dead = isinstance(future.exception(), BrokenProcessPool)
             self._idle.append(_new_process() if dead else pool)
@@ -137,9 +137,9 @@ class Cluster:
         threads, now_s = sum(self.threads().values()), time.monotonic()
         if threads:
             self._seen_s = now_s
-        elif now_s - self._seen_s > WITHOUT_WORKERS_S:
-            raise _cluster_lost(f"the scheduler has had no worker for {WITHOUT_WORKERS_S:g} s")
-        return max(0, AHEAD * threads - len(self._in_hand))
+        elif now_s - self._seen_s > NEW_WORKERS_S:
+            raise _cluster_lost(f"the scheduler has had no worker for {NEW_WORKERS_S:g} s")
+        return max(0, THREAD_RECORDINGS * threads - len(self._in_hand))
 
     def give(self, solve: Solve, task: Task) -> None:
         """Give the task to a worker that the scheduler chooses."""
@@ -150,7 +150,7 @@ class Cluster:
     def answers(self) -> Iterator[SolvedTask]:
         """Wait a moment for an answer, and yield one that arrives."""
         try:
-            future = self._done.get(timeout=LOOK_S)
+            future = self._done.get(timeout=POLL_S)
         except Empty:
             return
         del self._futures[future.key]

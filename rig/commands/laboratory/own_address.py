@@ -15,7 +15,7 @@ from rig.errors import Refused
 from rig.station.plain_text import say
 
 ARM_PORT = 30004  # a port at which every controller listens, whoever started it
-CANDIDATES = 250
+MAX_CANDIDATES = 250
 
 
 @contextmanager
@@ -51,8 +51,8 @@ def load_at_own_address(path: Path, overrides: Sequence[str]) -> Iterator[Loaded
 def _candidate_addresses() -> Iterator[str]:
     """Yield loopback addresses, in a different order for every process."""
     process = os.getpid()
-    for number in range(CANDIDATES):
-        yield f"127.0.{1 + process // CANDIDATES % CANDIDATES}.{2 + (process + number) % CANDIDATES}"
+    for number in range(MAX_CANDIDATES):
+        yield f"127.0.{1 + process // MAX_CANDIDATES % MAX_CANDIDATES}.{2 + (process + number) % MAX_CANDIDATES}"
 
 
 def _take_if_free(host: str, stack: ExitStack) -> bool:

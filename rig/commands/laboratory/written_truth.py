@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rig.commands.laboratory.laboratory_process import send_request
-from rig.data.run_folder import TRUTH
+from rig.data.run_folder import TRUTH_FILE
 from rig.station.events import DocumentWritten
 from rig.turners.turner_registry import kind_of
 
@@ -28,7 +28,7 @@ def write_truth(
     windows = _windows(outcome, follows_arm=kind_of(loaded.config.turner).name == "ur")
     with suppress(OSError, ValueError):  # the laboratory is gone: the run needs no truth
         if send_request(control, {"do": "write_truth", "windows": windows}).get("ok"):
-            yield DocumentWritten(written.replace(folder / TRUTH))
+            yield DocumentWritten(written.replace(folder / TRUTH_FILE))
 
 
 def _windows(outcome: "Outcome", *, follows_arm: bool) -> dict[str, Any]:

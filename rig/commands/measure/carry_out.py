@@ -14,7 +14,7 @@ from rig.commands.laboratory.simulated_operator import OperatorListener
 from rig.commands.laboratory.written_truth import write_truth
 from rig.commands.page_arguments import PageWish, serve_operators_page
 from rig.commands.standard_streams import say_where_the_result_is
-from rig.data.run_folder import CONFIG, LOG, RESULT, TRUTH, WORLD_LATE, recordings
+from rig.data.run_folder import CONFIG, LATENESS_FILE, LOG, RESULT, TRUTH_FILE, recordings
 from rig.report.document import document_of
 from rig.report.simulated_truth import truth_lines, truth_rows
 from rig.report.terminal.result_table import print_kept
@@ -56,15 +56,15 @@ def carry_out(
                 if configured.loaded.simulated:
                     # In a resumed run, the windows of the first part belong to the clock of an earlier laboratory.
                     resumed = bool(recordings(folder, "raw"))
-                    (folder / TRUTH).unlink(missing_ok=True)
+                    (folder / TRUTH_FILE).unlink(missing_ok=True)
                     control = stack.enter_context(
-                        run_simulated_laboratory(configured.loaded.text, folder / WORLD_LATE, folder / TRUTH)
+                        run_simulated_laboratory(configured.loaded.text, folder / LATENESS_FILE, folder / TRUTH_FILE)
                     )
                     station.mount = make_mounter(control)
                     station.listeners = (*station.listeners, OperatorListener(control))
             outcome = run.carry_out(configured.phase)
             if control is not None and not resumed:
-                for event in write_truth(control, folder / TRUTH, folder, configured.loaded, outcome):
+                for event in write_truth(control, folder / TRUTH_FILE, folder, configured.loaded, outcome):
                     station.event(event)
             try:
                 entered, comparisons = remember(folder, configured.loaded.config.history)

@@ -7,10 +7,10 @@ from argparse import ArgumentParser
 from collections.abc import Callable
 from pathlib import Path
 
-from rig.errors import INTERRUPTED, Fault, RigError
+from rig.errors import INTERRUPTED_STATUS, Fault, RigError
 from rig.station.plain_text import say
 
-PATIENCE_S = 60.0
+MAX_WAIT_S = 60.0
 
 
 def add_notice(parser: ArgumentParser) -> None:
@@ -38,7 +38,7 @@ def notify_after(command: str | None, folder: Path, work: Callable[[], int]) -> 
         status = error.exit_status
         raise
     except KeyboardInterrupt:
-        status = INTERRUPTED
+        status = INTERRUPTED_STATUS
         raise
     finally:
         _notify(command, folder, status)
@@ -49,7 +49,7 @@ def _notify(command: str, folder: Path, status: int) -> None:
     environment = {**os.environ, "RIG_RUN": str(folder.resolve()), "RIG_STATUS": str(status)}
     try:
         # Its output is not a result, so it goes to stderr like the run's progress.
-        done = subprocess.run(command, shell=True, env=environment, timeout=PATIENCE_S, check=False, stdout=2)
+        done = subprocess.run(command, shell=True, env=environment, timeout=MAX_WAIT_S, check=False, stdout=2)
         why = f"it ended with status {done.returncode}" if done.returncode else None
     except (OSError, ValueError, subprocess.TimeoutExpired) as error:
         why = str(error)

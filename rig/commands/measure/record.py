@@ -11,7 +11,7 @@ from rig.commands.laboratory.laboratory_process import run_simulated_laboratory
 from rig.errors import Refused
 from rig.station.plain_text import say
 
-NO_CRYSTAL = (
+NO_CRYSTAL_REMEDY = (
     "The board's clock does not follow its crystal: these times may be 1 % wrong. Another clock can correct them "
     "(rig solve --attitudes FILE --estimate-clock-offset); rig solve --turns cannot use them"
 )
@@ -47,6 +47,6 @@ def run(options: Namespace) -> int:
     for path, recording in recordings.items():
         say(f"{path}: {recording.summary.samples} samples, {recording.summary.lost} lost")
     if any(recording.follows_crystal is False for recording in recordings.values()):
-        say(NO_CRYSTAL, file=sys.stderr)
+        say(NO_CRYSTAL_REMEDY, file=sys.stderr)
     say(f"If they were at rest: rig allan {shlex.quote(str(options.out))}", file=sys.stderr)
     return 0

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from rig.analysis.design.candidate_search import Planned, TargetUncertainty
 
 # The names on the command line, and those of `rig.analysis.design.candidate_search.TargetUncertainty`.
-NAMES = {
+TARGETS = {
     "scale": "scale",
     "bias": "bias_rad_s",
     "acceleration_scale": "acceleration_scale",
@@ -78,13 +78,13 @@ def parse_target(options: Sequence[str], at_most_s: float | None) -> "TargetUnce
             uncertainties[name] = float(value)
         except ValueError:
             raise Refused("bad_option", f"--target-uncertainty {option} is not a number", EXAMPLE) from None
-        if name not in NAMES or not 0 < uncertainties[name] < inf:
-            raise Refused("bad_option", f"--target-uncertainty {option} is not one of {', '.join(NAMES)}", EXAMPLE)
+        if name not in TARGETS or not 0 < uncertainties[name] < inf:
+            raise Refused("bad_option", f"--target-uncertainty {option} is not one of {', '.join(TARGETS)}", EXAMPLE)
     if not uncertainties:
         raise Refused("bad_option", "--max-duration-s and --write are for a run with --target-uncertainty", EXAMPLE)
     if at_most_s is not None and not (isfinite(at_most_s) and at_most_s > 0):
         raise Refused("bad_option", f"--max-duration-s is {at_most_s:g}", "Give a time above 0, in seconds")
-    wanted = {NAMES[name]: size for name, size in uncertainties.items()}
+    wanted = {TARGETS[name]: size for name, size in uncertainties.items()}
     return TargetUncertainty(**wanted, at_most_s=inf if at_most_s is None else at_most_s)
 
 
@@ -99,7 +99,7 @@ def _write(options: Namespace, best: "Planned") -> None:
     overrides = [f"procedure.{key}={json.dumps(value)}" for key, value in changed.items()]
     loaded = load_configured(options.config, [*options.overrides, *overrides]).loaded
     reached = best.reached
-    predicted = ", ".join(f"{name} {size:.3g}" for name, key in NAMES.items() if (size := getattr(reached, key)) > 0)
+    predicted = ", ".join(f"{name} {size:.3g}" for name, key in TARGETS.items() if (size := getattr(reached, key)) > 0)
     predicted = f"{best.candidate.duration_s:.1f} s, U: {predicted} (SI units)"
     comment = f"# Made by rig plan --target-uncertainty. Predicted: {predicted}.\n"
     try:

@@ -9,7 +9,7 @@ from rig.commands.offline import solve_external
 from rig.errors import Refused
 from rig.station.plain_text import say, say_on_terminal
 
-SAMPLES = {".csv", ".tsv", ".txt", ".ulg", ".db3", ".mcap"}  # suffixes of files that are no recordings of the rig
+SAMPLE_SUFFIXES = {".csv", ".tsv", ".txt", ".ulg", ".db3", ".mcap"}  # of files that are no recordings of the rig
 
 
 def add(solve: ArgumentParser) -> None:
@@ -71,7 +71,7 @@ def run(options: Namespace) -> int:
 
 def _refuse_samples(path: Path) -> None:
     """Raise Refused `bad_option` for a file of samples without an option that gives the sensor's motion."""
-    if path.is_file() and path.suffix.lower() in SAMPLES:
+    if path.is_file() and path.suffix.lower() in SAMPLE_SUFFIXES:
         raise Refused(
             "bad_option",
             f"{path} holds samples, but no option states how the sensor was turned",

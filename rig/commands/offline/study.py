@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from rig.study.study_catalogue import StudyEntry
     from rig.study.study_report import StudyFinding
 
-SHOWN_FROM_S = 5.0
+MIN_SHOWN_S = 5.0
 
 
 def add(parser: ArgumentParser) -> None:
@@ -117,7 +117,7 @@ def _report_progress(jobs: int, results: Iterable[Any], total: int) -> Iterable[
     progress = track(results, total=total, description="study", console=console, disable=not console.is_terminal)
     for number, result in enumerate(progress):
         remaining_s = (time.monotonic() - began_s) * (total - 1) / jobs
-        if number == 0 and remaining_s > SHOWN_FROM_S:
+        if number == 0 and remaining_s > MIN_SHOWN_S:
             console.print(f"{total} parts, about {duration_words(remaining_s)} to go")
         yield result
 

@@ -26,7 +26,7 @@ from rig.commands.laboratory.written_truth import write_truth
 from rig.commands.page_arguments import Answer
 from rig.config.models import RigConfig
 from rig.data.result_file import read_result
-from rig.data.run_folder import ARM_LOG, CONFIG, LOG, RESULT, TRUTH, WORLD_LATE, discard, new_folder
+from rig.data.run_folder import ARM_LOG, CONFIG, LATENESS_FILE, LOG, RESULT, TRUTH_FILE, discard, new_folder
 from rig.data.user_texts import note_own
 from rig.errors import Fault, Refused
 from rig.report.certificate.content import certificate_of
@@ -200,7 +200,7 @@ class RigBench:
 
         A run begun in another laboratory, on another clock, is not compared.
         """
-        (folder / TRUTH).unlink(missing_ok=True)
+        (folder / TRUTH_FILE).unlink(missing_ok=True)
         if self.control is None or folder not in self.begun:
             return ""
         for event in write_truth(self.control, self.truth_file, folder, configured.loaded, outcome):
@@ -235,13 +235,13 @@ def open_bench(configured: Configured, folder: Path, station: BatchSettings) -> 
         control = None
         if configured.loaded.simulated:
             control = stack.enter_context(
-                run_simulated_laboratory(configured.loaded.text, folder / WORLD_LATE, folder / TRUTH)
+                run_simulated_laboratory(configured.loaded.text, folder / LATENESS_FILE, folder / TRUTH_FILE)
             )
         connect = partial(kind_of(config.turner).connect, config.turner)
         ahead = Ahead(connect, folder / ARM_LOG)
         stack.callback(ahead.close)
         ahead.begin()
-        yield RigBench(configured, control, station, ahead, folder / TRUTH)
+        yield RigBench(configured, control, station, ahead, folder / TRUTH_FILE)
 
 
 def refuse_other_sensors(config: RigConfig) -> None:

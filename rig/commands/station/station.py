@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from rig.config.models import RigConfig
     from rig.station.questions import Voice
 
-M_ARENA_MAX = -8  # malloc.h
+MALLOPT_ARENA_MAX = -8  # malloc.h
 
 
 def add(parser: ArgumentParser) -> None:
@@ -161,4 +161,4 @@ def keep_to_one_arena() -> None:
 
         mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
         if mallopt is not None:
-            mallopt(M_ARENA_MAX, 1)
+            mallopt(MALLOPT_ARENA_MAX, 1)

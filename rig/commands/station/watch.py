@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from rig.page.server.feed import Feed
     from rig.station.events import RunEvent
 
-LOG_TAIL = 3  # lines of the log that show how a run without a result ended
-LARGEST_LOG = 50_000_000  # bytes
+LOG_TAIL_LINES = 3  # they show how a run without a result ended
+MAX_LOG_BYTES = 50_000_000
 
 
 def add(parser: ArgumentParser) -> None:
@@ -114,7 +114,7 @@ def _replay(recorded: "Iterator[Moment]", feed: "Feed", speed: float) -> None:
 
 
 def _read_ending(folder: Path, result: "ResultDocument | None") -> "Iterator[RunEvent]":
-    from rig.data.run_folder import CERTIFICATE, RESULT, TRUTH
+    from rig.data.run_folder import CERTIFICATE, RESULT, TRUTH_FILE
     from rig.page.replay import end_events
     from rig.station.events import DocumentWritten, Interrupted
 
@@ -124,8 +124,8 @@ def _read_ending(folder: Path, result: "ResultDocument | None") -> "Iterator[Run
         yield Interrupted(read_last_words(folder))
         return
     yield DocumentWritten(folder / RESULT)
-    if (folder / TRUTH).is_file():
-        yield DocumentWritten(folder / TRUTH)
+    if (folder / TRUTH_FILE).is_file():
+        yield DocumentWritten(folder / TRUTH_FILE)
     yield from end_events(result)
 
 
@@ -134,9 +134,9 @@ def read_last_words(folder: Path) -> str:
     from rig.data.run_folder import LOG
 
     try:
-        log = read_regular_file(folder / LOG, LARGEST_LOG, follow_links=False)
+        log = read_regular_file(folder / LOG, MAX_LOG_BYTES, follow_links=False)
     except (OSError, UnfitFile):
         log = b""
     lines = log.decode("utf-8", errors="replace").splitlines()
     messages = [line.partition(" INFO ")[2] for line in lines if " INFO " in line]
-    return "; ".join(["this run has no result", *messages[-LOG_TAIL:][-1:]])
+    return "; ".join(["this run has no result", *messages[-LOG_TAIL_LINES:][-1:]])

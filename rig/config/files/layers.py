@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rig.config.files.yaml_text import DEPTH_MAX, Location, Unreadable, first_control_character, read_file, read_yaml
+from rig.config.files.yaml_text import MAX_DEPTH, Location, Unreadable, first_control_character, read_file, read_yaml
 from rig.errors.quoting import quote, shorten
 
-BASE = "base"
+BASE_KEY = "base"
 SET = "--set"
-FILES_MAX = 8  # files based on one another
+MAX_FILES = 8  # files based on one another
 
 Places = Mapping[Location, str]  # position of each key, in words: "line 3", "demo.yaml, line 3", "--set"
 
@@ -80,8 +80,8 @@ def _layers(text: str, path: Path | None) -> Iterator[_Layer]:
     """Yield a file, then the files that it is based on."""
     layer, names = _layer(text, ""), ["this file"]
     files = []
-    while BASE in layer.data:
-        where, wanted = f"{BASE} ({layer.places[(BASE,)]})", layer.data.pop(BASE)
+    while BASE_KEY in layer.data:
+        where, wanted = f"{BASE_KEY} ({layer.places[(BASE_KEY,)]})", layer.data.pop(BASE_KEY)
         yield layer
         if path is None:
             raise Unreadable(f"{where}: only a file can build on another")
@@ -96,8 +96,8 @@ def _layers(text: str, path: Path | None) -> Iterator[_Layer]:
             raise Unreadable(f"{where}: {shorten(wanted)} {error.why}") from None
         if path.resolve() in files:
             raise Unreadable(f"{where}: the files build on one another in a circle: {' → '.join(names)}")
-        if len(files) == FILES_MAX:
-            raise Unreadable(f"{where}: more than {FILES_MAX} files one on another: {' → '.join(names)}")
+        if len(files) == MAX_FILES:
+            raise Unreadable(f"{where}: more than {MAX_FILES} files one on another: {' → '.join(names)}")
         layer = _layer(text, shorten(wanted))
     yield layer
 
@@ -131,11 +131,11 @@ def _override(
         yield f"{what}: holds a control character"
         return
     *parents, last = location = tuple(path.split("."))
-    if len(location) > DEPTH_MAX:
-        yield f"{what}: more than {DEPTH_MAX} sections within one another"
+    if len(location) > MAX_DEPTH:
+        yield f"{what}: more than {MAX_DEPTH} sections within one another"
         return
-    if location[0] == BASE:
-        yield f"{what}: {BASE} can only be given in the file"
+    if location[0] == BASE_KEY:
+        yield f"{what}: {BASE_KEY} can only be given in the file"
         return
     try:
         parsed = read_yaml(value)

@@ -8,10 +8,10 @@ from contextvars import ContextVar
 from pathlib import Path
 from typing import BinaryIO
 
-PART = ".part"
+PART_SUFFIX = ".part"
 # Temporary files by their final paths.
 _held_back: ContextVar[dict[Path, Path] | None] = ContextVar("held_back", default=None)
-NO_LINK = getattr(os, "O_NOFOLLOW", 0)
+NO_FOLLOW_FLAG = getattr(os, "O_NOFOLLOW", 0)
 
 
 @contextmanager
@@ -41,7 +41,7 @@ def new_file(path: Path) -> Iterator[BinaryIO]:
     Within `replace_together` this happens at the end of that block. If `path` is a link, the link is replaced, not its
     target. Raise OSError as writing does, also if another process creates a file of that name meanwhile.
     """
-    part = path.with_name(path.name + PART)
+    part = path.with_name(path.name + PART_SUFFIX)
     part.unlink(missing_ok=True)
     try:
         with open(part, "xb", opener=_open_without_links) as file:
@@ -66,7 +66,7 @@ def write_new(path: Path, content: bytes | str) -> None:
 
 def open_to_append(path: str | Path) -> int:
     """Open a regular file to append to it, or create it; return its descriptor. Raise OSError."""
-    flags = os.O_WRONLY | os.O_CREAT | os.O_APPEND | NO_LINK | getattr(os, "O_NONBLOCK", 0)
+    flags = os.O_WRONLY | os.O_CREAT | os.O_APPEND | NO_FOLLOW_FLAG | getattr(os, "O_NONBLOCK", 0)
     descriptor = os.open(path, flags, 0o666)
     if not stat.S_ISREG(os.fstat(descriptor).st_mode):
         os.close(descriptor)
@@ -75,4 +75,4 @@ def open_to_append(path: str | Path) -> int:
 
 
 def _open_without_links(path: str, flags: int) -> int:
-    return os.open(path, flags | NO_LINK, 0o666)
+    return os.open(path, flags | NO_FOLLOW_FLAG, 0o666)

@@ -16,22 +16,22 @@ from rig.errors.quoting import printable, quote, shorten
 
 Location = tuple[int | str, ...]
 
-SIZE_MAX_BYTES = 65_536  # the longest configuration shipped has 2,500
-NODES_MAX = 5_000  # keys and values; an alias counts as often as the nodes it stands for
-DEPTH_MAX = 16  # sections within sections
-NUMBER_MAX_CHARACTERS = 40
+MAX_BYTES = 65_536  # the longest configuration shipped has 2,500
+MAX_NODES = 5_000  # keys and values; an alias counts as often as the nodes it stands for
+MAX_DEPTH = 16  # sections within sections
+MAX_NUMBER_CHARACTERS = 40
 
-NUMBERS = ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float")
-TEXT = "tag:yaml.org,2002:str"
-NOTHING = "tag:yaml.org,2002:null"
-MERGE = "tag:yaml.org,2002:merge"
+NUMBER_TAGS = ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float")
+TEXT_TAG = "tag:yaml.org,2002:str"
+NULL_TAG = "tag:yaml.org,2002:null"
+MERGE_TAG = "tag:yaml.org,2002:merge"
 OTHER_FILES = {  # files given for a configuration by mistake, and where they belong
     ".py": "a Python script, not a configuration; run a procedure of your own with `rig run CONFIG --script FILE.py`",
     ".h5": "a recording, not a configuration; solve it with `rig solve FILE.h5`",
     ".csv": "a table of readings, not a configuration; `rig look FILE.csv` says how to solve it",
 }
 # Invisible characters: control, format, surrogates, breaks of lines and paragraphs.
-UNSEEN = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})
+INVISIBLE_CATEGORIES = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})
 
 
 class Unreadable(Exception):
@@ -57,15 +57,15 @@ class Document:
 
 def first_control_character(text: str) -> str | None:
     """Return the first control character (escape, carriage return, text direction …), or None."""
-    return next((character for character in text if unicodedata.category(character) in UNSEEN), None)
+    return next((character for character in text if unicodedata.category(character) in INVISIBLE_CATEGORIES), None)
 
 
 def read_file(path: Path) -> str:
-    """Read the text of a regular file of at most `SIZE_MAX_BYTES`. Raise `Unreadable`."""
+    """Read the text of a regular file of at most `MAX_BYTES`. Raise `Unreadable`."""
     if path.suffix in OTHER_FILES and path.is_file():
         raise Unreadable(f"is {OTHER_FILES[path.suffix]}")
     try:
-        content = read_regular_file(path, SIZE_MAX_BYTES)
+        content = read_regular_file(path, MAX_BYTES)
     except UnfitFile as unfit:
         raise Unreadable(f"cannot be read: {unfit}") from None
     except OSError as error:
@@ -78,8 +78,8 @@ def read_file(path: Path) -> str:
 
 def read_yaml(text: str) -> Document:
     """Parse one YAML document. Raise `Unreadable`."""
-    if len(text) > SIZE_MAX_BYTES:
-        raise Unreadable(f"is longer than {SIZE_MAX_BYTES} characters, so it is not a configuration")
+    if len(text) > MAX_BYTES:
+        raise Unreadable(f"is longer than {MAX_BYTES} characters, so it is not a configuration")
     for number, line in enumerate(text.split("\n"), 1):
         if (character := first_control_character(line.rstrip("\r").replace("\t", " "))) is not None:
             raise Unreadable(f"holds the control character {printable(character)}", number)
@@ -128,8 +128,8 @@ class _Loader(yaml.SafeLoader):
             return super().compose_node(parent, index)
         if getattr(event, "tag", None) is not None:
             raise _refusal(f"{shorten(event.tag)}: tags are not used in a configuration", event.start_mark)
-        if self._depth == DEPTH_MAX:
-            raise _refusal(f"more than {DEPTH_MAX} sections or lists within one another", event.start_mark)
+        if self._depth == MAX_DEPTH:
+            raise _refusal(f"more than {MAX_DEPTH} sections or lists within one another", event.start_mark)
         before = self._nodes
         self._count(1, event.start_mark)
         self._depth += 1
@@ -141,11 +141,11 @@ class _Loader(yaml.SafeLoader):
 
     def _count(self, nodes: int, mark: Any) -> None:
         self._nodes += nodes
-        if self._nodes > NODES_MAX:
-            raise _refusal(f"more than {NODES_MAX} keys and values", mark)
+        if self._nodes > MAX_NODES:
+            raise _refusal(f"more than {MAX_NODES} keys and values", mark)
 
     def construct_object(self, node: yaml.Node, deep: bool = False) -> Any:
-        if node.tag in NUMBERS and len(node.value) > NUMBER_MAX_CHARACTERS:
+        if node.tag in NUMBER_TAGS and len(node.value) > MAX_NUMBER_CHARACTERS:
             raise _refusal(f"{shorten(node.value)} is too long for a number", node.start_mark)
         try:
             return super().construct_object(node, deep)
@@ -167,7 +167,7 @@ def _survey(
     if isinstance(node, yaml.MappingNode):
         for key, value in node.value:
             line = key.start_mark.line + 1
-            if key.tag not in (TEXT, MERGE):
+            if key.tag not in (TEXT_TAG, MERGE_TAG):
                 yield f"{format_path(location)} (line {line}): the key {quote(key.value)} is not a word; quote it"
                 continue
             path = (*location, key.value)
@@ -180,7 +180,7 @@ def _survey(
         for index, value in enumerate(node.value):
             yield from _survey(value, (*location, index), lines, written)
     elif isinstance(node, yaml.ScalarNode):
-        if node.tag not in (TEXT, NOTHING):
+        if node.tag not in (TEXT_TAG, NULL_TAG):
             written[location] = node.value
         yield from _visible(node, location)
 

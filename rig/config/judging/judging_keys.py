@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from rig.config.section import Positive, Ratio, no_number_is_true
 
-JUDGES = ConfigDict(frozen=True, allow_inf_nan=False, defer_build=True)
+JUDGING_MODEL = ConfigDict(frozen=True, allow_inf_nan=False, defer_build=True)
 NonNegative = Annotated[float, Field(ge=0)]
 DecisionRule = Literal["simple", "guard_band"]
 OfSensor = Literal[
@@ -26,7 +26,7 @@ OfSensor = Literal[
     "acceleration_scale_ppm_k",
     "acceleration_bias_instability_ug",
 ]
-OF_SENSORS: tuple[OfSensor, ...] = get_args(OfSensor)
+SENSOR_KEYS: tuple[OfSensor, ...] = get_args(OfSensor)
 # A size that a configuration states for all sensors, and a recording for each by its name.
 OfSensors = TypeVar("OfSensors")
 
@@ -39,7 +39,7 @@ def _part_default_key(what: str) -> Any:
 class ObservationKeys(BaseModel):
     """The requirements on a revolution to be averaged: the keys of the section `observation`."""
 
-    model_config = JUDGES
+    model_config = JUDGING_MODEL
 
     max_lost_fraction: Ratio = Field(
         default=0.001, ge=0, lt=1, description="fraction of a sweep's samples that may be missing"
@@ -62,7 +62,7 @@ class ObservationKeys(BaseModel):
 class UncertaintyKeys(BaseModel, Generic[OfSensors]):
     """The stated sizes of errors: the keys of the section `uncertainty`, without those of each sensor (`OfSensors`)."""
 
-    model_config = JUDGES
+    model_config = JUDGING_MODEL
 
     controller_clock_ppm: Positive = Field(
         default=50.0, description="error of the arm controller's clock, which its maker does not state"

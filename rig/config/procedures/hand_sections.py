@@ -7,8 +7,8 @@ from pydantic import Field
 from rig.config.models import ProcedureSection, RigConfig, TurnerSection
 from rig.config.section import Ratio, WholeNumber
 
-LEAST_RATE_HZ = 50.0  # lowest rate of readings that follow a hand, whose tremor is at 6 to 12 Hz
-STAMPED_THERE = ("lines", "mavlink")  # parts with a port of their own, whose device states the time of a sample
+MIN_RATE_HZ = 50.0  # of readings that follow a hand, whose tremor is at 6 to 12 Hz
+SELF_STAMPED_PARTS = ("lines", "mavlink")  # with a port of their own, whose device states the time of a sample
 
 
 class HandSection(TurnerSection):
@@ -64,7 +64,7 @@ class ByHandSection(ProcedureSection):
                 "of an Arduino Uno"
             )
         for name, sensor in config.sensors.items():
-            if not sensor.on_board and sensor.part not in STAMPED_THERE:
+            if not sensor.on_board and sensor.part not in SELF_STAMPED_PARTS:
                 yield f"sensors.{name}: a {sensor.part} is not calibrated by hand"
             elif sensor.lines is not None and sensor.lines.clock == "arrival":
                 yield (
@@ -72,5 +72,5 @@ class ByHandSection(ProcedureSection):
                     "is no other clock. Let its program begin each line with micros(), or with the sample's number if "
                     "a timer starts it; then write a new file: rig lines PORT --write NEW.yaml"
                 )
-            elif sensor.rate_hz < LEAST_RATE_HZ:
-                yield f"sensors.{name}.rate_hz: {sensor.rate_hz:g} is too slow for a hand; at least {LEAST_RATE_HZ:g}"
+            elif sensor.rate_hz < MIN_RATE_HZ:
+                yield f"sensors.{name}.rate_hz: {sensor.rate_hz:g} is too slow for a hand; at least {MIN_RATE_HZ:g}"

@@ -8,9 +8,9 @@ import numpy as np
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from rig.config.models import ProcedureSection, RigConfig
-from rig.config.procedures.attitude_sets import SETS
+from rig.config.procedures.attitude_sets import ATTITUDE_SETS
 from rig.config.procedures.hand_sections import ByHandSection
-from rig.config.procedures.servo_procedure import SPEED_TO_RANGE, ServoSixObservationSection
+from rig.config.procedures.servo_procedure import RANGE_RATIO, ServoSixObservationSection
 from rig.config.procedures.stage_section import StageSection, Wrist
 from rig.config.ranges import ACCELERATION_RANGE_DEG_S2, SPEED_RANGE_DEG_S
 from rig.config.section import (
@@ -37,8 +37,8 @@ SweptAxes = Annotated[
 Repeats = Annotated[WholeNumber, Field(ge=1, le=100, description="how many times the whole procedure is done")]
 DwellTime = Annotated[float, Field(ge=0.1, le=3600, description="time at rest in each attitude")]
 DEFAULT_PROCEDURE = "six_observation"
-LONGEST_SWEEP_S = 720  # one revolution at the lowest speed
-HOTTEST_HEATED_C = 65.0  # below the part's limit, because the heater overshoots the range a little
+MAX_SWEEP_S = 720  # one revolution at the lowest speed
+MAX_HEATED_C = 65.0  # below the part's limit, because the heater overshoots the range a little
 # Required by polynomials: equals that of `rig.estimation.temperature.over_temperature`, which the world must not import
 # through a section.
 MIN_RANGE_C = 10.0
@@ -63,7 +63,7 @@ class SixSweepsSection(ProcedureSection):
     repeats: Repeats = 1
     speed_deg_s: Speed = Field(
         default=60.0,
-        description=f"constant speed of a sweep; every sensor's range must be at least {SPEED_TO_RANGE} times as large",
+        description=f"constant speed of a sweep; every sensor's range must be at least {RANGE_RATIO} times as large",
     )
     speeds_deg_s: tuple[Speed, ...] | None = Field(
         default=None,
@@ -130,11 +130,11 @@ class SixSweepsSection(ProcedureSection):
     def problems(self, config: RigConfig) -> Iterator[str]:
         """Yield sweeps beyond a sensor's range, unfit arcs, an incomplete site, a verification that cannot pass."""
         for name, sensor in config.sensors.items():
-            if max(self.speeds) * SPEED_TO_RANGE > sensor.range_deg_s:
+            if max(self.speeds) * RANGE_RATIO > sensor.range_deg_s:
                 key = "speeds_deg_s" if self.speeds_deg_s else "speed_deg_s"
                 yield (
                     f"procedure.{key} {max(self.speeds):g} is too fast for sensors.{name}.range_deg_s "
-                    f"{sensor.range_deg_s:g}: the range must be at least {SPEED_TO_RANGE} times the speed"
+                    f"{sensor.range_deg_s:g}: the range must be at least {RANGE_RATIO} times the speed"
                 )
         yield from self._arc_problems(config)
         if config.site.latitude_deg is not None and config.site.heading_deg is None and not self.finds_earth_rate:
@@ -153,10 +153,10 @@ class SixSweepsSection(ProcedureSection):
         if self.arcs and self.finds_earth_rate:
             yield f"procedure.earth_rate: find needs whole turns, but procedure.arc_deg is {self.arc_deg:g}"
         slowest = min(self.speeds)
-        if self.arc_deg / slowest > LONGEST_SWEEP_S:
+        if self.arc_deg / slowest > MAX_SWEEP_S:
             yield (
                 f"procedure.arc_deg {self.arc_deg:g} takes {self.arc_deg / slowest:.0f} s at {slowest:g} °/s: the "
-                f"board keeps the readings of {LONGEST_SWEEP_S} s"
+                f"board keeps the readings of {MAX_SWEEP_S} s"
             )
 
 
@@ -242,20 +242,20 @@ def set_of_that_name(value: Any) -> Any:
     """Return the attitudes of a named set; a list is returned unchanged."""
     if not isinstance(value, str):
         return value
-    if value not in SETS:
-        raise ValueError(f"is not a set of attitudes; allowed: {', '.join(SETS)}, or a list of them")
-    return SETS[value]
+    if value not in ATTITUDE_SETS:
+        raise ValueError(f"is not a set of attitudes; allowed: {', '.join(ATTITUDE_SETS)}, or a list of them")
+    return ATTITUDE_SETS[value]
 
 
 Attitudes = tuple[tuple[JointAngle, JointAngle, JointAngle], ...]
-AsWritten = Literal["eighteen", "faces", "magnetic"] | Attitudes  # the names are those of SETS
+AsWritten = Literal["eighteen", "faces", "magnetic"] | Attitudes  # the names are those of ATTITUDE_SETS
 
 
 class AttitudesSection(ProcedureSection):
     """Attitudes in which the arm is at rest: which, how long, how often."""
 
     attitudes: Annotated[Attitudes, BeforeValidator(set_of_that_name, json_schema_input_type=AsWritten)] = Field(
-        default=SETS["eighteen"],
+        default=ATTITUDE_SETS["eighteen"],
         min_length=1,
         max_length=100,
         description="`eighteen`: the best for an arm whose attitudes are good to 1 mrad; `faces`: twelve that are the "
@@ -263,7 +263,7 @@ class AttitudesSection(ProcedureSection):
         "with the angles of wrists 1, 2 and 3 for each attitude; base, shoulder and elbow stay as in `arm.home_deg`",
         json_schema_extra={
             "unit": "°",
-            "allowed": f"{', '.join(f'`{name}`' for name in SETS)} or a list of 3 numbers each",
+            "allowed": f"{', '.join(f'`{name}`' for name in ATTITUDE_SETS)} or a list of 3 numbers each",
             "usual": "`eighteen`",
         },
     )
@@ -446,10 +446,10 @@ class ThermalSection(SixSweepsSection, AttitudesSection):
             yield f"magnetometers.{', '.join(config.magnetometers)} cannot be calibrated over temperature; leave it out"
         if self.heater_power > 0 and not config.on_board:
             yield "procedure.heater_power: the heater is on the board, but no sensor is on a board"
-        if self.heater_power > 0 and self.to_c > HOTTEST_HEATED_C:
+        if self.heater_power > 0 and self.to_c > MAX_HEATED_C:
             yield (
                 f"procedure.to_c {self.to_c:g} is too hot for the heater, which the board switches off at 70: at most "
-                f"{HOTTEST_HEATED_C:g}"
+                f"{MAX_HEATED_C:g}"
             )
 
 

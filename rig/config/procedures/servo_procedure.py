@@ -7,15 +7,15 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from rig.config.models import ProcedureSection, RigConfig
-from rig.config.procedures.servo_section import FASTEST_DEG_S
+from rig.config.procedures.servo_section import MAX_SPEED_DEG_S
 from rig.config.procedures.stage_section import Instruction, StageMountSection, mount_matrix
 from rig.config.ranges import ACCELERATION_RANGE_DEG_S2
 from rig.config.section import DEFAULT_REST_S, Direction, Section, WholeNumber
 
-SPEED_TO_RANGE = 1.5  # ratio of speed to range: scale error, bias, ripple and noise add to a sweep's speed
-AXES_SPAN = 0.5  # least singular value of the directions of the sweeps; 1 if they are orthogonal
-HANDS = "switch the servo's supply off with a hand on the item, screw it on with its {axis} axis along the shaft, away "
-REST = "from the servo, and switch the supply on"
+RANGE_RATIO = 1.5  # to the speed: scale error, bias, ripple and noise add to a sweep's speed
+MIN_AXES_SPAN = 0.5  # least singular value of the directions of the sweeps; 1 if they are orthogonal
+MOUNT = "switch the servo's supply off with a hand on the item, screw it on with its {axis} axis along the shaft, away "
+MOUNT_END = "from the servo, and switch the supply on"
 
 
 class ServoStageSection(Section):
@@ -32,7 +32,7 @@ class ServoStageSection(Section):
 
 
 def _shaft_along(axis: str, mount: StageMountSection) -> ServoStageSection:
-    return ServoStageSection(instruction=HANDS.format(axis=axis) + REST, mount=mount)
+    return ServoStageSection(instruction=MOUNT.format(axis=axis) + MOUNT_END, mount=mount)
 
 
 THREE_MOUNTINGS = (
@@ -63,8 +63,8 @@ class ServoSixObservationSection(ProcedureSection):
     speed_deg_s: float = Field(
         default=60.0,
         ge=10,
-        le=FASTEST_DEG_S,
-        description=f"constant speed of a turn; every sensor's range must be at least {SPEED_TO_RANGE} times as large",
+        le=MAX_SPEED_DEG_S,
+        description=f"constant speed of a turn; every sensor's range must be at least {RANGE_RATIO} times as large",
     )
     acceleration_deg_s2: float = Field(
         default=240.0, ge=10, le=ACCELERATION_RANGE_DEG_S2, description="acceleration of every motion"
@@ -86,17 +86,17 @@ class ServoSixObservationSection(ProcedureSection):
         if set(self.directions) != {"cw", "ccw"}:
             raise ValueError("directions must name both cw and ccw")
         shaft_axes = np.array([mount_matrix(stage.mount)[:, 2] for stage in self.stages])
-        if len(shaft_axes) < 3 or np.linalg.svd(shaft_axes, compute_uv=False)[2] < AXES_SPAN:
+        if len(shaft_axes) < 3 or np.linalg.svd(shaft_axes, compute_uv=False)[2] < MIN_AXES_SPAN:
             raise ValueError("stages must mount the item with the shaft along three independent directions of it")
         return self
 
     def problems(self, config: RigConfig) -> Iterator[str]:
         """Yield turns beyond a sensor's range, sensors that a servo disturbs, and a site without a heading."""
         for name, sensor in config.sensors.items():
-            if self.speed_deg_s * SPEED_TO_RANGE > sensor.range_deg_s:
+            if self.speed_deg_s * RANGE_RATIO > sensor.range_deg_s:
                 yield (
                     f"procedure.speed_deg_s {self.speed_deg_s:g} is too fast for sensors.{name}.range_deg_s "
-                    f"{sensor.range_deg_s:g}: the range must be at least {SPEED_TO_RANGE} times the speed"
+                    f"{sensor.range_deg_s:g}: the range must be at least {RANGE_RATIO} times the speed"
                 )
         if config.magnetometers:
             yield "magnetometers cannot be calibrated near a servo's motor: leave them out"

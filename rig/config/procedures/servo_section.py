@@ -11,7 +11,7 @@ from rig.config.ranges import PAYLOAD_RANGE_KG
 from rig.config.section import JointAngle, Offset, Port, WholeNumber
 
 ServoName = Literal["xl430_w250", "xm430_w350", "xm430_w210"]
-FASTEST_DEG_S = 460.0  # speed of the fastest servo without load
+MAX_SPEED_DEG_S = 460.0  # of the fastest servo without load
 
 
 class ServoSection(TurnerSection):
@@ -38,7 +38,7 @@ class ServoSection(TurnerSection):
         default=180.0, description="angle of the shaft, by the servo's encoder, around which the sweeps turn"
     )
     transfer_speed_deg_s: float = Field(
-        default=60.0, ge=1, le=FASTEST_DEG_S, description="speed of the movements between sweeps"
+        default=60.0, ge=1, le=MAX_SPEED_DEG_S, description="speed of the movements between sweeps"
     )
     state_rate_hz: float = Field(
         default=125.0, ge=100, le=250, description="how many times a second the shaft's angle is read"

@@ -9,10 +9,10 @@ from rig.config.section import Ratio, Section
 
 SHORTEST = "shortest"
 CARRIED_OUT = "six_observation"
-REPEATS = 16  # largest number, if the section states none
-IN_ADVANCE = "`rig plan CONFIG --target-uncertainty scale=U --write FILE` writes the shortest run for the target"
+MAX_REPEATS = 16  # if the section states none
+PLAN_REMEDY = "`rig plan CONFIG --target-uncertainty scale=U --write FILE` writes the shortest run for the target"
 # Procedures that do not end after a repeat, by the kind of turner, and the procedure that the message suggests.
-OTHERS: Mapping[str, tuple[str, str]] = {
+UNREPEATED_PROCEDURES: Mapping[str, tuple[str, str]] = {
     "servo": ("with a servo the repeats are made in each mounting, so no run ends early", "servo_six_observation"),
     "hand": ("nothing turns whole revolutions by hand", "by_hand"),
 }
@@ -51,14 +51,14 @@ def alternative_procedure(document: Mapping[str, Any]) -> str | None:
     """Return the procedure to use instead with a turner that is not an arm; None for an arm."""
     turner = document.get("turner")
     kind = str(turner.get("kind")) if isinstance(turner, dict) else ""
-    if kind not in OTHERS:
+    if kind not in UNREPEATED_PROCEDURES:
         return None
-    why, name = OTHERS[kind]
-    return f"{SHORTEST}: {why}; set name: {name}, and {IN_ADVANCE}"
+    why, name = UNREPEATED_PROCEDURES[kind]
+    return f"{SHORTEST}: {why}; set name: {name}, and {PLAN_REMEDY}"
 
 
 def expand_procedure(section: Mapping[str, Any], wanted: TargetUncertaintySection) -> dict[str, Any]:
     """Return the section of the procedure to carry out: all keys remain except the name and the target."""
     rest = {key: value for key, value in section.items() if key != "target_uncertainty"}
     ends = {"target_scale_u": wanted.scale, "target_bias_u_rad_s": wanted.bias}
-    return {"repeats": REPEATS, **ends, **rest, "name": CARRIED_OUT}
+    return {"repeats": MAX_REPEATS, **ends, **rest, "name": CARRIED_OUT}

@@ -13,10 +13,10 @@ from rig.errors.quoting import quote
 GYROSCOPE, ACCELEROMETER, MAGNETOMETER = ("gx", "gy", "gz"), ("ax", "ay", "az"), ("mx", "my", "mz")
 COLUMNS = ("time", "sequence", *GYROSCOPE, *ACCELEROMETER, *MAGNETOMETER, "temperature", "-")
 SEPARATORS = {"comma": b",", "semicolon": b";", "tab": b"\t", "space": b" "}
-GAP = "?"  # what `rig lines` writes for values that the readings do not determine
-LONGEST_GAP_S = 2.0  # a device that is silent for longer is lost
+UNDETERMINED = "?"  # what `rig lines` writes for values that the readings do not determine
+MAX_GAP_S = 2.0  # a device that is silent for longer is lost
 PRINTABLE = r"^[ -~]*$"
-NOTHING: dict[str, Any] = {"usual": "none"}
+USUALLY_NONE: dict[str, Any] = {"usual": "none"}
 
 Scale = Annotated[
     float,
@@ -41,7 +41,7 @@ Decimals = Annotated[
 
 def _refuse_gap(value: str) -> str:
     """Return the value. Raise ValueError for `?`, which `rig lines` writes if readings do not determine a value."""
-    if value == GAP:
+    if value == UNDETERMINED:
         raise ValueError("the readings did not determine it: look it up in the device's program, and write it here")
     return value
 
@@ -143,14 +143,14 @@ class LinesSection(Section):
         pattern=PRINTABLE,
         description="text at the start of every sample's line, such as `$IMU,`; other lines are skipped; `*` in it "
         "stands for any digits, as in `I (*) imu: `",
-        json_schema_extra={"allowed": "at most 40 plain characters"} | NOTHING,
+        json_schema_extra={"allowed": "at most 40 plain characters"} | USUALLY_NONE,
     )
     keys: tuple[Annotated[str, Field(min_length=1, max_length=40, pattern=PRINTABLE)], ...] = Field(
         default=(),
         max_length=40,
         description='text before each number, if the device prints names: `["gx:", "gy:", "gz:"]`; brackets and '
         "separators between them do not matter",
-        json_schema_extra={"allowed": "as many as `columns`"} | NOTHING,
+        json_schema_extra={"allowed": "as many as `columns`"} | USUALLY_NONE,
     )
     comment: str = Field(
         default="#",

@@ -7,7 +7,7 @@ from firmware_host.protocol import BATCH_AGE_US, COBS_BYTES, MESSAGE_BY_NAME, OV
 
 BITS_PER_BYTE = 10  # start bit, eight data bits, stop bit
 KVH1775_MESSAGE_BYTES = {"A": 36, "B": 40, "C": 38}  # ICD 56-0298 Rev. B, tables 5-1, 5-3, 5-5
-MARGIN = 0.1  # fraction of the link that remains free: for replies, and for a clock that is slightly wrong
+HEADROOM = 0.1  # fraction of the link: for replies, and for a clock that is slightly wrong
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +45,7 @@ class LinkLoad:
 
 def capacity_bytes_per_s(baud: int) -> float:
     """Return the load that a link at `baud` may have, bytes/s."""
-    return baud / BITS_PER_BYTE * (1 - MARGIN)
+    return baud / BITS_PER_BYTE * (1 - HEADROOM)
 
 
 def over_budget(streams: Mapping[str, LinkLoad], baud: int) -> str | None:
@@ -58,7 +58,7 @@ def over_budget(streams: Mapping[str, LinkLoad], baud: int) -> str | None:
     )
     return (
         f"the serial link cannot carry these rates: {terms} = {needed:.0f} bytes/s, but board.baud {baud} / "
-        f"{BITS_PER_BYTE} bits a byte less {MARGIN:.0%} kept free = {capacity_bytes_per_s(baud):.0f} bytes/s; "
+        f"{BITS_PER_BYTE} bits a byte less {HEADROOM:.0%} kept free = {capacity_bytes_per_s(baud):.0f} bytes/s; "
         "lower rate_hz or raise board.baud"
     )
 
@@ -69,6 +69,6 @@ def sensor_line_over_budget(rate_hz: float, message_bytes: int, baud: int) -> st
         return None
     return (
         f"its line cannot carry this rate: {rate_hz:g} Hz × {message_bytes} bytes = {rate_hz * message_bytes:g} "
-        f"bytes/s, but serial.baud {baud} / {BITS_PER_BYTE} bits a byte less {MARGIN:.0%} kept free = "
+        f"bytes/s, but serial.baud {baud} / {BITS_PER_BYTE} bits a byte less {HEADROOM:.0%} kept free = "
         f"{capacity_bytes_per_s(baud):.0f} bytes/s; lower rate_hz, or set the sensor to a higher baud rate"
     )

@@ -6,7 +6,7 @@ from typing import Literal
 from pydantic import Field, field_validator
 
 from rig.config.section import Section, check_port
-from rig.config.sensors.link_budget import BITS_PER_BYTE, MARGIN, capacity_bytes_per_s
+from rig.config.sensors.link_budget import BITS_PER_BYTE, HEADROOM, capacity_bytes_per_s
 from rig.config.sensors.stated_temperature import StatedTemperatureSection
 
 ImuMessage = Literal["HIGHRES_IMU", "RAW_IMU", "SCALED_IMU", "SCALED_IMU2", "SCALED_IMU3"]
@@ -86,7 +86,7 @@ def autopilots_over_budget(sensors: Mapping[str, tuple[MavlinkSection | None, fl
             terms = " + ".join(f"{name} {rate:g} Hz × {MESSAGE_BYTES[imu.imu]} bytes" for name, imu, rate in imus)
             return (
                 f"the line to {port} cannot carry these rates: {terms} and {OTHER_BYTES_PER_S} for the rest = "
-                f"{needed:g} bytes/s, but {first.baud} / {BITS_PER_BYTE} bits a byte less {MARGIN:.0%} kept free = "
+                f"{needed:g} bytes/s, but {first.baud} / {BITS_PER_BYTE} bits a byte less {HEADROOM:.0%} kept free = "
                 f"{capacity_bytes_per_s(first.baud):.0f} bytes/s; lower rate_hz or raise mavlink.baud"
             )
     return None

@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
 from rig.config.section import RATIO, Port, Positive, Section, Vector3
-from rig.config.sensors.lines_section import GAP, LinesSection
+from rig.config.sensors.lines_section import UNDETERMINED, LinesSection
 from rig.config.sensors.link_budget import KVH1775_MESSAGE_BYTES, sensor_line_over_budget
 from rig.config.sensors.mavlink_section import MavlinkSection
 from rig.config.sensors.sensor_catalogue import (
@@ -20,8 +20,8 @@ from rig.config.sensors.sensor_catalogue import (
 )
 
 AxisName = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
-SERIAL_NUMBER_MAX = 24  # length of a "text24" in the board's protocol
-OF_THE_PART: dict[str, Any] = {"allowed": "what the part has, see below", "usual": "the part's usual one"}
+MAX_SERIAL_NUMBER = 24  # length of a "text24" in the board's protocol
+PART_DEPENDENT: dict[str, Any] = {"allowed": "what the part has, see below", "usual": "the part's usual one"}
 
 
 def mounting_matrix(mounting: "MountingSection") -> np.ndarray:
@@ -104,7 +104,7 @@ class AccelerationSection(Section):
 
     range_g: float = Field(
         description="full scale of the accelerometer, one of the part's ranges",
-        json_schema_extra={**OF_THE_PART, "unit": "g"},
+        json_schema_extra={**PART_DEPENDENT, "unit": "g"},
     )
 
 
@@ -123,10 +123,10 @@ class ConfiguredSensor(Protocol):
 
 def check_serial_number(value: str) -> str:
     """Return a serial number that fits the board's record of a calibration. Raise ValueError otherwise."""
-    if value == GAP:
+    if value == UNDETERMINED:
         raise ValueError("write the number of this specimen here; it is on the device or its certificate")
-    if not (value.isascii() and value.isprintable() and 0 < len(value) <= SERIAL_NUMBER_MAX):
-        raise ValueError(f"must be 1 to {SERIAL_NUMBER_MAX} plain ASCII characters: a board can store no others")
+    if not (value.isascii() and value.isprintable() and 0 < len(value) <= MAX_SERIAL_NUMBER):
+        raise ValueError(f"must be 1 to {MAX_SERIAL_NUMBER} plain ASCII characters: a board can store no others")
     return value
 
 
@@ -149,7 +149,7 @@ class SensorSection(Section):
     serial_number: SerialNumber = Field(
         description="serial number of this sensor; stored on the board and in every result; a `kvh1775` reports "
         "its own, and another number is refused",
-        json_schema_extra={"allowed": f"1 to {SERIAL_NUMBER_MAX} plain ASCII characters"},
+        json_schema_extra={"allowed": f"1 to {MAX_SERIAL_NUMBER} plain ASCII characters"},
     )
     role: Literal["calibrate", "reference"] = Field(
         default="calibrate",
@@ -157,11 +157,11 @@ class SensorSection(Section):
         "compared; at most one is the reference",
     )
     rate_hz: OfThePart = Field(
-        description="samples per second, one of the part's rates; 333.33 means 1000/3", json_schema_extra=OF_THE_PART
+        description="samples per second, one of the part's rates; 333.33 means 1000/3", json_schema_extra=PART_DEPENDENT
     )
     range_deg_s: OfThePart = Field(
         description="full scale, one of the part's ranges; at least 1.5 times the fastest sweep",
-        json_schema_extra=OF_THE_PART,
+        json_schema_extra=PART_DEPENDENT,
     )
     mounting: MountingSection = Field(default=MountingSection(), description="how it is mounted on the flange")
     correction: Literal["matrix", "diagonal"] = Field(
@@ -286,7 +286,7 @@ class MagnetometerSection(Section):
     part: MagnetometerName = Field(description="which magnetometer it is")
     serial_number: SerialNumber = Field(
         description="serial number of this sensor; in every result",
-        json_schema_extra={"allowed": f"1 to {SERIAL_NUMBER_MAX} plain ASCII characters"},
+        json_schema_extra={"allowed": f"1 to {MAX_SERIAL_NUMBER} plain ASCII characters"},
     )
     rate_hz: OfThePart = Field(
         default=MAGNETOMETERS["lsm9ds1_magnetometer"].default_rate_hz,

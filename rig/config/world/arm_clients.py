@@ -7,7 +7,7 @@ from pydantic import Field
 
 from rig.config.section import Section
 
-MILLISECONDS: dict[str, Any] = {"unit": "ms"}
+MILLISECOND_UNIT: dict[str, Any] = {"unit": "ms"}
 
 
 class SimulatedFieldbusSection(Section):

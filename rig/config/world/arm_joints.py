@@ -15,7 +15,7 @@ JointsKind = Literal["measured", "rough", "ideal"]
 Cycles = Annotated[int, Field(ge=1, le=600)]
 RippleRate = Annotated[float, Field(ge=0, le=0.1)]
 RippleRates = tuple[RippleRate, RippleRate, RippleRate, RippleRate, RippleRate, RippleRate]
-SECOND_SQUARED: dict[str, Any] = {"unit": "s²"}
+SECOND_SQUARED_UNIT: dict[str, Any] = {"unit": "s²"}
 
 
 class DriveRippleSection(Section):

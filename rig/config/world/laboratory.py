@@ -40,8 +40,8 @@ SensitivityRow = tuple[Sensitivity, Sensitivity, Sensitivity]
 NO_ROW: SensitivityRow = (0.0, 0.0, 0.0)
 Tilt = Annotated[float, Field(ge=-10, le=10)]
 Turn = Annotated[float, Field(ge=-180, le=180)]
-RATE_PER_K: dict[str, Any] = {"unit": "rad/s/K"}
-PER_RATE: dict[str, Any] = {"unit": "1/(rad/s)"}
+RATE_PER_K_UNIT: dict[str, Any] = {"unit": "rad/s/K"}
+PER_RATE_UNIT: dict[str, Any] = {"unit": "1/(rad/s)"}
 JointRange = Annotated[float, Field(gt=0, le=363)]
 JointRanges = tuple[JointRange, JointRange, JointRange, JointRange, JointRange, JointRange]
 JointSpeed = Annotated[float, Field(gt=0, le=360)]

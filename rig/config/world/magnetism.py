@@ -6,7 +6,7 @@ from pydantic import Field
 
 from rig.config.section import RATIO, Section, Vector3
 
-NOTHING: Vector3 = (0.0, 0.0, 0.0)
+NO_FIELD: Vector3 = (0.0, 0.0, 0.0)
 
 
 class IronSection(Section):
@@ -17,7 +17,7 @@ class IronSection(Section):
         "wrist 3 is carried by `wrist_2`, the flange by `wrist_3`"
     )
     position_mm: Vector3 = Field(
-        default=NOTHING, description="position in the frame of that link (Denavit and Hartenberg)"
+        default=NO_FIELD, description="position in the frame of that link (Denavit and Hartenberg)"
     )
     moment_a_m2: Vector3 = Field(description="magnetic moment, in that frame")
 
@@ -42,17 +42,17 @@ class SimulatedFieldSection(Section):
 
     scale: RowLengths = (1.0, 1.0, 1.0)
     bias_ut: Vector3 = Field(
-        default=NOTHING,
+        default=NO_FIELD,
         description="bias b of each axis, part of the reading: the sensor's own, and that of iron that turns with it",
     )
     noise_ut: float = Field(default=0.3, ge=0, description="standard deviation of a sample's noise")
-    non_orthogonality_deg: NonOrthogonality = NOTHING
+    non_orthogonality_deg: NonOrthogonality = NO_FIELD
 
 
 class SimulatedMagnetometerSection(SimulatedFieldSection):
     """A simulated magnetometer on the board."""
 
-    mounting_error_deg: MountingError = NOTHING
+    mounting_error_deg: MountingError = NO_FIELD
     offset_mm: Vector3 | None = Field(
         default=None,
         description="position of the sensor, x y z from the flange's centre in the flange's frame; if left out, the "

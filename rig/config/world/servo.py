@@ -7,7 +7,7 @@ from pydantic import Field
 from rig.config.procedures.servo_section import ServoName
 from rig.config.section import Ratio, Section, WholeNumber
 
-MILLISECONDS: dict[str, Any] = {"unit": "ms"}
+MILLISECOND_UNIT: dict[str, Any] = {"unit": "ms"}
 Error = Annotated[float, Field(ge=0, le=10)]
 
 

@@ -10,7 +10,7 @@ from rig.data.entries.result_types import Entry, Vector6
 from rig.estimation.statistics.coverage import COVERAGE_FACTOR
 
 # Ends the source of an estimate if the degrees of freedom are unknown but their effect is included in u.
-IN_U = "how well is in u"
+INCLUDED_IN_U = "how well is in u"
 # Infinite degrees of freedom are null.
 Freedom6 = Annotated[tuple[float | None, ...], Field(min_length=6, max_length=6)]
 

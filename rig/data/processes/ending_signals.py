@@ -32,7 +32,7 @@ ENDING_SIGNALS: Final = (*MEANT_SIGNALS, *OTHER_SIGNALS)
 
 
 BURST_S = 1.0  # a stop takes less time: further signals within it request the same stop
-LATER_S = 0.001
+REPEAT_S = 0.001
 # Methods of the locks of `threading`, which are written in Python.
 _LOCK_METHODS = ("__enter__", "__exit__", "_acquire_restore", "_release_save")
 
@@ -80,7 +80,7 @@ def _takes_a_lock(frame: FrameType | None) -> bool:
 
 def _send_later(thread: int, number: int) -> None:
     """Send a thread a signal after a moment, without the module `threading`, whose locks may be in use."""
-    time.sleep(LATER_S)
+    time.sleep(REPEAT_S)
     if hasattr(signal, "pthread_kill"):
         signal.pthread_kill(thread, number)
     else:  # Windows

@@ -5,9 +5,9 @@ from pathlib import Path
 
 from firmware_host import computer_load
 
-STARVED = 0.5  # fraction of a tick spent waiting for a processor: above it, silence says nothing about the process
-STANDS = 0.05  # largest fraction of a tick for which a starved thread that is ready to run has run
-HELD_UP = ("R", "D")  # states of a thread: ready to run, or waiting for swapped memory
+MIN_STARVED_FRACTION = 0.5  # of a tick spent waiting for a processor: above it, silence says nothing about the process
+MAX_RUN_FRACTION = 0.05  # of a tick for which a starved thread that is ready to run has run
+WAITING = ("R", "D")  # of a thread: ready to run, or waiting for swapped memory
 NS_PER_S = 1e9
 
 _Times = dict[str, tuple[float, float]]  # by thread: seconds on a processor, seconds waiting for one
@@ -70,8 +70,8 @@ class Silence:
         elapsed_s, before = now_s - self._looked_s, self._times
         self._looked_s, self._times = now_s, _times(self._tasks)
         return has_previous and any(
-            waited_s - before[thread][1] > STARVED * elapsed_s
-            or (ran_s - before[thread][0] < STANDS * elapsed_s and _state(self._tasks / thread) in HELD_UP)
+            waited_s - before[thread][1] > MIN_STARVED_FRACTION * elapsed_s
+            or (ran_s - before[thread][0] < MAX_RUN_FRACTION * elapsed_s and _state(self._tasks / thread) in WAITING)
             for thread, (ran_s, waited_s) in self._times.items()
             if thread in before and self._thread in (None, thread)
         )

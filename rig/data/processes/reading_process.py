@@ -31,22 +31,22 @@ if TYPE_CHECKING:
 
 Reader = Callable[..., Iterator[Part]]
 
-MOST_FILES = 10_000  # largest number of files in a folder: a bag is split into one for every minute or gigabyte
+MAX_FILES = 10_000  # in a folder: a bag is split into one for every minute or gigabyte
 # Largest ratio of unpacked to stored size: noisy readings unpack to a quarter of that, zeros to a thousand times.
-MAX_UNPACKED = 20
+MAX_UNPACKED_RATIO = 20
 SPARE_BYTES = 32_000_000  # margin for small files, in addition to that ratio
 # Address space, half of which the libraries take; and more per byte of the file.
 MEMORY_BYTES, MEMORY_TIMES_STORED = 320 << 20, 2
 PROCESSOR_S, PROCESSOR_S_PER_BYTE = 8.0, 1e-6  # a slow computer reads 3 MB of readings a second, packed 1 MB
-IDLE_TIMES_PROCESSOR = 1.5  # total duration on an idle computer, relative to the processor time
-TICK_S, GONE_S = 0.1, 1.0
-SPARED = 6  # largest factor on that duration while the reading process gets no processor
+IDLE_DURATION_RATIO = 1.5  # of the total duration on an idle computer to the processor time
+TICK_S, MAX_EXIT_S = 0.1, 1.0
+MAX_STARVED_FACTOR = 6  # on that duration while the reading process gets no processor
 # A foreign file must load no plugin of HDF5; and threads for linear algebra would reserve gigabytes of memory.
 ENVIRONMENT = {f"{library}_NUM_THREADS": "1" for library in ("OPENBLAS", "OMP", "MKL")} | HDF5_PLUGINS
-COMPLAINT_BYTES = 65_536
-LONGEST_REASON = 300  # characters
+MAX_COMPLAINT_BYTES = 65_536
+MAX_REASON_CHARACTERS = 300
 # The signal that the system sends to a process that has used up its time.
-OUT_OF_TIME = getattr(signal, "SIGXCPU", None)
+TIME_LIMIT_SIGNAL = getattr(signal, "SIGXCPU", None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,8 +78,8 @@ def limits_for(stored_bytes: int) -> ReadingLimits:
     return ReadingLimits(
         memory_bytes=MEMORY_BYTES + MEMORY_TIMES_STORED * stored_bytes,
         processor_s=processor_s,
-        idle_s=IDLE_TIMES_PROCESSOR * processor_s,
-        written_bytes=SPARE_BYTES + MAX_UNPACKED * stored_bytes,
+        idle_s=IDLE_DURATION_RATIO * processor_s,
+        written_bytes=SPARE_BYTES + MAX_UNPACKED_RATIO * stored_bytes,
     )
 
 
@@ -92,9 +92,9 @@ def stored_bytes(path: Path) -> int:
     if not path.is_dir():
         return _file_size_on_disk(path)
     with os.scandir(path) as entries:
-        files = [entry.name for entry in islice(entries, MOST_FILES + 1) if not entry.is_dir()]
-    if len(files) > MOST_FILES:
-        raise UnfitFile(f"it holds more than {MOST_FILES} files")
+        files = [entry.name for entry in islice(entries, MAX_FILES + 1) if not entry.is_dir()]
+    if len(files) > MAX_FILES:
+        raise UnfitFile(f"it holds more than {MAX_FILES} files")
     return sum(_file_size_on_disk(path / name, f"{name!r:.60}") for name in files)
 
 
@@ -105,7 +105,7 @@ def _file_size_on_disk(path: Path, name: str = "it") -> int:
             size, stored = os.fstat(file.fileno()).st_size, size_without_holes(file)
     except UnfitFile as error:
         raise UnfitFile(str(error).replace("it ", f"{name} ", 1)) from None
-    if size > MAX_UNPACKED * stored + SPARE_BYTES:
+    if size > MAX_UNPACKED_RATIO * stored + SPARE_BYTES:
         raise UnfitFile(f"{name} expands {stored} bytes to {size}")
     return stored
 
@@ -213,7 +213,7 @@ def _wait_for(reading: "subprocess.Popen[bytes] | ForkedReader", idle_s: float) 
     Raise TimeoutError if it has been idle for `idle_s`; time spent waiting for a processor or the disk does not count.
     Wall time is measured, because a hanging library may sleep and so use no processor time.
     """
-    silent = Silence(reading.pid, spared=SPARED)
+    silent = Silence(reading.pid, spared=MAX_STARVED_FACTOR)
     while not silent.lasts_over(idle_s / TICK_S):
         try:
             return reading.communicate(timeout=TICK_S)[1]
@@ -226,7 +226,7 @@ def _kill(reading: "subprocess.Popen[bytes] | ForkedReader") -> None:
     """Kill the process, and wait a limited time for its end, which a dead disk may delay."""
     reading.kill()
     with suppress(subprocess.TimeoutExpired):
-        reading.wait(GONE_S)
+        reading.wait(MAX_EXIT_S)
     if reading.stderr is not None:
         reading.stderr.close()
 
@@ -235,7 +235,7 @@ def _raise_failure(status: int, complaint: bytes, limits: ReadingLimits) -> None
     """Raise as `read_apart` does if the process' exit status is a failure."""
     if status == Status.READ:
         return
-    lines = complaint[-COMPLAINT_BYTES:].decode(errors="replace").strip().splitlines()
+    lines = complaint[-MAX_COMPLAINT_BYTES:].decode(errors="replace").strip().splitlines()
     why = printable(lines[-1]) if lines else "reading it ended the process that read it"
     if status == Status.REFUSED:
         raise Refused(*json.loads(lines[-1]))
@@ -243,9 +243,9 @@ def _raise_failure(status: int, complaint: bytes, limits: ReadingLimits) -> None
         raise CostlyFile(f"it takes more than {limits.memory_bytes >> 20} MiB of memory to be read")
     if status == Status.TOO_LONG:
         raise CostlyFile(f"its unpacked content is longer than {limits.written_bytes // 1_000_000} MB")
-    if -status == OUT_OF_TIME:
+    if -status == TIME_LIMIT_SIGNAL:
         raise CostlyFile(f"it takes more than {limits.processor_s:.0f} s of a processor to be read")
-    raise UnreadableFile(why if len(why) <= LONGEST_REASON else f"{why[:LONGEST_REASON]}…")
+    raise UnreadableFile(why if len(why) <= MAX_REASON_CHARACTERS else f"{why[:MAX_REASON_CHARACTERS]}…")
 
 
 def _no_room(path: Path, why: str) -> Refused:

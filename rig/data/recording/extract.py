@@ -13,15 +13,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.data.processes.reading_process import MAX_UNPACKED, size_without_holes
-from rig.data.recording.layout_keys import SCHEMA, SCHEMA_ELSEWHERE, TABLES, TEXTS
+from rig.data.processes.reading_process import MAX_UNPACKED_RATIO, size_without_holes
+from rig.data.recording.layout_keys import EXTERNAL_SCHEMA, SCHEMA, TABLES, TEXTS
 from rig.data.recording.run_reading import MAX_UNWRITTEN_BYTES
 
-OPEN_FOR_WRITING = 0x01  # a consistency flag of the superblock
+WRITING_FLAG = 0x01  # a consistency flag of the superblock
 MAX_SENSORS = 64
 MAX_COLUMNS = 40  # columns of states: times, joints, and 32 fields
-# Characters of a text (configurations have 65,536 at most); elements of an attribute.
-LONGEST_TEXT, LONGEST_ATTRIBUTE = 1_000_000, 1000
+MAX_TEXT_CHARACTERS, MAX_ATTRIBUTE_ELEMENTS = 1_000_000, 1000  # configurations have 65,536 at most
 MAX_UNWRITTEN_ROWS = 100_000  # rows that are announced but missing: more than a kill can lose of one flush
 
 
@@ -45,7 +44,7 @@ def extract(path: Path) -> Iterator[dict[str, Any] | NDArray[Any]]:
         if schema not in TEXTS:
             raise ValueError(f"its schema is {schema!r:.60}; this version of the rig reads {SCHEMA!r}")
         texts = {name: _text(file, name) for name in TEXTS[schema]}
-        is_external = schema == SCHEMA_ELSEWHERE
+        is_external = schema == EXTERNAL_SCHEMA
         group = dict[str, Any]() if is_external else _member(file, "samples", h5py.Group)
         if len(group) > MAX_SENSORS:
             raise ValueError(f"it announces {len(group)} sensors")
@@ -87,7 +86,7 @@ def _is_left_open(path: Path) -> bool:
     """Return whether a file is being written, or its writer was killed."""
     with path.open("rb") as file:
         start = file.read(12)
-    return len(start) == 12 and start[8] >= 3 and bool(start[11] & OPEN_FOR_WRITING)
+    return len(start) == 12 and start[8] >= 3 and bool(start[11] & WRITING_FLAG)
 
 
 def _member(group: Any, name: str, kind: type) -> Any:
@@ -122,7 +121,7 @@ def _refuse_endless(path: Path, unpacked: int) -> None:
     with path.open("rb") as file:
         stored = size_without_holes(file)
     for what, size in (("its rows unpack", unpacked), ("it swells", path.stat().st_size)):
-        if size > MAX_UNPACKED * stored + MAX_UNWRITTEN_BYTES:
+        if size > MAX_UNPACKED_RATIO * stored + MAX_UNWRITTEN_BYTES:
             raise ValueError(f"{what} {stored} bytes to {size}")
 
 
@@ -148,6 +147,6 @@ def _convert(value: Any) -> Any:
     Raise ValueError for a type that no run file has. `_encode` raises TypeError for types that JSON does not have.
     """
     size = getattr(value, "size", 1) or 0  # an empty attribute has None
-    if size > LONGEST_ATTRIBUTE or (isinstance(value, str | bytes) and len(value) > LONGEST_TEXT):
+    if size > MAX_ATTRIBUTE_ELEMENTS or (isinstance(value, str | bytes) and len(value) > MAX_TEXT_CHARACTERS):
         raise ValueError("an attribute of it is longer than any a run has")
     return value.tolist() if isinstance(value, np.ndarray | np.generic) else value

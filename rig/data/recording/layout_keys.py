@@ -8,11 +8,11 @@ from typing import Final
 import numpy as np
 
 SCHEMA = "rig.run/1"
-SCHEMA_ELSEWHERE = "rig.files/1"
+EXTERNAL_SCHEMA = "rig.files/1"
 TABLES = ("readings", "motion")
 TEXTS = {
     SCHEMA: ("config", "settings", "provenance", "turner"),
-    SCHEMA_ELSEWHERE: ("config", "settings", "provenance", "elsewhere"),
+    EXTERNAL_SCHEMA: ("config", "settings", "provenance", "elsewhere"),
 }
 NOT_STATED: Final = "not stated"  # the part or serial number of external readings
 EVENTS_DTYPE = np.dtype("u1")

@@ -20,7 +20,7 @@ MotionKind = Literal["sweeps", "attitudes", "turns"]
 Columns = Mapping[str, NDArray[np.float64]]
 
 # Largest absolute number in any SI unit: a larger one is a mistake, and its square might overflow.
-LARGEST_NUMBER = 1e12
+MAX_NUMBER = 1e12
 ItemWord = Annotated[str, Field(pattern="^[ -~]{1,40}$")]  # plain ASCII, as for sensors on a board
 TIME = "time_s"
 QUATERNION = ("qw", "qx", "qy", "qz")
@@ -53,11 +53,11 @@ class Header:
         if wanted - names or names - allowed or len(names & set(self.one_of)) != min(len(self.one_of), 1):
             raise ValueError(f"its columns are {', '.join(columns)}")
         for name, column in columns.items():
-            if not (np.abs(column) < LARGEST_NUMBER).all():
+            if not (np.abs(column) < MAX_NUMBER).all():
                 raise ValueError(f"a value of its {name} is not a number, or cannot have been measured")
             if self.one_row and len(column) != 1:
                 raise ValueError(f"it has {len(column)} rows of {name}, not one")
-            above, most = self.between.get(name, (-LARGEST_NUMBER, LARGEST_NUMBER))
+            above, most = self.between.get(name, (-MAX_NUMBER, MAX_NUMBER))
             if not ((column > above) & (column <= most)).all():
                 raise ValueError(f"its {name} must be above {above:g} and at most {most:g}")
 
@@ -90,7 +90,7 @@ MOTIONS: Final[Mapping[MotionKind, Header]] = MappingProxyType(
                 "clock_ppm": (0, 1e5),
                 "box_rad": (0, 0.2),
                 "closure": (-1, 1),
-                "gravity_m_s2": (0, LARGEST_NUMBER),
+                "gravity_m_s2": (0, MAX_NUMBER),
                 "first_face": (-1, 5),
             },
         ),

@@ -24,9 +24,9 @@ from rig.motion.turner_state import Report, TurnerIdentity
 if TYPE_CHECKING:
     from rig.config.load import Loaded
 
-OF_FILES = ("readings_file", "motion_file")
-OPTIONAL = ("arm_kinematics", "tcp_offset", "arm_maker", "arm_model", "turner_kind", "board_follows_crystal")
-SIMULATED = "(simulated)"  # ends the version of a simulated controller
+FILE_KEYS = ("readings_file", "motion_file")
+OPTIONAL_KEYS = ("arm_kinematics", "tcp_offset", "arm_maker", "arm_model", "turner_kind", "board_follows_crystal")
+SIMULATED_SUFFIX = "(simulated)"  # ends the version of a simulated controller
 PACKAGES = ("ur-rtde", "numpy", "h5py", "pyserial")
 
 
@@ -80,16 +80,16 @@ class Provenance:
     def document(self) -> dict[str, Any]:
         """Return the provenance as plain JSON values, without unknown fields."""
         stored = {name: entry.model_dump(mode="json") for name, entry in self.stored_calibrations.items()}
-        files = {name: value.model_dump() for name in OF_FILES if (value := getattr(self, name)) is not None}
+        files = {name: value.model_dump() for name in FILE_KEYS if (value := getattr(self, name)) is not None}
         document = {**asdict(self), "stored_calibrations": stored, **files}
         unknown = {"script", "script_sha256", "script_installed"} if self.script_sha256 is None else set()
-        unknown |= {name for name in (*OPTIONAL, *OF_FILES) if document[name] is None}
+        unknown |= {name for name in (*OPTIONAL_KEYS, *FILE_KEYS) if document[name] is None}
         return {key: value for key, value in document.items() if key not in unknown}
 
 
 def calls_itself_simulated(software: str) -> bool:
     """Return whether a controller of this version is simulated; its seconds may then have any length."""
-    return software.endswith(SIMULATED)
+    return software.endswith(SIMULATED_SUFFIX)
 
 
 def provenance_of_files(readings: FileEntry, motion: FileEntry | None, item: Item, start: datetime) -> Provenance:

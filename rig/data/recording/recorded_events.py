@@ -23,9 +23,9 @@ from rig.data.validation import Finite, parse_json, validate
 from rig.errors.quoting import quote
 from rig.motion.steps import Dwell, Sweep
 
-LARGEST_INTEGER = 2**63 - 1
+MAX_INTEGER = 2**63 - 1
 # Largest number of a sweep or dwell in rad, rad/s, rad/s² or s: ten days, and more turns than any joint makes.
-LARGEST = 1e6
+LIMIT = 1e6
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,18 +197,18 @@ def _check_sweep(sweep: Sweep) -> None:
     rates = sweep.speed_rad_s, sweep.acceleration_rad_s2, sweep.duration_s
     numbers = (*sweep.axis_flange, *sweep.start_q_rad, *sweep.end_q_rad, low, high, *rates)
     joints = len(sweep.start_q_rad)
-    possible = all(abs(number) <= LARGEST for number in numbers) and all(rate >= 1 / LARGEST for rate in rates)
-    counted = 0 <= sweep.index <= LARGEST and 0 <= sweep.joint < joints == len(sweep.end_q_rad)
+    possible = all(abs(number) <= LIMIT for number in numbers) and all(rate >= 1 / LIMIT for rate in rates)
+    counted = 0 <= sweep.index <= LIMIT and 0 <= sweep.joint < joints == len(sweep.end_q_rad)
     if not (counted and low < high and possible):
         raise ValueError(f"there is no such sweep as {quote(sweep)}")
 
 
 def _check_dwell(dwell: Dwell) -> None:
     """Raise ValueError for a dwell that no plan contains."""
-    if not (0 <= dwell.index <= LARGEST and all(abs(number) <= LARGEST for number in (*dwell.q_rad, dwell.duration_s))):
+    if not (0 <= dwell.index <= LIMIT and all(abs(number) <= LIMIT for number in (*dwell.q_rad, dwell.duration_s))):
         raise ValueError(f"there is no such dwell as {quote(dwell)}")
 
 
 def _check_observation(observation: BoardObservation) -> None:
-    if not all(0 <= n <= LARGEST_INTEGER for n in (observation.start_us, observation.end_us, observation.samples)):
+    if not all(0 <= n <= MAX_INTEGER for n in (observation.start_us, observation.end_us, observation.samples)):
         raise ValueError(f"there is no such observation as {quote(observation)}")

@@ -24,7 +24,7 @@ UNKNOWN_CHANGE_K = 20.0
 
 Axis = Annotated[tuple[Finite, ...], Field(min_length=3, max_length=3)]
 Mounting = Annotated[tuple[Axis, ...], Field(min_length=3, max_length=3)]
-AS_THE_FLANGE: Mounting = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+ALIGNED_MOUNTING: Mounting = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +41,7 @@ class RecordedSensor:
     serial_number: str
     rate_hz: Positive
     channels: Annotated[tuple[Channel, ...], Field(min_length=1, max_length=MAX_CHANNELS)]
-    mounting: Mounting = AS_THE_FLANGE
+    mounting: Mounting = ALIGNED_MOUNTING
     mode: Literal["raw", "calibrated"] = "raw"
     clock: str | None = None
     stamp_std_s: Positive | None = None

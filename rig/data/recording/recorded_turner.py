@@ -17,7 +17,7 @@ from rig.motion.state_rows import StateField, state_dtype
 from rig.motion.turner_state import Joints, TurnerIdentity
 
 MAX_FIELDS = 32
-ALWAYS = ("time_s", "host_time_s", "q_rad", "qd_rad_s")
+REQUIRED = ("time_s", "host_time_s", "q_rad", "qd_rad_s")
 Kind = Annotated[str, Field(pattern=r"^\w[\w.-]*$", max_length=40)]
 Word = Annotated[str, Field(max_length=200)]
 JointName = Annotated[str, Field(pattern=r"^\w[\w -]*$", max_length=40)]  # becomes the name of a column
@@ -61,7 +61,7 @@ def parse_turner(document: Any) -> RecordedTurner:
     """Return the turner that a document describes. Raise ValueError naming the impossible value."""
     turner = validate(RecordedTurner, document, "turner")
     names = [field.name for field in turner.fields]
-    if len({*turner.joints}) < len(turner.joints) or len({*names, *ALWAYS}) < len(names) + len(ALWAYS):
+    if len({*turner.joints}) < len(turner.joints) or len({*names, *REQUIRED}) < len(names) + len(REQUIRED):
         raise ValueError("two joints of its turner, or two fields of its states, have one name")
     if not all(name.isascii() and name.isidentifier() and len(name) <= 40 for name in names):
         raise ValueError("a field of its turner's states has a name that is not allowed")

@@ -23,7 +23,7 @@ from rig.data.processes.reading_process import ReadingTask, UnreadableFile
 from rig.data.quantity import ACCELERATION, RATE
 from rig.data.recording.extract import reason
 from rig.data.recording.layout import Contents, append, check_rows, empty, lay_out, table_of
-from rig.data.recording.layout_keys import EVENTS_DTYPE, SCHEMA, SCHEMA_ELSEWHERE, TABLES
+from rig.data.recording.layout_keys import EVENTS_DTYPE, EXTERNAL_SCHEMA, SCHEMA, TABLES
 from rig.data.recording.motion_file import MOTIONS, ExternalHeader, ReadElsewhere, samples_header
 from rig.data.recording.provenance import Provenance
 from rig.data.recording.recorded_events import Event, TimedEvent, decode_events, encode_event
@@ -32,13 +32,13 @@ from rig.data.recording.recorded_turner import RecordedTurner, check_joints
 from rig.data.recording.run_data import RunData
 from rig.data.recording.run_reading import begin_reading
 from rig.data.recording.settings import RunSettings, settings_from_json
-from rig.data.validation import LARGEST_NUMBER, parse_json, validate
+from rig.data.validation import MAX_NUMBER, parse_json, validate
 from rig.errors import Fault, Refused
 from rig.errors.quoting import quote
 from rig.motion.turner_state import State
 
 FLUSH_PERIOD_S = 0.25  # half of the promised time, so that a slow flush still keeps the promise
-LARGEST_STATE = 1e12  # largest value of a turner's state in SI units, times included
+MAX_STATE = 1e12  # of a turner, in SI units, times included
 
 
 class RunRecorder:
@@ -190,9 +190,9 @@ def read_run(path: Path, timeout_s: float | None = None, *, begun: ReadingTask |
             turner = _turner(contents, provenance)
             check_joints(turner, settings, events)
         states = _whole_rows(contents.states)
-        _check_numbers("states", states, LARGEST_STATE)
+        _check_numbers("states", states, MAX_STATE)
         for name, rows in samples.items():
-            _check_numbers(name, rows, LARGEST_NUMBER)
+            _check_numbers(name, rows, MAX_NUMBER)
         return RunData(
             config=contents.texts["config"],
             settings=settings,
@@ -217,7 +217,7 @@ def write_elsewhere(path: Path, run: RunData) -> None:
     header = ExternalHeader(read.item, read.tells, read.origin_s, read.other_rows, read.note)
     texts["elsewhere"] = json.dumps(asdict(header))
     tables = {"readings": table_of(read.readings), "motion": table_of(read.motion)}
-    lay_out(path, replace(empty(SCHEMA_ELSEWHERE, texts, {}), tables=tables), swmr=False)
+    lay_out(path, replace(empty(EXTERNAL_SCHEMA, texts, {}), tables=tables), swmr=False)
 
 
 def make_plain(path: Path) -> None:
@@ -243,7 +243,7 @@ def _contents(path: Path, timeout_s: float | None, begun: ReadingTask | None = N
         samples={name: next(rows) for name in fields["described"]},
         states=next(rows),
         events=next(rows),
-        tables={name: next(rows) for name in (TABLES if fields["schema"] == SCHEMA_ELSEWHERE else ())},
+        tables={name: next(rows) for name in (TABLES if fields["schema"] == EXTERNAL_SCHEMA else ())},
     )
     try:
         check_rows(contents)
@@ -263,7 +263,7 @@ def _not_a_run_file(path: Path, why: str) -> Refused:
 def _settings(contents: Contents, sensors: Mapping[str, RecordedSensor]) -> RunSettings:
     """Return the settings of a file. Raise ValueError if they contradict its schema or its sensors."""
     settings = settings_from_json(contents.texts["settings"])
-    if (settings.elsewhere is None) != (contents.schema != SCHEMA_ELSEWHERE):
+    if (settings.elsewhere is None) != (contents.schema != EXTERNAL_SCHEMA):
         raise ValueError("its settings are those of other readings")
     if settings.elsewhere is not None:
         return settings

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from rig.config.files.regular_file import RECORDING_MAX_BYTES, UnfitFile, open_regular_file
-from rig.data.processes.reading_process import MAX_UNPACKED, ReadingLimits, ReadingTask, size_without_holes
+from rig.data.processes.reading_process import MAX_UNPACKED_RATIO, ReadingLimits, ReadingTask, size_without_holes
 from rig.errors import Refused
 
 FIRST_RECORDING = "run.h5"
@@ -27,7 +27,7 @@ def begin_reading(path: Path, timeout_s: float | None = None) -> ReadingTask:
 
 def _limits(stored_bytes: int, time_s: float) -> ReadingLimits:
     """Return the limits for reading a run file, because a compressed part may claim any length."""
-    rows_bytes = MAX_UNPACKED * stored_bytes + MAX_UNWRITTEN_BYTES
+    rows_bytes = MAX_UNPACKED_RATIO * stored_bytes + MAX_UNWRITTEN_BYTES
     return ReadingLimits(LIBRARIES_BYTES + 3 * rows_bytes, time_s, time_s, 2 * rows_bytes)  # rows, and their copies
 
 

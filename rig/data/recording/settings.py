@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from rig.config.judging.judging_keys import (
-    OF_SENSORS,
+    SENSOR_KEYS,
     NonNegative,
     ObservationKeys,
     OfSensor,
@@ -25,7 +25,7 @@ from rig.config.judging.judging_keys import (
 )
 from rig.config.judging.verdict_limits import LIMITS, Limits
 from rig.config.sensors.sensor_catalogue import PARTS
-from rig.data.recording.recorded_sensor import AS_THE_FLANGE, Mounting, check_rotation
+from rig.data.recording.recorded_sensor import ALIGNED_MOUNTING, Mounting, check_rotation
 from rig.data.validation import Finite, OfJoints, Positive, parse_json, validate
 from rig.errors import Refused
 from rig.errors.quoting import quote
@@ -117,7 +117,7 @@ class Uncertainty(UncertaintyKeys[dict[str, NonNegative]]):
 
     def knows(self, name: str) -> bool:
         """Return whether error sizes are stated for the sensor `name`."""
-        return all(name in getattr(self, what) for what in OF_SENSORS)
+        return all(name in getattr(self, what) for what in SENSOR_KEYS)
 
     def find_stated_size(self, what: OfSensor, name: str) -> float:
         """Return the stated size of the error `what` of the sensor `name`."""
@@ -228,7 +228,7 @@ class RunSettings:
     @property
     def mount(self) -> Mounting:
         """The nominal rotation from the flange's frame to the item's, to which sensor mountings refer."""
-        return self.mounts[self.stage] if self.mounts else AS_THE_FLANGE
+        return self.mounts[self.stage] if self.mounts else ALIGNED_MOUNTING
 
     @property
     def stated_uncertainty(self) -> Uncertainty:
@@ -406,7 +406,7 @@ def uncertainty_of(config: "RigConfig") -> Uncertainty:
             name: getattr(PARTS[sensor.part], what) if stated[what] is None else stated[what]
             for name, sensor in config.sensors.items()
         }
-        for what in OF_SENSORS
+        for what in SENSOR_KEYS
     }
     return Uncertainty(**{**stated, **of_sensors})
 

@@ -23,7 +23,7 @@ PAGE, HEADER = "certificate.html", "calibration.h"
 DOCUMENTS = (RESULT, CONFIG, SCRIPT, SCRIPT_IDENTITY, HEADER)
 CERTIFICATES = (PAGE, "certificate.pdf", "certificate.xml")
 CHUNK_BYTES = 1 << 20
-PAGE_MAX_BYTES = 64_000_000  # the page of six sweeps has 30,000
+MAX_PAGE_BYTES = 64_000_000  # six sweeps have 30,000
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +117,7 @@ def document_sha256(folder: Path, name: str) -> str | None:
     Raise OSError, and UnfitFile for a file that cannot belong to a run.
     """
     try:
-        content = read_regular_file(folder / name, PAGE_MAX_BYTES)
+        content = read_regular_file(folder / name, MAX_PAGE_BYTES)
     except FileNotFoundError:
         return None
     if name == RESULT:
@@ -175,7 +175,7 @@ def _certificate(folder: Path, document: "ResultDocument", stated: "StatedFacts"
     An amended certificate is entered when it is made, not here.
     """
     try:
-        page = read_regular_file(folder / PAGE, PAGE_MAX_BYTES)
+        page = read_regular_file(folder / PAGE, MAX_PAGE_BYTES)
     except (UnfitFile, OSError):
         return None
     from rig.report.certificate.certificate_page import certificate_page

@@ -9,7 +9,7 @@ from rig.data.result_file import ResultDocument
 from rig.report.findings.history_records import HistoryRecord, Parameter
 from rig.report.kinds.kind_registry import history_records
 
-SAME = 1e-6  # tolerance relative to the standard uncertainty: above the rounding of another processor
+STD_TOLERANCE = 1e-6  # relative to the standard uncertainty: above the rounding of another processor
 
 
 def run_row(document: ResultDocument) -> dict[str, str | bool]:
@@ -75,7 +75,7 @@ def _differences(stated: HistoryRecord, recomputed: HistoryRecord) -> Iterator[s
 
 
 def _parameter_differences(stated: Parameter, recomputed: Parameter) -> Iterator[str]:
-    if not abs(stated.value - recomputed.value) <= SAME * stated.std:
+    if not abs(stated.value - recomputed.value) <= STD_TOLERANCE * stated.std:
         yield f"{stated.name} {recomputed.value:.9g}, stated {stated.value:.9g},"
     for name in ("std_statistical", "std_combined", "max_deviation", "coverage_factor"):
         if not _close(getattr(stated, name), getattr(recomputed, name)):
@@ -85,4 +85,4 @@ def _parameter_differences(stated: Parameter, recomputed: Parameter) -> Iterator
 
 
 def _close(stated: float | None, other: float | None) -> bool:
-    return stated == other if stated is None or other is None else math.isclose(stated, other, rel_tol=SAME)
+    return stated == other if stated is None or other is None else math.isclose(stated, other, rel_tol=STD_TOLERANCE)

@@ -7,13 +7,13 @@ from dataclasses import replace
 from rig.config.judging.verdict_limits import Kind
 from rig.data.installed_kinds import quantities
 from rig.data.result_file import CheckEntry, ResultDocument
-from rig.history.entered.index import SAME, unlike
+from rig.history.entered.index import STD_TOLERANCE, unlike
 from rig.report.findings.history_records import BIASES, SCALES, HistoryRecord
 from rig.report.kinds.kind_registry import history_records
 
-ROUNDING = 1e-15  # values that are zero except for rounding: no quantity of a result is as small
+ROUNDING_ERROR = 1e-15  # values that are zero except for rounding: no quantity of a result is as small
 # The same result may take other iterations, and has another time.
-AS_IT_COMES = ("iterations", "solved_utc")
+UNCOMPARED_FIELDS = ("iterations", "solved_utc")
 
 
 def not_given(claimed: ResultDocument, recomputed: ResultDocument) -> list[str]:
@@ -54,7 +54,7 @@ def _check_values(check: CheckEntry) -> tuple[bool, str, Kind]:
 
 def _origin(document: ResultDocument) -> dict[str, object]:
     fields: dict[str, object] = json.loads(document.provenance.model_dump_json(exclude_unset=True))
-    return {name: value for name, value in fields.items() if name not in AS_IT_COMES}
+    return {name: value for name, value in fields.items() if name not in UNCOMPARED_FIELDS}
 
 
 def _numbers_of(document: ResultDocument) -> dict[str, object]:
@@ -70,7 +70,7 @@ def _differences(claimed: object, recomputed: object, where: str, scale: float =
         for name, item in claimed.items():
             if name not in recomputed:
                 yield f"{where}{name}"
-            elif name not in AS_IT_COMES:
+            elif name not in UNCOMPARED_FIELDS:
                 yield from _differences(item, recomputed[name], f"{where}{name}.")
     elif isinstance(claimed, Sequence) and isinstance(recomputed, Sequence) and not isinstance(claimed, str):
         if len(claimed) != len(recomputed):
@@ -80,7 +80,7 @@ def _differences(claimed: object, recomputed: object, where: str, scale: float =
         for number, (item, other) in enumerate(zip(claimed, recomputed, strict=True)):
             yield from _differences(item, other, f"{where}{number}.", largest)
     elif isinstance(claimed, float | int) and isinstance(recomputed, float | int):
-        if abs(claimed - recomputed) > max(SAME * max(scale, abs(recomputed)), ROUNDING):
+        if abs(claimed - recomputed) > max(STD_TOLERANCE * max(scale, abs(recomputed)), ROUNDING_ERROR):
             yield f"{where.rstrip('.')} {claimed:.9g}, which is {recomputed:.9g}"
     elif type(claimed) is not type(recomputed):
         yield where.rstrip(".")

@@ -12,7 +12,7 @@ from rig.history.entered.issued_certificate import Issued
 from rig.history.store import Past
 from rig.report.findings.history_records import HistoryRecord, Parameter
 
-OF_U = 0.1  # fraction of U: a smaller shift changes at most the second digit of a stated uncertainty
+U_FRACTION = 0.1  # a smaller shift changes at most the second digit of a stated uncertainty
 
 # Reasons for a missing present result: the method refuses the recording; the requested setting or estimator does not
 # suit it; the recording is missing; it has changed since it was entered; its worker died; the program failed.
@@ -95,7 +95,7 @@ class Compared:
 
     stated: StatedResult
     answer: Answer | None
-    of_u: float = OF_U
+    of_u: float = U_FRACTION
 
     @cached_property
     def moves(self) -> Mapping[int, tuple[ParameterMove, ...]]:
@@ -194,7 +194,7 @@ class RecomputeOutcome:
 
 
 def match_answers(
-    stated: Iterable[StatedResult], answers: Mapping[str, Answer], of_u: float = OF_U
+    stated: Iterable[StatedResult], answers: Mapping[str, Answer], of_u: float = U_FRACTION
 ) -> RecomputeOutcome:
     """Return each result with the answer under the result's checksum, if any."""
     return RecomputeOutcome(

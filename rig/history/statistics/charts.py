@@ -15,12 +15,12 @@ from rig.estimation.arrays import Array
 
 Alarms = NDArray[np.bool_]
 
-FEWEST = 5  # results before the first judgement: fewer do not determine the scatter
+MIN_RESULTS = 5  # before the first judgement: fewer do not determine the scatter
 SMOOTHING = 0.15  # λ: weight of the newest deviation
 # Standard deviations of the average; together with the other limit, an alarm in about 340 runs in control.
 EWMA_LIMIT = 2.8
 SHEWHART_LIMIT = 4.0  # standard deviations: 3 together with an EWMA would halve the time between false alarms
-SPREAD_MIN = 1e-12  # least scatter relative to a value: the rounding of equal values is not scatter
+MIN_SCATTER = 1e-12  # relative to a value: the rounding of equal values is not scatter
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,9 +49,9 @@ def chart(values: Array, std: Array) -> Chart:
     deviation, ewma, limit = np.full(shape, np.nan), np.full(shape, np.nan), np.full(shape, np.nan)
     alarm = np.zeros(shape, dtype=bool)
     average = np.zeros(shape[:-1])
-    for i in range(FEWEST - 1, shape[-1]):
+    for i in range(MIN_RESULTS - 1, shape[-1]):
         deviation[..., i] = _deviation(values[..., : i + 1], std[..., : i + 1], ~alarm[..., :i])
-        average, limit[..., i] = step(average, deviation[..., i], i - FEWEST + 1)
+        average, limit[..., i] = step(average, deviation[..., i], i - MIN_RESULTS + 1)
         ewma[..., i] = average
         alarm[..., i] = raise_alarms(deviation[..., i], average, limit[..., i])
     return Chart(deviation, ewma, limit, alarm)
@@ -102,7 +102,7 @@ def _deviation(values: Array, std: Array, counted: Alarms) -> Array:
     mean = (weights * before).sum(axis=-1) / total
     scatter = (weights * (before - mean[..., None]) ** 2).sum(axis=-1) / (count - 1)
     prediction_std = np.sqrt(scatter * (std[..., -1] ** 2 + between + 1 / total))
-    student = (newest - mean) / np.maximum(prediction_std, SPREAD_MIN * np.maximum(np.abs(mean), np.finfo(float).tiny))
+    student = (newest - mean) / np.maximum(prediction_std, MIN_SCATTER * np.maximum(np.abs(mean), np.finfo(float).tiny))
     from scipy import special
 
     tail = np.maximum(special.stdtr(count - 1, -np.abs(student)), np.finfo(float).tiny)

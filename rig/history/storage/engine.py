@@ -12,7 +12,7 @@ from rig.history.storage.address import HistoryAddress
 from rig.history.storage.forks import kept_from_children
 from rig.history.storage.libpq import connect_arguments
 from rig.history.storage.migrations import bring_up_to_date, version_of
-from rig.history.storage.sqlite_engine import WAIT_S, WRITES, share_engine, sqlite_engine
+from rig.history.storage.sqlite_engine import MAX_WAIT_S, WRITE_OPTION, share_engine, sqlite_engine
 from rig.history.storage.sqlite_file import history_is_there, new_file_in_place
 
 
@@ -49,7 +49,7 @@ def connection_apart(engine: Engine) -> Iterator[Connection]:
 
 
 def _bring_up_to_date(engine: Engine, label: str) -> None:
-    with engine.connect().execution_options(**{WRITES: True}) as connection, connection.begin():
+    with engine.connect().execution_options(**{WRITE_OPTION: True}) as connection, connection.begin():
         bring_up_to_date(connection, label)
 
 
@@ -76,7 +76,7 @@ def _server_engine(server: URL) -> Iterator[Engine]:
 
 
 def _postgresql(server: URL) -> Engine:
-    limits = f"-c lock_timeout={WAIT_S}s -c statement_timeout={WAIT_S}s"
+    limits = f"-c lock_timeout={MAX_WAIT_S}s -c statement_timeout={MAX_WAIT_S}s"
     with requiring("postgres"):
         arguments = {"options": limits, **connect_arguments(server)}
         return kept_from_children(create_engine(server, connect_args=arguments))

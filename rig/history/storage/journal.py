@@ -16,8 +16,8 @@ from sqlalchemy import Connection, Table, insert, select, text
 
 from rig.history.storage import schema
 
-LOCK = 7_245_118  # an arbitrary common number: writers wait for one another
-ENTERED: Mapping[str, Table] = {
+LOCK_NUMBER = 7_245_118  # an arbitrary common number: writers wait for one another
+ENTRY_TABLES: Mapping[str, Table] = {
     table.name: table
     for table in (schema.run, schema.location, schema.voided, schema.certificate, schema.certificate_file)
 }
@@ -43,7 +43,7 @@ class Head:
 def alone(connection: Connection) -> None:
     """Lock out other writers until the transaction ends; on SQLite, a writing transaction is exclusive anyway."""
     if connection.dialect.name == "postgresql":
-        connection.execute(text("SELECT pg_advisory_xact_lock(:lock)"), {"lock": LOCK})
+        connection.execute(text("SELECT pg_advisory_xact_lock(:lock)"), {"lock": LOCK_NUMBER})
 
 
 def note(connection: Connection, table: Table, *key: int | str) -> None:
@@ -95,7 +95,7 @@ def broken(connection: Connection) -> Iterator[Broken]:
     """Yield rows that differ from the journal or are not in the journal, and gaps and breaks of the chain."""
     remaining = {
         (name, json.dumps(tuple(key))): (table, tuple(key))
-        for name, table in ENTERED.items()
+        for name, table in ENTRY_TABLES.items()
         for key in connection.execute(select(*table.primary_key)).all()
     }
     before, chain = 0, ""

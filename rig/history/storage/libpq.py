@@ -10,13 +10,13 @@ from collections.abc import Mapping
 from ipaddress import ip_address
 from typing import TYPE_CHECKING
 
-from rig.config.judging.history_address import ENCRYPTED
+from rig.config.judging.history_address import ENCRYPTED_MODES
 
 if TYPE_CHECKING:
     from sqlalchemy import URL
 
-CONNECT_S = 5
-SILENCE_S = 5  # time after which an unresponsive connection is closed
+CONNECT_TIMEOUT_S = 5
+SILENCE_TIMEOUT_S = 5  # after which an unresponsive connection is closed
 
 
 def connect_arguments(server: "URL", environment: Mapping[str, str] = os.environ) -> dict[str, str | int]:
@@ -28,13 +28,13 @@ def connect_arguments(server: "URL", environment: Mapping[str, str] = os.environ
     is_local = _is_on_this_computer(server, environment)
     options: dict[str, str | int] = {
         "require_auth": environment.get("PGREQUIREAUTH") or ("scram-sha-256,none" if is_local else "scram-sha-256"),
-        "connect_timeout": CONNECT_S,
-        "tcp_user_timeout": SILENCE_S * 1000,
-        "keepalives_idle": SILENCE_S,
+        "connect_timeout": CONNECT_TIMEOUT_S,
+        "tcp_user_timeout": SILENCE_TIMEOUT_S * 1000,
+        "keepalives_idle": SILENCE_TIMEOUT_S,
     }
     if "sslmode" not in server.query:
         requested = environment.get("PGSSLMODE", "")
-        options["sslmode"] = requested if requested in ENCRYPTED else "prefer" if is_local else ENCRYPTED[0]
+        options["sslmode"] = requested if requested in ENCRYPTED_MODES else "prefer" if is_local else ENCRYPTED_MODES[0]
     return options
 
 

@@ -20,7 +20,7 @@ def refuse_lost(connection: Connection, address: HistoryAddress, before: Head, a
     lines = schema.journal.c
     entered = select(lines.kind, lines.key).where(lines.number > before.number, lines.number <= after.number)
     for line in connection.execute(entered.order_by(lines.number)).all():
-        refuse_missing(connection, address, journal.ENTERED[line.kind], *json.loads(line.key))
+        refuse_missing(connection, address, journal.ENTRY_TABLES[line.kind], *json.loads(line.key))
     continuity.refuse_another(address, connection)
 
 

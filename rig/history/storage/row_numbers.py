@@ -7,7 +7,7 @@ from sqlalchemy import Connection, Table, func, select
 from rig.history.storage import schema
 from rig.history.storage.journal import Broken
 
-NUMBERED = (schema.run, schema.location, schema.calibration, schema.certificate)
+NUMBERED_TABLES = (schema.run, schema.location, schema.calibration, schema.certificate)
 
 
 def next_number(connection: Connection, table: Table) -> int:
@@ -17,7 +17,7 @@ def next_number(connection: Connection, table: Table) -> int:
 
 def gaps(connection: Connection) -> Iterator[Broken]:
     """Yield the gaps in the row numbers of the history's tables."""
-    for table in NUMBERED:
+    for table in NUMBERED_TABLES:
         before = 0
         for number in connection.scalars(select(table.c.id).order_by(table.c.id)):
             if number > before + 1:

@@ -17,8 +17,8 @@ from rig.history.storage.continuity import refuse_unlike
 from rig.history.storage.forks import kept_from_children
 from rig.history.storage.sqlite_file import address_of, identities, refuse_unmarked
 
-WAIT_S = 30  # wait for other writers: far longer than an entry takes
-WRITES = "rig_writes"  # execution option of a connection that will write
+MAX_WAIT_S = 30  # for other writers: far longer than an entry takes
+WRITE_OPTION = "rig_writes"  # execution option of a connection that will write
 
 
 @dataclass(slots=True)
@@ -79,7 +79,7 @@ def sqlite_engine(file: Path, label: str, *, new: bool = False) -> Engine:
         @event.listens_for(engine, "begin")
         def begin(connection: Connection) -> None:
             # A transaction that reads before it writes cannot wait for a writer: it would have read old rows.
-            writes = connection.get_execution_options().get(WRITES)
+            writes = connection.get_execution_options().get(WRITE_OPTION)
             connection.exec_driver_sql("BEGIN IMMEDIATE" if writes else "BEGIN")
 
     return engine
@@ -109,7 +109,7 @@ def _connect_to_read(file: Path) -> sqlite3.Connection:
 
 def _connect(file: Path, options: str) -> sqlite3.Connection:
     # For any thread: the engine's pool gives a connection to one thread at a time.
-    return sqlite3.connect(address_of(file, options), uri=True, timeout=WAIT_S, check_same_thread=False)
+    return sqlite3.connect(address_of(file, options), uri=True, timeout=MAX_WAIT_S, check_same_thread=False)
 
 
 def _begin_anew() -> None:

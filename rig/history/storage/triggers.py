@@ -12,14 +12,14 @@ from sqlalchemy import Connection, Table, UniqueConstraint, text
 from rig.history.storage import schema
 from rig.history.storage.journal import Broken
 
-NO = "a history keeps its rows as they were entered"
+REFUSAL = "a history keeps its rows as they were entered"
 # A migration changes the version in `meta`; nothing else there changes.
-NEWER = (
+NEWER_VERSION = (
     "OLD.key = 'schema_version' AND NEW.key = 'schema_version' "
     "AND CAST(NEW.value AS INTEGER) > CAST(OLD.value AS INTEGER)"
 )
 FUNCTION = "history_keeps_its_rows"
-_BODY = f" BEGIN RAISE EXCEPTION USING MESSAGE = '{NO}: ' || TG_OP || ' of ' || TG_TABLE_NAME; END "
+_BODY = f" BEGIN RAISE EXCEPTION USING MESSAGE = '{REFUSAL}: ' || TG_OP || ' of ' || TG_TABLE_NAME; END "
 # Bits of pg_trigger.tgtype for the properties of a trigger (PostgreSQL's catalog/pg_trigger.h).
 _BITS: Mapping[str, int] = {"ROW": 1, "BEFORE": 2, "DELETE": 8, "UPDATE": 16, "TRUNCATE": 32}
 _FIRES = ("O", "A")  # pg_trigger.tgenabled: fires in sessions without replication, or in all
@@ -103,8 +103,8 @@ def _file_triggers() -> Mapping[str, str]:
     """Return the statements that make SQLite's triggers, by the triggers' names."""
     statements: dict[str, str] = {}
     for table in schema.metadata.sorted_tables:
-        unless = f"WHEN NOT ({NEWER})" if table is schema.meta else ""
-        refused = f"BEGIN SELECT RAISE(ABORT, '{NO}'); END"
+        unless = f"WHEN NOT ({NEWER_VERSION})" if table is schema.meta else ""
+        refused = f"BEGIN SELECT RAISE(ABORT, '{REFUSAL}'); END"
         # INSERT OR REPLACE removes a row without firing the trigger of removal.
         exists = f"EXISTS (SELECT 1 FROM {table} WHERE {_same_row(table)})"
         for name, fires in {
@@ -129,7 +129,7 @@ def _same_row(table: Table) -> str:
 def _server_triggers() -> Iterator[_ServerTrigger]:
     for table in schema.metadata.sorted_tables:
         if table is schema.meta:
-            yield _ServerTrigger(table, "not_changed", ("UPDATE",), "ROW", f"NOT ({NEWER})")
+            yield _ServerTrigger(table, "not_changed", ("UPDATE",), "ROW", f"NOT ({NEWER_VERSION})")
             yield _ServerTrigger(table, "not_removed", ("DELETE", "TRUNCATE"))
         else:
             yield _ServerTrigger(table, "not_changed", ("UPDATE", "DELETE", "TRUNCATE"))

@@ -12,10 +12,10 @@ from rig.history.series import Trend
 from rig.station.plain_text import plain
 
 BLOCKS = "▁▂▃▄▅▆▇█"
-PLAIN = str.maketrans(BLOCKS, "__..--''")  # for a terminal without blocks
-MOST = 16  # number of the newest results
+PLAIN_BLOCKS = str.maketrans(BLOCKS, "__..--''")  # for a terminal without blocks
+MAX_RESULTS = 16  # the newest
 
-STROKES, ROUND_A_CELL = 1, 3  # width of the frame: one stroke, and for each cell two spaces and a stroke
+FRAME_STROKES, CELL_FRAME = 1, 3  # width of the frame: one stroke, and for each cell two spaces and a stroke
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,12 +70,12 @@ class FittingTable:
             side: JustifyMethod = "right" if column.number else "left"
             table.add_column(column.heading, justify=side, no_wrap=fits and not column.wraps, overflow="fold")
         for row in zip(*(column.cells for column in columns), strict=True):
-            table.add_row(*(plain(cell.translate(PLAIN) if options.ascii_only else cell) for cell in row))
+            table.add_row(*(plain(cell.translate(PLAIN_BLOCKS) if options.ascii_only else cell) for cell in row))
         yield table
 
 
 def _total_width(columns: Sequence[TableColumn]) -> int:
-    return sum(column.width + ROUND_A_CELL for column in columns) + STROKES
+    return sum(column.width + CELL_FRAME for column in columns) + FRAME_STROKES
 
 
 def picture(trend: Trend) -> str:
@@ -84,7 +84,7 @@ def picture(trend: Trend) -> str:
     The lowest block is the lowest value − U, the highest block the highest value + U, so values with equal blocks
     differ by less than U. Empty for a single result.
     """
-    newest = trend.parameters[-MOST:]
+    newest = trend.parameters[-MAX_RESULTS:]
     if len(newest) < 2:
         return ""
     values, widths = (np.array([getattr(parameter, name) for parameter in newest]) for name in ("value", "expanded"))

@@ -4,8 +4,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from rig.data.absent import NO_ARM, NO_BOARD
 from rig.data.installed_kinds import quantities
-from rig.history.series import DRIFT_DAYS, YEAR_DAYS, Change, RigState, Subject, Trend
-from rig.history.statistics.charts import FEWEST, Chart
+from rig.history.series import MIN_DRIFT_DAYS, YEAR_DAYS, Change, RigState, Subject, Trend
+from rig.history.statistics.charts import MIN_RESULTS, Chart
 from rig.history.statistics.rig_effects import RigEffect
 from rig.history.store import Kept, Past
 from rig.history.terminal.change_words import add_sign
@@ -56,10 +56,10 @@ def trend_lines(trends: Mapping[str, Trend]) -> Iterator[str]:
     yield "trend: oldest to newest, from the lowest value − U to the highest + U"
     if "k" in trends:
         yield "k: the mean of the scale factors; an error of a clock changes it most"
-    if fewest < FEWEST:
-        yield f"drift, scatter, chart and recall need {FEWEST} calibrations; there are {fewest}"
+    if fewest < MIN_RESULTS:
+        yield f"drift, scatter, chart and recall need {MIN_RESULTS} calibrations; there are {fewest}"
     elif all(trend.line is None for trend in trends.values()):
-        yield f"drift and recall need {DRIFT_DAYS:g} days from the first calibration to the last"
+        yield f"drift and recall need {MIN_DRIFT_DAYS:g} days from the first calibration to the last"
     calibrated = [trend.last for name, trend in trends.items() if name in (*SCALES, *BIASES)]
     if calibrated and all(parameter.std_combined is None for parameter in calibrated):
         yield "U includes noise only: no result of this sensor has a budget"

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rig.config.column_map import AS_NAMED, ColumnMap
+from rig.config.column_map import STANDARD_NAMES, ColumnMap
 from rig.data.installed_kinds import quantities
 from rig.data.quantity import ACCELERATION, RATE, TEMPERATURE
 from rig.data.recording.motion_file import TIME, Columns, Item, MotionKind, ReadElsewhere
@@ -47,7 +47,7 @@ class Files:
     tells: MotionKind
     item: Item
     recorded: datetime | None = None
-    columns: ColumnMap = AS_NAMED
+    columns: ColumnMap = STANDARD_NAMES
 
 
 def build_recording(
@@ -102,7 +102,7 @@ def build_recording(
     )
 
 
-def read_log(path: Path, columns: ColumnMap = AS_NAMED, item: Item = UNNAMED_ITEM) -> RunData:
+def read_log(path: Path, columns: ColumnMap = STANDARD_NAMES, item: Item = UNNAMED_ITEM) -> RunData:
     """Return the readings of a file without motion, as `rig solve` reads them, to be shown or exported.
 
     Raise Refused as `read_sample_table` and `samples_in` do.

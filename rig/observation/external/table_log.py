@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rig.config.column_map import AS_NAMED, AxisSection, ColumnMap, TableSection
+from rig.config.column_map import STANDARD_NAMES, AxisSection, ColumnMap, TableSection
 from rig.data.recording.motion_file import TIME, Columns, Header
 from rig.errors import Refused
 from rig.estimation.arrays import Array, axis_of
@@ -14,7 +14,7 @@ from rig.observation.formats.csv_table import read_columns
 
 
 def read_table_log(
-    path: Path, table: TableSection, columns: ColumnMap = AS_NAMED, origin_s: int = 0
+    path: Path, table: TableSection, columns: ColumnMap = STANDARD_NAMES, origin_s: int = 0
 ) -> dict[str, Array]:
     """Return the columns of attitudes (`motion_file.MOTIONS`) from the log of a table, times from `origin_s` on.
 

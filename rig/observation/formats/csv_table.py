@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rig.config.column_map import TIMES
 from rig.data.processes.reading_parts import Part
-from rig.data.recording.motion_file import LARGEST_NUMBER, TIME, Header
+from rig.data.recording.motion_file import MAX_NUMBER, TIME, Header
 from rig.errors import Refused
 from rig.errors.quoting import quote
 from rig.estimation.arrays import Array
@@ -189,7 +189,7 @@ class _Wanted:
             numbers = [float(row[index]) * factor for index, factor in zip(self.names, self.factors, strict=True)]
         except ValueError:
             return ()
-        return numbers if all(abs(number) < LARGEST_NUMBER for number in numbers) else ()
+        return numbers if all(abs(number) < MAX_NUMBER for number in numbers) else ()
 
     def names_units(self, line: int, row: Sequence[str]) -> bool:
         """Return whether a row below the heading holds units and no numbers. Raise Refused `wrong_unit`."""
@@ -248,12 +248,11 @@ class _Wanted:
             ]
         except (ValueError, ArithmeticError):
             numbers = list[float]()
-        right = [abs(number) < LARGEST_NUMBER or not cell.strip() for number, cell in zip(numbers, cells, strict=False)]
+        right = [abs(number) < MAX_NUMBER or not cell.strip() for number, cell in zip(numbers, cells, strict=False)]
         if len(right) < len(cells) or not all(right):
             raise Refused(
                 "not_a_number",
-                f"{self.path}, line {line}: {quote(','.join(cells))} is not {len(cells)} numbers below "
-                f"{LARGEST_NUMBER:g}",
+                f"{self.path}, line {line}: {quote(','.join(cells))} is not {len(cells)} numbers below {MAX_NUMBER:g}",
                 "Write plain decimal numbers with a point, no NaN, one for each column; state the text of a missing "
                 "value with --columns; or leave out what is not a reading",
             )

@@ -9,10 +9,10 @@ from typing import Any, cast
 
 import numpy as np
 
-from rig.config.column_map import ALLOWED
+from rig.config.column_map import ALLOWED_UNITS
 from rig.config.units import TIME, UNITS
 from rig.data.processes.reading_parts import Part
-from rig.data.recording.motion_file import LARGEST_NUMBER
+from rig.data.recording.motion_file import MAX_NUMBER
 from rig.errors import Refused
 from rig.observation.formats.csv_cells import is_number, is_value, repeats, seconds_of, unit_of
 from rig.observation.formats.csv_text import is_harmless, read_rows
@@ -158,7 +158,7 @@ def _describe(  # noqa: PLR0917
         "skip_lines": skip,
         "headings": headings,
         "units": stated,
-        "numbers": [index for index in numbers if index == time or _largest_number(columns[index]) < LARGEST_NUMBER],
+        "numbers": [index for index in numbers if index == time or _largest_number(columns[index]) < MAX_NUMBER],
         "texts": [index for index, column in enumerate(columns) if column and index not in {*numbers, time}],
         "time": time,
         "time_unit": time_unit,
@@ -230,7 +230,7 @@ def _time_unit(heading: str, unit: str, column: Sequence[str]) -> str:
 
     They are plausible as dates, or if they give a likely sample rate.
     """
-    if unit in ALLOWED and UNITS[unit].quantity == TIME:
+    if unit in ALLOWED_UNITS and UNITS[unit].quantity == TIME:
         return unit
     name = heading.lower()
     for word, meant in (

@@ -16,9 +16,9 @@ from rig.page.server.feed import Broadcast
 from rig.page.server.guard import CERTIFICATE_POLICY, COOKIE, Door
 
 STATIC = Path(__file__).parents[1] / "static"
-MEDIA = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
-LARGEST_BODY = 1000  # bytes of a request
-LARGEST_CERTIFICATE = 8_000_000
+MEDIA_TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
+MAX_BODY_BYTES = 1000  # of a request
+MAX_CERTIFICATE_BYTES = 8_000_000
 Handler = Callable[[Request], Awaitable[Response]]
 
 
@@ -39,7 +39,7 @@ def looking(broadcast: Broadcast, door: Door, home: str) -> list[Route]:
     async def nothing(request: Request) -> Response:
         return Response(status_code=204)
 
-    shown = {path.name: path for path in STATIC.rglob("*") if path.suffix in MEDIA}
+    shown = {path.name: path for path in STATIC.rglob("*") if path.suffix in MEDIA_TYPES}
     files = [Route("/", _file(shown[home])), Route("/favicon.ico", nothing)]
     files += [Route(f"/{name}", _file(path)) for name, path in shown.items()]
     return [*files, Route("/events", stream)]
@@ -59,7 +59,7 @@ async def body_of(request: Request) -> bytes:
     body = b""
     async for chunk in request.stream():
         body += chunk
-        if len(body) > LARGEST_BODY:
+        if len(body) > MAX_BODY_BYTES:
             return b""
     return body
 
@@ -72,7 +72,7 @@ def run_routes(broadcast: Broadcast, control: Control, door: Door, folder: Path)
             return _token_needed()
         try:
             text = await run_in_threadpool(
-                read_regular_file, folder / CERTIFICATE, LARGEST_CERTIFICATE, follow_links=False
+                read_regular_file, folder / CERTIFICATE, MAX_CERTIFICATE_BYTES, follow_links=False
             )
         except FileNotFoundError:
             return PlainTextResponse("there is no certificate yet\n", 404)
@@ -103,7 +103,7 @@ def run_routes(broadcast: Broadcast, control: Control, door: Door, folder: Path)
 
 
 def _file(path: Path) -> Handler:
-    text, media = path.read_bytes(), MEDIA[path.suffix]
+    text, media = path.read_bytes(), MEDIA_TYPES[path.suffix]
 
     async def served(request: Request) -> Response:
         return Response(text, media_type=media)

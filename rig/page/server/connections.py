@@ -14,16 +14,16 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from uvicorn.protocols.http.h11_impl import H11Protocol
 
-STRANGERS = 96  # connections that have not shown the token, at most
-TRUSTED = 64  # connections that have, at most
-REQUEST_S = 5.0  # time for the complete headers of a request
+MAX_STRANGERS = 96  # connections that have not shown the token
+MAX_TRUSTED = 64  # connections that have
+MAX_REQUEST_S = 5.0  # for the complete headers of a request
 Client = tuple[str, int]  # address and port
 
 
 class Connections:
     """The connections of one server, all in its event loop."""
 
-    def __init__(self, request_s: float = REQUEST_S) -> None:
+    def __init__(self, request_s: float = MAX_REQUEST_S) -> None:
         self._request_s = request_s
         self._strangers: dict[Client, asyncio.WriteTransport] = {}  # the oldest first
         self._trusted: dict[Client, asyncio.WriteTransport] = {}
@@ -31,7 +31,7 @@ class Connections:
 
     def add(self, client: Client, transport: asyncio.WriteTransport) -> None:
         """Add a connection; if there are too many, close an older one."""
-        if len(self._strangers) >= STRANGERS:
+        if len(self._strangers) >= MAX_STRANGERS:
             most = Counter(address for address, _ in self._strangers).most_common(1)[0][0]
             oldest = next(client for client in self._strangers if client[0] == most)
             self._strangers[oldest].abort()
@@ -51,7 +51,7 @@ class Connections:
         """Mark a client whose complete request is answered in this block."""
         if (deadline := self._deadlines.pop(client, None)) is not None:
             deadline.cancel()
-        if has_token and len(self._trusted) < TRUSTED and client in self._strangers:
+        if has_token and len(self._trusted) < MAX_TRUSTED and client in self._strangers:
             self._trusted[client] = self._strangers.pop(client)
         try:
             yield

@@ -12,7 +12,7 @@ from types import FrameType
 
 from rig.data.processes.ending_signals import INTERRUPTS, signal_name
 
-STOPPED = "stopped from the page"
+STOP_REASON = "stopped from the page"
 STOP_SIGNAL = getattr(signal, "SIGUSR1", signal.SIGINT)  # SIGINT may be ignored in background jobs
 
 
@@ -34,7 +34,7 @@ class Control:
         """Make `stop` raise KeyboardInterrupt in this block of the main thread."""
 
         def interrupt(number: int, frame: FrameType | None) -> None:
-            INTERRUPTS.hear(number, frame, STOPPED if self._stopping else f"interrupted by {signal_name(number)}")
+            INTERRUPTS.hear(number, frame, STOP_REASON if self._stopping else f"interrupted by {signal_name(number)}")
 
         INTERRUPTS.allow()
         before = signal.signal(STOP_SIGNAL, interrupt)

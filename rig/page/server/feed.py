@@ -18,9 +18,9 @@ from rig.page.rows import Look
 from rig.station.events import RunEvent
 
 FRAME_S = 0.1
-SIGN_OF_LIFE_S = 0.8  # interval of messages if there is no news: a browser reports silence after 2 s
-CLIENTS = 32  # largest number of browsers with the token
-STRANGERS = 16  # largest number of browsers without the token
+HEARTBEAT_S = 0.8  # interval of messages if there is no news: a browser reports silence after 2 s
+MAX_CLIENTS = 32  # browsers with the token
+MAX_STRANGERS = 16  # browsers without the token
 
 
 class Source(Protocol):
@@ -129,7 +129,7 @@ class Broadcast:
     def full(self, *, has_token: bool) -> bool:
         """Return whether no further browser is admitted; the limits with and without the token are separate."""
         return sum(trusted == has_token for trusted in self._mailboxes.values()) >= (
-            CLIENTS if has_token else STRANGERS
+            MAX_CLIENTS if has_token else MAX_STRANGERS
         )
 
     @property
@@ -149,7 +149,7 @@ class Broadcast:
             await asyncio.sleep(FRAME_S)
             frame = self._feed.news()
             idle_s = 0.0 if frame is not None else idle_s + FRAME_S
-            if frame is None and idle_s >= SIGN_OF_LIFE_S:
+            if frame is None and idle_s >= HEARTBEAT_S:
                 frame, idle_s = b": here\n\n", 0.0
             if frame is not None:
                 self.post(frame)

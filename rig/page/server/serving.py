@@ -23,13 +23,13 @@ if TYPE_CHECKING:
     from starlette.routing import Route
 
 ADDRESS, PORT = "127.0.0.1", 8137
-LAST_NEWS_S = 4.0  # time for browsers to receive the last news
-ENDING_S = 8.0
-SHORTEST_TOKEN = 22  # characters of base64, for 128 bits
-AT_ONCE = 8  # connections accepted in one cycle of the event loop
-WAITING = 128  # connections that may wait to be accepted
-IDLE_S = 3  # duration for which a browser's connection waits for another request
-LARGEST_HEADERS = 8192  # bytes of the headers
+MAX_LAST_NEWS_S = 4.0  # time for browsers to receive the last news
+MAX_EXIT_S = 8.0
+MIN_TOKEN = 22  # characters of base64, for 128 bits
+MAX_ACCEPTED = 8  # connections in one cycle of the event loop
+BACKLOG = 128  # connections that may wait to be accepted
+MAX_IDLE_S = 3  # for which a browser's connection waits for another request
+MAX_HEADER_BYTES = 8192
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,12 +85,12 @@ def serving(
         served = asyncio.create_task(server.serve([listening]))
         while not server.started and not served.done():
             await asyncio.sleep(0.01)
-        listening.listen(WAITING)  # the server has already set it to AT_ONCE
+        listening.listen(BACKLOG)  # the server has already set it to MAX_ACCEPTED
         ending = asyncio.create_task(over.wait())
         await asyncio.wait((ending, served, posting), return_when=asyncio.FIRST_COMPLETED)
         ending.cancel()
         try:
-            await broadcast.close(LAST_NEWS_S)
+            await broadcast.close(MAX_LAST_NEWS_S)
         finally:
             server.should_exit = True
             await asyncio.wait((posting, served))
@@ -117,7 +117,7 @@ def serving(
     finally:
         with suppress(RuntimeError):  # its loop is closed: the server has already ended
             loop.call_soon_threadsafe(over.set)
-        thread.join(ENDING_S)  # it closes its socket; a starved one ends with the process
+        thread.join(MAX_EXIT_S)  # it closes its socket; a starved one ends with the process
 
 
 def _server(broadcast: Broadcast, control: Control, door: Door, folder: Path | None, shown: Page) -> "uvicorn.Server":
@@ -134,9 +134,9 @@ def _server(broadcast: Broadcast, control: Control, door: Door, folder: Path | N
     config = uvicorn.Config(
         Guard(Starlette(routes=served), door, connections),
         http=counting_protocol(connections),
-        h11_max_incomplete_event_size=LARGEST_HEADERS,
-        backlog=AT_ONCE,
-        timeout_keep_alive=IDLE_S,
+        h11_max_incomplete_event_size=MAX_HEADER_BYTES,
+        backlog=MAX_ACCEPTED,
+        timeout_keep_alive=MAX_IDLE_S,
         proxy_headers=False,  # anyone can send such headers; a connection is identified by its own address
         log_config=None,
         log_level="critical",  # requests of strangers must not fill the terminal
@@ -158,11 +158,11 @@ def check(address: PageAddress) -> None:
             "Give the one address by which the tablet reaches it: --page-address ADDRESS:PORT",
         )
     if address.token is not None and (
-        len(address.token) < SHORTEST_TOKEN or not address.token.replace("-", "").replace("_", "").isalnum()
+        len(address.token) < MIN_TOKEN or not address.token.replace("-", "").replace("_", "").isalnum()
     ):
         raise Refused(
             "page_address",
-            f"the page's token has fewer than {SHORTEST_TOKEN} characters, or others than letters, digits, - and _",
+            f"the page's token has fewer than {MIN_TOKEN} characters, or others than letters, digits, - and _",
             "Make one with: python -c 'import secrets; print(secrets.token_urlsafe(16))'",
         )
     if not address.loopback and address.token is None:

@@ -4,7 +4,7 @@ import numpy as np
 
 from rig.estimation.arrays import Array
 
-WORTH_S = 1e-9  # a smaller gain is rounding, and might repeat forever
+MIN_GAIN_S = 1e-9  # a smaller gain is rounding, and might repeat forever
 
 
 def shortest_way(between_s: Array) -> tuple[int, ...]:
@@ -39,6 +39,6 @@ def _improve(order: list[int], between_s: Array) -> list[int]:
         gain = durations_s[:, None] + durations_s - between_s[np.ix_(starts, starts)] - between_s[np.ix_(ends, ends)]
         gain = np.triu(gain, 1)  # between two different edges
         first, last = np.unravel_index(int(np.argmax(gain)), gain.shape)
-        if not gain[first, last] > WORTH_S:
+        if not gain[first, last] > MIN_GAIN_S:
             return order
         order[first + 1 : last + 1] = order[first + 1 : last + 1][::-1]

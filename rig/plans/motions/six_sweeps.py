@@ -10,7 +10,7 @@ import numpy as np
 
 from rig.config.models import ArmSection
 from rig.config.procedures.procedure_sections import SixSweepsSection
-from rig.config.procedures.servo_procedure import AXES_SPAN
+from rig.config.procedures.servo_procedure import MIN_AXES_SPAN
 from rig.config.procedures.stage_section import Wrist, mount_matrix
 from rig.config.section import Direction, Vector3
 from rig.errors import Refused
@@ -27,10 +27,10 @@ from rig.plans.motions.transfer_steps import append_steps, approach, pace_of
 
 USUAL_ORDER: tuple[Wrist, ...] = ("wrist_3", "wrist_1", "wrist_2")  # the order in the paper
 BOTH_WAYS: tuple[Direction, Direction] = ("cw", "ccw")
-WORTHWHILE = 2 / 3  # an order must be better by a third to replace the paper's
+MAX_WORTHWHILE_RATIO = 2 / 3  # an order must be better by a third to replace the paper's
 # Trial of a stage's mounting: large enough to exceed any gyroscope's noise, and slow enough to take a hand away.
 TRIAL_RAD, TRIAL_PACE = math.radians(10), pace_of(15, 60)
-DIGITS = 9  # orders that differ only by rounding are equal: the first of them is chosen, on every machine
+COMPARED_DIGITS = 9  # orders that differ only by rounding are equal: the first of them is chosen, on every machine
 WRIST_1, WRIST_2, WRIST_3 = (JOINT_NAMES.index(name) for name in ("wrist_1", "wrist_2", "wrist_3"))
 
 
@@ -77,7 +77,7 @@ def plan_six_observation(
 
 def _check_span(axes: Array) -> None:
     """Raise Refused `axes_do_not_span` unless the axes (3, n) of the turns span all directions."""
-    if axes.shape[1] < 3 or np.linalg.svd(axes, compute_uv=False)[2] < AXES_SPAN:
+    if axes.shape[1] < 3 or np.linalg.svd(axes, compute_uv=False)[2] < MIN_AXES_SPAN:
         raise Refused(
             "axes_do_not_span",
             "the swept wrists do not turn the sensors about three independent axes",
@@ -106,12 +106,12 @@ def _order_sweeps(arm: ArmSection, procedure: SixSweepsSection) -> tuple[Sweep, 
 
     def harm(order: Order) -> float:
         sweeps = _sweeps(order, procedure, min(procedure.repeats, 2))  # further repeats are the same
-        return round(drift_effect(tuple(_connect(sweeps, arm, procedure))), DIGITS)
+        return round(drift_effect(tuple(_connect(sweeps, arm, procedure))), COMPARED_DIGITS)
 
     def best(orders: Sequence[Order]) -> Order:
         first, *others = ((harm(order), order) for order in orders) if len(orders) > 1 else [(0.0, orders[0])]
         least = min(others, key=lambda candidate: candidate[0], default=first)
-        return least[1] if least[0] < WORTHWHILE * first[0] else first[1]
+        return least[1] if least[0] < MAX_WORTHWHILE_RATIO * first[0] else first[1]
 
     chosen = best(list(_list_orders(_stations(home, procedure, procedure.order or USUAL_ORDER), procedure)))
     if procedure.order is None:

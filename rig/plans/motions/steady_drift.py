@@ -11,7 +11,7 @@ from rig.motion.steps import Dwell, Rest, Step, Sweep, Transfer, closes
 from rig.motion.turner_state import Joints
 
 ARC_POSES = 24
-NEGLIGIBLE = 1e-6  # ratio to the largest singular value: directions that attitudes do not determine are omitted
+NEGLIGIBLE_RATIO = 1e-6  # to the largest singular value: directions that attitudes do not determine are omitted
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,7 @@ def drift_effect(steps: Sequence[Step]) -> float:
     speed = np.sqrt(np.mean(speeds[turning] ** 2))
     gravity = [] if turning.all() else [downwards]
     design = np.column_stack([rates / speed, np.ones(len(rates)), *gravity])
-    coefficients = np.linalg.pinv(root[:, None] * design, rcond=NEGLIGIBLE) @ (root * ramp)
+    coefficients = np.linalg.pinv(root[:, None] * design, rcond=NEGLIGIBLE_RATIO) @ (root * ramp)
     return float(np.sqrt(coefficients[:3] @ coefficients[:3] + 3 * coefficients[3] ** 2))  # the three axes drift alike
 
 

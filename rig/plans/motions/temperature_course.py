@@ -11,11 +11,11 @@ from itertools import pairwise, zip_longest
 
 from rig.data.recording.thermal_events import SetMeasured
 
-NEXT_AFTER = 0.5  # fraction of the largest step from which on a set begins: its own change of temperature is added
-AT_THE_END = 0.25  # largest distance from an end of the range, as a fraction of the largest step
+NEXT_SET_FRACTION = 0.5  # of the largest step from which on a set begins: its own change of temperature is added
+END_FRACTION = 0.25  # largest distance from an end of the range, as a fraction of the largest step
 FULL_POWER_K = 2.0  # control error at which the heater has full power
-FOLLOWS_K = 3.0  # largest difference between the ramp and the heated sensor
-REMEMBERS_S = 30.0  # integral time of the controller
+MAX_LAG_K = 3.0  # between the ramp and the heated sensor
+INTEGRAL_TIME_S = 30.0  # of the controller
 
 
 @dataclass(slots=True)
@@ -45,9 +45,9 @@ class TemperatureCourse:
         self._turn_round(step)
 
     def _turn_round(self, step: SetMeasured) -> None:
-        if self.warming and min(step.temperatures_c.values()) >= self.to_c - AT_THE_END * self.max_step_k:
+        if self.warming and min(step.temperatures_c.values()) >= self.to_c - END_FRACTION * self.max_step_k:
             self.warming = False
-        elif not self.warming and max(step.temperatures_c.values()) <= self.from_c + AT_THE_END * self.max_step_k:
+        elif not self.warming and max(step.temperatures_c.values()) <= self.from_c + END_FRACTION * self.max_step_k:
             self.warming = True
 
     def is_due(self, now_c: Mapping[str, float]) -> bool:
@@ -58,14 +58,14 @@ class TemperatureCourse:
             return True
         last = self.sets[-1].temperatures_c
         moved = (abs(now_c[name] - last[name]) for name in now_c)
-        return min(moved) >= NEXT_AFTER * self.max_step_k
+        return min(moved) >= NEXT_SET_FRACTION * self.max_step_k
 
     def next_c(self, now_c: float) -> float:
         """Return the temperature at which the next set is due, for a sensor at `now_c`."""
         if not self.sets:
             return now_c
         last = self.sets[-1].temperatures_c.values()
-        step_k = NEXT_AFTER * self.max_step_k
+        step_k = NEXT_SET_FRACTION * self.max_step_k
         return min(max(last) + step_k, self.to_c) if self.warming else max(min(last) - step_k, self.from_c)
 
     def missing(self) -> str | None:
@@ -95,7 +95,7 @@ class TemperatureCourse:
 
     def _gap(self, temperatures_c: Sequence[float]) -> tuple[float, float] | None:
         """Return the first gap between sets, counted from the cold end, or None."""
-        end_k = AT_THE_END * self.max_step_k
+        end_k = END_FRACTION * self.max_step_k
         if temperatures_c[0] > self.from_c + end_k:
             return self.from_c, temperatures_c[0]
         for low, high in pairwise(temperatures_c):
@@ -124,9 +124,9 @@ class Ramp:
         dt_s, self._time_s = time_s - self._time_s, time_s
         step_k = self.rate_k_s * dt_s
         self.wanted_c += min(max(goal_c - self.wanted_c, -step_k), step_k)
-        self.wanted_c = min(max(self.wanted_c, now_c - FOLLOWS_K), now_c + FOLLOWS_K)
+        self.wanted_c = min(max(self.wanted_c, now_c - MAX_LAG_K), now_c + MAX_LAG_K)
         off_k = self.wanted_c - now_c
-        wanted = off_k / FULL_POWER_K + self._sum_k_s / (FULL_POWER_K * REMEMBERS_S)
+        wanted = off_k / FULL_POWER_K + self._sum_k_s / (FULL_POWER_K * INTEGRAL_TIME_S)
         # The integral must not wind up while the power is at its limit.
         if 0.0 < wanted < 1.0 or (wanted >= 1.0) != (off_k > 0):
             self._sum_k_s += off_k * dt_s

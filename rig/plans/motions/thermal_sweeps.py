@@ -12,7 +12,7 @@ from rig.plans.motions.six_sweeps import plan_six_observation
 from rig.plans.motions.static_attitudes import dwells
 from rig.plans.motions.transfer_steps import append_steps, approach, pace_of
 
-LEAST_WAIT_S = 1.0
+MIN_WAIT_S = 1.0
 
 
 def plan_thermal(
@@ -52,4 +52,4 @@ def _sets(arm: ArmSection, procedure: ThermalSection) -> Iterator[list[Step]]:
 def _wait_s(procedure: ThermalSection, steps: list[Step]) -> float:
     """Return the shortest possible time of heating to the next set, s, which the plan assumes."""
     gap_s = 60 * procedure.max_step_k / (procedure.max_rate_k_per_min * 2)
-    return max(LEAST_WAIT_S, gap_s - sum(step.duration_s for step in steps))
+    return max(MIN_WAIT_S, gap_s - sum(step.duration_s for step in steps))

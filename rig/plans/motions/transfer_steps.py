@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from rig.motion.steps import SAME_PLACE_RAD, Plan, Step, Transfer, trapezoid_duration, travel
+from rig.motion.steps import POSE_TOLERANCE_RAD, Plan, Step, Transfer, trapezoid_duration, travel
 from rig.motion.turner_state import Joints
 
 
@@ -22,14 +22,14 @@ def pace_of(speed_deg_s: float, acceleration_deg_s2: float) -> Pace:
 
 
 # The first motion is slow, because it may move the large joints from any pose.
-LEISURE = pace_of(30, 60)
+FIRST_PACE = pace_of(30, 60)
 
 
 def approach(start_q_rad: Joints | None, home: Joints, pace: Pace) -> Plan:
     """Return the slow motion home from the turner's pose; empty if that is unknown or is home."""
     start = home if start_q_rad is None else start_q_rad
-    speed_rad_s = min(pace.speed_rad_s, LEISURE.speed_rad_s)
-    acceleration_rad_s2 = min(pace.acceleration_rad_s2, LEISURE.acceleration_rad_s2)
+    speed_rad_s = min(pace.speed_rad_s, FIRST_PACE.speed_rad_s)
+    acceleration_rad_s2 = min(pace.acceleration_rad_s2, FIRST_PACE.acceleration_rad_s2)
     steps = tuple(transfer("approach home", start, home, Pace(speed_rad_s, acceleration_rad_s2)))
     return Plan(steps, start_q_rad=start, home_q_rad=home)
 
@@ -42,7 +42,7 @@ def append_steps(plan: Plan, steps: Iterable[Step]) -> Plan:
 def transfer(name: str, start: Joints, target: Joints, pace: Pace) -> Iterable[Transfer]:
     """Yield the transfer from `start` to `target`; nothing if both are the same pose."""
     distance_rad = max(map(abs, travel(start, target)))
-    if distance_rad > SAME_PLACE_RAD:
+    if distance_rad > POSE_TOLERANCE_RAD:
         speed_rad_s, acceleration_rad_s2 = pace.speed_rad_s, pace.acceleration_rad_s2
         duration_s = trapezoid_duration(distance_rad, speed_rad_s, acceleration_rad_s2)
         yield Transfer(name, start, target, speed_rad_s, acceleration_rad_s2, duration_s)

@@ -15,7 +15,7 @@ from rig.analysis.design.candidate_search import target_of
 from rig.config.models import RigConfig
 from rig.config.procedures.procedure_sections import SixObservationSection
 from rig.motion.plan_warnings import doubts
-from rig.motion.steps import SAME_PLACE_RAD, Dwell, Plan, Rest, Step, Sweep, Transfer, closes, turn_words
+from rig.motion.steps import POSE_TOLERANCE_RAD, Dwell, Plan, Rest, Step, Sweep, Transfer, closes, turn_words
 from rig.motion.turner_state import JOINT_NAMES, Joints
 from rig.report.terminal.shortest_words import wish_words
 from rig.station.plain_text import LONG_S, duration_words, plain
@@ -201,7 +201,7 @@ def _motion(step: Step) -> tuple[str, str, str]:
     turns = [
         f"{name} {math.degrees(start):+.1f} → {math.degrees(target):+.1f}"
         for name, start, target in zip(_names(step.start_q_rad), step.start_q_rad, step.target_q_rad, strict=True)
-        if abs(target - start) > SAME_PLACE_RAD
+        if abs(target - start) > POSE_TOLERANCE_RAD
     ]
     return "\n".join(turns), f"{math.degrees(step.speed_rad_s):g}", f"{math.degrees(step.acceleration_rad_s2):g}"
 

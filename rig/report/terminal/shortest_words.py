@@ -19,7 +19,7 @@ from rig.analysis.design.candidate_search import (
     TargetUncertainty,
 )
 from rig.config.models import ProcedureSection
-from rig.config.procedures.attitude_sets import SETS
+from rig.config.procedures.attitude_sets import ATTITUDE_SETS
 from rig.config.procedures.procedure_sections import AttitudesSection
 from rig.estimation.design.optimality import c_efficiency, g_efficiency, list_designs
 from rig.station.plain_text import build_number_table, plain
@@ -53,7 +53,7 @@ def list_key_changes(before: ProcedureSection, after: ProcedureSection) -> dict[
 def _values(section: ProcedureSection) -> dict[str, Any]:
     values = section.model_dump(mode="json")
     if isinstance(section, AttitudesSection):
-        names = {attitudes: name for name, attitudes in SETS.items()}
+        names = {attitudes: name for name, attitudes in ATTITUDE_SETS.items()}
         values["attitudes"] = names.get(section.attitudes, values["attitudes"])
     return values
 

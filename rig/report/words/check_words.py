@@ -8,7 +8,7 @@ from shlex import quote
 
 from rig.config.judging.verdict_limits import key_of
 from rig.data.installed_kinds import quantities
-from rig.data.quantity import OF_THE_RIG
+from rig.data.quantity import RIG_QUANTITIES
 from rig.data.result_file import CheckEntry
 from rig.errors import Refused
 from rig.errors.table_rows import read_rows
@@ -65,4 +65,4 @@ def _quantities() -> Iterable[str]:
     try:
         return quantities()
     except Refused:  # a package that cannot be loaded must not prevent an explanation of that error
-        return [quantity.name for quantity in OF_THE_RIG]
+        return [quantity.name for quantity in RIG_QUANTITIES]

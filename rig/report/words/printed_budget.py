@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rig.data.entries.budget import IN_U, BudgetEntry, ContributorEntry
+from rig.data.entries.budget import INCLUDED_IN_U, BudgetEntry, ContributorEntry
 from rig.data.quantity import DisplayUnit
 from rig.estimation.arrays import MIN_SIZE, divide_or_infinity
 from rig.report.words.printed_values import figures, percent, power_of_ten, small
@@ -127,7 +127,7 @@ def _explain_missing_dof(line: ContributorEntry) -> str:
     """Return the words for degrees of freedom that have no number: infinite, included in u, or unknown."""
     if line.kind == "B":
         return "∞"
-    return "in\u00a0u" if line.source.endswith(IN_U) else "–"
+    return "in\u00a0u" if line.source.endswith(INCLUDED_IN_U) else "–"
 
 
 def _parts(

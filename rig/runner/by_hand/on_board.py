@@ -25,7 +25,7 @@ from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.errors import Fault, Refused
 from rig.motion.by_hand import Face, HandMove
 from rig.observation.by_hand.rests_and_moves import MICROSECOND_S, clock_unknown, rotate_face
-from rig.plans.by_hand import ROUND, WantedMoves, next_instruction, still_open
+from rig.plans.by_hand import FACE_ORDER, WantedMoves, next_instruction, still_open
 from rig.runner.board.sensors import BoardSource, open_board_source
 from rig.runner.by_hand.hand_session import drain
 
@@ -102,10 +102,10 @@ class FollowedSession:
         self.tell(HandRested(report.after_us, report.end_us, self._lay[-1]))
 
     def _ask(self, wrong: Fault | None) -> None:
-        """Request the next flip of `ROUND`, which is repeated until the board has enough moves."""
+        """Request the next flip of `FACE_ORDER`, which is repeated until the board has enough moves."""
         flips = self.moves
         while (remaining := still_open(WantedMoves(flips, 0), self._accepted, self._lay)).done:
-            flips += len(ROUND)
+            flips += len(FACE_ORDER)
         instruction = next_instruction(remaining, self._lay[-1] if self._lay else None)
         again, why = (None, "") if wrong is None else (wrong.name, f"{wrong.what}. {wrong.remedy}.")
         if instruction is not None:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.config.sensors.sensor_sections import OwnPortSection, SensorSection, field_name
-from rig.data.not_provided import POSSIBLE_C, Absent
+from rig.data.not_provided import RANGE_C, Absent
 from rig.data.quantity import ACCELERATION, FIELD, RATE, TEMPERATURE
 from rig.data.recording.channel import stamp_samples, thermometer_channel
 from rig.data.recording.recorded_sensor import RecordedSensor, build_sensor, range_m_s2
@@ -29,7 +29,7 @@ from rig.sensors.thermometer import Thermometer
 # ICD 56-0298 Rev. B, section 5: bits 0 to 2 of a message's status say that the axes of the gyroscope are valid, bits 4
 # to 6 those of the accelerometer. Temperature and field have no such bits.
 NOT_PROVIDED: Mapping[str, Absent] = MappingProxyType(
-    {"rate": Absent(bits=0x07), "force": Absent(bits=0x70), "temperature": Absent(within=POSSIBLE_C)}
+    {"rate": Absent(bits=0x07), "force": Absent(bits=0x70), "temperature": Absent(within=RANGE_C)}
 )
 INVALID_S = 1.0  # tolerated duration of messages in a row that are marked invalid
 

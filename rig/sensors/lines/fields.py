@@ -7,14 +7,14 @@ from types import MappingProxyType
 import numpy as np
 
 from rig.config.sensors.lines_section import GYROSCOPE, SEPARATORS, LinesSection
-from rig.data.not_provided import POSSIBLE_C, Absent
+from rig.data.not_provided import RANGE_C, Absent
 from rig.estimation.arrays import Array
 
 NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 # Texts that programs print for a missing value: C's and Python's words, Arduino's "ovf", an empty field.
 WORDS = frozenset({"", "-", "--", "nan", "-nan", "null", "none", "na", "n/a", "inf", "-inf", "+inf", "ovf", "nil"})
 # -127 is DallasTemperature's DEVICE_DISCONNECTED_C; others print 999 or -273.15: all are impossible.
-NOT_PROVIDED: Mapping[str, Absent] = MappingProxyType({"temperature": Absent(within=POSSIBLE_C)})
+NOT_PROVIDED: Mapping[str, Absent] = MappingProxyType({"temperature": Absent(within=RANGE_C)})
 NEEDED = ("time", "sequence", *GYROSCOPE)  # values that a sample must have
 _AROUND_KEYS = " \t,;{}[]()\"'|&"
 

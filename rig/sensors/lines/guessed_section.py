@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from rig.config.sensors.lines_section import GAP
+from rig.config.sensors.lines_section import UNDETERMINED
 from rig.sensors.lines.guessing import Guess
 from rig.sensors.lines.shape import Shape
 
@@ -73,11 +73,11 @@ def _format_mapping(values: Mapping[str, object]) -> str:
 
 
 def _format_value(value: object) -> str:
-    return f'"{GAP}"' if value == GAP else str(value)
+    return f'"{UNDETERMINED}"' if value == UNDETERMINED else str(value)
 
 
 def _fill(value: str | None) -> str:
-    return f'"{GAP}"' if value is None else value
+    return f'"{UNDETERMINED}"' if value is None else value
 
 
 def _quote(text: str) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.config.units import UNITS
-from rig.data.quantity import HOTTEST_C
+from rig.data.quantity import MAX_TEMPERATURE_C
 from rig.data.recording.motion_file import MOTIONS, QUATERNION
 from rig.estimation.arrays import Array
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
@@ -114,7 +114,7 @@ def _guess_samples(
             position = guessed.columns.index("temperature")
             column = layout.name(group.indices[position])
             largest = float(np.abs(group.values[:, position]).max())
-            if largest <= HOTTEST_C:
+            if largest <= MAX_TEMPERATURE_C:
                 samples["temperature_c"] = {"column": column, "unit": "C"}
             else:
                 gaps.append(

@@ -7,7 +7,7 @@ from math import exp
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.config.sensors.lines_section import LONGEST_GAP_S, LinesSection, LineTimeSection
+from rig.config.sensors.lines_section import MAX_GAP_S, LinesSection, LineTimeSection
 from rig.config.units import UNITS
 from rig.estimation.arrays import Array
 from rig.sensors.errors import SensorError
@@ -151,7 +151,7 @@ class Stamper:
     def _is_possible(self, passed_s: Array, steps: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Return a mask of samples that can follow the previous one: later, or equal for coarse times, within 2 s."""
         later = passed_s > 0 if self.section.time is not None and not self._is_coarse else passed_s >= 0
-        in_time = (passed_s <= LONGEST_GAP_S) & (steps >= 1) & (steps <= LONGEST_GAP_S * self.rate_hz + 1)
+        in_time = (passed_s <= MAX_GAP_S) & (steps >= 1) & (steps <= MAX_GAP_S * self.rate_hz + 1)
         possible: NDArray[np.bool_] = later & in_time
         return possible
 

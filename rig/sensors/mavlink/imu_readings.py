@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from rig.data.not_provided import POSSIBLE_C, Absent
+from rig.data.not_provided import RANGE_C, Absent
 from rig.estimation.arrays import Array
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 
@@ -31,7 +31,7 @@ _WHOLE: Mapping[Field, Absent] = MappingProxyType(
 )
 # HIGHRES_IMU_UPDATED_FLAGS in `fields_updated`: which fields have a new value since the last message.
 _SINGLE: Mapping[Field, Absent] = MappingProxyType(
-    {"rate": Absent(bits=0x38), "force": Absent(bits=0x07), "temperature": Absent(within=POSSIBLE_C, bits=0x1000)}
+    {"rate": Absent(bits=0x38), "force": Absent(bits=0x07), "temperature": Absent(within=RANGE_C, bits=0x1000)}
 )
 NOT_PROVIDED: Mapping[str, Mapping[Field, Absent]] = MappingProxyType(
     {message: _SINGLE if message == "HIGHRES_IMU" else _WHOLE for message in UNIT_US}

@@ -11,7 +11,7 @@ from scipy.stats import ksone
 from rig.analysis.consistency.reference_alternatives import ReferenceModel
 from rig.analysis.consistency.reference_checks import check_reference
 from rig.analysis.reference.arm_patterns import Posture, StatedArm, arm_patterns
-from rig.config.procedures.attitude_sets import EIGHTEEN
+from rig.config.procedures.attitude_sets import OPTIMAL_ATTITUDES
 from rig.estimation.arrays import Array
 from rig.estimation.reference.accelerometer_model import DELAY, LEVER, NO_SWEEPS, Movement
 from rig.estimation.reference.imu import solve_imu
@@ -24,7 +24,7 @@ from support.recordings.reference_p_values import p_values
 pytestmark = pytest.mark.slow
 
 NORM = 9.80665
-JOINTS = joints_rad(EIGHTEEN)
+JOINTS = joints_rad(OPTIMAL_ATTITUDES)
 WRIST_1 = 3
 WAVE_FRACTION = 0.3
 SMALL = 0.25  # p-values

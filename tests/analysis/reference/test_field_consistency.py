@@ -7,7 +7,7 @@ from scipy.stats import kstest
 from rig.analysis.consistency.reference_alternatives import ReferenceModel
 from rig.analysis.reference.arm_patterns import Posture, StatedArm, arm_patterns
 from rig.analysis.reference.reference_budgets import UNTESTED_DRIFT_T, drift_patterns
-from rig.config.procedures.attitude_sets import MAGNETIC
+from rig.config.procedures.attitude_sets import MAGNETIC_ATTITUDES
 from rig.estimation.reference.accelerometer_model import LEVER, NO_SWEEPS, PARAMETERS, Dwells, Movement
 from rig.estimation.reference.reference_model import KnownNorm
 from rig.estimation.reference.triaxial import solve_triaxial
@@ -17,7 +17,7 @@ from support.recordings.reference_p_values import p_values
 
 pytestmark = pytest.mark.slow
 
-JOINTS = joints_rad(MAGNETIC)
+JOINTS = joints_rad(MAGNETIC_ATTITUDES)
 FIELD_T = np.array([17.0, -4.0, -44.7]) * 1e-6  # in the base's axes
 NOISE_T = 0.32e-6 / np.sqrt(80 * 3.0)  # of a dwell of three seconds
 ARM_RAD = 1e-4

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from rig.analysis.reference.datasheet_errors import Datasheet, read_datasheet
 from rig.analysis.reference.reference_budgets import accelerometer_budget, magnetometer_budget
-from rig.config.procedures.attitude_sets import EIGHTEEN
+from rig.config.procedures.attitude_sets import OPTIMAL_ATTITUDES
 from rig.data.quantity import ACCELERATION
 from rig.data.recording.settings import Site
 from rig.estimation.arrays import Array
@@ -39,7 +39,7 @@ SITE = Site(
 )
 
 pytestmark = pytest.mark.slow
-JOINTS = joints_rad(EIGHTEEN)
+JOINTS = joints_rad(OPTIMAL_ATTITUDES)
 NOISE_T, TEST_NOISE_T = 3e-8, 2e-8  # of a mean
 Session = tuple[Array, Budget, Array]  # error over u (6,), the budget, error over the solution's own spread (6,)
 

@@ -57,7 +57,7 @@ def test_workers_of_a_cluster_work_in_processes_of_their_own_and_one_that_dies_c
 
 @pytest.mark.slow
 def test_a_cluster_without_workers_is_waited_for_and_then_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rig.commands.history.worker_pools.WITHOUT_WORKERS_S", 0.5)
+    monkeypatch.setattr("rig.commands.history.worker_pools.NEW_WORKERS_S", 0.5)
     with (
         local_cluster(n_workers=0, processes=False) as cluster,
         connect_client(cluster.scheduler_address) as client,

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from rig.config.column_map import GIVE_MAP, ColumnMap
+from rig.config.column_map import MAP_REMEDY, ColumnMap
 from rig.config.load import load_as
 from rig.observation.external.table_log import read_table_log
 from support.laboratories.commands import rig_here
@@ -103,7 +103,7 @@ def test_a_table_that_counts_the_other_way_turns_the_other_way(tmp_path: Path) -
         "angle: {column: a, unit: deg}, rate: {column: v, unit: deg/s}}]}",
         encoding="utf-8",
     )
-    table = load_as(ColumnMap, told, GIVE_MAP).table
+    table = load_as(ColumnMap, told, MAP_REMEDY).table
     assert table is not None
     found = read_table_log(log, table)
     turned = Rotation.from_quat(np.column_stack([found[name] for name in ("qx", "qy", "qz", "qw")]))

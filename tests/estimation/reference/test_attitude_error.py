@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from rig.config.procedures.attitude_sets import EIGHTEEN, FACES
+from rig.config.procedures.attitude_sets import FACE_ATTITUDES, OPTIMAL_ATTITUDES
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.reference.reference_model import KnownNorm
@@ -18,7 +18,7 @@ from support.motions.arm_attitudes import attitudes_of, draw_true_attitudes, joi
 NORM = 9.80665
 UP = NORM * np.array([0.02, -0.01, 1.0]) / np.linalg.norm([0.02, -0.01, 1.0])  # a base that is not quite upright
 KVH_10_S, MPU_3_S, ADIS_3_S = (1e-3 * MG * density / np.sqrt(s) for density, s in ((119, 10), (300, 3), (23, 3)))
-JOINTS = joints_rad(EIGHTEEN)
+JOINTS = joints_rad(OPTIMAL_ATTITUDES)
 AXIS_PAIRS = [1, 2, 0], [2, 0, 1]
 
 pytestmark = pytest.mark.slow
@@ -146,7 +146,8 @@ def test_the_uncertainty_of_the_attitude_error_is_its_scatter(thorough: bool) ->
 
 def test_faces_alone_lose_the_angles_between_the_axes_on_a_real_arm() -> None:
     eighteen, faces = (
-        errors(independent(1e-3), KVH_10_S, "attitude_weighted", 20, joints_rad(wrists)) for wrists in (EIGHTEEN, FACES)
+        errors(independent(1e-3), KVH_10_S, "attitude_weighted", 20, joints_rad(wrists))
+        for wrists in (OPTIMAL_ATTITUDES, FACE_ATTITUDES)
     )
     assert faces.non_orthogonality > 5 * eighteen.non_orthogonality
 

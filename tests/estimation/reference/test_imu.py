@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from rig.config.procedures.attitude_sets import EIGHTEEN
+from rig.config.procedures.attitude_sets import OPTIMAL_ATTITUDES
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.reference.accelerometer_model import (
@@ -45,7 +45,7 @@ from support.motions.arm_sweeps import (
 NORM = 9.80665
 UP = NORM * np.array([0.02, -0.01, 1.0]) / np.linalg.norm([0.02, -0.01, 1.0])  # a base that is not quite upright
 DENSITY_UG = {"MPU-9250": 300.0, "ADIS16465": 23.0, "LSM9DS1": 150.0}  # µg/√Hz
-JOINTS = joints_rad(EIGHTEEN)
+JOINTS = joints_rad(OPTIMAL_ATTITUDES)
 RUNS = 100  # the RMS of three values in each of so many scatters by 4 %, of twenty by 9
 SIX_AND_REST, TWELVE, TWELVE_AND_REST = (3, True), (6, False), (6, True)  # axes of the sweeps; whether the 18 attitudes
 NAMES = ("scale", "non-orthogonality", "bias", "lever arm", "delay")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rig.config.procedures.attitude_sets import EIGHTEEN
+from rig.config.procedures.attitude_sets import OPTIMAL_ATTITUDES
 from rig.estimation.arrays import Array
 from rig.estimation.reference.accelerometer_model import DELAY, Dwells
 from rig.estimation.reference.imu import solve_imu
@@ -45,7 +45,7 @@ def test_what_the_world_lets_a_sensor_feel_gives_the_truth_back() -> None:
         harmonics.append([m.mean(axis=0), 2 * np.cos(ANGLES) @ m / len(m), 2 * np.sin(ANGLES) @ m / len(m)])
     quiet = MICRO_G**2
     sweeps = make_sweeps(np.array(harmonics), np.tile(quiet * np.eye(9), (12, 1, 1)), plan_sweeps(6))
-    joints = joints_rad(EIGHTEEN)
+    joints = joints_rad(OPTIMAL_ATTITUDES)
     readings = read(joints, np.zeros(6))
     dwells = Dwells(readings, np.full_like(readings, quiet), flange_pose(joints)[:, :3, :3])
     found = solve_imu(dwells, sweeps, gravity_m_s2=NORM)

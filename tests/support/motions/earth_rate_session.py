@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from rig.analysis.gyroscope.vector_inputs import WAVE_RATIO
-from rig.config.procedures.attitude_sets import EIGHTEEN
+from rig.config.procedures.attitude_sets import OPTIMAL_ATTITUDES
 from rig.estimation.arrays import Array
 from rig.estimation.earth import DEG_H
 from rig.estimation.gyroscope.vector_fit import VectorInputs
@@ -76,7 +76,7 @@ class Session:
     vibration_rad_s: float = 0.0
     g_sensitivity_rad_s_g: tuple[float, ...] = (0.0,) * 9
     earth_rad_s: float = EARTH_RAD_S
-    wrists_deg: tuple[tuple[float, float, float], ...] = EIGHTEEN
+    wrists_deg: tuple[tuple[float, float, float], ...] = OPTIMAL_ATTITUDES
 
 
 @dataclass(frozen=True, slots=True)

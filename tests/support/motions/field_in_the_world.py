@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from rig.config.procedures.attitude_sets import SETS
+from rig.config.procedures.attitude_sets import ATTITUDE_SETS
 from rig.config.sensors.sensor_sections import MountingSection, mounting_matrix
 from rig.config.world.laboratory import WorldSiteSection
 from rig.config.world.magnetism import IronSection, SimulatedMagnetometerSection
@@ -59,7 +59,7 @@ def solve_field(
         WorldSiteSection.model_validate({"magnetic_field_ut": FIELD_UT, "magnetic_dip_deg": 65.0} | dict(site or {})),
         [IronSection.model_validate(iron_section) for iron_section in iron],
     )
-    poses = [list(frames([*ARM, *np.radians(wrists)])) for wrists in SETS["magnetic"]]
+    poses = [list(frames([*ARM, *np.radians(wrists)])) for wrists in ATTITUDE_SETS["magnetic"]]
     sensed = np.array([mounted.sense(field, pose, 0.0) for pose in poses])
     matrix = _matrix()
     rng = np.random.default_rng(seed)

@@ -16,7 +16,7 @@ from rig.analysis.reference.datasheet_errors import (
     list_sensor_errors,
 )
 from rig.analysis.reference.reference_budgets import accelerometer_budget
-from rig.config.procedures.attitude_sets import EIGHTEEN
+from rig.config.procedures.attitude_sets import OPTIMAL_ATTITUDES
 from rig.config.sensors.sensor_catalogue import PARTS
 from rig.data.recording.settings import Site
 from rig.estimation.arrays import Array
@@ -35,7 +35,7 @@ GRAVITY = 9.80665
 SITE = Site(up=(0.0, 0.0, 1.0), gravity_m_s2=GRAVITY, earth_rate_rad_s=None, gravity_expanded_m_s2=1e-5)
 RANGES_G = {"lsm9ds1": 2.0, "mpu9250": 2.0, "adis16465": 8.0, "kvh1775": 10.0}
 STEPS_K = {"lsm9ds1": 1 / 16, "mpu9250": 1 / 333.87, "adis16465": 0.1, "kvh1775": 1.0}
-JOINTS, AXES = joints_rad(EIGHTEEN), 6
+JOINTS, AXES = joints_rad(OPTIMAL_ATTITUDES), 6
 SWEEP_S, BETWEEN_S = 6.0, 8.0
 ASKEW = np.array([1.0, -0.7, 0.5])
 SAMPLE_RATE_HZ = 200.0

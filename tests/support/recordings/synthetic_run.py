@@ -11,7 +11,7 @@ import numpy as np
 
 from firmware_host.emulator.parts.accelerometer import STANDARD_GRAVITY_M_S2
 from firmware_host.samples import SAMPLE_DTYPE
-from rig.config.judging.judging_keys import OF_SENSORS
+from rig.config.judging.judging_keys import SENSOR_KEYS
 from rig.config.load import parse
 from rig.config.procedures.procedure_sections import SixSweepsSection
 from rig.config.sensors.sensor_catalogue import PARTS
@@ -218,7 +218,7 @@ def readings(setup: Setup, rate: Array, rng: np.random.Generator, force_g: Array
 
 def sizes_of(parts: Mapping[str, str]) -> dict[str, dict[str, float]]:
     """Return the defaults of `uncertainty` for sensors of these parts, by name."""
-    return {what: {name: float(getattr(PARTS[part], what)) for name, part in parts.items()} for what in OF_SENSORS}
+    return {what: {name: float(getattr(PARTS[part], what)) for name, part in parts.items()} for what in SENSOR_KEYS}
 
 
 def run_data(setup: Setup, motion: Motion, board_s: Array, counts: Array) -> RunData:
