@@ -3,7 +3,7 @@
 import os
 from pathlib import Path
 
-LARGEST_LOAD_FACTOR = 5.0  # largest factor on a limit: the number of runnable programs per processor
+MAX_LOAD_FACTOR = 5.0  # on a limit: the number of runnable programs per processor
 
 
 def exceeds(delay: float, limit: float) -> bool:
@@ -19,7 +19,7 @@ def load_factor() -> float:
     """
     if not hasattr(os, "getloadavg"):  # Windows
         return 1.0
-    return min(max(max(os.getloadavg()[0], _runnable()) / (os.cpu_count() or 1), 1.0), LARGEST_LOAD_FACTOR)
+    return min(max(max(os.getloadavg()[0], _runnable()) / (os.cpu_count() or 1), 1.0), MAX_LOAD_FACTOR)
 
 
 def _runnable() -> int:

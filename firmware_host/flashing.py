@@ -36,7 +36,7 @@ CONNECT_MODES = ("under-reset", "halt")
 IMAGE_NAME = "rig_l432.bin"
 NUCLEO_CODE = "0770"  # the Nucleo-L432KC in the link of its MBED.HTM, as in mbed-ls' table of platforms
 DRIVE_TIMEOUT_S = 20.0
-LONGEST_TEXT = 10_000  # bytes of a file on a Nucleo's drive
+MAX_TEXT_BYTES = 10_000  # of a file on a Nucleo's drive
 _POLL_S = 0.05
 
 
@@ -269,7 +269,7 @@ def _short_text(path: Path) -> str:
     with open(path, "rb", opener=_no_link) as file:
         if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
             raise OSError(f"{path} is no regular file")
-        return file.read(LONGEST_TEXT).decode(errors="replace")
+        return file.read(MAX_TEXT_BYTES).decode(errors="replace")
 
 
 def _no_link(path: str, flags: int) -> int:

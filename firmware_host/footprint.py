@@ -31,13 +31,13 @@ RANGE_G = 8.0  # a range of every gyroscope's accelerometer
 RAM = range(0x2000_0000, 0x2000_C000)
 RATE_HZ, RANGE_DEG_S = 200.0, 100.0  # the parts' nearest rate, their smallest range that has it
 SENSORS = range(len(GYROSCOPES))  # the board's first
-ALL = (1 << len(GYROSCOPES)) - 1  # a mask of them
+ALL_SENSORS = (1 << len(GYROSCOPES)) - 1  # a mask of them
 DIRECTIONS = ((0, 0, 1), (0, 0, -1), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0))
-STILL = (0, 0, 0)
+NO_ROTATION = (0, 0, 0)
 REST_S = 1.4  # the board needs a second for a rest
 SPEED_RAD_S = 1.5  # within that range for the scale of every part
 STEP_S = 0.01
-ANSWER_STEPS = 10  # longest wait for an answer
+MAX_ANSWER_STEPS = 10
 
 
 class Session:
@@ -82,7 +82,7 @@ class Session:
     def ask(self, name: str, **values: Any) -> dict[str, Any]:
         """Send a request and return the answer's fields. Raise RuntimeError if the board refuses or does not answer."""
         self._board.receive(encode(name, 9, values))
-        for _ in range(ANSWER_STEPS):
+        for _ in range(MAX_ANSWER_STEPS):
             for frame in self.run(STEP_S):
                 if frame.values.get("reply_to") != 9:
                     continue
@@ -95,7 +95,7 @@ class Session:
         """Make one sweep: store, rotate, and have the board observe every sensor."""
         self.direction = DIRECTIONS[index]
         self.run(0.1)
-        self.ask("keep", sensors=ALL, duration_s=1.0)
+        self.ask("keep", sensors=ALL_SENSORS, duration_s=1.0)
         start_us = self.ask("status")["uptime_us"]
         self.run(0.2)
         end_us = self.ask("status")["uptime_us"]
@@ -107,7 +107,11 @@ class Session:
     def turn_by_hand(self) -> None:
         """Rotate by a whole revolution from rest to rest. Raise RuntimeError if the board does not take the move."""
         self.ask("by_hand", sensor=0, moves=1, scale_std=1.0)
-        for direction, duration_s in ((STILL, REST_S), (DIRECTIONS[0], 2 * math.pi / SPEED_RAD_S), (STILL, REST_S)):
+        for direction, duration_s in (
+            (NO_ROTATION, REST_S),
+            (DIRECTIONS[0], 2 * math.pi / SPEED_RAD_S),
+            (NO_ROTATION, REST_S),
+        ):
             self.direction = direction
             self.run(duration_s)
         if (solution := self.ask("hand_solve"))["accepted"] != 1:
@@ -140,7 +144,7 @@ def measure_stack(image: bytes, elf: bytes) -> int:
         polynomials = dict.fromkeys(("scale_change", "bias_change_rad_s"), np.full((3, 3), 1e-7))
         session.ask("write_calibration", sensor=sensor, **header, **values, **polynomials, lowest_c=0.0, highest_c=50.0)
         session.ask("read_calibration", sensor=sensor)
-    session.ask("start", sensors=ALL)
+    session.ask("start", sensors=ALL_SENSORS)
     session.run(0.5)
     session.ask("stop")
     for sensor in SENSORS:

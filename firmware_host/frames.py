@@ -22,7 +22,7 @@ from firmware_host.protocol import (
 from firmware_host.stuffing import stuff, unstuff
 
 _BLOCK_MAX = PAYLOAD_MAX + OVERHEAD + 1
-_REMEMBERED = 200  # frames: more than a buffer in between repeats, and fewer than the range of their sequence
+_RECENT_FRAMES = 200  # more than a buffer in between repeats, and fewer than the range of their sequence
 # The first meaningless value by field. Fields with a name for unknown values (`unknown`) accept all.
 _INVALID_FROM = {
     "mode": len(MODES),
@@ -178,6 +178,6 @@ class FrameReader:
         if block in self._recent:
             return True
         self._recent[block] = None
-        if len(self._recent) > _REMEMBERED:
+        if len(self._recent) > _RECENT_FRAMES:
             self._recent.popitem(last=False)
         return False

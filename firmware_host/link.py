@@ -11,8 +11,8 @@ from firmware_host.errors import BoardError
 from firmware_host.frames import Frame, FrameReader, encode
 from firmware_host.serial_port import READ_TIMEOUT_S, SerialPort, explain_closed
 
-_ATTEMPTS = 4  # attempts of a request; each waits twice as long as the one before
-_SHARES = 2**_ATTEMPTS - 1  # their waits together, in units of the first
+_MAX_ATTEMPTS = 4  # attempts of a request; each waits twice as long as the one before
+_WAIT_UNITS = 2**_MAX_ATTEMPTS - 1  # their waits together, in units of the first
 
 
 class _Request:
@@ -101,25 +101,25 @@ class BoardLink:
         with self._sending:
             self._sequence = sequence = self._sequence % 255 + 1
         request = self._requests[sequence] = _Request(name)
-        waited = 0  # of _SHARES
+        waited = 0  # of _WAIT_UNITS
         try:
             for attempt in count():
-                share = 2 ** min(attempt, _ATTEMPTS - 1)
+                share = 2 ** min(attempt, _MAX_ATTEMPTS - 1)
                 if self.fault is None:
                     self._send(name, sequence, values or {})
-                    request.done.wait(timeout_s * share / _SHARES)
+                    request.done.wait(timeout_s * share / _WAIT_UNITS)
                 if request.answer is not None:
                     return request.answer
                 if self.fault is not None:
                     raise self.fault
                 waited += share
-                if waited >= _SHARES * computer_load.load_factor():
+                if waited >= _WAIT_UNITS * computer_load.load_factor():
                     break
         finally:
             del self._requests[sequence]
         raise BoardError(
             "board_link_lost",
-            f"the board on {self.port} did not answer {name} within {timeout_s * waited / _SHARES:.2g} s",
+            f"the board on {self.port} did not answer {name} within {timeout_s * waited / _WAIT_UNITS:.2g} s",
             "Check the board's supply and cable",
         )
 

@@ -6,7 +6,7 @@ from contextlib import suppress
 
 READ_TIMEOUT_S = 0.005  # the delay of every read: bytes come a few at a time, and each would wake the reader
 _READ_SIZE = 65536
-_MOST_READS = 64  # more than any buffer holds: a device that sends without end must not hold the reader
+_MAX_READS = 64  # more than any buffer holds: a device that sends without end must not hold the reader
 
 
 def explain_closed(port: str, error: OSError) -> str:
@@ -58,7 +58,7 @@ class SerialPort:
         time.sleep(READ_TIMEOUT_S)
         data = bytearray(self._serial.read(_READ_SIZE))
         with suppress(OSError):  # of a port that has closed: the next read raises it
-            for _ in range(_MOST_READS):
+            for _ in range(_MAX_READS):
                 if not self._serial.in_waiting:
                     break
                 data += self._serial.read(_READ_SIZE)

@@ -48,7 +48,7 @@ def solve_in_loop(means: Array, speed_rad_s: float) -> Array:
 def main() -> None:
     """Print times, ratios and differences, at both speeds."""
     print(f"{'15,000 runs':44}{'seconds':>10}{'µs a run':>10}{'times batch':>13}{'largest difference':>20}")
-    for speed, name in ((sim.ARM_RAD_S, "60°/s"), (sim.FAST_RAD_S, "3 rad/s")):
+    for speed, name in ((sim.ARM_SPEED_RAD_S, "60°/s"), (sim.FAST_SPEED_RAD_S, "3 rad/s")):
         means = simulate_mean_readings(speed)
         batch_s = np.inf
         for _ in range(5):
@@ -69,7 +69,7 @@ def main() -> None:
         looped = solve_in_loop(means[::EVERY], speed)
         passed = (time.perf_counter() - start) * EVERY
         differences = np.abs(looped - exact[::EVERY])
-        if speed == sim.ARM_RAD_S:
+        if speed == sim.ARM_SPEED_RAD_S:
             batch_us, loop_us = (1e6 * seconds / len(means) for seconds in (batch_s, passed))
             record("batch, a run", batch_us, "µs", peer="least_squares, looped", peer_value=loop_us)
         _print_line(f'least_squares("lm"), scaled loop, {name}', passed, len(means), batch_s, float(differences.max()))

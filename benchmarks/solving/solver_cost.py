@@ -42,7 +42,7 @@ from firmware_host.emulator.timeline import NEVER, Timeline
 from firmware_host.protocol import METHODS
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.accumulator import Accumulator
-from rig.study.simulation import ARM_RAD_S, DIRECTIONS, EXTREME, NORMAL, Population
+from rig.study.simulation import ARM_SPEED_RAD_S, DIRECTIONS, EXTREME, NORMAL, Population
 
 FIRMWARE = Path(__file__).parents[2] / "firmware_host" / "firmware"
 SOURCES = (FIRMWARE / "core" / "calibration" / "solver.c", Path(__file__).parent / "levenberg_marquardt.c")
@@ -156,7 +156,7 @@ def observe(population: Population, seed: int) -> Observations:
     rng = np.random.default_rng(seed)
     scale, bias = population.draw(rng)
     mounting = Rotation.from_rotvec(np.radians(5) * rng.normal(size=3))
-    speeds = ARM_RAD_S * rng.uniform(0.999, 1.001, 6)
+    speeds = ARM_SPEED_RAD_S * rng.uniform(0.999, 1.001, 6)
     noise = 0.035 / np.sqrt(1428) * rng.normal(size=(6, 3))
     means = speeds[:, None] * mounting.apply(DIRECTIONS) / scale - bias + noise
     return Observations(means.astype(np.float32), speeds.astype(np.float32))

@@ -7,7 +7,7 @@ from firmware_host import protocol
 from firmware_host.frames import encode
 from firmware_host.protocol import Field, Message
 
-LARGEST_BLOCK = protocol.PAYLOAD_MAX + protocol.OVERHEAD + protocol.COBS_BYTES
+MAX_BLOCK_BYTES = protocol.PAYLOAD_MAX + protocol.OVERHEAD + protocol.COBS_BYTES
 
 
 def reference() -> str:
@@ -58,7 +58,7 @@ def _frame() -> list[str]:
         "",
         "- Everything is little-endian. A vector is x, y, z, a matrix its three rows; a text is",
         "  ASCII, filled up with zeros.",
-        f"- A payload has at most {protocol.PAYLOAD_MAX} bytes, a frame on the wire at most {LARGEST_BLOCK}: COBS",
+        f"- A payload has at most {protocol.PAYLOAD_MAX} bytes, a frame on the wire at most {MAX_BLOCK_BYTES}: COBS",
         "  needs no second block.",
         "- The CRC is CRC-32 as in zlib and Ethernet, over type, sequence and payload.",
         "- The host chooses the numbers of its frames, 1 … 255; the board's answer repeats the number as `reply_to`,",

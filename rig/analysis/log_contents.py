@@ -25,7 +25,7 @@ from rig.observation.formats.csv_table import read_table
 from rig.observation.formats.sample_files import is_in_format
 from rig.observation.formats.table_layout import TableLayout, find_layout
 from rig.observation.log_survey import LogSurvey, survey_log
-from rig.sensors.lines.log_columns import OPEN, LogColumns, guess_columns
+from rig.sensors.lines.log_columns import UNSTATED, LogColumns, guess_columns
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,8 +94,8 @@ def count_from(looked: LookedFile, origin_s: int) -> LookedFile:
 
 def is_incomplete(columns: Mapping[str, Any]) -> bool:
     """Return whether a map contains a "?" in place of a number."""
-    return OPEN in columns.values() or any(
-        OPEN in entry.values()
+    return UNSTATED in columns.values() or any(
+        UNSTATED in entry.values()
         for section in columns.values()
         if isinstance(section, dict)
         for entry in section.values()
@@ -137,7 +137,7 @@ def _map_of(layout: TableLayout, guess: LogColumns) -> dict[str, Any]:
         if layout.missing:
             columns[f"{section}_missing"] = list(layout.missing)
         if TIME not in entries and not set(rows) & {TIME, "start_s"}:
-            columns[f"{section}_rate_hz"] = OPEN
+            columns[f"{section}_rate_hz"] = UNSTATED
     return columns
 
 

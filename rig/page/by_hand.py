@@ -13,7 +13,7 @@ from rig.data.recording.hand_events import (
     OfTheHand,
 )
 from rig.motion.by_hand import FACES
-from rig.station.by_hand_words import RED_FROM, open_moves_words
+from rig.station.by_hand_words import RED_FRACTION, open_moves_words
 from rig.station.events import HandSeen
 
 Section = dict[str, Any]
@@ -27,7 +27,7 @@ def live_section(event: HandSeen) -> Section:
         "turned_deg": round(degrees(event.turned_rad), 1),
         "peak_deg_s": round(degrees(event.peak_rad_s)),
         "range_deg_s": round(degrees(event.range_rad_s)),
-        "red_deg_s": round(RED_FROM * degrees(event.range_rad_s)),
+        "red_deg_s": round(RED_FRACTION * degrees(event.range_rad_s)),
         "scale_u": event.expanded_scale,
         "sides": [[face, face in event.faces] for face in FACES],
         "pairs": [list(pair) for pair in event.pairs],

@@ -13,13 +13,13 @@ from rig.report.entry import entry
 from rig.report.findings.result_kind import NoOutlet
 from rig.report.kinds.kind_registry import kinds
 
-ALWAYS = ("gyroscopes", "verification")  # in every result, even if they are empty
+REQUIRED_KEYS = ("gyroscopes", "verification")  # in every result, even if they are empty
 
 
 def document_of(outcome: Outcome) -> ResultDocument:
     """Return the result as plain numbers, texts and tuples, in SI units, in the schema "rig.result/1"."""
     by_kind = {kind.key: kind.entries(outcome) for kind in kinds() if not isinstance(kind.entries, NoOutlet)}
-    entries: dict[str, object] = {key: of_kind for key, of_kind in by_kind.items() if of_kind or key in ALWAYS}
+    entries: dict[str, object] = {key: of_kind for key, of_kind in by_kind.items() if of_kind or key in REQUIRED_KEYS}
     others = {key: _plain_values(entries.pop(key)) for key in list(entries) if key not in ResultDocument.model_fields}
     clock = {} if outcome.clock is None else {"clock": clock_entry(outcome.clock)}
     return ResultDocument.model_validate(

@@ -14,7 +14,7 @@ from rig.report.findings.result_kind import outlet_items
 from rig.report.kinds.kind_registry import kinds
 from rig.station.events import DocumentWritten, RunEvent
 
-NOTHING: Mapping[str, Array] = MappingProxyType({})
+NO_PARAMETERS: Mapping[str, Array] = MappingProxyType({})
 
 
 def write_header(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
@@ -40,7 +40,7 @@ def g_sensitivity(result: SensorResult) -> Array | None:
     return matrix
 
 
-def calibration_header(document: ResultDocument, g_sensitivity: Mapping[str, Array] = NOTHING) -> str:
+def calibration_header(document: ResultDocument, g_sensitivity: Mapping[str, Array] = NO_PARAMETERS) -> str:
     """Return C source text for the sensors of a result.
 
     A calibrated gyroscope gets its scale factors, its biases (rad/s), the matrix M of the board's correction g = M (m +

@@ -19,10 +19,10 @@ from rig.runner.settling import Settling
 from rig.station.events import SensorSamples
 
 KEPT_PARTS = 3
-REACHES_BACK_S = 300.0  # data before a sweep from which its clock is determined: more take longer and add nothing
-WHOLE_S = 5.0  # beginning of a dwell, in which every state of the arm is recorded
+CLOCK_DATA_S = 300.0  # before a sweep, from which its clock is determined: more take longer and add nothing
+FULL_RATE_S = 5.0  # beginning of a dwell, in which every state of the arm is recorded
 # Interval of the states recorded after that: all states of an arm at rest for hours would fill the disk.
-STANDING_S = 0.25
+REST_INTERVAL_S = 0.25
 
 
 @dataclass(slots=True)
@@ -74,13 +74,13 @@ class _Thinning:
     last_s: float = 0.0
 
     def keeps(self, time_s: float) -> bool:
-        """Return whether to record the state at `time_s`: every state for `WHOLE_S`, then one in each `STANDING_S`.
+        """Return whether to record the state at `time_s`: all for `FULL_RATE_S`, then one in each `REST_INTERVAL_S`.
 
         Call this for each state in order.
         """
         if self.began_s is None:
             self.began_s = time_s
-        if time_s - self.began_s > WHOLE_S and time_s - self.last_s < STANDING_S:
+        if time_s - self.began_s > FULL_RATE_S and time_s - self.last_s < REST_INTERVAL_S:
             return False
         self.last_s = time_s
         return True
@@ -154,7 +154,7 @@ class Acquisition:
     def collect_kept(self, sensor: str) -> tuple[np.ndarray, list[State], int]:
         """Return the kept samples (n,) of one sensor, the kept states of the arm, and the number of new states.
 
-        States since the latest `keep` are new. Older states are from at most `REACHES_BACK_S` before it, however long
+        States since the latest `keep` are new. Older states are from at most `CLOCK_DATA_S` before it, however long
         the run has waited.
         """
         with self._lock:
@@ -164,7 +164,7 @@ class Acquisition:
         samples = np.concatenate(batches or [np.empty(0, self.counts[sensor].sensor.sample_dtype)])
         if not new or not len(samples):
             return samples, states, new
-        from_s = states[-new].time_s - REACHES_BACK_S
+        from_s = states[-new].time_s - CLOCK_DATA_S
         span_us = round(1e6 * (states[-1].time_s - from_s))
         recent = samples["board_time_us"] + np.uint64(span_us) >= samples["board_time_us"][-1]
         return samples[recent], [state for state in states if state.time_s >= from_s], new

@@ -12,7 +12,7 @@ from rig.station.events import Prompt
 from rig.station.plain_text import duration_words
 from rig.turners.turner_kind import Wording
 
-NOBODY = "Nobody and nothing may be within its reach."
+KEEP_CLEAR = "Nobody and nothing may be within its reach."
 
 
 def mounting(plan: Plan, number: int, words: Wording) -> Prompt:
@@ -25,7 +25,7 @@ def mounting(plan: Plan, number: int, words: Wording) -> Prompt:
         "Then small turns try the mounting, before "
         f"{len(stage.indices)} sweeps turn {words.turned} by more than {far} each.",
         *filter(None, [words.beware]),
-        NOBODY,
+        KEEP_CLEAR,
         *cable_words(plan, plan.home_q_rad, _joint_names(plan)),
     )
     ticked = f"The item is mounted so, and nobody and nothing is within the {words.short}'s reach"
@@ -69,7 +69,7 @@ def announcement(
             f"{len(repeated.sweeps)} sweeps verify it, for {repeated.duration_s:.0f} s."
         )
     lines += [*doubts(plan), *filter(None, [words.beware])]
-    lines += [NOBODY, *cable_words(plan, report.state.q_rad, report.joints)]
+    lines += [KEEP_CLEAR, *cable_words(plan, report.state.q_rad, report.joints)]
     return Prompt(tuple(lines), to_tick=f"I have looked: nobody and nothing is within the {words.short}'s reach")
 
 

@@ -26,7 +26,7 @@ from rig.sensors.sample_source import OnSamples, SampleSource
 from rig.sensors.sensor_registry import group_by_port
 from rig.station.events import SensorSamples
 
-LOOK_S = 0.05
+POLL_S = 0.05
 
 
 @contextmanager
@@ -122,9 +122,9 @@ def record_readings(config: SensorsConfig, folder: Path, duration_s: float) -> M
         }
         for source in sources:
             source.start()
-        first_samples = FirstSamples(LOOK_S)
+        first_samples = FirstSamples(POLL_S)
         while min(file.lasts_s for file in files.values()) < duration_s:
-            time.sleep(LOOK_S)
+            time.sleep(POLL_S)
             while not arrived.empty():
                 name, samples = arrived.get()
                 files[name].add(samples)

@@ -20,9 +20,9 @@ from rig.motion.steps import POSE_TOLERANCE_RAD, Motion, Plan, Sweep, Transfer
 from rig.motion.turner_state import Joints
 from rig.station.events import UncertaintySoFar
 
-WRITTEN_S = 0.6  # time after which the recorder has written everything
+WRITING_DELAY_S = 0.6  # after which the recorder has written everything
 # Fraction of the target: the complete recording determines clocks and noise slightly better than the present one.
-ENOUGH = 0.99
+TARGET_RATIO = 0.99
 
 
 @dataclass(slots=True)
@@ -88,7 +88,7 @@ class EndingEarly:
         reached = looked.result() if looked.done() else None
         if reached is None:
             return None
-        self.ended = self.wanted.ratio_to_target(reached) <= ENOUGH
+        self.ended = self.wanted.ratio_to_target(reached) <= TARGET_RATIO
         return UncertaintySoFar(reached.scale, reached.bias_rad_s, self._repeats_left, self.ended)
 
     def skips(self, motion: Motion) -> bool:
@@ -97,7 +97,7 @@ class EndingEarly:
         return self.ended and index != self._home
 
     def _look(self) -> ReachedUncertainty | None:
-        time.sleep(WRITTEN_S)
+        time.sleep(WRITING_DELAY_S)
         try:
             return assess_reached([*self.earlier, *([read_run(self.path)] if self._recorded else [])], self.estimator)
         except RigError:  # the end of the run reports what is wrong with the recording

@@ -19,11 +19,11 @@ from rig.estimation.by_hand.session_parts import nearest_face
 from rig.motion.steps import Stage
 
 REST_S = 1.0  # duration of the readings that show whether the item is at rest
-PARTS = 5
-STEADY_RAD_S = 0.02  # change beyond the noise: a hand at the item causes more, a turner at rest less
-NOISES = 6
-ASKEW_RAD = np.radians(20)  # the largest error of the mounting of sensor and item together
-FRACTIONS = 0.5, 2.0  # fraction of the angle that a sensor with a scale error may read
+REST_PARTS = 5
+MAX_CHANGE_RAD_S = 0.02  # beyond the noise: a hand at the item causes more, a turner at rest less
+NOISE_STDS = 6
+MAX_TILT_RAD = np.radians(20)  # error of the mounting of sensor and item together
+READING_RATIOS = 0.5, 2.0  # to the angle, that a sensor with a scale error may read
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,10 +48,10 @@ class GyroscopeReadings:
 def refuse_unsteady(readings: GyroscopeReadings, turner: str) -> None:
     """Raise Refused `item_not_at_rest`, naming the `turner`, if a gyroscope's readings change by more than noise."""
     rates = readings.rates_rad_s
-    means = np.array([part.mean(axis=0) for part in np.array_split(rates, PARTS)])
-    noise = np.diff(rates, axis=0).std(axis=0) / np.sqrt(2 * len(rates) / PARTS)
+    means = np.array([part.mean(axis=0) for part in np.array_split(rates, REST_PARTS)])
+    noise = np.diff(rates, axis=0).std(axis=0) / np.sqrt(2 * len(rates) / REST_PARTS)
     moved = np.ptp(means, axis=0)
-    if np.any(moved > STEADY_RAD_S + NOISES * noise):
+    if np.any(moved > MAX_CHANGE_RAD_S + NOISE_STDS * noise):
         raise Refused(
             "item_not_at_rest",
             f"{readings.name} reads rates changing by {degrees(moved.max()):.1f} °/s while the {turner} stands still",
@@ -69,7 +69,7 @@ def refuse_hanging_otherwise(readings: GyroscopeReadings, stage: Stage, up_flang
     force = readings.sensor.channel(ACCELERATION).values(readings.samples).mean(axis=0)
     stated = np.array(stage.mount) @ up_flange
     measured = readings.mounting.T @ force
-    if _angle_between_rad(measured, stated) > ASKEW_RAD:
+    if _angle_between_rad(measured, stated) > MAX_TILT_RAD:
         raise Refused(
             "mounted_otherwise",
             f"by the accelerometer of {readings.name} the item's {nearest_face(measured)} axis points up, "
@@ -93,9 +93,9 @@ def refuse_turning_otherwise(
     subject = (
         f"in the {what} {readings.name} is turned about the item's {nearest_face(stated)} axis by the stage's mounting"
     )
-    if not FRACTIONS[0] < fraction < FRACTIONS[1]:
+    if not READING_RATIOS[0] < fraction < READING_RATIOS[1]:
         how = f"but reads {degrees(np.linalg.norm(measured)):.1f}° of {degrees(np.linalg.norm(stated)):.1f}°"
-    elif _angle_between_rad(measured, stated) > ASKEW_RAD:
+    elif _angle_between_rad(measured, stated) > MAX_TILT_RAD:
         how = f"but reads a turn about its {nearest_face(measured)} axis"
     else:
         return

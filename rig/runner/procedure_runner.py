@@ -50,7 +50,7 @@ from rig.runner.mounting import (
 )
 from rig.runner.warming import Warming, range_not_reached
 from rig.sensors.sample_source import SampleSource
-from rig.station.confirm import NOT_AGREED
+from rig.station.confirm import AGREEMENT_REMEDY
 from rig.station.events import (
     ArmSeen,
     PhaseRecorded,
@@ -65,12 +65,12 @@ from rig.station.operator_station import Station
 from rig.turners.turner import Turner
 from rig.turners.turner_kind import AnyTurner
 
-FIRST_SAMPLES_LOOK_S = 0.005  # interval of checking whether every sensor has sent something
-LOOK_S = 60.0  # the longest time to solve the present recording
-SETTLING_LOOK_S = 0.05  # interval of checking whether the sensors have settled
+FIRST_SAMPLES_POLL_S = 0.005  # checks whether every sensor has sent something
+SOLVING_S = 60.0  # longest, for the present recording
+SETTLING_POLL_S = 0.05  # checks whether the sensors have settled
 AT_REST_TIMEOUT_S = 10.0  # time for the readings whose scatter at rest is measured
 TRIAL_REST_S = 0.3  # wait after a trial of the mounting, because the sensors lag
-SAME_POSE_RAD = radians(1)  # largest difference to the pose for which the operator's agreement is valid
+MAX_POSE_DIFFERENCE_RAD = radians(1)  # to the pose for which the operator's agreement is valid
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,7 +165,7 @@ class Rig:
             self._motions = iter(())
             return  # nothing moves by itself, so the operator is not asked
         away_rad = max(map(abs, find_travel_to_home(self.plan, report.state.q_rad)), default=0.0)
-        if not (self.phase.agreed and away_rad <= SAME_POSE_RAD):
+        if not (self.phase.agreed and away_rad <= MAX_POSE_DIFFERENCE_RAD):
             self._agree()
         self._refuse_moved()
         self.devices.turner.take_control(kind.carried(section))
@@ -178,12 +178,12 @@ class Rig:
         situation = self.plan, devices.report, devices.kind.words, repeated, devices.mounted.lines()
         question = announcement(*situation, early=self.early is not None)
         if not station.ask(question):
-            raise Refused("not_confirmed", "nobody agreed to the movement", NOT_AGREED)
+            raise Refused("not_confirmed", "nobody agreed to the movement", AGREEMENT_REMEDY)
 
     def _refuse_moved(self) -> None:
         """Raise Refused `arm_moved` if the arm was moved since the announcement, which changes its path."""
         moved_rad = max(map(abs, travel(self.plan.start_q_rad, self.devices.turner.latest.q_rad)), default=0.0)
-        if moved_rad > SAME_POSE_RAD:
+        if moved_rad > MAX_POSE_DIFFERENCE_RAD:
             raise Refused(
                 "arm_moved",
                 f"the arm at {self.devices.report.host} has moved by {degrees(moved_rad):.1f}° since the program "
@@ -198,12 +198,12 @@ class Rig:
             self.onboard.begin()
         for source in sources:
             source.start()
-        first_samples = FirstSamples(FIRST_SAMPLES_LOOK_S)
+        first_samples = FirstSamples(FIRST_SAMPLES_POLL_S)
         while silent := self.devices.acquisition.find_silent():
             self._check()
             turner.check()
             first_samples.wait_on(silent, turner.latest.time_s)
-            time.sleep(FIRST_SAMPLES_LOOK_S)
+            time.sleep(FIRST_SAMPLES_POLL_S)
         if self.whole_plan.dwells:
             self._wait(self.devices.acquisition.settling.learn_rest, AT_REST_TIMEOUT_S, self._check)
         if self.whole_plan.stages:
@@ -294,8 +294,8 @@ class Rig:
             host_s, turner_s = time.monotonic(), turner.latest.time_s
             with self.early.look_in_background() as looked:
                 # By both clocks: this computer may be busy, and the controller's clock may be simulated.
-                while not looked.done() and min(time.monotonic() - host_s, turner.latest.time_s - turner_s) < LOOK_S:
-                    turner.rest(SETTLING_LOOK_S, self._check)
+                while not looked.done() and min(time.monotonic() - host_s, turner.latest.time_s - turner_s) < SOLVING_S:
+                    turner.rest(SETTLING_POLL_S, self._check)
                 reached = self.early.conclude(looked)
             if reached is not None:
                 self.recording.station.event(reached)
@@ -310,7 +310,7 @@ class Rig:
         else:
             with self.onboard.look_in_background(sweep) as looked:
                 while not looked.done():
-                    self.devices.turner.rest(SETTLING_LOOK_S, self._check)
+                    self.devices.turner.rest(SETTLING_POLL_S, self._check)
             revolutions = looked.result()
         self.onboard.observe(sweep, revolutions)
 
@@ -343,7 +343,7 @@ class Rig:
         while not until():
             if turner.latest.time_s - began_s > at_most_s:
                 return False
-            turner.rest(SETTLING_LOOK_S, watch)
+            turner.rest(SETTLING_POLL_S, watch)
         return True
 
     def wait_for_next_temperature(self, rest: Rest) -> bool:

@@ -17,11 +17,11 @@ from rig.estimation.arrays import Array
 
 SPAN_S = 0.5  # time span of the readings in one scatter, all after the motion
 SPANS_AT_REST = 6  # spans at rest: the vibration of an arm varies, so the largest scatter of these counts
-QUIET = 1.2  # ratio to the scatter at rest; that of a hundred samples on three axes has a standard uncertainty of 4 %
+MAX_QUIET_RATIO = 1.2  # to the scatter at rest, whose standard uncertainty is 4 % for a hundred samples on three axes
 # Largest ratio of a constant scatter to that at rest, and the least ratio of a scatter to the one before that counts as
 # constant: an arm vibrates differently in each attitude, so a constant scatter is no decaying oscillation.
-STEADY, NOT_FALLING = 2.0, 0.85
-LEAST_COUNTS = 0.5  # least scatter: a smaller one is rounding
+MAX_STEADY_RATIO, MIN_STEADY_DECREASE = 2.0, 0.85
+MIN_SCATTER_COUNTS = 0.5  # a smaller scatter is rounding
 
 
 @dataclass(slots=True)
@@ -50,7 +50,7 @@ class _Watched:
         scatter = self.scatter_counts()
         if scatter is None or not self.at_rest_counts:
             return None
-        return scatter / max(*self.at_rest_counts, LEAST_COUNTS)
+        return scatter / max(*self.at_rest_counts, MIN_SCATTER_COUNTS)
 
     @property
     def settled(self) -> bool:
@@ -58,8 +58,8 @@ class _Watched:
         ratio, scatter, earlier = self.over_rest(), self.scatter_counts(), self.scatter_counts(before=1)
         if ratio is None or scatter is None:
             return False
-        steady = earlier is not None and scatter >= NOT_FALLING * earlier
-        return ratio <= QUIET or (ratio <= STEADY and steady)
+        steady = earlier is not None and scatter >= MIN_STEADY_DECREASE * earlier
+        return ratio <= MAX_QUIET_RATIO or (ratio <= MAX_STEADY_RATIO and steady)
 
 
 @dataclass(slots=True)

@@ -21,13 +21,13 @@ from rig.errors import Fault, ProblemError, Refused
 from rig.plans.motions.temperature_course import Ramp, TemperatureCourse
 from rig.runner.acquisition import Acquisition
 
-LOOK_S = 0.25  # interval of checks, and of commands to the heater
+POLL_S = 0.25  # of checks, and of commands to the heater
 RATE_SPAN_S = 30.0  # time over which the rate of change is judged: a thermometer's steps are coarse
-RATE_LEAST_S = 0.8 * RATE_SPAN_S
-RAMP_SHARE = 0.6  # fraction of the largest allowed rate: the parts do not warm up evenly
-SET_SHARE = 0.6  # fraction of the largest step within which a set must end
-BEYOND_K = 1.0  # beyond the ends of the range, so that a set's mean reaches them
-KEEPS_AWAY_K = 2.0  # distance from the heater's own limit
+MIN_RATE_SPAN_S = 0.8 * RATE_SPAN_S
+RAMP_FRACTION = 0.6  # of the largest allowed rate: the parts do not warm up evenly
+SET_FRACTION = 0.6  # of the largest step within which a set must end
+OVERTRAVEL_K = 1.0  # over the ends of the range, so that a set's mean reaches them
+HEATER_MARGIN_K = 2.0  # to the heater's own limit
 
 
 @dataclass(slots=True)
@@ -81,15 +81,15 @@ class Warming:
     @property
     def _rate_k_s(self) -> float:
         """The rate of a ramp: below the limit, and slow enough for a nearly constant temperature in each set."""
-        allowed_k_s = RAMP_SHARE * self.section.max_rate_k_per_min / 60
-        return min(allowed_k_s, SET_SHARE * self.section.max_step_k / max(self.set_s, 1.0))
+        allowed_k_s = RAMP_FRACTION * self.section.max_rate_k_per_min / 60
+        return min(allowed_k_s, SET_FRACTION * self.section.max_step_k / max(self.set_s, 1.0))
 
     def check(self, time_s: float) -> None:
         """Check the thermometers at the controller's time `time_s`, and command the heater.
 
         Raise Fault `overheated`, `too_fast`.
         """
-        if time_s - self._looked_s < LOOK_S:
+        if time_s - self._looked_s < POLL_S:
             return
         self._looked_s = time_s
         now_c = self.now_c()
@@ -176,7 +176,7 @@ class Warming:
         history.append((read_s, temperature_c))
         while history[-1][0] - history[0][0] > RATE_SPAN_S:
             history.popleft()
-        if history[-1][0] - history[0][0] < RATE_LEAST_S:
+        if history[-1][0] - history[0][0] < MIN_RATE_SPAN_S:
             return
         times_s, temperatures_c = np.array(history).T
         k_per_min = 60 * float(np.polynomial.polynomial.polyfit(times_s - times_s[0], temperatures_c, 1)[1])
@@ -193,8 +193,8 @@ class Warming:
         """Send the heater one command."""
         if self._ramp is None or self.heater is None or self.course.warming is None:
             return
-        ends_c = self.section.from_c - BEYOND_K, self.section.to_c + BEYOND_K
-        goal_c = min(ends_c[self.course.warming], HEATER_LIMIT_C - KEEPS_AWAY_K)
+        ends_c = self.section.from_c - OVERTRAVEL_K, self.section.to_c + OVERTRAVEL_K
+        goal_c = min(ends_c[self.course.warming], HEATER_LIMIT_C - HEATER_MARGIN_K)
         self.heater.keep_heating(self._ramp.power(time_s, max(now_c.values()), goal_c))
 
 

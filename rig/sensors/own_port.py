@@ -9,9 +9,9 @@ from typing import Protocol
 
 from firmware_host.serial_port import SerialPort, explain_closed
 from rig.sensors.errors import SensorError
-from rig.sensors.port_silence import USUAL, Patience, PortSilence
+from rig.sensors.port_silence import PATIENCE, Patience, PortSilence
 
-CATCH_UP_S = 60.0  # longest time to read what has arrived, however busy the computer
+MAX_CATCH_UP_S = 60.0  # to read what has arrived, however busy the computer
 
 
 class DevicePort(Protocol):
@@ -56,7 +56,7 @@ class OwnPort:
         faults: PortFaults,
         take: Callable[[bytes, float], None],
         *,
-        patience: Patience = USUAL,
+        patience: Patience = PATIENCE,
         farewell: Callable[[], None] = lambda: None,
     ) -> None:
         """Prepare the reader of the port called `name`; `farewell` is called before the port closes."""
@@ -107,7 +107,7 @@ class OwnPort:
     def catch_up(self) -> None:
         """Wait until all data that have arrived by now are taken. Raise a fault that occurs meanwhile."""
         enough = self._reads + 2  # the present read may have begun before
-        self.wait(lambda: self._reads >= enough, CATCH_UP_S)
+        self.wait(lambda: self._reads >= enough, MAX_CATCH_UP_S)
 
     def write(self, data: bytes) -> None:
         """Send data. Raise SensorError if the port has closed."""

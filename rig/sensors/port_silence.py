@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from firmware_host.serial_port import READ_TIMEOUT_S
 
-ATTEMPTS = 4  # attempts of a request
+MAX_ATTEMPTS = 4  # of a request
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,10 +16,10 @@ class Patience:
 
     def attempts(self, more_s: float = 0.0) -> list[float]:
         """Return the time-outs, s, of repeated requests: each twice the previous one, together `first_s` + `more_s`."""
-        return [(self.first_s + more_s) * 2**attempt / (2**ATTEMPTS - 1) for attempt in range(ATTEMPTS)]
+        return [(self.first_s + more_s) * 2**attempt / (2**MAX_ATTEMPTS - 1) for attempt in range(MAX_ATTEMPTS)]
 
 
-USUAL = Patience()
+PATIENCE = Patience()
 
 
 class PortSilence:

@@ -58,7 +58,7 @@ def _single_sensor_kind(
     )
 
 
-OWN_PORT: Mapping[str, PartKind] = MappingProxyType(
+PORT_KINDS: Mapping[str, PartKind] = MappingProxyType(
     {
         "kvh1775": _single_sensor_kind(kvh1775.kvh1775, kvh1775.describe, kvh1775.look),
         "lines": _single_sensor_kind(lines.lines, lines.describe, lines.look),
@@ -75,4 +75,4 @@ def group_by_port(sensors: Sections) -> Iterator[tuple[str, PartKind, Sections]]
             sections_by_port.setdefault(section.own_port[1], {})[name] = section
     for port, sections in sections_by_port.items():
         (first, *_) = sections.values()
-        yield port, OWN_PORT[first.part], sections
+        yield port, PORT_KINDS[first.part], sections

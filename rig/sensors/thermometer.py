@@ -7,7 +7,7 @@ import numpy as np
 from rig.estimation.arrays import Array
 from rig.sensors.errors import SensorError
 
-LONGEST_WITHOUT_S = 10.0  # longest use of the last temperature in place of missing ones
+MAX_WITHOUT_READING_S = 10.0  # use of the last temperature in place of missing ones
 
 
 @dataclass(slots=True)
@@ -30,14 +30,14 @@ class Thermometer:
     def read(self, temperatures_c: Array) -> Array:
         """Return temperatures (n,) with each NaN replaced by the last value before it; NaN remain before the first.
 
-        Raise SensorError `temperature_lost` if the source has provided none for `LONGEST_WITHOUT_S`.
+        Raise SensorError `temperature_lost` if the source has provided none for `MAX_WITHOUT_READING_S`.
         """
         valid = np.flatnonzero(np.isfinite(temperatures_c))
         self._missing = len(temperatures_c) - 1 - int(valid[-1]) if len(valid) else self._missing + len(temperatures_c)
-        if self._missing > LONGEST_WITHOUT_S * self.rate_hz:
+        if self._missing > MAX_WITHOUT_READING_S * self.rate_hz:
             raise SensorError(
                 "temperature_lost",
-                f"{self.where} has provided no temperature for {LONGEST_WITHOUT_S:g} s",
+                f"{self.where} has provided no temperature for {MAX_WITHOUT_READING_S:g} s",
                 "Check its thermometer; if it has none, state the temperature in the configuration",
             )
         newest = np.maximum.accumulate(np.where(np.isfinite(temperatures_c), np.arange(len(temperatures_c)), -1))

@@ -12,7 +12,7 @@ from rig.data.recording.hand_events import (
 )
 from rig.station.events import HandSeen, RunEvent
 
-RED_FROM = 0.8  # fraction of the range, above which a reading may be saturated
+RED_FRACTION = 0.8  # fraction of the range, above which a reading may be saturated
 
 
 def hand_event_line(event: RunEvent) -> str | None:
@@ -45,7 +45,7 @@ def hand_event_line(event: RunEvent) -> str | None:
 def live_rows(state: HandSeen) -> tuple[tuple[str, str], ...]:
     """Return the present state of a session, by the names of its rows."""
     peak, range_deg_s = degrees(state.peak_rad_s), degrees(state.range_rad_s)
-    fast = "  TOO FAST" if range_deg_s and peak > RED_FROM * range_deg_s else ""
+    fast = "  TOO FAST" if range_deg_s and peak > RED_FRACTION * range_deg_s else ""
     of_range = f" of {range_deg_s:.0f}" if range_deg_s else ""
     rows = [
         ("now", f"{state.doing} for {state.since_s:.1f} s"),

@@ -8,7 +8,7 @@ from rig.errors.quoting import printable_lines
 from rig.station.plain_text import format_for_file
 from rig.station.questions import Terminal, is_agreed, question_before
 
-NOT_AGREED = "Run again and agree, or agree in advance: --yes, in Python yes=True"
+AGREEMENT_REMEDY = "Run again and agree, or agree in advance: --yes, in Python yes=True"
 
 
 def ask_operator(announcement: Sequence[str], to_do: str = "start") -> bool:
@@ -26,10 +26,10 @@ def ask_operator(announcement: Sequence[str], to_do: str = "start") -> bool:
 def require_agreement(announcement: Sequence[str], to_do: str, assume_yes: bool) -> None:
     """Raise Refused `not_confirmed` unless the operator agrees."""
     if not assume_yes and not ask_operator(announcement, to_do):
-        raise Refused("not_confirmed", "the operator did not agree to the change", NOT_AGREED)
+        raise Refused("not_confirmed", "the operator did not agree to the change", AGREEMENT_REMEDY)
 
 
 def refuse_unless_answerable(assume_yes: bool) -> None:
     """Raise Refused `not_confirmed` without a terminal, before a long action that ends with a question."""
     if not assume_yes and not sys.stdin.isatty():
-        raise Refused("not_confirmed", "there is no terminal at which to agree to the change", NOT_AGREED)
+        raise Refused("not_confirmed", "there is no terminal at which to agree to the change", AGREEMENT_REMEDY)

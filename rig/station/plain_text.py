@@ -13,11 +13,11 @@ if TYPE_CHECKING:
     from rich.table import Table
     from rich.text import Text
 
-LONG_S = 600.0  # longer durations are shown in minutes
-NARROWEST, USUAL = 30, 80  # columns of a terminal: the least for breaking lines, and the default
+MINUTES_FROM_S = 600.0  # longer durations are shown in minutes
+MIN_WIDTH, DEFAULT_WIDTH = 30, 80  # columns of a terminal: the least for breaking lines, and the default
 INDENT = "  "
 COMMAND = re.compile("(`[^`]*`|(?<=: )rig .*$)")  # between backticks, or at the end of a line
-UNBROKEN = "\N{NO-BREAK SPACE}"
+NBSP = "\N{NO-BREAK SPACE}"
 
 
 def say(text: str, file: TextIO | None = None) -> None:
@@ -37,7 +37,7 @@ def format_for_file(text: str, file: TextIO) -> str:
     if not file.isatty():
         return text
     width = _columns(file)
-    if width < NARROWEST:
+    if width < MIN_WIDTH:
         return text
     return "\n".join(row for line in text.split("\n") for row in wrap_line(line, width) or [""])
 
@@ -46,9 +46,9 @@ def wrap_line(text: str, width: int) -> list[str]:
     """Return the text of one line, broken into lines of at most `width`; a command or a long word is not broken."""
     import textwrap
 
-    unbroken = "".join(part.replace(" ", UNBROKEN) if i % 2 else part for i, part in enumerate(COMMAND.split(text)))
+    unbroken = "".join(part.replace(" ", NBSP) if i % 2 else part for i, part in enumerate(COMMAND.split(text)))
     lines = textwrap.wrap(unbroken, width, subsequent_indent=INDENT, break_long_words=False, break_on_hyphens=False)
-    return [line.replace(UNBROKEN, " ") for line in lines]
+    return [line.replace(NBSP, " ") for line in lines]
 
 
 def _columns(file: TextIO) -> int:
@@ -56,7 +56,7 @@ def _columns(file: TextIO) -> int:
     try:
         return int(stated) if stated.isdecimal() else os.get_terminal_size(file.fileno()).columns
     except OSError:
-        return USUAL
+        return DEFAULT_WIDTH
 
 
 def plain(text: str, style: str = "") -> "Text":
@@ -80,7 +80,7 @@ def build_number_table(
 
 def duration_words(duration_s: float) -> str:
     """Return a duration in words: `66 s`, `5 h 36 min`."""
-    if duration_s < LONG_S:
+    if duration_s < MINUTES_FROM_S:
         return f"{duration_s:.0f} s"
     hours, minutes = divmod(round(duration_s / 60), 60)
     return f"{hours} h {minutes} min" if hours else f"{minutes} min"

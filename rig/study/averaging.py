@@ -55,9 +55,9 @@ def _simulate_gyroscope(runs: int, rng: np.random.Generator, _: int) -> Array:
     F = sim.build_sensitivity(scale, sim.draw_mountings(rng, runs))
     errors = np.empty((len(NOISES_RAD_S), len(ORDERS), runs, 6))
     for n, noise in enumerate(NOISES_RAD_S):
-        means, squares = sim.draw_means_and_squares(rng, F, bias, sim.build_whole_turn(sim.ARM_RAD_S, noise))
+        means, squares = sim.draw_means_and_squares(rng, F, bias, sim.build_whole_turn(sim.ARM_SPEED_RAD_S, noise))
         for o, x in enumerate((design(means), np.concatenate([squares, means], axis=-1))):
-            k, b = _solve_closed_form(x, sim.ARM_RAD_S)
+            k, b = _solve_closed_form(x, sim.ARM_SPEED_RAD_S)
             errors[n, o] = np.concatenate([k / scale - 1, b - bias], axis=-1)
     return errors
 
@@ -77,7 +77,7 @@ def _draw(rows: list[dict[str, Any]], figure: "Figure") -> None:
         noises = [row["noise_rad_s"] for row in chosen]
         panel.plot(noises, [row["scale_bias_percent"] for row in chosen], "o-", label=label)
     noise = np.linspace(0, 0.2)
-    expected = -50 * (3 * noise**2 / sim.ARM_RAD_S**2 + sim.VIBRATION_FRACTION**2)  # in %
+    expected = -50 * (3 * noise**2 / sim.ARM_SPEED_RAD_S**2 + sim.VIBRATION_FRACTION**2)  # in %
     panel.plot(noise, expected, "k:", label="−(3 σ²/ω² + ε²) / 2")
     panel.set(xlabel="noise of one sample, rad/s", ylabel="mean error of the scale factor, %")
     panel.set_title("averaging and squaring at 60°/s, 200 Hz")

@@ -24,7 +24,7 @@ PUBLISHED = {
     "normal": {0.035: (9.3e-4, 3.0e-3), 0.2: (5.4e-3, 1.7e-2)},
     "extreme": {0.035: (3.0e-3, 3.0e-3), 0.2: (1.8e-2, 1.8e-2)},
 }
-SPEEDS = {"3 rad/s": sim.FAST_RAD_S, "60°/s": sim.ARM_RAD_S}
+SPEEDS = {"3 rad/s": sim.FAST_SPEED_RAD_S, "60°/s": sim.ARM_SPEED_RAD_S}
 WHISKER = 1.5  # length of a box plot's whiskers, in boxes
 
 

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 DRAWS, BATCHES = 1500, 30
 REST_S = 2.6
 # Lever arms of the flange's centre from wrists 3, 1 and 2: offsets d5 and d6 of a UR10e (maker's article 45257).
-ARMS_M = np.array([[0.0, 0.0, 0.0], [0.11985, 0.0, 0.11655], [0.0, 0.0, 0.11655]])
+LEVER_ARMS_M = np.array([[0.0, 0.0, 0.0], [0.11985, 0.0, 0.11655], [0.0, 0.0, 0.11655]])
 STEP_S = 0.05  # step of the bias random walk
 ATTITUDES = 72  # attitudes per revolution
 MOUNTING_RAD, SKEW_RAD = np.radians(5.0), np.radians(0.25)
@@ -216,7 +216,7 @@ def _build_session(twists: Array, speed_rad_s: float) -> Session:
         for sign in (-1.0, 1.0):
             attitudes.append(_rotate(axis, -turn))
             rates.append(sign * speed_rad_s * axis)
-            arms.append(ARMS_M[number])
+            arms.append(LEVER_ARMS_M[number])
             windows.append((start_s, start_s + sweep_s))
             rest_attitudes.append(np.repeat(_rotate(axis, np.array([-sign * np.radians(190)])), ATTITUDES, axis=0))
             rests.append((start_s + sweep_s + 0.4, start_s + sweep_s + 0.4 + REST_S))

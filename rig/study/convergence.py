@@ -74,10 +74,10 @@ def study(settings: Settings) -> StudyReport:
     """Show the estimators' convergence without noise; no random numbers are drawn, so `settings` have no effect."""
     rows = []
     for name, example in TABLE_I.items():
-        for speed in (sim.FAST_RAD_S, example.speed_rad_s, sim.ARM_RAD_S):
+        for speed in (sim.FAST_SPEED_RAD_S, example.speed_rad_s, sim.ARM_SPEED_RAD_S):
             rows.extend(_build_rows(name, np.array([example.scale]), np.array([example.bias_rad_s]), speed))
-    growing = np.repeat(sim.ARM_RAD_S * np.sqrt(RATIOS / 3)[:, None], 3, axis=1)
-    rows.extend(_build_rows("growing bias", np.ones_like(growing), growing, sim.ARM_RAD_S))
+    growing = np.repeat(sim.ARM_SPEED_RAD_S * np.sqrt(RATIOS / 3)[:, None], 3, axis=1)
+    rows.extend(_build_rows("growing bias", np.ones_like(growing), growing, sim.ARM_SPEED_RAD_S))
     return StudyReport(table(rows), _findings(rows), partial(_draw, rows), (10.0, 5.0))
 
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 NOISE_RAD_S = sim.NOISE_LEVELS_RAD_S[0]
-SPEEDS = {"60°/s": sim.ARM_RAD_S, "3 rad/s": sim.FAST_RAD_S}
+SPEEDS = {"60°/s": sim.ARM_SPEED_RAD_S, "3 rad/s": sim.FAST_SPEED_RAD_S}
 RESTS, REST_SAMPLES = 6, round(3 * sim.RATE_HZ)  # SIX, section IV: 3 s after each sweep
 GYRO_ESTIMATORS = ("closed form", "Algorithm 1", "Levenberg–Marquardt", "vector model", "vector model with rests")
 METHODS: tuple[EqualWeights, ...] = ("as_published", "maximum_likelihood")

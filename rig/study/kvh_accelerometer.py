@@ -15,8 +15,8 @@ from rig.study.work import run_parallel
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-STILL, STILL_S = 24, 60.0  # TRIAX states only N ≥ 5 attitudes
-SAMPLES = round(STILL_S * rt.RATE_HZ)
+REST_ATTITUDES, REST_S = 24, 60.0  # TRIAX states only N ≥ 5 attitudes
+REST_SAMPLES = round(REST_S * rt.RATE_HZ)
 RUNS = 500
 TRUTH = np.concatenate(
     [
@@ -66,10 +66,10 @@ def _calibrate(rng: np.random.Generator, _: int) -> tuple[Array, Array, Array]:
     The residuals: largest standard deviation of corrected samples, and largest mean in any attitude, with and without
     second-order terms.
     """
-    attitudes = rt.draw_attitudes(STILL)
+    attitudes = rt.draw_attitudes(REST_ATTITUDES)
     force = rt.project(attitudes, rt.ACCELEROMETER_REFERENCE_M_S2)
     model = (force + rt.ACCELEROMETER_SECOND_ORDER * force**2) @ rt.ACCELEROMETER_MATRIX.T + rt.ACCELEROMETER_BIAS_M_S2
-    noise = rt.ACCELEROMETER_RESIDUAL_M_S2 * rng.normal(size=(STILL, SAMPLES, 3))
+    noise = rt.ACCELEROMETER_RESIDUAL_M_S2 * rng.normal(size=(REST_ATTITUDES, REST_SAMPLES, 3))
     samples = model[:, None] + noise
     means = samples.mean(axis=1)
     full, first = _solve(means, attitudes, second_order=True), _solve(means, attitudes, second_order=False)
@@ -83,7 +83,7 @@ def _solve(means: Array, attitudes: Array, *, second_order: bool) -> TriaxialSol
     return solve_triaxial(
         means,
         attitudes,
-        np.full(means.shape, rt.ACCELEROMETER_RESIDUAL_M_S2**2 / SAMPLES),
+        np.full(means.shape, rt.ACCELEROMETER_RESIDUAL_M_S2**2 / REST_SAMPLES),
         KnownNorm(float(np.linalg.norm(rt.ACCELEROMETER_REFERENCE_M_S2)), (0.0, 0.0, -1.0)),
         second_order=second_order,
     )
@@ -108,7 +108,7 @@ def _draw(rows: list[dict[str, Any]], drift: list[dict[str, Any]], figure: "Figu
     first.bar(positions, [row["std_over_runs"] / row["std_by_covariance"] for row in rows], color="tab:blue", alpha=0.7)
     first.axhline(1.0, color="k", linestyle="--", label="covariance as stated")
     first.set_xticks(positions, [row["parameter"].replace("_", " ") for row in rows], rotation=75, fontsize=7)
-    first.set(ylabel="σ over runs / σ by covariance", title=f"{STILL} attitudes of {STILL_S:.0f} s, 25 Hz")
+    first.set(ylabel="σ over runs / σ by covariance", title=f"{REST_ATTITUDES} attitudes of {REST_S:.0f} s, 25 Hz")
     first.legend(loc="lower right")
     rt.draw_drift(second, drift, "mg", 0.5, "bias, mg")
     second.set_title("TRIAX Fig. 6: bias by repeat")

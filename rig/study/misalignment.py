@@ -63,7 +63,7 @@ def _simulate_gyroscope(runs: int, rng: np.random.Generator, _: int) -> Array:
             skew = None if askew is None else _draw_axes(rng, runs, np.radians(angle))
             F = sim.build_sensitivity(scale, mounting, skew)
             for n, noise in enumerate(NOISES_RAD_S):
-                sweep = sim.build_whole_turn(sim.ARM_RAD_S, noise)
+                sweep = sim.build_whole_turn(sim.ARM_SPEED_RAD_S, noise)
                 means = sim.draw_mean_readings(rng, F, bias, sweep)
                 rates = sweep.speed_rad_s * sim.DIRECTIONS
                 solved: tuple[BatchSolution | VectorBatch, ...] = (

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 RATE_HZ = 25.0  # TRIAX, section III-A
-REPEATS, ATTITUDES, AVERAGED_S = 10, 10, 360.0  # TRIAX, section III-A: ten repeats of ten attitudes, six minutes each
+REPEATS, ATTITUDES, AVERAGING_S = 10, 10, 360.0  # TRIAX, section III-A: ten repeats of ten attitudes, six minutes each
 
 DEG_H = np.pi / 180 / 3600  # rad/s
 EARTH_RATE_RAD_S = 7.2921159e-5
@@ -98,7 +98,7 @@ class DriftingSensor:
         attitudes = draw_attitudes(ATTITUDES)
         force = project(attitudes, self.reference)
         model = (force + self.second_order * force**2) @ self.matrix.T
-        variance = self.random_walk**2 / AVERAGED_S
+        variance = self.random_walk**2 / AVERAGING_S
         biases = self.bias + np.cumsum(self.bias_steps[:, None] * rng.normal(size=(REPEATS, 3)), axis=0)
         rows = []
         for repeat, bias in enumerate(biases):

@@ -25,9 +25,9 @@ Vibration = Literal["whole_turns", "white"]
 RATE_HZ = 200.0  # SIX, section III-A
 NOISE_LEVELS_RAD_S = (0.035, 0.2)
 VIBRATION_FRACTION = 0.05
-LARGEST_MISALIGNMENT = 0.1
-FAST_RAD_S = 3.0  # the speed at which simulated errors agree with the published bands
-ARM_RAD_S = np.pi / 3  # SIX, section IV: 60°/s
+MAX_MISALIGNMENT = 0.1
+FAST_SPEED_RAD_S = 3.0  # the speed at which simulated errors agree with the published bands
+ARM_SPEED_RAD_S = np.pi / 3  # SIX, section IV: 60°/s
 SETS, RUNS = 30, 500
 
 # SIX, Fig. 1, in the order of Eq. (7): clockwise and counter-clockwise along x, y, z.
@@ -77,7 +77,7 @@ def build_whole_turn(speed_rad_s: float, noise_rad_s: float, vibration: Vibratio
     return SimulatedSweep(speed_rad_s, noise_rad_s, count_turn_samples(speed_rad_s), vibration)
 
 
-def draw_mountings(rng: np.random.Generator, runs: int, largest: float = LARGEST_MISALIGNMENT) -> Array:
+def draw_mountings(rng: np.random.Generator, runs: int, largest: float = MAX_MISALIGNMENT) -> Array:
     """Draw rotations (runs, 3, 3) from flange to sensor axes, about random axes, the sine of the angle U(0, largest).
 
     SIX states only "misalignment U(0 %, 10 %)", taken here as the fraction of a rate that other axes sense.

@@ -28,9 +28,9 @@ def study(settings: Settings) -> StudyReport:
     The correction here is g = K (m + b).
     """
     rng = np.random.default_rng(settings.seed)
-    sweep = sim.build_whole_turn(sim.FAST_RAD_S, NOISE_RAD_S)
+    sweep = sim.build_whole_turn(sim.FAST_SPEED_RAD_S, NOISE_RAD_S)
     means = sim.draw_mean_readings(rng, np.diag(1 / SCALE), BIAS_RAD_S, sweep)
-    solved = newton_batch(means[None], sim.FAST_RAD_S)
+    solved = newton_batch(means[None], sim.FAST_SPEED_RAD_S)
     scale, bias = solved.scale[0], solved.bias_rad_s[0]
     time_s = np.arange(round(DURATION_S * sim.RATE_HZ)) / sim.RATE_HZ
     desired = AMPLITUDE_RAD_S * np.sin(2 * np.pi * FREQUENCY_HZ * time_s)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 SPEEDS_RAD_S = np.round(np.arange(0.3, 3.05, 0.1), 1)
 DURATIONS: dict[str, Callable[[float], int]] = {
     "whole_turn": sim.count_turn_samples,
-    "fixed_samples": lambda speed_rad_s: sim.count_turn_samples(sim.FAST_RAD_S),
+    "fixed_samples": lambda speed_rad_s: sim.count_turn_samples(sim.FAST_SPEED_RAD_S),
 }
 
 

@@ -94,7 +94,7 @@ def robot_state(robot: Robot) -> Reply:
 def _unlock(robot: Robot) -> None:
     """Unlock a protective stop on the pendant. Raise ValueError if the controller does not permit it yet."""
     if robot.safety_mode == SafetyMode.PROTECTIVE_STOP and robot.stopped_for_s < dashboard_server.UNLOCK_AFTER_S:
-        raise ValueError(dashboard_server.TOO_EARLY)
+        raise ValueError(dashboard_server.UNLOCK_REFUSAL)
     robot.unlock_protective_stop()
 
 

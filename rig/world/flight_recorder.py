@@ -16,9 +16,9 @@ from pathlib import Path
 
 from rig.config.files.safe_writing import open_to_append
 
-LATE_S = 0.5  # wall time of a tick that is late
-LOOK_S = 0.1  # interval of the thread's checks
-RECORDS = 40  # largest number of records, so that a world that is always late does not fill the disk
+MIN_LATENESS_S = 0.5  # wall time of a tick that is late
+POLL_S = 0.1  # of the thread's checks
+MAX_RECORDS = 40  # so that a world that is always late does not fill the disk
 NS_PER_S = 1e9
 
 
@@ -43,9 +43,9 @@ class FlightRecorder:
         """Record that a step was made, or that no step is due."""
         now_s = time.monotonic()
         late_s, self._alive_s = now_s - self._alive_s, now_s
-        if late_s > LATE_S:
+        if late_s > MIN_LATENESS_S:
             self._account(late_s)
-        if now_s - self._checked_s > LOOK_S:
+        if now_s - self._checked_s > POLL_S:
             self._checked_s = now_s
             self._ran_s, self._starved_s = read_processor_times()
 
@@ -55,9 +55,9 @@ class FlightRecorder:
 
     def _watch(self) -> None:
         recorded_s = 0.0
-        while not self._ended.wait(LOOK_S):
+        while not self._ended.wait(POLL_S):
             began_s = self._alive_s
-            if began_s != recorded_s and time.monotonic() - began_s > LATE_S:
+            if began_s != recorded_s and time.monotonic() - began_s > MIN_LATENESS_S:
                 recorded_s = began_s
                 self._dump(time.monotonic() - began_s)
 
@@ -76,9 +76,9 @@ class FlightRecorder:
         )
 
     def _write(self, text: str, *, stacks: bool) -> None:
-        """Append a dated line, and on request all threads' stacks; stop after `RECORDS` records."""
+        """Append a dated line, and on request all threads' stacks; stop after `MAX_RECORDS` records."""
         with self._writing, suppress(OSError):
-            if self._records >= RECORDS:
+            if self._records >= MAX_RECORDS:
                 return
             self._records += 1
             file = os.dup(sys.stderr.fileno()) if self._path is None else open_to_append(self._path)

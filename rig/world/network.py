@@ -13,8 +13,8 @@ from rig.world.clock import TICK_S
 from rig.world.wire import SocketTable, Wire
 
 BACKLOG_BYTES = 1 << 16  # bytes that a client may leave unread before it loses packages
-UNPACED = inf  # lag of a client for which the world does not wait
-ALONE_S = 0.3  # wall time after which a client's question no longer depends on the last answer
+UNPACED_LAG = inf  # lag of a client for which the world does not wait
+INDEPENDENCE_S = 0.3  # wall time after which a client's question no longer depends on the last answer
 GATHER_S = 0.002  # wall time for which a gathering port collects bytes while more ticks are due
 
 
@@ -84,7 +84,7 @@ class ClientConnection:
             self.close()
             return False
         last_read_s, self._last_read_s = self._last_read_s, time.monotonic()
-        if self.session.dialogue and self._last_read_s - last_read_s < ALONE_S:
+        if self.session.dialogue and self._last_read_s - last_read_s < INDEPENDENCE_S:
             self._network.on_dialogue()
         self.send(self.session.receive(data))
         if self.session.closing:  # `send` does not check this if there is nothing to send
@@ -272,7 +272,7 @@ class Network:
         new_session: Callable[[], ClientSession],
         *,
         limit: int = 16,
-        lag_s: float = UNPACED,
+        lag_s: float = UNPACED_LAG,
         gathers: bool = False,
     ) -> PortListener:
         listener = PortListener(self, (host, port), new_session, limit=limit, lag_s=lag_s, gathers=gathers)

@@ -20,9 +20,9 @@ from rig.world.ur10e.motion.forward_kinematics import Vector
 DIFFERENCE_S = 5e-4  # half the interval of the central difference of the rate
 # the other mistakes occur in both
 MISTAKE_ACTION = {"short": "turn", "two_turns": "turn", "other_way": "turn", "wrong_face": "lay"}
-SKIPPED_S = 5.0  # time until a skipped instruction is read again
+REREADING_S = 5.0  # time until a skipped instruction is read again
 ORIGIN: Vector = (0.0, 0.0, 0.0)
-UNMOVED = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+ORIENTATION = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 class SimulatedOperator:
@@ -100,7 +100,7 @@ class SimulatedOperator:
             self._acts += 1
             self._hand.act(action, self.time_s)
             if kind == "skipped":  # the instruction is still displayed
-                self._pending = replace(action, mistake=None), self.time_s + SKIPPED_S
+                self._pending = replace(action, mistake=None), self.time_s + REREADING_S
 
     def rate_at(self, time_s: float) -> Components:
         """Return the item's angular rate, rad/s."""
@@ -123,4 +123,4 @@ class SimulatedOperator:
     def frames_at(self, time_s: float) -> Frames:
         """Return rotation (rows) and position (m) of the table and of the item."""
         x, y, z = map(tuple, self._hand.motion_at(np.array([time_s])).attitude[0].tolist())
-        return [(UNMOVED, ORIGIN), ((x, y, z), ORIGIN)]
+        return [(ORIENTATION, ORIGIN), ((x, y, z), ORIGIN)]

@@ -11,9 +11,9 @@ from collections.abc import Callable
 
 # All in wall time. A client gains patience while it keeps pace; one that never does delays the others only at first.
 FIRST_PATIENCE_S, PATIENCE_S = 0.1, 5.0
-EARNED = 0.5  # patience gained per time in pace
-IN_PACE_S = 0.05  # a shorter wait costs no patience: the client works, though slowly
-LOOK_S = (0.0001, 0.001)  # limits of the time between two checks of a lagging client: a quarter of its delay
+PATIENCE_GAIN = 0.5  # per time in pace
+MAX_PACED_WAIT_S = 0.05  # a shorter wait costs no patience: the client works, though slowly
+POLL_LIMITS_S = (0.0001, 0.001)  # of the time between two checks of a lagging client: a quarter of its delay
 
 Unread = Callable[[], int]
 
@@ -116,15 +116,15 @@ class Wire:
         if self._waiting_since_s is None:
             self._waiting_since_s = now_s
         waited_s = now_s - self._waiting_since_s
-        if waited_s >= max(self._patience_s, IN_PACE_S if self._in_pace else 0.0):
+        if waited_s >= max(self._patience_s, MAX_PACED_WAIT_S if self._in_pace else 0.0):
             return 0.0
         due_s = self._send_s + time_s - self._send_time_s - now_s
-        return max(0.0, min(due_s, max(LOOK_S[0], waited_s / 4), LOOK_S[1]))
+        return max(0.0, min(due_s, max(POLL_LIMITS_S[0], waited_s / 4), POLL_LIMITS_S[1]))
 
     def _take(self, now_s: float) -> None:
         """Record that the client has read something. If it did not read before, reduce its patience."""
         waited_s = 0.0 if self._waiting_since_s is None else now_s - self._waiting_since_s
-        if waited_s > IN_PACE_S:
+        if waited_s > MAX_PACED_WAIT_S:
             self._slept = True
             self._patience_s = max(0.0, self._patience_s - waited_s)
         self._waiting_since_s = now_s
@@ -133,5 +133,5 @@ class Wire:
         """Record that the client has caught up."""
         self._in_pace, self._slept = not self._slept, False
         if self._in_pace:
-            self._patience_s = min(self._patience_s + EARNED * (now_s - self._settled_s), PATIENCE_S)
+            self._patience_s = min(self._patience_s + PATIENCE_GAIN * (now_s - self._settled_s), PATIENCE_S)
         self._settled_s, self._behind_since_s, self._waiting_since_s = now_s, None, None

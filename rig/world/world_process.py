@@ -27,8 +27,8 @@ from rig.world.clock import PATIENCE_S, WorldClock
 from rig.world.fault_channel import KINDS, ControlSession
 from rig.world.flight_recorder import FlightRecorder
 from rig.world.laboratory import Laboratory
-from rig.world.network import UNPACED, ClientSession, Network, PortListener
-from rig.world.servo.servo_bench import BEHIND_S, ServoBench
+from rig.world.network import UNPACED_LAG, ClientSession, Network, PortListener
+from rig.world.servo.servo_bench import MAX_LAG_S, ServoBench
 from rig.world.ur10e.interfaces import dashboard_server, primary_server, robot_api_server, rtde, script_socket
 from rig.world.ur10e.interfaces.stored_programs import StoredPrograms
 from rig.world.ur10e.robot import Robot
@@ -40,15 +40,15 @@ if TYPE_CHECKING:
 IDLE_POLL_S = 0.2
 BUSY_POLL_S = 0.001  # wall time between two polls of the sockets while ticks are due one after the other
 # The threshold of Python's cyclic garbage collection: about the number of objects that ten clients leave behind.
-GARBAGE = 5_000
-LEAP = 4  # ticks in one go, at most: a packet's interval at 125 Hz
+GARBAGE_THRESHOLD = 5_000
+MAX_LEAP_TICKS = 4  # in one go: a packet's interval at 125 Hz
 ARM_LAG_S = 0.04  # virtual time by which a reader of the arm's states may lag: five packets at 125 Hz
 SERIAL_LAG_S = 1.0  # virtual time by which a reader of a serial line may lag: the system buffers the bytes
 ARM_PORTS: dict[int, tuple[Callable[[Robot], ClientSession], float]] = {
-    dashboard_server.PORT: (dashboard_server.DashboardSession, UNPACED),
-    script_socket.PRIMARY_PORT: (primary_server.PrimarySession, UNPACED),
-    script_socket.SECONDARY_PORT: (primary_server.PrimarySession, UNPACED),
-    script_socket.REALTIME_PORT: (script_socket.ScriptSession, UNPACED),
+    dashboard_server.PORT: (dashboard_server.DashboardSession, UNPACED_LAG),
+    script_socket.PRIMARY_PORT: (primary_server.PrimarySession, UNPACED_LAG),
+    script_socket.SECONDARY_PORT: (primary_server.PrimarySession, UNPACED_LAG),
+    script_socket.REALTIME_PORT: (script_socket.ScriptSession, UNPACED_LAG),
     rtde.PORT: (rtde.RtdeSession, ARM_LAG_S),
 }
 
@@ -73,7 +73,7 @@ class World:
         source = self.laboratory.motion_source
         self.servo_line = SerialLine(lambda: source.bus, section.seed) if isinstance(source, ServoBench) else None
         self.lines = (self.line, *self.instrument_lines.values(), *filter(None, [self.servo_line]))
-        patience_s = PATIENCE_S if self.servo_line is None else BEHIND_S
+        patience_s = PATIENCE_S if self.servo_line is None else MAX_LAG_S
         self.clock = WorldClock(section.time_scale, time.monotonic, self.laboratory.tick_s, patience_s)
         self.network = Network(self.clock.dialogue)
         self._silent_until_s = 0.0
@@ -242,13 +242,13 @@ class World:
                 alive()
 
     def _tick(self) -> None:
-        """Simulate one tick, or all that are due, at most `LEAP`, while only a client can make the arm move.
+        """Simulate one tick, or all that are due, at most `MAX_LEAP_TICKS`, while only a client can make the arm move.
 
         With a board, ticks are simulated one at a time: several at once would not be faster, because of the board's
         core, and clients would receive their packets in bursts. If the arm is at rest, its motion is sensed once at the
         end of several ticks, with the same bytes as a result. Every session is called at every tick.
         """
-        for remaining in reversed(range(LEAP if self.board_listener is None else 1)):
+        for remaining in reversed(range(MAX_LEAP_TICKS if self.board_listener is None else 1)):
             self.clock.count()
             self.laboratory.turn()
             last = not (remaining and self.laboratory.motion_source.waiting and self.clock.wait_s() <= 0.0)
@@ -339,7 +339,7 @@ def serve(loaded: Loaded, until_eof: bool, late: Path | None = None, truth: Path
         # All objects so far are permanent. To search them for garbage again and again costs 5 % of the pace.
         gc.collect()
         gc.freeze()
-        gc.set_threshold(GARBAGE)
+        gc.set_threshold(GARBAGE_THRESHOLD)
         with closing(FlightRecorder(late, world.network.describe_lagging_clients)) as recorder:
             print(world.describe(), flush=True)
             world.run(recorder.alive)

@@ -52,7 +52,7 @@ def errors(drifts: list[BiasDrift], truth: Array) -> tuple[Array, Array]:
 def test_an_accelerometer_s_bias_is_as_good_as_its_bound() -> None:
     """TRIAX, Fig. 6: ten attitudes of six minutes, a jump after the first repeat."""
     truth = rt.ACCELEROMETER_BIAS_M_S2 + np.repeat([[0.0, 0, 0], [0.3 * rt.MG, -0.1 * rt.MG, 0]], [1, 9], axis=0)
-    variance = rt.ACCELEROMETER_RANDOM_WALK**2 / rt.AVERAGED_S
+    variance = rt.ACCELEROMETER_RANDOM_WALK**2 / rt.AVERAGING_S
     model = rt.project(TURNED, rt.ACCELEROMETER_REFERENCE_M_S2) @ rt.ACCELEROMETER_MATRIX.T
     gravity = float(np.linalg.norm(rt.ACCELEROMETER_REFERENCE_M_S2))
     site = Site((0.0, 0.0, -1.0), gravity, None)
@@ -76,7 +76,7 @@ def test_an_accelerometer_s_bias_is_as_good_as_its_bound() -> None:
 def test_a_gyroscope_s_bias_is_as_good_as_its_bound() -> None:
     """TRIAX, Fig. 4. What F is wrong by in the Earth's rate is the same in every repeat, and no drift."""
     truth = np.cumsum(0.1 * rt.DEG_H * np.random.default_rng(4).normal(size=(rt.REPEATS, 3)), axis=0)
-    variance = rt.GYRO_RANDOM_WALK**2 / rt.AVERAGED_S
+    variance = rt.GYRO_RANDOM_WALK**2 / rt.AVERAGING_S
     model = rt.project(TURNED, EARTH_RAD_S) @ rt.GYRO_MATRIX.T
     x, y, z = EARTH_RAD_S.tolist()
     site = Site((0.0, 0.0, -1.0), 9.8, (x, y, z))

@@ -14,7 +14,7 @@ from rig.errors import Refused
 from rig.history.storage import engine
 from rig.history.store import open_history
 from rig.report.exports.exported_recording import export_recordings
-from rig.report.exports.formats import OF_READINGS, writer_of_readings
+from rig.report.exports.formats import READING_FORMATS, writer_of_readings
 from rig.runner.csv_recording import ReadingsFile
 from support.laboratories.commands import rig_here
 from support.paths import RECORDINGS, ROOT
@@ -51,7 +51,7 @@ def test_the_file_that_is_not_written_is_named_and_not_there(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", sorted(OF_READINGS))
+@pytest.mark.parametrize("name", sorted(READING_FORMATS))
 def test_readings_are_exported_whole_or_not_at_all(name: str, tmp_path: Path) -> None:
     recordings = export_recordings([read_run(RUN / "run.h5")])
     with full_disk(4000), pytest.raises(OSError, match=str(tmp_path)):

@@ -10,7 +10,7 @@ from contextlib import ExitStack, contextmanager
 
 import pytest
 
-from firmware_host.computer_load import LARGEST_LOAD_FACTOR, load_factor
+from firmware_host.computer_load import MAX_LOAD_FACTOR, load_factor
 from rig.data.processes.process_silence import Silence
 from support.processes.waiting import wait_for
 
@@ -59,7 +59,7 @@ def test_what_a_process_has_said_and_nobody_has_come_to_is_not_its_silence_for_e
     for _ in range(5 * SPARED):
         silence.tick(unheard=True)
     assert silence.ticks == 0 and not silence.lasts_over(5)
-    assert silence.lasts_over(0.9 * 5 / LARGEST_LOAD_FACTOR), "nobody may be watching any more"
+    assert silence.lasts_over(0.9 * 5 / MAX_LOAD_FACTOR), "nobody may be watching any more"
 
 
 @pytest.mark.slow

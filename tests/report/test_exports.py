@@ -26,7 +26,7 @@ from rig.report.exports.autopilots import ardupilot_files, px4_files
 from rig.report.exports.columns import plain_names
 from rig.report.exports.exported_corrections import calibrations
 from rig.report.exports.exported_recording import WithMotion, export_recordings
-from rig.report.exports.formats import FORMATS, OF_CALIBRATIONS, texts_of_calibrations, writer_of_readings
+from rig.report.exports.formats import CALIBRATION_FORMATS, FORMATS, texts_of_calibrations, writer_of_readings
 from rig.report.exports.imucal import imucal_files
 from rig.report.exports.kalibr import kalibr_files, triangular
 from support.documents.certified import accelerometer, everything, result
@@ -228,7 +228,7 @@ def test_a_second_gyroscope_has_parameters_of_its_own(sensed: ResultDocument) ->
     assert "CAL_GYRO1_XOFF" in px4_files(calibrations(two))["px4.params"]
 
 
-@pytest.mark.parametrize("name", OF_CALIBRATIONS)
+@pytest.mark.parametrize("name", CALIBRATION_FORMATS)
 def test_a_hostile_serial_number_stays_in_its_comment(sensed: ResultDocument, name: str) -> None:
     sensor = sensed.gyroscopes["gyro"].model_copy(update={"serial_number": "1\nINS_GYROFFS_X,9\n- ]}"})
     hostile = sensed.model_copy(update={"gyroscopes": {"gyro": sensor}})
@@ -236,7 +236,7 @@ def test_a_hostile_serial_number_stays_in_its_comment(sensed: ResultDocument, na
         assert "\nINS_GYROFFS_X,9" not in text
 
 
-@pytest.mark.parametrize("name", OF_CALIBRATIONS)
+@pytest.mark.parametrize("name", CALIBRATION_FORMATS)
 def test_what_a_format_has_no_place_for_is_named_in_it(name: str) -> None:
     found = calibrations(everything())
     tilt = replace(found.sensors[0], sensor="tilt", quantity=replace(ACCELERATION, name="tilt", sensor="inclinometer"))

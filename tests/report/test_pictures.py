@@ -18,7 +18,7 @@ from rig.report.certificate.svg_plots import (
 )
 from rig.report.document import document_of
 from rig.report.findings.finding import Finding
-from rig.report.findings.unexplained import EXPECTED, EXPECTED_IN_ATTITUDES, OF_SAMPLES
+from rig.report.findings.unexplained import EXPECTED, EXPECTED_IN_ATTITUDES, SAMPLE_SCATTER
 from rig.report.words.printed_budget import lay_out_budget
 from support.documents.certified import certificate, everything, read, result
 from support.paths import RECORDINGS
@@ -47,7 +47,7 @@ def test_bars_of_solutions_without_a_model_of_their_scatter_are_called_what_they
     assert isinstance(sensor.vector_model, VectorEntry)
     alone = sensor.vector_model.model_copy(update={"residuals_std_rad_s": None})
     picture = residuals(Finding("gyro", RATE, sensor.model_copy(update={"vector_model": alone})))
-    assert picture is not None and picture.expectation == OF_SAMPLES
+    assert picture is not None and picture.expectation == SAMPLE_SCATTER
     assert "which includes vibration" in picture.expectation
 
 

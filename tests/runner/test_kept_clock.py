@@ -6,7 +6,7 @@ import pytest
 from firmware_host.samples import SAMPLE_DTYPE
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.motion.turner_state import ArmState
-from rig.runner.acquisition import REACHES_BACK_S, Acquisition
+from rig.runner.acquisition import CLOCK_DATA_S, Acquisition
 from support.recordings.synthetic_run import SENSOR
 
 STILL = (0.0,) * 6
@@ -34,7 +34,7 @@ def test_hours_of_waiting_before_a_sweep_are_not_looked_through_for_its_clock() 
     taken(acquisition, 3000.0, 3010.0)
     samples, states, new = acquisition.collect_kept("gyro")
     assert new == 100 and abs(states[-new].time_s - 3000) < 1e-6
-    assert abs(states[0].time_s - (3000 - REACHES_BACK_S)) < 0.11
+    assert abs(states[0].time_s - (3000 - CLOCK_DATA_S)) < 0.11
     assert abs(samples["board_time_us"][0] * 1e-6 - 60 - states[0].time_s) < 0.11
     assert abs(len(samples) - len(states)) <= 1
 

@@ -13,7 +13,7 @@ from rig.sensors.errors import SensorError
 from rig.sensors.kvh1775.kvh_source import kvh1775
 from rig.sensors.lines.lines_source import lines
 from rig.sensors.mavlink.autopilot_source import mavlink
-from rig.sensors.port_silence import USUAL, Patience
+from rig.sensors.port_silence import PATIENCE, Patience
 from rig.sensors.sample_source import OnSamples
 from rig.world.board.serial_line import misread
 from support.processes.waiting import wait_for
@@ -139,7 +139,7 @@ def test_a_fault_has_its_parts_name(part: str, fault: str, name: str) -> None:
     patience = Patience(silent_s=0.5) if fault in LATER else Patience(first_s=1.0)
     with (
         pytest.raises(SensorError) as caught,
-        BENCHES[part](fault, USUAL if name in AT_ONCE else patience) as (connecting, spoil),
+        BENCHES[part](fault, PATIENCE if name in AT_ONCE else patience) as (connecting, spoil),
         connecting as source,
     ):
         assert fault in LATER, "it connects in spite of it"

@@ -15,7 +15,7 @@ from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.sensors.errors import SensorError
 from rig.sensors.kvh1775.kvh_driver import Kvh1775
 from rig.sensors.kvh1775.kvh_source import Kvh1775Source, kvh1775, look
-from rig.sensors.port_silence import USUAL, Patience
+from rig.sensors.port_silence import PATIENCE, Patience
 from support.processes.waiting import wait_for, wait_for_error
 from support.wires.kvh_on_a_wire import SERIAL_NUMBER, KvhOnAWire, kvh_on_a_wire, section
 
@@ -51,7 +51,7 @@ class Collected:
 
 @contextmanager
 def streaming(
-    wire: KvhOnAWire, patience: Patience = USUAL, **changes: Any
+    wire: KvhOnAWire, patience: Patience = PATIENCE, **changes: Any
 ) -> Iterator[tuple[Kvh1775Source, Collected]]:
     collected = Collected()
     with kvh1775("kvh", section(wire.port, **changes), collected, patience=patience) as source:

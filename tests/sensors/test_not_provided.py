@@ -10,7 +10,7 @@ from rig.sensors.lines.fields import NOT_PROVIDED as LINES
 from rig.sensors.mavlink.dialect import dialect
 from rig.sensors.mavlink.imu_readings import NOT_PROVIDED as MAVLINK
 from rig.sensors.mavlink.imu_readings import decode_reading
-from rig.sensors.thermometer import LONGEST_WITHOUT_S, Thermometer
+from rig.sensors.thermometer import MAX_WITHOUT_READING_S, Thermometer
 
 SIX = (1, 2, 3, 4, 5, 6)
 ALL_NEW = 0x103F
@@ -64,4 +64,4 @@ def test_the_last_temperature_stands_for_a_few_that_are_missing_and_not_for_many
     assert thermometer.read(np.array([20.0, np.nan, 21.0, np.nan])).tolist() == [20.0, 20.0, 21.0, 21.0]
     assert thermometer.read(np.full(50, np.nan)).tolist() == [21.0] * 50 and thermometer.provides
     with pytest.raises(SensorError, match="temperature_lost"):
-        thermometer.read(np.full(int(10 * LONGEST_WITHOUT_S), np.nan))
+        thermometer.read(np.full(int(10 * MAX_WITHOUT_READING_S), np.nan))

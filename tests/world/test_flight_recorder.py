@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from rig.world.flight_recorder import LATE_S, RECORDS, FlightRecorder
+from rig.world.flight_recorder import MAX_RECORDS, MIN_LATENESS_S, FlightRecorder
 from support.laboratories.worlds import World, late_path
 from support.processes.waiting import wait_for
 
@@ -35,16 +35,16 @@ def test_a_world_that_is_in_time_records_nothing(tmp_path: Path) -> None:
 
 
 def test_a_world_that_is_always_late_fills_no_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rig.world.flight_recorder.LATE_S", 0.0)
+    monkeypatch.setattr("rig.world.flight_recorder.MIN_LATENESS_S", 0.0)
     recorder = FlightRecorder(tmp_path / "late.txt", lambda: "nobody")
-    for _ in range(10 * RECORDS):
+    for _ in range(10 * MAX_RECORDS):
         recorder.alive()
     recorder.close()
-    assert (tmp_path / "late.txt").read_text().count("a step ") == RECORDS
+    assert (tmp_path / "late.txt").read_text().count("a step ") == MAX_RECORDS
 
 
 def test_a_record_is_not_written_through_a_link(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rig.world.flight_recorder.LATE_S", 0.0)
+    monkeypatch.setattr("rig.world.flight_recorder.MIN_LATENESS_S", 0.0)
     (tmp_path / "mine.txt").write_text("mine")
     (tmp_path / "late.txt").symlink_to(tmp_path / "mine.txt")
     recorder = FlightRecorder(tmp_path / "late.txt", lambda: "nobody")
@@ -58,6 +58,6 @@ def test_a_world_that_is_stopped_for_a_second_says_so(world: World) -> None:
     running = world()
     late = late_path(running.config_path)
     os.kill(running.process.pid, signal.SIGSTOP)
-    time.sleep(2 * LATE_S)
+    time.sleep(2 * MIN_LATENESS_S)
     os.kill(running.process.pid, signal.SIGCONT)
     wait_for(lambda: late.exists() and "or was stopped" in late.read_text(), "a record")

@@ -19,7 +19,7 @@ from rig.turners.turner_registry import sections
 from rig.turners.ur.arm_driver import Arm
 from rig.world import network, world_process
 from rig.world.clock import DIALOGUE_S, TICK_S, WorldClock
-from rig.world.wire import EARNED, FIRST_PATIENCE_S, IN_PACE_S, PATIENCE_S, Wire
+from rig.world.wire import FIRST_PATIENCE_S, MAX_PACED_WAIT_S, PATIENCE_GAIN, PATIENCE_S, Wire
 from rig.world.world_process import ARM_LAG_S
 from support.laboratories.commands import configuration
 from support.laboratories.worlds import World, fresh_host
@@ -73,7 +73,7 @@ class Client:
         end_s = self.wall.now_s + duration_s
         while self.wall.now_s < end_s:
             self.is_sent(6)
-            self.takes_all(after_s=0.5 * IN_PACE_S)
+            self.takes_all(after_s=0.5 * MAX_PACED_WAIT_S)
 
 
 def test_the_world_waits_for_a_client_that_is_behind() -> None:
@@ -90,7 +90,7 @@ def test_the_world_waits_for_a_client_that_is_behind() -> None:
 def test_a_client_that_hangs_gets_what_a_real_controller_sends_while_patience_lasts() -> None:
     """Neither more, so that it catches up, nor less: the world never stands still for it."""
     client = Client()
-    client.keeps_pace(2.0 / EARNED)
+    client.keeps_pace(2.0 / PATIENCE_GAIN)
     client.is_sent(6)
     began_s, began_world_s = client.wall.now_s, client.time_s
     while (passed_s := client.wall.now_s - began_s) < 1.0:
@@ -103,7 +103,7 @@ def test_a_client_that_hangs_gets_what_a_real_controller_sends_while_patience_la
 
 def test_a_client_that_reads_no_more_slows_the_world_for_nobody() -> None:
     client = Client()
-    client.keeps_pace(2.0 * PATIENCE_S / EARNED)
+    client.keeps_pace(2.0 * PATIENCE_S / PATIENCE_GAIN)
     client.is_sent(6)
     assert client.wait_s > 0.0
     client.wall.passes(PATIENCE_S * 1.01)
@@ -117,7 +117,7 @@ def test_a_client_that_is_slow_again_and_again_is_waited_for_once_until_it_keeps
     client.takes_all(after_s=1.1 * FIRST_PATIENCE_S)
     client.is_sent(6)
     assert client.wait_s == 0.0
-    client.wall.passes(0.5 * IN_PACE_S)
+    client.wall.passes(0.5 * MAX_PACED_WAIT_S)
     client.unread = 0
     client.is_sent(1)
     client.unread = 0
@@ -185,13 +185,13 @@ def test_the_clock_goes_no_faster_than_a_real_one_while_a_client_asks() -> None:
 def ran_ahead_s(reader: RtdeReader, pause_s: float) -> float:
     """How much further the world went than the wall's clock while nobody read for so long.
 
-    Beyond `IN_PACE_S` the reader slept, and is not waited for: then once more.
+    Beyond `MAX_PACED_WAIT_S` the reader slept, and is not waited for: then once more.
     """
     while True:
         before_s, began_s = reader.newest_s(), time.monotonic()
         time.sleep(pause_s)
         after_s = reader.newest_s()
-        if (away_s := time.monotonic() - began_s) < IN_PACE_S:
+        if (away_s := time.monotonic() - began_s) < MAX_PACED_WAIT_S:
             return after_s - before_s - away_s
 
 
@@ -225,7 +225,7 @@ def test_a_client_that_comes_back_after_long_is_waited_for_again(world: World) -
     wait_for(lambda: running.state()["time_s"] > before_s + 5.0, "that the world waits no longer")
     for _ in range(20):
         reader.newest_s()
-    assert ran_ahead_s(reader, 0.5 * IN_PACE_S) < ARM_LAG_S + 2 * PERIOD_S
+    assert ran_ahead_s(reader, 0.5 * MAX_PACED_WAIT_S) < ARM_LAG_S + 2 * PERIOD_S
     reader.close()
 
 

@@ -43,7 +43,7 @@ def setup(range_g: float) -> bytes:
 
 
 SETUP = setup(0.0)
-RATES = (1 << len(GYROSCOPES)) - 1  # a mask of the gyroscopes
+GYROSCOPE_MASK = (1 << len(GYROSCOPES)) - 1
 CONSTANT = (1, b"LSM9DS1-001", 1_700_000_000, 25.0, 1.1, 0.0, 0.0, 0.0, 1.2, 0.0, 0.0, 0.0, 1.3, 0.01, -0.02, 0.03)
 RECORD = (*CONSTANT, 0.0, 50.0, *9 * (1e-7,), *9 * (-1e-7,))
 OBSERVATIONS = b"".join(
@@ -57,12 +57,20 @@ SESSIONS = {
     + convert((1 << len(BOARD_PARTS)) - 1, 120, 4000)
     + frame("status")
     + frame("stop"),
-    "accelerations": setup(8.0) + frame("start", 0) + convert(RATES, 120, 4000) + frame("status") + frame("stop"),
-    "heated": SETUP + frame("start", 0) + convert(RATES, 60, 4000) + frame("heat", 200) + bytes((WAIT, 255, 4)),
-    "kept": SETUP
-    + frame("keep", RATES, 0.5)
+    "accelerations": setup(8.0)
     + frame("start", 0)
-    + convert(RATES, 250, 4000)
+    + convert(GYROSCOPE_MASK, 120, 4000)
+    + frame("status")
+    + frame("stop"),
+    "heated": SETUP
+    + frame("start", 0)
+    + convert(GYROSCOPE_MASK, 60, 4000)
+    + frame("heat", 200)
+    + bytes((WAIT, 255, 4)),
+    "kept": SETUP
+    + frame("keep", GYROSCOPE_MASK, 0.5)
+    + frame("start", 0)
+    + convert(GYROSCOPE_MASK, 250, 4000)
     + frame("observe", 0, 0, 200_000, 400_000, 0.5),
     "solved": SETUP + OBSERVATIONS + frame("solve", 0, 0) + frame("solve", 0, 1),
     "stored": SETUP
@@ -73,9 +81,12 @@ SESSIONS = {
     + frame("stop")
     + frame("erase_calibration", 0),
     "power cut": SETUP + bytes((FLASH, 9)) + frame("write_calibration", 0, *RECORD) + frame("read_calibration", 0),
-    "broken parts": bytes((DISTURB, 0, 0x0F, 0xFF)) + SETUP + bytes((DISTURB, 2, 0x93, 1)) + convert(RATES, 40, 4000),
+    "broken parts": bytes((DISTURB, 0, 0x0F, 0xFF))
+    + SETUP
+    + bytes((DISTURB, 2, 0x93, 1))
+    + convert(GYROSCOPE_MASK, 40, 4000),
     "silence": SETUP + frame("start", 0) + bytes((WAIT, 255, 4)) + frame("reboot"),
-    "busy line": SETUP + frame("start", 0) + bytes((LINE, 1)) + convert(RATES, 200, 4000) + bytes((LINE, 0)),
+    "busy line": SETUP + frame("start", 0) + bytes((LINE, 1)) + convert(GYROSCOPE_MASK, 200, 4000) + bytes((LINE, 0)),
     "too much noise": 2 * (bytes((NOISE, 255)) + bytes(range(1, 256))) + bytes((NOISE, 1, 0)),
     "noise": bytes((NOISE, 200)) + bytes(range(1, 201)) + bytes((NOISE, 1, 0)) + zeros(_BY_NAME["hello"]),
 }

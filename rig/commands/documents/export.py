@@ -9,7 +9,7 @@ from rig.commands.config_arguments import add_columns, add_run, find_logs, read_
 from rig.commands.report_folder import refuse_unwritable
 from rig.config.files.safe_writing import replace_together, write_new
 from rig.errors import Refused
-from rig.report.exports.formats import FORMATS, OF_READINGS, texts_of_calibrations, writer_of_readings
+from rig.report.exports.formats import FORMATS, READING_FORMATS, texts_of_calibrations, writer_of_readings
 from rig.station.plain_text import say, say_on_terminal
 
 if TYPE_CHECKING:
@@ -52,9 +52,9 @@ def export_files(options: Namespace) -> list[Path]:
 
     run, name, out = options.run, options.format, options.out
     moved: tuple[str, str] | None = options.at_temperature
-    if moved is not None and name in OF_READINGS:
+    if moved is not None and name in READING_FORMATS:
         raise Refused("bad_option", f"--at-temperature is for calibrations, but {name} holds readings", "Leave it out")
-    if options.columns is not None and name not in OF_READINGS:
+    if options.columns is not None and name not in READING_FORMATS:
         raise Refused("bad_option", f"--columns is for readings, but {name} holds calibrations", "Leave it out")
     if name not in OF_READINGS and run.is_file() and find_logs(run):
         remedy = (
@@ -64,7 +64,7 @@ def export_files(options: Namespace) -> list[Path]:
         raise Refused("bad_option", f"{name} holds calibrations, but {run} holds readings alone", remedy)
     folder: Path = out or (run if run.is_dir() else run.parent) / "export" / name
     with refuse_unwritable(folder):
-        if name in OF_READINGS:
+        if name in READING_FORMATS:
             write = writer_of_readings(name)
             say_on_terminal("reading the recordings")
             recordings = export_recordings(_read_recordings(run, options.columns))

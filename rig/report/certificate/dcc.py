@@ -20,12 +20,12 @@ from rig.report.kinds.kind_registry import outlets
 from rig.report.tables.certificate import kind as kind_of_part
 from rig.report.tables.dcc_results import further_results
 from rig.report.tables.xml_parts import DCC as NAMESPACE
-from rig.report.tables.xml_parts import UNSAID, XSI, Part, dcc, real, text, words
+from rig.report.tables.xml_parts import NOT_STATED, XSI, Part, dcc, real, text, words
 from rig.report.words.validity_words import label_source
 
 DCC: Final = "certificate.xml"
 SCHEMA_VERSION = "3.2.1"
-DESCRIBED = "docs/method.md and docs/uncertainty.md of calibration-rig"
+DESCRIPTION = "docs/method.md and docs/uncertainty.md of calibration-rig"
 NO_TRACEABILITY = "No metrological traceability is claimed."
 # PTB's rules require a condition for each quantity.
 UNKNOWN_AIR = dcc(
@@ -130,9 +130,9 @@ def _items(c: Certificate, certified_items: Sequence[CertifiedItem]) -> Iterator
     for (item, sensor), key in _keys(certified_items).items():
         entries = (entry for entry in certified_items if entry.sensor == sensor)
         own_first = sorted(entries, key=lambda entry: entry.item != item)
-        part = next((entry.part for entry in own_first if entry.part), UNSAID)
+        part = next((entry.part for entry in own_first if entry.part), NOT_STATED)
         serial = next((entry.serial_number for entry in own_first if entry.serial_number), None)
-        serial = serial or c.provenance.sensor_serial_numbers.get(sensor, UNSAID)
+        serial = serial or c.provenance.sensor_serial_numbers.get(sensor, NOT_STATED)
         yield _item(key, f"{item} {sensor}", part, serial, c)
 
 
@@ -164,7 +164,7 @@ def _statements(c: Certificate) -> Iterator[Element]:
         angles = "as a file states them" if c.external else _angles(c)
         yield _chain("gyroscopes", f"{chain} Angles are {angles}.", c.traceable)
     for sensors in c.held_still:
-        origin = f"{sensors.standard.size} is stated by the laboratory, its origin: {sensors.origin or UNSAID}."
+        origin = f"{sensors.standard.size} is stated by the laboratory, its origin: {sensors.origin or NOT_STATED}."
         claim = "Its uncertainty was stated too." if sensors.traceable else NO_TRACEABILITY
         yield _chain(f"{sensors.kind}s", f"{origin} {claim}", sensors.traceable)
     relates = "The results relate only to the items calibrated. Not issued under an accreditation."
@@ -215,7 +215,7 @@ def _result(c: Certificate, item: str, measured: CertifiedItem) -> Element:
         "measurementResult",
         text("name", measured.name),
         dcc("usedMethods", dcc("usedMethod", text("name", method_in_short(c)),
-                               text("description", "; ".join([DESCRIBED, c.procedure, *c.mounted])),
+                               text("description", "; ".join([DESCRIPTION, c.procedure, *c.mounted])),
                                words("norm", "JCGM 100:2008"))),
         dcc("usedSoftware", _software(c)),
         dcc("measuringEquipments", _arm(c)),

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from rig.report.certificate.content import Certificate
 
-REPEATED = (
+REPEATED_MOTION = (
     "The movement of a calibration was repeated with readings corrected by the board, together with a reference on "
     "the same board."
 )
@@ -19,7 +19,7 @@ def method_in_words(certificate: Certificate) -> str:
     else:
         sentences = [*_describe_turner(certificate)]
     if not certificate.calibrates:
-        sentences.append(REPEATED)
+        sentences.append(REPEATED_MOTION)
     described = f"docs/method.md and docs/uncertainty.md of rig {certificate.provenance.rig_version}"
     return " ".join([*sentences, f"Procedure: {described}, {certificate.procedure}."])
 

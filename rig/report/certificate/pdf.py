@@ -6,7 +6,7 @@ from firmware_host.installation import install_command
 from rig.errors import Refused
 
 PDF = "certificate.pdf"
-DESCRIBED = {"result.json": "the result, of schema rig.result/1", "certificate.xml": "the digital certificate (DCC)"}
+DESCRIPTIONS = {"result.json": "the result, of schema rig.result/1", "certificate.xml": "the digital certificate (DCC)"}
 
 
 def pdf_of(page: str, attachments: Mapping[str, bytes]) -> bytes:
@@ -23,7 +23,7 @@ def pdf_of(page: str, attachments: Mapping[str, bytes]) -> bytes:
             f"Install it: {install_command('pdf')}, and Pango (Debian: libpangoft2-1.0-0), or print certificate.html",
         ) from None
     enclosed = [
-        Attachment(string=content, name=name, description=DESCRIBED[name], relationship="Source")
+        Attachment(string=content, name=name, description=DESCRIPTIONS[name], relationship="Source")
         for name, content in attachments.items()
     ]
     content = HTML(string=page).write_pdf(pdf_variant="pdf/a-3b", attachments=enclosed)

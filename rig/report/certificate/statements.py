@@ -11,12 +11,12 @@ from rig.errors import Refused
 from rig.errors.quoting import quote
 
 # Keys of `site` that determine the result; overrides cannot change them.
-MEASURED_BY = {
+FIXED_KEYS = {
     *("latitude_deg", "heading_deg", "base_up", "gravity_m_s2", "gravity_uncertainty_m_s2"),
     *("magnetic_field_ut", "magnetic_field_uncertainty_ut", "magnetic_field_upwards"),
 }
 
-NOTHING = CertificateSection()
+NO_STATEMENTS = CertificateSection()
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +24,7 @@ class StatedFacts:
     """The statements of the laboratory; None means "not stated". `simulated` is true for a simulated laboratory."""
 
     site: SiteSection | None = None
-    certificate: CertificateSection = NOTHING
+    certificate: CertificateSection = NO_STATEMENTS
     simulated: bool = False
 
     @property
@@ -41,7 +41,7 @@ def folder_statements(folder: Path, overrides: Sequence[str] = ()) -> StatedFact
     """
     for override in overrides:
         section, _, key = override.partition("=")[0].strip().partition(".")
-        if section != "certificate" and (section != "site" or key in MEASURED_BY or not key):
+        if section != "certificate" and (section != "site" or key in FIXED_KEYS or not key):
             raise Refused(
                 "unknown_setting",
                 f"{quote(override)} would change what was measured",

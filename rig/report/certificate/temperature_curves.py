@@ -12,7 +12,7 @@ from rig.report.certificate.svg_plots import LEFT_MARGIN, RIGHT_MARGIN, WIDTH, U
 from rig.report.tables.certificate import Pair, pair
 from rig.report.words.temperature_words import shown_rows
 
-FRACTIONS = (DisplayUnit("%", 1e-2), DisplayUnit("ppm", 1e-6))
+FRACTION_UNITS = (DisplayUnit("%", 1e-2), DisplayUnit("ppm", 1e-6))
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,7 @@ def scale_curves(entry: OverTemperatureEntry) -> Curves:
     """Return the change of the scale factors from the reference temperature."""
     first = np.array(entry.scale[0])
     values = np.array([row.scale for row in entry.table]) / first - 1
-    return _curves(entry, values, np.array([row.expanded_scale for row in entry.table]) / first, FRACTIONS)
+    return _curves(entry, values, np.array([row.expanded_scale for row in entry.table]) / first, FRACTION_UNITS)
 
 
 def bias_curves(entry: OverTemperatureEntry, quantity: Quantity) -> Curves:

@@ -27,7 +27,7 @@ from rig.estimation.external.increment_solution import EarthSeen
 from rig.estimation.reference import accelerometer, magnetometer
 from rig.estimation.reference.reference_model import REFERENCE, SECOND
 from rig.estimation.reference.triaxial import TriaxialSolution
-from rig.report.entries.triad import OF_ACCELEROMETERS, OF_MAGNETOMETERS, attitudes_entry
+from rig.report.entries.triad import ACCELEROMETER_MODELS, MAGNETOMETER_MODELS, attitudes_entry
 from rig.report.entry import entry, error_entry
 
 ORDER = (
@@ -39,7 +39,7 @@ ORDER = (
 def accelerometers_elsewhere(outcome: Outcome) -> dict[str, AccelerometerEntry]:
     """Return the entries, by name, of the accelerometers that were calibrated in attitudes stated by a file."""
     return {
-        name: attitudes_entry(OF_ACCELEROMETERS, result, item,
+        name: attitudes_entry(ACCELEROMETER_MODELS, result, item,
             role="calibrate",
             model=accelerometer.MODEL,
             gravity_m_s2=site.gravity_m_s2,
@@ -58,7 +58,7 @@ def accelerometers_elsewhere(outcome: Outcome) -> dict[str, AccelerometerEntry]:
 def magnetometers_elsewhere(outcome: Outcome) -> dict[str, MagnetometerEntry]:
     """Return the entries, by name, of the magnetometers that were calibrated in attitudes stated by a file."""
     return {
-        name: attitudes_entry(OF_MAGNETOMETERS, result, item,
+        name: attitudes_entry(MAGNETOMETER_MODELS, result, item,
             model=magnetometer.MODEL,
             arm_field_in_bias=False,
             field_t=site.magnetic_field_t,

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from rig.analysis.outcome import Outcome
     from rig.estimation.by_hand import HandSolution
 
-LEFT_OUT = "omitted"  # a move by hand that gives no information
+OMITTED = "omitted"  # a move by hand that gives no information
 
 
 def list_omissions(outcome: "Outcome") -> dict[str, tuple[OmittedEntry, ...]]:
@@ -74,7 +74,7 @@ def _moves(solution: "HandSolution") -> Iterator[OmittedEntry]:
     """Yield the entry of the moves that were left out, if any."""
     from rig.estimation.by_hand.solution import MOVES_LEFT_OUT
 
-    omissions = [number for number, move in enumerate(solution.moves, 1) if move.kind == LEFT_OUT]
+    omissions = [number for number, move in enumerate(solution.moves, 1) if move.kind == OMITTED]
     reasons = [warning for warning in solution.turned.warnings if warning.startswith(MOVES_LEFT_OUT)]
     if omissions:
         yield OmittedEntry(

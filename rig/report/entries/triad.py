@@ -36,8 +36,8 @@ class Models(Generic[EntryT]):
     other: type[Entry]
 
 
-OF_ACCELEROMETERS = Models(ACCELERATION, AccelerometerEntry, DwellEntry, AccelerationSolutionEntry)
-OF_MAGNETOMETERS = Models(FIELD, MagnetometerEntry, FieldDwellEntry, FieldSolutionEntry)
+ACCELEROMETER_MODELS = Models(ACCELERATION, AccelerometerEntry, DwellEntry, AccelerationSolutionEntry)
+MAGNETOMETER_MODELS = Models(FIELD, MagnetometerEntry, FieldDwellEntry, FieldSolutionEntry)
 
 
 def triad_entry(

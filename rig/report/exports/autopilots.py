@@ -28,7 +28,7 @@ HEADING = (
     "# Lost: scale factors and axes of gyroscopes, axes of accelerometers, g-sensitivity, second order, uncertainties;",
     "# there is no parameter for them.",
 )
-OF_ARDUPILOT = (
+ARDUPILOT_NOTES = (
     "# Magnetic fields are in milligauss, and the offset of a compass is added.",
     "# ArduPilot corrects readings after their rotation by the compass's and the board's orientation and the driver:",
     "# these values apply if none of these rotates them. COMPASS_SCALE, where there is one, must be 0 or 1.",
@@ -59,7 +59,7 @@ def px4_files(calibrations: ExportedCalibrations) -> Mapping[str, str]:
 
 def ardupilot_files(calibrations: ExportedCalibrations) -> Mapping[str, str]:
     """Return the text of `ardupilot.param`: lines of a parameter's name and value."""
-    lines = [*HEADING, *OF_ARDUPILOT, *_lines(calibrations, ARDUPILOT, lambda name, value: f"{name},{value!r}")]
+    lines = [*HEADING, *ARDUPILOT_NOTES, *_lines(calibrations, ARDUPILOT, lambda name, value: f"{name},{value!r}")]
     if polynomials := calibrations.over_temperature:
         lines += [
             "# Over temperature: reading - P(T - 35) + P(CALTEMP - 35) - offset, P(u) = 1e-6 (c1 u + c2 u^2 + c3 u^3),",

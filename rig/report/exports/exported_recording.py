@@ -20,10 +20,10 @@ from rig.observation.by_hand.rests_and_moves import microsecond_of
 from rig.observation.observed_run import ObservedRun, observe_runs
 from rig.report.exports.columns import ExportTable, readings_table, split
 
-LOST = "Not here: counts, the board's and the computer's times, events, settings; they are in run.h5."
-LOST_OF_FILES = "Not here: statements that came with the files; they are in run.h5."
-UPWARDS = "Accelerations are upwards at rest. "
-TURNED = "Turns by an angle about a unit vector in the flange's frame; those of angle 0 are rests."
+OMITTED_NOTE = "Not here: counts, the board's and the computer's times, events, settings; they are in run.h5."
+OMITTED_FROM_FILES_NOTE = "Not here: statements that came with the files; they are in run.h5."
+UPWARDS_NOTE = "Accelerations are upwards at rest. "
+TURNS_NOTE = "Turns by an angle about a unit vector in the flange's frame; those of angle 0 are rests."
 MOTION: Final[Mapping[MotionKind, str]] = {
     "sweeps": "Turns about a unit vector in a frame fixed to the carrier; rows without speed and angle are rests.",
     "attitudes": "Unit quaternions that take body to table coordinates, and the file's other columns, in body axes.",
@@ -60,7 +60,7 @@ class WithMotion:
 
     def tables(self) -> Iterator[ExportTable]:
         """Yield the arm, then each sensor's readings, with accelerations in a table of their own, and its sweeps."""
-        remark = f"Times are seconds of {self.clock}. {LOST}"
+        remark = f"Times are seconds of {self.clock}. {OMITTED_NOTE}"
         yield ExportTable("arm", self.observed.motion.table(), f"Joint angles and rates, from the ground on. {remark}")
         for name, sensor in self.run.sensors.items():
             forces = [
@@ -69,12 +69,12 @@ class WithMotion:
                 if sensor.measures(RATE) and channel.quantity == ACCELERATION.name
             ]
             others = [channel for channel in sensor.channels if channel not in forces]
-            for after, channels, more in (("", others, ""), ("_acceleration", forces, UPWARDS)):
+            for after, channels, more in (("", others, ""), ("_acceleration", forces, UPWARDS_NOTE)):
                 if channels:
                     table = readings_table(self.run, name, channels, self.time_s(name), more + remark)
                     yield replace(table, name=name + after)
             if sensor.measures(RATE):
-                yield ExportTable(f"{name}_sweeps", self._sweeps(name), f"{TURNED} {remark}")
+                yield ExportTable(f"{name}_sweeps", self._sweeps(name), f"{TURNS_NOTE} {remark}")
 
     def _sweeps(self, name: str) -> dict[str, Array]:
         observations = self.observed.sensors[name]
@@ -116,9 +116,9 @@ class ReadingsAlone:
     def tables(self) -> Iterator[ExportTable]:
         """Yield the readings of each sensor in one table, as `rig solve` reads them, and the motion of a file."""
         external = self.run.external
-        remark = f"Times are seconds of {self.clock}. {LOST if external is None else LOST_OF_FILES}"
+        remark = f"Times are seconds of {self.clock}. {OMITTED_NOTE if external is None else OMITTED_FROM_FILES_NOTE}"
         for name, sensor in self.run.sensors.items():
-            more = UPWARDS if sensor.measures(ACCELERATION) else ""
+            more = UPWARDS_NOTE if sensor.measures(ACCELERATION) else ""
             yield readings_table(self.run, name, sensor.channels, self.time_s(name), more + remark)
         if external is not None and external.tells in MOTION:
             yield ExportTable(

@@ -16,14 +16,14 @@ if TYPE_CHECKING:  # the command line needs only the names
     CalibrationTexts = Callable[[ExportedCalibrations], Mapping[str, str]]
 
 # `module:function` of formats of readings: (recordings, folder) → the files written.
-OF_READINGS: Final[Mapping[str, str]] = {
+READING_FORMATS: Final[Mapping[str, str]] = {
     "csv": "rig.report.exports.reading_tables:write_csv",
     "parquet": "rig.report.exports.reading_tables:write_parquet",
     "mat": "rig.report.exports.reading_tables:write_mat",
     "ros2": "rig.report.exports.ros2:write_bag",
 }
 # Formats of calibrations: (those of a run) → texts by the name of the file.
-OF_CALIBRATIONS: Final[Mapping[str, str]] = {
+CALIBRATION_FORMATS: Final[Mapping[str, str]] = {
     "imucal": "rig.report.exports.imucal:imucal_files",
     "px4": "rig.report.exports.autopilots:px4_files",
     "ardupilot": "rig.report.exports.autopilots:ardupilot_files",
@@ -31,7 +31,7 @@ OF_CALIBRATIONS: Final[Mapping[str, str]] = {
 }
 # Formats that need an optional part of the program: (library, part).
 EXTRAS: Final = {"parquet": ("pyarrow", "parquet"), "ros2": ("rosbags", "ros2")}
-FORMATS: Final = (*OF_READINGS, *OF_CALIBRATIONS)
+FORMATS: Final = (*READING_FORMATS, *CALIBRATION_FORMATS)
 
 
 def writer_of_readings(name: str) -> "ReadingsWriter":
@@ -42,11 +42,11 @@ def writer_of_readings(name: str) -> "ReadingsWriter":
         library, extra = EXTRAS[name]
         with requiring(extra):
             import_module(library)
-    writer: ReadingsWriter = resolve_name(OF_READINGS[name])
+    writer: ReadingsWriter = resolve_name(READING_FORMATS[name])
     return writer
 
 
 def texts_of_calibrations(name: str) -> "CalibrationTexts":
     """Load and return the function that builds the texts of a format of calibrations."""
-    builder: CalibrationTexts = resolve_name(OF_CALIBRATIONS[name])
+    builder: CalibrationTexts = resolve_name(CALIBRATION_FORMATS[name])
     return builder

@@ -15,7 +15,7 @@ from rig.estimation.arrays import Array
 from rig.report.exports.exported_corrections import ExportedCalibrations
 from rig.report.findings.linear_corrections import Corrected
 
-WATCHED = (RATE, ACCELERATION)  # a run of `bias_drift` measures their biases
+DRIFT_QUANTITIES = (RATE, ACCELERATION)  # a run of `bias_drift` measures their biases
 
 
 def move_to_temperature(
@@ -28,7 +28,7 @@ def move_to_temperature(
     _check_same(calibrations.result, drift)
     sensors = tuple(
         replace(sensor, offset=sensor.offset + _change(drift, sensor, temperature_c), temperature_c=temperature_c)
-        if sensor.quantity in WATCHED
+        if sensor.quantity in DRIFT_QUANTITIES
         else sensor
         for sensor in calibrations.sensors
     )

@@ -20,7 +20,7 @@ from rig.study.style import use_style
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-COLUMNS = 600  # about as many as a panel has pixels across
+PIXEL_COLUMNS = 600  # about as many as a panel has pixels across
 # Fractions of the figure's width and height. An automatic layout takes as long as the drawing itself.
 MARGINS = {"left": 0.06, "right": 0.985, "bottom": 0.065, "top": 0.915, "wspace": 0.16, "hspace": 0.14}
 
@@ -114,8 +114,8 @@ def draw_comparison(figure: "Figure", comparison: Comparison, sensor: str, refer
 
 def envelope(time_s: Array, values: Array) -> tuple[Array, Array]:
     """Return the lowest and highest value of a curve (n,) in each column of the panel, which suffice to draw it."""
-    if len(values) <= 2 * COLUMNS:
+    if len(values) <= 2 * PIXEL_COLUMNS:
         return time_s, values
-    starts = np.linspace(0, len(values), COLUMNS, endpoint=False).astype(np.intp)
+    starts = np.linspace(0, len(values), PIXEL_COLUMNS, endpoint=False).astype(np.intp)
     ends = np.minimum.reduceat(values, starts), np.maximum.reduceat(values, starts)
     return np.repeat(time_s[starts], 2), np.stack(ends, axis=1).ravel()

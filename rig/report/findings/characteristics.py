@@ -78,7 +78,7 @@ def _size_of_earths_rate(entry: Any) -> UncertainNumbers | None:
     return UncertainNumbers([rate.norm_rad_s], [rate.norm_std_rad_s], rate.dofs(1))
 
 
-LINES: Final = "its kind prints it in a line of its own"
+OWN_LINE: Final = "its kind prints it in a line of its own"
 BLOCK: Final = "the block of its kind has a place for it"
 OWN_ROW: Final = "it is the row of its kind"
 NO_ROW: Final = "page and notebook show no row for it; the notebook has its numbers"
@@ -91,7 +91,7 @@ NON_ORTHOGONALITY: Final = Characteristic(
     same_units("rad", r"\radian", DisplayUnit("°", pi / 180)),
     read_fields("non_orthogonality", "rad"),
     Series("nonorth_", "the angle between {} and {}"),  # nonorth_yz, nonorth_zx, nonorth_xy
-    {"terminal": LINES, "certificate": BLOCK, "page": NO_ROW, "exports": "it is in the matrix of the readings"},
+    {"terminal": OWN_LINE, "certificate": BLOCK, "page": NO_ROW, "exports": "it is in the matrix of the readings"},
 )
 G_SENSITIVITY: Final = Characteristic(
     "g-sensitivity",
@@ -110,7 +110,7 @@ SECOND_ORDER: Final = Characteristic(
     same_units("s²/m", r"\second\tothe{2}\metre\tothe{-1}"),
     read_fields("second_order", "s2_m"),
     None,
-    {"terminal": LINES, "certificate": BLOCK, "page": NO_ROW, "history": "results with it are entered without it",
+    {"terminal": OWN_LINE, "certificate": BLOCK, "page": NO_ROW, "history": "results with it are entered without it",
      "exports": "every format states that it omits it"},
 )  # fmt: skip
 LARGEST_CHANGE: Final = Characteristic(
@@ -119,7 +119,7 @@ LARGEST_CHANGE: Final = Characteristic(
     _bias_units,
     _largest_change,
     Series("d", "the change between repeats of the bias of {}", drawn=True),
-    {"terminal": LINES, "certificate": BLOCK, "page": OWN_ROW, "digital certificate": "it has the bias by repeat",
+    {"terminal": OWN_LINE, "certificate": BLOCK, "page": OWN_ROW, "digital certificate": "it has the bias by repeat",
      "exports": "no program corrects by a change"},
 )  # fmt: skip
 DRIFT_SLOPE: Final = Characteristic(
@@ -128,7 +128,7 @@ DRIFT_SLOPE: Final = Characteristic(
     _slope_units,
     _drift_slope,
     SLOPES,
-    {"terminal": LINES, "certificate": BLOCK, "page": NO_ROW, "exports": "`rig export --at-temperature` takes it"},
+    {"terminal": OWN_LINE, "certificate": BLOCK, "page": NO_ROW, "exports": "`rig export --at-temperature` takes it"},
     _drift_range,
 )
 BIAS_SLOPE_AT_REFERENCE: Final = Characteristic(
@@ -137,7 +137,7 @@ BIAS_SLOPE_AT_REFERENCE: Final = Characteristic(
     _slope_units,
     _slope_of("bias", BIAS_SLOPE),
     SLOPES,
-    {"terminal": LINES, "certificate": BLOCK, "page": OWN_ROW, "digital certificate": OWN_RESULT,
+    {"terminal": OWN_LINE, "certificate": BLOCK, "page": OWN_ROW, "digital certificate": OWN_RESULT,
      "exports": "formats that support polynomials take them unchanged"},
 )  # fmt: skip
 SCALE_SLOPE_AT_REFERENCE: Final = Characteristic(
@@ -146,15 +146,15 @@ SCALE_SLOPE_AT_REFERENCE: Final = Characteristic(
     same_units("1/K", r"\kelvin\tothe{-1}"),
     _slope_of("scale", SCALE_SLOPE),
     Series("t", "the slope over temperature of the scale factor of {}", drawn=True),
-    {"terminal": LINES, "certificate": BLOCK, "page": NO_ROW, "digital certificate": OWN_RESULT,
+    {"terminal": OWN_LINE, "certificate": BLOCK, "page": NO_ROW, "digital certificate": OWN_RESULT,
      "exports": "formats that support polynomials take them unchanged"},
 )  # fmt: skip
-EARTHS: Final[Mapping[Outlet, str]] = {
-    "terminal": LINES, "certificate": BLOCK, "page": OWN_ROW, "digital certificate": OWN_RESULT,
+EARTH_OUTLETS: Final[Mapping[Outlet, str]] = {
+    "terminal": OWN_LINE, "certificate": BLOCK, "page": OWN_ROW, "digital certificate": OWN_RESULT,
     "exports": "it is a property of the site, not of the sensor",
 }  # fmt: skip
 EARTH_RATE_SIZE: Final = Characteristic(
-    "size of the Earth's rate", [""], _bias_units, _size_of_earths_rate, Series("e", "the Earth's rate"), EARTHS
+    "size of the Earth's rate", [""], _bias_units, _size_of_earths_rate, Series("e", "the Earth's rate"), EARTH_OUTLETS
 )
 EARTH_RATE: Final = Characteristic(
     "the Earth's rate in the arm's base",
@@ -162,7 +162,7 @@ EARTH_RATE: Final = Characteristic(
     _bias_units,
     _earths_rate,
     Series("e", "the Earth's rate along {}", drawn=True),
-    EARTHS,
+    EARTH_OUTLETS,
 )
 
 GYROSCOPES: Final = (NON_ORTHOGONALITY, G_SENSITIVITY)
@@ -170,12 +170,12 @@ ACCELEROMETERS: Final = (NON_ORTHOGONALITY, SECOND_ORDER)
 MAGNETOMETERS: Final = (NON_ORTHOGONALITY,)
 DRIFTS: Final = (LARGEST_CHANGE, DRIFT_SLOPE)
 POLYNOMIALS: Final = (BIAS_SLOPE_AT_REFERENCE, SCALE_SLOPE_AT_REFERENCE)
-EARTHS_RATES: Final = (EARTH_RATE_SIZE, EARTH_RATE)
-OF_THE_RIG: Final = (
-    *GYROSCOPES, *ACCELEROMETERS, *MAGNETOMETERS, *DRIFTS, *POLYNOMIALS, *EARTHS_RATES,
+EARTH_RATES: Final = (EARTH_RATE_SIZE, EARTH_RATE)
+RIG_CHARACTERISTICS: Final = (
+    *GYROSCOPES, *ACCELEROMETERS, *MAGNETOMETERS, *DRIFTS, *POLYNOMIALS, *EARTH_RATES,
 )  # fmt: skip
 
 
 def every_characteristic() -> tuple[Characteristic, ...]:
     """Return all characteristics in the order in which a history shows them; those of installed kinds are last."""
-    return (*OF_THE_RIG, *(row for kind in installed_kinds() for row in kind.result.characteristics))
+    return (*RIG_CHARACTERISTICS, *(row for kind in installed_kinds() for row in kind.result.characteristics))

@@ -19,9 +19,9 @@ EXPECTED_IN_ATTITUDES = {
     FIELD: "the residuals expected from noise and the arm's attitudes",
 }
 EXPECTED_OF_FILES = "the residuals expected from noise and the file's attitudes"
-OF_SAMPLES = "the samples' scatter over the root of their number, which includes vibration that a mean averages out"
-OF_REPEATS = "the differences between repeats"
-FROM_MEAN = "minus its mean"
+SAMPLE_SCATTER = "the samples' scatter over the root of their number, which includes vibration that a mean averages out"
+REPEAT_DIFFERENCES = "the differences between repeats"
+MINUS_MEAN = "minus its mean"
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ def find_sweep_residuals(finding: Finding[GyroscopeEntry]) -> Unexplained | None
         return Unexplained(RATE, labels, residuals, np.array(vector.residuals_std_rad_s), EXPECTED, split=split)
     # Not the average's own standard deviation, which includes the effect of gravity on the rests as drift of the bias.
     std = np.array([average.noise_rad_s for average in averages]) / np.sqrt([[average.samples] for average in averages])
-    return Unexplained(RATE, labels, residuals, std, OF_SAMPLES, split=split)
+    return Unexplained(RATE, labels, residuals, std, SAMPLE_SCATTER, split=split)
 
 
 def find_attitude_residuals(finding: Finding[Any]) -> Unexplained:
@@ -74,4 +74,4 @@ def find_repeat_residuals(finding: Finding[DriftEntry]) -> Unexplained:
     bias = np.array([repeat.scale_fixed.bias for repeat in repeats])
     std = np.array([repeat.scale_fixed.std for repeat in repeats])
     labels = [f"repeat {number}" for number in range(1, len(repeats) + 1)]
-    return Unexplained(finding.quantity, labels, bias - bias.mean(axis=0), std, OF_REPEATS, shown=FROM_MEAN)
+    return Unexplained(finding.quantity, labels, bias - bias.mean(axis=0), std, REPEAT_DIFFERENCES, shown=MINUS_MEAN)

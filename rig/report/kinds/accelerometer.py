@@ -41,13 +41,13 @@ def _entry(outcome: Outcome, name: str, result: "AccelerometerResult") -> Accele
     from rig.estimation.reference.accelerometer_model import DELAY, SECOND
     from rig.estimation.reference.imu import MODEL
     from rig.estimation.residuals import dwell_residual_std_m_s2
-    from rig.report.entries.triad import OF_ACCELEROMETERS, triad_entry
+    from rig.report.entries.triad import ACCELEROMETER_MODELS, triad_entry
     from rig.report.entry import when_entry
 
     solution = result.solution
     std = np.sqrt(np.diag(solution.covariance))
     return triad_entry(
-        OF_ACCELEROMETERS, result, result.sensor,
+        ACCELEROMETER_MODELS, result, result.sensor,
         (solution.dwell_residuals_m_s2, dwell_residual_std_m_s2(solution, result.movement)),
         role="calibrate",
         range_m_s2=result.sensor.channel(ACCELERATION).range,

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from rig.data.entries.earth_rate import EarthRateEntry
 from rig.data.quantity import RATE
 from rig.data.result_file import GyroscopeEntry, ResultDocument
-from rig.report.findings.characteristics import EARTH_RATE, EARTHS_RATES
+from rig.report.findings.characteristics import EARTH_RATE, EARTH_RATES
 from rig.report.findings.finding import Finding
 from rig.report.findings.history_records import HistoryRecord
 from rig.report.findings.result_kind import CertifiedItem, NoOutlet, ResultKind, row_of
@@ -53,13 +53,13 @@ def _describe_item(finding: Finding[GyroscopeEntry], _: object) -> CertifiedItem
     return CertifiedItem("gyroscope", finding.sensor, sensor.part, sensor.serial_number, name, results, temperatures)
 
 
-AMONG = NoOutlet("it is among the lines of its gyroscope")
+NO_OWN_LINE = NoOutlet("it is among the lines of its gyroscope")
 EARTHS_RATE = ResultKind(
     name="Earth's rate",
     key="gyroscopes",
     entries=NoOutlet("it is part of its gyroscope's entry"),
     find=_find,
-    printed=AMONG,
+    printed=NO_OWN_LINE,
     shown=lambda finding: row_of(EARTH_RATE.term_of(finding)),
     followed=_build_record,
     header=NoOutlet("it is a property of the site, not of the sensor"),
@@ -69,5 +69,5 @@ EARTHS_RATE = ResultKind(
     standard=NoOutlet("it has the standard of its gyroscope"),
     corrected=NoOutlet("it is a property of the site, not of the sensor"),
     unexplained=NoOutlet("its gyroscope's picture shows its residuals"),
-    characteristics=EARTHS_RATES,
+    characteristics=EARTH_RATES,
 )

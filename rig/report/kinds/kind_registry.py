@@ -20,7 +20,7 @@ from rig.report.kinds.over_temperature import OVER_TEMPERATURE
 from rig.report.kinds.verification import VERIFICATION
 
 OutletT = TypeVar("OutletT")
-OF_THE_RIG: Final[tuple[ResultKind[Any], ...]] = (
+RIG_KINDS: Final[tuple[ResultKind[Any], ...]] = (
     GYROSCOPE, EARTHS_RATE, ACCELEROMETER, MAGNETOMETER, BIAS_DRIFT, OVER_TEMPERATURE, VERIFICATION,
 )  # fmt: skip
 
@@ -28,7 +28,7 @@ OF_THE_RIG: Final[tuple[ResultKind[Any], ...]] = (
 @cache
 def kinds() -> tuple[ResultKind[Any], ...]:
     """Return all kinds of results: the rig's own, then those of packages (`rig.data.installed_kinds`)."""
-    return (*OF_THE_RIG, *(kind.result for kind in installed_kinds()))
+    return (*RIG_KINDS, *(kind.result for kind in installed_kinds()))
 
 
 def outlets(

@@ -24,7 +24,7 @@ from rig.report.words.validity_words import when_words
 if TYPE_CHECKING:
     from rig.analysis.reference.magnetometer import MagnetometerResult
 
-FAR_ENOUGH_M = 0.3  # distance from the flange: a housing of 0.2 A m² makes 0.4 to 1.2 µT at 20 to 40 cm
+MIN_FLANGE_DISTANCE_M = 0.3  # a housing of 0.2 A m² makes 0.4 to 1.2 µT at 20 to 40 cm
 
 
 def _entries(outcome: Outcome) -> dict[str, MagnetometerEntry | ErrorEntry]:
@@ -43,11 +43,11 @@ def _entry(outcome: Outcome, name: str, result: "MagnetometerResult") -> Magneto
     from rig.analysis.effective_dof import field_angle_dof
     from rig.analysis.measurement_conditions import magnetometer_conditions
     from rig.estimation.reference.magnetometer import MODEL, hard_iron
-    from rig.report.entries.triad import OF_MAGNETOMETERS, attitudes_entry
+    from rig.report.entries.triad import MAGNETOMETER_MODELS, attitudes_entry
     from rig.report.entry import when_entry
 
     return attitudes_entry(
-        OF_MAGNETOMETERS, result, result.sensor,
+        MAGNETOMETER_MODELS, result, result.sensor,
         model=MODEL,
         range_t=result.sensor.channel(FIELD).range,
         arm_field_in_bias=True,
@@ -94,8 +94,8 @@ def _field_test_lines(entry: MagnetometerEntry) -> Iterator[str]:
     else:
         yield "no field test at home before and after: a drift of the field is not detected (procedure.field_test_s)"
     distance_m = float(np.linalg.norm(entry.extension_m))
-    if distance_m < FAR_ENOUGH_M:
-        advised = f"{1e3 * FAR_ENOUGH_M:.0f} mm are advised (arm.extension_mm)"
+    if distance_m < MIN_FLANGE_DISTANCE_M:
+        advised = f"{1e3 * MIN_FLANGE_DISTANCE_M:.0f} mm are advised (arm.extension_mm)"
         yield f"{1e3 * distance_m:.0f} mm from the flange; {advised}"
 
 

@@ -10,9 +10,9 @@ from pyhanko.sign.general import extract_certificate_info
 from rig.report.signatures.signatory import DIGEST
 from rig.report.signatures.trust import chain_of
 
-DATA, STAMPED = "v1", "v3"  # versions of a container, by its content (RFC 5652, 5.1)
-METHODS = ("sha256_rsa", "rsassa_pkcs1v15", "sha256_ecdsa")
-WITH_PARAMETERS = "rsassa_pss"
+DATA_VERSION, STAMPED_VERSION = "v1", "v3"  # versions of a container, by its content (RFC 5652, 5.1)
+PLAIN_METHODS = ("sha256_rsa", "rsassa_pkcs1v15", "sha256_ecdsa")
+PSS_METHOD = "rsassa_pss"
 
 
 def find_uncovered_in_container(der: bytes) -> Iterator[str]:
@@ -25,17 +25,17 @@ def find_uncovered_in_container(der: bytes) -> Iterator[str]:
     content = cms.ContentInfo.load(der, strict=True)
     (info,) = content["content"]["signer_infos"]
     method = info["signature_algorithm"]["algorithm"].native
-    if info["digest_algorithm"]["algorithm"].native != DIGEST or method not in METHODS:
+    if info["digest_algorithm"]["algorithm"].native != DIGEST or method not in PLAIN_METHODS:
         yield f"it is signed by a method that is not accepted: {method}"
     if "signing_certificate_v2" not in [attribute["type"].native for attribute in info["signed_attrs"]]:
         yield "its signed attributes do not name the signer's certificate"
-    yield from _find_uncovered(content, der, DATA)
+    yield from _find_uncovered(content, der, DATA_VERSION)
     stamps = [(attribute["type"].native, list(attribute["values"])) for attribute in info["unsigned_attrs"] or ()]
     if [(kind, len(values)) for kind, values in stamps] not in ([], [("signature_time_stamp_token", 1)]):
         yield "its signature has more unsigned attributes than a time stamp"
         return
     for _, (stamp,) in stamps:
-        yield from _find_uncovered(stamp, stamp.dump(), STAMPED)
+        yield from _find_uncovered(stamp, stamp.dump(), STAMPED_VERSION)
         if stamp["content"]["signer_infos"][0]["unsigned_attrs"]:
             yield "its time stamp has unsigned attributes"
 
@@ -86,7 +86,7 @@ def _rebuild(container: Any, info: Any, signer: Any, version: str) -> Any:
     signed = {
         "version": version,
         "digest_algorithms": list(map(_drop_parameters, digests)),
-        "encap_content_info": {"content_type": "data"} if version == DATA else container["encap_content_info"],
+        "encap_content_info": {"content_type": "data"} if version == DATA_VERSION else container["encap_content_info"],
         "certificates": container["certificates"],
         "signer_infos": [cms.SignerInfo(by)],
     }
@@ -94,9 +94,9 @@ def _rebuild(container: Any, info: Any, signer: Any, version: str) -> Any:
 
 
 def _drop_parameters(algorithm: Any) -> Any:
-    """Return the algorithm without parameters, or with NULL if the original has it; `WITH_PARAMETERS` keeps its own."""
+    """Return the algorithm without parameters, or with NULL if the original has it; `PSS_METHOD` keeps its own."""
     name = algorithm["algorithm"].native
-    if name == WITH_PARAMETERS:
+    if name == PSS_METHOD:
         return algorithm
     nones: tuple[dict[str, None], ...] = ({}, {"parameters": None})
     forms = [type(algorithm)({"algorithm": name, **none}) for none in nones]

@@ -10,7 +10,7 @@ from signxml.algorithms import CanonicalizationMethod, DigestAlgorithm, Signatur
 from signxml.util import namespaces
 
 NAMES = {"ds": namespaces.ds, "xades": namespaces.xades}
-BEFORE_PROPERTIES = "-SignedProperties"  # suffix of the Id of the signed properties, after the signature's Id
+PROPERTIES_SUFFIX = "-SignedProperties"  # of the Id of the signed properties, after the signature's Id
 _ENCODINGS = {  # first bytes → the codec, and its names in the declaration
     b"\xff\xfe": ("utf-16", {"utf-16", "utf-16le"}),
     b"\xfe\xff": ("utf-16", {"utf-16", "utf-16be"}),
@@ -64,7 +64,7 @@ def rebuild_document(verified: tuple[bytes, bytes, bytes], method: str, value: s
     """
     document, properties, key_info = verified
     root, signed_properties, certificates = map(etree.fromstring, verified)
-    name = signed_properties.get("Id", "").partition(BEFORE_PROPERTIES)[0]
+    name = signed_properties.get("Id", "").partition(PROPERTIES_SUFFIX)[0]
     about = signed_properties.find(".//xades:DataObjectFormat", NAMES).get("ObjectReference", "")
     signature = etree.SubElement(root, _ds("Signature"), nsmap=NAMES, Id=name)
     info = etree.SubElement(signature, _ds("SignedInfo"))

@@ -13,7 +13,7 @@ from rig.report.findings.characteristic import Term
 from rig.report.words.expanded_uncertainty import factor_words
 from rig.station.plain_text import build_number_table
 
-FEWEST_DECIMALS = 5
+MIN_DECIMALS = 5
 
 
 def triple(values: Iterable[float], form: str) -> str:
@@ -49,7 +49,7 @@ def scale_and_bias_table(
     return table
 
 
-def decimals(uncertainties: Sequence[float], fewest: int = FEWEST_DECIMALS) -> int:
+def decimals(uncertainties: Sequence[float], fewest: int = MIN_DECIMALS) -> int:
     """Return the number of decimals that shows two digits of the smallest uncertainty, at least `fewest`."""
     smallest = min(uncertainties)
     return max(fewest, 1 - math.floor(math.log10(smallest))) if smallest > 0 else fewest

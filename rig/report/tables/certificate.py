@@ -15,7 +15,7 @@ from rig.report.words.printed_values import percent, round_to_u
 
 AXES = ("x", "y", "z")
 DEG = math.degrees(1)
-FINE_DEG_S = 1e-3
+MAX_FINE_DEG_S = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +88,7 @@ def rows_of(
 
 def degrees_of(sensor: GyroscopeEntry) -> tuple[str, float]:
     """Return the unit of biases printed in addition to rad/s, and its factor: °/h if U is small."""
-    return ("°/s", DEG) if DEG * max(_widths(sensor)[3:]) >= FINE_DEG_S else ("°/h", 3600 * DEG)
+    return ("°/s", DEG) if DEG * max(_widths(sensor)[3:]) >= MAX_FINE_DEG_S else ("°/h", 3600 * DEG)
 
 
 def _widths(sensor: GyroscopeEntry) -> Sequence[float]:

@@ -11,7 +11,7 @@ from rig.report.words.expanded_uncertainty import Expanded
 DCC, SI = "https://ptb.de/dcc", "https://ptb.de/si"
 XSI = "http://www.w3.org/2001/XMLSchema-instance"
 DIGITS = 4  # decimals of a probability
-UNSAID = "not stated"
+NOT_STATED = "not stated"
 for _prefix, _name in (("dcc", DCC), ("si", SI), ("xsi", XSI)):
     register_namespace(_prefix, _name)
 
@@ -49,7 +49,7 @@ def text(name: str, statement: str | None) -> Element:
 
 def _printable(statement: str | date | None) -> str:
     """Return text without control characters, which XML does not allow, and one space for any white space."""
-    return UNSAID if statement is None else printable(" ".join(str(statement).split())) or UNSAID
+    return NOT_STATED if statement is None else printable(" ".join(str(statement).split())) or NOT_STATED
 
 
 def values(name: str, numbers: Iterable[object]) -> Element:

@@ -25,9 +25,9 @@ COLUMNS = (
     ("temperature", "temperature_c"),
     ("quaternion", "qw", "qx", "qy", "qz"),
 )
-NAMES_SHOWN = 46  # characters of the names
+MAX_NAME_CHARACTERS = 46
 PLACEHOLDER = "ATTITUDES.csv"
-LEAST_LAG_S = 0.004
+MIN_LAG_S = 0.004
 
 
 def describe_file(looked: LookedFile) -> Iterator[str]:
@@ -78,7 +78,7 @@ def describe_convention(convention: Convention | None, *, is_order_named: bool) 
     yield _row("direction", f"{direction}{order}: {100 * convention.explained:.2f} % of the motion agrees")
     if convention.up:
         yield _row("up", f"{convention.up} of the room, by the accelerometer")
-    if abs(convention.lag_s) >= LEAST_LAG_S:
+    if abs(convention.lag_s) >= MIN_LAG_S:
         later = "readings" if convention.lag_s > 0 else "attitudes"
         yield _row("clock", f"the {later} come {1e3 * abs(convention.lag_s):.0f} ms later; the solution finds this")
 
@@ -155,7 +155,7 @@ def _spell(*entries: Mapping[str, Any]) -> str:
         unit = f"{entry['factor']:g} {unit} a step"
     wraps = f", begins again at {entry['wraps_at']}" if "wraps_at" in entry else ""
     unit = "" if unit == "1" else unit
-    return f"{shorten(names)[:NAMES_SHOWN]:<24} {unit}{wraps}".rstrip()
+    return f"{shorten(names)[:MAX_NAME_CHARACTERS]:<24} {unit}{wraps}".rstrip()
 
 
 def _describe_readings(looked: LookedFile, survey: LogSurvey) -> Iterator[str]:

@@ -8,7 +8,7 @@ from rig.config.section import Vector3
 from rig.motion.steps import Plan, Rest, Sweep
 
 HEADINGS = ("axis", "at_s", "angle_deg", "rate_deg_s", "what")
-SAME = 1e-6  # tolerance of directions, which are rounded
+DIRECTION_TOLERANCE = 1e-6  # directions are rounded
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +61,7 @@ def _name_axis(axis: Vector3) -> str:
     """Return the name of an axis, the same for both directions: `x`, `y`, `z`, or a vector in the flange's frame."""
     leading = _leading_component(axis)
     upright = [component / math.copysign(1.0, leading) for component in axis]
-    if abs(leading) > 1 - SAME:
+    if abs(leading) > 1 - DIRECTION_TOLERANCE:
         return "xyz"[max(range(3), key=lambda i: abs(axis[i]))]
     return " ".join(f"{component:.4f}" for component in upright)
 

@@ -18,7 +18,7 @@ from rig.motion.plan_warnings import doubts
 from rig.motion.steps import POSE_TOLERANCE_RAD, Dwell, Plan, Rest, Step, Sweep, Transfer, closes, turn_words
 from rig.motion.turner_state import JOINT_NAMES, Joints
 from rig.report.terminal.shortest_words import wish_words
-from rig.station.plain_text import LONG_S, duration_words, plain
+from rig.station.plain_text import MINUTES_FROM_S, duration_words, plain
 
 if TYPE_CHECKING:
     from rig.analysis.consistency.detection_limits import DetectionLimit
@@ -132,7 +132,7 @@ def _print_steps(planned: DryRun, console: Console) -> None:
         table.add_row(f"{at_s:.1f}", name, f"{step.duration_s:.2f}", *_motion(step))
         at_s += step.duration_s
     console.print(table)
-    long = f" ({duration_words(plan.duration_s)})" if plan.duration_s >= LONG_S else ""
+    long = f" ({duration_words(plan.duration_s)})" if plan.duration_s >= MINUTES_FROM_S else ""
     console.print(f"{_counts(plan)}{len(plan.motions)} motions, {plan.duration_s:.1f} s{long}; all within limits")
     if isinstance(section := planned.config.procedure, SixObservationSection) and (wanted := target_of(section)):
         repeats = f"of {section.repeats} repeats, each of about {plan.duration_s / section.repeats:.1f} s"

@@ -15,12 +15,12 @@ from rig.report.words.mounting_words import farthest_off
 from rig.report.words.printed_values import format_with_u, plus_minus
 from rig.station.plain_text import INDENT, wrap_line
 
-MOST_WITH_MODELS = 4  # more sensors leave no line for their formulas on a screen of 25
-NEAR = 0.9  # ratio to its limit, above which a passed check is named
-MOST_NEAR = 2
-CAUSES = ("stuck_axis", "repeated_readings")  # these cause other checks to fail: such readings do not follow the motion
-ONE_SENSOR, MANY = 12, 25  # largest number of lines for one sensor, and for several
-LEAST_WIDTH = 80  # columns: a narrower screen has more lines
+MAX_SENSORS_WITH_MODELS = 4  # more leave no line for their formulas on a screen of 25
+NEAR_LIMIT_RATIO = 0.9  # above which a passed check is named
+MAX_NEAR_CHECKS = 2
+ROOT_CHECKS = ("stuck_axis", "repeated_readings")  # such readings do not follow the motion: other checks fail too
+MAX_LINES_ONE, MAX_LINES_MANY = 12, 25  # for one sensor, and for several
+MIN_WIDTH = 80  # columns: a narrower screen has more lines
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,9 +57,9 @@ def ending(
     broken = _explain_failures(result, folder)
 
     def lines_of(*texts: str) -> int:
-        return sum(len([*_wrap(text, max(width, LEAST_WIDTH))]) for text in texts)
+        return sum(len([*_wrap(text, max(width, MIN_WIDTH))]) for text in texts)
 
-    room = (ONE_SENSOR if len(items) == 1 else MANY) - len([*_values(items, max(width, LEAST_WIDTH))])
+    room = (MAX_LINES_ONE if len(items) == 1 else MAX_LINES_MANY) - len([*_values(items, max(width, MIN_WIDTH))])
     room -= lines_of(*_first_failures(broken, 1), summary, *needed[0], *needed[1]) + len(files) + 1
     spare = []
     for text in (*in_short, *farthest_off(result), *_name_near(result)):
@@ -171,7 +171,7 @@ def _describe_values(items: Sequence[_SensorValues]) -> Iterator[str]:
         (kind, held_at) = conditions.pop()
         yield f"{kind}s {held_at}" if len(items) > 1 else held_at
     models = dict.fromkeys((item.kind, item.shown.model.partition(",")[0]) for item in items if item.shown.model)
-    if len(items) <= MOST_WITH_MODELS:
+    if len(items) <= MAX_SENSORS_WITH_MODELS:
         yield from (f"{kind}: {model}" if len(items) > 1 else model for kind, model in models)
 
 
@@ -186,7 +186,7 @@ def _explain_failures(result: ResultDocument, folder: Path | None) -> list[tuple
     Checks without a value come last: most lack it because another check failed.
     """
     failed = sorted((check for check in result.checks if not check.passed), key=_ratio_to_limit, reverse=True)
-    failed.sort(key=lambda check: (check.value is None, check.means.what not in CAUSES))
+    failed.sort(key=lambda check: (check.value is None, check.means.what not in ROOT_CHECKS))
     words = [what_failed(check, folder) for check in failed]
     return [
         (f"FAILED {_value_and_limit(check)}", "" if meaning is None else f": {meaning}")
@@ -204,11 +204,11 @@ def _first_failures(broken: Sequence[tuple[str, str]], count: int) -> Iterator[s
 def _name_near(result: ResultDocument) -> Iterator[str]:
     """Yield the names of passed checks that are near their limits."""
     near = sorted(
-        (check for check in result.checks if check.passed and _ratio_to_limit(check) >= NEAR),
+        (check for check in result.checks if check.passed and _ratio_to_limit(check) >= NEAR_LIMIT_RATIO),
         key=_ratio_to_limit,
         reverse=True,
     )
-    for check in near[:MOST_NEAR]:
+    for check in near[:MAX_NEAR_CHECKS]:
         words = words_of(check)
         yield f"near its limit: {_value_and_limit(check)}" + ("" if words is None else f" (beyond it: {words.means})")
 

@@ -27,17 +27,17 @@ from rig.station.plain_text import build_number_table, plain
 if TYPE_CHECKING:
     from rig.estimation.arrays import Array
 
-LINES = 3  # contributors that are listed for each sensor
+LISTED_CONTRIBUTORS = 3  # for each sensor
 # Possible targets by their names in `TARGET_NAMES`: unit and words.
-SHOWN = {
+TARGETS = {
     "scale": ("", "the scale factors"),
     "bias_rad_s": (" rad/s", "the biases"),
     "acceleration_scale": ("", "the accelerometers' scale factors"),
     "acceleration_bias_m_s2": (" m/s²", "the accelerometers' biases"),
 }
-SIGNIFICANT = 0.05  # least fraction of the variance of a contributor that is listed
-MANY = 8  # a list of speeds is shorter
-ASSUMED = (
+MIN_LISTED_FRACTION = 0.05  # of the variance of a contributor that is listed
+MAX_LISTED_SPEEDS = 8
+ASSUMPTIONS = (
     "Predicted for parts as in their data sheets, at one temperature, with flicker noise as the only bias drift, "
     "and a mounting error of 5° (in stages uncertainty.mount_deg). A sensor that is mounted more exactly does "
     "better; one that warms up does worse."
@@ -72,7 +72,7 @@ def print_shortest(shortest: Shortest, section: ProcedureSection, *, as_json: bo
     console.print(plain(_describe_floor(shortest)))
     if shortest.directions is not None:
         console.print(_optimality(shortest.directions))
-    console.print(plain(f"{shortest.tried} of {shortest.candidates_count} plans were compared. {ASSUMED}"))
+    console.print(plain(f"{shortest.tried} of {shortest.candidates_count} plans were compared. {ASSUMPTIONS}"))
 
 
 def shortest_document(shortest: Shortest, section: ProcedureSection) -> dict[str, Any]:
@@ -126,7 +126,7 @@ def wish_words(wanted: TargetUncertainty) -> str:
     """Return the target as `U ≤ 0.0005 of the scale factors`."""
     sizes = {size: getattr(wanted, size) for size in TARGET_NAMES}
     return " and ".join(
-        f"U ≤ {value:.3g}{SHOWN[size][0]} of {SHOWN[size][1]}" for size, value in sizes.items() if value < inf
+        f"U ≤ {value:.3g}{TARGETS[size][0]} of {TARGETS[size][1]}" for size, value in sizes.items() if value < inf
     )
 
 
@@ -138,7 +138,7 @@ def _tabulate_plans(shortest: Shortest, shown: Planned, section: ProcedureSectio
     old = _values(section)
     for key, value in list_key_changes(section, shown.candidate.procedure).items():
         table.add_row(f"procedure.{key}", plain(_shown(old.get(key))), plain(_shown(value)))
-    for size, (unit, what) in SHOWN.items():
+    for size, (unit, what) in TARGETS.items():
         if getattr(shown.reached, size) > 0:
             own_value = "–" if before is None else f"{getattr(before.reached, size):.3g}"
             name = f"U of {what}" + unit.replace(" ", ", ")
@@ -149,7 +149,7 @@ def _tabulate_plans(shortest: Shortest, shown: Planned, section: ProcedureSectio
 
 
 def _shown(value: object) -> str:
-    if isinstance(value, list) and len(value) > MANY:
+    if isinstance(value, list) and len(value) > MAX_LISTED_SPEEDS:
         return f"{len(value)} attitudes"
     return "–" if value is None else f"{value:g}" if isinstance(value, float) else str(value)
 
@@ -173,8 +173,8 @@ def _main_contributors(budgets: Budgets) -> dict[str, list[tuple[str, float, flo
             (part.name, _fraction(part.std[scale], budget.std[scale]), _fraction(part.std[bias], budget.std[bias]))
             for part in budget.contributors
         ]
-        largest = sorted(lines, key=lambda line: -max(line[1:]))[:LINES]
-        lines_by_sensor[name] = [line for line in largest if max(line[1:]) >= SIGNIFICANT]
+        largest = sorted(lines, key=lambda line: -max(line[1:]))[:LISTED_CONTRIBUTORS]
+        lines_by_sensor[name] = [line for line in largest if max(line[1:]) >= MIN_LISTED_FRACTION]
     return lines_by_sensor
 
 
@@ -185,7 +185,7 @@ def _fraction(part: float, whole: float) -> float:
 def _describe_floor(shortest: Shortest) -> str:
     """Return a sentence on the smallest uncertainties that this kind of run can reach, with their contributors."""
     parts = []
-    for index, (size, (unit, what)) in enumerate(SHOWN.items()):
+    for index, (size, (unit, what)) in enumerate(TARGETS.items()):
         least = shortest.least(size)
         of_kind = Budgets(least.rates) if index < len(TARGET_NAMES) // 2 else Budgets({}, least.accelerations)
         by_sensor = [lines for lines in _main_contributors(of_kind).values() if lines]

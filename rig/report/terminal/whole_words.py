@@ -5,7 +5,7 @@ from rich.cells import cell_len
 from rich.table import Table
 
 # Characters of a column in addition to its words: two blanks and a stroke; two blanks at most without a frame.
-FRAMED, BARE = 3, 2
+FRAMED_PADDING, BARE_PADDING = 3, 2
 STROKE = 1
 
 
@@ -17,11 +17,11 @@ def fit_words(table: Table, width: int) -> Table:
         max((cell_len(word) for text in column for word in text.replace("\n", " ").split(" ")), default=0)
         for column in texts
     ]
-    room = width - FRAMED * len(lines) - STROKE
+    room = width - FRAMED_PADDING * len(lines) - STROKE
     if sum(lines) <= room:
         return table
     if sum(words) > room:
-        table.box, table.padding, room = box.SIMPLE, (0, 0), width - BARE * len(lines)
+        table.box, table.padding, room = box.SIMPLE, (0, 0), width - BARE_PADDING * len(lines)
     spare = max(room - sum(words), 0)
     wished = [line - word for line, word in zip(lines, words, strict=True)]
     for column, word, wish in zip(table.columns, words, wished, strict=True):

@@ -14,7 +14,7 @@ from rig.errors import Refused
 from rig.errors.table_rows import read_rows
 
 TABLE = Path(__file__).with_name("checks.txt")
-ALLOWING = ", or allow it"  # begins the advice to change the limit
+LIMIT_ADVICE = ", or allow it"  # begins the advice to change the limit
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +56,7 @@ def what_failed(check: CheckEntry, folder: Path | None) -> str | None:
         return None
     key = key_of(check.means.quantity, words.name)
     remedy = (
-        words.remedy.partition(ALLOWING)[0] if key is None else words.remedy.replace("limits.NAME", f"limits.{key}")
+        words.remedy.partition(LIMIT_ADVICE)[0] if key is None else words.remedy.replace("limits.NAME", f"limits.{key}")
     )
     return f"{words.means}. {remedy}".replace("RUN", "RUN" if folder is None else quote(str(folder)))
 

@@ -11,7 +11,7 @@ from rig.errors.table_rows import read_rows
 
 OWNERS = ("field", "machine", "project")
 TABLE = Path(__file__).with_name("glossary.txt")
-OWN_WORDS = Path(__file__).with_name("words.toml")
+HOUSE_WORDS = Path(__file__).with_name("words.toml")
 LINK = re.compile(r"\[([^]]+)\]\(([^)#]+)[^)]*\)")
 
 
@@ -37,7 +37,7 @@ class Word:
 def glossary() -> tuple[Word, ...]:
     """Return all words. Raise ValueError for a line of another form than `owner | names | meaning`."""
     words = (Word(*cells) for cells in read_rows(TABLE, "owner | names | meaning", 0, OWNERS))
-    house = tomllib.loads(OWN_WORDS.read_text(encoding="utf-8"))["house"]
+    house = tomllib.loads(HOUSE_WORDS.read_text(encoding="utf-8"))["house"]
     return (*words, *(Word("project", names, meaning) for names, meaning in house.items()))
 
 

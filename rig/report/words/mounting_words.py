@@ -10,7 +10,7 @@ from rig.data.result_file import MountEntry, ResultDocument
 from rig.estimation.statistics.coverage import COVERAGE_FACTOR
 from rig.report.words.printed_values import plus_minus
 
-ROUNDING = 1e-6  # ratio to its uncertainty, below which a rotation is the assumed one and not a measured one
+MIN_MEASURED_RATIO = 1e-6  # ratio to its uncertainty, below which a rotation is the assumed one and not a measured one
 
 
 def mount_lines(result: ResultDocument) -> Iterator[str]:
@@ -29,7 +29,7 @@ def farthest_off(result: ResultDocument) -> Iterator[str]:
 
 
 def _significant_mounts(result: ResultDocument) -> list[MountEntry]:
-    return [mount for mount in result.mounts if hypot(*mount.rotation_rad) > ROUNDING * hypot(*mount.std_rad)]
+    return [mount for mount in result.mounts if hypot(*mount.rotation_rad) > MIN_MEASURED_RATIO * hypot(*mount.std_rad)]
 
 
 def _line(mount: MountEntry) -> str:

@@ -14,8 +14,8 @@ from rig.data.quantity import DisplayUnit
 from rig.estimation.arrays import MIN_SIZE, divide_or_infinity
 from rig.report.words.printed_values import figures, percent, power_of_ten, small
 
-NEGLIGIBLE = 0.001  # contributors below this fraction of both variances share one line
-DIGITS = 3  # digits of a combined standard uncertainty: its parts are printed to the same decimal
+MIN_FRACTION = 0.001  # contributors below it in both variances share one line
+STD_DIGITS = 3  # of a combined standard uncertainty: its parts are printed to the same decimal
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +63,7 @@ def lay_out_budget(budget: BudgetEntry, scale: Sequence[float], bias: DisplayUni
         _Size.choose(budget.std[indices[1]], 1 / bias.size, bias.name),
     ]
     lines = sorted(budget.contributors, key=lambda line: -max(line.variance_fraction[index] for index in indices))
-    significant = [line for line in lines if max(line.variance_fraction[index] for index in indices) >= NEGLIGIBLE]
+    significant = [line for line in lines if max(line.variance_fraction[index] for index in indices) >= MIN_FRACTION]
     printed = [_line(line, indices, sizes) for line in significant]
     if len(significant) < len(lines):
         small_ones = [line for line in lines if line not in significant]
@@ -94,7 +94,7 @@ class _Size:
             return cls(unit or "1", per_unit, 0)
         power = 3 * math.floor(math.log10(std * per_unit) / 3)
         factor = per_unit * 10.0**-power
-        decimals = max(DIGITS - 1 - math.floor(math.log10(std * factor)), 0)
+        decimals = max(STD_DIGITS - 1 - math.floor(math.log10(std * factor)), 0)
         name = " ".join(filter(None, (power_of_ten(power) if power else "", unit)))
         return cls(name or "1", factor, decimals)
 

@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 from decimal import ROUND_HALF_UP, Context, Decimal
 
-DIGITS = 2  # significant digits of an uncertainty
+U_DIGITS = 2  # significant digits of an uncertainty
 NO_U = "–"
-RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-WIDE = Context(prec=1000)  # a value may be much larger than its uncertainty
+SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+WIDE_CONTEXT = Context(prec=1000)  # a value may be much larger than its uncertainty
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +35,7 @@ def round_to_u(value: float, uncertainty: float) -> Rounded:
     exact, wide = Decimal(repr(value)), Decimal(repr(uncertainty))
     if not exact.is_finite() or not wide.is_finite() or wide <= 0:
         raise ValueError(f"{value!r} ± {uncertainty!r} cannot be rounded")
-    last = wide.adjusted() - (DIGITS - 1)
+    last = wide.adjusted() - (U_DIGITS - 1)
     if _quantize(wide, last).adjusted() > wide.adjusted():  # 0.0996 is 0.10
         last += 1
     return Rounded(_quantize(exact, last), _quantize(wide, last))
@@ -77,7 +77,7 @@ def figures(value: float) -> str:
 
 def power_of_ten(exponent: int) -> str:
     """Return 10 with a superscript exponent."""
-    return f"10{str(exponent).translate(RAISED)}"
+    return f"10{str(exponent).translate(SUPERSCRIPTS)}"
 
 
 def percent(fraction: float) -> str:
@@ -86,5 +86,5 @@ def percent(fraction: float) -> str:
 
 
 def _quantize(number: Decimal, exponent: int) -> Decimal:
-    quantized = number.quantize(Decimal((0, (1,), exponent)), ROUND_HALF_UP, WIDE)
+    quantized = number.quantize(Decimal((0, (1,), exponent)), ROUND_HALF_UP, WIDE_CONTEXT)
     return quantized if quantized else abs(quantized)  # no −0.000

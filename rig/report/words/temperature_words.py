@@ -11,12 +11,12 @@ from rig.estimation.temperature.over_temperature import GRADIENT, HYSTERESIS, LA
 from rig.report.words.expanded_uncertainty import spell_factors
 from rig.report.words.printed_values import plus_minus
 
-STEP = 4  # every fourth row of the table is shown
+ROW_STEP = 4  # every fourth row of the table is shown
 
 
 def shown_rows(entry: OverTemperatureEntry) -> Sequence[AtTemperatureEntry]:
     """Return the rows for the ends, the middle and the quarters of the range."""
-    return entry.table[::STEP]
+    return entry.table[::ROW_STEP]
 
 
 def coverage_at_rows(rows: Sequence[AtTemperatureEntry], entry: OverTemperatureEntry) -> Array:

@@ -10,7 +10,7 @@ from rig.data.entries.result_types import ConditionsEntry
 from rig.data.result_file import GyroscopeEntry
 
 # Statements for every run: a budget covers one temperature, one power-up and one mounting.
-ALWAYS = (
+EXCLUSIONS = (
     "other temperatures",
     "power cycling",
     "remounting and its stress",
@@ -19,13 +19,13 @@ ALWAYS = (
 )
 
 # Statement for a motion that a file describes.
-OF_THE_FILE = ("the scale of the file's angles and of its time",)
+FILE_EXCLUSIONS = ("the scale of the file's angles and of its time",)
 
 DEG = math.degrees(1)
-AS_STATED = ", as stated"
-UNKNOWN = "a temperature that is not known"
+STATED_SUFFIX = ", as stated"
+UNKNOWN_TEMPERATURE = "a temperature that is not known"
 # Relative difference of rates that count as one speed: the effect of the arm's timing, and of a sensor tilted by 5°.
-ALIKE = 0.005
+SPEED_TOLERANCE = 0.005
 
 
 def when_words(when: ConditionsEntry) -> str:
@@ -35,7 +35,7 @@ def when_words(when: ConditionsEntry) -> str:
     until = f"{end:%H:%M:%S}" if end.date() == start.date() else f"{end:%Y-%m-%d %H:%M:%S}"
     over = f"mean over {day}{start:%H:%M:%S} to {until} UTC"
     if when.temperature_c is None:
-        return f"at {UNKNOWN}, {over}"
+        return f"at {UNKNOWN_TEMPERATURE}, {over}"
     if when.temperature_range_c is None:
         return f"at {when.temperature_c:.1f} °C, as stated, {over}"
     low, high = (f"{temperature_c:.2f}" for temperature_c in when.temperature_range_c)
@@ -54,12 +54,12 @@ def warmth_words(when: ConditionsEntry | None) -> str:
 
 def warmth(when: ConditionsEntry, use: str = "") -> dict[str, float | None]:
     """Return a temperature with its label, which contains the `use` of the readings, for example " at the biases"."""
-    return {f"{use}{AS_STATED}" if when.temperature_stated else use: when.temperature_c}
+    return {f"{use}{STATED_SUFFIX}" if when.temperature_stated else use: when.temperature_c}
 
 
 def label_source(use: str) -> str:
     """Return a label of `warmth` (`use`), followed by the temperature's source."""
-    return use if use.endswith(AS_STATED) else f"{use}, by its own thermometer"
+    return use if use.endswith(STATED_SUFFIX) else f"{use}, by its own thermometer"
 
 
 def speed_words(sensor: GyroscopeEntry) -> str:
@@ -83,7 +83,7 @@ def _range_words(load: Sequence[float]) -> str:
 
 
 def _is_close(one: float, other: float) -> bool:
-    return math.isclose(one, other, rel_tol=ALIKE)
+    return math.isclose(one, other, rel_tol=SPEED_TOLERANCE)
 
 
 def has_contributor(budget: BudgetEntry | None, name: str) -> bool:
@@ -93,17 +93,17 @@ def has_contributor(budget: BudgetEntry | None, name: str) -> bool:
 
 def list_omitted_rates(sensor: GyroscopeEntry, *, external: bool = False) -> str:
     """Return the errors that a gyroscope's U omits; for external motion, also errors that readings do not show."""
-    bent = ALWAYS if sensor.nonlinearity is not None else ("nonlinearity at other speeds", *ALWAYS)
-    return ", ".join(("the effect of gravity", *OF_THE_FILE, *bent) if external else bent)
+    bent = EXCLUSIONS if sensor.nonlinearity is not None else ("nonlinearity at other speeds", *EXCLUSIONS)
+    return ", ".join(("the effect of gravity", *FILE_EXCLUSIONS, *bent) if external else bent)
 
 
 def list_omitted_accelerations(entry: AccelerometerEntry) -> str:
     """Return the effects that an accelerometer's U does not include."""
     bent = "nonlinearity" if entry.second_order_s2_m is None else "nonlinearity beyond the second order"
     bent = "nonlinearity beyond 1 g" if has_contributor(entry.budget, "nonlinearity") else bent
-    return ", ".join((bent, *ALWAYS))
+    return ", ".join((bent, *EXCLUSIONS))
 
 
 def list_omitted_fields() -> str:
     """Return the errors that a magnetometer's U omits, without the arm's field, which is stated with the bias."""
-    return ", ".join(("nonlinearity", "iron magnetised since", *ALWAYS))
+    return ", ".join(("nonlinearity", "iron magnetised since", *EXCLUSIONS))

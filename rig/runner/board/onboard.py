@@ -30,7 +30,7 @@ from rig.observation.onboard_window import find_board_averages, revolution_on_th
 from rig.runner.acquisition import Acquisition
 
 # Longest time from the request to keep readings to the arm's first motion, on a busy computer.
-KEEP_LONGER_S = 4.0
+KEEPING_MARGIN_S = 4.0
 
 Revolution = tuple[int, int, float]  # two board times, µs, and the speed between them, rad/s
 
@@ -65,7 +65,7 @@ class BoardCalibration:
     def keep(self, sweep: Sweep) -> None:
         """Make board and host keep their readings, beginning just before a sweep."""
         self.acquisition.keep()
-        self.board.keep([index for index, _ in self.sensors.values()], sweep.duration_s + KEEP_LONGER_S)
+        self.board.keep([index for index, _ in self.sensors.values()], sweep.duration_s + KEEPING_MARGIN_S)
 
     def revolutions(self, sweep: Sweep) -> Attempts[str, Revolution]:
         """Return each sensor's window of the revolution just finished; this may take seconds."""

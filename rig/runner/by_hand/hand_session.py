@@ -44,15 +44,15 @@ from rig.plans.by_hand import Open, WantedMoves, next_instruction, still_open
 from rig.runner.acquisition import Acquisition
 from rig.station.events import HandSeen, RunEvent
 
-LOOK_S = 0.05
-HELD_S = 3.0  # time in the hand, after which the operator is reminded to lay it down
-MISSED = 3.0  # error of a whole turn's end, in standard deviations
-REFUSED_IN_A_ROW = 10  # after these the session ends, because another error is likely
-NO_REST = frozenset({"held_not_laid_down", "not_flat"})  # the item lies still, but not on a side
-ANEW = frozenset(
+POLL_S = 0.05
+MAX_HELD_S = 3.0  # time in the hand, after which the operator is reminded to lay it down
+MAX_CLOSURE_STDS = 3.0  # error of a whole turn's end
+MAX_REFUSALS = 10  # in a row; then the session ends, because another error is likely
+UNFIT_RESTS = frozenset({"held_not_laid_down", "not_flat"})  # the item lies still, but not on a side
+RESTARTS = frozenset(
     {"bias_jumped", "table_moved", "accelerometer_jumped"}
 )  # the readings before and after it contradict each other
-MENDED_BY_HAND = frozenset({"clipping", "lost_in_move", "no_fit", "turn_not_closed"}) | NO_REST | ANEW
+REPEATABLE = frozenset({"clipping", "lost_in_move", "no_fit", "turn_not_closed"}) | UNFIT_RESTS | RESTARTS
 
 
 @dataclass(slots=True)
@@ -114,7 +114,7 @@ class HandSession:
         heard = self.acquisition.hear()
         self._ask(next_instruction(self._open, None))
         while self._request is not None:
-            self.wait(LOOK_S)
+            self.wait(POLL_S)
             check()
             self._feed([samples for name, samples in drain(heard) if name == self.name])
             self._remind()
@@ -185,7 +185,7 @@ class HandSession:
         missed_rad = last.closure_rad
         if missed_rad is None and self._request.instruction.say == "turn" and last.angle_rad > np.pi:
             missed_rad = last.angle_rad - whole_rad * max(1, round(last.angle_rad / whole_rad))
-        if missed_rad is None or abs(missed_rad) <= MISSED * self.settings.closure_rad:
+        if missed_rad is None or abs(missed_rad) <= MAX_CLOSURE_STDS * self.settings.closure_rad:
             return None
         what = f"that turn ended {abs(np.degrees(missed_rad)):.1f}° from where it began"
         return Fault("turn_not_closed", what, "Lay it against the rule, and turn again")
@@ -213,18 +213,18 @@ class HandSession:
         the bias itself has changed. Raise a fault that no move can correct.
         """
         self._refused += 1
-        if wrong.name not in MENDED_BY_HAND:
+        if wrong.name not in REPEATABLE:
             raise wrong
-        if self._refused >= REFUSED_IN_A_ROW:
-            what = f"{REFUSED_IN_A_ROW} moves in a row were refused; the last: {wrong.what}"
+        if self._refused >= MAX_REFUSALS:
+            what = f"{MAX_REFUSALS} moves in a row were refused; the last: {wrong.what}"
             raise Fault(wrong.name, what, wrong.remedy)
         events: list[OfTheHand] = []
         crept = wrong.name == "bias_jumped" and not self._bias_doubted
-        no_rest = crept or wrong.name in NO_REST
+        no_rest = crept or wrong.name in UNFIT_RESTS
         if no_rest:
             self._bias_doubted |= crept
             events.append(HandRestRefused(*self._board_us(rest), wrong.name))
-        elif wrong.name in ANEW:
+        elif wrong.name in RESTARTS:
             events.append(HandBegunAnew(self._board_us(rest)[0], wrong.name))
             self._accepted = []
             self._lay = []
@@ -238,7 +238,7 @@ class HandSession:
     def _remind(self) -> None:
         """Remind the operator to lay the item down if it is held in a hand."""
         live = self._segmenter.live
-        in_hand = live.state == "held" and live.time_s - live.since_s >= HELD_S
+        in_hand = live.state == "held" and live.time_s - live.since_s >= MAX_HELD_S
         if in_hand and not self._reminded and self._request is not None:
             what = f"it has been held in the hand for {live.time_s - live.since_s:.0f} s"
             wrong = Fault("held_not_laid_down", what, "Lay it down and let go")

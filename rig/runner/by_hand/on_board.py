@@ -29,8 +29,8 @@ from rig.plans.by_hand import FACE_ORDER, WantedMoves, next_instruction, still_o
 from rig.runner.board.sensors import BoardSource, open_board_source
 from rig.runner.by_hand.hand_session import drain
 
-LOOK_S = 0.05
-AGAIN = {  # the board's term: the error's name, what, what to do
+POLL_S = 0.05
+FAULTS = {  # the board's term: the error's name, what, what to do
     "clipped": ("clipping", "it was turned faster than the sensor's range", "Turn more slowly"),
     "lost": ("lost_in_move", "readings are missing", "Make the move again"),
     "no_face": ("not_flat", "it does not lie on any of its six sides", "Lay it down on a side, and let go"),
@@ -87,7 +87,7 @@ class FollowedSession:
         if report.outcome == "nothing":
             return None
         if report.outcome != "accepted" or report.before is None or report.after is None:
-            wrong = Fault(*AGAIN[report.outcome])
+            wrong = Fault(*FAULTS[report.outcome])
             self.tell(HandMoveRefused(report.move_us, report.after_us, wrong.name))
             return wrong
         before, after = self._face(report.before), self._face(report.after)
@@ -156,7 +156,7 @@ def read_kept_solution(board: Board) -> CalibratedByBoard:
         return CalibratedByBoard(report.sensor, board.hand_solution(), None)
     why = "none has been made since it was switched on or reset"
     if report.state == "failed":
-        why = f"it was given up because ten moves in a row were refused; the last because {AGAIN[report.outcome][1]}"
+        why = f"it was given up because ten moves in a row were refused; the last because {FAULTS[report.outcome][1]}"
     elif report.state != "idle":
         why = f"it was not done after {report.accepted} moves, and has ended now"
     raise Refused(
@@ -184,10 +184,10 @@ def _follow(source: BoardSource, session: FollowedSession) -> None:
         report = source.board.hand_report()
         session.take(report)
         if report.state == "failed":
-            raise Fault(*AGAIN[report.outcome])
+            raise Fault(*FAULTS[report.outcome])
         if report.state == "done":
             return
-        time.sleep(LOOK_S)
+        time.sleep(POLL_S)
         source.check()
 
 

@@ -14,7 +14,7 @@ from rig.sensors.kvh1775.kvh_messages import BuiltInTest, MessageReader
 from rig.sensors.kvh1775.kvh_settings import NAMES, Kvh1775Settings, same
 from rig.sensors.kvh1775.message_numbering import MessageCounter
 from rig.sensors.own_port import OwnPort, PortFaults, closing_on_failure, open_device_port
-from rig.sensors.port_silence import ATTEMPTS, USUAL, Patience
+from rig.sensors.port_silence import MAX_ATTEMPTS, PATIENCE, Patience
 
 KEPT_BYTES = 4096  # bytes of the input that are searched for an answer
 _CABLE = "Check its supply and cable, and whether another program has the port"
@@ -30,7 +30,7 @@ class Kvh1775:
     """
 
     def __init__(
-        self, sensor: str, port: str, baud: int, on_messages: OnMessages | None = None, *, patience: Patience = USUAL
+        self, sensor: str, port: str, baud: int, on_messages: OnMessages | None = None, *, patience: Patience = PATIENCE
     ) -> None:
         """Open the port, end a stream that may be running, and read serial number and settings.
 
@@ -77,7 +77,7 @@ class Kvh1775:
         """Switch to normal mode, in which the instrument streams messages. Raise SensorError `kvh_silent`."""
         count_before = self._message_count
         period_s = 1.0 / float(self.settings["DR"])
-        for wait_s in self._patience.attempts(ATTEMPTS * period_s):
+        for wait_s in self._patience.attempts(MAX_ATTEMPTS * period_s):
             self._leave_configuration()
             if self.own_port.wait(lambda: self._message_count > count_before, wait_s):
                 return
@@ -91,7 +91,7 @@ class Kvh1775:
         """Return the result of its built-in test in normal mode. Raise SensorError `kvh_no_test`, `kvh_test_failed`."""
         self._tests.clear()
         period_s = 1.0 / float(self.settings["DR"])  # its result follows the next message
-        for wait_s in self._patience.attempts(ATTEMPTS * period_s):
+        for wait_s in self._patience.attempts(MAX_ATTEMPTS * period_s):
             self._write("?BIT")  # not ?BIT,2: in its result, bytes other than the 7f of the ICD mean "good" too
             if self.own_port.wait(lambda: bool(self._tests), wait_s):
                 result = self._tests[0]

@@ -30,8 +30,8 @@ NAMES = (
     "FILTEN,A",
     "FILTEN,G",
 )
-USUAL_FILTER = "CHEBY"  # as delivered; replaces the other built-in ones
-SAME_NUMBER = 1e-6
+DEFAULT_FILTER = "CHEBY"  # as delivered; replaces the other built-in ones
+NUMBER_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,8 +52,8 @@ class Kvh1775Settings:
             "ROTFMT": self.rotation.upper(),
             "ROTUNITS": "RAD",
             "TEMPUNITS": "C" if self.message == "C" else "C_100",  # in format C it is a float in either unit
-            "FILTTYPE,A": USUAL_FILTER,
-            "FILTTYPE,G": USUAL_FILTER,
+            "FILTTYPE,A": DEFAULT_FILTER,
+            "FILTTYPE,G": DEFAULT_FILTER,
             "FILTEN,A": "1",
             "FILTEN,G": "1",
         }
@@ -78,7 +78,7 @@ def refusals(sensor: str, stored: Mapping[str, str]) -> Iterable[SensorError]:
             yield SensorError(
                 "kvh_custom_filter",
                 f"{sensor}: the filter of its {triad} is {stored[name]}, a custom one",
-                f"If it is not needed, reset it in its configuration mode: ={name},{USUAL_FILTER}",
+                f"If it is not needed, reset it in its configuration mode: ={name},{DEFAULT_FILTER}",
             )
 
 
@@ -90,6 +90,6 @@ def same(one: str, other: str) -> bool:
 
 def _equal_entries(one: str, other: str) -> bool:
     try:
-        return abs(float(one) - float(other)) <= SAME_NUMBER
+        return abs(float(one) - float(other)) <= NUMBER_TOLERANCE
     except ValueError:
         return one == other

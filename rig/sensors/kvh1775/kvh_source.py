@@ -21,7 +21,7 @@ from rig.sensors.kvh1775.format_c_field import READING_MESSAGES, MagneticFieldRe
 from rig.sensors.kvh1775.kvh_driver import Kvh1775
 from rig.sensors.kvh1775.kvh_settings import Kvh1775Settings, corrections, refusals
 from rig.sensors.own_port import closing_on_failure
-from rig.sensors.port_silence import USUAL, Patience
+from rig.sensors.port_silence import PATIENCE, Patience
 from rig.sensors.sample_source import OnSamples
 from rig.sensors.scales import DEGREES_PER_COUNT, FIELD_FULL_SCALE_T, FULL_SCALE_COUNTS, fine_axes
 from rig.sensors.thermometer import Thermometer
@@ -31,13 +31,15 @@ from rig.sensors.thermometer import Thermometer
 NOT_PROVIDED: Mapping[str, Absent] = MappingProxyType(
     {"rate": Absent(bits=0x07), "force": Absent(bits=0x70), "temperature": Absent(within=RANGE_C)}
 )
-INVALID_S = 1.0  # tolerated duration of messages in a row that are marked invalid
+MAX_INVALID_S = 1.0  # of messages in a row that are marked invalid
 
 
 class Kvh1775Source:
     """An instrument, set up for a run. A message with an axis marked invalid counts as lost."""
 
-    def __init__(self, name: str, section: SensorSection, on_samples: OnSamples, *, patience: Patience = USUAL) -> None:
+    def __init__(
+        self, name: str, section: SensorSection, on_samples: OnSamples, *, patience: Patience = PATIENCE
+    ) -> None:
         """Connect and set up the instrument. Raise SensorError `kvh_other_serial_number`, and as `refusals` yields."""
         self._name, self._on_samples = name, on_samples
         line = _port_section(section)
@@ -114,13 +116,13 @@ class Kvh1775Source:
         self._on_samples(self._name, samples)
 
     def _watch(self, messages: NDArray[Any], valid: NDArray[np.bool_]) -> None:
-        """Raise SensorError `kvh_axis_invalid` if all messages have been invalid for `INVALID_S`."""
+        """Raise SensorError `kvh_axis_invalid` if all messages have been invalid for `MAX_INVALID_S`."""
         good = np.flatnonzero(valid)
         self._invalid_run = len(valid) - 1 - int(good[-1]) if len(good) else self._invalid_run + len(valid)
-        if self._invalid_run > INVALID_S * self._required.rate_hz:
+        if self._invalid_run > MAX_INVALID_S * self._required.rate_hz:
             raise SensorError(
                 "kvh_axis_invalid",
-                f"sensors.{self._name}: the KVH 1775 has called its readings invalid for {INVALID_S:g} s, status "
+                f"sensors.{self._name}: the KVH 1775 has called its readings invalid for {MAX_INVALID_S:g} s, status "
                 f"0x{int(messages['status'][-1]):02x} where 0x77 is good",
                 "Wait until it is warm, look at its built-in test with `rig kvh info`; if the problem persists, ask "
                 "its maker",
@@ -171,7 +173,7 @@ def describe_field(name: str, section: SensorSection) -> RecordedSensor | None:
 
 
 def kvh1775(
-    name: str, section: SensorSection, on_samples: OnSamples, *, patience: Patience = USUAL
+    name: str, section: SensorSection, on_samples: OnSamples, *, patience: Patience = PATIENCE
 ) -> closing[Kvh1775Source]:
     """Return the instrument's source as a context manager. Raise the SensorErrors of `Kvh1775Source`."""
     return closing(Kvh1775Source(name, section, on_samples, patience=patience))

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from rig.estimation.arrays import Array
 
-MOST_DIGITS = 18  # digits of a 64-bit integer
-MOST_DECIMALS = 22  # powers of ten that are exact as floats
-LONGEST = 40  # characters of a number
+MAX_DIGITS = 18  # of a 64-bit integer
+MAX_DECIMALS = 22  # powers of ten that are exact as floats
+MAX_CHARACTERS = 40  # of a number
 _ZERO, _POINT, _PLUS, _MINUS = (ord(character) for character in "0.+-")
-_POWERS = 10.0 ** np.arange(MOST_DECIMALS + 1)
+_POWERS = 10.0 ** np.arange(MAX_DECIMALS + 1)
 
 
 def parse_numbers(text: NDArray[np.uint8], starts: NDArray[np.intp], ends: NDArray[np.intp]) -> Array:
@@ -33,12 +33,12 @@ def parse_numbers(text: NDArray[np.uint8], starts: NDArray[np.intp], ends: NDArr
     decimals = np.zeros(len(starts), np.int64)
     decimals[owner] = ends[owner] - 1 - points
     # The fast path: digits, at most one point, a leading sign. Others are parsed one by one.
-    plain = (dots <= 1) & (digits + dots + signed == ends - starts) & (digits > 0) & (digits <= MOST_DIGITS)
-    numbers = integer / _POWERS[np.minimum(decimals, MOST_DECIMALS)]
+    plain = (dots <= 1) & (digits + dots + signed == ends - starts) & (digits > 0) & (digits <= MAX_DIGITS)
+    numbers = integer / _POWERS[np.minimum(decimals, MAX_DECIMALS)]
     numbers = np.where(signs == _MINUS, -numbers, numbers)
     for index in np.flatnonzero(~plain):
         numbers[index] = np.nan
-        if ends[index] - starts[index] <= LONGEST:
+        if ends[index] - starts[index] <= MAX_CHARACTERS:
             with suppress(ValueError):
                 numbers[index] = float(text[starts[index] : ends[index]].tobytes())
     numbers[np.isinf(numbers)] = np.nan
@@ -50,7 +50,7 @@ def _sum_digits(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return the digits of each number as an integer, without the decimal point, and their count."""
     lengths = ends - starts
-    longest = min(int(lengths.max()), MOST_DIGITS + 2)
+    longest = min(int(lengths.max()), MAX_DIGITS + 2)
     values = text - np.uint8(_ZERO)  # other characters wrap around to more than nine
     integer, digits = np.zeros(len(starts), np.int64), np.zeros(len(starts), np.int64)
     shortest = int(lengths.min())

@@ -18,8 +18,8 @@ from rig.estimation.arrays import Array
 from rig.sensors.lines.decimal_numbers import parse_numbers
 from rig.sensors.lines.fields import TextFieldReader
 
-LONGEST_LINE = 2000  # bytes; longer input without a line end is no line
-KEPT_TEXT = 120  # characters of a rejected line that a message quotes
+MAX_LINE_BYTES = 2000  # longer input without a line end is no line
+QUOTED = 120  # characters of a rejected line, in a message
 
 # Classes of bytes.
 _OTHER, _NUMBER, _SEPARATOR, _SPACE, _END, _KEY = range(6)
@@ -73,7 +73,7 @@ class LineReader:
         data = (self._rest + data).replace(b"\r", b"\n")
         end = data.rfind(b"\n") + 1
         self._rest = data[end:]
-        if len(self._rest) > LONGEST_LINE:  # the rest of it becomes a rejected line
+        if len(self._rest) > MAX_LINE_BYTES:  # the rest of it becomes a rejected line
             data, end, self._rest = self._rest + b"\n", len(self._rest) + 1, b""
         data = COLOURS.sub(b"", data[:end])
         end = len(data)
@@ -132,7 +132,7 @@ class LineReader:
         first_rejected = b""
         if len(samples_before):
             index = int(np.argmin(is_sample))
-            first_rejected = bytes(data[line_starts[index] : min(line_ends[index], line_starts[index] + KEPT_TEXT)])
+            first_rejected = bytes(data[line_starts[index] : min(line_ends[index], line_starts[index] + QUOTED)])
         return LineBatch(values, samples_before, comments, first_rejected)
 
     @staticmethod

@@ -12,10 +12,10 @@ from rig.estimation.arrays import Array
 
 NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 # Texts that programs print for a missing value: C's and Python's words, Arduino's "ovf", an empty field.
-WORDS = frozenset({"", "-", "--", "nan", "-nan", "null", "none", "na", "n/a", "inf", "-inf", "+inf", "ovf", "nil"})
+MISSING = frozenset({"", "-", "--", "nan", "-nan", "null", "none", "na", "n/a", "inf", "-inf", "+inf", "ovf", "nil"})
 # -127 is DallasTemperature's DEVICE_DISCONNECTED_C; others print 999 or -273.15: all are impossible.
 NOT_PROVIDED: Mapping[str, Absent] = MappingProxyType({"temperature": Absent(within=RANGE_C)})
-NEEDED = ("time", "sequence", *GYROSCOPE)  # values that a sample must have
+REQUIRED_VALUES = ("time", "sequence", *GYROSCOPE)  # of a sample
 _AROUND_KEYS = " \t,;{}[]()\"'|&"
 
 
@@ -39,8 +39,8 @@ class TextFieldReader:
         for index, (name, field) in enumerate(zip(self._columns, fields, strict=True)):
             number = float(field) if NUMBER.fullmatch(field) else np.nan
             values[index] = number if np.isfinite(number) else np.nan
-            absent = np.isnan(number) and field.lower() in WORDS
-            if name != "-" and not np.isfinite(number) and (name in NEEDED or not absent):
+            absent = np.isnan(number) and field.lower() in MISSING
+            if name != "-" and not np.isfinite(number) and (name in REQUIRED_VALUES or not absent):
                 return None
         return values
 

@@ -7,8 +7,8 @@ from rig.config.sensors.lines_section import UNDETERMINED
 from rig.sensors.lines.guessing import Guess
 from rig.sensors.lines.shape import Shape
 
-NICE = 0.02  # relative tolerance of a round rate
-ROUND = (1, 2, 2.5, 4, 5, 8, 10)
+RATE_TOLERANCE = 0.02  # relative tolerance of a round rate
+ROUND_DIGITS = (1, 2, 2.5, 4, 5, 8, 10)
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +87,7 @@ def _quote(text: str) -> str:
 def _round_rate(rate_hz: float) -> float:
     """Return the nearest round rate, or three digits if none is near."""
     size = 10.0 ** (len(str(int(rate_hz))) - 1)
-    for digits in ROUND:
-        if abs(rate_hz / (digits * size) - 1) < NICE:
+    for digits in ROUND_DIGITS:
+        if abs(rate_hz / (digits * size) - 1) < RATE_TOLERANCE:
             return digits * size
     return float(f"{rate_hz:.3g}")

@@ -16,17 +16,17 @@ from rig.sensors.lines.shape import NoShape, Shape
 
 Flags = NDArray[np.bool_]
 G = 9.80665
-FEWEST = 10  # fewest lines at rest, and in motion
+MIN_LINES = 10  # at rest, and in motion
 TOLERANCE = 0.12  # relative tolerance for an uncalibrated accelerometer and a rotation by hand
 COUNTS_PER_G = (1024, 2048, 4096, 8192, 16384, 32768)
 # °/s per count: InvenSense (131 … 16.4 counts per °/s), ST (8.75 … 70 m°/s), Bosch (as InvenSense), Analog Devices.
-COUNTS = (1 / 131, 1 / 65.5, 1 / 32.8, 1 / 16.4, 0.00875, 0.0175, 0.035, 0.07, 0.00625, 0.025, 0.1)
-SAME_SCALE = 0.03
-ROTATION_RATIO = 10.0  # least scatter of a gyroscope in rotation, relative to that at rest
+DEG_S_PER_COUNT = (1 / 131, 1 / 65.5, 1 / 32.8, 1 / 16.4, 0.00875, 0.0175, 0.035, 0.07, 0.00625, 0.025, 0.1)
+SCALE_TOLERANCE = 0.03
+MIN_ROTATION_RATIO = 10.0  # of a gyroscope's scatter in rotation to that at rest
 # Quantile of the differences between readings, and its ratio to the noise's standard deviation.
-NOISE_QUANTILE, OF_STEPS = 0.9, 1.645 * 2**0.5
+NOISE_QUANTILE, QUANTILE_RATIO = 0.9, 1.645 * 2**0.5
 # Interval over which gravity's direction is averaged: in twice this the device rotates by at most a fifth of a radian.
-FLAT_S = 0.02
+GRAVITY_INTERVAL_S = 0.02
 TIMES = {"ns": 1e9, "us": 1e6, "ms": 1e3, "s": 1.0}
 _NAMES = {
     "time": r"(time|timestamp|t|ts|ms|us|millis|micros|tick|ticks|uptime)(_?(us|ms|s|ns))?",
@@ -71,7 +71,7 @@ def guess(shape: Shape, still_until_s: float) -> Guess:
     """
     resting = int(np.count_nonzero(shape.arrived_s < still_until_s))
     for number, when in ((resting, "while it lay still"), (len(shape.arrived_s) - resting, "while it was turned")):
-        if number < FEWEST:
+        if number < MIN_LINES:
             raise NoShape(f"only {number} of its lines came {when}")
     count = shape.values.shape[1]
     result = Guess(["-"] * count)
@@ -225,9 +225,9 @@ def _kind(values: Array, still: Flags) -> str | None:
     if not len(moving):
         return "a" if _gravity(level) is not None else None
     # By differences between readings, because a log may have rests in several attitudes.
-    scatter = float(np.linalg.norm(np.quantile(np.abs(np.diff(rest, axis=0)), NOISE_QUANTILE, axis=0))) / OF_STEPS
+    scatter = float(np.linalg.norm(np.quantile(np.abs(np.diff(rest, axis=0)), NOISE_QUANTILE, axis=0))) / QUANTILE_RATIO
     if (
-        np.linalg.norm(moving.std(axis=0)) > ROTATION_RATIO * max(scatter, 1e-9)
+        np.linalg.norm(moving.std(axis=0)) > MIN_ROTATION_RATIO * max(scatter, 1e-9)
         and np.percentile(sizes[~still], 90) > 4 * level
     ):
         return "g"
@@ -282,7 +282,7 @@ def _rate_unit(shape: Shape, guess: Guess, rates: Array, still: Flags) -> tuple[
         return None
     forces = shape.values[:, [guess.columns.index("a" + axis) for axis in "xyz"]]
     rates = rates - rates[still].mean(axis=0)
-    block_size = max(int(FLAT_S * guess.rate_hz), 1)
+    block_size = max(int(GRAVITY_INTERVAL_S * guess.rate_hz), 1)
     blocks = len(rates) // block_size
     if blocks < 8:
         return None
@@ -304,8 +304,8 @@ def _rate_unit(shape: Shape, guess: Guess, rates: Array, still: Flags) -> tuple[
         if abs(rad_s / one - 1) < TOLERANCE:
             return unit, 1.0
     per_count = np.degrees(rad_s)
-    near = sorted(COUNTS, key=lambda scale: abs(scale / per_count - 1))
-    if abs(near[0] / per_count - 1) < SAME_SCALE and abs(near[1] / per_count - 1) > 2 * SAME_SCALE:
+    near = sorted(DEG_S_PER_COUNT, key=lambda scale: abs(scale / per_count - 1))
+    if abs(near[0] / per_count - 1) < SCALE_TOLERANCE and abs(near[1] / per_count - 1) > 2 * SCALE_TOLERANCE:
         return "deg/s", near[0]
     guess.gaps.append(f"the gyroscope's scale: a printed 1 is about {per_count:.3g} deg/s")
     return None

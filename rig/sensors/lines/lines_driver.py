@@ -19,15 +19,15 @@ from rig.sensors.lines.decoding import LineBatch, LineReader
 from rig.sensors.lines.stamping import Stamper, is_coarse
 from rig.sensors.lines.time_steps import find_time_step_s
 from rig.sensors.own_port import OwnPort, PortFaults, closing_on_failure, open_device_port
-from rig.sensors.port_silence import USUAL, Patience
+from rig.sensors.port_silence import PATIENCE, Patience
 
-LOOK_SAMPLES, LOOK_S = 50, 0.5  # fewest samples, and shortest time by the device's clock, from which its rate is judged
-QUOTED = 60  # characters of a quoted line
-UNPRINTABLE = 0.05  # fraction of bytes above which the baud rate is wrong
-DAMAGED = 0.5  # fraction of rejected lines above which a stream is useless
-DAMAGED_LINES = 200  # least number of rejected lines for that
+MIN_RATE_SAMPLES, MIN_RATE_S = 50, 0.5  # and time by the device's clock, from which its rate is judged
+QUOTED_CHARACTERS = 60  # of a line
+MAX_UNPRINTABLE = 0.05  # fraction of bytes above which the baud rate is wrong
+MAX_REJECTED = 0.5  # fraction of lines above which a stream is useless
+MIN_REJECTED_LINES = 200  # for that
 RATE_TOLERANCE = 0.03
-ROUNDED = 2.0  # error of a time interval, in steps of the time stamps: one step at either end
+STAMP_ROUNDING_STEPS = 2.0  # error of a time interval: one step of the time stamps at either end
 _CABLE = "Check its supply and cable, and whether another program has the port"
 
 # Values (n, columns) as printed, their numbers (n,) from 0, their times (n,) in µs, and the time of the read.
@@ -69,7 +69,7 @@ class LinesDevice:
         rate_hz: float,
         on_values: OnValues | None = None,
         *,
-        patience: Patience = USUAL,
+        patience: Patience = PATIENCE,
     ) -> None:
         """Open the port, and read until samples come at the stated rate.
 
@@ -143,8 +143,8 @@ class LinesDevice:
         """Return whether the samples suffice to judge the rate: few at a low rate, more with coarse times."""
         if self._section.time is None:
             return self.counts.samples >= 3
-        is_long_enough = self.counts.samples >= 5 and self._span_s() >= LOOK_S
-        return (is_long_enough or self.counts.samples >= LOOK_SAMPLES) and self._rate_error <= RATE_TOLERANCE
+        is_long_enough = self.counts.samples >= 5 and self._span_s() >= MIN_RATE_S
+        return (is_long_enough or self.counts.samples >= MIN_RATE_SAMPLES) and self._rate_error <= RATE_TOLERANCE
 
     @property
     def _rate_error(self) -> float:
@@ -152,7 +152,7 @@ class LinesDevice:
         step_s, span_s = self.time_step_s, self._span_s()
         if not is_coarse(step_s, self._rate_hz):
             return 0.0
-        return ROUNDED * step_s / span_s if span_s > 0 else float("inf")
+        return STAMP_ROUNDING_STEPS * step_s / span_s if span_s > 0 else float("inf")
 
     def _span_s(self) -> float:
         if self._section.time is None or not self._first_blocks:
@@ -189,14 +189,14 @@ class LinesDevice:
         reader, counts = self._lines, self.counts
         if not reader.byte_count:
             return SensorError("lines_silent", f"{self.where} has sent nothing within {timeout_s:g} s", _CABLE)
-        if reader.unprintable > UNPRINTABLE * reader.byte_count or not (counts.before or counts.comments):
+        if reader.unprintable > MAX_UNPRINTABLE * reader.byte_count or not (counts.before or counts.comments):
             return SensorError(
                 "lines_wrong_baud_rate",
                 f"{reader.byte_count} bytes came from {self.where} at {self._line.baud} Bd, but they are not lines of "
                 "text",
                 "Set serial.baud to what the device's program sets; `rig lines` finds it",
             )
-        first = counts.first_other[:QUOTED].decode("ascii", "replace")
+        first = counts.first_other[:QUOTED_CHARACTERS].decode("ascii", "replace")
         return SensorError(
             "lines_other_format",
             f"{self.where} prints other lines than sensors.{self._sensor}.lines states, such as {quote(first)}",
@@ -230,10 +230,10 @@ class LinesDevice:
     def _refuse_damage(self) -> None:
         """Raise SensorError `lines_damaged` if too many lines are not samples."""
         counts = self.counts
-        if counts.damaged > DAMAGED_LINES and counts.damaged > DAMAGED * (counts.samples + counts.damaged):
+        if counts.damaged > MIN_REJECTED_LINES and counts.damaged > MAX_REJECTED * (counts.samples + counts.damaged):
             raise SensorError(
                 "lines_damaged",
                 f"{self.where}: {counts.damaged} of {counts.samples + counts.damaged} lines are not samples, such as "
-                f"{quote(counts.first_other[:QUOTED].decode('ascii', 'replace'))}",
+                f"{quote(counts.first_other[:QUOTED_CHARACTERS].decode('ascii', 'replace'))}",
                 "Check the cable and the speed of the line; see that nothing else prints there",
             )

@@ -27,15 +27,15 @@ from rig.sensors.errors import SensorError
 from rig.sensors.lines.fields import NOT_PROVIDED
 from rig.sensors.lines.lines_driver import LinesDevice
 from rig.sensors.lines.stamping import is_coarse
-from rig.sensors.port_silence import USUAL, Patience
+from rig.sensors.port_silence import PATIENCE, Patience
 from rig.sensors.sample_source import OnSamples
 from rig.sensors.scales import DEGREES_PER_COUNT, FIELD_FULL_SCALE_T, FULL_SCALE_COUNTS, thermometer_channels
 from rig.sensors.thermometer import Thermometer
 
 # Fraction of the range from which on readings count as saturated: within a 16-bit count of the end.
-AT_THE_END = 1 - 1e-4
+SATURATION_FRACTION = 1 - 1e-4
 LookResult = str | SensorError
-AXES = {RATE: GYROSCOPE, ACCELERATION: ACCELEROMETER, FIELD: MAGNETOMETER}
+AXIS_NAMES = {RATE: GYROSCOPE, ACCELERATION: ACCELEROMETER, FIELD: MAGNETOMETER}
 _TriadSection = LineRateSection | LineAccelerationSection | LineFieldSection
 
 
@@ -47,13 +47,15 @@ class FirstLines:
     time_step_s: float = 0.0
 
 
-NOT_CONNECTED = FirstLines()  # before a connection, according to the section
+UNCONNECTED_LINES = FirstLines()  # before a connection, according to the section
 
 
 class LinesSource:
     """A device that prints as configured; samples are passed on after `start`."""
 
-    def __init__(self, name: str, section: SensorSection, on_samples: OnSamples, *, patience: Patience = USUAL) -> None:
+    def __init__(
+        self, name: str, section: SensorSection, on_samples: OnSamples, *, patience: Patience = PATIENCE
+    ) -> None:
         """Connect and read the first lines. Raise SensorError as `LinesDevice` does."""
         self._on_samples = on_samples
         line, lines = _split_section(section)
@@ -133,7 +135,7 @@ class _Printed:
 
 def describe(name: str, section: SensorSection) -> RecordedSensor:
     """Return the description of the gyroscope's samples for a recording."""
-    _, (sensor, _) = next(_make_readers(name, section, NOT_CONNECTED))
+    _, (sensor, _) = next(_make_readers(name, section, UNCONNECTED_LINES))
     return sensor
 
 
@@ -180,7 +182,7 @@ def stamp_std_s(lines: LinesSection, rate_hz: float, step_s: float = 0.0) -> flo
 
 
 def lines(
-    name: str, section: SensorSection, on_samples: OnSamples, *, patience: Patience = USUAL
+    name: str, section: SensorSection, on_samples: OnSamples, *, patience: Patience = PATIENCE
 ) -> closing[LinesSource]:
     """Return the device's source as a context manager. Raise the SensorErrors of `LinesSource`."""
     return closing(LinesSource(name, section, on_samples, patience=patience))
@@ -238,8 +240,8 @@ def _make_triad(
     unit = section.scale * UNITS[section.unit].size
     step = 0.0 if section.decimals is None else unit * 10.0**-section.decimals
     step = max(step, full_scale / FULL_SCALE_COUNTS)
-    channel = triad_channel(quantity, step, max(int(AT_THE_END * full_scale / step), 1), full_scale)
-    return channel, _Printed(tuple(map(lines.columns.index, AXES[quantity])), unit)
+    channel = triad_channel(quantity, step, max(int(SATURATION_FRACTION * full_scale / step), 1), full_scale)
+    return channel, _Printed(tuple(map(lines.columns.index, AXIS_NAMES[quantity])), unit)
 
 
 def _make_thermometer(lines: LinesSection, *, provides: bool) -> Iterator[tuple[Channel, _Printed]]:

@@ -19,23 +19,23 @@ from rig.sensors.lines.guessing import Guess, guess_triads
 NAMES = {"g": "_rad_s", "a": "_m_s2", "m": "_t"}
 SENSORS = {"g": "gyroscope", "a": "accelerometer", "m": "magnetometer"}
 SI_UNITS = {"g": "rad/s", "a": "m/s2", "m": "T"}
-OPEN = "?"  # where a number is still to be stated
-LIKELY_HZ = 100.0  # assumed sample rate of a log without times
-LARGEST_COUNT = 500.0  # whole numbers beyond it are steps of a converter
+UNSTATED = "?"  # where a number is still to be stated
+ASSUMED_RATE_HZ = 100.0  # of a log without times
+MIN_COUNT = 500.0  # larger whole numbers are steps of a converter
 # A block is at rest if its scatter is at most this many times that of the quietest tenth.
-BLOCK_S, QUIETEST, AS_QUIET = 0.25, 0.1, 3.0
+BLOCK_S, QUIETEST_FRACTION, QUIET_RATIO = 0.25, 0.1, 3.0
 # Larger than the readings of a gyroscope in rad/s, and than its scatter at rest.
-LARGEST_RAD_S, NOISIEST_RAD_S = 40.0, 0.02
+MAX_RATE_RAD_S, MAX_SCATTER_RAD_S = 40.0, 0.02
 NORM_TOLERANCE = 2e-3
 # of a counter: the fewest steps, and the least fraction of them that rise; none may fall
-FEWEST_STEPS, MOST_RISE = 10, 0.9
+MIN_STEPS, MIN_RISING = 10, 0.9
 AXES = ("x", "y", "z")
 REFERENCE = {name for group in MOTIONS["attitudes"].optional for name in group} | {"start_s", "end_s"}
 QUATERNION_NAME = re.compile(r"(?:.*_)?(?:q|quat|quaternion|orientation|rot|rotation|attitude)_?([wxyz0-3])")
 POSITION_NAME = re.compile(r"(?:(?:p|t|pos|position|trans|translation)_?)?[xyz](?: \[.*\])?")
 KIND_OF = {UNITS["rad/s"].quantity: ("gyro",), UNITS["m/s2"].quantity: ("acc",), UNITS["T"].quantity: ("mag",)}
-DIGITS = {"0": "qw", "1": "qx", "2": "qy", "3": "qz"}
-GRAVITY = {"m/s2": STANDARD_GRAVITY_M_S2, "g": 1.0, "mg": 1000.0}
+QUATERNION_DIGITS = {"0": "qw", "1": "qx", "2": "qy", "3": "qz"}
+GRAVITY_BY_UNIT = {"m/s2": STANDARD_GRAVITY_M_S2, "g": 1.0, "mg": 1000.0}
 ANGLE_WORDS = {"yaw", "pitch", "roll", "heading", "azimuth", "phi", "theta", "psi", "euler"}
 ROUND_STEPS = (131.0, 65.5, 32.8, 16.4)  # steps per °/s, as data sheets state them
 
@@ -71,7 +71,7 @@ def guess_columns(layout: TableLayout, values: Array, time: Array | None) -> Log
     `time` (n,) is in the layout's unit, None without times. Values may be NaN in rows that belong to other sensors.
     """
     unit_s = 1.0 if layout.time_unit is None else UNITS[layout.time_unit].size
-    rate_hz = LIKELY_HZ if time is None else _mean_rate_hz(unit_s * time)
+    rate_hz = ASSUMED_RATE_HZ if time is None else _mean_rate_hz(unit_s * time)
     quaternion = _find_quaternion(layout, values)
     samples, gaps = _guess_samples(layout, values, quaternion, rate_hz)
     if layout.time is None:
@@ -176,7 +176,7 @@ def find_still(values: Array, rate_hz: float) -> NDArray[np.bool_]:
     if count < 2:
         return np.ones(len(values), dtype=np.bool_)
     scatter = values[: count * width].reshape(count, width, -1).std(axis=1)
-    still = (scatter <= AS_QUIET * np.maximum(np.quantile(scatter, QUIETEST, axis=0), 1e-12)).all(axis=1)
+    still = (scatter <= QUIET_RATIO * np.maximum(np.quantile(scatter, QUIETEST_FRACTION, axis=0), 1e-12)).all(axis=1)
     rows = np.repeat(still, width)
     return np.append(rows, np.full(len(values) - len(rows), rows[-1]))
 
@@ -184,7 +184,7 @@ def find_still(values: Array, rate_hz: float) -> NDArray[np.bool_]:
 def _mean_rate_hz(time_s: Array) -> float:
     steps = np.diff(time_s[np.isfinite(time_s)])
     steps = steps[steps > 0]
-    return 1 / float(np.mean(steps[steps <= np.quantile(steps, 0.99)])) if len(steps) else LIKELY_HZ
+    return 1 / float(np.mean(steps[steps <= np.quantile(steps, 0.99)])) if len(steps) else ASSUMED_RATE_HZ
 
 
 def _plain_name(layout: TableLayout, index: int) -> str:
@@ -275,7 +275,7 @@ def _is_constant(column: Array) -> bool:
 def _is_counter(column: Array) -> bool:
     """Return whether a column rises from row to row, as the numbers of the rows or a second clock do."""
     steps = np.diff(column[np.isfinite(column)])
-    return len(steps) > FEWEST_STEPS and bool((steps >= 0).all() and (steps > 0).mean() > MOST_RISE)
+    return len(steps) > MIN_STEPS and bool((steps >= 0).all() and (steps > 0).mean() > MIN_RISING)
 
 
 def _list_angles(layout: TableLayout) -> list[int]:
@@ -295,7 +295,7 @@ def _find_quaternion(layout: TableLayout, values: Array) -> dict[str, int]:
     for index in layout.numbers:
         name = re.sub(r"[\W_]+", "_", layout.headings[index].lower()).strip("_")
         if (match := QUATERNION_NAME.fullmatch(name)) is not None:
-            named.setdefault(DIGITS.get(match[1], f"q{match[1]}"), index)
+            named.setdefault(QUATERNION_DIGITS.get(match[1], f"q{match[1]}"), index)
     if set(named) == set(QUATERNION) and _have_length_1(values[:, [*named.values()]]):
         return {name: named[name] for name in QUATERNION}
     for start in layout.numbers:
@@ -322,11 +322,11 @@ def _unit_of(kind: str, unit: dict[str, Any], values: Array, still: NDArray[np.b
         return {"unit": unit["unit"]}, ""
     if kind != "g":
         return {"unit": SI_UNITS[kind]}, "the size of its readings fits no unit; check that it is SI"
-    if (values == np.rint(values)).all() and np.abs(values).max() > LARGEST_COUNT:
-        return {"unit": "deg/s", "lsb_per_unit": OPEN}, "steps of a converter: state lsb_per_unit by its data sheet"
+    if (values == np.rint(values)).all() and np.abs(values).max() > MIN_COUNT:
+        return {"unit": "deg/s", "lsb_per_unit": UNSTATED}, "steps of a converter: state lsb_per_unit by its data sheet"
     turned = values - np.median(values[still], axis=0)
     noise = np.median(np.abs(np.diff(values, axis=0)), axis=0).max()  # a steady turn is as quiet as a rest
-    if np.abs(turned).max() > LARGEST_RAD_S or noise > NOISIEST_RAD_S:
+    if np.abs(turned).max() > MAX_RATE_RAD_S or noise > MAX_SCATTER_RAD_S:
         largest = f"{np.abs(values).max():.4g}"
         reason = f"deg/s by size alone (up to {largest}); if these are counts, give factor or lsb_per_unit"
         return {"unit": "deg/s"}, reason
@@ -336,7 +336,7 @@ def _unit_of(kind: str, unit: dict[str, Any], values: Array, still: NDArray[np.b
 def _compare_stated(kind: str, stated: str, values: Array, still: NDArray[np.bool_]) -> tuple[dict[str, Any], str]:
     """Return the unit that the heading states, and a sentence if an accelerometer's norm at rest contradicts it."""
     level = float(np.median(np.linalg.norm(values[still] if still.any() else values, axis=1)))
-    fitting = [unit for unit, size in GRAVITY.items() if abs(level / size - 1) < 0.15]
+    fitting = [unit for unit, size in GRAVITY_BY_UNIT.items() if abs(level / size - 1) < 0.15]
     if kind == "a" and fitting and stated not in fitting:
         return {"unit": fitting[0]}, f"the heading says {stated}, but at rest it reads {level:.4g}, as in {fitting[0]}"
     return {"unit": stated}, ""

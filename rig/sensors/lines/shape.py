@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from rig.errors.quoting import quote, shorten
 from rig.estimation.arrays import Array
-from rig.sensors.lines.decoding import LONGEST_LINE
-from rig.sensors.lines.fields import NUMBER, WORDS
+from rig.sensors.lines.decoding import MAX_LINE_BYTES
+from rig.sensors.lines.fields import MISSING, NUMBER
 
-MOST_NUMBERS = 40  # numbers in a line, at most: the limit of a section
-LARGEST = 1e30  # a larger number is no measurement, and its square overflows
-ENOUGH = 0.6  # fraction of the lines that must be alike
-FEWEST = 30
+MAX_NUMBERS = 40  # in a line: the limit of a section
+MAX_NUMBER = 1e30  # a larger one is no measurement, and its square overflows
+MIN_ALIKE_FRACTION = 0.6  # of the lines
+MIN_LINES = 30
 _NUMBER = re.compile(r"(?<![A-Za-z0-9_.])[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?(?![A-Za-z0-9_])")
 _SUM = re.compile(r"\*([0-9A-Fa-f]{2})$")
 _SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab", "": "space"}
@@ -26,7 +26,7 @@ _CheckedLine = tuple["TimedLine", str, bool]  # a line, its text without checksu
 _AROUND = " \t,;{}[]()|&"
 _COLOURS = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
 _BEFORE_A_NUMBER = re.compile(r"(.*[^0-9.+\-])([-+]?[0-9.]+(?:[eE][-+]?\d+)?)")
-MOSTLY = 0.9  # fraction of a numeric column's fields that are numbers or missing
+MIN_NUMERIC_FRACTION = 0.9  # of a numeric column's fields that are numbers or missing
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,8 +90,8 @@ def _find_number_shape(checked: Sequence[_CheckedLine]) -> Shape:
     separator, prefix, keys = _interpret_texts(common)
     numbers = [_NUMBER.findall(text) for _, text, _ in alike]
     values = np.array(numbers, dtype=np.float64)
-    measured: NDArray[np.bool_] = np.all(np.abs(values) < LARGEST, axis=1)
-    if np.count_nonzero(measured) < ENOUGH * len(checked):
+    measured: NDArray[np.bool_] = np.all(np.abs(values) < MAX_NUMBER, axis=1)
+    if np.count_nonzero(measured) < MIN_ALIKE_FRACTION * len(checked):
         raise NoShape(f"it prints numbers that no sensor measures: {_find_impossible(numbers, values)}")
     arrived_s = np.array([line.arrived_s for line, _, _ in alike])[measured]
     others = [text for (_, text, _), line_texts in zip(checked, texts, strict=True) if line_texts != common]
@@ -112,11 +112,11 @@ def _find_number_shape(checked: Sequence[_CheckedLine]) -> Shape:
 
 def _select_short(checked: list[_CheckedLine]) -> list[_CheckedLine]:
     """Return the lines that are short enough to hold a single sample. Raise NoShape if too few remain."""
-    if len(checked) < FEWEST:
+    if len(checked) < MIN_LINES:
         raise NoShape(f"only {len(checked)} lines came, which is too few to see what they have in common")
-    short = [line for line in checked if len(line[1]) <= LONGEST_LINE]
-    if len(short) < ENOUGH * len(checked):
-        raise NoShape(f"its lines are longer than {LONGEST_LINE} characters")
+    short = [line for line in checked if len(line[1]) <= MAX_LINE_BYTES]
+    if len(short) < MIN_ALIKE_FRACTION * len(checked):
+        raise NoShape(f"its lines are longer than {MAX_LINE_BYTES} characters")
     return short
 
 
@@ -124,20 +124,20 @@ def _find_common(texts: Sequence[tuple[str, ...]]) -> tuple[str, ...]:
     """Return the texts around the numbers of most lines. Raise NoShape."""
     common, count = Counter(texts).most_common(1)[0]
     numbers = len(common) - 1
-    if count < ENOUGH * len(texts):
+    if count < MIN_ALIKE_FRACTION * len(texts):
         raise NoShape(
             f"only {count} of {len(texts)} lines look alike: its lines do not hold one sample each, or are of several "
             "kinds"
         )
     if numbers < 3:
         raise NoShape(f"a line holds {numbers} numbers, but a gyroscope needs three")
-    if numbers > MOST_NUMBERS:
-        raise NoShape(f"a line holds {numbers} numbers, but a section has room for {MOST_NUMBERS}")
+    if numbers > MAX_NUMBERS:
+        raise NoShape(f"a line holds {numbers} numbers, but a section has room for {MAX_NUMBERS}")
     return common
 
 
 def _find_impossible(numbers: Sequence[Sequence[str]], values: Array) -> str:
-    row, column = np.argwhere(~(np.abs(values) < LARGEST))[0]
+    row, column = np.argwhere(~(np.abs(values) < MAX_NUMBER))[0]
     return shorten(numbers[row][column])
 
 
@@ -151,7 +151,7 @@ def _split_by(sign: str, name: str, checked: Sequence[_CheckedLine]) -> Shape | 
     """Return the shape of lines with the separator `sign`, called `name`; None if most lines do not have it."""
     rows = [[field.strip() for field in text.split(sign or None)] for _, text, _ in checked]
     count, frequency = Counter(map(len, rows)).most_common(1)[0]
-    if not 3 <= count <= MOST_NUMBERS or frequency < ENOUGH * len(checked):
+    if not 3 <= count <= MAX_NUMBERS or frequency < MIN_ALIKE_FRACTION * len(checked):
         return None
     alike = [line for line, row in zip(checked, rows, strict=True) if len(row) == count]
     others = [text for (_, text, _), row in zip(checked, rows, strict=True) if len(row) != count]
@@ -199,9 +199,9 @@ def _split_prefix(fields: list[list[str]]) -> tuple[str, list[list[str]]]:
 def _parse_column(fields: Sequence[str]) -> Array | None:
     """Return the numbers (n,) of a column, NaN if missing; None if it holds a text."""
     numbers = np.array([float(field) if NUMBER.fullmatch(field) else np.nan for field in fields])
-    numbers[np.abs(numbers) >= LARGEST] = np.nan
-    missing = sum(field.lower() in WORDS for field in fields)
-    if np.count_nonzero(np.isfinite(numbers)) + missing < MOSTLY * len(fields) or missing == len(fields):
+    numbers[np.abs(numbers) >= MAX_NUMBER] = np.nan
+    missing = sum(field.lower() in MISSING for field in fields)
+    if np.count_nonzero(np.isfinite(numbers)) + missing < MIN_NUMERIC_FRACTION * len(fields) or missing == len(fields):
         return None
     return numbers
 

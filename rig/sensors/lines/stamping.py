@@ -12,16 +12,16 @@ from rig.config.units import UNITS
 from rig.estimation.arrays import Array
 from rig.sensors.errors import SensorError
 
-ODD_SAMPLES = 3  # samples in a row with an impossible time: fewer are damaged, as many are a restart
-COARSE = 0.2  # fraction of the sample interval: a time with coarser steps is smoothed
-SMOOTHED_S = 2.0  # time constant of smoothing arrival times and coarse ones
-ARRIVAL_GAP_S = 0.1  # delay of a line above which one counts as lost
+MAX_ODD_SAMPLES = 3  # in a row with an impossible time: fewer are damaged, as many are a restart
+COARSE_STEP_FRACTION = 0.2  # of the sample interval: a time with coarser steps is smoothed
+SMOOTHING_S = 2.0  # time constant, of arrival times and coarse ones
+MAX_ARRIVAL_DELAY_S = 0.1  # of a line: above it, one counts as lost
 _RESTARTED = "Check its supply and cable, and that its program prints nothing else between; then run again"
 
 
 def is_coarse(step_s: float, rate_hz: float) -> bool:
     """Return whether the step of a printed time is a large part of the sample interval."""
-    return step_s * rate_hz > COARSE
+    return step_s * rate_hz > COARSE_STEP_FRACTION
 
 
 @dataclass(slots=True)
@@ -142,7 +142,7 @@ class Stamper:
                     continue
                 self.odd += 1
                 self._odd_in_a_row += 1
-                if self._odd_in_a_row >= ODD_SAMPLES:
+                if self._odd_in_a_row >= MAX_ODD_SAMPLES:
                     raise SensorError("lines_time_jumped", f"{self.where}: {self._jump(row)}", _RESTARTED)
         finally:
             self._last_time, self._last_sequence = last
@@ -190,7 +190,7 @@ class Stamper:
         if "sequence" in self.section.columns or self._smoothed is None:
             return steps
         late_s = host_time_s - (self._host_began_s or 0.0) - self._smoothed.predict_s(int(steps.sum()))
-        if late_s > max(ARRIVAL_GAP_S, 8 / self.rate_hz):
+        if late_s > max(MAX_ARRIVAL_DELAY_S, 8 / self.rate_hz):
             steps = steps.copy()
             steps[0] += round(late_s * self.rate_hz)
         return steps
@@ -237,7 +237,7 @@ class SmoothedClock:
             self.number, self._time_s = last, input_s
             return np.asarray(input_s - (last - numbers) * self._period_s, np.float64)
         error_s = input_s - self.predict_s(count)
-        gain = 1 - exp(-count * self._period_s / SMOOTHED_S)
+        gain = 1 - exp(-count * self._period_s / SMOOTHING_S)
         self._time_s = max(self.predict_s(count) + gain * error_s, time_before_s + 1e-6 * count)
         self._period_s = max(self._period_s + gain**2 / 4 * error_s / count, 1e-6)
         times_s: Array = time_before_s + (self._time_s - time_before_s) * (numbers - self.number) / count

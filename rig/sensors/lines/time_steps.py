@@ -5,7 +5,7 @@ import numpy as np
 from rig.config.units import UNITS
 from rig.estimation.arrays import Array
 
-GROWS = 2.0  # factor by which the step of a single-precision number grows if the number doubles
+STEP_GROWTH = 2.0  # by which the step of a single-precision number grows if the number doubles
 
 
 def find_time_step_s(printed: Array, decimals: int, unit: str) -> float:
@@ -17,5 +17,5 @@ def find_time_step_s(printed: Array, decimals: int, unit: str) -> float:
     single = np.float32(printed)
     last_bit = float(np.spacing(np.abs(single).max())) if len(printed) else 0.0
     is_single = bool((np.abs(single.astype(np.float64) - printed) <= 0.51 * last_digit).all())
-    step = GROWS * last_bit if is_single and last_bit > last_digit else last_digit
+    step = STEP_GROWTH * last_bit if is_single and last_bit > last_digit else last_digit
     return step * UNITS[unit].size

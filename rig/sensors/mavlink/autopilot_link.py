@@ -11,14 +11,14 @@ from typing import Any
 
 from rig.sensors.errors import SensorError
 from rig.sensors.mavlink.autopilot_port import open_port
-from rig.sensors.mavlink.dialect import ARMED, FIRMWARES, dialect
+from rig.sensors.mavlink.dialect import ARMED_FLAG, FIRMWARES, dialect
 from rig.sensors.mavlink.message_losses import LinkCounter
 from rig.sensors.mavlink.parameter_encoding import AutopilotParameter, decode_float, extract_value
 from rig.sensors.own_port import OwnPort, PortFaults, closing_on_failure, open_device_port
-from rig.sensors.port_silence import USUAL, Patience
+from rig.sensors.port_silence import PATIENCE, Patience
 
 HEARTBEAT_S = 1.0
-OURS = (255, 190)  # system and component of a ground station (mavlink.io, MAV_COMP_ID_MISSIONPLANNER)
+OWN_ADDRESS = (255, 190)  # system and component of a ground station (mavlink.io, MAV_COMP_ID_MISSIONPLANNER)
 GROUND_STATION, NO_AUTOPILOT = 6, 8  # MAV_TYPE_GCS, MAV_AUTOPILOT_INVALID
 SET_INTERVAL, REQUEST_MESSAGE = 511, 512  # MAV_CMD
 AUTOPILOT_VERSION = 148
@@ -52,7 +52,7 @@ class AutopilotLink:
     """
 
     def __init__(
-        self, sensor: str, port: str, baud: int, on_messages: OnMessages | None = None, *, patience: Patience = USUAL
+        self, sensor: str, port: str, baud: int, on_messages: OnMessages | None = None, *, patience: Patience = PATIENCE
     ) -> None:
         """Open the port, and wait for the heartbeat of an autopilot, which must not be armed.
 
@@ -63,7 +63,7 @@ class AutopilotLink:
         self._sensor, self.port, self._baud, self._patience = sensor, port, baud, patience
         self._on_messages = on_messages
         self.wanted: Collection[str] = ()
-        self._parser = self._mavlink.MAVLink(None, srcSystem=OURS[0], srcComponent=OURS[1])
+        self._parser = self._mavlink.MAVLink(None, srcSystem=OWN_ADDRESS[0], srcComponent=OWN_ADDRESS[1])
         self._parser.robust_parsing = True
         self.counter = LinkCounter()
         self.autopilot: Autopilot | None = None
@@ -272,7 +272,7 @@ class AutopilotLink:
         """Store a message's contents by its type: state, parameter, answer or version."""
         match message.get_type():
             case "HEARTBEAT":
-                self.armed = bool(message.base_mode & ARMED)
+                self.armed = bool(message.base_mode & ARMED_FLAG)
             case "PARAM_VALUE":
                 name = message.param_id
                 field = extract_value(bytes(message.get_msgbuf()))

@@ -19,9 +19,9 @@ from rig.sensors.errors import SensorError
 from rig.sensors.mavlink.autopilot_link import AutopilotLink
 from rig.sensors.mavlink.corrections import OnboardCorrection, delay_s, parameter_names, read_correction, refusals
 from rig.sensors.mavlink.imu_readings import (
-    CUT_STEPS,
     INT16_MAX,
     MILLI,
+    TRUNCATION_STEPS,
     UNIT_US,
     Field,
     ImuReading,
@@ -31,16 +31,16 @@ from rig.sensors.mavlink.imu_readings import (
 from rig.sensors.mavlink.message_losses import ImuCounter
 from rig.sensors.mavlink.writing import find_unfinished_change
 from rig.sensors.own_port import closing_on_failure
-from rig.sensors.port_silence import USUAL, Patience
+from rig.sensors.port_silence import PATIENCE, Patience
 from rig.sensors.sample_source import OnSamples
 from rig.sensors.scales import DEGREES_PER_COUNT, fine_axes, thermometer_channels
 from rig.sensors.thermometer import Thermometer
 
-RATE_LOOK = 40  # messages for judging the rate
-RATE_WAIT_S = 20.0
+RATE_MESSAGES = 40  # for judging the rate
+MAX_RATE_WAIT_S = 20.0
 RATE_TOLERANCE = 0.05
-ASKED_FOR, ASKED_S = 10, 2.0  # messages that a check requests one by one, and its wait for them
-WIDEST = 0.98  # fraction of the 16-bit range, because undoing a correction may shift the end of the scale
+MESSAGES, WAIT_S = 10, 2.0  # that a check requests one by one, and its wait for them
+RANGE_FRACTION = 0.98  # of the 16-bit range, because undoing a correction may shift the end of the scale
 
 
 class _ImuStream:
@@ -66,7 +66,7 @@ class _ImuStream:
     @property
     def has_enough_messages(self) -> bool:
         """Whether enough messages came to judge the rate."""
-        return max(len(self.intervals_us), self.without_reading) >= RATE_LOOK
+        return max(len(self.intervals_us), self.without_reading) >= RATE_MESSAGES
 
     def settle(self) -> None:
         """Describe the samples by the fields that the first messages provided."""
@@ -86,7 +86,7 @@ class _ImuStream:
         before_us, first = self.counter.time_us, self.counter.number < 0
         if not self.counter.count(reading.time):
             return None
-        if is_consecutive and not first and len(self.intervals_us) < RATE_LOOK:
+        if is_consecutive and not first and len(self.intervals_us) < RATE_MESSAGES:
             self.intervals_us.append(self.counter.time_us - before_us)
         return self.counter.number, self.counter.time_us, reading
 
@@ -111,7 +111,7 @@ class MavlinkSource:
     """The autopilot's configured IMUs, set up: parameters read, rates requested and confirmed."""
 
     def __init__(
-        self, sections: Mapping[str, SensorSection], on_samples: OnSamples, *, patience: Patience = USUAL
+        self, sections: Mapping[str, SensorSection], on_samples: OnSamples, *, patience: Patience = PATIENCE
     ) -> None:
         """Connect and set up.
 
@@ -173,7 +173,7 @@ class MavlinkSource:
     def _confirm_rates(self) -> None:
         """Raise SensorError unless every IMU's messages come at the requested rate with new readings."""
         imus = self._imus.values()
-        self.link.own_port.wait(lambda: all(imu.has_enough_messages for imu in imus), RATE_WAIT_S)
+        self.link.own_port.wait(lambda: all(imu.has_enough_messages for imu in imus), MAX_RATE_WAIT_S)
         for imu in imus:
             requested_hz, intervals_us = imu.section.rate_hz, imu.intervals_us[1:]
             if imu.without_reading > imu.counter.number:
@@ -252,7 +252,7 @@ def describe(name: str, section: SensorSection, *, provides_temperature: bool = 
 
 
 def mavlink(
-    sections: Mapping[str, SensorSection], on_samples: OnSamples, *, patience: Patience = USUAL
+    sections: Mapping[str, SensorSection], on_samples: OnSamples, *, patience: Patience = PATIENCE
 ) -> closing[MavlinkSource]:
     """Return the source of the IMUs at one port as a context manager. Raise the SensorErrors of `MavlinkSource`."""
     return closing(MavlinkSource(sections, on_samples, patience=patience))
@@ -286,9 +286,9 @@ def _describe_temperature(name: str, section: SensorSection, link: AutopilotLink
     """Yield a sentence on the source of the temperature, unless the first messages provide one."""
     line = mavlink_section(section)
     link.wanted = (line.imu,)
-    for _ in range(ASKED_FOR):
+    for _ in range(MESSAGES):
         link.request(line.imu)
-    done = link.own_port.wait(lambda: sum(message.get_type() == line.imu for message in messages) >= ASKED_FOR, ASKED_S)
+    done = link.own_port.wait(lambda: sum(message.get_type() == line.imu for message in messages) >= MESSAGES, WAIT_S)
     link.wanted = ()  # no interval was changed, so none has to be restored
     readings = [decode_reading(message) for message in messages if message.get_type() == line.imu]
     if not done or any("temperature" in reading.provided for reading in readings):
@@ -313,5 +313,5 @@ def _channel(quantity: Quantity, end_of_scale: float, sent: float | None) -> Cha
     channel = fine_axes(quantity, end_of_scale)
     if sent is None:
         return channel
-    widest = min(end_of_scale, WIDEST * INT16_MAX * sent)
-    return replace(channel, full_scale_counts=round(widest / channel.unit_per_count), step=CUT_STEPS * sent)
+    widest = min(end_of_scale, RANGE_FRACTION * INT16_MAX * sent)
+    return replace(channel, full_scale_counts=round(widest / channel.unit_per_count), step=TRUNCATION_STEPS * sent)

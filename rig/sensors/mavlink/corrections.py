@@ -20,7 +20,7 @@ from rig.sensors.mavlink.dialect import ARDUPILOT
 from rig.sensors.mavlink.orientations import board_rotation
 
 AXES = "XYZ"
-LEAST_CUTOFF_HZ = 5.0  # a slower low-pass filter has not settled when a sweep's steady part begins
+MIN_CUTOFF_HZ = 5.0  # a slower low-pass filter has not settled when a sweep's steady part begins
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,11 +129,11 @@ def refusals(sensor: str, names: ParameterNames, parameters: Mapping[str, float]
             f"Set {names.orientation} to 0 for the calibration, and set it back afterwards",
         )
     for name in names.filters:
-        if 0.0 < parameters[name] < LEAST_CUTOFF_HZ:
+        if 0.0 < parameters[name] < MIN_CUTOFF_HZ:
             yield SensorError(
                 "autopilot_filter_slow",
                 f"{sensor}: {name} is {parameters[name]:g} Hz, too slow to have settled when a turn is measured",
-                f"Set {name} to {LEAST_CUTOFF_HZ:g} or more; ArduPilot's default is 20",
+                f"Set {name} to {MIN_CUTOFF_HZ:g} or more; ArduPilot's default is 20",
             )
     if names.identity is not None and parameters[names.identity] == 0.0:
         yield SensorError(

@@ -6,7 +6,7 @@ from rig.errors.extras import requiring
 
 ARDUPILOT, PX4 = 3, 12  # MAV_AUTOPILOT of a heartbeat
 FIRMWARES = {ARDUPILOT: "ArduPilot", PX4: "PX4"}
-ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED in its base_mode
+ARMED_FLAG = 128  # MAV_MODE_FLAG_SAFETY_ARMED in its base_mode
 
 
 def dialect() -> Any:

@@ -19,7 +19,7 @@ MILLI = 1e-3
 INT16_MAX = 32767
 # Both firmwares assign a float to an integer field, which truncates it toward zero: an integer covers the step beyond
 # it, and 0 all between -1 and 1. So two steps bound the distance of readings that differ.
-CUT_STEPS = 2
+TRUNCATION_STEPS = 2
 UNIT_US = {"HIGHRES_IMU": 1, "RAW_IMU": 1, "SCALED_IMU": 1000, "SCALED_IMU2": 1000, "SCALED_IMU3": 1000}
 
 

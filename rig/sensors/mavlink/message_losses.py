@@ -6,11 +6,13 @@ from dataclasses import dataclass, field
 from rig.sensors.errors import SensorError
 
 SEQUENCE_NUMBERS = 256
-LATE = 64  # a message whose number is at most this far before the newest was overtaken
-REMEMBERED = 64  # recent messages that are compared to detect copies
+MAX_OVERTAKEN = 64  # a message whose number is at most this far before the newest was overtaken
+RECENT_MESSAGES = 64  # compared to detect copies
 TIME_WRAP = 1 << 32
-LONGEST_GAP_US = 60e6  # a longer step is a restarted clock
-MISSING = 1.5  # in intervals between samples: after a longer one a sample is missing, although a scheduler may be late
+MAX_GAP_US = 60e6  # a longer step is a restarted clock
+LOSS_STEP = (
+    1.5  # in intervals between samples: after a longer one a sample is missing, although a scheduler may be late
+)
 
 
 @dataclass(slots=True)
@@ -23,7 +25,7 @@ class LinkCounter:
     lost: int = 0
     doubled: int = 0
     _last: int | None = None
-    _recent: deque[bytes] = field(default_factory=lambda: deque(maxlen=REMEMBERED))
+    _recent: deque[bytes] = field(default_factory=lambda: deque(maxlen=RECENT_MESSAGES))
 
     def is_new(self, sequence: int, frame: bytes) -> bool:
         """Return whether a message, given as the bytes of its frame, is neither a repetition nor late."""
@@ -32,7 +34,7 @@ class LinkCounter:
             return False
         self._recent.append(frame)
         gap = 0 if self._last is None else (sequence - self._last - 1) % SEQUENCE_NUMBERS
-        if gap >= SEQUENCE_NUMBERS - LATE:
+        if gap >= SEQUENCE_NUMBERS - MAX_OVERTAKEN:
             return False
         self.lost += gap
         self._last = sequence
@@ -67,13 +69,13 @@ class ImuCounter:
         if passed_us == 0:  # PX4 repeats a reading if only its compass has a new one
             self.repeated += 1
             return False
-        if passed_us > LONGEST_GAP_US:
+        if passed_us > MAX_GAP_US:
             raise SensorError(
                 "autopilot_restarted",
                 f"sensors.{self.name}: the autopilot's time went from {self._last} to {time} × {self.unit_us} µs",
                 "Look at its supply: it has restarted. Then run again",
             )
-        self.number += max(1, round(passed_us / self.interval_us)) if passed_us > MISSING * self.interval_us else 1
+        self.number += max(1, round(passed_us / self.interval_us)) if passed_us > LOSS_STEP * self.interval_us else 1
         self.time_us += passed_us
         self._last = time
         return True

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from rig.sensors.mavlink.dialect import PX4
 
 REAL32 = 9  # MAV_PARAM_TYPE
-WHOLE = {1: "B", 2: "b", 3: "H", 4: "h", 5: "I", 6: "i"}  # MAV_PARAM_TYPE from UINT8 to INT32, as struct formats
-SINGLE = struct.Struct("<f")
+FORMATS = {1: "B", 2: "b", 3: "H", 4: "h", 5: "I", 6: "i"}  # MAV_PARAM_TYPE from UINT8 to INT32, as struct formats
+FLOAT32 = struct.Struct("<f")
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,22 +26,22 @@ class AutopilotParameter:
     @property
     def value(self) -> float:
         """The value of the four bytes. Raise ValueError for a type that does not fit four bytes."""
-        if self.type in WHOLE and self.firmware == PX4:
-            code = WHOLE[self.type]
+        if self.type in FORMATS and self.firmware == PX4:
+            code = FORMATS[self.type]
             return float(struct.unpack_from(f"<{code}", self.field)[0])
-        if self.type in WHOLE or self.type == REAL32:
-            return float(SINGLE.unpack(self.field)[0])
+        if self.type in FORMATS or self.type == REAL32:
+            return float(FLOAT32.unpack(self.field)[0])
         raise ValueError(f"{self.name} is of type {self.type}, which four bytes cannot hold")
 
 
 def encode_value(value: float) -> bytes:
     """Return the four bytes of a value in single precision, as in a parameter of type REAL32."""
-    return SINGLE.pack(value)
+    return FLOAT32.pack(value)
 
 
 def decode_float(field: bytes) -> float:
     """Return the float that pymavlink decodes from the four bytes of `field`."""
-    return float(SINGLE.unpack(field)[0])
+    return float(FLOAT32.unpack(field)[0])
 
 
 def extract_value(frame: bytes) -> bytes:

@@ -15,7 +15,7 @@ from typing import Any
 
 from rig.config.files.user_folder import rig_folder
 from rig.errors import Refused
-from rig.sensors.mavlink.parameter_encoding import REAL32, WHOLE, AutopilotParameter
+from rig.sensors.mavlink.parameter_encoding import FORMATS, REAL32, AutopilotParameter
 
 SCHEMA = "rig.autopilot/1"
 
@@ -118,7 +118,7 @@ def _read_parameters(document: Mapping[str, Any], firmware: int) -> dict[str, Au
     parameters = {name: AutopilotParameter(str(name), int(entry["type"]), bytes.fromhex(entry["bytes"]), firmware)
              for name, entry in document.items()}  # fmt: skip
     for parameter in parameters.values():
-        if len(parameter.field) != 4 or not (parameter.type in WHOLE or parameter.type == REAL32):
+        if len(parameter.field) != 4 or not (parameter.type in FORMATS or parameter.type == REAL32):
             raise ValueError(f"{parameter.name} is not a parameter")
     return parameters
 

@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 from rig.errors import Problem
 from rig.motion.steps import Motion
-from rig.turners.servo.servo_models import FARTHEST, LONGEST_MS, PULSE_RAD
+from rig.turners.servo.servo_models import MAX_PROFILE_MS, MAX_PULSES, PULSE_RAD
 
-SHORTEST_MS = 20  # shortest profile: a few of the servo's control steps; 0 would mean the fastest motion
+MIN_PROFILE_MS = 20  # a few of the servo's control steps; 0 would mean the fastest motion
 
 
 class ProfileMove(NamedTuple):
@@ -24,7 +24,7 @@ class ProfileMove(NamedTuple):
 
 def move_of(motion: Motion) -> ProfileMove:
     """Return the servo's profile nearest to a motion: the same total duration, and ramps to the nearest unit."""
-    total_ms = max(SHORTEST_MS, round(1000 * motion.duration_s))
+    total_ms = max(MIN_PROFILE_MS, round(1000 * motion.duration_s))
     ramp_ms = min(round(1000 * motion.speed_rad_s / motion.acceleration_rad_s2), total_ms // 2)
     return ProfileMove(round(motion.target_q_rad[0] / PULSE_RAD), total_ms, ramp_ms)
 
@@ -41,17 +41,17 @@ def move_problems(motions: Iterable[Motion], velocity_limit_rad_s: float) -> lis
     for motion in motions:
         move = move_of(motion)
         speed_rad_s = cruise_rad_s(motion.start_q_rad[0], move)
-        if abs(move.goal) > FARTHEST:
+        if abs(move.goal) > MAX_PULSES:
             problem = Problem(
                 "servo_out_of_range",
-                f"{motion.name} ends {move.goal} pulses from zero, but the servo counts {FARTHEST} either way",
+                f"{motion.name} ends {move.goal} pulses from zero, but the servo counts {MAX_PULSES} either way",
                 "Switch the servo off and on, so that it forgets its turns, and plan fewer",
             )
-        elif move.total_ms > LONGEST_MS:
+        elif move.total_ms > MAX_PROFILE_MS:
             problem = Problem(
                 "servo_move_too_long",
                 f"{motion.name} takes {motion.duration_s:.1f} s, but the servo can take at most "
-                f"{1e-3 * LONGEST_MS:.1f} s",
+                f"{1e-3 * MAX_PROFILE_MS:.1f} s",
                 "Turn faster, or fewer turns at a time",
             )
         elif speed_rad_s > velocity_limit_rad_s:

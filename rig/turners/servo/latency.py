@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import serial
 
 DEVICES = Path("/sys/bus/usb-serial/devices")
-BEARABLE_MS = 2
+MAX_LATENCY_MS = 2
 
 
 def lower_latency(port: "serial.Serial", path: str, devices: Path = DEVICES) -> None:
@@ -24,11 +24,11 @@ def lower_latency(port: "serial.Serial", path: str, devices: Path = DEVICES) -> 
     with suppress(ValueError, OSError, AttributeError, NotImplementedError):  # a port without a latency timer
         port.set_low_latency_mode(True)
     timer_ms = _read_ms(timer)
-    if timer_ms is not None and timer_ms > BEARABLE_MS:
+    if timer_ms is not None and timer_ms > MAX_LATENCY_MS:
         with suppress(OSError):
             timer.write_text("1")
         timer_ms = _read_ms(timer)
-    if timer_ms is not None and timer_ms > BEARABLE_MS:
+    if timer_ms is not None and timer_ms > MAX_LATENCY_MS:
         raise Refused(
             "servo_adapter_slow",
             f"the adapter at {path} passes data on only every {timer_ms} ms, and that cannot be changed",

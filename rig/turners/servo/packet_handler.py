@@ -12,20 +12,20 @@ from rig.turners.servo.servo_port import Port
 from rig.turners.servo.servo_registers import RETURN_LEVEL, Register
 
 # The errors of an unplugged port: pyserial's own is an OSError; a port closed meanwhile raises TypeError.
-FAILURES: list[type[Exception]] = [OSError, TypeError]
+PORT_ERRORS: list[type[Exception]] = [OSError, TypeError]
 with suppress(ImportError):  # on Windows
     import termios
 
-    FAILURES.append(termios.error)
-SLACK_S = 0.020  # return delay (0.5 ms as delivered), latency of the adapter, and delays of a busy host
-SETTLE_MOST_S = 0.1  # the longest wait for a line to fall silent
-ATTEMPTS = 4  # a write without acknowledgement is read back, and repeated if it did not take effect
-ALERT = 0x80  # bit of the error byte: Hardware Error Status is not zero. The instruction itself has not failed
+    PORT_ERRORS.append(termios.error)
+TIMEOUT_MARGIN_S = 0.020  # return delay (0.5 ms as delivered), latency of the adapter, and delays of a busy host
+MAX_SETTLING_S = 0.1  # for a line to fall silent
+MAX_ATTEMPTS = 4  # a write without acknowledgement is read back, and repeated if it did not take effect
+ALERT_BIT = 0x80  # of the error byte: Hardware Error Status is not zero. The instruction itself has not failed
 # results of the packet handler; not sent: port busy, failed, wrong instruction
 SUCCESS, NOT_SENT = 0, (-1000, -1001, -2000)
-DAMAGED = -3002
+DAMAGED_PACKET = -3002
 ID, LENGTH, ERROR, DATA = 4, 5, 8, 9  # indices in a status packet of protocol 2.0
-WITHOUT_DATA = 4  # the length of a status packet without data: instruction, error, checksum
+EMPTY_LENGTH = 4  # of a status packet without data: instruction, error, checksum
 
 
 class BusError(Exception):
@@ -64,7 +64,7 @@ class Bus:
         self._gone = False
         self.alert = False  # flag of the newest reply
         try:
-            self._port = Port(path, baud, SLACK_S, clock)
+            self._port = Port(path, baud, TIMEOUT_MARGIN_S, clock)
         except (OSError, ValueError) as error:  # SerialException is an OSError
             raise Refused.from_problem(_no_port(path, baud, error)) from error
         try:
@@ -109,13 +109,13 @@ class Bus:
             while result == SUCCESS and (not reply or reply[ID] != self._id):
                 reply, result = self._packets.rxPacket(self._port, False)
         self._judge(result, reply[ERROR] if result == SUCCESS else 0, register)
-        if reply[LENGTH] + 256 * reply[LENGTH + 1] != register.size + WITHOUT_DATA:  # a late reply to another request
+        if reply[LENGTH] + 256 * reply[LENGTH + 1] != register.size + EMPTY_LENGTH:  # a late reply to another request
             raise ReplyLost(damaged=True)
         return bytes(reply[DATA : DATA + register.size])
 
     def look_up(self, register: Register) -> tuple[int, ...]:
         """Read a register's values, again after a lost reply. Raise ReplyLost, InstructionDenied, PortGone."""
-        for _ in range(ATTEMPTS - 1):
+        for _ in range(MAX_ATTEMPTS - 1):
             try:
                 return self.read(register)
             except ReplyLost:
@@ -129,7 +129,7 @@ class Bus:
         InstructionDenied, PortGone.
         """
         data = register.pack(*values)
-        for attempt in range(ATTEMPTS):
+        for attempt in range(MAX_ATTEMPTS):
             try:
                 with self._failing():
                     result, error = self._packets.writeTxRx(
@@ -139,7 +139,7 @@ class Bus:
                 return
             except ReplyLost:
                 self.settle()
-                if attempt == ATTEMPTS - 1:
+                if attempt == MAX_ATTEMPTS - 1:
                     raise
                 try:
                     if self.read_bytes(register) == data:
@@ -154,25 +154,25 @@ class Bus:
             self._packets.writeTxOnly(self._port, self._id, register.address, register.size, data)
 
     def settle(self) -> None:
-        """Wait until the line has been silent for `SLACK_S`.
+        """Wait until the line has been silent for `TIMEOUT_MARGIN_S`.
 
         Replies do not name their instruction, so a late reply would be taken for the next one. Raise PortGone.
         """
         with self._failing():
             now_s = self.clock.now_s()
-            quiet_s, give_up_s = now_s + SLACK_S, now_s + SETTLE_MOST_S
+            quiet_s, give_up_s = now_s + TIMEOUT_MARGIN_S, now_s + MAX_SETTLING_S
             while (now_s := self.clock.now_s()) < min(quiet_s, give_up_s):
                 if self._port.readPort(1024):
-                    quiet_s = now_s + SLACK_S
+                    quiet_s = now_s + TIMEOUT_MARGIN_S
 
     def _judge(self, result: int, error: int, register: Register) -> None:
         if result in NOT_SENT:
             raise PortGone(f"the packet handler gives {result}")
         if result != SUCCESS:
-            raise ReplyLost(damaged=result == DAMAGED)
-        self.alert = bool(error & ALERT)
-        if error & ~ALERT:
-            raise InstructionDenied(error & ~ALERT, register)
+            raise ReplyLost(damaged=result == DAMAGED_PACKET)
+        self.alert = bool(error & ALERT_BIT)
+        if error & ~ALERT_BIT:
+            raise InstructionDenied(error & ~ALERT_BIT, register)
 
     @contextmanager
     def _failing(self) -> Iterator[None]:
@@ -184,7 +184,7 @@ class Bus:
         except IndexError as error:  # the packet handler reads beyond a reply that is too short
             self._port.is_using = False
             raise ReplyLost(damaged=True) from error
-        except tuple(FAILURES) as error:
+        except tuple(PORT_ERRORS) as error:
             self._gone = True
             raise PortGone(str(error)) from error
 

@@ -20,21 +20,21 @@ from rig.turners.servo.packet_handler import Bus, BusError, InstructionDenied
 from rig.turners.servo.servo_link import Job, ServoLink
 from rig.turners.servo.servo_models import PULSE_RAD
 from rig.turners.servo.servo_preflight import servo_problems
-from rig.turners.servo.servo_registers import TRIPPED, WATCHDOG, WATCHDOG_MOST, WATCHDOG_S
+from rig.turners.servo.servo_registers import WATCHDOG, WATCHDOG_MAX, WATCHDOG_S, WATCHDOG_TRIPPED
 from rig.turners.servo.servo_state import ServoReport, ServoState, stands
 from rig.turners.servo.stopping import SURE, ShaftStop
 from rig.turners.stop_once import StopOnce, StopOutcome, stopping_on_error, tell_of_stop
 from rig.turners.turner import watch_nothing
 
-WATCH_S = 0.02  # the caller's watch is called at least this often
-ARRIVAL_RAD = 15 * PULSE_RAD  # 1.3°: the position error at rest of a servo without an integral gain
+WATCH_PERIOD_S = 0.02  # the caller's watch is called at least this often
+ARRIVAL_TOLERANCE_RAD = 15 * PULSE_RAD  # 1.3°: the position error at rest of a servo without an integral gain
 # longest move: ratio to its planned duration, plus a time for settling ("t4" of the manual)
-SLOWNESS, SLOWNESS_S = 1.1, 1.0
-FIRST_STATE_S = 5.0
-STANDING_S = 3.0  # time within which states must show rest before control is taken
-UNWATCHED_S = 2.0  # time without supervision, after which a move is stopped
-HUNG_S = 1.0  # the link's thread repeats its loop at least this often
-KEPT_S = 1.0  # duration of the buffered states that distinguish rest from motion
+MAX_DURATION_RATIO, SETTLING_TIME_S = 1.1, 1.0
+MAX_FIRST_STATE_S = 5.0
+MAX_REST_PROOF_S = 3.0  # time within which states must show rest before control is taken
+MAX_UNWATCHED_S = 2.0  # without supervision, after which a move is stopped
+MAX_LOOP_S = 1.0  # the link's thread repeats its loop at least this often
+BUFFERED_S = 1.0  # of states that distinguish rest from motion
 NOT_CONTROLLED = StopOutcome(True, "the rig has not moved the servo")
 NOT_ENDED = StopOutcome(False, "the stop has not ended", f"Look at the shaft: {SURE}")
 
@@ -66,9 +66,9 @@ class Servo:
         """
         self._port, self._wanted_model, self._on_state, self._clock = port, model, on_state, clock
         self._id, self._baud, self._period_s = servo_id, baud, 1 / rate_hz
-        self._watchdog = max(1, min(WATCHDOG_MOST, round(watchdog_s / WATCHDOG_S)))
+        self._watchdog = max(1, min(WATCHDOG_MAX, round(watchdog_s / WATCHDOG_S)))
         self._changed = threading.Condition()  # notified when anything below changes
-        self._states: deque[ServoState] = deque(maxlen=round(KEPT_S * rate_hz))
+        self._states: deque[ServoState] = deque(maxlen=round(BUFFERED_S * rate_hz))
         self._problem: Problem | None = None
         self._doing = "the preparation"
         self._holds = False  # this driver may have switched torque on, so it has to stop the shaft
@@ -97,7 +97,7 @@ class Servo:
         stop = ShaftStop(self._link, self._clock, self._watchdog * WATCHDOG_S, self._await_rest, self._lets_go)
         self._stopper = StopOnce("servo stop", stop.carry_out, NOT_ENDED)
         self._link.start()
-        ends_s = self._clock.now_s() + FIRST_STATE_S
+        ends_s = self._clock.now_s() + MAX_FIRST_STATE_S
         self._wait(lambda: bool(self._states) or self._clock.now_s() > ends_s)
         if not self._states:
             raise Refused(
@@ -146,7 +146,7 @@ class Servo:
         """Hold the shaft in place, watchdog armed. Raise Refused for `problems`, or `servo_moves`."""
         self.check()
         refuse(self.problems(carried))
-        ends_s = self._clock.now_s() + STANDING_S
+        ends_s = self._clock.now_s() + MAX_REST_PROOF_S
         self._wait(lambda: stands(list(self._states)) or self._clock.now_s() > ends_s)
         if not stands(list(self._states)):
             raise Refused("servo_moves", "the servo's shaft is moving", "Hold the board still, then start again")
@@ -172,13 +172,13 @@ class Servo:
             self._looked_s, self._moving = self._clock.now_s(), True
             try:
                 self._call(lambda bus: go(bus, move))
-                takes_s = 1e-3 * move.total_ms * SLOWNESS + SLOWNESS_S
+                takes_s = 1e-3 * move.total_ms * MAX_DURATION_RATIO + SETTLING_TIME_S
                 began_s = self.latest.time_s
                 goal_rad = move.goal * PULSE_RAD
 
                 def is_at_goal() -> bool:
                     recent = [state for state in list(self._states) if state.time_s > began_s]
-                    return stands(recent) and abs(recent[-1].q_rad[0] - goal_rad) < ARRIVAL_RAD
+                    return stands(recent) and abs(recent[-1].q_rad[0] - goal_rad) < ARRIVAL_TOLERANCE_RAD
 
                 self._wait(lambda: is_at_goal() or self.latest.time_s > began_s + takes_s, watch)
                 if not is_at_goal():
@@ -255,7 +255,7 @@ class Servo:
     def _why_denied(self, error: InstructionDenied) -> Problem:
         """Return why the servo refused an instruction: usually because the watchdog had stopped the shaft."""
         with suppress(BusError):
-            if self._linked.call(lambda bus: bus.look_up(WATCHDOG), also_stopped=True) == (TRIPPED,):
+            if self._linked.call(lambda bus: bus.look_up(WATCHDOG), also_stopped=True) == (WATCHDOG_TRIPPED,):
                 return problems.watchdog_tripped()
         return problems.refuses(error)
 
@@ -264,7 +264,7 @@ class Servo:
         finished = False
         while not finished:
             with self._changed:
-                self._clock.wait_for(self._changed, lambda: self._problem is not None or done(), WATCH_S)
+                self._clock.wait_for(self._changed, lambda: self._problem is not None or done(), WATCH_PERIOD_S)
                 finished = done()
             self._looked_s = self._clock.now_s()
             self.check()
@@ -273,7 +273,7 @@ class Servo:
     def _thread_problem(self, link: ServoLink) -> Problem | None:
         """Return the problem `driver_hung` if the link's thread hangs, otherwise None."""
         silent_s = self._clock.now_s() - link.turned_s
-        if not link.alive or not computer_load.exceeds(silent_s, HUNG_S):
+        if not link.alive or not computer_load.exceeds(silent_s, MAX_LOOP_S):
             return None
         return problems.driver_hung(silent_s)
 
@@ -288,8 +288,8 @@ class Servo:
             self._fail(error.problem)
         except Exception as error:
             self._fail(problems.state_not_taken(error))
-        if self._moving and computer_load.exceeds(self._clock.now_s() - self._looked_s, UNWATCHED_S):
-            self._fail(problems.move_unsupervised(UNWATCHED_S, self._doing))
+        if self._moving and computer_load.exceeds(self._clock.now_s() - self._looked_s, MAX_UNWATCHED_S):
+            self._fail(problems.move_unsupervised(MAX_UNWATCHED_S, self._doing))
         with self._changed:
             self._changed.notify_all()
 

@@ -23,7 +23,7 @@ from rig.turners.turner_kind import OnState, TurnerKind, Wording
 SHAFT = DenavitHartenberg(theta_rad=(0.0,), a_m=(0.0,), d_m=(0.0,), alpha_rad=(0.0,))
 # One reading of its encoder: steps of 0.088° and a noise of 0.06° (AS5045, data sheet: "transition noise").
 READING_STD_RAD = radians(0.065)
-FARTHEST_RAD = 2 * pi
+MAX_TRAVEL_RAD = 2 * pi
 
 
 def _connect(section: ServoSection, on_state: OnState, log: Path) -> AbstractContextManager[Turner]:
@@ -76,12 +76,12 @@ def _wind_up_problems(plans: Sequence[Plan], report: ServoReport) -> list[Proble
     """Return a problem if the shaft is more than a revolution from home: the cable may be wound up."""
     (angle_rad,) = report.state.q_rad
     distance_rad = max((abs(angle_rad - plan.home_q_rad[0]) for plan in plans), default=0.0)
-    if distance_rad <= FARTHEST_RAD:
+    if distance_rad <= MAX_TRAVEL_RAD:
         return []
     return [
         Problem(
             "servo_wound_up",
-            f"the servo counts {degrees(angle_rad):.0f}°, which is {distance_rad / FARTHEST_RAD:.1f} turns from home",
+            f"the servo counts {degrees(angle_rad):.0f}°, which is {distance_rad / MAX_TRAVEL_RAD:.1f} turns from home",
             "Unwind the cable by hand, with the supply off, and switch it on: the servo forgets its turns then",
         )
     ]

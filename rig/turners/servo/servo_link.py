@@ -12,16 +12,16 @@ from rig.turners.servo import problems
 from rig.turners.servo.packet_handler import Bus, BusError, InstructionDenied, PortGone, ReplyLost
 from rig.turners.servo.servo_models import TICKS, ServoModel
 from rig.turners.servo.servo_preflight import hardware_problem
-from rig.turners.servo.servo_registers import HARDWARE_ERROR, STATE, TORQUE, TRIPPED, WATCHDOG
+from rig.turners.servo.servo_registers import HARDWARE_ERROR, STATE, TORQUE, WATCHDOG, WATCHDOG_TRIPPED
 from rig.turners.servo.servo_state import ServoState, decode
 
-LOST_MOST, SILENCE_S = 5, 0.4  # most states lost in a row, and longest time without a state, that are tolerated
-LOOK_S = 0.1  # period of reading what the state packet lacks: torque and watchdog, alternately
-HELD_UP_S = 0.05  # a longer transaction leaves the time of the position unknown
+MAX_LOST_STATES, MAX_SILENCE_S = 5, 0.4  # in a row, and time without a state, that are tolerated
+SLOW_POLL_S = 0.1  # of what the state packet lacks: torque and watchdog, alternately
+MAX_TRANSACTION_S = 0.05  # a longer one leaves the time of the position unknown
 # Tolerance of the servo's clock relative to ours: with a larger difference the reply is late.
 TICK_S, TICK_FRACTION = 0.005, 0.02
-UNLIKE_MOST = 4  # after more such replies in a row the servo's clock has restarted
-JOB_S = 5.0  # a caller's longest wait for a job
+MAX_UNLIKE_REPLIES = 4  # then the servo's clock has restarted
+MAX_JOB_WAIT_S = 5.0  # of a caller
 
 Job = Callable[[Bus], Any]
 
@@ -103,7 +103,7 @@ class ServoLink:
 
         self._jobs.append(carry_out)
         self._woken.set()
-        if not self._clock.wait(done, JOB_S):
+        if not self._clock.wait(done, MAX_JOB_WAIT_S):
             raise PortGone("the thread that drives the line does not run")
         if "error" in outcome:
             raise outcome["error"]
@@ -123,7 +123,7 @@ class ServoLink:
                 while self._jobs:
                     self._jobs.popleft()()
                 self._poll()
-                if self._clock.now_s() - looked_s > LOOK_S:
+                if self._clock.now_s() - looked_s > SLOW_POLL_S:
                     looked_s = self._clock.now_s()
                     self._look()
                 due_s = max(due_s + self._period_s, self._clock.now_s() - self._period_s)
@@ -160,7 +160,7 @@ class ServoLink:
     def _fresh(self, state: ServoState) -> bool:
         """Return whether the servo's own clock shows that a reply is current."""
         before = self._latest
-        if state.took_s > HELD_UP_S:
+        if state.took_s > MAX_TRANSACTION_S:
             return False
         if before is None:
             return True
@@ -173,7 +173,7 @@ class ServoLink:
             return True
         self._unlike += 1
         self._bus.settle()
-        if self._unlike > UNLIKE_MOST:
+        if self._unlike > MAX_UNLIKE_REPLIES:
             self._unlike = 0
             if self.supervising:
                 self._fail(problems.servo_restarted())
@@ -198,7 +198,7 @@ class ServoLink:
             return
         if register is TORQUE and not value:
             self._fail(hardware_problem(self._error_bits) if self._error_bits else problems.torque_lost())
-        elif register is WATCHDOG and value == TRIPPED:
+        elif register is WATCHDOG and value == WATCHDOG_TRIPPED:
             self._fail(problems.watchdog_tripped())
 
     def _count_lost(self, damaged: bool) -> None:
@@ -206,7 +206,7 @@ class ServoLink:
         self._lost += 1
         self._damaged += damaged
         silent_s = self._clock.now_s() - self._heard_s
-        if self._lost > LOST_MOST and computer_load.exceeds(silent_s, SILENCE_S):
+        if self._lost > MAX_LOST_STATES and computer_load.exceeds(silent_s, MAX_SILENCE_S):
             self._fail(problems.silent(silent_s, mostly_damaged=2 * self._damaged > self._lost))
         try:
             self._bus.settle()

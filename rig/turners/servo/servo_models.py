@@ -10,9 +10,9 @@ from dataclasses import dataclass
 MAKER = "ROBOTIS"
 PULSES = 4096  # pulses per revolution; 12 bits, 0.088°
 PULSE_RAD = 2 * math.pi / PULSES
-FARTHEST = 1_048_575  # pulses in either direction in extended position mode: 256 revolutions
+MAX_PULSES = 1_048_575  # in either direction in extended position mode: 256 revolutions
 SPEED_RAD_S = 0.229 * 2 * math.pi / 60  # unit of Present Velocity and Velocity Limit: 0.229 rev/min
-LONGEST_MS = 32_737  # longest duration of a time-based profile
+MAX_PROFILE_MS = 32_737  # of a time-based profile
 TICKS = 32_768  # Realtime Tick counts milliseconds modulo this
 
 # Smooth motion takes at most a fifth of the stall torque: the maker's performance graphs are measured with a rising

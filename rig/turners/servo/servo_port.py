@@ -13,9 +13,9 @@ import serial
 
 from rig.turners.servo.driver_clock import Clock
 
-WAIT_S = 0.002  # longest wait of a read for its bytes, after which the time-out is checked
+READ_WAIT_S = 0.002  # longest wait of a read for its bytes, after which the time-out is checked
 WRITE_S = 1.0  # a write that takes longer has no receiver; pyserial's time-out includes delays of this program
-BITS = 10  # bits per byte on the line: start, eight, stop
+BITS_PER_BYTE = 10  # on the line: start, eight, stop
 
 
 class Port:
@@ -28,7 +28,7 @@ class Port:
 
     def __init__(self, path: str, baud: int, slack_s: float, clock: Clock) -> None:
         locked = True if "://" not in path else None
-        self.serial = serial.serial_for_url(path, baud, timeout=WAIT_S, write_timeout=WRITE_S, exclusive=locked)
+        self.serial = serial.serial_for_url(path, baud, timeout=READ_WAIT_S, write_timeout=WRITE_S, exclusive=locked)
         self.is_using = False
         self._baud, self._slack_s, self._clock = baud, slack_s, clock
         self._deadline_s = 0.0
@@ -44,7 +44,7 @@ class Port:
     @property
     def byte_s(self) -> float:
         """The duration of a byte, s."""
-        return BITS / self._baud
+        return BITS_PER_BYTE / self._baud
 
     # Called by the packet handler ------------------------------------------------------------------------------
     def getBaudRate(self) -> int:  # noqa: N802

@@ -6,10 +6,10 @@ from rig.errors import Problem
 from rig.motion.carried import FlangeLoad
 from rig.turners.servo.servo_models import LOAD_FRACTION
 from rig.turners.servo.servo_registers import (
-    BY_HEAT,
-    BY_LOAD,
     EXTENDED_POSITION,
     NO_SECONDARY_ID,
+    OVERHEATING_ERROR,
+    OVERLOAD_ERROR,
     TIME_BASED,
     TIMED_FIRMWARE,
     WATCHDOG_FIRMWARE,
@@ -88,7 +88,7 @@ def _settings(report: ServoReport) -> list[Problem]:
                 "Set Secondary ID (12) to 255",
             )
         )
-    if report.shutdown & (BY_HEAT | BY_LOAD) != BY_HEAT | BY_LOAD:
+    if report.shutdown & (OVERHEATING_ERROR | OVERLOAD_ERROR) != OVERHEATING_ERROR | OVERLOAD_ERROR:
         problems.append(
             Problem(
                 "servo_unprotected",
@@ -155,9 +155,9 @@ def _load(report: ServoReport, carried: FlangeLoad) -> list[Problem]:
 def hardware_problem(bits: int) -> Problem:
     """Return the problem by the most serious bit of a hardware error."""
     what = f"the servo reports {error_words(bits)}"
-    if bits & BY_LOAD:
+    if bits & OVERLOAD_ERROR:
         remedy = "Find what blocked the shaft; hold the board, and switch the servo off and on"
         return Problem("servo_overload", what, remedy)
-    if bits & BY_HEAT:
+    if bits & OVERHEATING_ERROR:
         return Problem("servo_overheated", what, "Let it cool; hold the board, and switch the servo off and on")
     return Problem("servo_hardware_error", what, "Check its supply; hold the board, and switch the servo off and on")

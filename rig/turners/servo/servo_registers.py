@@ -52,15 +52,15 @@ WATCHDOG_FIRMWARE, TIMED_FIRMWARE, STARTUP_FIRMWARE = 38, 42, 45
 EXTENDED_POSITION = 4  # Operating Mode: ±256 revolutions
 TIME_BASED = 4  # Drive Mode: bit 2 alone; ccw counts up, and only Torque Enable switches torque on
 NO_SECONDARY_ID = 253  # IDs from this one on mean "none"
-WATCHDOG_S, WATCHDOG_MOST, TRIPPED = 0.020, 127, 255
+WATCHDOG_S, WATCHDOG_MAX, WATCHDOG_TRIPPED = 0.020, 127, 255
 # bits of Shutdown and Hardware Error Status
-BY_VOLTAGE, BY_HEAT, BY_ENCODER, BY_SHOCK, BY_LOAD = 0x01, 0x04, 0x08, 0x10, 0x20
+VOLTAGE_ERROR, OVERHEATING_ERROR, ENCODER_ERROR, SHOCK_ERROR, OVERLOAD_ERROR = 0x01, 0x04, 0x08, 0x10, 0x20
 ERROR_WORDS = {
-    BY_VOLTAGE: "input voltage",
-    BY_HEAT: "overheating",
-    BY_ENCODER: "encoder",
-    BY_SHOCK: "electrical shock",
-    BY_LOAD: "overload",
+    VOLTAGE_ERROR: "input voltage",
+    OVERHEATING_ERROR: "overheating",
+    ENCODER_ERROR: "encoder",
+    SHOCK_ERROR: "electrical shock",
+    OVERLOAD_ERROR: "overload",
 }
 
 

@@ -22,8 +22,8 @@ SERVO_FIELDS = (
 )
 SERVO_STATE_DTYPE = state_dtype(1, SERVO_FIELDS)
 JOINTS = ("shaft",)
-STILL_S, STILL_STATES = 0.15, 5  # duration and number of the states that show a shaft at rest
-STILL_RAD = 6.5 * PULSE_RAD  # range of its angles: a shaft at rest dithers by ±3 pulses (forum.robotis.com 7582)
+REST_PROOF_S, REST_PROOF_STATES = 0.15, 5  # duration and number of the states that show a shaft at rest
+REST_RANGE_RAD = 6.5 * PULSE_RAD  # of its angles: a shaft at rest dithers by ±3 pulses (forum.robotis.com 7582)
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,15 +85,15 @@ def decode(
 
 
 def stands(states: Sequence[ServoState]) -> bool:
-    """Return whether the newest `STILL_STATES` of `states`, in order, show a shaft at rest."""
-    if len(states) < STILL_STATES:
+    """Return whether the newest `REST_PROOF_STATES` of `states`, in order, show a shaft at rest."""
+    if len(states) < REST_PROOF_STATES:
         return False
     newest = states[-1]
-    lately = sum(newest.time_s - state.time_s <= STILL_S for state in states)
-    recent = states[-max(lately, STILL_STATES) :]
-    covered = newest.time_s - states[0].time_s >= STILL_S
+    lately = sum(newest.time_s - state.time_s <= REST_PROOF_S for state in states)
+    recent = states[-max(lately, REST_PROOF_STATES) :]
+    covered = newest.time_s - states[0].time_s >= REST_PROOF_S
     angles = [state.q_rad[0] for state in recent]
-    return covered and not any(state.moving for state in recent) and max(angles) - min(angles) <= STILL_RAD
+    return covered and not any(state.moving for state in recent) and max(angles) - min(angles) <= REST_RANGE_RAD
 
 
 @dataclass(frozen=True, slots=True)

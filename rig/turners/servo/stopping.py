@@ -16,11 +16,11 @@ from rig.turners.servo.driver_clock import Clock
 from rig.turners.servo.instructions import brake
 from rig.turners.servo.packet_handler import Bus, BusError, InstructionDenied
 from rig.turners.servo.servo_link import ServoLink
-from rig.turners.servo.servo_registers import TRIPPED, WATCHDOG
+from rig.turners.servo.servo_registers import WATCHDOG, WATCHDOG_TRIPPED
 from rig.turners.stop_once import StopOutcome
 
-STOP_S = 0.95  # a stop is confirmed within this time, or not at all
-ACKNOWLEDGE_S = 0.25  # the longest wait for an acknowledgement
+MAX_STOP_S = 0.95  # a stop is confirmed within this time, or not at all
+MAX_ACKNOWLEDGE_S = 0.25
 SURE = "only the switch of its supply is sure"
 
 
@@ -45,7 +45,7 @@ class ShaftStop:
     def carry_out(self) -> StopOutcome:
         """Stop the shaft and return its state, within 1 s."""
         clock = self._clock
-        since_s, ends_s = clock.reference_s(), clock.now_s() + STOP_S
+        since_s, ends_s = clock.reference_s(), clock.now_s() + MAX_STOP_S
         acknowledged = threading.Event()
         answer, refused = "the servo did not acknowledge the stop", False
 
@@ -64,7 +64,7 @@ class ShaftStop:
                 self._link.keep_quiet(2 * self._watchdog_s)
 
         self._link.stop(send_stop)
-        if not clock.wait(acknowledged, ACKNOWLEDGE_S):
+        if not clock.wait(acknowledged, MAX_ACKNOWLEDGE_S):
             self._link.keep_quiet(2 * self._watchdog_s)
         stands = self._await_rest(since_s, ends_s - clock.now_s())
         refusal = f" ({answer})" if refused else ""
@@ -82,4 +82,4 @@ class ShaftStop:
 
 def _has_tripped(bus: Bus) -> bool:
     """Return whether the watchdog has stopped the servo, which then refuses goals."""
-    return bus.read(WATCHDOG) == (TRIPPED,)
+    return bus.read(WATCHDOG) == (WATCHDOG_TRIPPED,)

@@ -29,29 +29,29 @@ from rig.turners.ur.child_messages import (
     ScriptStarted,
     TakeControl,
 )
-from rig.turners.ur.condition import MAKERS_SIMULATOR, local_control, payload_refused, readiness
+from rig.turners.ur.condition import SIMULATOR_HOSTS, local_control, payload_refused, readiness
 from rig.turners.ur.control_watch import ControlWatch
 from rig.turners.ur.controller.robot_api import PORT as ROBOT_API_PORT
 from rig.turners.ur.controller.robot_api import RobotApi
-from rig.turners.ur.controller_answers import ANSWER_S, read_report, reports_local_control, stop_problem
+from rig.turners.ur.controller_answers import OPEN_PORT_TIMEOUT_S, read_report, reports_local_control, stop_problem
 from rig.turners.ur.identity import is_polyscope_x
 from rig.turners.ur.stopping.stop import ArmStop, StopOrder
 from rig.turners.ur.stopping.stop_paths import StopPath, stop_paths
 from rig.turners.ur.stopping.stop_trial import stop_trial
 from rig.turners.ur.supervision import ControlStage, Supervision, describe_early_end
 
-WATCH_S = 0.02  # the caller's watch is called at least this often
-ARRIVAL_RAD = 0.01  # the joint servo's ripple and lag stay below this
+WATCH_PERIOD_S = 0.02  # the caller's watch is called at least this often
+ARRIVAL_TOLERANCE_RAD = 0.01  # the joint servo's ripple and lag stay below this
 START_S = 5.0  # a move begins within this wall time, or not at all
 LAST_STOP_S = 0.8  # time for one more stop order if no state has confirmed the stop
-SLOWNESS = 1.1  # longest move, relative to its planned duration
-SLOWNESS_S = 1.0  # additional time of a move, on the controller's clock
-REPORT_S = 5.0  # wall time to report a move, once the arm has reached its target
-SILENCE_S = 0.8  # after a longer silence the controller may have lost the client
-SETTLED_S = 2.0  # after this wall time an arm that was not at rest for a moment moves
-REASON_S = 0.2  # a failure waits this long (wall time) for its explanation
+MAX_DURATION_RATIO = 1.1  # of a move to its planned duration
+SETTLING_TIME_S = 1.0  # additional time of a move, on the controller's clock
+MAX_REPORT_S = 5.0  # wall time to report a move, once the arm has reached its target
+MAX_SILENCE_S = 0.8  # after a longer silence the controller may have lost the client
+MAX_SETTLING_S = 2.0  # after this wall time an arm that was not at rest for a moment moves
+MAX_REASON_WAIT_S = 0.2  # a failure waits this long (wall time) for its explanation
 OUR_PROGRAM = "rtde_control"  # the client's name for it
-NOT_BEGUN = ("not_in_remote_control", "registers_in_use")  # reasons for which the client could not start a program
+START_REFUSALS = ("not_in_remote_control", "registers_in_use")  # for which the client could not start a program
 NOT_CONTROLLED = StopOutcome(True, "the rig has not moved the arm")
 NOT_ENDED = StopOutcome(False, "the stop has not ended", "Look at the arm")
 
@@ -124,11 +124,11 @@ class Arm:
     def report(self) -> ArmReport:
         """Return what the controller reports about its arm, for the pre-flight check.
 
-        An arm that settles or vibrates seems to move at moments. So wait up to `SETTLED_S` for a state at rest.
+        An arm that settles or vibrates seems to move at moments. So wait up to `MAX_SETTLING_S` for a state at rest.
         """
         self.check()
         with self._changed:
-            self._changed.wait_for(lambda: self.latest.at_rest or self._link.ended, SETTLED_S)
+            self._changed.wait_for(lambda: self.latest.at_rest or self._link.ended, MAX_SETTLING_S)
         return read_report(self._host, self._controller, self.latest, self._robot_api_port)
 
     def check(self) -> None:
@@ -190,8 +190,8 @@ class Arm:
             self._wait(lambda: self._answer is not None or time.monotonic() > asked_s + START_S, watch)
             if self._answer is None:
                 self._fail(self._unbegun(_not_started(motion)))
-            takes_s = motion.duration_s * SLOWNESS + SLOWNESS_S
-            deadline_s, reported_s = self.latest.time_s + takes_s, time.monotonic() + takes_s + REPORT_S
+            takes_s = motion.duration_s * MAX_DURATION_RATIO + SETTLING_TIME_S
+            deadline_s, reported_s = self.latest.time_s + takes_s, time.monotonic() + takes_s + MAX_REPORT_S
 
             def is_late() -> bool:
                 """Return whether the move takes too long on the controller's clock, allowing time for the report."""
@@ -282,14 +282,14 @@ class Arm:
         return stop_paths(self._host, self._controller.version, self._robot_api_port)
 
     def _watch_control(self) -> None:
-        if self._host not in MAKERS_SIMULATOR:
+        if self._host not in SIMULATOR_HOSTS:
             version, newest_s = self._controller.version, lambda: self.latest.host_time_s
             self._watch = ControlWatch(self._host, version, self._robot_api_port, newest_s, self._fail_meanwhile)
             self._watch.start()
 
     def _prove_the_stop(self) -> None:
         """Test the stop. Raise Refused as `stop_trial` explains if the arm cannot be stopped without the client."""
-        problem = stop_trial(self._host, RobotApi(self._host, self._robot_api_port, ANSWER_S), self._shows)
+        problem = stop_trial(self._host, RobotApi(self._host, self._robot_api_port, OPEN_PORT_TIMEOUT_S), self._shows)
         if problem is not None:
             self._holds_arm = False
             raise Refused.from_problem(readiness(self.latest) or problem)
@@ -305,7 +305,7 @@ class Arm:
         if not isinstance(self._answer, RequestFailed):
             return
         problem = self._answer.problem
-        if problem.name in NOT_BEGUN:
+        if problem.name in START_REFUSALS:
             self._holds_arm = False
             raise Refused.from_problem(problem)
         if problem.name == "control_not_taken" and self._watch and OUR_PROGRAM in self._watch.stopped_programs:
@@ -319,7 +319,7 @@ class Arm:
         if watch is None or problem.name != "program_stopped":
             return problem
         with self._changed:
-            self._changed.wait_for(lambda: watch.exception is not None, REASON_S)
+            self._changed.wait_for(lambda: watch.exception is not None, MAX_REASON_WAIT_S)
         if watch.exception is None:
             return problem
         if self._sets_payload and self._supervision.stage is ControlStage.PREPARING:
@@ -336,18 +336,18 @@ class Arm:
         finished = False
         while not finished:
             with self._changed:
-                self._changed.wait_for(lambda: self._problem is not None or done(), WATCH_S)
+                self._changed.wait_for(lambda: self._problem is not None or done(), WATCH_PERIOD_S)
                 finished = done()
             self.check()
             watch()
 
     def _wait_for_reason(self) -> None:
         with self._changed:
-            self._changed.wait_for(lambda: self._problem is not None, REASON_S)
+            self._changed.wait_for(lambda: self._problem is not None, MAX_REASON_WAIT_S)
 
     def _unbegun(self, problem: Problem) -> Problem:
         """Return why a move did not begin: the controller refused it, or lost the client during a silence."""
-        if self._silent_s <= SILENCE_S:
+        if self._silent_s <= MAX_SILENCE_S:
             return problem
         what = f"the arm at {self._host} was silent for {self._silent_s:.1f} s, and {problem.what}"
         return link_lost(what)
@@ -360,7 +360,7 @@ class Arm:
     def _stands_at(self, motion: Motion) -> bool:
         """Return whether the arm is at rest at the end of the motion."""
         distance_rad = max(map(abs, travel(self.latest.q_rad, motion.target_q_rad)))
-        return self.latest.at_rest and distance_rad < ARRIVAL_RAD
+        return self.latest.at_rest and distance_rad < ARRIVAL_TOLERANCE_RAD
 
     def _take(self, message: Message) -> None:
         """Handle a message of the child, on the link's reader thread."""

@@ -15,7 +15,7 @@ from rig.motion.preflight import find_travel_to_home
 from rig.motion.steps import Plan
 from rig.motion.turner_state import JOINT_NAMES, TurnerIdentity
 from rig.turners.ur.arm_report import MAKER, ArmReport
-from rig.turners.ur.condition import MAKERS_SIMULATOR, local_control, readiness
+from rig.turners.ur.condition import SIMULATOR_HOSTS, local_control, readiness
 from rig.turners.ur.controller.free_registers import registers_in_use
 from rig.turners.ur.identity import identify_model, identity_problems
 from rig.turners.ur.plan_problems import plan_problems
@@ -58,7 +58,7 @@ def arm_problems(plan: Plan, report: ArmReport) -> list[Problem]:
     if unready := readiness(report.state):
         problems.append(unready)
     # The client skips this check at the loopback address of the robot's own simulator, and so does the pendant.
-    if report.remote_control is False and report.host not in MAKERS_SIMULATOR:
+    if report.remote_control is False and report.host not in SIMULATOR_HOSTS:
         problems.append(local_control(report.host))
     if report.program_running:
         problems.append(

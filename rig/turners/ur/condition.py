@@ -6,7 +6,7 @@ from rig.motion.turner_state import ArmState, RobotMode, RuntimeState, SafetyMod
 
 # The slider is reported as a fraction; anything below 99.9 % stretches a sweep measurably.
 FULL_SPEED_FRACTION = 0.999
-MAKERS_SIMULATOR = ("127.0.0.1", "localhost")  # hosts at which the client skips the check of remote control
+SIMULATOR_HOSTS = ("127.0.0.1", "localhost")  # at which the client skips the check of remote control
 
 LIMITED_REMEDY = (
     "Widen that limit in the arm's safety settings (speed of tool, elbow or joint, momentum, power, a safety plane), "

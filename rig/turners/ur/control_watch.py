@@ -21,10 +21,10 @@ from rig.turners.ur.controller.primary_interface import PORT, ROBOT_MESSAGE, pac
 from rig.turners.ur.controller.robot_api import RobotApi
 from rig.turners.ur.identity import is_polyscope_x
 
-ASK_S = 0.5  # period of polling the control mode
-LOOK_S = 0.1  # time within which the thread ends after `close`
-ANSWER_S = 0.8
-GONE_S, CLOSED_S = 1.0, 0.25  # time for which states must continue to show that only the port is gone, or has closed
+POLL_S = 0.5  # of the control mode
+CLOSING_S = 0.1  # time within which the thread ends after `close`
+MAX_ANSWER_S = 0.8
+GONE_PROOF_S, CLOSED_PROOF_S = 1.0, 0.25  # for which states must show that only the port is gone, or has closed
 
 Remote = bool | None  # None: unknown to the controller
 ControlMode = Remote | Literal["gone"]
@@ -46,7 +46,7 @@ class ControlWatch:
     ) -> None:
         self._host = host
         self._is_x = is_polyscope_x(version)
-        self._api = RobotApi(host, robot_api_port, ANSWER_S)
+        self._api = RobotApi(host, robot_api_port, MAX_ANSWER_S)
         self._newest_s, self._on_problem = newest_s, on_problem
         self._dashboard: Dashboard | None = None
         self._primary: socket.socket | None = None
@@ -66,7 +66,7 @@ class ControlWatch:
         """End the thread."""
         self._ending.set()
         if self._thread.ident is not None and self._thread is not threading.current_thread():
-            self._thread.join(2 * ANSWER_S)
+            self._thread.join(2 * MAX_ANSWER_S)
 
     def _run(self) -> None:
         """Watch control mode and primary interface until the end, or until a problem is found."""
@@ -95,13 +95,13 @@ class ControlWatch:
             self._gone_since_s = None
             return None
         self._gone_since_s = self._gone_since_s or time.monotonic()
-        if not self._lasts(self._gone_since_s, GONE_S):
+        if not self._lasts(self._gone_since_s, GONE_PROOF_S):
             return None
         return _no_port_to_stop(self._host, "primary interface" if self._is_x else "dashboard and primary interface")
 
     def _has_lost_primary_alone(self) -> bool:
         """Return whether the primary interface has closed its connection although states continue."""
-        return self._closed_s is not None and self._lasts(self._closed_s, CLOSED_S)
+        return self._closed_s is not None and self._lasts(self._closed_s, CLOSED_PROOF_S)
 
     def _lasts(self, since_s: float, duration_s: float) -> bool:
         """Return whether states have continued for `duration_s` since `since_s`."""
@@ -113,7 +113,7 @@ class ControlWatch:
             return self._api.is_in_remote_control()
         for _ in range(2):  # some controllers close the connection on the change to local control; ask once more
             try:
-                self._dashboard = self._dashboard or Dashboard(self._host, ANSWER_S)
+                self._dashboard = self._dashboard or Dashboard(self._host, MAX_ANSWER_S)
                 return self._dashboard.is_in_remote_control()
             except OSError:
                 if self._dashboard is not None:
@@ -122,17 +122,17 @@ class ControlWatch:
         return "gone"
 
     def _listen(self, remote: ControlMode) -> None:
-        """Read messages of the primary interface for `ASK_S`; return at once if it closes."""
-        ends_s = time.monotonic() + ASK_S
+        """Read messages of the primary interface for `POLL_S`; return at once if it closes."""
+        ends_s = time.monotonic() + POLL_S
         # One that hides its control mode accepts connections in local control too, so a new one proves nothing.
         may_open = not (self._is_x and remote is None and self._closed_s is not None)
         if self._primary is None and may_open:
             with suppress(OSError):
-                self._primary = socket.create_connection((self._host, PORT), ANSWER_S)
+                self._primary = socket.create_connection((self._host, PORT), MAX_ANSWER_S)
                 self._buffer.clear()
         while self._primary is not None and not self._ending.is_set() and time.monotonic() < ends_s:
             try:
-                self._primary.settimeout(LOOK_S)
+                self._primary.settimeout(CLOSING_S)
                 self._hear(self._primary)
             except TimeoutError:
                 continue
@@ -141,7 +141,7 @@ class ControlWatch:
                 self._primary, self._closed_s = None, time.monotonic()
                 return
         if self._primary is None:
-            self._ending.wait(ASK_S)
+            self._ending.wait(POLL_S)
 
     def _hear(self, primary: socket.socket) -> None:
         """Record messages about ended programs. Raise `OSError` if the connection has closed."""

@@ -11,7 +11,7 @@ from rig.errors import Problem, Refused
 from rig.motion.turner_state import ArmState, RuntimeState
 from rig.turners.ur.arm_report import ArmReport
 from rig.turners.ur.child_messages import Connected
-from rig.turners.ur.condition import MAKERS_SIMULATOR
+from rig.turners.ur.condition import SIMULATOR_HOSTS
 from rig.turners.ur.controller.dashboard import Dashboard
 from rig.turners.ur.controller.free_registers import find_free_half
 from rig.turners.ur.controller.primary_interface import ArmDescription, read_description
@@ -19,8 +19,8 @@ from rig.turners.ur.controller.primary_stop import PrimaryStop
 from rig.turners.ur.controller.robot_api import RobotApi
 from rig.turners.ur.identity import identify_model, is_polyscope_x, series_problem
 
-LOOK_S = 1.0  # time-out of a port that may be closed
-ANSWER_S = 5.0  # time-out of an open port while nothing moves
+CLOSED_PORT_TIMEOUT_S = 1.0  # of a port that may be closed
+OPEN_PORT_TIMEOUT_S = 5.0  # while nothing moves
 NOT_REPORTED = "not reported"
 
 
@@ -28,7 +28,7 @@ def stop_problem(host: str, version: tuple[int, ...]) -> Problem | None:
     """Return why the rig could not stop the arm at this controller without its client; None if it could."""
     interface = PrimaryStop if is_polyscope_x(version) else Dashboard
     try:
-        interface(host, LOOK_S).close()
+        interface(host, CLOSED_PORT_TIMEOUT_S).close()
     except OSError as error:
         return series_problem(host, version) or _describe_closed_port(interface, host, error)
     return None
@@ -38,7 +38,7 @@ def no_states(host: str, error: OSError) -> Problem:
     """Describe a host that sends no states: no arm answers, or only the arm's other ports answer."""
     for interface in (Dashboard, PrimaryStop):
         try:
-            interface(host, LOOK_S).close()
+            interface(host, CLOSED_PORT_TIMEOUT_S).close()
         except OSError:
             continue
         return Problem(
@@ -55,10 +55,10 @@ def no_states(host: str, error: OSError) -> Problem:
 
 def reports_local_control(host: str, version: tuple[int, ...]) -> bool:
     """Return whether a dashboard reports local control. Other controllers show it in the trial of the stop."""
-    if is_polyscope_x(version) or host in MAKERS_SIMULATOR:
+    if is_polyscope_x(version) or host in SIMULATOR_HOSTS:
         return False
     try:
-        with Dashboard(host, ANSWER_S) as dashboard:
+        with Dashboard(host, OPEN_PORT_TIMEOUT_S) as dashboard:
             return dashboard.is_in_remote_control() is False
     except OSError:
         return False
@@ -84,10 +84,10 @@ def read_report(host: str, connected: Connected, state: ArmState, robot_api_port
         registers_free=_has_free_registers(host, connected.version),
     )
     if is_polyscope_x(connected.version):
-        complete = _add_robot_api_answers(report, RobotApi(host, robot_api_port, LOOK_S))
+        complete = _add_robot_api_answers(report, RobotApi(host, robot_api_port, CLOSED_PORT_TIMEOUT_S))
     else:
         try:
-            with closing(Dashboard(host, ANSWER_S)) as dashboard:
+            with closing(Dashboard(host, OPEN_PORT_TIMEOUT_S)) as dashboard:
                 complete = _add_dashboard_answers(report, dashboard)
         except OSError as error:
             raise Refused.from_problem(_describe_closed_port(Dashboard, host, error)) from error
@@ -112,7 +112,7 @@ def _add_robot_api_answers(report: ArmReport, api: RobotApi) -> ArmReport:
 def _read_description(host: str) -> ArmDescription:
     """Return the controller's description of its arm, empty if the primary interface is closed."""
     try:
-        return read_description(host, ANSWER_S)
+        return read_description(host, OPEN_PORT_TIMEOUT_S)
     except OSError:
         return ArmDescription()
 
@@ -120,7 +120,7 @@ def _read_description(host: str) -> ArmDescription:
 def _has_free_registers(host: str, version: tuple[int, ...]) -> bool | None:
     """Return whether a half of the registers is free for the client; None without an answer of the controller."""
     try:
-        return find_free_half(host, version, LOOK_S) is not None
+        return find_free_half(host, version, CLOSED_PORT_TIMEOUT_S) is not None
     except OSError:
         return None
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from rig.config.models import ArmSection
 
 E_SERIES, POLYSCOPE_X = 5, 10  # first major versions of their software; the CB3 series has 3
-POLYSCOPE_X_SINCE = (10, 10)  # earlier versions may not take programs and stops at their primary interface
+POLYSCOPE_X_MIN_VERSION = (10, 10)  # earlier versions may not take programs and stops at their primary interface
 E_SERIES_MODELS = {
     1: "UR5e or UR7e",  # same construction, different payloads
     2: "UR10e or UR12e",  # same construction, same payload
@@ -32,7 +32,7 @@ E_SERIES_MODELS = {
 }
 CB3_MODELS = {1: "UR5", 2: "UR10", 3: "UR3"}
 LENGTH_TOLERANCE_M = 0.01  # a factory's measurement differs from the drawing by a few millimetres
-OTHER_ARM = "Correct arm.host, or name the arm that is there in arm.model"
+OTHER_ARM_REMEDY = "Correct arm.host, or name the arm that is there in arm.model"
 
 
 def version_text(version: tuple[int, ...]) -> str:
@@ -59,8 +59,8 @@ def series_problem(host: str, version: tuple[int, ...]) -> Problem | None:
 
     For a configured arm of the CB3 series, `cb3_not_supported` does not apply.
     """
-    if is_polyscope_x(version) and version < POLYSCOPE_X_SINCE:
-        since = ".".join(map(str, POLYSCOPE_X_SINCE))
+    if is_polyscope_x(version) and version < POLYSCOPE_X_MIN_VERSION:
+        since = ".".join(map(str, POLYSCOPE_X_MIN_VERSION))
         return Problem(
             "polyscope_x",
             f"the controller at {host} is a PolyScope X {version_text(version)}, and the rig can stop an arm "
@@ -139,4 +139,4 @@ def _mismatch(arm: "ArmSection", report: ArmReport, why: str) -> Problem:
     model = identify_model(report) or "arm that is not known"
     with_article = f"an {model}" if model.startswith("arm") else f"a {model}"
     what = f"the controller at {report.host} is {with_article}; configured is {arm.model} ({why})"
-    return Problem("other_arm", what, OTHER_ARM)
+    return Problem("other_arm", what, OTHER_ARM_REMEDY)

@@ -10,9 +10,9 @@ from rig.estimation.arrays import Array
 from rig.motion.steps import Motion, Sweep, travel
 from rig.motion.turner_state import JOINT_NAMES, JointLimits, Joints
 
-OURS, THEIRS = "the limit", "the controller's limit"
-WIDER = ", or widen that limit in the arm's safety settings"
-ROUNDING = 1e-6  # tolerance relative to a limit
+RIG_LIMIT, CONTROLLER_LIMIT = "the limit", "the controller's limit"
+REMEDY = ", or widen that limit in the arm's safety settings"
+LIMIT_TOLERANCE = 1e-6  # relative
 
 
 def motion_problems(motion: Motion, ours: JointLimits, theirs: JointLimits | None) -> list[Problem]:
@@ -40,7 +40,7 @@ def _position_problems(motion: Motion, ours: JointLimits, theirs: JointLimits | 
                     "joint_limit",
                     f"{motion.name} takes {name} from {math.degrees(low):.1f}° to {math.degrees(high):.1f}°, beyond "
                     f"{beyond if narrow else f'±{math.degrees(most):g}°'}",
-                    f"{_describe_remedy(motion, joint, (-least, greatest))}{WIDER if narrow else ''}",
+                    f"{_describe_remedy(motion, joint, (-least, greatest))}{REMEDY if narrow else ''}",
                 )
             )
     return problems
@@ -69,7 +69,7 @@ def _speed_problems(motion: Motion, ours_rad_s: Joints, theirs_rad_s: Joints | N
         Problem(
             "joint_speed",
             f"{motion.name} turns {name} at {math.degrees(speed):.1f}°/s; {whose} is {math.degrees(limit):.1f}°/s",
-            f"Lower procedure.speed_deg_s or arm.transfer_speed_deg_s{WIDER if whose == THEIRS else ''}",
+            f"Lower procedure.speed_deg_s or arm.transfer_speed_deg_s{REMEDY if whose == CONTROLLER_LIMIT else ''}",
         )
         for name, speed, limit, whose in _find_excess(motion.speed_rad_s * _fractions(motion), ours_rad_s, theirs_rad_s)
     ]
@@ -106,4 +106,4 @@ def _fractions(motion: Motion) -> Array:
 
 def _narrower(ours: float, theirs: float | None) -> tuple[float, str]:
     """Return the narrower of the model's and the controller's limit, apart from rounding, and its owner."""
-    return (ours, OURS) if theirs is None or theirs >= ours * (1 - ROUNDING) else (theirs, THEIRS)
+    return (ours, RIG_LIMIT) if theirs is None or theirs >= ours * (1 - LIMIT_TOLERANCE) else (theirs, CONTROLLER_LIMIT)

@@ -6,8 +6,8 @@ from rig.errors import Problem
 from rig.motion.turner_state import ArmState, RuntimeState
 from rig.turners.ur.condition import FULL_SPEED_FRACTION, program_interruption, readiness, speed_limited
 
-INTERRUPTION_S = 0.05  # wait after a program ended, for the safety bits that explain it
-LIMITED_S = 0.1  # duration of reduced speed in a movement: a longer one is no ramp of the controller
+EXPLANATION_WAIT_S = 0.05  # after a program ended, for the safety bits that explain it
+MIN_LIMITED_S = 0.1  # of reduced speed in a movement: a longer one is no ramp of the controller
 FIELDBUS = (
     "Make sure that nobody uses the pendant; check whether a fieldbus (EtherNet/IP, PROFINET) without a connection is "
     "set to stop or pause programs, in the installation under Fieldbus; then start again"
@@ -54,7 +54,7 @@ class Supervision:
         if problem := readiness(state):
             return problem
         if self._interruption is not None:
-            return self._interruption[0] if state.time_s - self._interruption[1] >= INTERRUPTION_S else None
+            return self._interruption[0] if state.time_s - self._interruption[1] >= EXPLANATION_WAIT_S else None
         return self._limit(state)
 
     @property
@@ -67,4 +67,4 @@ class Supervision:
             self._limited_since_s = None
             return None
         self._limited_since_s = state.time_s if self._limited_since_s is None else self._limited_since_s
-        return speed_limited(state) if state.time_s - self._limited_since_s >= LIMITED_S else None
+        return speed_limited(state) if state.time_s - self._limited_since_s >= MIN_LIMITED_S else None

@@ -25,11 +25,11 @@ ACCEPTED, DENIED, UNSUPPORTED = 0, 2, 3
 SCALED = {26: 0, 116: 1, 129: 2}  # index of the IMU in SCALED_IMU, SCALED_IMU2, SCALED_IMU3
 RAW_IMU, HIGHRES_IMU, AUTOPILOT_VERSION = 27, 105, 148
 IMU_INDEX = {**SCALED, RAW_IMU: 0, HIGHRES_IMU: 0}
-FASTEST_S = 1.0 / RATE_HZ
+MIN_INTERVAL_S = 1.0 / RATE_HZ
 HEAD_BYTES = 6  # header of a message in MAVLink 1
 BAROMETER_S = 0.05  # interval of PX4's barometer readings
 # HIGHRES_IMU_UPDATED_FLAGS: x y z of the accelerometer and of the gyroscope; temperature.
-UPDATED, TEMPERATURE_UPDATED = 0x3F, 0x1000
+SENSORS_UPDATED, TEMPERATURE_UPDATED = 0x3F, 0x1000
 
 
 @dataclass(slots=True)
@@ -165,12 +165,12 @@ class SimulatedAutopilot:
         PX4 flags it after a reading, ArduPilot always.
         """
         if not self._provides_temperature:
-            return 0.0, UPDATED
+            return 0.0, SENSORS_UPDATED
         own_s = self._steps / RATE_HZ
         new = self._firmware == "ardupilot" or own_s >= self._next_pressure_s
         if new:
             self._next_pressure_s = own_s + BAROMETER_S
-        return celsius, UPDATED | TEMPERATURE_UPDATED * new
+        return celsius, SENSORS_UPDATED | TEMPERATURE_UPDATED * new
 
     def _send(self, message: Any) -> None:
         data = self._pack_first_version(message) if self._first_version else message.pack(self._out)
@@ -239,7 +239,7 @@ class SimulatedAutopilot:
         elif interval_us <= 0:  # a disabled message, or the default, which is also disabled
             self._intervals_s.pop(number, None)
         else:
-            self._intervals_s[number] = max(1e-6 * interval_us, FASTEST_S)
+            self._intervals_s[number] = max(1e-6 * interval_us, MIN_INTERVAL_S)
             self._next_s[number] = self._steps / RATE_HZ
         return ACCEPTED
 

@@ -15,9 +15,9 @@ from rig.world.faulty_gyroscope import FrozenGyroscope, Repeats
 from rig.world.ur10e.motion.forward_kinematics import rotation_from_vector
 
 RATE_HZ = 400.0  # sampling rate: that of a fast main loop
-AVERAGED = 2  # readings in a mean of PX4's VehicleIMU: IMU_INTEG_RATE is 200 Hz
+MEAN_READINGS = 2  # in a mean of PX4's VehicleIMU: IMU_INTEG_RATE is 200 Hz
 ORIENTATIONS = {0: (), 2: ((2, 90),), 4: ((2, 180),), 6: ((2, 270),), 8: ((0, 180),), 12: ((1, 180),), 24: ((1, 90),)}
-FAULTLESS = SimulatedFaultySection()
+NO_FAULTS = SimulatedFaultySection()
 Vector = NDArray[np.float64]
 
 
@@ -61,7 +61,7 @@ class SimulatedImu:
         *,
         px4: bool,
         seed: np.random.SeedSequence,
-        faulty: SimulatedFaultySection = FAULTLESS,
+        faulty: SimulatedFaultySection = NO_FAULTS,
     ) -> None:
         """Build the part's gyroscope and accelerometer, and name the parameters of their corrections.
 
@@ -101,8 +101,8 @@ class SimulatedImu:
         if self._px4:
             self._sum += (rate, force)
             self._summed += 1
-            if self._summed == AVERAGED:
-                self.rate, self.force = self._sum / AVERAGED
+            if self._summed == MEAN_READINGS:
+                self.rate, self.force = self._sum / MEAN_READINGS
                 self._sum, self._summed, self.time_us = np.zeros((2, 3)), 0, time_us
             return
         self.rate = self._low_passes[0].apply(rate, self._parameters["INS_GYRO_FILTER"])

@@ -14,7 +14,7 @@ from rig.config.files.safe_writing import write_new
 from rig.errors import Refused
 from rig.world.board.mounted_board import read_firmware
 
-LARGEST_BYTES = 2 * FLASH_BYTES  # with an offset for every doubleword
+MAX_BYTES = 2 * FLASH_BYTES  # with an offset for every doubleword
 # The chip's memories (RM0394, section 2.2). A program's first word points to the end of the RAM, its second into the
 # flash.
 RAM, FLASH = range(0x2000_0000, 0x2001_0000), range(0x0800_0000, 0x0804_0000)
@@ -29,7 +29,7 @@ def open_flash(path: Path | None) -> FlashMemory:
     try:
         if path.is_symlink():
             raise UnfitFile("it is a link")
-        data = read_regular_file(path, LARGEST_BYTES)
+        data = read_regular_file(path, MAX_BYTES)
         _check(data)
     except FileNotFoundError:
         data = b"\xff" * FLASH_BYTES

@@ -5,7 +5,7 @@ from enum import StrEnum
 
 MotionAt = Callable[[float], Sequence[float]]
 
-FAR_BEYOND = 1e3  # rad/s and g: no part has such a range
+UNLIMITED_RANGE = 1e3  # rad/s and g: no part has such a range
 
 
 class ElementFault(StrEnum):
@@ -31,5 +31,5 @@ class SensingElement:
             return self._motion_at(time_s)
         if self._faulty_motion is None:
             motion = self._motion_at(time_s)
-            self._faulty_motion = motion if self._fault is ElementFault.STUCK else (FAR_BEYOND,) * len(motion)
+            self._faulty_motion = motion if self._fault is ElementFault.STUCK else (UNLIMITED_RANGE,) * len(motion)
         return self._faulty_motion

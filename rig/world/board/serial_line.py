@@ -5,12 +5,12 @@ from typing import Protocol
 
 import numpy as np
 
-TOLERANCE = 0.03  # relative error of the baud rate at which a receiver still reads ten bits correctly
+BAUD_TOLERANCE = 0.03  # relative error of the baud rate at which a receiver still reads ten bits correctly
 
 
 def misread(data: bytes, sent_baud: float, read_baud: float) -> bytes:
     """Return the bytes that a receiver at `read_baud` makes of `data` sent back to back at `sent_baud` (8N1)."""
-    if abs(sent_baud / read_baud - 1.0) < TOLERANCE:
+    if abs(sent_baud / read_baud - 1.0) < BAUD_TOLERANCE:
         return data
     line = [bit for byte in data for bit in (0, *(byte >> i & 1 for i in range(8)), 1)]
     bit_length = sent_baud / read_baud  # length of a receiver's bit in the sender's bits

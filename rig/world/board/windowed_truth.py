@@ -17,8 +17,8 @@ from rig.world.board.sensor_truth import SensorTruth
 
 SCHEMA = "rig.truth/1"
 STEP_S = 0.05  # interval of the instants of a mean; longer in long windows
-MOST_INSTANTS = 20_000
-ONE_SPEED = 0.01  # relative difference, below which two speeds count as one
+MAX_INSTANTS = 20_000
+SPEED_TOLERANCE = 0.01  # relative difference, below which two speeds count as one
 
 Windows = Sequence[tuple[float, float]]
 
@@ -102,7 +102,7 @@ def truth_document(truth: SimulatedTruth, windows: Mapping[str, Any], now_s: flo
     for name, gyroscope in windows.get("gyroscopes", {}).items():
         entry = {"bias_rad_s": truth.bias_rad_s(name, _span(gyroscope["averages_s"] or whole)).tolist()}
         speeds = gyroscope["speeds_rad_s"]
-        if not truth.depends_on_speed(name) or (speeds and max(speeds) <= (1 + ONE_SPEED) * min(speeds)):
+        if not truth.depends_on_speed(name) or (speeds and max(speeds) <= (1 + SPEED_TOLERANCE) * min(speeds)):
             speed_rad_s = float(np.mean(speeds)) if speeds else 1.0
             entry["scale"] = truth.scale(name, gyroscope["sweeps_s"] or whole, speed_rad_s).tolist()
         document["gyroscopes"][name] = entry
@@ -121,5 +121,5 @@ def _span(windows_s: Windows) -> Windows:
 
 def _instants(windows_s: Windows) -> np.ndarray:
     """Return the instants (n,), in order, at which a mean over the windows is computed."""
-    step_s = max(STEP_S, sum(end_s - start_s for start_s, end_s in windows_s) / MOST_INSTANTS)
+    step_s = max(STEP_S, sum(end_s - start_s for start_s, end_s in windows_s) / MAX_INSTANTS)
     return np.concatenate([np.arange(start_s, end_s, step_s) for start_s, end_s in sorted(windows_s)])

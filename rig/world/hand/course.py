@@ -11,7 +11,7 @@ from rig.world.hand.habits import Habits
 from rig.world.hand.rotations import Array, exp_map, log_map, multiply_steps
 
 STEP_S = 1e-3
-PASSES = 4  # iterations of the correction after which the course ends at its target
+CORRECTION_PASSES = 4  # after which the course ends at its target
 GRASP_S = (0.1, 0.25)  # range of the time from the first touch to the first push
 ROCK_S, ROCK_HZ = (0.1, 0.3), (3.0, 10.0)
 WOBBLE_HZ, TREMOR_HZ = (0.3, 2.0), (6.0, 12.0)
@@ -49,7 +49,7 @@ def move(start: Array, end: Array, vector: Array, habits: Habits, rng: np.random
     rates[0] = rates[-1] = 0.0
     last_s = grasp_s + 0.3 * (end_s - grasp_s)
     shape = _pulse(time_s, last_s, end_s - last_s)[:, None]
-    for _ in range(PASSES):
+    for _ in range(CORRECTION_PASSES):
         rotations = integrate_rates(time_s, rates)
         residual = rotations[-1] @ log_map((start @ rotations[-1]).T @ end)  # in the axes of the body at the start
         rates = rates + shape * (np.swapaxes(rotations, -1, -2) @ residual)

@@ -15,7 +15,7 @@ MistakeKind = Literal[
 
 FACES: tuple[Face, ...] = ("+x", "-x", "+y", "-y", "+z", "-z")
 FLIPS: tuple[Face, ...] = ("+x", "+y", "-z", "-x", "-y", "+z", "+y", "-x", "-z", "+x", "-y", "+z")
-USUAL: dict[MistakeKind, float] = {
+MISTAKE_SIZES: dict[MistakeKind, float] = {
     "short": 2.0,  # °
     "crumb": 5.0,  # mrad
     "table_pushed": 10.0,  # mrad
@@ -30,7 +30,7 @@ USUAL: dict[MistakeKind, float] = {
 
 @dataclass(frozen=True, slots=True)
 class Mistake:
-    """A mistake of magnitude `size`; None takes the usual magnitude of its kind (`USUAL`).
+    """A mistake of magnitude `size`; None takes the usual magnitude of its kind (`MISTAKE_SIZES`).
 
     - `short`: the turn ends this many degrees early, as if the edge had slipped.
     - `two_turns`: two turns in place of one; `other_way`: a turn in the other direction; `wrong_face`: another face up;
@@ -49,7 +49,7 @@ class Mistake:
     @property
     def magnitude(self) -> float:
         """The magnitude, in the unit of its kind."""
-        return USUAL.get(self.kind, 0.0) if self.size is None else self.size
+        return MISTAKE_SIZES.get(self.kind, 0.0) if self.size is None else self.size
 
 
 @dataclass(frozen=True, slots=True)

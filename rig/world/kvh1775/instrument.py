@@ -29,9 +29,9 @@ from rig.world.kvh1775.memory import KvhMemory
 
 INTERNAL_STEP_S = 1e-3  # longest step of the integration of a delta angle
 LINE_END = b"\r\n"
-LONGEST_COMMAND = 200
-PERFECT = MagnetometerTruth()
-FAULTLESS = SimulatedFaultySection()
+MAX_COMMAND_BYTES = 200
+PERFECT_MAGNETOMETER = MagnetometerTruth()
+NO_FAULTS = SimulatedFaultySection()
 
 
 def no_field(time_s: float) -> Sequence[float]:
@@ -62,13 +62,13 @@ class SimulatedKvh1775:
         memory: KvhMemory,
         *,
         field_at: Callable[[float], Sequence[float]] = no_field,
-        magnetometer: MagnetometerTruth = PERFECT,
+        magnetometer: MagnetometerTruth = PERFECT_MAGNETOMETER,
         serial_number: str,
         oscillator_ppm: float,
         uptime_s: float,
         seed: np.random.SeedSequence,
         time_s: float,
-        faulty: SimulatedFaultySection = FAULTLESS,
+        faulty: SimulatedFaultySection = NO_FAULTS,
     ) -> None:
         """Switch the instrument on; it streams messages at once.
 
@@ -117,7 +117,7 @@ class SimulatedKvh1775:
                 line, self._command = bytes(self._command), bytearray()
                 if line.strip():
                     self._obey(line.decode("ascii", "replace").strip().upper())
-            elif len(self._command) < LONGEST_COMMAND:
+            elif len(self._command) < MAX_COMMAND_BYTES:
                 self._command.append(byte)
 
     def advance(self, time_s: float) -> None:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 IDENTITY = "1,0,0,0,1,0,0,0,1"
 FILTERS = ("CHEBY", "BUTTER", "AVE", "CUSTOM")
-FACTORY: Mapping[str, str] = {
+FACTORY_SETTINGS: Mapping[str, str] = {
     "AXES": IDENTITY,
     "BAUD": "921600",
     "DR": "1000",
@@ -42,7 +42,7 @@ class KvhMemory:
     """The instrument's memory: `settings` replace the factory's. Raise ValueError for one that it does not have."""
 
     def __init__(self, settings: Mapping[str, str]) -> None:
-        self._settings = dict(FACTORY)
+        self._settings = dict(FACTORY_SETTINGS)
         for name, value in settings.items():
             if not self._set(name.upper(), value.upper()):
                 raise ValueError(f"a KVH 1775 cannot be set to {name},{value}")
@@ -61,7 +61,7 @@ class KvhMemory:
         if sign == "?" and name in self._settings:
             return self._report(name)
         if command == "=RSTCFG":
-            self._settings.update({**FACTORY, "BAUD": self["BAUD"]})
+            self._settings.update({**FACTORY_SETTINGS, "BAUD": self["BAUD"]})
             return "RSTCFG"
         if sign == "=":
             for setting in self._settings:

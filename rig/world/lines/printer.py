@@ -28,10 +28,10 @@ UNITS = {
     "gauss": GAUSS_T, "mgauss": 1e-3 * GAUSS_T, "uT": 1e-6, "nT": 1e-9, "T": 1.0,
 }  # fmt: skip
 TICKS_PER_S = {"ns": 1e9, "us": 1e6, "ms": 1e3, "s": 1.0}
-USUAL_DECIMALS = 5
-COLOURED = "\033[0;32m{}\033[0m"  # green, as in ESP-IDF's log at level I
+DEFAULT_DECIMALS = 5
+COLOURED_LINE = "\033[0;32m{}\033[0m"  # green, as in ESP-IDF's log at level I
 LINE_END = b"\r\n"
-FAULTLESS = SimulatedFaultySection()
+NO_FAULTS = SimulatedFaultySection()
 
 
 @dataclass(slots=True)
@@ -62,7 +62,7 @@ class Printer:
         baud_rate: float,
         seed: np.random.SeedSequence,
         time_s: float,
-        faulty: SimulatedFaultySection = FAULTLESS,
+        faulty: SimulatedFaultySection = NO_FAULTS,
     ) -> None:
         """Switch the device on: it prints its boot text, then the columns of `prints`."""
         self.faults = PrinterFaults()
@@ -131,7 +131,7 @@ class Printer:
         values["time"] = self._time(at_s)
         sequence = self._samples % prints.sequence_wrap if prints.sequence_wrap else self._samples
         values["sequence"] = str(sequence)
-        values |= {name: f"{value:.{USUAL_DECIMALS}f}" for name, value in self._section.scalars.items()}
+        values |= {name: f"{value:.{DEFAULT_DECIMALS}f}" for name, value in self._section.scalars.items()}
         texts = iter(self._section.texts)
         numbers = [next(texts, "0") if name == "-" else values.get(name, "0") for name in prints.columns]
         if prints.keys:
@@ -142,7 +142,7 @@ class Printer:
         text = prints.prefix.replace("*", str(int(1e3 * at_s))) + text
         if prints.checksum == "nmea":
             text += f"*{reduce(xor, text.lstrip('$!').encode(), 0):02X}"
-        return (COLOURED.format(text) if self._section.colours else text).encode() + LINE_END
+        return (COLOURED_LINE.format(text) if self._section.colours else text).encode() + LINE_END
 
     def _time(self, at_s: float) -> str:
         time = self._prints.time
@@ -157,6 +157,6 @@ class Printer:
 def _format_value(value: float, section: LineRateSection | LineAccelerationSection | LineFieldSection | None) -> str:
     """Format a reading in SI units as the program prints it."""
     if section is None:  # printed in SI units; the rig does not read it
-        return f"{value:.{USUAL_DECIMALS}f}"
-    decimals = USUAL_DECIMALS if section.decimals is None else section.decimals
+        return f"{value:.{DEFAULT_DECIMALS}f}"
+    decimals = DEFAULT_DECIMALS if section.decimals is None else section.decimals
     return f"{value / section.scale / UNITS[section.unit]:.{decimals}f}"

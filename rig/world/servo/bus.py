@@ -9,7 +9,7 @@ from rig.world.servo.servo import SimulatedServo
 from rig.world.servo.truth import LineTruth
 from rig.world.servo.wire_format import BROADCAST, PING, SYNC_READ, Receiver, ServoPacket
 
-BITS = 10  # bits of a byte on the wire: start, eight data, stop
+BITS_PER_BYTE = 10  # on the wire: start, eight data, stop
 STALL_S = 0.02  # far longer than one cycle of the world's loop
 PING_SLOT_S = 0.003  # delay per ID of the answers to a broadcast ping, as the maker's client expects it
 
@@ -66,7 +66,7 @@ class SimulatedBus:
 
     def _answer(self, packet: ServoPacket, time_s: float) -> None:
         """Queue the answers of all servos to the packet; bytes that coincide on the wire are combined by AND."""
-        byte_s = BITS / (self.baud_rate or 1e6)
+        byte_s = BITS_PER_BYTE / (self.baud_rate or 1e6)
         answers: list[tuple[int, bytes]] = []  # the first byte's slot on the wire, counted from now, and the bytes
         free = 0  # the first free slot after the earlier answers to a sync read
         for servo in sorted(self.servos, key=lambda servo: servo.memory["ID"]):

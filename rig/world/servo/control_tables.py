@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 from rig.world.servo.wire_format import ACCESS_ERROR, LENGTH_ERROR, LIMIT_ERROR, RANGE_ERROR
 
-RAM = 64  # first address of the RAM; registers below are in the EEPROM
-SIZE = 662
-MOST_TURNS = 1_048_575  # pulses in extended position mode, ±256 turns
+RAM_START = 64  # first address of the RAM_START; registers below are in the EEPROM
+TABLE_SIZE = 662
+MAX_PULSES = 1_048_575  # in extended position mode, ±256 turns
 
 
 class RegisterRow(NamedTuple):
@@ -49,7 +49,7 @@ MODELS: Mapping[str, Model] = {
 }
 POSITION, EXTENDED = 3, 4  # values of Operating Mode
 TIME_BASED, REVERSE = 0x04, 0x01  # bits of Drive Mode
-TRIPPED = 255  # Bus Watchdog: −1 in its one byte
+WATCHDOG_TRIPPED = 255  # Bus Watchdog: −1 in its one byte
 MODES = {True: (0, 1, 3, 4, 5, 16), False: (1, 3, 4, 16)}  # values of Operating Mode with and without a current sensor
 
 
@@ -96,7 +96,7 @@ def build_control_table(model: Model, firmware: int) -> tuple[RegisterRow, ...]:
         RegisterRow(104, 4, "Goal Velocity", True, 0, -1023, 1023),
         RegisterRow(108, 4, "Profile Acceleration", True, 0, 0, 32767),
         RegisterRow(112, 4, "Profile Velocity", True, 0, 0, 32767),
-        RegisterRow(116, 4, "Goal Position", True, 0, -MOST_TURNS, MOST_TURNS),
+        RegisterRow(116, 4, "Goal Position", True, 0, -MAX_PULSES, MAX_PULSES),
         RegisterRow(120, 2, "Realtime Tick"),
         RegisterRow(122, 1, "Moving"),
         RegisterRow(123, 1, "Moving Status"),
@@ -140,7 +140,7 @@ class ServoMemory:
         self._by_name = {register.name: register for register in table}
         self._by_address = {register.address: register for register in table}
         self._defined = {a for register in table for a in range(register.address, register.address + register.size)}
-        self._bytes = bytearray(SIZE)
+        self._bytes = bytearray(TABLE_SIZE)
         for register in table:
             self[register.name] = register.initial
         for name, value in settings.items():
@@ -162,7 +162,7 @@ class ServoMemory:
     def forget(self) -> None:
         """Reset the RAM to its state after power-up."""
         for register in self._by_name.values():
-            if register.address >= RAM:
+            if register.address >= RAM_START:
                 self[register.name] = register.initial
 
     def read(self, address: int, length: int) -> bytes | int:
@@ -178,7 +178,7 @@ class ServoMemory:
             return LENGTH_ERROR
         while data:
             register = self._by_address.get(address)
-            if register is None or not register.writable or (locked and address < RAM):
+            if register is None or not register.writable or (locked and address < RAM_START):
                 return ACCESS_ERROR
             if len(data) < register.size:
                 return LENGTH_ERROR
@@ -199,7 +199,7 @@ def find_write_error(memory: ServoMemory, write: Write, senses_current: bool, fi
     name, value = write.register.name, write.value
     is_goal = name in ("Goal PWM", "Goal Current", "Goal Velocity", "Goal Position")
     out_of_range = (
-        (is_goal and "Bus Watchdog" in memory and memory["Bus Watchdog"] == TRIPPED)
+        (is_goal and "Bus Watchdog" in memory and memory["Bus Watchdog"] == WATCHDOG_TRIPPED)
         or (name == "Operating Mode" and value not in MODES[senses_current])
         or (name == "Drive Mode" and value & TIME_BASED and firmware < 42)
     )

@@ -10,7 +10,7 @@ from math import floor, inf, isclose, pi, radians
 
 import numpy as np
 
-from rig.world.servo.control_tables import EXTENDED, POSITION, REVERSE, TIME_BASED, TRIPPED, Model, ServoMemory
+from rig.world.servo.control_tables import EXTENDED, POSITION, REVERSE, TIME_BASED, WATCHDOG_TRIPPED, Model, ServoMemory
 from rig.world.servo.profile import ProfileSegment, plan_limited, plan_timed
 from rig.world.servo.shaft import Shaft, whole_turns
 from rig.world.servo.truth import ServoTruth
@@ -18,10 +18,10 @@ from rig.world.servo.truth import ServoTruth
 PULSE_RAD = 2 * pi / 4096
 SPEED_RAD_S = 0.229 * 2 * pi / 60  # unit of velocity registers
 ACCELERATION_RAD_S2 = 214.577 * 2 * pi / 3600  # unit of Profile Acceleration: 214.577 rev/min²
-FASTEST_RAD_S2 = 200.0  # an "infinite" acceleration
+MAX_RAD_S2 = 200.0  # an "infinite" acceleration
 WATCHDOG_S = 0.020
 TICKS = 32768
-BY_VOLTAGE, BY_HEAT, BY_LOAD = 0x01, 0x04, 0x20  # bits of Hardware Error Status and of Shutdown
+VOLTAGE_ERROR, OVERHEATING_ERROR, OVERLOAD_ERROR = 0x01, 0x04, 0x20  # bits of Hardware Error Status and of Shutdown
 
 
 @dataclass(slots=True)
@@ -75,12 +75,12 @@ class Drive:
             self._strained_s = min(self._strained_s, time_s)
             self.shaft.halt(time_s)
         if self.torque and time_s > self._strained_s + self._truth.overload_after_s:
-            self._fail(BY_LOAD, time_s)
+            self._fail(OVERLOAD_ERROR, time_s)
         if self.faults.temperature_c > memory["Temperature Limit"]:
-            self._fail(BY_HEAT, time_s)
+            self._fail(OVERHEATING_ERROR, time_s)
         low, high = memory["Min Voltage Limit"], memory["Max Voltage Limit"]
         if not low <= 10 * self.faults.voltage_v <= high:
-            self._fail(BY_VOLTAGE, time_s)
+            self._fail(VOLTAGE_ERROR, time_s)
 
     @property
     def _is_watchdog_on(self) -> bool:
@@ -89,7 +89,7 @@ class Drive:
     def trip(self, time_s: float) -> None:
         """Let the watchdog stop the shaft abruptly and set the profile to zero (bus_watchdog.md, steps 4, 5)."""
         self.shaft.halt(time_s)
-        self._memory["Bus Watchdog"] = TRIPPED
+        self._memory["Bus Watchdog"] = WATCHDOG_TRIPPED
         self._memory["Profile Velocity"] = self._memory["Profile Acceleration"] = 0
 
     def _fail(self, bit: int, time_s: float) -> None:
@@ -129,10 +129,10 @@ class Drive:
         if memory["Drive Mode"] & TIME_BASED and velocity:
             segments = plan_timed(start, goal_rad, 1e-3 * velocity, 1e-3 * acceleration, most)
         elif memory["Drive Mode"] & TIME_BASED:
-            segments = plan_limited(start, goal_rad, most, FASTEST_RAD_S2)
+            segments = plan_limited(start, goal_rad, most, MAX_RAD_S2)
         else:
             speed = min(velocity * SPEED_RAD_S, most) if velocity else most
-            ramp = min(acceleration * ACCELERATION_RAD_S2, FASTEST_RAD_S2) if acceleration else FASTEST_RAD_S2
+            ramp = min(acceleration * ACCELERATION_RAD_S2, MAX_RAD_S2) if acceleration else MAX_RAD_S2
             segments = plan_limited(start, goal_rad, speed, ramp)
         self.shaft.follow(start.time_s, segments)
 

@@ -17,9 +17,9 @@ from rig.world.ur10e.motion.flange_motion import BodyMotion, find_base_motion, p
 from rig.world.ur10e.motion.forward_kinematics import Rotation, Vector
 from rig.world.ur10e.motion.links import ArmLink
 
-BEHIND_S = 60.0  # wall time by which the board may lag the servo and still catch up
-AHEAD_S = 2 * TICK_S  # lead of the servo over the first tick: no sensor requests a later angle of the shaft
-CHANGE_S = 1e-4  # the step of the numerical derivative of the rate
+MAX_LAG_S = 60.0  # wall time by which the board may lag the servo and still catch up
+LEAD_S = 2 * TICK_S  # of the servo over the first tick: no sensor requests a later angle of the shaft
+DERIVATIVE_STEP_S = 1e-4  # of the numerical derivative of the rate
 SHAFT = ArmLink(theta_rad=0.0, a_m=0.0, d_m=0.0, alpha_rad=0.0, cos_alpha=1.0, sin_alpha=0.0)
 # Its setup for the rig (docs/how-to/without-an-arm/servo.md): 1 Mbit/s, no return delay. The driver sets the modes.
 BAUDS = {57600: 1, 115200: 2, 1_000_000: 3, 2_000_000: 4, 3_000_000: 5, 4_000_000: 6}
@@ -62,7 +62,7 @@ class ServoBench:
 
     def now_s(self) -> float:
         """Return the servo's time: wall time since the world began, s. No tick is ahead of this time."""
-        return time.monotonic() - self._began_s + AHEAD_S
+        return time.monotonic() - self._began_s + LEAD_S
 
     @property
     def time_s(self) -> float:
@@ -96,7 +96,7 @@ class ServoBench:
     def motion_at(self, time_s: float) -> BodyMotion:
         """Return the motion of a body on the shaft."""
         angle, rate = self.servo.angle_at(time_s), self.servo.rate_at(time_s)
-        change = (self.servo.rate_at(time_s + CHANGE_S) - rate) / CHANGE_S
+        change = (self.servo.rate_at(time_s + DERIVATIVE_STEP_S) - rate) / DERIVATIVE_STEP_S
         return propagate(find_base_motion(self._site), [(cos(angle), sin(angle))], (rate,), (change,), (SHAFT,))
 
     def frames_at(self, time_s: float) -> Sequence[tuple[Rotation, Vector]]:

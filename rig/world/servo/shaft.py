@@ -7,7 +7,7 @@ from math import copysign, cos, pi, radians, sin
 from rig.world.servo.profile import ProfileSegment, ProfileStart
 from rig.world.servo.truth import ServoTruth
 
-HISTORY = 4096  # number of past segments to keep
+KEPT_SEGMENTS = 4096
 ITERATIONS = 12  # enough to invert the encoder's error to 1e-15 of a revolution
 
 
@@ -47,7 +47,7 @@ class Shaft:
             self._segments.append(segment)
             self._gaps.append(gap)
             gap = self._play(gap, segment.angle_at(segment.end_s) - segment.angle_rad)
-        del self._segments[:-HISTORY], self._gaps[:-HISTORY]
+        del self._segments[:-KEPT_SEGMENTS], self._gaps[:-KEPT_SEGMENTS]
 
     def halt(self, time_s: float) -> None:
         """Stop at `time_s`, without a ramp."""

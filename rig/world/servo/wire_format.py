@@ -8,9 +8,9 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 HEADER = b"\xff\xff\xfd"
-STUFFED = HEADER + b"\xfd"
+STUFFED_HEADER = HEADER + b"\xfd"
 BROADCAST = 0xFE
-LONGEST = 1024  # length field of the longest packet that is accepted
+MAX_LENGTH = 1024  # length field of the longest packet that is accepted
 GAP_S = 0.1  # time between two bytes of a packet, after which the partial packet is dropped (not in the manual)
 
 PING, READ, WRITE, REG_WRITE, ACTION, REBOOT, CLEAR, STATUS = 0x01, 0x02, 0x03, 0x04, 0x05, 0x08, 0x10, 0x55
@@ -40,7 +40,7 @@ def crc16(data: bytes) -> int:
 
 def encode(servo_id: int, instruction: int, parameters: bytes = b"") -> bytes:
     """Return an instruction packet with stuffed parameters."""
-    body = (bytes([instruction]) + parameters).replace(HEADER, STUFFED)
+    body = (bytes([instruction]) + parameters).replace(HEADER, STUFFED_HEADER)
     packet = HEADER + b"\0" + bytes([servo_id]) + (len(body) + 2).to_bytes(2, "little") + body
     return packet + crc16(packet).to_bytes(2, "little")
 
@@ -87,12 +87,12 @@ class Receiver:
             if len(buffer) < 7:
                 return None
             length = int.from_bytes(buffer[5:7], "little")
-            if buffer[3] != 0 or not 3 <= length <= LONGEST:
+            if buffer[3] != 0 or not 3 <= length <= MAX_LENGTH:
                 del buffer[:3]  # no packet begins here
                 continue
             if len(buffer) < 7 + length:
                 return None
             packet, self._buffer = bytes(buffer[: 7 + length]), buffer[7 + length :]
-            body = packet[7:-2].replace(STUFFED, HEADER)
+            body = packet[7:-2].replace(STUFFED_HEADER, HEADER)
             is_valid = crc16(packet[:-2]) == int.from_bytes(packet[-2:], "little")
             return ServoPacket(packet[4], body[0], body[1:], is_valid)

@@ -4,8 +4,8 @@ from collections import deque
 from dataclasses import dataclass
 from enum import IntEnum
 
-HISTORY = 200
-TEXT_MAX = 4000  # characters of a message, at most
+KEPT_MESSAGES = 200
+MAX_CHARACTERS = 4000  # of a message
 
 
 class MessageKind(IntEnum):
@@ -73,13 +73,13 @@ class Messages:
     """The newest messages, numbered."""
 
     def __init__(self) -> None:
-        self._messages: deque[Message] = deque(maxlen=HISTORY)
+        self._messages: deque[Message] = deque(maxlen=KEPT_MESSAGES)
         self.last = 0  # number of the newest message
 
     def say(
         self, text: str, kind: MessageKind = MessageKind.TEXT, title: str = "", position: tuple[int, int] = (0, 0)
     ) -> None:
-        self._add(Message(self.last + 1, kind, text[:TEXT_MAX], title, position))
+        self._add(Message(self.last + 1, kind, text[:MAX_CHARACTERS], title, position))
 
     def report(self, error: ErrorReport) -> None:
         """Add an error by its code."""

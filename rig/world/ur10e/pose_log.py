@@ -9,7 +9,7 @@ from rig.errors import Refused
 
 HEADER = "start_s,end_s,qw,qx,qy,qz\n"
 ROW_S = 0.001  # duration stated in a row
-LEAST_STEP_S = 2 * ROW_S  # least interval of rows, so that no two have the same time
+MIN_STEP_S = 2 * ROW_S  # of rows, so that no two have the same time
 
 
 class PoseLog:
@@ -37,7 +37,7 @@ class PoseLog:
     def write(self, time_s: float, pose: Sequence[float]) -> None:
         """Write a row of a pose (6,): position, and rotation vector in rad from the tool's frame to the base's."""
         late_s = 1e-3 * (self._section.latency_ms + self._random.gauss(0.0, self._section.jitter_ms))
-        stamp_s = self._last_s = max(time_s + late_s, self._last_s + LEAST_STEP_S)
+        stamp_s = self._last_s = max(time_s + late_s, self._last_s + MIN_STEP_S)
         quaternion = ",".join(f"{component:.9f}" for component in _quaternion(pose[3:]))
         with self._section.path.open("a", encoding="utf-8") as file:
             file.write(f"{stamp_s - ROW_S / 2:.6f},{stamp_s + ROW_S / 2:.6f},{quaternion}\n")

@@ -16,7 +16,7 @@ from rig.study.rate_table import (
     ACCELEROMETER_RANDOM_WALK,
     ACCELEROMETER_REFERENCE_M_S2,
     ACCELEROMETER_SECOND_ORDER,
-    AVERAGED_S,
+    AVERAGING_S,
     MG,
 )
 from support.motions.rate_table import attitudes, noisy
@@ -27,7 +27,7 @@ NORM = float(np.linalg.norm(GRAVITY))
 KNOWN = KnownNorm(NORM, (0, 0, -1))  # north-east-down
 FIRST = np.concatenate([ACCELEROMETER_MATRIX.ravel(), -GRAVITY, ACCELEROMETER_BIAS_M_S2])
 THETA = np.concatenate([FIRST, ACCELEROMETER_SECOND_ORDER])
-VARIANCES = np.full((30, 3), ACCELEROMETER_RANDOM_WALK**2 / AVERAGED_S) * np.array([1.0, 0.5, 2.0])
+VARIANCES = np.full((30, 3), ACCELEROMETER_RANDOM_WALK**2 / AVERAGING_S) * np.array([1.0, 0.5, 2.0])
 
 
 def readings(r: Array, second_order: Array = ACCELEROMETER_SECOND_ORDER) -> Array:

@@ -9,7 +9,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.reference.reference_model import KnownNorm, KnownVector, jacobian, predicted
 from rig.estimation.reference.triaxial import EqualWeights, TriaxialSolution, solve_triaxial, solve_triaxial_batch
 from rig.study.rate_table import (
-    AVERAGED_S,
+    AVERAGING_S,
     DEG_H,
     GYRO_BIAS_RAD_S,
     GYRO_MATRIX,
@@ -53,7 +53,7 @@ def test_the_published_gyroscope_is_found_from_25_hz_samples(method: EqualWeight
 @pytest.mark.parametrize("method", METHODS)
 def test_a_still_gyroscope_knows_the_earth_from_its_norm(method: EqualWeights) -> None:
     r = attitudes(10)
-    variances = np.full((10, 3), GYRO_RANDOM_WALK**2 / AVERAGED_S)
+    variances = np.full((10, 3), GYRO_RANDOM_WALK**2 / AVERAGING_S)
     exact = solve_triaxial(readings(r), r, variances, EARTH, method=method)
     np.testing.assert_allclose(values(exact), THETA, rtol=1e-9, atol=1e-17)
     assert (exact.rank, exact.observations) == (14, 10)
@@ -71,7 +71,7 @@ def test_the_covariance_is_that_of_repeated_calibrations(method: EqualWeights, s
     r = attitudes(16)
     rates = None if still else np.random.default_rng(3).normal(size=(16, 3)) * 1e-3
     known = EARTH if rates is None else KnownVector(rates)
-    variances = np.full((16, 3), GYRO_RANDOM_WALK**2 / AVERAGED_S) * UNEVEN
+    variances = np.full((16, 3), GYRO_RANDOM_WALK**2 / AVERAGING_S) * UNEVEN
     exact = readings(r, rates)
     reported = solve_triaxial(exact, r, variances, known, method=method).covariance
     draws = noisy(exact, variances, runs=count)

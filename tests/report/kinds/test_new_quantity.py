@@ -27,7 +27,7 @@ from rig.page.outcome_screen import outcome_rows
 from rig.page.rows import parameter_rows
 from rig.report.certificate.dcc import digital_certificate
 from rig.report.exports.exported_corrections import calibrations
-from rig.report.exports.formats import OF_CALIBRATIONS, texts_of_calibrations
+from rig.report.exports.formats import CALIBRATION_FORMATS, texts_of_calibrations
 from rig.report.findings import characteristics
 from rig.report.findings.characteristic import OUTLETS, Characteristic, Series, Units, read_fields
 from rig.report.findings.history_records import BIASES, SCALES
@@ -76,11 +76,11 @@ def plain() -> ResultDocument:
 @pytest.fixture
 def document(monkeypatch: pytest.MonkeyPatch) -> Iterator[ResultDocument]:
     """A result that states it, while the table of characteristics has its row."""
-    gyroscope = next(kind for kind in kind_registry.OF_THE_RIG if kind.name == "gyroscope")
+    gyroscope = next(kind for kind in kind_registry.RIG_KINDS if kind.name == "gyroscope")
     with_it = replace(gyroscope, characteristics=(*gyroscope.characteristics, DENSITY))
-    others = [kind for kind in kind_registry.OF_THE_RIG if kind is not gyroscope]
-    monkeypatch.setattr(kind_registry, "OF_THE_RIG", (with_it, *others))
-    monkeypatch.setattr(characteristics, "OF_THE_RIG", (*characteristics.OF_THE_RIG, DENSITY))
+    others = [kind for kind in kind_registry.RIG_KINDS if kind is not gyroscope]
+    monkeypatch.setattr(kind_registry, "RIG_KINDS", (with_it, *others))
+    monkeypatch.setattr(characteristics, "RIG_CHARACTERISTICS", (*characteristics.RIG_CHARACTERISTICS, DENSITY))
     kinds.cache_clear()
     said = plain().model_dump(mode="json", by_alias=True, exclude_unset=True)
     said["gyroscopes"]["gyro"] |= {
@@ -174,7 +174,7 @@ def test_a_result_of_before_that_does_not_state_it_is_still_what_its_recordings_
     assert any("bow_x" in each for each in not_given(changed, document))
 
 
-@pytest.mark.parametrize("name", OF_CALIBRATIONS)
+@pytest.mark.parametrize("name", CALIBRATION_FORMATS)
 def test_exports_say_that_they_have_no_place_for_it(name: str, document: ResultDocument) -> None:
     texts = "\n".join(texts_of_calibrations(name)(calibrations(document)).values())
     assert "gyro, density of noise" in texts

@@ -10,7 +10,7 @@ import pytest
 
 from firmware_host.computer_load import load_factor
 from rig.data.recording.run_file import read_run
-from rig.turners.servo.servo_link import SILENCE_S
+from rig.turners.servo.servo_link import MAX_SILENCE_S
 from support.laboratories.commands import rig, rig_here
 from support.laboratories.servo_runs import Act, Seen, carry_out, configure
 
@@ -118,7 +118,7 @@ def test_whatever_happens_the_shaft_stands_the_data_are_kept_and_the_run_goes_on
     config, out = configure(tmp_path), tmp_path / "run"
     seen = carry_out("run", config, "--out", out, config=config, when=TURNS, times=times, act=act, after_s=after_s)
     said = "".join(seen.output)
-    silent_s = SILENCE_S * load_factor()
+    silent_s = MAX_SILENCE_S * load_factor()
     print(f"at rest after {seen.at_rest_after_s:.2f} s; a silence is known after {silent_s:.2f} s here")
     names = {name, *ALSO.get(what, ())}
     if moment == "as a turn begins" and name in UNANSWERED:

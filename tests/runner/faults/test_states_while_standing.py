@@ -6,7 +6,7 @@ import pytest
 
 from rig.data.recording.run_file import RunRecorder, read_run
 from rig.motion.turner_state import ArmState
-from rig.runner.acquisition import STANDING_S, WHOLE_S, Acquisition
+from rig.runner.acquisition import FULL_RATE_S, REST_INTERVAL_S, Acquisition
 from support.recordings.synthetic_run import PROVENANCE, SENSOR, UR, Setup, synthetic_run
 
 pytestmark = pytest.mark.slow
@@ -31,6 +31,6 @@ def test_a_long_dwell_is_recorded_with_few_states_after_a_while(tmp_path: Path) 
             states(acquisition, 2.0, 62.0)
         states(acquisition, 62.0, 64.0)
     time_s = read_run(path).states["time_s"]
-    whole = (time_s < 2 + WHOLE_S) | (time_s >= 62)
-    assert whole.sum() == round((2 + WHOLE_S + 2) / STEP_S)
-    assert 0.9 * (60 - WHOLE_S) / STANDING_S < (~whole).sum() <= 1.05 * (60 - WHOLE_S) / STANDING_S
+    whole = (time_s < 2 + FULL_RATE_S) | (time_s >= 62)
+    assert whole.sum() == round((2 + FULL_RATE_S + 2) / STEP_S)
+    assert 0.9 * (60 - FULL_RATE_S) / REST_INTERVAL_S < (~whole).sum() <= 1.05 * (60 - FULL_RATE_S) / REST_INTERVAL_S

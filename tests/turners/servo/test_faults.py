@@ -9,7 +9,7 @@ from contextlib import suppress
 import pytest
 
 from rig.errors import Fault
-from rig.turners.servo.servo_registers import TRIPPED
+from rig.turners.servo.servo_registers import WATCHDOG_TRIPPED
 from rig.turners.servo.servo_state import ServoState
 from rig.world.servo.truth import ServoTruth
 from support.processes.forked import find_fork_server
@@ -98,7 +98,7 @@ def test_a_driver_that_says_nothing_for_too_long_is_stopped_by_the_watchdog() ->
         if abs(state.qd_rad_s[0]) > 1.0 and not slept:
             slept.append(True)
             with wire.clock.without_the_driver():
-                wait_for(lambda: wire.do("register", "Bus Watchdog") == TRIPPED, "the watchdog's trip")
+                wait_for(lambda: wire.do("register", "Bus Watchdog") == WATCHDOG_TRIPPED, "the watchdog's trip")
 
     with servo_on_a_wire() as wire:
         with pytest.raises(Fault) as fault, control_servo(wire, 0.2, on_state=take) as servo:
@@ -149,7 +149,7 @@ def test_a_program_that_is_killed_or_frozen_leaves_a_shaft_that_stands_within_a_
             os.kill(program.pid, how)
             wire.clock.go_on_until(wire.clock.now_s() + 1.0)
             assert abs(wire.rate_rad_s) < STANDS_RAD_S
-            assert (wire.do("register", "Bus Watchdog"), wire.do("register", "Torque Enable")) == (TRIPPED, 1)
+            assert (wire.do("register", "Bus Watchdog"), wire.do("register", "Torque Enable")) == (WATCHDOG_TRIPPED, 1)
         finally:
             with suppress(ProcessLookupError):
                 program.kill()

@@ -426,7 +426,7 @@ def test_an_arm_elsewhere_that_falls_silent_is_missed_at_once_on_a_crowded_compu
     laboratory: WorldHandle, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """By as crowded a one a controller here would be excused for hours."""
-    monkeypatch.setattr("firmware_host.computer_load.LARGEST_LOAD_FACTOR", 1e6)
+    monkeypatch.setattr("firmware_host.computer_load.MAX_LOAD_FACTOR", 1e6)
     monkeypatch.setattr(os, "getloadavg", lambda: (1e6, 1e6, 1e6))
     with relay(laboratory.host, outside_address()) as wire:
         with Arm(wire.host) as arm:

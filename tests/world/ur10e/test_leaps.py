@@ -157,8 +157,8 @@ def session(loaded: Loaded, ports: dict[str, int], dwell_s: float) -> tuple[dict
 def test_every_wire_carries_the_same_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
     host = fresh_host()
     found = []
-    for leap in (1, world_process.LEAP):
-        monkeypatch.setattr(world_process, "LEAP", leap)
+    for leap in (1, world_process.MAX_LEAP_TICKS):
+        monkeypatch.setattr(world_process, "MAX_LEAP_TICKS", leap)
         found.append(session(*loaded_from("own_port/kvh1775_earth.yaml", host), dwell_s=0.6))
     (one_by_one, looks), (leaping, fewer_looks) = found
     assert looks == 1.0 and fewer_looks > 1.5, "it leaps"

@@ -10,7 +10,7 @@ import pytest
 from rig.world.clock import TICKS_PER_SECOND
 from rig.world.laboratory import Laboratory
 from rig.world.ur10e.controller_messages import READ_ONLY
-from rig.world.ur10e.interfaces.dashboard_server import NOT_ALLOWED, DashboardSession
+from rig.world.ur10e.interfaces.dashboard_server import REMOTE_CONTROL_REFUSAL, DashboardSession
 from rig.world.ur10e.interfaces.primary_server import PrimarySession
 from rig.world.ur10e.interfaces.robot_api_server import RobotApiSession
 from rig.world.ur10e.interfaces.rtde import RtdeSession, build_package
@@ -54,7 +54,7 @@ def test_the_dashboard_refuses_every_order_and_answers_questions(order: str) -> 
     robot = playing()
     dashboard = DashboardSession(robot)
     robot.remote_control = False
-    assert dashboard.answer(order) == NOT_ALLOWED
+    assert dashboard.answer(order) == REMOTE_CONTROL_REFUSAL
     assert plays(robot)
     assert dashboard.answer("is in remote control") == "false"
     assert dashboard.answer("running") == "Program running: true"
@@ -65,7 +65,7 @@ def test_a_connection_that_was_opened_in_local_control_stays_so() -> None:
     robot.remote_control = False
     dashboard, primary = DashboardSession(robot), PrimarySession(robot)
     robot.remote_control = True
-    assert dashboard.answer("stop") == NOT_ALLOWED
+    assert dashboard.answer("stop") == REMOTE_CONTROL_REFUSAL
     primary.receive(b"stop program\n")
     assert robot.messages.after(0)[-1].error == READ_ONLY and plays(robot)
     assert DashboardSession(robot).answer("stop") == "Stopped"

@@ -20,11 +20,11 @@ from rig.turners.ur.controller.rtde_packages import PORT
 
 TICK_S = 0.05
 SILENT_TICKS = 10  # 0.5 s without a heartbeat
-SPARED = 4  # factor on these limits while the main thread in question is ready to run but gets no processor
+MAX_STARVED_FACTOR = 4  # factor on these limits while the main thread in question is ready to run but gets no processor
 FROZEN_TICKS = 16  # 0.8 s with heartbeats but no new state
-LINK_S = 0.8  # silence of a remote controller, whose pace does not depend on the load of this machine
+MAX_LINK_SILENCE_S = 0.8  # of a remote controller, whose pace does not depend on the load of this machine
 STALE_TICKS = 2  # a child that ends after 0.1 s without a new state had lost the arm before
-CRASHES = (-signal.SIGSEGV, -signal.SIGABRT)  # exit statuses of the client after the arm closes a connection
+CRASH_STATUSES = (-signal.SIGSEGV, -signal.SIGABRT)  # exit statuses of the client after the arm closes a connection
 PATIENT_TICKS = 240  # 12 s while a client's constructor holds the child's interpreter, at worst until its 5 s time-out
 
 
@@ -51,9 +51,9 @@ class ChildLink:
         self._ended = threading.Event()
         self._sending = threading.Lock()
         self._patient = False
-        self._silent = Silence(0, spared=SPARED)  # ticks without a message; counted once the child runs
+        self._silent = Silence(0, spared=MAX_STARVED_FACTOR)  # ticks without a message; counted once the child runs
         self._beaten = False  # whether a heartbeat came since the guard's last tick
-        self._frozen = Silence(0, spared=SPARED)  # ticks with heartbeats, but without a new state
+        self._frozen = Silence(0, spared=MAX_STARVED_FACTOR)  # ticks with heartbeats, but without a new state
         self._silent_s = 0.0  # time without data from the controller
         self._is_remote = False  # whether the controller runs on another machine
         context = multiprocessing.get_context("spawn")
@@ -78,13 +78,13 @@ class ChildLink:
         ip = resolve_address(self._host)
         self._is_remote = ip is None or not ip.is_loopback
         if ip is not None and not self._is_remote and (controller_pid := find_listener(ip, PORT)) is not None:
-            self._frozen = Silence(controller_pid, spared=SPARED, thread=controller_pid)
+            self._frozen = Silence(controller_pid, spared=MAX_STARVED_FACTOR, thread=controller_pid)
         with _block_interrupts():
             self._process.start()
         self._child_pipe.close()
         assert self._process.pid is not None
         # Its main thread sends the heartbeats; delays of the client's own threads do not count.
-        self._silent = Silence(self._process.pid, spared=SPARED, thread=self._process.pid)
+        self._silent = Silence(self._process.pid, spared=MAX_STARVED_FACTOR, thread=self._process.pid)
         for thread in self._threads:
             thread.start()
 
@@ -149,7 +149,7 @@ class ChildLink:
                 stale = self._frozen.ticks > STALE_TICKS
                 self._process.join(0.2)
                 status = self._process.exitcode
-                name = "arm_link_lost" if stale or status in CRASHES else "arm_driver_died"
+                name = "arm_link_lost" if stale or status in CRASH_STATUSES else "arm_driver_died"
                 self._lose(name, f"the process that talks to the arm at {self._host} ended (exit status {status})")
 
     def _guard(self) -> None:
@@ -163,7 +163,7 @@ class ChildLink:
             if self._silent.lasts_over(PATIENT_TICKS if self._patient else SILENT_TICKS):
                 return self._give_up("arm_driver_hung", "the process that talks to the arm no longer answers")
             frozen = self._frozen.lasts_over(PATIENT_TICKS if self._patient else FROZEN_TICKS)
-            if frozen or (self._is_remote and not self._patient and self._silent_s > LINK_S):
+            if frozen or (self._is_remote and not self._patient and self._silent_s > MAX_LINK_SILENCE_S):
                 return self._give_up("arm_link_lost", f"no new state arrives from the arm at {self._host}")
         return None
 

@@ -44,23 +44,23 @@ from rig.turners.ur.child_messages import (
     ScriptStarted,
     TakeControl,
 )
-from rig.turners.ur.controller.free_registers import UPPER, find_free_half, registers_in_use
+from rig.turners.ur.controller.free_registers import UPPER_FIRST, find_free_half, registers_in_use
 from rig.turners.ur.controller.state_stream import StatePacket, StateStream
-from rig.turners.ur.stopping.stop import BRAKE_RAD_S2, STOP_S, StopOrder
+from rig.turners.ur.stopping.stop import BRAKE_RAD_S2, MAX_STOP_S, StopOrder
 from rig.turners.ur.stopping.stop_paths import stop_paths
 
 HEARTBEAT_S = 0.01
 MOVE_POLL_S = 0.003
-FIRST_PACKET_S = 5.0
+MAX_FIRST_PACKET_S = 5.0
 TICK_S = 0.1
 PARENT_TICKS = 20  # 2 s without a sign of life from the parent
-PARENT_SPARED = 2  # factor on that limit while the parent gets no processor
-ABANDON_S = 5.0  # time for the last stop, over the controller's own ports or over the client
-PAYLOAD_S = 1.0  # time until states show the payload, by the controller's clock and by this machine's
+MAX_PARENT_FACTOR = 2  # factor on that limit while the parent gets no processor
+MAX_LAST_STOP_S = 5.0  # time for the last stop, over the controller's own ports or over the client
+MAX_PAYLOAD_WAIT_S = 1.0  # time until states show the payload, by the controller's clock and by this machine's
 PAYLOAD_TRIES = 3  # a try ends after 4 s if the client's script is not ready
 PAYLOAD_TOLERANCE_KG, CENTRE_TOLERANCE_M = 0.01, 0.001
-REGISTERS_S = 2.0  # time for the controller to report its free registers
-SILENCE_S = 0.8  # after a longer silence the controller may have lost the client
+MAX_REGISTER_WAIT_S = 2.0  # time for the controller to report its free registers
+MAX_SILENCE_S = 0.8  # after a longer silence the controller may have lost the client
 
 
 def main(
@@ -105,7 +105,7 @@ class _Child:
         self._operations_before: int | None = None  # change count before the running move; None when none runs
         # Whether a request is being served: other messages, and the parent's signs of life, wait in the pipe.
         self._serving = False
-        self._parent = Silence(os.getppid(), spared=PARENT_SPARED)
+        self._parent = Silence(os.getppid(), spared=MAX_PARENT_FACTOR)
 
     def send(self, message: Message) -> None:
         with self._sending:
@@ -113,7 +113,7 @@ class _Child:
 
     def connect(self) -> None:
         """Subscribe to the controller's states and wait for the first. Raise `OSError` if none comes."""
-        self._states = StateStream(self._host, self._state_rate_hz, FIRST_PACKET_S)
+        self._states = StateStream(self._host, self._state_rate_hz, MAX_FIRST_PACKET_S)
         first = self._latest = self._states.first
         self.send(Connected(self._states.version))
         self.send(ChildHeartbeat((first.state,)))
@@ -207,19 +207,19 @@ class _Child:
 
         flags = RTDEControlInterface.FLAG_UPLOAD_SCRIPT.value | RTDEControlInterface.FLAG_NO_EXT_FT.value
         try:
-            half = find_free_half(self._host, self._states.version, REGISTERS_S)
+            half = find_free_half(self._host, self._states.version, MAX_REGISTER_WAIT_S)
         except OSError as error:
             return RequestFailed(link_lost(f"the arm at {self._host} no longer answers ({error})"))
         if half is None:
             return RequestFailed(registers_in_use(self._host, self._states.version))
-        if half == UPPER:
+        if half == UPPER_FIRST:
             flags |= RTDEControlInterface.FLAG_UPPER_RANGE_REGISTERS.value
         self._holds_arm = True
         try:
             self._control = RTDEControlInterface(self._host, self._state_rate_hz, flags)
         except RuntimeError as error:
             self._let_parent_see()
-            silent = self._states.silent_s > SILENCE_S
+            silent = self._states.silent_s > MAX_SILENCE_S
             return RequestFailed(
                 self._link_problem(silent=silent) or control_failure(self._host, self._states.version, str(error))
             )
@@ -239,7 +239,7 @@ class _Child:
         while abs((latest := self._latest).payload_kg - wanted_kg) > PAYLOAD_TOLERANCE_KG:
             if (lost := self._link_problem()) is not None:
                 return RequestFailed(lost)
-            if min(time.monotonic() - host_s, latest.state.time_s - arm_s) > PAYLOAD_S:
+            if min(time.monotonic() - host_s, latest.state.time_s - arm_s) > MAX_PAYLOAD_WAIT_S:
                 try:
                     reported_kg = self._read_payload_kg()
                 except OSError as error:
@@ -254,7 +254,7 @@ class _Child:
 
     def _read_payload_kg(self) -> float:
         """Return the payload that the controller uses now."""
-        with StateStream(self._host, self._state_rate_hz, FIRST_PACKET_S) as states:
+        with StateStream(self._host, self._state_rate_hz, MAX_FIRST_PACKET_S) as states:
             return states.first.payload_kg
 
     def _link_problem(self, *, silent: bool = False) -> Problem | None:
@@ -266,7 +266,7 @@ class _Child:
     def _let_parent_see(self) -> None:
         """Wait until all states so far have been sent to the parent."""
         beats, began_s = self._beats, time.monotonic()
-        while self._beats < beats + 2 and time.monotonic() - began_s < ABANDON_S:
+        while self._beats < beats + 2 and time.monotonic() - began_s < MAX_LAST_STOP_S:
             time.sleep(HEARTBEAT_S)
 
     def _move(self, move: MoveRequest) -> None:
@@ -290,7 +290,7 @@ class _Child:
         The parent then reports the lost link before this wait ends.
         """
         latest, began_s = self._latest, time.monotonic()
-        while self._latest is latest and time.monotonic() - began_s < ABANDON_S:
+        while self._latest is latest and time.monotonic() - began_s < MAX_LAST_STOP_S:
             time.sleep(HEARTBEAT_S)
 
     def _brake(self, deceleration_rad_s2: float) -> bool:
@@ -312,8 +312,8 @@ class _Child:
         """
         if self._holds_arm:
             # The client's stop may wait forever for a controller that is gone; the system's alarm ends that.
-            signal.setitimer(signal.ITIMER_REAL, ABANDON_S)
-            order = StopOrder(stop_paths(self._host, self._states.version, self._robot_api_port), STOP_S)
+            signal.setitimer(signal.ITIMER_REAL, MAX_LAST_STOP_S)
+            order = StopOrder(stop_paths(self._host, self._states.version, self._robot_api_port), MAX_STOP_S)
             if not order.await_program_end():
                 print(f"{order.words}; the client brakes", file=sys.stderr)
                 self._brake(BRAKE_RAD_S2)

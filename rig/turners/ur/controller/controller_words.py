@@ -15,9 +15,9 @@ ERROR_CODE, KEY, EXCEPTION = 6, 7, 10
 ERROR = struct.Struct(">iiiII")  # code, argument, level, type of the value, value
 POSITION = struct.Struct(">ii")  # line, column
 TITLED = struct.Struct(">iiB")  # code, argument, length of the title that follows
-STOPPED = b"PROGRAM_XXX_STOPPED"
-READ_ONLY = 210  # the answer to a line of script in local control
-TEXT = 160  # characters of one message
+STOPPED_TITLE = b"PROGRAM_XXX_STOPPED"
+READ_ONLY_ERROR = 210  # the answer to a line of script in local control
+MAX_CHARACTERS = 160  # of one message
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,11 +58,11 @@ def decode_message(message: bytes) -> ErrorCode | ProgramException | ProgramStop
         return ErrorCode(code, argument, _text(rest[ERROR.size :]))
     if kind == KEY and len(rest) >= TITLED.size:
         title, text = rest[TITLED.size :][: rest[TITLED.size - 1]], rest[TITLED.size + rest[TITLED.size - 1] :]
-        return ProgramStopped(_text(text)) if title == STOPPED else None
+        return ProgramStopped(_text(text)) if title == STOPPED_TITLE else None
     if kind == EXCEPTION and len(rest) >= POSITION.size:
         return ProgramException(_text(rest[POSITION.size :]))
     return None
 
 
 def _text(data: bytes) -> str:
-    return printable(data.decode(errors="replace").strip())[:TEXT]
+    return printable(data.decode(errors="replace").strip())[:MAX_CHARACTERS]

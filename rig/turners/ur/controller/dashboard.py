@@ -9,8 +9,8 @@ from rig.errors.quoting import printable
 
 DASHBOARD_PORT = 29999
 GREETING = "Connected:"
-STOPPED, FAILED = "Stopped", "Failed to execute"  # answers to `stop`; a refusal is a sentence
-ANSWER = 160  # characters of an answer in a message
+STOPPED_ANSWER, FAILED_ANSWER = "Stopped", "Failed to execute"  # answers to `stop`; a refusal is a sentence
+MAX_ANSWER_CHARACTERS = 160  # in a message
 LINE_BYTES = 4096  # the longest answer has some dozens
 
 
@@ -48,9 +48,9 @@ class Dashboard:
         without a running program, is not a refusal.
         """
         answer = self.ask("stop")
-        self.acknowledged = answer == STOPPED
-        if not self.acknowledged and not (answer.startswith(FAILED) and not self.program_running()):
-            self.refusal = f'"{answer[:ANSWER]}"'
+        self.acknowledged = answer == STOPPED_ANSWER
+        if not self.acknowledged and not (answer.startswith(FAILED_ANSWER) and not self.program_running()):
+            self.refusal = f'"{answer[:MAX_ANSWER_CHARACTERS]}"'
 
     def program_running(self) -> bool:
         """Return whether any program runs on the controller."""

@@ -13,11 +13,11 @@ import time
 from rig.errors import Problem
 from rig.turners.ur.controller.rtde_packages import PORT, VERSION, package, packages
 
-LOWER, UPPER = 0, 24  # the first register of each half
+LOWER_FIRST, UPPER_FIRST = 0, 24  # the first register of each half
 INTEGERS, DOUBLES = range(8), range(18)  # the client's registers, relative to the first
-MISSING = "no_such_register"  # refuses the whole recipe, so that the query reserves no register
-IN_USE = "IN_USE"
-LOWER_ONLY_SINCE = (5, 23)  # version of the controller's software
+MISSING_REGISTER = "no_such_register"  # refuses the whole recipe, so that the query reserves no register
+IN_USE_ANSWER = "IN_USE"
+LOWER_ONLY_VERSION = (5, 23)  # of the controller's software
 OWNERS = (
     "End the other client; disable EtherNet/IP, PROFINET and MODBUS in the installation (they take 0-23); remove "
     "URCaps that use RTDE, such as those of grippers and force sensors"
@@ -25,7 +25,7 @@ OWNERS = (
 
 
 def find_free_half(host: str, version: tuple[int, ...], timeout_s: float) -> int | None:
-    """Return the half of the registers, `LOWER` or `UPPER`, that is free at the controller `host`, or None.
+    """Return the half of the registers, `LOWER_FIRST` or `UPPER_FIRST`, that is free at the controller `host`, or None.
 
     `version`: the controller's software. Nothing remains reserved. Raise `OSError` if no answer comes within
     `timeout_s`.
@@ -35,9 +35,9 @@ def find_free_half(host: str, version: tuple[int, ...], timeout_s: float) -> int
         connection.sendall(package("V", struct.pack(">H", VERSION)))
         _await_answer(connection, "V", received, deadline_s)
         for first in usable_halves(version):
-            connection.sendall(package("I", ",".join([*register_names(first), MISSING]).encode()))
+            connection.sendall(package("I", ",".join([*register_names(first), MISSING_REGISTER]).encode()))
             answer = _await_answer(connection, "I", received, deadline_s)
-            if IN_USE not in answer[1:].decode(errors="replace").split(","):
+            if IN_USE_ANSWER not in answer[1:].decode(errors="replace").split(","):
                 return first
     return None
 
@@ -52,7 +52,7 @@ def registers_in_use(host: str, version: tuple[int, ...]) -> Problem:
     """Describe an arm at `host` that cannot be driven by RTDE, because its registers are in use."""
     which = (
         "of both halves, 0-23 and 24-47,"
-        if UPPER in usable_halves(version)
+        if UPPER_FIRST in usable_halves(version)
         else "0-23, of which the client needs some,"
     )
     what = f"other clients, URCaps or a fieldbus use input registers {which} of the arm at {host}"
@@ -61,7 +61,7 @@ def registers_in_use(host: str, version: tuple[int, ...]) -> Problem:
 
 def usable_halves(version: tuple[int, ...]) -> tuple[int, ...]:
     """Return the halves of the registers, lower and upper, that a client can use with software `version`."""
-    return (LOWER,) if version >= LOWER_ONLY_SINCE else (LOWER, UPPER)
+    return (LOWER_FIRST,) if version >= LOWER_ONLY_VERSION else (LOWER_FIRST, UPPER_FIRST)
 
 
 def _await_answer(connection: socket.socket, kind: str, received: bytearray, deadline_s: float) -> bytes:

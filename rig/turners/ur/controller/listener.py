@@ -6,7 +6,7 @@ from contextlib import suppress
 from ipaddress import IPv4Address
 from pathlib import Path
 
-LISTENS = "0A"  # the state of a socket in the system's table
+LISTENING_STATE = "0A"  # the state of a socket in the system's table
 PROC = Path("/proc")
 
 
@@ -33,7 +33,7 @@ def find_listener(host: IPv4Address, port: int) -> int | None:
     with suppress(OSError):
         for row in (PROC / "net" / "tcp").read_text().splitlines()[1:]:
             _, address, _, state, _, _, _, _, _, inode, *_ = row.split()
-            if state == LISTENS and address in addresses:
+            if state == LISTENING_STATE and address in addresses:
                 return next(_holders(f"socket:[{inode}]"), None)
     return None
 

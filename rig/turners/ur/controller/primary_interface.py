@@ -30,8 +30,8 @@ KINEMATICS = struct.Struct(">6I 6d 6d 6d 6d I".replace(" ", ""))  # checksums; �
 CARTESIAN = struct.Struct(">6d 6d".replace(" ", ""))  # the tool centre point in the base's frame, and in the flange's
 # Per joint: least and greatest angle; speed and acceleration; then defaults; a, d, α, θ; boards, type, sub-type.
 CONFIGURATION = struct.Struct(">12d 12d 5d 6d 6d 6d 6d 4i".replace(" ", ""))
-SIZE_MAX = 1 << 20  # a robot state has some 1500 bytes
-VALUE_MAX = 1e4  # m or rad: a calibration of almost parallel axes has lengths of some hundred metres
+MAX_SIZE = 1 << 20  # a robot state has some 1500 bytes
+MAX_VALUE = 1e4  # m or rad: a calibration of almost parallel axes has lengths of some hundred metres
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +92,7 @@ def _setup(payload: bytes) -> ArmSetup | None:
         return None
     values = CONFIGURATION.unpack_from(payload)
     limits, drawing, robot_type = values[:24], values[29:53], values[55]
-    if any(map(isnan, limits)) or not all(abs(length) <= VALUE_MAX for length in drawing):
+    if any(map(isnan, limits)) or not all(abs(length) <= MAX_VALUE for length in drawing):
         return None
     least, greatest = limits[0:12:2], limits[1:12:2]
     speed, acceleration = limits[12::2], limits[13::2]
@@ -117,14 +117,14 @@ def _software(message: bytes) -> str | None:
 def _numbers(layout: struct.Struct, payload: bytes) -> tuple[float, ...]:
     """Decode the numbers of a payload; return an empty tuple if it is too short or a value is impossible."""
     values = layout.unpack_from(payload) if len(payload) >= layout.size else ()
-    return values if all(isinstance(value, int) or abs(value) <= VALUE_MAX for value in values) else ()
+    return values if all(isinstance(value, int) or abs(value) <= MAX_VALUE for value in values) else ()
 
 
 def packages(buffer: bytearray) -> Iterator[tuple[int, bytes]]:
     """Yield complete packages and remove them from the start of `buffer`. Raise `ConnectionError` for other bytes."""
     while len(buffer) >= HEADER.size:
         size, kind = HEADER.unpack_from(buffer)
-        if not HEADER.size <= size <= SIZE_MAX:
+        if not HEADER.size <= size <= MAX_SIZE:
             raise ConnectionError("this is not a primary interface")
         if len(buffer) < size:
             return

@@ -11,7 +11,7 @@ import struct
 import time
 from collections.abc import Iterator
 
-from rig.turners.ur.controller.controller_words import READ_ONLY, ErrorCode, ProgramStopped, decode_message
+from rig.turners.ur.controller.controller_words import READ_ONLY_ERROR, ErrorCode, ProgramStopped, decode_message
 from rig.turners.ur.controller.primary_interface import PORT, ROBOT_MESSAGE, ROBOT_STATE, packages
 
 ROBOT_MODE_DATA = 0
@@ -74,7 +74,7 @@ class PrimaryStop:
         for kind, payload in packages(self._buffer):
             if kind == ROBOT_MESSAGE:
                 match decode_message(payload):
-                    case ErrorCode(code=code) as error if code == READ_ONLY:
+                    case ErrorCode(code=code) as error if code == READ_ONLY_ERROR:
                         self.refusal = f"{error.words}: it is read-only in local control"
                     case ProgramStopped(program):
                         self.stopped_programs.add(program)

@@ -15,13 +15,13 @@ from rig.errors.quoting import printable
 
 PORT = 80
 BASE = "/universal-robots/robot-api"
-SINCE = (10, 11)  # the first version that has one
+MIN_VERSION = (10, 11)  # the first version that has one
 PROGRAM = "/program/v1/state"
 CONTROL_MODE, INFORMATION = "/system/v1/controlmode", "/system/v1/information"
 ANSWER_BYTES = 1 << 16
-REDIRECTED = 3  # largest number of redirections: some paths have moved between versions
-MOVED = (301, 302, 307, 308)
-WORD, ANSWER = 60, 160  # characters of an answer
+MAX_REDIRECTIONS = 3  # some paths have moved between versions
+REDIRECTION_STATUSES = (301, 302, 307, 308)
+MAX_WORD_CHARACTERS, MAX_ANSWER_CHARACTERS = 60, 160  # of an answer
 
 
 class RobotApi:
@@ -44,7 +44,7 @@ class RobotApi:
         except (OSError, HTTPException, ValueError, RecursionError):
             return None
         word = answer.get(key) if isinstance(answer, dict) else None
-        return printable(word[:WORD]) if isinstance(word, str) and word else None
+        return printable(word[:MAX_WORD_CHARACTERS]) if isinstance(word, str) and word else None
 
     def _get(self, path: str) -> bytes:
         status, body = self.request("GET", path)
@@ -59,12 +59,12 @@ class RobotApi:
         """
         body = None if order is None else json.dumps(order)
         headers = {"Accept": "application/json", **({} if body is None else {"Content-Type": "application/json"})}
-        for _ in range(REDIRECTED + 1):
+        for _ in range(MAX_REDIRECTIONS + 1):
             with closing(HTTPConnection(self._host, self._port, timeout=self._timeout_s)) as connection:
                 connection.request(method, path, body, headers)
                 answer = connection.getresponse()
                 location = answer.getheader("Location")
-                if answer.status not in MOVED or not location:
+                if answer.status not in REDIRECTION_STATUSES or not location:
                     return answer.status, answer.read(ANSWER_BYTES)
                 path = urlsplit(location).path
         raise HTTPException("it redirects again and again")
@@ -109,4 +109,4 @@ def _message(body: bytes) -> str:
     except (ValueError, RecursionError):
         return ""
     message = answer.get("message") if isinstance(answer, dict) else None
-    return printable(message[:ANSWER]) if isinstance(message, str) else ""
+    return printable(message[:MAX_ANSWER_CHARACTERS]) if isinstance(message, str) else ""

@@ -12,13 +12,13 @@ from rig.errors import Problem
 from rig.motion.turner_state import JOINT_NAMES, ArmState
 
 # Beyond all arms; the angle is large because a UR3e's wrist 3 turns without limit and counts its revolutions.
-ANGLE_RAD, SPEED_RAD_S, MODES = 1e3, 20.0, range(-1, 64)
+MAX_ANGLE_RAD, MAX_SPEED_RAD_S, MODES = 1e3, 20.0, range(-1, 64)
 # A joint of the fastest arm of this kind turns by 6.3 rad/s, and by 3.14 under the rig; three times that is impossible.
-ENCODER_RAD, FASTEST_RAD_S = 0.03, 10.0
+MAX_ENCODER_ERROR_RAD, MAX_TRAVEL_RAD_S = 0.03, 10.0
 CYCLE_S = 0.002  # the controller's cycle, at whose ends states are made: four of these for a CB3
-OFF_CYCLE = 0.3  # largest fraction of a cycle between a time stamp and its cycle
-LOST_S = 0.1  # longest gap in the states that other evidence need not confirm
-RESTART = "Restart the controller if it happens again"
+MAX_CYCLE_ERROR = 0.3  # fraction of a cycle between a time stamp and its cycle
+MAX_GAP_S = 0.1  # in the states, that other evidence need not confirm
+RESTART_REMEDY = "Restart the controller if it happens again"
 
 
 def impossible_state(state: ArmState) -> Problem | None:
@@ -34,7 +34,7 @@ def impossible_state(state: ArmState) -> Problem | None:
         if not all(map(math.isfinite, numbers)):
             return _impossible(f"its {name} is {numbers[0]:g}")
     for name, (angle, speed) in _joints(state):
-        if abs(angle) > ANGLE_RAD or abs(speed) > SPEED_RAD_S:
+        if abs(angle) > MAX_ANGLE_RAD or abs(speed) > MAX_SPEED_RAD_S:
             return _impossible(f"its {name} is at {angle:.4g} rad and turns at {speed:.4g} rad/s")
     if not 0.0 <= state.target_speed_fraction <= 1.0:
         return _impossible(f"its speed slider is at {100 * state.target_speed_fraction:.4g} %")
@@ -49,8 +49,8 @@ def _is_possible(state: ArmState) -> bool:
     q_rad, qd_rad_s, fraction = state.q_rad, state.qd_rad_s, state.target_speed_fraction
     return (
         math.isfinite(state.time_s + state.speed_scaling + sum(q_rad) + sum(qd_rad_s))
-        and max(map(abs, q_rad)) <= ANGLE_RAD
-        and max(map(abs, qd_rad_s)) <= SPEED_RAD_S
+        and max(map(abs, q_rad)) <= MAX_ANGLE_RAD
+        and max(map(abs, qd_rad_s)) <= MAX_SPEED_RAD_S
         and 0.0 <= fraction <= 1.0
         and state.robot_mode in MODES
         and state.safety_mode in MODES
@@ -68,7 +68,7 @@ def impossible_motion(before: ArmState, after: ArmState) -> Problem | None:
     """Return the problem of two states between which a joint turned farther than any arm can."""
     step_s = abs(after.time_s - before.time_s)
     for name, q1, q2 in zip(JOINT_NAMES, before.q_rad, after.q_rad, strict=True):
-        if abs(q2 - q1) > ENCODER_RAD + FASTEST_RAD_S * step_s:
+        if abs(q2 - q1) > MAX_ENCODER_ERROR_RAD + MAX_TRAVEL_RAD_S * step_s:
             return _impossible(f"its {name} went by {math.degrees(q2 - q1):+.1f}° in {step_s:.3f} s")
     return None
 
@@ -81,13 +81,13 @@ def clock_step(before_s: float, after_s: float, period_s: float, missed_s: float
     step_s = after_s - before_s
     step_unit_s = period_s if _divides(period_s) else CYCLE_S
     error_s = abs(step_s - max(1, round(step_s / step_unit_s)) * step_unit_s)
-    if error_s <= OFF_CYCLE * step_unit_s and step_s - period_s <= LOST_S + missed_s:
+    if error_s <= MAX_CYCLE_ERROR * step_unit_s and step_s - period_s <= MAX_GAP_S + missed_s:
         return None
     return Problem(
         "arm_clock_stepped",
         f"the controller's time went from {before_s:.3f} s to {after_s:.3f} s from one state to the next, instead "
         f"of by {period_s:.3f} s: its clock was set",
-        f"Look whether a second controller answers at arm.host, then start again. {RESTART}",
+        f"Look whether a second controller answers at arm.host, then start again. {RESTART_REMEDY}",
     )
 
 
@@ -105,5 +105,5 @@ def _impossible(what: str) -> Problem:
     return Problem(
         "arm_state_impossible",
         f"the controller sends a state that no arm is in: {what}",
-        f"Look at the arm, and read the pendant's log for a fault of an encoder. {RESTART}",
+        f"Look at the arm, and read the pendant's log for a fault of an encoder. {RESTART_REMEDY}",
     )

@@ -23,12 +23,12 @@ from rig.turners.ur.controller.state_checks import clock_step, impossible_motion
 
 # The buffer holds ten seconds at the highest rate, if the system grants it. Further states wait at the controller, for
 # an undocumented time.
-ROOM_BYTES = 1 << 20
+BUFFER_BYTES = 1 << 20
 # Allowed ratio of a time by the controller's clock to that by this computer's: far more than their errors.
-CLOCKS_DIFFER = 1.05
+MAX_CLOCK_RATIO = 1.05
 # Duration of a silence after which a controller on this computer may have sent states without a receiver.
-SILENT_S = 0.3
-RECENT_S = 2.0  # time after the gap within which states delayed or lost by a network show
+MIN_SILENCE_S = 0.3
+LOSS_PROOF_S = 2.0  # time after the gap within which states delayed or lost by a network show
 # The requested variables and their types. Nothing else is requested, which keeps the packets small.
 VARIABLES = {
     "timestamp": "DOUBLE",
@@ -95,7 +95,7 @@ class StateStream:
         self._socket = socket.create_connection((host, PORT), timeout_s)
         try:
             self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, ROOM_BYTES)
+            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER_BYTES)
             self._socket.setblocking(False)
             self._set_up(rate_hz)
             self._first = self._await_packet()
@@ -136,7 +136,7 @@ class StateStream:
             return []
         self._receive()
         now_s = time.monotonic()
-        if self.silent_s >= self._gap_s or now_s - self._gap_ended_s > RECENT_S:
+        if self.silent_s >= self._gap_s or now_s - self._gap_ended_s > LOSS_PROOF_S:
             self._gap_s, self._gap_ended_s = self.silent_s, now_s
         self.silent_s, self._received_s = 0.0, now_s
         packets: list[StatePacket] = []
@@ -174,11 +174,11 @@ class StateStream:
     def _missed_s(self) -> float:
         """The longest time, s of the controller's clock, for which states may have been lost in recent silences.
 
-        A local connection loses no states unless it was silent for `SILENT_S`; then any number may be lost.
+        A local connection loses no states unless it was silent for `MIN_SILENCE_S`; then any number may be lost.
         """
         if self._is_remote:
-            return CLOCKS_DIFFER * self._gap_s
-        return 0.0 if self._gap_s < SILENT_S else math.inf
+            return MAX_CLOCK_RATIO * self._gap_s
+        return 0.0 if self._gap_s < MIN_SILENCE_S else math.inf
 
     def _set_up(self, rate_hz: float) -> None:
         """Agree with the controller on protocol version, variables and rate, and start the stream."""

@@ -2,7 +2,7 @@
 
 import os
 
-SPARE = 16  # the sockets of two paths, and those of the host's name resolution for each
+SPARE_DESCRIPTORS = 16  # the sockets of two paths, and those of the host's name resolution for each
 
 
 class SpareDescriptors:
@@ -14,7 +14,7 @@ class SpareDescriptors:
     def keep(self) -> None:
         """Reserve the descriptors. Raise OSError if the system has none left."""
         try:
-            while len(self._descriptors) < SPARE:
+            while len(self._descriptors) < SPARE_DESCRIPTORS:
                 self._descriptors.append(os.open(os.devnull, os.O_RDONLY))
         except OSError:
             self.release()

@@ -10,12 +10,12 @@ from rig.turners.ur.child_messages import Braked, BrakeRequest
 from rig.turners.ur.stopping.spare_descriptors import SpareDescriptors
 from rig.turners.ur.stopping.stop_paths import StopConnection, StopPath
 
-STOP_S = 0.9  # a stop is confirmed within this time, or not at all
-PATH_S = 0.8  # time-out of a port of the controller
-LATE_S = 0.1  # shortest time-out of a port, at the end of the stop's time
-LOOKS = 2  # reports about programs, within which a refusal would have come
-ASK_S = 0.05  # period of asking a port whether the program has ended
-ANSWERS_S = 0.3  # wait at rest for late refusals: the time of three states
+MAX_STOP_S = 0.9  # a stop is confirmed within this time, or not at all
+PATH_TIMEOUT_S = 0.8  # time-out of a port of the controller
+MIN_TIMEOUT_S = 0.1  # of a port, at the end of the stop's time
+REFUSAL_REPORTS = 2  # reports about programs, within which a refusal would have come
+POLL_S = 0.05  # of a port, whether the program has ended
+REFUSAL_WAIT_S = 0.3  # at rest: the time of three states
 BRAKE_RAD_S2 = 5.0
 
 
@@ -75,7 +75,7 @@ class StopOrder:
         """Stop the program by this path, and note and ask whether the controller has done so."""
         try:
             # At any time, however late: ending a program needlessly is better than an arm that goes on.
-            with closing(path.open(max(LATE_S, min(PATH_S, self._remaining_s)))) as connection:
+            with closing(path.open(max(MIN_TIMEOUT_S, min(PATH_TIMEOUT_S, self._remaining_s)))) as connection:
                 connection.stop_program()
                 self._note(path, connection)
                 self._remove(path, self._pending)
@@ -114,13 +114,13 @@ class StopOrder:
             self._note(path, connection)
             self._ended = self._ended or not running
             # The first state at a port may precede the stop order.
-            if is_answered := looks >= LOOKS or connection.acknowledged or connection.refusal is not None:
+            if is_answered := looks >= REFUSAL_REPORTS or connection.acknowledged or connection.refusal is not None:
                 self._remove(path, self._unanswered)
             if self._ended and is_answered:
                 return
             with self._changed:
                 self._changed.notify_all()
-            time.sleep(ASK_S)
+            time.sleep(POLL_S)
 
 
 class ArmStop:
@@ -151,10 +151,10 @@ class ArmStop:
         # In a thread of its own: a child that does not read must not delay the stop over the controller's ports.
         threading.Thread(target=self._send, args=(BrakeRequest(BRAKE_RAD_S2),), name="arm brake", daemon=True).start()
         self.descriptors.release()
-        order = StopOrder(self._paths(), STOP_S)
-        if self._await_rest(began_s, began_s + STOP_S - time.monotonic()):
+        order = StopOrder(self._paths(), MAX_STOP_S)
+        if self._await_rest(began_s, began_s + MAX_STOP_S - time.monotonic()):
             order.await_delivery()
-            order.await_answers(ANSWERS_S)
+            order.await_answers(REFUSAL_WAIT_S)
             return StopOutcome(True, _add_refusals("the arm is stopped and at rest", order.refusals))
         if order.await_program_end():
             return StopOutcome(

@@ -44,6 +44,6 @@ def stop_paths(host: str, version: tuple[int, ...], robot_api_port: int) -> tupl
     primary = StopPath(PrimaryStop.name, partial(PrimaryStop, host))
     if not is_polyscope_x(version):
         return StopPath(Dashboard.name, partial(Dashboard, host)), primary
-    if version < robot_api.SINCE:
+    if version < robot_api.MIN_VERSION:
         return (primary,)
     return primary, StopPath(RobotApiStop.name, partial(RobotApiStop, host, robot_api_port))

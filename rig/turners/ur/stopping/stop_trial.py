@@ -16,8 +16,8 @@ from rig.turners.ur.supervision import describe_early_end
 
 NAME = "rig_stop_trial"
 PROGRAM = f"def {NAME}():\n  while True:\n    sync()\n  end\nend\n"
-BEGIN_S = 5.0  # time for which the client's own program may take to start
-END_S = 2.0
+MAX_BEGIN_S = 5.0  # time for which the client's own program may take to start
+MAX_END_S = 2.0
 
 
 def stop_trial(host: str, api: RobotApi, shows: Callable[[RuntimeState, float], bool]) -> Problem | None:
@@ -28,13 +28,13 @@ def stop_trial(host: str, api: RobotApi, shows: Callable[[RuntimeState, float], 
     if api.is_in_remote_control() is False:
         return local_control(host)
     try:
-        with closing(PrimaryStop(host, BEGIN_S)) as primary:
+        with closing(PrimaryStop(host, MAX_BEGIN_S)) as primary:
             primary.send(PROGRAM)
-            if not shows(RuntimeState.PLAYING, BEGIN_S):
+            if not shows(RuntimeState.PLAYING, MAX_BEGIN_S):
                 not_started = _not_proved(host, "began no program that was sent to it there")
                 return describe_early_end(not_started) if _has_ended_at_once(primary) else not_started
             primary.stop_program()
-            if not shows(RuntimeState.STOPPED, END_S):
+            if not shows(RuntimeState.STOPPED, MAX_END_S):
                 return _not_proved(host, "did not end a program that moves nothing, which may still run")
     except OSError as error:
         return _not_proved(host, f"does not answer ({error})")

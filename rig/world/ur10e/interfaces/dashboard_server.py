@@ -18,7 +18,7 @@ LINE_BYTES = 1 << 16  # longer than any command
 UNLOCK_AFTER_S = 5.0
 PROGRAMS = (f"{WAIT_PROGRAM}.urp",)
 OPERATIONAL_MODES = ("MANUAL", "AUTOMATIC")
-SINCE = {  # the first versions of the e-Series with these commands, which no CB3 has
+MIN_VERSIONS = {  # the first versions of the e-Series with these commands, which no CB3 has
     "version": E_SERIES,
     "safetystatus": (5, 4),
     "is in remote control": (5, 6),
@@ -26,10 +26,10 @@ SINCE = {  # the first versions of the e-Series with these commands, which no CB
     "set operational mode": E_SERIES,
     "clear operational mode": E_SERIES,
 }
-OF_CB3 = ("setuserrole", "getuserrole")
-SAFETY = "Command is not allowed due to safety reasons"
-NOT_ALLOWED = f"{SAFETY}, please switch robot to Remote Control mode and reconnect to port {PORT}"
-TOO_EARLY = (
+CB3_COMMANDS = ("setuserrole", "getuserrole")
+SAFETY_REFUSAL = "Command is not allowed due to safety reasons"
+REMOTE_CONTROL_REFUSAL = f"{SAFETY_REFUSAL}, please switch robot to Remote Control mode and reconnect to port {PORT}"
+UNLOCK_REFUSAL = (
     "Cannot unlock protective stop until 5s after occurrence. Always inspect cause of protective stop before unlocking"
 )
 
@@ -124,17 +124,17 @@ class DashboardSession:
         if key in self._questions and self._has(key):
             return self._questions[key]()
         if key in self._orders:
-            return self._orders[key]() if self._may_order else NOT_ALLOWED
+            return self._orders[key]() if self._may_order else REMOTE_CONTROL_REFUSAL
         for words, handler in {**self._orders_with_text, **self._questions_with_text}.items():
             if (key == words or key.startswith(words + " ")) and self._has(words):
                 allowed = self._may_order or words not in self._orders_with_text
-                return handler(line[len(words) :].strip()) if allowed else NOT_ALLOWED
+                return handler(line[len(words) :].strip()) if allowed else REMOTE_CONTROL_REFUSAL
         return f"could not understand: '{line}'"
 
     def _has(self, command: str) -> bool:
         """Return whether the controller's software has a command."""
         version = self._robot.identity.polyscope
-        return version < E_SERIES if command in OF_CB3 else version >= SINCE.get(command, (0,))
+        return version < E_SERIES if command in CB3_COMMANDS else version >= MIN_VERSIONS.get(command, (0,))
 
     @property
     def _may_order(self) -> bool:
@@ -198,7 +198,7 @@ class DashboardSession:
     def _unlock(self) -> str:
         """Unlock a protective stop, at the earliest after 5 s: a rule of the pendant and the dashboard only."""
         if self._robot.safety_mode == SafetyMode.PROTECTIVE_STOP and self._robot.stopped_for_s < UNLOCK_AFTER_S:
-            return TOO_EARLY
+            return UNLOCK_REFUSAL
         self._robot.unlock_protective_stop()
         return "Protective stop releasing"
 

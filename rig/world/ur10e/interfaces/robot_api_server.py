@@ -18,7 +18,7 @@ from rig.world.ur10e.modes import RobotMode, RuntimeState, SafetyMode
 from rig.world.ur10e.robot import Robot
 
 BASE = "/universal-robots/robot-api"
-SINCE = (10, 11)  # older versions have no Robot API
+MIN_VERSION = (10, 11)  # older versions have no Robot API
 REQUEST_BYTES = 1 << 20
 END = b"\r\n\r\n"
 PROGRAM_STATE = "/program/v1/state"
@@ -29,11 +29,11 @@ Body = dict[str, Any]
 Answer = Callable[[Robot], Body]
 Order = Callable[[Robot], object]
 Done = Callable[[Robot], bool]
-PAUSED = (RuntimeState.PAUSING, RuntimeState.PAUSED)
+PAUSE_STATES = (RuntimeState.PAUSING, RuntimeState.PAUSED)
 
 
 def _program_state(robot: Robot) -> Body:
-    stopped = "PAUSED" if robot.runtime_state in PAUSED else "STOPPED"
+    stopped = "PAUSED" if robot.runtime_state in PAUSE_STATES else "STOPPED"
     return {"state": "PLAYING" if robot.robot_status_bits >> 1 & 1 else stopped}
 
 
@@ -49,10 +49,10 @@ def _api_version(robot: Robot) -> str:
 
 QUESTIONS: Mapping[str, tuple[tuple[int, int], Answer]] = {
     "/openapi.json": (
-        SINCE,
+        MIN_VERSION,
         lambda robot: {"openapi": "3.0.0", "info": {"title": "Robot API", "version": _api_version(robot)}},
     ),
-    PROGRAM_STATE: (SINCE, _program_state),
+    PROGRAM_STATE: (MIN_VERSION, _program_state),
     "/program/v1/loaded": ((10, 12), lambda robot: {"name": robot.loaded_program or DEFAULT_PROGRAM}),
     "/robotstate/v1/robotmode": ((10, 12), lambda robot: {"mode": robot.robot_mode.name}),
     "/robotstate/v1/safetymode": ((10, 12), _safety_mode),
@@ -91,13 +91,13 @@ ORDERS: Mapping[str, Mapping[str, tuple[Order, Done]]] = {
         "RESTART_SAFETY": (Robot.restart_safety, lambda robot: robot.robot_mode == RobotMode.POWER_OFF),
     },
 }
-LOADING = {"/program/v1/loaded": ("name", (10, 12)), "/program/v1/load": ("programName", SINCE)}
+PROGRAM_PATHS = {"/program/v1/loaded": ("name", (10, 12)), "/program/v1/load": ("programName", MIN_VERSION)}
 PROGRAMS = "/programs/v1/"
 
 
 def has_robot_api(robot: Robot) -> bool:
     """Return whether the controller's software has a Robot API."""
-    return robot.identity.polyscope >= SINCE
+    return robot.identity.polyscope >= MIN_VERSION
 
 
 @dataclass(slots=True)
@@ -155,7 +155,7 @@ class RobotApiSession:
         path = path.removeprefix(BASE)
         if path.startswith(PROGRAMS) and version >= (10, 12):
             return self._answer_about_programs(method, path.removeprefix(PROGRAMS), body)
-        if method == "PUT" and (path in ORDERS or path in LOADING):
+        if method == "PUT" and (path in ORDERS or path in PROGRAM_PATHS):
             return self._obey(path, body)
         since, answer = QUESTIONS.get(path, (None, None))
         if answer is None or since is None or version < since:
@@ -180,11 +180,11 @@ class RobotApiSession:
         """Begin to carry out an order; return the answer if it takes no time."""
         if self._robot.local_control:
             return _http(HTTPStatus.FORBIDDEN, {"message": "the robot is in local control mode"})
-        key, since = LOADING.get(path, ("action", SINCE))
+        key, since = PROGRAM_PATHS.get(path, ("action", MIN_VERSION))
         word = _read_word(body, key)
         if word is None or self._robot.identity.polyscope < since:
             return _http(HTTPStatus.BAD_REQUEST, {"message": f"no {key}"})
-        return self._load(word) if path in LOADING else self._act(ORDERS[path], word)
+        return self._load(word) if path in PROGRAM_PATHS else self._act(ORDERS[path], word)
 
     def _load(self, name: str) -> bytes:
         if name not in self._programs:

@@ -4,7 +4,7 @@ import json
 
 WAIT_PROGRAM = "wait_program"
 DEFAULT_PROGRAM = "Default program"  # the program that a PolyScope X has loaded at the start
-PROGRAMS_MAX = 50
+MAX_PROGRAMS = 50
 
 
 class WaitProgram:
@@ -43,7 +43,7 @@ class StoredPrograms:
             name = json.loads(text)["program"]["programInformation"]["name"]
         except (TypeError, KeyError, RecursionError):
             raise ValueError("no program") from None
-        if not isinstance(name, str) or len(self._documents) >= PROGRAMS_MAX:
+        if not isinstance(name, str) or len(self._documents) >= MAX_PROGRAMS:
             raise ValueError("no program that can be stored")
         if (name in self._documents) is not replace:
             raise ValueError("no such program" if replace else "the program exists")

@@ -19,10 +19,10 @@ TYPES = {
 
 JOINT_MODE_OFF = 239
 JOINT_MODES = {RobotMode.RUNNING: 253, RobotMode.IDLE: 255}
-CONFIGURABLE = 0xFF00  # mask of the configurable digital inputs and outputs
+CONFIGURABLE_MASK = 0xFF00  # the configurable digital inputs and outputs
 
 # The first versions of controllers with these outputs (RTDE guide, "introduced in version").
-SINCE: dict[str, tuple[int, int]] = {
+MIN_VERSIONS: dict[str, tuple[int, int]] = {
     "collision_detection_ratio": (5, 15),
     "time_scale_source": (5, 17),
     "actual_robot_energy_consumed": (5, 23),
@@ -32,7 +32,7 @@ SINCE: dict[str, tuple[int, int]] = {
 
 def find_output_type(robot: Robot, name: str) -> str:
     """Return the RTDE type of an output; "NOT_FOUND" if this version of the controller does not have it."""
-    is_known = name in OUTPUTS and robot.identity.polyscope[:2] >= SINCE.get(name, (0, 0))
+    is_known = name in OUTPUTS and robot.identity.polyscope[:2] >= MIN_VERSIONS.get(name, (0, 0))
     return OUTPUTS[name][0] if is_known else "NOT_FOUND"
 
 
@@ -102,7 +102,7 @@ OUTPUTS: dict[str, tuple[str, Get]] = {
     "speed_scaling": ("DOUBLE", lambda r: r.speed_scaling),
     "target_speed_fraction": ("DOUBLE", lambda r: r.speed_slider),
     "actual_digital_output_bits": ("UINT64", lambda r: r.digital_outputs),
-    "actual_configurable_digital_output_bits": ("UINT64", lambda r: r.digital_outputs & CONFIGURABLE),
+    "actual_configurable_digital_output_bits": ("UINT64", lambda r: r.digital_outputs & CONFIGURABLE_MASK),
     "actual_joint_voltage": ("VECTOR6D", lambda r: (_supply_v(r),) * 6),
     "actual_robot_voltage": ("DOUBLE", _supply_v),
     "standard_analog_output0": ("DOUBLE", lambda r: r.analog_outputs[0]),
@@ -193,14 +193,14 @@ INPUTS |= {
     for i in numbers
 }
 
-DIGITAL = (("standard", 0), ("configurable", 8), ("tool", 16))  # kind, first bit of actual_digital_output_bits
+DIGITAL_OUTPUTS = (("standard", 0), ("configurable", 8), ("tool", 16))  # kind, first bit of actual_digital_output_bits
 
 
 def apply_masked(robot: Robot, values: dict[str, Any]) -> None:
     """Apply the inputs that act only if their mask is set."""
     if values.get("speed_slider_mask"):
         robot.set_speed_slider(values.get("speed_slider_fraction", robot.speed_slider))
-    for kind, first in DIGITAL:
+    for kind, first in DIGITAL_OUTPUTS:
         mask = values.get(f"{kind}_digital_output_mask", 0) << first
         if mask:
             bits = values.get(f"{kind}_digital_output", 0) << first

@@ -16,9 +16,9 @@ Array = NDArray[np.float64]
 
 KNOT_S = 0.01  # interval at which the joints follow the line exactly, with constant acceleration in between
 ROTATION_RADIUS_M = 0.3  # the length that a rotation by one radian counts as
-ACCURACY = 1e-9
-SLOWEST = 0.1  # smallest fraction of the requested speed that is tried
-KNOTS_A_TICK = 5  # knots that are computed in one tick: a long line must not stop the world
+FIT_TOLERANCE = 1e-9
+MIN_SPEED_FRACTION = 0.1  # of the requested speed, that is tried
+KNOTS_PER_TICK = 5  # knots that are computed in one tick: a long line must not stop the world
 
 
 def _twist(q: Sequence[float] | Array, rotation: Array, position: Array, links: Links) -> Array:
@@ -50,7 +50,7 @@ def solve_inverse_kinematics(pose: Sequence[float], start_rad: Joints, links: Li
     q = np.array(start_rad)
     for _ in range(100):
         error = _twist(q, rotation, position, links)
-        if np.abs(error).max() < ACCURACY:
+        if np.abs(error).max() < FIT_TOLERANCE:
             return tuple(q.tolist())
         matrix = _jacobian(q, links)
         step = matrix.T @ np.linalg.solve(matrix @ matrix.T + 1e-9 * np.eye(6), error)
@@ -84,19 +84,19 @@ def plan_straight_line(
     """Plan a moveL from rest to rest, a few knots per tick so that the world continues during planning.
 
     If a joint would be too fast, the whole line is slowed down. Raise `OutOfReach` if that makes it slower than
-    `SLOWEST`, because the line leads through a singularity, or if the pose is out of reach.
+    `MIN_SPEED_FRACTION`, because the line leads through a singularity, or if the pose is out of reach.
     """
     rotation, position = np.array(rotation_from_vector(pose[3:])), np.array(pose[:3])
     twist = _twist(start, rotation, position, links)
     length = _length(twist)
-    if length < ACCURACY:
+    if length < FIT_TOLERANCE:
         return build_rest(start)
     try:
         solve_inverse_kinematics(pose, start, links)
     except ProgramError as error:  # the pose is out of reach
         raise OutOfReach(str(error)) from None
     top_m_s = min(speed_m_s, sqrt(length * acceleration_m_s2))
-    slowest = SLOWEST * top_m_s
+    slowest = MIN_SPEED_FRACTION * top_m_s
     while top_m_s > slowest:
         segments, excess = yield from _sample_line(start, twist, top_m_s, acceleration_m_s2, links)
         if excess <= 1.0:
@@ -124,7 +124,7 @@ def _sample_line(
     segments: list[MotionSegment] = []
     excess = 0.0
     for knot in range(1, knots + 1):
-        if knot % KNOTS_A_TICK == 0:
+        if knot % KNOTS_PER_TICK == 0:
             yield
         speed_m_s = top_m_s * min(1.0, knot * step_s / ramp_s, max(0.0, duration_s - knot * step_s) / ramp_s)
         try:

@@ -8,8 +8,8 @@ import numpy as np
 from rig.world.clock import TICK_S, TICKS_PER_SECOND
 from rig.world.ur10e.motion.trajectory import Joints
 
-STANDING_RAD_S = 1e-3  # the speeds of slower joints have no noise
-NOISES = 12  # random numbers a tick: six for angles, six for speeds
+MIN_NOISY_SPEED_RAD_S = 1e-3  # the speeds of slower joints have no noise
+NOISES_PER_TICK = 12  # six random numbers for angles, six for speeds
 
 
 @dataclass(slots=True)
@@ -46,10 +46,10 @@ class Encoders:
 
     def read_speeds(self, time_s: float, qd_rad_s: Joints) -> Joints:
         """Return the speeds that the encoders report at the end of the tick at `time_s`, rad/s."""
-        if not self.speed_noise_rad_s or max(map(abs, qd_rad_s)) < STANDING_RAD_S:
+        if not self.speed_noise_rad_s or max(map(abs, qd_rad_s)) < MIN_NOISY_SPEED_RAD_S:
             return qd_rad_s
         return tuple(
-            v + self.speed_noise_rad_s * n if abs(v) >= STANDING_RAD_S else v
+            v + self.speed_noise_rad_s * n if abs(v) >= MIN_NOISY_SPEED_RAD_S else v
             for v, n in zip(qd_rad_s, self._draw(time_s)[6:], strict=True)
         )
 
@@ -58,5 +58,5 @@ class Encoders:
         block, index = divmod(round(time_s / TICK_S), TICKS_PER_SECOND)
         if block != self._block[0]:
             rng = np.random.default_rng([self.seed, block])
-            self._block = block, rng.standard_normal((TICKS_PER_SECOND, NOISES)).tolist()
+            self._block = block, rng.standard_normal((TICKS_PER_SECOND, NOISES_PER_TICK)).tolist()
         return self._block[1][index]

@@ -15,10 +15,10 @@ from typing import NamedTuple
 from rig.config.world.arm_joints import SimulatedDriveSection
 from rig.world.clock import TICK_S
 
-SLOW_RAD_S = 0.1  # v₀ of the ripple
-SLOW_SQUARED = SLOW_RAD_S**2
-PARALLEL = {1: (2,), 2: (1, 3), 3: (2,)}  # shoulder, elbow and wrist 1 have parallel axes
-MOST_YIELD_RAD = 3e-4  # largest yielding: in logs no joint errs by more than 0.7 to 1 mrad, including the lag
+RIPPLE_SPEED_RAD_S = 0.1  # v₀ of the ripple
+RIPPLE_SPEED_SQUARED = RIPPLE_SPEED_RAD_S**2
+PARALLEL_JOINTS = {1: (2,), 2: (1, 3), 3: (2,)}  # shoulder, elbow and wrist 1 have parallel axes
+MAX_YIELD_RAD = 3e-4  # in logs no joint errs by more than 0.7 to 1 mrad, including the lag
 NEGLIGIBLE_RAD, NEGLIGIBLE_RAD_S = 1e-9, 1e-7  # a smaller yielding counts as none
 RippleOrders = tuple[tuple[int, float, float], ...]  # cycles a turn, Rₙ/n in rad/s, phase in rad
 Derivatives = tuple[float, float, float]  # an angle in rad and its first two derivatives
@@ -57,19 +57,19 @@ class JointDrive:
             sines += sine
             cosines += cosine
             bends += n * n * sine
-        square = v * v + SLOW_SQUARED
+        square = v * v + RIPPLE_SPEED_SQUARED
         size = v / square
         if a:
-            growth = (SLOW_SQUARED - v * v) / (square * square) * a  # rate of change of the ripple's size
-            bend = 2.0 * v * (v * v - 3.0 * SLOW_SQUARED) / (square * square * square) * a * a
+            growth = (RIPPLE_SPEED_SQUARED - v * v) / (square * square) * a  # rate of change of the ripple's size
+            bend = 2.0 * v * (v * v - 3.0 * RIPPLE_SPEED_SQUARED) / (square * square * square) * a * a
             angle, rate = size * sines, growth * sines + size * v * cosines
             change = bend * sines + 2.0 * growth * v * cosines + size * (a * cosines - v * v * bends)
         else:
             angle, rate, change = size * sines, size * v * cosines, -size * v * v * bends
         shaken = [(joint, angle, rate, change)]
         c = self.crosstalk
-        if c and joint in PARALLEL:
-            shaken += [(other, c * angle, c * rate, c * change) for other in PARALLEL[joint]]
+        if c and joint in PARALLEL_JOINTS:
+            shaken += [(other, c * angle, c * rate, c * change) for other in PARALLEL_JOINTS[joint]]
         return shaken
 
     def advance(self, yielding: Sequence[Yielding], change_rad_s: Sequence[float]) -> tuple[Yielding, ...]:
@@ -84,7 +84,7 @@ class JointDrive:
         for joint, change in enumerate(change_rad_s):
             angle, rate, _ = before.get(joint, (0.0, 0.0, 0.0))
             if change or abs(angle) > NEGLIGIBLE_RAD or abs(rate) > NEGLIGIBLE_RAD_S:
-                end = -max(-MOST_YIELD_RAD, min(self.yield_s2 * change / TICK_S, MOST_YIELD_RAD))
+                end = -max(-MAX_YIELD_RAD, min(self.yield_s2 * change / TICK_S, MAX_YIELD_RAD))
                 joints.append(Yielding(joint, end, angle - end, rate + (angle - end) / self.yield_time_s))
         return tuple(joints)
 

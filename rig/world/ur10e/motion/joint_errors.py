@@ -15,8 +15,8 @@ from rig.world.ur10e.motion.trajectory import ZERO, Joints
 from rig.world.ur10e.motion.vibration import WRISTS, Vibration
 
 REVERSAL_RAD = 0.01  # travel within which hysteresis develops: shorter than the ramps
-STANDING_RAD_S = 1e-6  # slower speeds are rounding errors of joints that do not move
-NEGLIGIBLE_AFTER = 12.0  # decay times after which settling is negligible
+MIN_SPEED_RAD_S = 1e-6  # slower speeds are rounding errors of joints that do not move
+NEGLIGIBLE_DECAY_TIMES = 12.0  # after which settling is negligible
 JointState = tuple[Joints, Joints, Joints]  # angles, speeds, accelerations
 
 
@@ -68,7 +68,7 @@ class JointErrors:
         tones += [(turn, [random.uniform(0.0, 2.0 * pi) for _ in WRISTS]) for turn in more]
         self._vibration = Vibration(errors.vibration_rms_rad_s, tones)
         self._settling = errors.settling_rad_s
-        self._patience_s = NEGLIGIBLE_AFTER * errors.settling_decay_s
+        self._patience_s = NEGLIGIBLE_DECAY_TIMES * errors.settling_decay_s
         self._last = [(0.0, 0.0, 1.0, 0.0)] * 6  # last result: encoder's angle; true angle and its two derivatives
         self._is_current = [False] * 6
         self._rest: tuple[Joints, Joints] = ((), ())  # encoder and true angles at the last rest
@@ -82,7 +82,7 @@ class JointErrors:
             return
         self._speed = smooth_qd_rad_s
         for joint, speed in enumerate(smooth_qd_rad_s):
-            moving = abs(speed) > STANDING_RAD_S
+            moving = abs(speed) > MIN_SPEED_RAD_S
             if moving:
                 direction = 1.0 if speed > 0.0 else -1.0
                 if direction != self._direction[joint]:

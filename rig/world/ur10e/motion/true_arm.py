@@ -13,7 +13,7 @@ from rig.world.ur10e.motion.joint_motion import JointMotion
 from rig.world.ur10e.motion.links import UR10E, ZERO6, Drawing, Links, links
 from rig.world.ur10e.motion.trajectory import Joints
 
-STILL: Vector = (0.0, 0.0, 0.0)
+NO_MOTION: Vector = (0.0, 0.0, 0.0)
 WRIST = 3  # the first joint that vibrates: those before it are mostly at rest
 
 
@@ -73,7 +73,7 @@ class TrueArm:
 
     def rate_at(self, time_s: float) -> Vector:
         """Return the angular rate of an ideal arm's flange in its own frame, rad/s, at a time within the last tick."""
-        return STILL if self._motion.still else flange_rate(*self._motion.joints_at(time_s), self._links)
+        return NO_MOTION if self._motion.still else flange_rate(*self._motion.joints_at(time_s), self._links)
 
     def motion_at(self, time_s: float) -> BodyMotion:
         """Return the motion of the flange at a time within the last tick or the motion's memory."""

@@ -11,9 +11,9 @@ from rig.world.ur10e.robot import Robot
 
 Steps = Iterator[None]
 
-NUMBER_MAX = 1e6  # angles, lengths, speeds and accelerations, all in SI units
+MAX_NUMBER = 1e6  # angles, lengths, speeds and accelerations, all in SI units
 # lowest speeds of moves, rad/s and m/s; lowest accelerations have the same numbers
-SLOWEST, SLOWEST_LINE_M_S = 1e-6, 1e-3
+MIN_SPEED, MIN_LINE_SPEED_M_S = 1e-6, 1e-3
 HAND_OVER_RAD_S2 = 4.0  # deceleration before a move that follows a killed one
 
 
@@ -34,7 +34,7 @@ class ScriptMove:
 
 def check_finite(values: Sequence[float]) -> None:
     """Raise `ProgramError` if a number is too large for any joint."""
-    if not all(abs(value) <= NUMBER_MAX for value in values):
+    if not all(abs(value) <= MAX_NUMBER for value in values):
         raise ProgramError(f"a number no joint can follow among {list(values)}")
 
 
@@ -79,7 +79,7 @@ class Threads:
 
     def move(self, name: str, move: ScriptMove) -> Steps:
         """Move the joints for the thread `name`, until they rest at the target."""
-        if not min(move.speed, move.acceleration) >= (SLOWEST_LINE_M_S if move.straight else SLOWEST):
+        if not min(move.speed, move.acceleration) >= (MIN_LINE_SPEED_M_S if move.straight else MIN_SPEED):
             raise ProgramError("a move needs a speed and an acceleration above zero")
         check_finite([*move.target, move.speed, move.acceleration])
         self.take(name)

@@ -13,13 +13,13 @@ from rig.world.ur10e.controller_messages import ProgramError
 from rig.world.ur10e.motion.cartesian import approach_speed, solve_inverse_kinematics, solve_joint_speeds
 from rig.world.ur10e.motion.trajectory import Joints
 from rig.world.ur10e.programs.program_threads import ScriptMove, Steps, Threads, check_finite
-from rig.world.ur10e.programs.ur_rtde_questions import NOT_ACTED_OUT, build_questions
+from rig.world.ur10e.programs.ur_rtde_questions import UNSIMULATED_CODES, build_questions
 from rig.world.ur10e.programs.ur_rtde_registers import ProgramRegisters
 from rig.world.ur10e.robot import Robot
 
-REALTIME = frozenset({6, 9, 10, 11, 24, 25, 26, 27, 38, 58, 66, 67, 68, 69, 70, 71})
+REALTIME_CODES = frozenset({6, 9, 10, 11, 24, 25, 26, 27, 38, 58, 66, 67, 68, 69, 70, 71})
 STOP_SCRIPT = 255
-READY, DONE = 1, 2
+READY_STATE, DONE_STATE = 1, 2
 
 FOLLOWING_RAD_S2 = 40.0  # acceleration of joints that follow a target from tick to tick
 
@@ -80,22 +80,22 @@ class ControlProgram:
     def _loop(self) -> Steps:
         """Run the main loop of ur_rtde's program: take a code from register 0, carry it out, report its end."""
         self._signal_async(-1)
-        self._registers.write_integer(0, READY)
+        self._registers.write_integer(0, READY_STATE)
         executing = False
         while True:
             code = self._registers.integer(0)
-            if code == 0 or code in REALTIME:
+            if code == 0 or code in REALTIME_CODES:
                 executing = False if code == 0 else executing
                 if code:
                     yield from self._command(code)()
-                self._registers.write_integer(0, READY)
+                self._registers.write_integer(0, READY_STATE)
             elif not executing:
                 if code == STOP_SCRIPT:
                     return
                 yield from self._command(code)()
-                self._registers.write_integer(0, DONE)
+                self._registers.write_integer(0, DONE_STATE)
                 executing = True
-            self._idle_code = None if code in REALTIME else code
+            self._idle_code = None if code in REALTIME_CODES else code
             yield
             self._idle_code = None
 
@@ -103,7 +103,7 @@ class ControlProgram:
         if code in self._questions:
             return partial(_run_instant, self._questions[code])
         if code not in self._commands:
-            name = f" ({NOT_ACTED_OUT[code]})" if code in NOT_ACTED_OUT else ""
+            name = f" ({UNSIMULATED_CODES[code]})" if code in UNSIMULATED_CODES else ""
             raise ProgramError(f"not simulated: command {code}{name} of rtde_control")
         return self._commands[code]
 

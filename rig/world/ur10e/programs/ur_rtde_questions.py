@@ -67,7 +67,7 @@ def build_questions(robot: Robot, registers: ProgramRegisters) -> dict[int, Call
     }
 
 
-NOT_ACTED_OUT = {
+UNSIMULATED_CODES = {
     6: "forceMode", 7: "forceModeStop", 12: "servoC", 18: "teachMode", 19: "endTeachMode", 20: "forceModeSetDamping",
     21: "forceModeSetGainScaling", 25: "toolContact", 27: "getActualJointPositionsHistory", 28: "getTargetWaypoint",
     41: "jogStart", 42: "jogStop", 51: "moveUntilContact", 52: "freedriveMode", 53: "endFreedriveMode",

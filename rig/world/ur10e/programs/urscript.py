@@ -13,7 +13,7 @@ from rig.world.ur10e.motion.trajectory import Joints
 from rig.world.ur10e.programs.program_threads import ScriptMove, Steps, Threads, check_finite
 from rig.world.ur10e.robot import Robot
 
-NESTED = 50  # loops inside loops
+MAX_NESTING = 50  # loops inside loops
 CALL = re.compile(r"([a-z_][a-z_0-9]*)\((.*)\)$", re.IGNORECASE)
 TEXT = re.compile(r'"[^"]*"|\'[^\']*\'')  # text in quotation marks, in which brackets and # have no meaning
 FRAME = re.compile(r"^(def|sec)\s+(\w+)\s*\(\s*\)\s*:$")
@@ -115,7 +115,7 @@ def parse_program(lines: Sequence[str]) -> tuple[str, Block]:
         if frame and number == 1:
             name = frame.group(2)
         elif text == "while True:":
-            if len(stack) > NESTED:
+            if len(stack) > MAX_NESTING:
                 raise ProgramError("not simulated: loops so deep in one another", (number, 1))
             stack.append([])
         elif text == "end" and len(stack) > 1:
