@@ -15,7 +15,7 @@ SPLINE_NOISE_RATIO = 0.935  # the same for an angle between two readings, by the
 
 
 @dataclass(frozen=True, slots=True)
-class Surroundings:
+class MeasurementEnvironment:
     """The site, the stated uncertainty, the controller's clock, and its states' jitter in s.
 
     - `clock`: the comparison that corrects the speeds; `clocks`: those of all recordings, for the checks.
@@ -35,7 +35,7 @@ class Surroundings:
     reading_noise_rad: float = 0.0
 
 
-def surroundings_of(recordings: Sequence[ObservedRun], settings: RunSettings) -> Surroundings:
+def find_environment(recordings: Sequence[ObservedRun], settings: RunSettings) -> MeasurementEnvironment:
     """Return the site and the clock comparison of a run.
 
     The recording with the longest motion determines the clock, since all recordings share the controller's quartz. The
@@ -46,7 +46,7 @@ def surroundings_of(recordings: Sequence[ObservedRun], settings: RunSettings) ->
     clocks = tuple(check_clock(recording, uncertainty) for recording in recordings)
     clock = next(check for recording, check in zip(recordings, clocks, strict=True) if recording is longest)
     jitter = state_jitter(recordings)
-    return Surroundings(
+    return MeasurementEnvironment(
         settings.site,
         uncertainty,
         clock,

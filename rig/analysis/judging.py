@@ -9,7 +9,7 @@ import numpy as np
 from rig.analysis.check import Check, list_unsolved
 from rig.analysis.consistency.contradictions import NO_CHECKS, ConsistencyChecks, check_references, contradictions
 from rig.analysis.consistency.detection_limits import DetectionLimit
-from rig.analysis.environment import surroundings_of
+from rig.analysis.environment import find_environment
 from rig.analysis.estimator_names import Estimator, find_estimator
 from rig.analysis.gyroscope.board_averages import board_averages
 from rig.analysis.gyroscope.calibration import SensorResult, solve_observed
@@ -124,13 +124,13 @@ def _judge_gyroscopes(
     polynomials: "Polynomials",
 ) -> _GyroscopeOutcome:
     """Solve and judge the gyroscopes of a run: calibration, the board's arithmetic, contradictions and clocks."""
-    surroundings = surroundings_of(recordings, settings)
-    results = solve_observed(runs[0].measuring(RATE), recordings, surroundings, estimator, settings.matrix_corrected)
+    environment = find_environment(recordings, settings)
+    results = solve_observed(runs[0].measuring(RATE), recordings, environment, estimator, settings.matrix_corrected)
     if polynomials:
         from rig.analysis.temperature.over_temperature import add_rate_polynomials
 
         results, polynomials = _add_polynomials(results, RATE, add_rate_polynomials, polynomials)
-    among_rates = contradictions(recordings, results, settings.to_calibrate, surroundings, settings)
+    among_rates = contradictions(recordings, results, settings.to_calibrate, environment, settings)
     onboard = {name: check_arithmetic(runs, name) for name in settings.to_calibrate if runs[0].sensors[name].on_board}
     checks = judge(
         {name: results[name].solution for name in settings.to_calibrate},
@@ -146,9 +146,9 @@ def _judge_gyroscopes(
             *checks,
             *(check for name, agreed in onboard.items() for check in agreed.checks(name)),
             *among_rates.checks,
-            *clock_checks(surroundings.clocks),
+            *clock_checks(environment.clocks),
         ),
-        clock=surroundings.clock,
+        clock=environment.clock,
         detection_limits=among_rates.detection_limits,
     )
 

@@ -34,7 +34,7 @@ class AtRest:
 
     curve: AllanCurve
     axes: tuple[AllanAxis, AllanAxis, AllanAxis]
-    stretches: int
+    intervals: int
     longest_s: float
     total_s: float
     temperature_c: tuple[float, float] | None
@@ -120,7 +120,7 @@ def _summarise_noise(times_s: Sequence[Array], readings: Sequence[Array], quanti
     return AtRest(
         curve=curve,
         axes=(read_axis(curve, 0), read_axis(curve, 1), read_axis(curve, 2)),
-        stretches=len(readings),
+        intervals=len(readings),
         longest_s=max(durations_s),
         total_s=float(np.sum(durations_s)),
         temperature_c=None,

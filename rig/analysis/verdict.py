@@ -153,7 +153,9 @@ def acceleration_checks(
     limit_set = _LimitSet(sensor, "acceleration", limits, rule)
     uncertainties = _split_expanded(result.budget)
     checks = limit_set.calibration(result.triad.scale, result.bias_m_s2, result.budget.std, uncertainties)
-    return checks if result.held_out is None else (*checks, limit_set.check("verification", result.held_out.rms_m_s2))
+    return (
+        checks if result.validation is None else (*checks, limit_set.check("verification", result.validation.rms_m_s2))
+    )
 
 
 def drift_checks(

@@ -35,7 +35,7 @@ class Judged(Protocol):
     def limit(self) -> float | None: ...
 
 
-def limit_held(checks: Iterable[Judged], sensor: str, quantity: str, parameter: Parameter) -> float | None:
+def find_conformity_limit(checks: Iterable[Judged], sensor: str, quantity: str, parameter: Parameter) -> float | None:
     """Return the limit of conformity that judges a parameter of a sensor's quantity, or None."""
     subject = "conformity", sensor, quantity, parameter
     limits = ((check.means, check.limit) for check in checks)

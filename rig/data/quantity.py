@@ -28,7 +28,7 @@ class Mistaken:
     """A `unit` in which readings are often given by mistake, the remedy, and an SI value that no part reaches."""
 
     unit: str
-    mend: str
+    remedy: str
     most: float
 
     @property

@@ -39,7 +39,7 @@ def dwell_residual_std_m_s2(solution: "ImuSolution", movement: "Movement") -> Ar
     from rig.estimation.reference.reading_errors import noise
 
     movement, theta = (
-        replace(movement, sensor_errors=solution.sensor_errors, own_share=solution.own_share),
+        replace(movement, sensor_errors=solution.sensor_errors, independent_fraction=solution.independent_fraction),
         solution.theta,
     )
     arm = solution.attitude_error.std_rad * accelerometer_model.effects(theta, movement)

@@ -43,7 +43,7 @@ def _refuse_other_units(values: Array, quantity: Quantity, limit: float | None, 
     most = MAX_RANGE_RATIO * limit if limit is not None else np.inf if mistaken is None else mistaken.most
     largest = float(np.abs(values[~np.isnan(values)]).max(initial=0.0))
     other_unit = "another unit" if mistaken is None else mistaken.unit
-    remedy = f"Give them in {quantity.unit}" + ("" if mistaken is None else f": {mistaken.mend}")
+    remedy = f"Give them in {quantity.unit}" + ("" if mistaken is None else f": {mistaken.remedy}")
     if largest > most:
         reaches = f"its range is ±{limit:.4g}" if limit is not None else f"no such sensor reads more than {most:g}"
         raise Refused(

@@ -76,7 +76,7 @@ class Observation:
     angle_rad: float | None = None
     arc_rad: tuple[float, float] | None = None
     ripple: float = 0.0
-    beats: int = SIDEBANDS
+    sidebands: int = SIDEBANDS
     state_gain: float = 1.0
 
 
@@ -222,7 +222,7 @@ def _average_revolution(
         angle_rad=turn.angle_rad,
         arc_rad=None if turn.closed else sweep.revolution_rad,
         ripple=float(sampled.uneven_rad_s.std()) / turn.speed_rad_s,
-        beats=turn.beats,
+        sidebands=turn.sidebands,
         state_gain=1.0 if turn.uneven else motion.state_gain(stream.time_s[inside][covered], weights),
     )
 
@@ -230,7 +230,7 @@ def _average_revolution(
 def _sample_turn(time_s: Array, motion: ArmMotion, turn: Revolution, covered: NDArray[np.bool_]) -> SampledTurn:
     """Return a turn at the times at which the arm's motion is recorded, and `covered`, the mask (n,) of these times."""
     fraction = (time_s - turn.start_s) / turn.duration_s
-    waves = harmonics(turn.angle_rad * fraction, 2 * turn.beats)[covered]
+    waves = harmonics(turn.angle_rad * fraction, 2 * turn.sidebands)[covered]
     if not turn.closed:
         waves -= waves.mean(axis=0)  # over an arc, gravity's part remains in the mean; the attitudes account for it
     rates = motion.rates_at_samples(time_s)[covered]
@@ -238,8 +238,8 @@ def _sample_turn(time_s: Array, motion: ArmMotion, turn: Revolution, covered: ND
         share=fraction[covered],
         rates_rad_s=rates,
         uneven_rad_s=rates @ turn.axis_flange - turn.speed_rad_s,
-        passing=waves,
-        beats=turn.beats,
+        regressors=waves,
+        sidebands=turn.sidebands,
         encoders_true=not turn.uneven,
         closed=turn.closed,
         complete=bool(covered.all()) and not is_sparse(time_s),

@@ -36,7 +36,7 @@ SLOW_CYCLES = 8.0  # per revolution: slower lines are hard to separate from wave
 MIN_POWER_RATIO = 50.0  # of a slow ripple to the median of the encoders' noise, which by chance reaches 15
 MAX_NOISE_GAIN = 3.0  # of the arm's angles, up to which weights remove slow spectral lines
 SENSOR_SEARCH = LineSearch(slowest=5.0)
-ENCODER_SEARCH = LineSearch(slowest=2.5, beats=0, most=5)
+ENCODER_SEARCH = LineSearch(slowest=2.5, sidebands=0, most=5)
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,8 +46,8 @@ class SampledTurn:
     - `share` (n,): elapsed fraction of its time.
     - `rates_rad_s` (n, 3): the flange's mean rate around each sample, from the encoders.
     - `uneven_rad_s` (n,): that rate along the axis minus the turn's mean rate, which the angles at its ends determine.
-    - `passing` (n, k): columns of the turn's harmonics; for an arc minus their means.
-    - `beats`: number of sidebands of spectral lines, see `Revolution`.
+    - `regressors` (n, k): columns of the turn's harmonics; for an arc minus their means.
+    - `sidebands`: number of sidebands of spectral lines, see `Revolution`.
     - `encoders_true`: whether the encoders are right within a turn, not only over whole turns.
     - `closed`: whether it consists of whole turns.
     - `complete`: whether samples follow each other closely, and no long gap is among them.
@@ -56,8 +56,8 @@ class SampledTurn:
     share: Array
     rates_rad_s: Array
     uneven_rad_s: Array
-    passing: Array
-    beats: int
+    regressors: Array
+    sidebands: int
     encoders_true: bool
     closed: bool
     complete: bool
@@ -83,14 +83,14 @@ class Lines:
 def turn_mean(readings: Array, steps: Steps, turn: SampledTurn) -> tuple[Mean, Array]:
     """Return the mean of readings (n, 3) with resolution `steps`, and the weights (n,), also of the arm's mean rate."""
     ones = whole(readings)
-    steady = np.column_stack([ones, turn.passing])
+    steady = np.column_stack([ones, turn.regressors])
     lines = _find_turn_lines(readings, steady, turn)
-    vibration = waves(lines.cycles, turn.share, turn.beats)
-    weights = mean_weights(ones, np.column_stack([turn.passing, lines.rate, vibration]))
+    vibration = waves(lines.cycles, turn.share, turn.sidebands)
+    weights = mean_weights(ones, np.column_stack([turn.regressors, lines.rate, vibration]))
     added = np.zeros(3)
-    is_slow = np.repeat(lines.cycles < SLOW_CYCLES, column_count(turn.beats))
+    is_slow = np.repeat(lines.cycles < SLOW_CYCLES, column_count(turn.sidebands))
     if is_slow.any():
-        nuisance = np.column_stack([turn.passing, lines.rate, vibration[:, ~is_slow]])
+        nuisance = np.column_stack([turn.regressors, lines.rate, vibration[:, ~is_slow]])
         without_slow = mean_weights(ones, nuisance)
         change, explained = (weights - without_slow)[0], np.column_stack([ones, nuisance, lines.encoded])
         added = _slow_line_variance(readings, turn, vibration[:, is_slow], change, explained)
@@ -144,18 +144,18 @@ def _find_turn_lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines
     if not turn.complete:
         fixed = np.column_stack([steady, uneven])
         cycles = find_lines(
-            readings - fixed @ fit_columns(fixed, readings), LineSearch(beats=turn.beats), fraction=turn.share
+            readings - fixed @ fit_columns(fixed, readings), LineSearch(sidebands=turn.sidebands), fraction=turn.share
         )
         return Lines(cycles, len(cycles), none, uneven)
     ripple_rate, residuals = (values - steady @ fit_columns(steady, values) for values in (uneven, readings))
     if not turn.encoders_true:
-        cycles = find_lines(residuals, LineSearch(beats=turn.beats), fraction=turn.share)
+        cycles = find_lines(residuals, LineSearch(sidebands=turn.sidebands), fraction=turn.share)
         return Lines(cycles, len(cycles), ripple_rate, none)
     search = replace(ENCODER_SEARCH, floor=median_power(residuals))
     ripple = find_lines(ripple_rate, search, fraction=turn.share)
-    columns = waves(ripple, turn.share, ENCODER_SEARCH.beats)
+    columns = waves(ripple, turn.share, ENCODER_SEARCH.sidebands)
     sizes = fit_columns(columns, ripple_rate)
-    fast = np.repeat(ripple >= SLOW_CYCLES, column_count(ENCODER_SEARCH.beats))
+    fast = np.repeat(ripple >= SLOW_CYCLES, column_count(ENCODER_SEARCH.sidebands))
     slow = ripple_rate - columns[:, fast] @ sizes[fast]
     smooth = _find_slow_ripple(slow, turn.share)
     late = _changes(smooth) if turn.closed else none  # over an arc it resembles encoder errors

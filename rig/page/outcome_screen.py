@@ -7,7 +7,7 @@ from typing import Any
 
 from rig.analysis.check import Check
 from rig.data.installed_kinds import quantities
-from rig.data.meaning import JUDGED_PARAMETERS, limit_held
+from rig.data.meaning import JUDGED_PARAMETERS, find_conformity_limit
 from rig.data.result_file import ResultDocument
 from rig.data.run_folder import CONFIG, resuming
 from rig.page.about import About
@@ -29,7 +29,7 @@ def outcome_rows(result: ResultDocument, parts: Mapping[str, str], true_rows: Se
     true_by_name = {true.row.name: true for true in true_rows}
     for row in shown(result):
         names = row.sensor, row.quantity.name
-        scale, bias = (limit_held(result.checks, *names, parameter) for parameter in JUDGED_PARAMETERS)
+        scale, bias = (find_conformity_limit(result.checks, *names, parameter) for parameter in JUDGED_PARAMETERS)
         if row.scale is None:  # only calibrations have limits
             bias = None
         rows.append(

@@ -268,7 +268,7 @@ def list_observations(outcome: Outcome) -> Iterator[ObservationMade | AttitudeRe
         for observation in result.observations:
             yield ObservationMade(name, observation)
     for name, accelerometer in outcome.accelerometers.items():
-        for dwell in (*accelerometer.dwells, *(accelerometer.held_out.dwells if accelerometer.held_out else ())):
+        for dwell in (*accelerometer.dwells, *(accelerometer.validation.dwells if accelerometer.validation else ())):
             yield _read(name, ACCELERATION, dwell, accelerometer.gravity_m_s2)
     for name, solved in outcome.magnetometers.results.items():
         for reading in solved.dwells:

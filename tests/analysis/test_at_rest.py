@@ -33,7 +33,7 @@ def rates(run: RunData) -> AtRest:
 @pytest.mark.slow
 def test_random_walk_is_found_in_the_rests_between_sweeps(run: RunData) -> None:
     found = rates(run)
-    assert found.stretches == 6 and found.total_s == pytest.approx(6 * 19.6, abs=0.1)
+    assert found.intervals == 6 and found.total_s == pytest.approx(6 * 19.6, abs=0.1)
     assert found.longest_s == pytest.approx(19.6, abs=0.02) and found.temperature_c == (22.0, 22.0)
     for axis in found.axes:
         assert isinstance(axis.random_walk, AllanReading)
@@ -48,14 +48,14 @@ def test_a_missing_reading_parts_a_rest_in_two(run: RunData) -> None:
     middle = int(np.searchsorted(np.arange(len(samples)), 0.5 * len(samples)))
     inside = [index for index in (middle, middle + 238 * 10, middle + 238 * 20) if index < len(samples)]
     found = rates(replace(run, samples={"gyro": np.delete(samples, inside)}))
-    assert whole.stretches < found.stretches <= whole.stretches + 3
+    assert whole.intervals < found.intervals <= whole.intervals + 3
 
 
 @pytest.mark.slow
 def test_a_rest_in_which_the_arm_moved_is_left_out(run: RunData) -> None:
     arm = run.states.copy()
     arm["q_rad"][(arm["time_s"] > run.states["time_s"][-1] - 15.0), 5] += 0.01
-    assert rates(replace(run, states=arm)).stretches == 5
+    assert rates(replace(run, states=arm)).intervals == 5
 
 
 def float32(time_s: Array) -> Array:
@@ -85,7 +85,7 @@ def test_the_curve_of_bad_stamps_is_that_of_evened_ones(rate_hz: float, stamp: C
     readings = 0.01 * np.random.default_rng(3).normal(size=(len(time_s), 3))
     columns = {"time_s": stamp(time_s), **dict(zip(RATE.columns, readings.T, strict=True))}
     found = log_at_rest(samples_in(columns, "log")).quantities.results[RATE]
-    assert found.stretches == 1
+    assert found.intervals == 1
     for axis in range(3):
         _, theirs, *_ = allantools.oadev(readings[:, axis], rate=true_hz, data_type="freq", taus=found.curve.tau_s)
         assert found.curve.deviation[: len(theirs), axis] == pytest.approx(theirs, rel=0.02)
@@ -100,6 +100,6 @@ def test_a_few_missing_readings_do_not_split_a_log_and_are_reported() -> None:
     readings = 0.01 * np.random.default_rng(3).normal(size=(6000, 3))
     columns = {"time_s": np.round(time_s, 3)[kept], **dict(zip(RATE.columns, readings[kept].T, strict=True))}
     found = log_at_rest(samples_in(columns, "log"))
-    assert found.quantities.results[RATE].stretches == 1
+    assert found.quantities.results[RATE].intervals == 1
     (note,) = found.notes
     assert note.startswith(f"{np.count_nonzero(~kept)} samples are missing in ") and "after sample " in note

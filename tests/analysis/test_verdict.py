@@ -139,7 +139,7 @@ def test_accelerometers_and_drifts_are_held_against_their_limits_with_their_unce
         ),
         bias_m_s2=np.array([0.1, 0.0, -0.495]),
         budget=Budget((_line("noise", 6e-4, 3e-3), _line("gravity", 13**0.5 * 1e-4, 7**0.5 * 1e-3))),
-        held_out=None,
+        validation=None,
     )
     checks = {check.name: check for check in acceleration_checks("a", cast(AccelerometerResult, found), limits, rule)}
     held = BiasByRepeat(

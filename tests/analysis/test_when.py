@@ -124,7 +124,7 @@ def test_axes_that_lean_are_loaded_with_less_than_the_speed_of_the_sweeps() -> N
     result = calibrate([synthetic_run(Setup(noise_rad_s=0.002, mounting_error_rad=(float(lean), 0.0, 0.0)))])
     explained = result.results["gyro"].explained
     assert explained is not None
-    upright, *leaning = np.degrees(explained.loads_rad_s).tolist()
+    upright, *leaning = np.degrees(explained.axis_rate_ranges_rad_s).tolist()
     assert upright == pytest.approx([60, 60], rel=1e-3)  # what turns it across that axis tells nothing of it
     for each in leaning:
         assert each == pytest.approx([60 * float(np.cos(lean))] * 2, rel=2e-3)

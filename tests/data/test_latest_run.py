@@ -10,7 +10,7 @@ from rig.errors import Refused
 
 
 @pytest.fixture(autouse=True)
-def own_share(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def independent_fraction(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "share"))
     monkeypatch.chdir(tmp_path)
 

@@ -18,7 +18,7 @@ from rig.analysis.design.candidate_search import (
     find_shortest,
 )
 from rig.analysis.design.predicted_accelerations import predict_accelerometer_budgets
-from rig.analysis.environment import surroundings_of
+from rig.analysis.environment import find_environment
 from rig.analysis.gyroscope.calibration import observe_recordings, solve_observed
 from rig.cli import main
 from rig.config.load import load, parse
@@ -136,7 +136,7 @@ def reached(of: Run, seed: int) -> ReachedUncertainty:
         )
         runs, sensors, estimator = on_servo.runs, on_servo.runs[0].sensors, "newton"
     seen = observe_recordings(runs)
-    found = solve_observed(sensors, seen, surroundings_of(seen, seen[0].run.settings), estimator)["gyro"]
+    found = solve_observed(sensors, seen, find_environment(seen, seen[0].run.settings), estimator)["gyro"]
     assert found.uncertainty is not None
     return ReachedUncertainty.worst_case({"gyro": found.uncertainty})
 
@@ -183,7 +183,7 @@ def test_a_run_that_is_ten_times_as_noisy_is_not_what_was_predicted() -> None:
     each = RUNS[0]
     noisy = synthetic_run(Setup(noise_rad_s=10 * noise_of(each)))
     seen = observe_recordings([noisy])
-    found = solve_observed(noisy.sensors, seen, surroundings_of(seen, seen[0].run.settings))["gyro"]
+    found = solve_observed(noisy.sensors, seen, find_environment(seen, seen[0].run.settings))["gyro"]
     assert found.uncertainty is not None
     assert ReachedUncertainty.worst_case({"gyro": found.uncertainty}).scale > 2 * predicted_of(each).scale
 

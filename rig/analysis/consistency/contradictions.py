@@ -15,7 +15,7 @@ from rig.analysis.consistency.frozen_axis import find_longest_frozen
 from rig.analysis.consistency.gyroscope_checks import DISTURBED_SWEEP
 from rig.analysis.consistency.residual_tests import Statistic
 from rig.analysis.consistency.systematic_errors import build_error_patterns, collect_known_errors
-from rig.analysis.environment import Surroundings, surroundings_of
+from rig.analysis.environment import MeasurementEnvironment, find_environment
 from rig.analysis.gyroscope.calibration import SensorResult, solve_observed
 from rig.analysis.gyroscope.segment_table import append_transfers, stack_segments
 from rig.analysis.numeric_errors import solvable
@@ -53,7 +53,7 @@ def contradictions(
     recordings: Sequence[ObservedRun],
     results: Mapping[str, SensorResult],
     sensors: Sequence[str],
-    surroundings: Surroundings,
+    environment: MeasurementEnvironment,
     settings: RunSettings,
     *,
     false_alarms: float = FALSE_ALARM_PROBABILITY,
@@ -61,7 +61,7 @@ def contradictions(
 ) -> ConsistencyChecks:
     """Return the checks for contradictions in the gyroscopes' recordings.
 
-    `surroundings` are those of the recordings, `false_alarms` is the fraction of undamaged runs that may fail. The
+    `environment` are those of the recordings, `false_alarms` is the fraction of undamaged runs that may fail. The
     check of a disturbed sweep has the sweep's index in its name, `gyro.disturbed_sweep.3`, and in its meaning.
     `has_limits`: whether to compute the detection limits, which takes a third of the time.
     """
@@ -75,7 +75,7 @@ def contradictions(
         windows = segment_recordings(name, recordings)
         segments = stack_segments(windows, explained, settings.site)
         known_errors = collect_known_errors(
-            surroundings, name, results[name], recordings[0].run.sensors[name].stamp_std_s
+            environment, name, results[name], recordings[0].run.sensors[name].stamp_std_s
         )
         matrix, extension_m = explained.solution.matrix, np.array(settings.extension_m)
         transfers = average_transfers(name, recordings, matrix, settings.site, extension_m)
@@ -100,11 +100,11 @@ def contradictions(
         checks += [
             fitness(name, "rate", what, *statistic) for what, statistic in {**tested.statistics, **of_readings}.items()
         ]
-        stated_deg = surroundings.uncertainty.find_stated_size("non_orthogonality_deg", name)
+        stated_deg = environment.uncertainty.find_stated_size("non_orthogonality_deg", name)
         non_orthogonality = _non_orthogonality_deg(explained.solution, stated_deg, false_alarm_probability)
         checks.append(fitness(name, "rate", NON_ORTHOGONALITY, *non_orthogonality, unit="°"))
         if has_limits:
-            limits = find_gyroscope_limits(tested.detection_limits, name, results[name], surroundings)
+            limits = find_gyroscope_limits(tested.detection_limits, name, results[name], environment)
             detection_limits[name] = tuple(limits)
     return ConsistencyChecks(tuple(checks), detection_limits)
 
@@ -194,10 +194,10 @@ def contradicting_sweeps(runs: Sequence[RunData]) -> frozenset[int]:
 
             recordings = correct_recordings(recordings, settings, settings.reference_c).recordings
         chosen = {name: runs[0].sensors[name] for name in settings.to_calibrate}
-        surroundings = surroundings_of(recordings, settings)
-        results = solve_observed(chosen, recordings, surroundings)
+        environment = find_environment(recordings, settings)
+        results = solve_observed(chosen, recordings, environment)
         disturbed = contradictions(
-            recordings, results, settings.to_calibrate, surroundings, settings, has_limits=False
+            recordings, results, settings.to_calibrate, environment, settings, has_limits=False
         ).disturbed
         accelerometers = calibrate_accelerometers(recordings, settings, results)
         disturbed |= check_references(recordings, accelerometers, {}, settings).disturbed

@@ -216,8 +216,8 @@ def _longest_run(counts: NDArray[np.int64]) -> int:
 
 def _count_repeated(counts: NDArray[np.int64]) -> int:
     """Count the sequences of readings that repeat an earlier sequence."""
-    stretches = np.lib.stride_tricks.sliding_window_view(counts.astype(np.int16), PATTERN_READINGS, axis=0)
-    rows = np.ascontiguousarray(stretches.reshape(len(stretches), -1))
+    patterns = np.lib.stride_tricks.sliding_window_view(counts.astype(np.int16), PATTERN_READINGS, axis=0)
+    rows = np.ascontiguousarray(patterns.reshape(len(patterns), -1))
     return len(rows) - len(np.unique(rows.view(f"V{rows.shape[1] * 2}")))
 
 

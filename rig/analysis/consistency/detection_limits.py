@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rig.analysis.consistency.alternatives import FAULT_MODES, Means
-from rig.analysis.environment import Surroundings
+from rig.analysis.environment import MeasurementEnvironment
 from rig.analysis.gyroscope.vector_inputs import list_uncertainties
 from rig.data.quantity import RATE, Quantity
 from rig.errors import Fault
@@ -35,14 +35,14 @@ class DetectionLimit:
 
 
 def find_gyroscope_limits(
-    sizes: Mapping[str, float], name: str, result: "SensorResult", surroundings: Surroundings
+    sizes: Mapping[str, float], name: str, result: "SensorResult", environment: MeasurementEnvironment
 ) -> Iterator[DetectionLimit]:
     """Yield the detection limits of the gyroscope `name`; `sizes`: minimal detectable sizes by fault mode."""
     explained = result.explained
     if explained is None:
         return
     means, mounting = _means_of_solve(explained), np.array(result.sensor.mounting)
-    inputs = list_uncertainties(surroundings, name, result.earth)
+    inputs = list_uncertainties(environment, name, result.earth)
     for mode in FAULT_MODES:
         if (size := sizes.get(mode.what)) is None:
             continue

@@ -33,7 +33,7 @@ def compare_dwell_halves(
     # One noise for all dwells: in a single dwell, half a cycle of an oscillation looks like coloured noise, which would
     # explain a step as well.
     noise = np.median(variances, axis=0) + 2 * flicker_counts**2
-    swing = _swing_variances(differences, noise)
+    swing = _vibration_variances(differences, noise)
     dof_of_noise = min(len(dwell.counts) for dwell in long_dwells) - 2
     dof_of_swing = max(len(long_dwells) - 1, 1)
     dof = (noise.mean() + swing) ** 2 / (noise.mean() ** 2 / dof_of_noise + swing**2 / dof_of_swing)
@@ -43,7 +43,7 @@ def compare_dwell_halves(
     return {"knocked_dwell": (float(chi_squared[worst]), float(limits[worst]))}
 
 
-def _swing_variances(differences: Array, noise: Array) -> Array:
+def _vibration_variances(differences: Array, noise: Array) -> Array:
     """Return the mean square of all other dwells' `differences` (N, 3), minus the `noise` (3,), for each dwell."""
     beyond = (differences**2 - noise).mean(axis=1)
     others: Array = np.maximum((beyond.sum() - beyond) / max(len(beyond) - 1, 1), 0.0)

@@ -13,7 +13,7 @@ import numpy as np
 
 from rig.analysis.consistency.gyroscope_checks import ErrorPatterns
 from rig.analysis.consistency.state_errors import build_reading_patterns, build_time_patterns
-from rig.analysis.environment import Surroundings
+from rig.analysis.environment import MeasurementEnvironment
 from rig.analysis.gyroscope.segment_table import Segments
 from rig.analysis.gyroscope.vector_inputs import WAVE_RATIO, list_uncertainties
 from rig.config.judging.judging_keys import OfSensor
@@ -87,7 +87,7 @@ class KnownErrors:
 
 
 def collect_known_errors(
-    surroundings: Surroundings, name: str, result: "SensorResult", stamp_std_s: float | None = None
+    environment: MeasurementEnvironment, name: str, result: "SensorResult", stamp_std_s: float | None = None
 ) -> KnownErrors:
     """Return the standard uncertainties of gyroscope and arm, from the configuration and the recording.
 
@@ -97,14 +97,14 @@ def collect_known_errors(
     """
     sensor, explained = result.sensor, result.explained
     return build_known_errors(
-        surroundings.uncertainty,
+        environment.uncertainty,
         name,
         sensor.range_rad_s or 0.0,
         finds_curve=explained is not None and explained.nonlinearity is not None,
         arcs=any(observation.arc_rad is not None for observation in result.observations),
-        jitter_s=surroundings.state_jitter_s,
-        reading_rad=surroundings.reading_noise_rad,
-        earth_rad_s=_earth(surroundings, name, result.earth),
+        jitter_s=environment.state_jitter_s,
+        reading_rad=environment.reading_noise_rad,
+        earth_rad_s=_earth(environment, name, result.earth),
         sensor=None if explained is None else explained.inputs.sensor,
         temperature_times_s=np.zeros(0) if explained is None else explained.inputs.windows_s.mean(axis=1),
         stamp_s=stamp_std_s or 0.0,
@@ -161,9 +161,9 @@ def build_error_patterns(
     )
 
 
-def _earth(surroundings: Surroundings, name: str, earth_rate: "EarthRate | None") -> Array:
+def _earth(environment: MeasurementEnvironment, name: str, earth_rate: "EarthRate | None") -> Array:
     """Return the uncertainty of the Earth's rate as k independent vectors of one standard deviation, (3, k), rad/s."""
-    unknown = list_uncertainties(surroundings, name, earth_rate)
+    unknown = list_uncertainties(environment, name, earth_rate)
     if unknown.earth_covariance_rad2_s2 is not None:
         size, directions = np.linalg.eigh(unknown.earth_covariance_rad2_s2)
         return np.asarray(directions * np.sqrt(size.clip(min=0.0)), dtype=np.float64)

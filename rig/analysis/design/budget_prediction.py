@@ -22,7 +22,7 @@ from rig.analysis.design.planned_motion import (
     predict_state_jitter,
     time_steps_of,
 )
-from rig.analysis.environment import Surroundings
+from rig.analysis.environment import MeasurementEnvironment
 from rig.analysis.gyroscope.calibration import solve_six_observation
 from rig.analysis.gyroscope.vector_inputs import RecordingPart, combine_recordings, describe_sensor, list_uncertainties
 from rig.config.models import RigConfig
@@ -68,11 +68,11 @@ def _budget(config: RigConfig, run: PlannedRun, turner: TurnerIdentity, name: st
     scatters = turner.reading_std_rad > 0
     # The scatter of the readings already includes the jitter.
     jitter_s = 0.0 if scatters else predict_state_jitter(run.plan)
-    surroundings = Surroundings(
+    environment = MeasurementEnvironment(
         run.site, uncertainty, _clock(uncertainty, on_board=sensor.on_board), jitter_s, run.settings.extension_m
     )
     parts = [_plan_recording_part(config, stage, sensor, turner) for stage in _stages(run)]
-    inputs = combine_recordings(parts, surroundings)
+    inputs = combine_recordings(parts, environment)
     constant_sensor = describe_sensor(
         uncertainty, name, float(np.radians(sensor.range_deg_s)), np.full(len(inputs.windows_s), ROOM_C), STEP_K
     )
@@ -81,7 +81,7 @@ def _budget(config: RigConfig, run: PlannedRun, turner: TurnerIdentity, name: st
         inputs, means_rad_s=_simulate_readings(inputs, _mounting_rotation(off_deg) @ mounting), sensor=constant_sensor
     )
     explained = explain(inputs, mounting, BiasProcess(0.0, 0.0, 0, constant_sensor.instability_rad_s))
-    uncertainty_inputs = list_uncertainties(surroundings, name, None)
+    uncertainty_inputs = list_uncertainties(environment, name, None)
     if not scatters:
         return budget(explained, uncertainty_inputs)
     turns = [turn for part in parts for turn in part.turns]

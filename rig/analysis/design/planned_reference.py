@@ -6,7 +6,7 @@ import numpy as np
 
 from rig.analysis.consistency.reference_alternatives import ReferenceModel
 from rig.analysis.design.planned_motion import PlannedRun, Timed, predict_attitude, predict_revolution, time_steps_of
-from rig.analysis.reference.accelerometer import select_held_out, stack_sweeps
+from rig.analysis.reference.accelerometer import select_validation, stack_sweeps
 from rig.analysis.reference.arm_patterns import Posture, StatedArm, arm_patterns, list_arm_rotations
 from rig.analysis.reference.datasheet_errors import Datasheet, ReferenceWindow, list_sensor_errors, read_datasheet
 from rig.analysis.reference.reference_budgets import lag_pattern
@@ -60,8 +60,8 @@ def predict_readings(accelerometer: PlannedAccelerometer) -> ReferenceModel:
         accelerometer.run.settings.second_order,
     )
     walk_m_s_sqrt_s = PARTS[accelerometer.sensor.part].velocity_random_walk_ug_sqrt_s * MICRO_G_M_S2
-    held_out_dwells = select_held_out(run.settings.planned_dwells)
-    dwells = [dwell for dwell in time_steps_of(run.plan, Dwell) if dwell.step.index not in held_out_dwells]
+    validation_dwells = select_validation(run.settings.planned_dwells)
+    dwells = [dwell for dwell in time_steps_of(run.plan, Dwell) if dwell.step.index not in validation_dwells]
     sweeps = time_steps_of(run.plan, Sweep)
     swept = [_predict_sweep(sweep, run.arm, walk_m_s_sqrt_s) for sweep in sweeps]
     theta = np.zeros(PARAMETERS)

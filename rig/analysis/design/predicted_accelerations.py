@@ -17,7 +17,7 @@ from rig.estimation.arrays import scale_of
 from rig.estimation.gyroscope.budget import Budget
 from rig.estimation.reference.attitude_error import AttitudeError
 from rig.estimation.reference.imu_fit import covariance_bound
-from rig.estimation.reference.reference_budget import Spread, scale_and_bias
+from rig.estimation.reference.reference_budget import FitUncertainty, scale_and_bias
 from rig.estimation.reference.reference_model import matrix
 from rig.estimation.statistics.expected_variances import INDEPENDENT_FRACTIONS
 from rig.motion.chain import DenavitHartenberg
@@ -38,13 +38,13 @@ def _budget(accelerometer: PlannedAccelerometer) -> Budget:
     """Return the budget of scale and bias from the Cramér–Rao bound of the planned dwells and sweeps."""
     model, run = predict_readings(accelerometer), accelerometer.run
     delta_rad = float(np.radians(run.uncertainty.axis_deg) / np.sqrt(3))
-    movement = replace(model.movement, own_share=_new_fraction(run.uncertainty))
+    movement = replace(model.movement, independent_fraction=_new_fraction(run.uncertainty))
     covariance, response = covariance_bound(model.theta, movement, delta_rad, second_order=model.second_order)
     scale = scale_of(matrix(model.theta))
     to_scale_and_bias = scale_and_bias(matrix(model.theta), scale, len(model.theta))
     attitude_error = AttitudeError(delta_rad, 0.0)
     dof = np.full(response.shape[1], np.inf)
-    spread = Spread(
+    spread = FitUncertainty(
         scale,
         to_scale_and_bias @ covariance @ to_scale_and_bias.T,
         to_scale_and_bias @ response,

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from rig.analysis.design.candidate_search import ReachedUncertainty
-from rig.analysis.environment import surroundings_of
+from rig.analysis.environment import find_environment
 from rig.analysis.gyroscope.calibration import observe_recordings, solve_observed
 from rig.analysis.numeric_errors import solvable
 from rig.data.quantity import RATE
@@ -19,9 +19,9 @@ def assess_reached(runs: Sequence[RunData], estimator: str) -> ReachedUncertaint
             recordings = observe_recordings(runs)
             if not recordings:
                 return None
-            surroundings = surroundings_of(recordings, settings)
+            environment = find_environment(recordings, settings)
             sensors = runs[0].measuring(RATE)
-            results = solve_observed(sensors, recordings, surroundings, estimator, settings.matrix_corrected)
+            results = solve_observed(sensors, recordings, environment, estimator, settings.matrix_corrected)
     except Fault:  # the end of the run reports the fault
         return None
     budgets = {name: results[name].uncertainty for name in settings.to_calibrate}

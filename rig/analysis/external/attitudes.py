@@ -23,7 +23,7 @@ from rig.estimation.external.placement import NOISE, LaidDown, laid_down
 from rig.estimation.external.placement_changes import find_placement_change
 from rig.estimation.external.sole_attitude import find_sole_attitude
 from rig.estimation.gyroscope.budget import Budget
-from rig.estimation.gyroscope.earth_rate import check_earth_seen
+from rig.estimation.gyroscope.earth_rate import check_earth_rate
 from rig.estimation.reference.accelerometer_model import Dwells
 from rig.estimation.reference.reference_model import BIAS, REFERENCE, SECOND, F
 from rig.estimation.reference.triaxial import EqualWeights, Method, TriaxialSolution
@@ -144,7 +144,7 @@ def _solve_rows(equations: Equations, method: Method, *, any_mounting: bool) -> 
         other_methods,
         budget,
         equations.measurements,
-        or_fault(partial(check_earth_seen, solution.reference, solution.covariance[REFERENCE, REFERENCE])),
+        or_fault(partial(check_earth_rate, solution.reference, solution.covariance[REFERENCE, REFERENCE])),
     )
 
 

@@ -224,7 +224,7 @@ def budget_of(solution: Estimate, data: ExternalData) -> Budget:
             return Budget((noise,))
         return Budget((noise, Contributor(SWEEPS, "A", "normal", None, "", FROM_RESIDUALS, more.dof, more.covariance)))
     dof_by_name = {NOISE: float(data.turned.noise_dof), BIAS: float(data.turned.bias_dof)}
-    dof_by_name |= dict.fromkeys((rotations_by_angle.ENDS, rotations_by_angle.AXES), solution.widened_dof)
+    dof_by_name |= dict.fromkeys((rotations_by_angle.ENDS, rotations_by_angle.AXES), solution.inflation_dof)
     lines = solution.budget.contributors
     return Budget(tuple(replace(line, dof=dof_by_name.get(line.name, line.dof)) for line in lines))
 
@@ -307,8 +307,8 @@ def _describe_as_swept(result: Result) -> TurnedSolution:
         mounting=axes.mounting,
         angles_covariance_rad2=axes.angles_covariance_rad2(solution.covariance[F, F]),
         residuals_rad_s=residuals,
-        widened=1.0,
-        widened_dof=np.inf,
+        inflation=1.0,
+        inflation_dof=np.inf,
         budget=Budget(lines),
         observations=observations,
         rank=rank,

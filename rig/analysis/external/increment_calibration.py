@@ -14,7 +14,7 @@ from rig.estimation.arrays import Array, scale_of
 from rig.estimation.external.increment_solution import KnownIncrements, solve_known_increments
 from rig.estimation.gyroscope.budget import Budget
 from rig.estimation.refusals import check_axes, check_unit
-from rig.observation.external.fixes import LeftOut, gather
+from rig.observation.external.fixes import OmittedIncrements, gather
 from rig.observation.external.omission import Omitted
 from rig.observation.external.reference_rows import Turning, select_covered
 from rig.observation.external.robust_start import find_start
@@ -32,7 +32,7 @@ class InIncrements:
 
     solution: KnownIncrements
     window_s: float
-    left_out: tuple[LeftOut, ...]
+    left_out: tuple[OmittedIncrements, ...]
     increments: int
 
     @property

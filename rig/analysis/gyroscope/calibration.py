@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.environment import Surroundings
+from rig.analysis.environment import MeasurementEnvironment
 from rig.analysis.estimator_names import DEFAULT_ESTIMATOR, Estimator, find_estimator
 from rig.analysis.gyroscope.correction import Correction, CorrectionKind, diagonal_correction, matrix_correction
 from rig.analysis.gyroscope.vector_inputs import collect_inputs, list_given, list_uncertainties
@@ -134,11 +134,11 @@ def refuse_different_sensors(runs: Sequence[RunData]) -> None:
 def solve_observed(
     sensors: Mapping[str, RecordedSensor],
     recordings: Sequence[ObservedRun],
-    surroundings: Surroundings,
+    environment: MeasurementEnvironment,
     estimator: str = DEFAULT_ESTIMATOR,
     matrix_corrected: Collection[str] = (),
 ) -> dict[str, SensorResult]:
-    """Calibrate `sensors` from all recordings, which share the `surroundings`.
+    """Calibrate `sensors` from all recordings, which share the `environment`.
 
     With the vector model, sensors in `matrix_corrected` are corrected by the whole matrix; all other corrections assume
     orthogonal axes. For every estimator, sweeps must suffice for the six-observation solution. Raise Refused
@@ -146,7 +146,7 @@ def solve_observed(
     """
     chosen = find_estimator(estimator)
     return {
-        name: _solve_sensor(name, sensor, recordings, surroundings, chosen, whole_matrix=name in matrix_corrected)
+        name: _solve_sensor(name, sensor, recordings, environment, chosen, whole_matrix=name in matrix_corrected)
         for name, sensor in sensors.items()
     }
 
@@ -155,7 +155,7 @@ def _solve_sensor(
     name: str,
     sensor: RecordedSensor,
     recordings: Sequence[ObservedRun],
-    surroundings: Surroundings,
+    environment: MeasurementEnvironment,
     estimator: Estimator,
     *,
     whole_matrix: bool,
@@ -169,9 +169,9 @@ def _solve_sensor(
     six_observation = solve_six_observation(observations, "newton")
     faults = dict[str, Fault]()
     earth_rate: EarthRate | None = None
-    inputs = collect_inputs(recordings, name, surroundings)
-    if surroundings.finds_earth_rate:
-        given_values = list_given(surroundings, name)
+    inputs = collect_inputs(recordings, name, environment)
+    if environment.finds_earth_rate:
+        given_values = list_given(environment, name)
         earth_rate = attempt(faults, EARTH_RATE, lambda: find_earth_rate(inputs, mounting, given_values))
     explained = attempt(faults, VECTOR, lambda: explain(_add_earth_rate(inputs, earth_rate), mounting))
     vector_model = None if explained is None else explained.solution
@@ -190,8 +190,8 @@ def _solve_sensor(
         else _budget_of(
             solution,
             explained,
-            surroundings,
-            list_uncertainties(surroundings, name, earth_rate, sensor.stamp_std_s),
+            environment,
+            list_uncertainties(environment, name, earth_rate, sensor.stamp_std_s),
             name,
         ),
         six_observation=six_observation,
@@ -206,13 +206,13 @@ def _solve_sensor(
 
 
 def _budget_of(
-    solution: Estimate, explained: Explained, surroundings: Surroundings, unknown: Unknown, name: str
+    solution: Estimate, explained: Explained, environment: MeasurementEnvironment, unknown: Unknown, name: str
 ) -> Budget | None:
     """Return the budget of the chosen solution of the sensor `name`; None if its estimator has no budget."""
     if isinstance(solution, VectorSolution):
         return budget(explained, unknown)
     if isinstance(solution, Solution) and solution.estimator == "newton":
-        axes_rad = float(np.radians(surroundings.uncertainty.find_stated_size("non_orthogonality_deg", name)))
+        axes_rad = float(np.radians(environment.uncertainty.find_stated_size("non_orthogonality_deg", name)))
         return six_observation_budget(explained, solution, unknown, axes_rad)
     return None
 

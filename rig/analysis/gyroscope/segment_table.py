@@ -129,7 +129,7 @@ def _vibration_changes(windows: Sequence[SegmentedAverage], explained: Explained
     `times_s` (M, 2): start and end of the transfers on the clock of the first recording.
     """
     rests = [
-        (time_s, window.readings.swing_rad2)
+        (time_s, window.readings.vibration_rad2)
         for window, time_s in zip(windows, explained.inputs.windows_s.mean(axis=1), strict=True)
         if window.readings.sweep == REST and window.average.samples >= MIN_REST_SAMPLES  # fewer show no vibration
     ]

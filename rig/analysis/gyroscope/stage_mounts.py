@@ -10,7 +10,7 @@ from functools import partial
 
 import numpy as np
 
-from rig.analysis.environment import surroundings_of
+from rig.analysis.environment import find_environment
 from rig.analysis.gyroscope.calibration import observe_recordings
 from rig.analysis.gyroscope.vector_inputs import collect_inputs
 from rig.config.procedures.stage_section import rotation_by
@@ -60,16 +60,16 @@ def _estimate_mounts(recordings: Sequence[ObservedRun], settings: RunSettings) -
     stages = list(dict.fromkeys(recording.run.settings.stage for recording in recordings))
     if len(stages) < 2:
         return ()
-    surroundings, run = surroundings_of(recordings, settings), recordings[0].run
+    environment, run = find_environment(recordings, settings), recordings[0].run
     attempts = {
-        name: partial(explain, collect_inputs(recordings, name, surroundings), np.array(run.sensors[name].mounting))
+        name: partial(explain, collect_inputs(recordings, name, environment), np.array(run.sensors[name].mounting))
         for name in settings.to_calibrate
     }
     fits = list(attempt_each(attempts).results.values())
     if not fits:
         return ()
     best = min(fits, key=lambda fit: float(np.trace(fit.mounts_covariance)))
-    std_rad = float(np.radians(surroundings.uncertainty.mount_deg)) / np.sqrt(3)
+    std_rad = float(np.radians(environment.uncertainty.mount_deg)) / np.sqrt(3)
     return tuple(
         EstimatedMount(stage, *(std_rad * part for part in _rotation_in_stage(best, index)))
         for index, stage in enumerate(stages[1:])

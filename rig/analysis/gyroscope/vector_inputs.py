@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from rig.analysis.clock_comparison import PPM
-from rig.analysis.environment import Surroundings
+from rig.analysis.environment import MeasurementEnvironment
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.settings import Uncertainty
 from rig.estimation.arrays import Array
@@ -41,7 +41,7 @@ class RecordingPart:
     mount: Array | None
 
 
-def collect_inputs(recordings: Sequence[ObservedRun], sensor: str, surroundings: Surroundings) -> VectorInputs:
+def collect_inputs(recordings: Sequence[ObservedRun], sensor: str, environment: MeasurementEnvironment) -> VectorInputs:
     """Return the arm's motion and the readings in each average of a sensor, from all recordings of a run.
 
     Speeds are corrected for the controller's clock: if it runs too fast, recorded speeds are too small.
@@ -57,13 +57,13 @@ def collect_inputs(recordings: Sequence[ObservedRun], sensor: str, surroundings:
         )
         for recording in recordings
     ]
-    described = _describe_recorded(surroundings, sensor, run.sensors[sensor], _list_averages(parts)[0])
-    return replace(combine_recordings(parts, surroundings), sensor=described)
+    described = _describe_recorded(environment, sensor, run.sensors[sensor], _list_averages(parts)[0])
+    return replace(combine_recordings(parts, environment), sensor=described)
 
 
-def combine_recordings(parts: Sequence[RecordingPart], surroundings: Surroundings) -> VectorInputs:
+def combine_recordings(parts: Sequence[RecordingPart], environment: MeasurementEnvironment) -> VectorInputs:
     """Return the inputs from all recordings of a run, revolutions before rests, without the sensor's properties."""
-    site, extension_m = surroundings.site, np.array(surroundings.extension_m)
+    site, extension_m = environment.site, np.array(environment.extension_m)
     turns = [turn for part in parts for turn in part.turns]
     averages, offsets_s = _list_averages(parts)
     rests = len(averages) - len(turns)
@@ -75,17 +75,17 @@ def combine_recordings(parts: Sequence[RecordingPart], surroundings: Surrounding
     return VectorInputs(
         means_rad_s=np.array([average.mean_rad_s for average in averages]),
         variances_rad2_s2=np.array([average.variance_rad2_s2 - average.drift_rad2_s2 for average in averages]),
-        turns_rad_s=np.concatenate([rates_rad_s * (1 + surroundings.clock.error), np.zeros((rests, 3))]),
+        turns_rad_s=np.concatenate([rates_rad_s * (1 + environment.clock.error), np.zeros((rests, 3))]),
         earth_rate_rad_s=earth,
         speed_std_rad_s=np.array([*(turn.speed_std_rad_s for turn in turns), *np.zeros(rests)]),
         attitudes=attitudes,
         gravity_m_s2=attitudes @ site.down_m_s2,
         windows_s=np.array([(average.start_s, average.end_s) for average in averages]) + offsets_s[:, None],
         joints=(*(turn.joint_name for turn in turns), *[None] * rests),
-        axis_errors_rad_s=_axis_errors(turns, rests, surroundings.uncertainty.axis_deg),
-        return_errors_rad_s=_return_errors(turns, rests, surroundings.uncertainty),
-        encoder_errors_rad_s=_encoder_errors(turns, rests, surroundings.uncertainty),
-        mount_turns_rad=list_mount_rotations(stages, rests, surroundings.uncertainty.mount_deg),
+        axis_errors_rad_s=_axis_errors(turns, rests, environment.uncertainty.axis_deg),
+        return_errors_rad_s=_return_errors(turns, rests, environment.uncertainty),
+        encoder_errors_rad_s=_encoder_errors(turns, rests, environment.uncertainty),
+        mount_turns_rad=list_mount_rotations(stages, rests, environment.uncertainty.mount_deg),
         arms_m=np.concatenate([lever_arms, np.zeros((rests, 3))]),
         noise_dof=dof_by_axis(average.dof for average in averages),
         ripples=np.array([*(turn.ripple for turn in turns), *np.zeros(rests)]),
@@ -103,10 +103,10 @@ def _list_averages(parts: Sequence[RecordingPart]) -> tuple[list[Average], Array
 
 
 def _describe_recorded(
-    surroundings: Surroundings, name: str, sensor: RecordedSensor, averages: Sequence[Average]
+    environment: MeasurementEnvironment, name: str, sensor: RecordedSensor, averages: Sequence[Average]
 ) -> KnownSensor:
     temperature_c = np.array([average.temperature_c for average in averages])
-    stated = describe_sensor(surroundings.uncertainty, name, sensor.range_rad_s, temperature_c, sensor.unseen_change_k)
+    stated = describe_sensor(environment.uncertainty, name, sensor.range_rad_s, temperature_c, sensor.unseen_change_k)
     return replace(stated, temperature_words=sensor.temperature_words)
 
 
@@ -196,34 +196,34 @@ def _group_by_axis(turns: Sequence[Observation]) -> list[list[int]]:
     return groups
 
 
-def list_given(surroundings: Surroundings, name: str) -> EarthRatePrior:
+def list_given(environment: MeasurementEnvironment, name: str) -> EarthRatePrior:
     """Return the given values of surroundings and sensor for an estimate of the Earth's rate."""
-    site, uncertainty = surroundings.site, surroundings.uncertainty
+    site, uncertainty = environment.site, environment.uncertainty
     return EarthRatePrior(
         up=np.array(site.up),
         latitude_rad=site.latitude_rad,
         g_sensitivity=uncertainty.find_stated_size("g_sensitivity_deg_s_g", name) > 0,
         repeatability_rad=uncertainty.repeatability_std_rad,
-        state_jitter_s=surroundings.state_jitter_s,
+        state_jitter_s=environment.state_jitter_s,
     )
 
 
 def list_uncertainties(
-    surroundings: Surroundings, name: str, earth_rate: EarthRate | None, stamp_std_s: float | None = None
+    environment: MeasurementEnvironment, name: str, earth_rate: EarthRate | None, stamp_std_s: float | None = None
 ) -> Unknown:
     """Return the uncertainties that no recording of sensor `name` shows, and the uncertainty of the Earth's rate.
 
     `stamp_std_s` is as in `RecordedSensor`.
     """
-    uncertainty, clock = surroundings.uncertainty, surroundings.clock
+    uncertainty, clock = environment.uncertainty, environment.clock
     return Unknown(
         clock_std=clock.std,
         clock_dof=clock.dof,
         clock_half_width=None if clock.comparisons else PPM * uncertainty.controller_clock_ppm,
         clock_source="compared with "
         + (" and ".join(comparison.by for comparison in clock.comparisons) or "no other clock"),
-        state_jitter_s=surroundings.state_jitter_s,
-        state_jitter_dof=surroundings.state_jitter_dof,
+        state_jitter_s=environment.state_jitter_s,
+        state_jitter_dof=environment.state_jitter_dof,
         axis_rad=float(np.radians(uncertainty.axis_deg)),
         repeatability_rad=float(np.radians(uncertainty.repeatability_deg)),
         angle_std_rad=0.0 if uncertainty.angle_std_deg is None else uncertainty.angle_std_rad,
@@ -231,7 +231,7 @@ def list_uncertainties(
         stamp_std_s=stamp_std_s or 0.0,
         sensor_offset_m=uncertainty.sensor_offset_mm / 1000,
         g_sensitivity_rad_s_per_g=float(np.radians(uncertainty.find_stated_size("g_sensitivity_deg_s_g", name))),
-        earth_rate=earth_rate is None and surroundings.site.earth_rate_rad_s is None,
+        earth_rate=earth_rate is None and environment.site.earth_rate_rad_s is None,
         earth_covariance_rad2_s2=None if earth_rate is None else earth_rate.covariance_rad2_s2,
         earth_dof=np.inf if earth_rate is None else earth_rate.dof,
     )

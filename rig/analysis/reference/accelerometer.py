@@ -42,7 +42,7 @@ ORDER_REMEDY = "Set procedure.second_order: false, which makes the bias much bet
 
 
 @dataclass(frozen=True, slots=True)
-class HeldOut:
+class ValidationRepeat:
     """The unused last repeat of the attitudes; `error_m_s2` (N,): norm of each calibrated acceleration less gravity."""
 
     dwells: tuple[DwellReading, ...]
@@ -62,7 +62,7 @@ class AccelerometerResult:
     - `triad`: scale and axes, with the solution's uncertainty; `budget`: uncertainty of scale and bias from all causes.
     - `alignment`: rotation from the gyroscope of the same sensor, None if that was not calibrated.
     - `other_methods`: the solutions from the attitudes alone, by method, or the Fault of a method that fails.
-    - `held_out`: the validation, if the attitudes were repeated.
+    - `validation`: the validation, if the attitudes were repeated.
     - `temperature_c`: the mean of all readings.
     """
 
@@ -76,7 +76,7 @@ class AccelerometerResult:
     other_methods: Attempts[Method, TriaxialSolution]
     dwells: tuple[DwellReading, ...]
     sweeps: int
-    held_out: HeldOut | None
+    validation: ValidationRepeat | None
     temperature_c: float | None
 
     @property
@@ -169,7 +169,7 @@ def _calibrate(
         repeatability_rad=movement.repeatability_rad,
         sensor_errors=movement.sensor_errors,
         arm_turns=movement.arm_turns,
-        own_shares=INDEPENDENT_FRACTIONS,
+        independent_fractions=INDEPENDENT_FRACTIONS,
     )
     check_mounted(solution.matrix)
     if solution.second_order_s2_m is not None:
@@ -192,7 +192,7 @@ def _calibrate(
         other_methods=other_methods,
         dwells=used,
         sweeps=len(sweeps.speeds_rad_s),
-        held_out=_validate(left_out, solution, site.gravity_m_s2) if left_out else None,
+        validation=_validate(left_out, solution, site.gravity_m_s2) if left_out else None,
         temperature_c=None if np.isnan(temperature_c) else temperature_c,
     )
 
@@ -218,12 +218,12 @@ def _split_dwells(
             f"{len(missing)} of {len(planned)} dwells were not finished",
             "Go on with `rig resume RUN_DIR`, or run the procedure again",
         )
-    last = select_held_out(planned)
+    last = select_validation(planned)
     used = tuple(dwell for dwell in dwells if dwell.index not in last)
     return used, tuple(dwell for dwell in dwells if dwell.index in last)
 
 
-def select_held_out(planned: Sequence[PlannedDwell]) -> frozenset[int]:
+def select_validation(planned: Sequence[PlannedDwell]) -> frozenset[int]:
     """Return the indices of the last repeat's dwells; empty if each attitude is visited once."""
     last = max(dwell.repeat for dwell in planned)
     return frozenset(dwell.index for dwell in planned if dwell.repeat == last > 0)
@@ -271,7 +271,7 @@ def _align_to_gyroscope(gyroscope: SensorResult, solution: ImuSolution, mounting
     )
 
 
-def _validate(dwells: tuple[DwellReading, ...], solution: ImuSolution, gravity_m_s2: float) -> HeldOut:
+def _validate(dwells: tuple[DwellReading, ...], solution: ImuSolution, gravity_m_s2: float) -> ValidationRepeat:
     means = np.array([dwell.reading.mean for dwell in dwells])
     accelerations = specific_force(means, solution.matrix, solution.bias_m_s2, solution.second_order_s2_m)
-    return HeldOut(dwells, np.linalg.norm(accelerations, axis=1) - gravity_m_s2)
+    return ValidationRepeat(dwells, np.linalg.norm(accelerations, axis=1) - gravity_m_s2)

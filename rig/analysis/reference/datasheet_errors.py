@@ -30,7 +30,7 @@ from rig.estimation.reference.reading_errors import (
     flickering,
     scale_warming,
 )
-from rig.estimation.reference.reference_budget import Spread
+from rig.estimation.reference.reference_budget import FitUncertainty
 from rig.motion.chain import DenavitHartenberg
 from rig.motion.geometry import WRIST_1
 from rig.observation.average import Average
@@ -159,8 +159,8 @@ def add_errors(
 
 
 def separate_sensor_errors(
-    spread: Spread, theta: Array, movement: Movement, datasheet: Datasheet
-) -> tuple[Spread, list[Contributor]]:
+    spread: FitUncertainty, theta: Array, movement: Movement, datasheet: Datasheet
+) -> tuple[FitUncertainty, list[Contributor]]:
     """Return the `spread` due to noise and arm, and the contributors of the sensor's own errors in this `movement`.
 
     The spread's response is that of a fit of all parameters including φ, so the noise has a larger effect.

@@ -16,8 +16,8 @@ from rig.estimation.reference.attitude_error import AttitudeError
 from rig.estimation.reference.imu import ImuSolution
 from rig.estimation.reference.magnetometer import FieldDrift, Uniformity
 from rig.estimation.reference.reference_budget import (
+    FitUncertainty,
     KnownSize,
-    Spread,
     reference_budget,
     response_in_attitudes,
     scale_and_bias,
@@ -46,8 +46,8 @@ def accelerometer_budget(
 ) -> Budget:
     """Return the budget of the solution of the `movement`.
 
-    `lag_s` is the half-width of the sensor's filter lag. `noise_dof` (3 N + 9 M,) is as in `Spread`: of the dwells'
-    readings, then of the sweeps' harmonics. With a `datasheet` the sensor's own errors are contributors.
+    `lag_s` is the half-width of the sensor's filter lag. `noise_dof` (3 N + 9 M,) is as in `FitUncertainty`: of the
+    dwells' readings, then of the sweeps' harmonics. With a `datasheet` the sensor's own errors are contributors.
     """
     spread = _propagate(
         solution,
@@ -64,7 +64,7 @@ def accelerometer_budget(
 
 
 def combine_errors(
-    spread: Spread, theta: Array, movement: Movement, site: Site, lag_s: float, *, datasheet: Datasheet | None
+    spread: FitUncertainty, theta: Array, movement: Movement, site: Site, lag_s: float, *, datasheet: Datasheet | None
 ) -> Budget:
     """Return the budget of scale and bias from their `spread`; θ (22,) is the solution of the `movement`."""
     others = [_lag(spread, movement, lag_s)] if len(movement.sweeps.speeds_rad_s) else []
@@ -104,14 +104,16 @@ def _propagate(
     chi_square: tuple[float, int],
     *,
     noise_dof: Array,
-) -> Spread:
+) -> FitUncertainty:
     """Return the spread of scale and bias, from the `response` (p, n) of all parameters.
 
     `chi_square`: χ² of the residuals, and its degrees of freedom.
     """
     scale = scale_of(solution.matrix)
     rows = scale_and_bias(solution.matrix, scale, len(solution.covariance))
-    return Spread(scale, rows @ solution.covariance @ rows.T, rows @ response, noise, error, *chi_square, noise_dof)
+    return FitUncertainty(
+        scale, rows @ solution.covariance @ rows.T, rows @ response, noise, error, *chi_square, noise_dof
+    )
 
 
 def _gravity(site: Site) -> KnownSize:
@@ -151,12 +153,12 @@ def drift_patterns(matrix: Array, attitudes: Array, drift: FieldDrift | None) ->
     return change_t * np.moveaxis(change, -1, 0).reshape(3, -1), change_t
 
 
-def _lag(spread: Spread, movement: Movement, lag_s: float) -> Contributor:
+def _lag(spread: FitUncertainty, movement: Movement, lag_s: float) -> Contributor:
     source = "uncertainty.acceleration_lag_ms"
     return type_b("filter's lag", 1e3 * lag_s, "ms", source, spread.covariance_of(lag_pattern(movement, lag_s)))
 
 
-def _drift(spread: Spread, matrix: Array, attitudes: Array, drift: FieldDrift | None) -> Contributor:
+def _drift(spread: FitUncertainty, matrix: Array, attitudes: Array, drift: FieldDrift | None) -> Contributor:
     patterns, change_t = drift_patterns(matrix, attitudes, drift)
     if drift is None:
         source = f"procedure.field_test_s {NOT_GIVEN_SUFFIX}"

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rig.analysis.environment import Surroundings, surroundings_of
+from rig.analysis.environment import MeasurementEnvironment, find_environment
 from rig.analysis.gyroscope.calibration import SensorResult
 from rig.analysis.gyroscope.vector_inputs import collect_inputs
 from rig.analysis.reference.accelerometer import AccelerometerResult
@@ -55,16 +55,16 @@ def correct_recordings(recordings: Sequence[ObservedRun], settings: RunSettings,
 
     Raise Fault `temperature_not_recorded`, and as `fit_over_temperature` does.
     """
-    surroundings = surroundings_of(recordings, settings)
+    environment = find_environment(recordings, settings)
     runs, polynomials = list(recordings), dict[str, dict[Quantity, OverTemperature]]()
     for name in settings.to_calibrate:
         if not recordings[0].run.sensors[name].measures(TEMPERATURE):
             raise NOT_RECORDED_FAULT
         polynomials[name] = {}
         if settings.planned_dwells and recordings[0].run.sensors[name].measures(ACCELERATION):
-            runs, polynomials[name][ACCELERATION] = _correct_accelerations(runs, name, surroundings, reference_c)
+            runs, polynomials[name][ACCELERATION] = _correct_accelerations(runs, name, environment, reference_c)
         if settings.planned_sweeps:  # last: it sets the sweeps' temperatures to the reference
-            runs, polynomials[name][RATE] = _correct_rates(runs, name, surroundings, reference_c)
+            runs, polynomials[name][RATE] = _correct_rates(runs, name, environment, reference_c)
     return AtReference(tuple(replace(recording, polynomials=polynomials) for recording in runs), polynomials)
 
 
@@ -132,10 +132,10 @@ def _combine(
 
 
 def _correct_rates(
-    recordings: Sequence[ObservedRun], name: str, surroundings: Surroundings, reference_c: float
+    recordings: Sequence[ObservedRun], name: str, environment: MeasurementEnvironment, reference_c: float
 ) -> tuple[list[ObservedRun], OverTemperature]:
     """Return the recordings with a gyroscope's means corrected to `reference_c`, and the polynomials."""
-    inputs = collect_inputs(recordings, name, surroundings)
+    inputs = collect_inputs(recordings, name, environment)
     parts = [recording.sensors[name] for recording in recordings]
     averages = [turn.average for part in parts for turn in part.revolutions]
     averages += [rest for part in parts for rest in part.rests]
@@ -149,7 +149,7 @@ def _correct_rates(
         temperature_c=temperature_c,
         instability=0.0 if inputs.sensor is None else inputs.sensor.instability_rad_s,
     )
-    polynomials = fit_over_temperature(repeated, reference_c, surroundings.uncertainty.thermometer_gradient_k)
+    polynomials = fit_over_temperature(repeated, reference_c, environment.uncertainty.thermometer_gradient_k)
     corrected = iter(polynomials.correct_to_reference(repeated.means, temperature_c))
     turns = [tuple(_correct_turn(turn, next(corrected), reference_c) for turn in part.revolutions) for part in parts]
     rests = [tuple(_replace_mean(rest, next(corrected), reference_c) for rest in part.rests) for part in parts]
@@ -159,14 +159,14 @@ def _correct_rates(
 
 
 def _correct_accelerations(
-    recordings: Sequence[ObservedRun], name: str, surroundings: Surroundings, reference_c: float
+    recordings: Sequence[ObservedRun], name: str, environment: MeasurementEnvironment, reference_c: float
 ) -> tuple[list[ObservedRun], OverTemperature]:
     """Return the recordings with an accelerometer's means corrected to `reference_c`, and the polynomials."""
     parts = [recording.sensors[name] for recording in recordings]
     timed = [(dwell, recording.clock_offset_s) for recording in recordings for dwell in recording.sensors[name].dwells]
     dwells = [dwell for dwell, _ in timed]
     attitudes = np.array([dwell.attitude for dwell in dwells])
-    inputs = -(attitudes @ surroundings.site.down_m_s2)
+    inputs = -(attitudes @ environment.site.down_m_s2)
     temperature_c = np.array([dwell.temperature_c for dwell in dwells])
     repeated = RepeatedMeans(
         means=np.array([dwell.reading.mean for dwell in dwells]),
@@ -176,7 +176,7 @@ def _correct_accelerations(
         windows_s=np.array([(dwell.window.start_s + offset, dwell.window.end_s + offset) for dwell, offset in timed]),
         temperature_c=temperature_c,
     )
-    polynomials = fit_over_temperature(repeated, reference_c, surroundings.uncertainty.thermometer_gradient_k)
+    polynomials = fit_over_temperature(repeated, reference_c, environment.uncertainty.thermometer_gradient_k)
     corrected = iter(polynomials.correct_to_reference(repeated.means, temperature_c))
     dwelt = [
         tuple(

@@ -108,7 +108,7 @@ def _start(integrals: MoveIntegrals, faces: RestFaces, initial: GyroscopeModel) 
     return GraphState(
         matrix=initial.matrix,
         sensitivity=initial.sensitivity,
-        bends=initial.bends,
+        nonlinearities=initial.nonlinearities,
         drift_rad_s=np.zeros((2, 3)),
         level=np.eye(3),
         offset=np.zeros(3),

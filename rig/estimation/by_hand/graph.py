@@ -57,7 +57,7 @@ class GraphState:
 
     - matrix: F (3, 3).
     - sensitivity: G (3, 3) in rad/s per g.
-    - bends: the even and the odd nonlinearity (6,), s/rad.
+    - nonlinearities: the even and the odd nonlinearity (6,), s/rad.
     - drift_rad_s: the bias' drift from the first rest to the last, and its deviation in the middle of it (2, 3).
     - level: F_a (3, 3) of the accelerometer.
     - offset: b_a (3,) of the accelerometer, m/s².
@@ -69,7 +69,7 @@ class GraphState:
 
     matrix: Array
     sensitivity: Array
-    bends: Array
+    nonlinearities: Array
     drift_rad_s: Array
     level: Array
     offset: Array
@@ -81,7 +81,7 @@ class GraphState:
     @property
     def gyroscope(self) -> GyroscopeModel:
         """The gyroscope's model at the current values."""
-        return GyroscopeModel(self.matrix, self.biases, self.sensitivity, self.bends)
+        return GyroscopeModel(self.matrix, self.biases, self.sensitivity, self.nonlinearities)
 
     def after_step(self, step: Array) -> "GraphState":
         """Return the values after a step (p,) in the order of the design's columns."""
@@ -93,7 +93,7 @@ class GraphState:
             self,
             matrix=self.matrix + step[MATRIX].reshape(3, 3),
             sensitivity=self.sensitivity + step[GRAVITY].reshape(3, 3),
-            bends=self.bends + step[NONLINEARITIES],
+            nonlinearities=self.nonlinearities + step[NONLINEARITIES],
             drift_rad_s=self.drift_rad_s + step[DRIFT].reshape(2, 3),
             level=self.level + step[LEVEL].reshape(3, 3),
             offset=self.offset + step[OFFSET],
@@ -232,7 +232,7 @@ def _move(graph: Graph, row: int) -> Factor:
     design = np.zeros((3, graph.width))
     (first, first_bias), (second, second_bias) = _rest_columns(row), _rest_columns(row + 1)
     design[:, MATRIX], design[:, GRAVITY] = integrals.by_matrix[row], integrals.by_gravity[row]
-    design[:, NONLINEARITIES] = integrals.by_bends[row]
+    design[:, NONLINEARITIES] = integrals.by_nonlinearity[row]
     design[:, first_bias] = design[:, second_bias] = integrals.by_bias[row] / 2
     design[:, first], design[:, second] = np.eye(3), -graph.between[row]
     changes_rad_s = graph.state.biases[row + 1] - graph.state.biases[row]
@@ -344,7 +344,7 @@ def _priors(graph: Graph) -> Iterator[Factor]:
 
     yield prior("matrix", MATRIX, (state.matrix - np.eye(3)).ravel(), MATRIX_STD)
     yield prior("g-sensitivity", GRAVITY, state.sensitivity.ravel(), SENSITIVITY_STD)
-    yield prior("nonlinearity", NONLINEARITIES, state.bends, NONLINEARITY / HAND_RATE_RAD_S)
+    yield prior("nonlinearity", NONLINEARITIES, state.nonlinearities, NONLINEARITY / HAND_RATE_RAD_S)
     yield prior("drift", slice(DRIFT.start, DRIFT.start + 3), state.drift_rad_s[0], DRIFT_STD_RAD_S)
     yield prior("drift", slice(DRIFT.start + 3, DRIFT.stop), state.drift_rad_s[1], CURVE_STD_RAD_S)
     yield prior("level", LEVEL, (state.level - np.eye(3)).ravel(), LEVEL_STD)

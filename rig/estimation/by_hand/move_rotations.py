@@ -21,7 +21,7 @@ class MoveIntegrals:
     """The rotations of the body in k moves.
 
     - `rotations` (k, 3, 3): R from body coordinates at the end to those at the start; exp(J δθ) R with the derivatives
-      `by_matrix` (k, 3, 9), `by_bias` (k, 3, 3), `by_gravity` (k, 3, 9), `by_bends` (k, 3, 6).
+      `by_matrix` (k, 3, 9), `by_bias` (k, 3, 3), `by_gravity` (k, 3, 9), `by_nonlinearity` (k, 3, 6).
     - `swept_rad` (k, 3): the integral of the reading minus offset, g-sensitivity and nonlinearity.
     - `durations_s` (k,), `paths_rad` (k,): the total angle, there and back.
     - `changes_rad_s` (k,): the root sum of squares of the rate's changes from sample to sample. Multiplied by the
@@ -32,7 +32,7 @@ class MoveIntegrals:
     by_matrix: Array
     by_bias: Array
     by_gravity: Array
-    by_bends: Array
+    by_nonlinearity: Array
     swept_rad: Array
     durations_s: Array
     paths_rad: Array
@@ -46,7 +46,7 @@ class GyroscopeModel:
     matrix: Array
     biases: Array
     sensitivity: Array
-    bends: Array
+    nonlinearities: Array
 
 
 def integrate_moves(session: HandRecording, gyroscope: GyroscopeModel, up: Array) -> MoveIntegrals:
@@ -54,10 +54,11 @@ def integrate_moves(session: HandRecording, gyroscope: GyroscopeModel, up: Array
 
     `up` (N, 3) is the vertical in the body at each rest.
     """
-    matrix, biases, sensitivity, bends = gyroscope.matrix, gyroscope.biases, gyroscope.sensitivity, gyroscope.bends
+    matrix, biases, sensitivity = gyroscope.matrix, gyroscope.biases, gyroscope.sensitivity
+    factors = gyroscope.nonlinearities
     middles = np.array([(rest.start_s + rest.end_s) / 2 for rest in session.rests])
     inverse = np.linalg.inv(matrix)
-    rotations, by_theta, by_gravity, by_bends, swept = (list[Array]() for _ in range(5))
+    rotations, by_theta, by_gravity, by_nonlinearity, swept = (list[Array]() for _ in range(5))
     durations, paths, changes = (list[float]() for _ in range(3))
     for row, move in enumerate(session.moves):
         inside = _select_inside(session.time_s, move.start_s, move.end_s)
@@ -65,8 +66,8 @@ def integrate_moves(session: HandRecording, gyroscope: GyroscopeModel, up: Array
         corrected = session.rates[inside] - np.column_stack([np.interp(times_s, middles, axis) for axis in biases.T])
         path = track(times_s, corrected, matrix)
         squares = np.stack([corrected**2, corrected * np.abs(corrected)], axis=1)
-        if sensitivity.any() or bends.any():
-            bent = (squares * bends.reshape(2, 3)).sum(axis=1)
+        if sensitivity.any() or factors.any():
+            bent = (squares * factors.reshape(2, 3)).sum(axis=1)
             corrected = corrected - up[row] @ path.attitudes @ sensitivity.T - bent
             path = track(times_s, corrected, matrix)
         rotations.append(path.attitudes[-1])
@@ -74,7 +75,7 @@ def integrate_moves(session: HandRecording, gyroscope: GyroscopeModel, up: Array
         lasting_s = _durations(times_s)
         turned = path.attitudes @ inverse * -lasting_s[:, None, None]
         by_gravity.append(np.tensordot(turned, up[row] @ path.attitudes, (0, 0)).reshape(3, 9))
-        by_bends.append(np.einsum("kij,kbj->ibj", turned, squares).reshape(3, 6))
+        by_nonlinearity.append(np.einsum("kij,kbj->ibj", turned, squares).reshape(3, 6))
         swept.append(lasting_s @ corrected)
         durations.append(float(np.ptp(times_s)))
         paths.append(float(lasting_s @ np.linalg.norm(path.rates_rad_s, axis=1)))
@@ -85,7 +86,7 @@ def integrate_moves(session: HandRecording, gyroscope: GyroscopeModel, up: Array
         theta[..., :9],
         theta[..., 9:],
         _stack(by_gravity, (3, 9)),
-        _stack(by_bends, (3, 6)),
+        _stack(by_nonlinearity, (3, 6)),
         _stack(swept, (3,)),
         np.array(durations),
         np.array(paths),

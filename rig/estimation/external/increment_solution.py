@@ -47,7 +47,7 @@ from rig.estimation.external.attitude_drift import (
 )
 from rig.estimation.external.axis_directions import find_inclinations
 from rig.estimation.external.increment_changes import find_increment_change, find_reset
-from rig.estimation.gyroscope.earth_rate import check_earth_seen
+from rig.estimation.gyroscope.earth_rate import check_earth_rate
 from rig.estimation.statistics.variance_components import Mixed, MixedFit, MixedModel
 
 MAX_ITERATIONS, LAST_VARIANCE_ITERATION = 12, 3  # of the fit, and the last that estimates the variances
@@ -67,7 +67,7 @@ REMEDY = "Turn the body about all its axes, by a right angle and more"
 
 
 @dataclass(frozen=True, slots=True)
-class EarthSeen:
+class EarthRateEstimate:
     """The Earth's rate (3,) in table coordinates, determined to a tenth, and its covariance (3, 3)."""
 
     rate_rad_s: Array
@@ -105,7 +105,7 @@ class KnownIncrements:
     bias: Array
     covariance: Array
     causes: dict[str, Array]
-    earth: EarthSeen | Fault
+    earth: EarthRateEstimate | Fault
     clock_s: float
     clock_std_s: float
     fix_std_rad: float
@@ -332,7 +332,7 @@ def _causes(settled: _Settled) -> dict[str, Array]:
     return causes
 
 
-def _earth(rate_rad_s: Array, covariance: Array) -> EarthSeen | Fault:
+def _earth(rate_rad_s: Array, covariance: Array) -> EarthRateEstimate | Fault:
     """Return the Earth's rate from the increments, without the prior of its norm; the Fault if it is undetected."""
     information = np.linalg.inv(covariance)
     data_information: Array = information - EARTH_PRECISION * np.eye(3)
@@ -341,4 +341,4 @@ def _earth(rate_rad_s: Array, covariance: Array) -> EarthSeen | Fault:
         data_information = 1e-9 * EARTH_PRECISION * np.eye(3)
     variance = np.asarray(np.linalg.inv(data_information), dtype=np.float64)
     rate = variance @ information @ rate_rad_s
-    return or_fault(partial(check_earth_seen, rate, variance)) or EarthSeen(rate, variance)
+    return or_fault(partial(check_earth_rate, rate, variance)) or EarthRateEstimate(rate, variance)

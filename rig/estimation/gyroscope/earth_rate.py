@@ -155,7 +155,7 @@ def find_earth_rate(inputs: VectorInputs, nominal_mounting: Array, prior: EarthR
     )
     expected = float(np.sqrt(EARTH_RATE_RAD_S**2 - fixed @ fixed))
     component = "its level part" if earth.vertical_fixed else "it"
-    check_earth_seen(earth.rate_rad_s - fixed, earth.covariance_rad2_s2, expected, component)
+    check_earth_rate(earth.rate_rad_s - fixed, earth.covariance_rad2_s2, expected, component)
     return earth
 
 
@@ -254,7 +254,7 @@ def _condition(inputs: VectorInputs, directions: Array, gravity: Array | None) -
     return refusals.condition_of(design, parameters), parameters
 
 
-def check_earth_seen(
+def check_earth_rate(
     free_rad_s: Array, covariance_rad2_s2: Array, expected_rad_s: float = EARTH_RATE_RAD_S, component: str = "it"
 ) -> None:
     """Check that an estimate (3,) of the Earth's rate, or a component, is significant and of the expected size.

@@ -74,7 +74,7 @@ class TurnedSolution:
     """A solution with the fields of `vector_model.VectorSolution`; `budget` divides its covariance by cause.
 
     - `residuals_rad_s` (N, 3): those of the means, then of the rotations as mean rates.
-    - `widened`: the Birge ratio of the rotations, at least 1, with `widened_dof` degrees of freedom.
+    - `inflation`: the Birge ratio of the rotations, at least 1, with `inflation_dof` degrees of freedom.
     - `estimator`: the name of the method, "increments" or "by_hand".
     """
 
@@ -87,8 +87,8 @@ class TurnedSolution:
     mounting: Array
     angles_covariance_rad2: Array
     residuals_rad_s: Array
-    widened: float
-    widened_dof: float
+    inflation: float
+    inflation_dof: float
     budget: Budget
     observations: int
     rank: int
@@ -168,8 +168,8 @@ def solve_turned(
         mounting=axes.mounting,
         angles_covariance_rad2=axes.angles_covariance_rad2(covariance[:9, :9]),
         residuals_rad_s=np.array([(equation.observed - equation.design @ step)[:3] for equation in equations]),
-        widened=ratio,
-        widened_dof=dof,
+        inflation=ratio,
+        inflation_dof=dof,
         budget=_budget(equations, to_parameters @ covariance),
         observations=len(equations),
         rank=conditioning.rank,

@@ -153,7 +153,7 @@ class Explained:
     mounts_covariance: Array = field(default_factory=partial(np.zeros, (0, 0)))
 
     @property
-    def loads_rad_s(self) -> Array:
+    def axis_rate_ranges_rad_s(self) -> Array:
         """The smallest and largest rates (3, 2) along x, y, z, without sign, of the sweeps that determine the scale."""
         sensed = np.abs(self.inputs.turns_rad_s @ (self.solution.matrix * self.solution.scale[:, None]).T)
         largest = sensed.max(axis=0)

@@ -100,7 +100,7 @@ class Movement:
     - `repeatability_rad`: standard deviation of each sweep's independent rotations; a station shares all other errors.
     - `sensor_errors`: errors of the sensor itself; None if unknown.
     - `arm_turns` (P, 3 N + 10 M): effects of P errors of the arm per δ, in the order of `effects`; None if unknown.
-    - `own_share`: the fraction of δ² that is independent in each dwell.
+    - `independent_fraction`: the fraction of δ² that is independent in each dwell.
     """
 
     dwells: Dwells
@@ -108,7 +108,7 @@ class Movement:
     repeatability_rad: float = 0.0
     sensor_errors: AccelerometerErrors | None = None
     arm_turns: Array | None = None
-    own_share: float = INDEPENDENT_FRACTION
+    independent_fraction: float = INDEPENDENT_FRACTION
 
     def omit(self, dwell: int) -> "Movement":
         """Return the movement without the dwell of index `dwell`."""
@@ -252,7 +252,7 @@ def effects(theta: Array, movement: Movement) -> Array:
     joint's angle, A cos θ + B sin θ + C cos 2θ + D sin 2θ. The wrists' constant errors (`Movement.arm_turns`), if
     known, come last and are common to all stations.
     """
-    return combine_effects(*split_effects(theta, movement), movement.own_share)
+    return combine_effects(*split_effects(theta, movement), movement.independent_fraction)
 
 
 def split_effects(theta: Array, movement: Movement) -> tuple[Array, Array | None]:

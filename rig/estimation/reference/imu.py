@@ -85,7 +85,7 @@ class ImuSolution:
     iterations: int
     warnings: tuple[str, ...]
     sensor_errors: AccelerometerErrors | None = None
-    own_share: float = INDEPENDENT_FRACTION
+    independent_fraction: float = INDEPENDENT_FRACTION
 
     @property
     def theta(self) -> Array:
@@ -109,13 +109,13 @@ def solve_imu(
     repeatability_rad: float = 0.0,
     sensor_errors: AccelerometerErrors | None = None,
     arm_turns: Array | None = None,
-    own_shares: Sequence[float] = (INDEPENDENT_FRACTION,),
+    independent_fractions: Sequence[float] = (INDEPENDENT_FRACTION,),
 ) -> ImuSolution:
     """Calibrate from dwells, sweeps or both.
 
     `gravity_m_s2` is the length of v_ref, which points into the half-space of the base frame around `up` (3,).
-    `repeatability_rad`, `sensor_errors`, `arm_turns`: see `Movement`. `own_shares`: possible values of its `own_share`,
-    of which the readings show the most likely one.
+    `repeatability_rad`, `sensor_errors`, `arm_turns`: see `Movement`. `independent_fractions`: possible values of its
+    `independent_fraction`, of which the readings show the most likely one.
 
     Raise Fault `too_few_observations`, `not_finite`, `bad_variance`, `bad_speed`, `zero_reading`,
     `duplicated_observation`, `bad_attitude`, `rank_deficient`, `ill_conditioned`, `sign_unknown`, `wrong_unit`,
@@ -133,7 +133,7 @@ def solve_imu(
         refusals.check_conditioning(conditioning, parameters, MAX_CONDITION, parts, REMEDY)
         fit = most_likely(start, movement, fixed, None)
         if sensor_errors is not None:
-            movement, fit = refit_with_components(fit, movement, sensor_errors, fixed, own_shares)
+            movement, fit = refit_with_components(fit, movement, sensor_errors, fixed, independent_fractions)
         covariance, response = fit.covariance(), fit.response()
         _check_attitudes(start, movement, fixed, fit)
     f = matrix(fit.theta)
@@ -159,7 +159,7 @@ def solve_imu(
         condition=conditioning.condition,
         iterations=fit.iterations,
         sensor_errors=movement.sensor_errors,
-        own_share=movement.own_share,
+        independent_fraction=movement.independent_fraction,
         warnings=refusals.warn_of_residuals(whitened, np.ones_like(whitened), dof),
     )
 

@@ -117,14 +117,14 @@ def _least_squares(theta: Array, movement: Movement, fixed: list[int], whitener:
 
 
 def refit_with_components(
-    fit: Fit, movement: Movement, sensor: AccelerometerErrors, fixed: list[int], own_shares: Sequence[float]
+    fit: Fit, movement: Movement, sensor: AccelerometerErrors, fixed: list[int], independent_fractions: Sequence[float]
 ) -> tuple[Movement, Fit]:
     """Return the movement with variance components estimated from the residuals of `fit`, and its new fit."""
     residuals = (movement.readings() - predicted(fit.theta, movement)).ravel()
     modelled, variances = noise(fit.theta, movement), np.diag(movement.noise())
     of_arm = partial(combine_effects, *split_effects(fit.theta, movement))
     scattered = ResidualInputs(residuals, fit.jacobian, modelled, of_arm, walking(sensor, movement), variances)
-    components = estimate_variances(scattered, own_shares)
+    components = estimate_variances(scattered, independent_fractions)
     unit = float(np.sqrt(np.median(variances)))
     separate = [np.diag(np.sqrt(variances))[:, segment] for segment in movement.segments()]
     causes = [*separate, unit * select_sweeps(movement)]
@@ -133,7 +133,7 @@ def refit_with_components(
     disturbed = replace(
         sensor, walk_m_s2_sqrt_s=components.walk, louder=np.array(louder), turning_m_s2=float(np.sqrt(turning)) * unit
     )
-    movement = replace(movement, sensor_errors=disturbed, own_share=components.own_share)
+    movement = replace(movement, sensor_errors=disturbed, independent_fraction=components.independent_fraction)
     refit = most_likely(fit.theta, movement, fixed, components.std_rad)
     readings = decorrelate(noise(refit.theta, movement), effects(refit.theta, movement))
     return movement, replace(refit, readings=readings, iterations=fit.iterations + refit.iterations)

@@ -24,7 +24,7 @@ ATTITUDES = "arm's attitudes"
 
 
 @dataclass(frozen=True, slots=True)
-class Spread:
+class FitUncertainty:
     """The uncertainty of scale and bias, kx ky kz bx by bz, from n readings.
 
     - `scale` (3,); `covariance` (6, 6): due to noise and attitudes; `response` (6, n): derivative with respect to the
@@ -45,7 +45,7 @@ class Spread:
     noise_dof: Array
 
     @property
-    def known_noise(self) -> float:
+    def noise_dof_min(self) -> float:
         """The smallest degrees of freedom of the noise in scale and bias."""
         return fewest_dof(self.response, np.diag(self.noise), self.noise_dof)
 
@@ -107,11 +107,11 @@ def response_in_attitudes(solution: TriaxialSolution, dwells: Dwells) -> Array:
     return response
 
 
-def reference_budget(spread: Spread, size: KnownSize, others: Sequence[Contributor] = ()) -> Budget:
+def reference_budget(spread: FitUncertainty, size: KnownSize, others: Sequence[Contributor] = ()) -> Budget:
     """Return the budget of the readings, of the reference's norm, and of other contributors."""
     noise = spread.response @ spread.noise @ spread.response.T
     contributors = [
-        evaluate_a(NOISE, "scatter of the readings", noise, spread.known_noise),
+        evaluate_a(NOISE, "scatter of the readings", noise, spread.noise_dof_min),
         evaluate_a(
             ATTITUDES,
             "estimated from the residuals",

@@ -75,18 +75,18 @@ class AllanAxis:
     bias_instability: AllanReading | Fault
 
 
-def allan_curve(stretches: Sequence[Array], interval_s: float) -> AllanCurve:
+def allan_curve(intervals: Sequence[Array], interval_s: float) -> AllanCurve:
     """Return the overlapping Allan deviation of intervals (nᵢ, 3) of readings at a period of `interval_s`.
 
     τ takes values near powers of two, including 1 s. Raise Fault `not_finite`, and `recording_too_short` if no interval
     has three readings.
     """
-    used = [np.asarray(stretch, dtype=np.float64) for stretch in stretches if len(stretch) >= MIN_READINGS]
+    used = [np.asarray(interval, dtype=np.float64) for interval in intervals if len(interval) >= MIN_READINGS]
     if not used:
         raise too_short(f"no interval at rest has {MIN_READINGS} readings without a gap")
-    for stretch in used:
-        check_finite(readings=stretch)
-    phases = [np.vstack([np.zeros(3), np.cumsum(stretch - stretch.mean(axis=0), axis=0)]) for stretch in used]
+    for interval in used:
+        check_finite(readings=interval)
+    phases = [np.vstack([np.zeros(3), np.cumsum(interval - interval.mean(axis=0), axis=0)]) for interval in used]
     longest = (max(map(len, phases)) - 1) // 2
     factors = {2**power for power in range(longest.bit_length())} | {round(RANDOM_WALK_TAU_S / interval_s)}
     chosen = np.array(sorted(factor for factor in factors if 1 <= factor <= longest))

@@ -45,13 +45,13 @@ class ResidualInputs:
 class ErrorSizes:
     """The sizes of errors.
 
-    `walk`: the bias random walk in one second; `std_rad`: δ; `own_share`: the fraction of δ² that is independent in
+    `walk`: the bias random walk in one second; `std_rad`: δ; `independent_fraction`: that of δ² which is independent in
     each dwell.
     """
 
     walk: float
     std_rad: float
-    own_share: float
+    independent_fraction: float
 
 
 def estimate_variances(fit: ResidualInputs, shares: Sequence[float]) -> ErrorSizes:
@@ -87,7 +87,7 @@ def estimate_disturbances(
 
     Priors: log-uniform, with `odds` (k,) that the cause exists.
     """
-    effects = sizes.std_rad * fit.effects(sizes.own_share)
+    effects = sizes.std_rad * fit.effects(sizes.independent_fraction)
     whitener = np.linalg.inv(np.linalg.cholesky(fit.covariance + sizes.walk**2 * fit.walk + effects @ effects.T))
     basis = np.linalg.qr(whitener @ fit.slopes)[0]
     residuals = whitener @ fit.residuals

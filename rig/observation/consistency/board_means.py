@@ -57,10 +57,10 @@ def _deviation(recording: ObservedRun, stream: Stream, turn: Observation, observ
     of_turn, of_board = slice(*(edges - first).tolist()), slice(*(boards - first).tolist())
     time_s = stream.time_s[first:last]
     rates = recording.motion.rates_at_samples(time_s)
-    passing = _nuisance_columns(time_s, turn, rates @ axis)
+    regressors = _nuisance_columns(time_s, turn, rates @ axis)
     residuals = (stream.readings_rad_s[first:last] - zero - rates @ by_rate.T)[of_turn]
-    columns = np.column_stack([np.ones(len(residuals)), passing[of_turn]])
-    line_means = passing[of_board].mean(axis=0) @ fit_columns(columns, residuals)[1:]
+    columns = np.column_stack([np.ones(len(residuals)), regressors[of_turn]])
+    line_means = regressors[of_board].mean(axis=0) @ fit_columns(columns, residuals)[1:]
     deviation = np.array(board.mean_rad_s) - zero - by_rate @ rates[of_board].mean(axis=0) - line_means
     return float(np.max(np.abs(deviation) / average.mean_std_rad_s))
 
@@ -74,10 +74,10 @@ def _nuisance_columns(time_s: Array, turn: Observation, rates_rad_s: Array) -> A
     average = turn.average
     fraction = (time_s - average.start_s) / average.duration_s
     angle_rad = 2 * np.pi if turn.angle_rad is None else turn.angle_rad
-    of_turn = harmonics(angle_rad * fraction, 2 * turn.beats)
+    of_turn = harmonics(angle_rad * fraction, 2 * turn.sidebands)
     if turn.arc_rad is not None:
-        of_turn -= harmonics(angle_rad * np.linspace(0.0, 1.0, len(fraction)), 2 * turn.beats).mean(axis=0)
-    lines = waves(average.lines_hz * average.duration_s, fraction, turn.beats)
+        of_turn -= harmonics(angle_rad * np.linspace(0.0, 1.0, len(fraction)), 2 * turn.sidebands).mean(axis=0)
+    lines = waves(average.lines_hz * average.duration_s, fraction, turn.sidebands)
     if turn.arc_rad is not None:
         return np.column_stack([of_turn, lines])
     columns = np.column_stack([np.ones(len(fraction)), of_turn, lines])

@@ -20,8 +20,8 @@ from rig.observation.windows import Window
 class RawDwell:
     """The raw readings of one dwell: counts (n, 3) at controller times (n,) within the `window`.
 
-    The arm stood at `q_rad` (6,); `clock_offset_s` converts times to the clock of the first recording. `swing_counts`
-    (n, 3): the effect of the arm's oscillation, as encoders measure it.
+    The arm stood at `q_rad` (6,); `clock_offset_s` converts times to the clock of the first recording.
+    `oscillation_counts` (n, 3): the effect of the arm's oscillation, as encoders measure it.
     """
 
     index: int
@@ -30,12 +30,12 @@ class RawDwell:
     window: Window
     q_rad: Array
     clock_offset_s: float
-    swing_counts: Array | float = 0.0
+    oscillation_counts: Array | float = 0.0
 
     @property
     def still_counts(self) -> Array:
         """The counts (n, 3) with the arm's oscillation subtracted."""
-        return np.subtract(self.counts, self.swing_counts, dtype=np.float64)
+        return np.subtract(self.counts, self.oscillation_counts, dtype=np.float64)
 
     @property
     def middle_s(self) -> float:
@@ -53,7 +53,7 @@ def raw_acceleration_dwells(name: str, recording: ObservedRun, matrix: Array) ->
         counts = counts_of(stream, ACCELERATION, inside)
         attitudes = recording.motion.attitudes(stream.time_s[inside])
         swing = gravity_difference(attitudes, attitudes.mean(axis=0), stream.sensor, site) @ per_count.T
-        dwells.append(replace(_raw_dwell(dwell, counts, stream.time_s[inside], recording), swing_counts=swing))
+        dwells.append(replace(_raw_dwell(dwell, counts, stream.time_s[inside], recording), oscillation_counts=swing))
     return dwells
 
 

@@ -31,7 +31,7 @@ class RawReadings:
     counts: NDArray[np.int64]
     residual_counts: Array
     vibration_counts: Array
-    swing_rad2: Array = field(default_factory=partial(np.zeros, 3))
+    vibration_rad2: Array = field(default_factory=partial(np.zeros, 3))
 
 
 def counts_of(stream: Stream, quantity: Quantity, inside: slice) -> NDArray[np.int64]:

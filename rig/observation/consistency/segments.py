@@ -24,10 +24,10 @@ from rig.observation.statistics.mean import Mean, MeanNoise, compute_weighted_me
 from rig.observation.statistics.spectral_lines import (
     LineSearch,
     column_count,
+    find_angle_change_rad2,
     find_lines,
     fit_columns,
     fit_residuals,
-    line_swing,
     waves,
 )
 from rig.observation.statistics.tapered_weights import noise_at_zero
@@ -40,7 +40,7 @@ MIN_SAMPLES = 20  # of a segment
 MIN_SCATTER_SEGMENTS = 3  # number of segments up to which they do not show a scatter around a straight line
 MIN_REST_SAMPLES = 60  # fewer do not determine a rest's noise well enough for a weight
 MAX_NOISE_RATIO = 0.7  # of noise at zero frequency to scatter, below which the rest of the scatter is a vibration
-REST_SEARCH = LineSearch(stands_out=30.0, beats=0)  # noise alone exceeds this in one bin of 10⁹
+REST_SEARCH = LineSearch(stands_out=30.0, sidebands=0)  # noise alone exceeds this in one bin of 10⁹
 
 
 def segment_counts(revolutions: int) -> tuple[int, int]:
@@ -171,7 +171,7 @@ def _segment_revolution(
     division = _divide(stream, average, motion.covered(times_s), count)
     rates = motion.rates_at_samples(times_s)[division.used]
     fraction = (division.time_s - average.start_s) / average.duration_s
-    lines = waves(average.lines_hz * average.duration_s, fraction, turn.beats)
+    lines = waves(average.lines_hz * average.duration_s, fraction, turn.sidebands)
     vibration = np.column_stack([rates @ axis, motion.rate(division.time_s, 1) @ axis])
     encoded = np.column_stack([np.ones(len(rates)), vibration])
     residual, vibration = (
@@ -180,7 +180,7 @@ def _segment_revolution(
     vibrating = vibration @ np.linalg.lstsq(vibration, residual, rcond=None)[0]
     noise_alone = residual - vibrating
     noise = MeanNoise(average.noise_rad_s**2, average.noise_rad2_s2 * average.samples, average.dof)
-    is_slow = np.repeat(average.lines_hz * average.duration_s < SLOW_CYCLES, column_count(turn.beats))
+    is_slow = np.repeat(average.lines_hz * average.duration_s < SLOW_CYCLES, column_count(turn.sidebands))
     weights = mean_weights(division.groups, lines[:, ~is_slow])
     added: Array | float = 0.0
     if is_slow.any():
@@ -227,7 +227,7 @@ def _segment_rest(stream: Stream, motion: ArmMotion, average: Average, count: in
     division = replace(division, readings_rad_s=readings)
     fraction = (division.time_s - average.start_s) / average.duration_s
     cycles = find_lines(readings - readings.mean(axis=0), REST_SEARCH, fraction=fraction)
-    lines = waves(cycles, fraction, REST_SEARCH.beats)
+    lines = waves(cycles, fraction, REST_SEARCH.sidebands)
     weights = mean_weights(division.groups, lines)
     residuals = division.subtract_means(readings, weights)
     residuals = residuals - lines @ fit_columns(lines, residuals)
@@ -246,7 +246,7 @@ def _segment_rest(stream: Stream, motion: ArmMotion, average: Average, count: in
         counts=counts_of(stream, RATE, division.inside),
         residual_counts=residuals / lsb,
         vibration_counts=np.zeros(3),
-        swing_rad2=line_swing(vibrating, lines, cycles / average.duration_s),
+        vibration_rad2=find_angle_change_rad2(vibrating, lines, cycles / average.duration_s),
     )
     return SegmentedAverage(average, segments if average.samples >= MIN_REST_SAMPLES else (), raw)
 

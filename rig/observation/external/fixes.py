@@ -33,7 +33,7 @@ MIN_ROW_RATIO = 0.25  # to a fix's usual number of rows
 
 
 @dataclass(frozen=True, slots=True)
-class LeftOut:
+class OmittedIncrements:
     """Increments that could not be made for one reason: the error's name, their number, the first one's start.
 
     `longest_s`: the longest step from one reading to the next over which the motion is unknown.
@@ -51,7 +51,7 @@ class Gathered:
 
     fixes: Fixes
     window_s: float
-    left_out: tuple[LeftOut, ...]
+    left_out: tuple[OmittedIncrements, ...]
 
     @property
     def increments(self) -> int:
@@ -146,7 +146,7 @@ def _drop_thin(fixes: Fixes) -> Fixes:
 
 def _find_joined(
     turning: Turning, fixes: Fixes, clock_s: float
-) -> tuple[NDArray[np.bool_], Array, tuple[LeftOut, ...]]:
+) -> tuple[NDArray[np.bool_], Array, tuple[OmittedIncrements, ...]]:
     """Return which fixes are joined to the next, the std of the rotation hidden in between, and what is left out.
 
     The mask and the stds, rad, have shape (N − 1,). A fix is not joined over a step that may hide too much rotation.
@@ -167,7 +167,7 @@ def _find_joined(
         hidden += np.where(joined, amount, 0.0)
         if len(lost):
             first = float(begins[from_step[lost[0]]])
-            left_out.append(LeftOut(name, len(lost), first, float((ends - begins).max())))
+            left_out.append(OmittedIncrements(name, len(lost), first, float((ends - begins).max())))
     return joined, np.sqrt(hidden), tuple(left_out)
 
 
@@ -189,7 +189,7 @@ def _find_unknown_steps(turning: Turning) -> Iterator[tuple[str, NDArray[np.intp
     yield "turned_too_fast", fast, np.full(len(fast), UNKNOWN_STD_RAD)
 
 
-def _all_lost(count: int, total: int, left_out: tuple[LeftOut, ...]) -> Fault:
+def _all_lost(count: int, total: int, left_out: tuple[OmittedIncrements, ...]) -> Fault:
     """Return the Fault of too few increments, which names the commonest cause."""
     if not left_out:
         return _too_few(f"{count} increments between attitudes are left")

@@ -44,7 +44,7 @@ class Revolution:
     uneven: bool = False
 
     @property
-    def beats(self) -> int:
+    def sidebands(self) -> int:
         """The number of sidebands of each spectral line: the highest harmonic of a turn in the shaft's speed.
 
         A bad encoder errs once and twice a turn; products of these errors come up to four times a turn.

@@ -33,13 +33,13 @@ class LineSearch:
 
     - `stands_out`: its power exceeds this multiple of the median power around it, and of `floor`.
     - `floor`: the median power of the readings in the same window, if the line is sought in data with less noise.
-    - `slowest`: its least number of cycles in all readings; `beats`: its number of sidebands (`waves`).
+    - `slowest`: its least number of cycles in all readings; `sidebands`: its number of sidebands (`waves`).
     - `most`: the largest number of lines, previous ones included.
     """
 
     stands_out: float = 16.0  # one false line in seventy recordings costs nothing
     slowest: float = 8.0  # slower lines are hard to separate from waves once and twice per revolution
-    beats: int = SIDEBANDS
+    sidebands: int = SIDEBANDS
     most: int = MAX_LINES
     floor: float = 0.0
 
@@ -52,15 +52,15 @@ def find_lines(residuals: Array, search: LineSearch, previous: Array = EMPTY, fr
     """
     count, merged, fixed = len(residuals), EMPTY, len(previous)
     cycles = previous
-    most = min(search.most, count // (column_count(search.beats) * COLUMN_SAMPLES))
+    most = min(search.most, count // (column_count(search.sidebands) * COLUMN_SAMPLES))
     fraction = np.arange(count) / count if fraction is None else fraction
     while len(cycles) < most and len(merged) < most:
-        columns = waves(cycles, fraction, search.beats)
+        columns = waves(cycles, fraction, search.sidebands)
         remainder = residuals - columns @ fit_columns(columns, residuals)
         strongest = _find_strongest(remainder, np.append(cycles, merged), fraction, search)
         if strongest is None:
             break
-        refined = _refine(np.append(cycles, strongest), residuals, fixed, fraction, search.beats)
+        refined = _refine(np.append(cycles, strongest), residuals, fixed, fraction, search.sidebands)
         if _are_too_near(refined, search):
             merged = np.append(merged, strongest)
         else:
@@ -78,7 +78,7 @@ def _are_too_near(cycles: Array, search: LineSearch) -> bool:
     gaps = np.diff(ordered)
     if gaps.min(initial=np.inf) < MIN_LINE_CYCLES or ordered[0] < 1.0:
         return True
-    return bool(ordered[0] < search.slowest and gaps.size and gaps[0] < 2 * search.beats + MIN_SIDEBAND_CYCLES)
+    return bool(ordered[0] < search.slowest and gaps.size and gaps[0] < 2 * search.sidebands + MIN_SIDEBAND_CYCLES)
 
 
 def median_power(residuals: Array) -> float:
@@ -86,22 +86,22 @@ def median_power(residuals: Array) -> float:
     return float(np.median(np.abs(np.fft.rfft(apply_window(residuals).T)) ** 2, axis=1).min())
 
 
-def column_count(beats: int) -> int:
+def column_count(sidebands: int) -> int:
     """Return the number of columns of `waves` per spectral line."""
-    return LINE_COLUMNS * (1 + beats)
+    return LINE_COLUMNS * (1 + sidebands)
 
 
-def waves(cycles: Array, fraction: Array, beats: int = SIDEBANDS) -> Array:
+def waves(cycles: Array, fraction: Array, sidebands: int = SIDEBANDS) -> Array:
     """Return cosine and sine columns (n, w k) of k lines at elapsed fractions (n,) of the time, w = `column_count`.
 
-    A line also has two linearly growing columns, for a vibration that begins or ends, and sidebands up to `beats`
+    A line also has two linearly growing columns, for a vibration that begins or ends, and sidebands up to `sidebands`
     cycles away: at one cycle, a vibration of the room in a rotating sensor; for others see
     `rig.observation.motion.revolution.Revolution`.
     """
-    line, turn = (np.exp(2j * np.pi * np.outer(cycles_each, fraction)) for cycles_each in (cycles, range(1, beats + 1)))
-    sidebands = [line * shift for once in turn for shift in (once.conj(), once)]
-    columns = [part for wave in (line, line * (2 * fraction - 1), *sidebands) for part in (wave.real, wave.imag)]
-    return np.stack(columns, axis=1).reshape(column_count(beats) * len(cycles), len(fraction)).T
+    line, turn = (np.exp(2j * np.pi * np.outer(number, fraction)) for number in (cycles, range(1, sidebands + 1)))
+    shifted = [line * shift for once in turn for shift in (once.conj(), once)]
+    columns = [part for wave in (line, line * (2 * fraction - 1), *shifted) for part in (wave.real, wave.imag)]
+    return np.stack(columns, axis=1).reshape(column_count(sidebands) * len(cycles), len(fraction)).T
 
 
 def harmonics(angle_rad: Array, most: int) -> Array:
@@ -134,7 +134,7 @@ def fit_residuals(columns: Array, values: Array) -> Array:
     return residuals
 
 
-def line_swing(residuals: Array, columns: Array, lines_hz: Array) -> Array:
+def find_angle_change_rad2(residuals: Array, columns: Array, lines_hz: Array) -> Array:
     """Return the mean square (3,), rad², of the change of the lines' angle between two moments.
 
     The lines are those of columns (n, w k) in residuals (n, 3). A line of mean square P and frequency f has the angle
@@ -172,7 +172,7 @@ def _find_strongest(residuals: Array, previous: Array, fraction: Array, search: 
     bend = below - 2 * centre + above
     peak = best + (float(np.clip(0.5 * (below - above) / bend, -0.5, 0.5)) if bend < 0 else 0.0)
     peak *= float(cycles[1])
-    return _choose_middle(peak, residuals, previous, fraction, search) if search.beats else peak
+    return _choose_middle(peak, residuals, previous, fraction, search) if search.sidebands else peak
 
 
 def _choose_middle(peak: float, residuals: Array, previous: Array, fraction: Array, search: LineSearch) -> float:
@@ -185,20 +185,22 @@ def _choose_middle(peak: float, residuals: Array, previous: Array, fraction: Arr
     sidebands = [cycles for cycles in sidebands if not (np.abs(cycles - previous) <= MIN_LINE_CYCLES).any()]
     explained = []
     for cycles in (peak, *sidebands):
-        columns = waves(np.array([cycles]), fraction, search.beats)
+        columns = waves(np.array([cycles]), fraction, search.sidebands)
         explained.append(float(np.sum((columns @ fit_columns(columns, whitened)) ** 2)))
     best = int(np.argmax(explained))
     return (peak, *sidebands)[best] if explained[best] > MIN_GAIN * explained[0] else peak
 
 
-def _refine(cycles: Array, residuals: Array, fixed: int, fraction: Array, beats: int) -> Array:
+def _refine(cycles: Array, residuals: Array, fixed: int, fraction: Array, sidebands: int) -> Array:
     """Return the frequencies of spectral lines, in cycles, refined from their phase drift.
 
     The drift is the part of the amplitude that grows in quadrature. The first `fixed` lines, and lines with sidebands
     only, which have no phase, are unchanged.
     """
     for _ in range(PASSES):
-        sizes = fit_columns(waves(cycles, fraction, beats), residuals).reshape(len(cycles), column_count(beats), -1)
+        sizes = fit_columns(waves(cycles, fraction, sidebands), residuals).reshape(
+            len(cycles), column_count(sidebands), -1
+        )
         cosine, sine, cosine_grown, sine_grown = np.moveaxis(sizes, 1, 0)[:4]
         power = np.sum(sizes[:, :2] ** 2, axis=(1, 2)) + np.sum(sizes[:, LINE_COLUMNS:] ** 2, axis=(1, 2))
         late = np.sum(cosine_grown * sine - sine_grown * cosine, axis=1) / (power + np.finfo(np.float64).tiny)

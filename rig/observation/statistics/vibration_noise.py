@@ -23,7 +23,7 @@ SHORT_ORDERS = (1, 2)  # orders of autoregression that fit coloured noise, but n
 def average_rest(readings: Array, time_s: Array, window: Window, steps: Steps) -> Mean:
     """Average readings at rest with weights that cancel a vibration (`average_tapered`), so it is not noise."""
     residuals = readings - readings.mean(axis=0)
-    shaking = _columns(residuals, LineSearch(beats=0))
+    shaking = _columns(residuals, LineSearch(sidebands=0))
     columns = np.column_stack([np.ones(len(residuals)), shaking])
     smooth = columns @ fit_columns(columns, residuals)
     noise = estimate_noise(residuals - smooth, columns.shape[1], steps, SHORT_ORDERS if shaking.size else ORDERS)
@@ -51,7 +51,7 @@ def fit_inflation(residuals: Array) -> float:
 
 
 def _columns(residuals: Array, search: LineSearch) -> Array:
-    return waves(find_lines(residuals, search), np.arange(len(residuals)) / len(residuals), search.beats)
+    return waves(find_lines(residuals, search), np.arange(len(residuals)) / len(residuals), search.sidebands)
 
 
 def estimate_noise(residuals: Array, parameters: int, steps: Steps, memories: Sequence[int]) -> MeanNoise:

@@ -45,7 +45,7 @@ class CertifiedGyroscope:
 
 
 @dataclass(frozen=True, slots=True)
-class HeldStill:
+class RestCalibration:
     """The sensors of one `kind` that were calibrated at rest, and the reference standard of their scale factors.
 
     `value` is the standard's stated value, `origin` the laboratory's statement of its source.
@@ -98,7 +98,7 @@ class Certificate:
     stated: StatedFacts
     result: ResultDocument
     gyroscopes: tuple[CertifiedGyroscope, ...]
-    held_still: tuple[HeldStill, ...]
+    calibrated_at_rest: tuple[RestCalibration, ...]
     verified: Mapping[str, VerificationEntry]
     conformity: tuple[CheckEntry, ...]
     fitness: tuple[CheckEntry, ...]
@@ -183,13 +183,13 @@ class Certificate:
     @property
     def finds_attitudes(self) -> bool:
         """Whether the attitude error was estimated from the readings."""
-        return any(hasattr(entry, "attitude_error_rad") for kind in self.held_still for entry in kind.entries)
+        return any(hasattr(entry, "attitude_error_rad") for kind in self.calibrated_at_rest for entry in kind.entries)
 
     @property
     def temperature_source(self) -> str:
         """The source of the items' temperatures, in words."""
         conditions = [gyroscope.sensor.bias_conditions for gyroscope in self.gyroscopes]
-        conditions += [getattr(entry, "conditions", None) for kind in self.held_still for entry in kind.entries]
+        conditions += [getattr(entry, "conditions", None) for kind in self.calibrated_at_rest for entry in kind.entries]
         dated = [when for when in conditions if when is not None]
         measured = [when for when in dated if when.temperature_c is not None]
         if dated and not measured:
@@ -250,7 +250,7 @@ def certificate_of(
         stated=stated,
         result=result,
         gyroscopes=gyroscopes,
-        held_still=tuple(_find_held_still(result, stated)),
+        calibrated_at_rest=tuple(_find_rest_calibrations(result, stated)),
         verified=verified,
         conformity=conformity,
         fitness=fitness,
@@ -340,7 +340,7 @@ def _traceable(result: ResultDocument, stated: StatedFacts) -> bool:
     return measured and compared and whole and stated.where.time_reference is not None
 
 
-def _find_held_still(result: ResultDocument, stated: StatedFacts) -> Iterator[HeldStill]:
+def _find_rest_calibrations(result: ResultDocument, stated: StatedFacts) -> Iterator[RestCalibration]:
     """Yield the sensors measured at rest, kind by kind.
 
     A sensor is traceable if its standard was measured, and the standard's uncertainty and origin are stated.
@@ -352,7 +352,7 @@ def _find_held_still(result: ResultDocument, stated: StatedFacts) -> Iterator[He
         origin, budgets = kind.standard.origin(stated.where), (getattr(entry, "budget", None) for entry in entries)
         stated_size = all(budget is not None and _size_stated(budget) for budget in budgets)
         traceable = stated_size and origin is not None and not is_simulated(result, stated)
-        yield HeldStill(kind.name, kind.standard, entries, kind.standard.value(entries[0]), origin, traceable)
+        yield RestCalibration(kind.name, kind.standard, entries, kind.standard.value(entries[0]), origin, traceable)
 
 
 def _size_stated(budget: BudgetEntry) -> bool:

@@ -163,7 +163,7 @@ def _statements(c: Certificate) -> Iterator[Element]:
     if c.gyroscopes:
         angles = "as a file states them" if c.external else _angles(c)
         yield _chain("gyroscopes", f"{chain} Angles are {angles}.", c.traceable)
-    for sensors in c.held_still:
+    for sensors in c.calibrated_at_rest:
         origin = f"{sensors.standard.size} is stated by the laboratory, its origin: {sensors.origin or NOT_STATED}."
         claim = "Its uncertainty was stated too." if sensors.traceable else NO_TRACEABILITY
         yield _chain(f"{sensors.kind}s", f"{origin} {claim}", sensors.traceable)

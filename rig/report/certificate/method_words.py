@@ -58,8 +58,8 @@ def _describe_file(certificate: Certificate) -> Iterator[str]:
             "Scale factors, biases and axes of the gyroscope are solved for by weighted least squares "
             f"(estimator: {_estimators(certificate)}). {axes}"
         )
-    if certificate.held_still:
-        standards = " and ".join(kind.standard.quantity for kind in certificate.held_still)
+    if certificate.calibrated_at_rest:
+        standards = " and ".join(kind.standard.quantity for kind in certificate.calibrated_at_rest)
         attitudes = "; the attitude error of the file is estimated with it" if certificate.finds_attitudes else ""
         yield f"At rest, the readings are compared with {standards} in the axes of the file{attitudes}."
 
@@ -73,7 +73,7 @@ def _describe_turner(certificate: Certificate) -> Iterator[str]:
             f"The item was mounted in {len(stages) + 1} stages. Relative to the first, with U (k = 2): "
             f"{'; '.join(stages)}."
         )
-    for kind in certificate.held_still:
+    for kind in certificate.calibrated_at_rest:
         yield kind.standard.method(bool(certificate.gyroscopes))
         if kind.kind == "magnetometer" and certificate.reversals:
             yield "They were turned over between runs, which separates their bias from the arm's field."

@@ -23,7 +23,7 @@ from rig.data.recording.motion_file import Item
 from rig.data.recording.settings import Site
 from rig.errors import Fault
 from rig.estimation.arrays import scale_of
-from rig.estimation.external.increment_solution import EarthSeen
+from rig.estimation.external.increment_solution import EarthRateEstimate
 from rig.estimation.reference import accelerometer, magnetometer
 from rig.estimation.reference.reference_model import REFERENCE, SECOND
 from rig.estimation.reference.triaxial import TriaxialSolution
@@ -97,17 +97,17 @@ def angles_entry(sensor: OfSensor) -> AnglesEntry | None:
         rows=sensor.turned.rows,
         angle_std_rad=max(turn.angle_std_rad for turn in turns),
         axis_std_rad=max(turn.axis_std_rad for turn in turns),
-        uncertainty_inflation=getattr(sensor.gyroscope.solution, "widened", 1.0),
+        uncertainty_inflation=getattr(sensor.gyroscope.solution, "inflation", 1.0),
     )
 
 
-def _earth_rate(result: Result) -> EarthSeen | Fault:
+def _earth_rate(result: Result) -> EarthRateEstimate | Fault:
     """Return the Earth's rate in the axes of the table, or the Fault that explains its absence."""
     if isinstance(result, InIncrements):
         return result.solution.earth
     if result.reference_fault is not None:
         return result.reference_fault
-    return EarthSeen(result.solution.reference, result.solution.covariance[REFERENCE, REFERENCE])
+    return EarthRateEstimate(result.solution.reference, result.solution.covariance[REFERENCE, REFERENCE])
 
 
 def _increments_entry(increments: InIncrements) -> IncrementsEntry:

@@ -75,7 +75,7 @@ def _uncertainty_fields(result: SensorResult) -> dict[str, Any]:
     if (explained := result.explained) is not None:
         fields["bias_process"] = bias_process_entry(explained)
         fields["speeds_rad_s"] = explained.inputs.speeds_rad_s
-        fields["axis_rate_ranges_rad_s"] = explained.loads_rad_s
+        fields["axis_rate_ranges_rad_s"] = explained.axis_rate_ranges_rad_s
         if explained.nonlinearity is not None:
             fields["nonlinearity"] = entry(NonlinearityEntry, explained.nonlinearity)
     if result.earth is not None:

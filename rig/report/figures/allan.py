@@ -98,7 +98,7 @@ def _cells(figure: AllanReading | Fault, size: float) -> tuple[str, str]:
 def _lines(result: AtRest) -> Iterator[str]:
     temperatures = "" if result.temperature_c is None else "; {:.1f} to {:.1f} °C".format(*result.temperature_c)
     durations = f"{result.total_s:.4g} s in all, the longest {result.longest_s:.4g} s"
-    yield f"{result.stretches} intervals at rest, {durations}{temperatures}; U with k = 2"
+    yield f"{result.intervals} intervals at rest, {durations}{temperatures}; U with k = 2"
     for what in ("random_walk", "bias_instability"):
         faults = [figure for axis in result.axes if isinstance(figure := getattr(axis, what), Fault)]
         by_name = {fault.name: fault for fault in faults}  # one for each name: the axes differ in their numbers only
@@ -107,7 +107,7 @@ def _lines(result: AtRest) -> Iterator[str]:
 
 def _entry(quantity: Quantity, result: AtRest) -> dict[str, Any]:
     return {
-        "stretches": result.stretches,
+        "stretches": result.intervals,
         "longest_s": result.longest_s,
         "total_s": result.total_s,
         "temperature_c": None if result.temperature_c is None else list(result.temperature_c),

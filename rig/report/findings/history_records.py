@@ -103,14 +103,14 @@ def scale_and_bias(
     sensor: str, quantity: "Quantity", entry: Calibrated, bias: Sequence[float], document: "ResultDocument"
 ) -> Iterator[Parameter]:
     """Yield scale factor and bias of each axis, then the mean scale factor, with its covariance and largest k."""
-    from rig.data.meaning import JUDGED_PARAMETERS, limit_held
+    from rig.data.meaning import JUDGED_PARAMETERS, find_conformity_limit
 
     axes, unit_rows = len(entry.scale), np.eye(2 * len(entry.scale))
     mean = unit_rows[:axes].mean(axis=0)
     values, combined = np.array([*entry.scale, *bias]), entry.covariance_combined
     factors = np.full(2 * axes, COVERAGE_FACTOR) if entry.budget is None else np.array(entry.budget.coverage_factors)
     scale_limit, bias_limit = (
-        limit_held(document.checks, sensor, quantity.name, parameter) for parameter in JUDGED_PARAMETERS
+        find_conformity_limit(document.checks, sensor, quantity.name, parameter) for parameter in JUDGED_PARAMETERS
     )
     rows: list[tuple[str, Array, str, float | None]] = [("k", mean, "1", None)]
     rows += [(f"k{axis}", unit_rows[i], "1", scale_limit) for i, axis in enumerate(quantity.axes)]

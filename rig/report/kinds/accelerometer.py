@@ -21,7 +21,7 @@ from rig.report.words.detection_limit_words import detection_limit_field, detect
 from rig.report.words.validity_words import warmth, when_words
 
 if TYPE_CHECKING:
-    from rig.analysis.reference.accelerometer import AccelerometerResult, HeldOut
+    from rig.analysis.reference.accelerometer import AccelerometerResult, ValidationRepeat
     from rig.estimation.triads import Alignment
 
 
@@ -58,7 +58,7 @@ def _entry(outcome: Outcome, name: str, result: "AccelerometerResult") -> Accele
         alignment=None if result.alignment is None else _alignment(result.alignment),
         non_orthogonality_degrees_of_freedom=dof_or_none(acceleration_angle_dof(result)),
         second_order_degrees_of_freedom=dof_or_none(second_order_dof(result)),
-        validation=None if result.held_out is None else _validation(result.held_out),
+        validation=None if result.validation is None else _validation(result.validation),
         conditions=when_entry(
             accelerometer_conditions(outcome.recordings, name, [dwell.index for dwell in result.dwells])
         ),
@@ -73,11 +73,11 @@ def _alignment(alignment: "Alignment") -> AlignmentEntry:
     )  # fmt: skip
 
 
-def _validation(held_out: "HeldOut") -> ValidationEntry:
+def _validation(validation: "ValidationRepeat") -> ValidationEntry:
     return ValidationEntry(
-        dwells=len(held_out.dwells),
-        rms_m_s2=held_out.rms_m_s2,
-        max_m_s2=float(np.abs(held_out.error_m_s2).max()),
+        dwells=len(validation.dwells),
+        rms_m_s2=validation.rms_m_s2,
+        max_m_s2=float(np.abs(validation.error_m_s2).max()),
     )
 
 

@@ -10,7 +10,7 @@ from rig.analysis.check import Check
 from rig.analysis.consistency.contradictions import contradicting_sweeps, contradictions
 from rig.analysis.consistency.converter_tests import judge_readings
 from rig.analysis.consistency.false_alarms import FALSE_ALARM_PROBABILITY
-from rig.analysis.environment import surroundings_of
+from rig.analysis.environment import find_environment
 from rig.analysis.gyroscope.calibration import observe_recordings, solve_observed
 from rig.data.recording.run_data import RunData
 from rig.errors import Fault
@@ -137,12 +137,12 @@ DAMAGES: dict[str, tuple[tuple[str, ...], Damage]] = {
 def judged(run: RunData) -> tuple[tuple[Check, ...], Array, Array]:
     """The checks, the six parameters and their standard deviations. Raises Fault."""
     recordings = observe_recordings([run])
-    surroundings = surroundings_of(recordings, recordings[0].run.settings)
-    results = solve_observed(run.sensors, recordings, surroundings=surroundings)
+    environment = find_environment(recordings, recordings[0].run.settings)
+    results = solve_observed(run.sensors, recordings, environment=environment)
     solution = results["gyro"].solution
     found = np.concatenate([solution.scale, solution.bias_rad_s])
     settings = recordings[0].run.settings
-    checks = contradictions(recordings, results, ["gyro"], surroundings, settings, has_limits=False).checks
+    checks = contradictions(recordings, results, ["gyro"], environment, settings, has_limits=False).checks
     return checks, found, np.sqrt(np.diag(solution.covariance))
 
 

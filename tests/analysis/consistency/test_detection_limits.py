@@ -8,7 +8,7 @@ import pytest
 from rig.analysis.consistency.contradictions import ConsistencyChecks, contradictions
 from rig.analysis.consistency.detection_limits import DetectionLimit
 from rig.analysis.design.planned_limits import predict_limits
-from rig.analysis.environment import surroundings_of
+from rig.analysis.environment import find_environment
 from rig.analysis.gyroscope.calibration import observe_recordings, solve_observed
 from rig.config.load import parse
 from rig.data.recording.run_data import RunData
@@ -26,9 +26,9 @@ AXES = np.eye(3)
 
 def held(run: RunData) -> ConsistencyChecks:
     recordings = observe_recordings([run])
-    surroundings = surroundings_of(recordings, recordings[0].run.settings)
-    results = solve_observed(run.sensors, recordings, surroundings=surroundings)
-    return contradictions(recordings, results, ["gyro"], surroundings, recordings[0].run.settings)
+    environment = find_environment(recordings, recordings[0].run.settings)
+    results = solve_observed(run.sensors, recordings, environment=environment)
+    return contradictions(recordings, results, ["gyro"], environment, recordings[0].run.settings)
 
 
 def later(seen: Drawn) -> Array:

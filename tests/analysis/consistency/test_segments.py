@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rig.analysis.consistency.state_errors import build_reading_patterns
-from rig.analysis.environment import SPLINE_NOISE_RATIO, surroundings_of
+from rig.analysis.environment import SPLINE_NOISE_RATIO, find_environment
 from rig.analysis.gyroscope.calibration import observe_recordings, solve_observed
 from rig.analysis.gyroscope.segment_table import Segments, stack_segments
 from rig.data.recording.run_data import RunData
@@ -47,7 +47,7 @@ def without_states(run: RunData, from_s: float, to_s: float) -> RunData:
 
 def segments_of(run: RunData) -> Segments:
     recordings = observe_recordings([run])
-    result = solve_observed(run.sensors, recordings, surroundings=surroundings_of(recordings, run.settings))["gyro"]
+    result = solve_observed(run.sensors, recordings, environment=find_environment(recordings, run.settings))["gyro"]
     assert result.explained is not None and run.settings.site is not None
     return stack_segments(segment_recordings("gyro", recordings), result.explained, run.settings.site)
 

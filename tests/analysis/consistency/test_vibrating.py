@@ -8,7 +8,7 @@ import pytest
 from rig.data.quantity import RATE
 from rig.data.recording.run_data import RunData
 from rig.estimation.arrays import Array
-from rig.observation.statistics.spectral_lines import LineSearch, find_lines, line_swing, waves
+from rig.observation.statistics.spectral_lines import LineSearch, find_angle_change_rad2, find_lines, waves
 from support.recordings.checked_runs import check_run, list_failed
 from support.recordings.drawn_recording import ADIS16465, KINDS, drawn
 
@@ -66,4 +66,4 @@ def test_a_swing_is_how_much_an_angle_differs_between_two_moments() -> None:
     columns = waves(np.array([cycles]), np.arange(count) / count)
     angle = np.cumsum(shaking, axis=0) * seconds / count
     differs = np.mean((angle[:, None] - angle[None, ::7]) ** 2, axis=(0, 1))
-    assert line_swing(shaking, columns, np.array([cycles / seconds])) == pytest.approx(differs, rel=0.02)
+    assert find_angle_change_rad2(shaking, columns, np.array([cycles / seconds])) == pytest.approx(differs, rel=0.02)

@@ -6,7 +6,7 @@ from math import pi
 import numpy as np
 import pytest
 
-from rig.analysis.environment import surroundings_of
+from rig.analysis.environment import find_environment
 from rig.analysis.gyroscope.calibration import observe_recordings, solve_observed
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.vector_model import VectorSolution
@@ -22,7 +22,7 @@ MADE = replace(NOMINAL, theta_rad=(0, 0, 0, 0, 6e-4, 0), alpha_rad=(pi / 2, 0, 0
 def non_orthogonality(setup: Setup) -> Array:
     run = synthetic_run(setup)
     recordings = observe_recordings([run])
-    solved = solve_observed(run.sensors, recordings, surroundings_of(recordings, run.settings))
+    solved = solve_observed(run.sensors, recordings, find_environment(recordings, run.settings))
     solution = solved["gyro"].vector_model
     assert isinstance(solution, VectorSolution)
     return solution.non_orthogonality_rad

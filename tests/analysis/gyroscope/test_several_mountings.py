@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rig.analysis.environment import surroundings_of
+from rig.analysis.environment import find_environment
 from rig.analysis.gyroscope.calibration import solve_observed
 from rig.analysis.gyroscope.stage_mounts import EstimatedMount, observe_as_mounted
 from rig.data.recording.settings import settings_from_json
@@ -32,7 +32,7 @@ def solved(setup: Setup, seed: int, off_deg: Array) -> tuple[Array, Budget, tupl
     """(3,) errors of the scale, the budget, and the mounts that were found."""
     runs, scale = drawn_stages(seed, KIND, setup, off_deg)
     recordings, mounts = observe_as_mounted(runs, runs[0].settings)
-    result = solve_observed(runs[0].sensors, recordings, surroundings=surroundings_of(recordings, runs[0].settings))[
+    result = solve_observed(runs[0].sensors, recordings, environment=find_environment(recordings, runs[0].settings))[
         "gyro"
     ]
     assert result.uncertainty is not None

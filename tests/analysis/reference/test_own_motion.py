@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from rig.analysis.environment import surroundings_of
+from rig.analysis.environment import find_environment
 from rig.analysis.gyroscope.calibration import SensorResult, solve_observed
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.budget import Unknown, budget
@@ -36,7 +36,7 @@ def solved(setup: Setup, extension_m: tuple[float, float, float] = (0.0, 0.0, 0.
     made = synthetic_run(setup)
     settings = replace(made.settings, extension_m=extension_m)
     recordings = observe_runs([replace(made, settings=settings)])
-    return solve_observed(made.sensors, recordings, surroundings_of(recordings, settings))["gyro"]
+    return solve_observed(made.sensors, recordings, find_environment(recordings, settings))["gyro"]
 
 
 def bias_off(setup: Setup, result: SensorResult) -> Array:

@@ -163,7 +163,7 @@ def test_the_readings_tell_how_much_of_what_an_arm_is_off_by_is_new_in_each_dwel
         turns = turned(session.truth.theta(), session.movement)[:, : OWN_ERRORS * len(JOINTS)]
         elsewhere = new_rad * np.random.default_rng([9, seed]).standard_normal(turns.shape[1])
         solution, budget, error = drawn_accelerations.solve_session(session.reading(turns @ elsewhere))
-        shares.append(solution.own_share)
+        shares.append(solution.independent_fraction)
         off.append(error[3:] / budget.std[3:])
     assert least <= np.median(shares) <= most
     assert 0.5 < np.sqrt(np.mean(np.square(off))) < 1.5  # of 18 values, which scatter by 0.17

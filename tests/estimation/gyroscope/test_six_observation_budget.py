@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rig.analysis.environment import surroundings_of
+from rig.analysis.environment import find_environment
 from rig.analysis.gyroscope.calibration import observe_recordings, solve_six_observation
 from rig.analysis.gyroscope.vector_inputs import collect_inputs
 from rig.estimation.gyroscope.accumulator import Solution
@@ -23,9 +23,9 @@ Turns = tuple[tuple[Observation, ...], Solution, VectorInputs]
 def turns() -> Turns:
     recordings = observe_recordings([synthetic_run(Setup(repeats=2))])
     observations = recordings[0].sensors["gyro"].revolutions
-    surroundings = surroundings_of(recordings, recordings[0].run.settings)
-    assert surroundings is not None
-    return observations, solve_six_observation(observations, "newton"), collect_inputs(recordings, "gyro", surroundings)
+    environment = find_environment(recordings, recordings[0].run.settings)
+    assert environment is not None
+    return observations, solve_six_observation(observations, "newton"), collect_inputs(recordings, "gyro", environment)
 
 
 def test_it_is_the_derivative_of_the_solution(turns: Turns) -> None:

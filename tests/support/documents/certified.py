@@ -21,7 +21,7 @@ from rig.data.entries.result_types import Matrix3, Vector3
 from rig.data.entries.temperature import OverTemperatureEntry
 from rig.data.result_file import ResultDocument, VectorEntry
 from rig.estimation.reference.attitude_error import AttitudeError
-from rig.estimation.reference.reference_budget import KnownSize, Spread, reference_budget
+from rig.estimation.reference.reference_budget import FitUncertainty, KnownSize, reference_budget
 from rig.motion.geometry import NOMINAL
 from rig.report.certificate.certificate_page import certificate_page
 from rig.report.certificate.content import Certificate, certificate_of
@@ -119,7 +119,7 @@ def _add_budget(fields: Mapping[str, Any], size: KnownSize) -> dict[str, Any]:
     """Add a budget of noise and of the reference's uncertainty."""
     noise = np.linalg.cholesky(np.array(fields["covariance"]))
     exact = AttitudeError(0.0, 0.0)
-    spread = Spread(
+    spread = FitUncertainty(
         np.array(fields["scale"]),
         np.array(fields["covariance"]),
         noise,

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from rig.analysis.check import Check
 from rig.analysis.consistency.contradictions import contradictions
 from rig.analysis.consistency.false_alarms import CHECKS, FALSE_ALARM_PROBABILITY
-from rig.analysis.environment import Surroundings, surroundings_of
+from rig.analysis.environment import MeasurementEnvironment, find_environment
 from rig.analysis.gyroscope.calibration import SensorResult, observe_recordings, solve_observed
 from rig.data.recording.run_data import RunData
 from rig.observation.observed_run import ObservedRun
@@ -13,24 +13,24 @@ from rig.observation.observed_run import ObservedRun
 STATISTICS = len(CHECKS)  # of a gyroscope
 RATE = FALSE_ALARM_PROBABILITY / STATISTICS  # of each
 
-Solved = tuple[tuple[ObservedRun, ...], dict[str, SensorResult], Surroundings]
+Solved = tuple[tuple[ObservedRun, ...], dict[str, SensorResult], MeasurementEnvironment]
 
 
 def solve_inputs(run: RunData) -> Solved:
     """Return the inputs of the checks for a recording of one gyroscope."""
     recordings = observe_recordings([run])
-    surroundings = surroundings_of(recordings, recordings[0].run.settings)
-    return recordings, solve_observed(run.sensors, recordings, surroundings), surroundings
+    environment = find_environment(recordings, recordings[0].run.settings)
+    return recordings, solve_observed(run.sensors, recordings, environment), environment
 
 
 def checks_of(inputs: Solved, rate: float = RATE) -> tuple[Check, ...]:
     """Check with limits that undamaged recordings exceed with this probability each."""
-    recordings, results, surroundings = inputs
+    recordings, results, environment = inputs
     return contradictions(
         recordings,
         results,
         ["gyro"],
-        surroundings,
+        environment,
         recordings[0].run.settings,
         false_alarms=rate * STATISTICS,
         has_limits=False,

@@ -7,7 +7,7 @@ from types import MappingProxyType
 import numpy as np
 
 from rig.analysis.consistency.contradictions import contradictions
-from rig.analysis.environment import surroundings_of
+from rig.analysis.environment import find_environment
 from rig.analysis.gyroscope.calibration import observe_recordings, solve_observed
 from rig.config.sensors.sensor_catalogue import PARTS
 from rig.data.quantity import RATE
@@ -94,8 +94,8 @@ def record(source: Source, seed: int, noise_rad_s: float, *, vibrates: bool) -> 
 def state_solution(recording: Drawn) -> Stated:
     """Return the solution of a recording, compared with its truth."""
     recordings = observe_recordings([recording.run])
-    surroundings = surroundings_of(recordings, recording.run.settings)
-    results = solve_observed(recording.run.sensors, recordings, surroundings=surroundings)
+    environment = find_environment(recordings, recording.run.settings)
+    results = solve_observed(recording.run.sensors, recordings, environment=environment)
     result = results["gyro"]
     assert result.uncertainty is not None
     (observed,) = recordings
@@ -103,9 +103,7 @@ def state_solution(recording: Drawn) -> Stated:
     first_s, last_s = min(average.start_s for average in averages), max(average.end_s for average in averages)
     inside = (recording.time_s >= first_s) & (recording.time_s <= last_s)
     true = np.concatenate([recording.scale, -recording.bias_rad_s[inside].mean(axis=0)])
-    checks = contradictions(
-        recordings, results, ["gyro"], surroundings, recording.run.settings, has_limits=False
-    ).checks
+    checks = contradictions(recordings, results, ["gyro"], environment, recording.run.settings, has_limits=False).checks
     return Stated(
         np.concatenate([result.scale, result.bias_rad_s]) - true,
         result.uncertainty.expanded,

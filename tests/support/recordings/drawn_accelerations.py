@@ -159,7 +159,7 @@ def solve_session(session: Session) -> tuple[ImuSolution, Budget, Array]:
         gravity_m_s2=GRAVITY,
         sensor_errors=movement.sensor_errors,
         arm_turns=movement.arm_turns,
-        own_shares=INDEPENDENT_FRACTIONS,
+        independent_fractions=INDEPENDENT_FRACTIONS,
     )
     dof = np.full(movement.readings().size, AVERAGED)
     budget = accelerometer_budget(solution, movement, SITE, 0.0, datasheet=sheet_of(session.part), noise_dof=dof)
