@@ -133,7 +133,7 @@ def flash_by_probe(image: bytes, probe: Any) -> None:
     for mode in CONNECT_MODES:
         options = {"target_override": TARGET, "hide_programming_progress": True, "connect_mode": mode}
         try:
-            # pyocd executes a pyocd_user.py in the working folder, whatever its origin.
+            # pyocd executes a pyocd_user.py in the working folder, of any origin.
             with (
                 contextlib.chdir(PACKAGE),
                 Session(probe, options=options) as session,  # pyrefly: ignore[bad-context-manager]  # __exit__(None, …)

@@ -481,7 +481,7 @@ MESSAGES = (
 )
 
 
-ERRORS = {  # code → what the board reports; `what` follows "the board says that"
+ERRORS = {  # code → what the board reports; `what` continues "the board says that"
     1: Problem("unknown_message", "it does not know this request", "Flash the image that comes with this program"),
     2: Problem("bad_length", "the request has the wrong length", "Flash the image that comes with this program"),
     3: Problem("no_such_sensor", "it has no sensor of this number", "Check the sensors in the configuration"),

@@ -2,7 +2,7 @@
 
 A LOG is a CSV file: as the maker's RTDE recorder writes it (a heading, spaces between), or one without a heading from
 `jointwise_motion` of github.com/shamilmamedov/dynamic_calibration (time, angles, rates, …), whose name ends with the
-number of the joint that swings. Prints the same figures for each log and for the simulated arm, by the functions of
+number of the joint that oscillates. Prints the same figures for each log and for the simulated arm, by the functions of
 tests/support/motions/joint_figures.py, with which tests/world/ur10e/test_measured_joints.py tests the arm.
 docs/simulated-arm.md lists the logs and the results.
 """
@@ -37,7 +37,7 @@ BANDS = {"95-106": range(95, 107), "110-135": range(110, 136), "194-212": range(
 JOINTS = 6
 REST_TICKS = 20  # at least, for a noise; the first ones after a move are left out
 CRUISE_ROWS = 40
-SWING_S, PERIOD_S = 50.0, 10.0  # of the swings in dynamic_calibration
+SWING_S, PERIOD_S = 50.0, 10.0  # of the oscillations in dynamic_calibration
 
 
 def read_log(path: Path) -> Log:
@@ -111,7 +111,7 @@ def describe_joint(log: Log, joint: int) -> Iterator[str]:
 
 
 def describe_swing(path: Path) -> Iterator[str]:
-    """Yield lines about a log without targets, in which one joint swings."""
+    """Yield lines about a log without targets, in which one joint oscillates."""
     number = re.search(r"joint_(\d)", path.stem)
     if number is None:
         raise SystemExit(f"{path}: the name of a log without a heading ends with the joint that swings: joint_1")

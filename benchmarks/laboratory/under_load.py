@@ -1,6 +1,6 @@
 """Whether runs succeed on a busy machine: `python benchmarks/laboratory/under_load.py [--demos N] [--busy N]`.
 
-Runs the demonstration alone, then N times, two at a time, beside busy loops, each on a loopback address of its own.
+Runs the demonstration alone, then N times, two at a time, with busy loops, each on a loopback address of its own.
 Prints the number of runs with a verdict, the faults and refusals of the others by name, the number of missed arm
 states, and how much longer a run took than alone. `--keep DIR` keeps the folders of runs that did not pass, with their
 logs.
@@ -95,7 +95,7 @@ def busy_loops(number: int) -> Iterator[None]:
 
 
 def main() -> int:
-    """Run the demonstration alone and beside busy loops; print how runs end; return the exit status."""
+    """Run the demonstration alone and with busy loops; print how runs end; return the exit status."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("config", type=Path, nargs="?", default=DEMO, help="a configuration with a world: section")
     parser.add_argument("--demos", type=int, default=40, metavar="N", help="how many runs beside the busy loops")

@@ -132,7 +132,7 @@ class Bus(ctypes.Structure):
     predicted_to: int
 
     def set_predictions(self, answers: bytes) -> None:
-        """Set the answers to the next pairs of bytes, whatever is sent."""
+        """Set the answers to the next pairs of bytes to any bytes."""
         ctypes.memmove(ctypes.addressof(self) + Bus.predictions.offset, answers, len(answers))
         self.predicted_from, self.predicted_to = 0, len(answers) // 2
 

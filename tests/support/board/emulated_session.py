@@ -91,7 +91,7 @@ class Session:
             crystal_ppm=CRYSTAL_PPM,
             boot_time_s=boot_time_s,
         )
-        self.sent = bytearray()  # all the board has said
+        self.sent = bytearray()  # all bytes from the board
         self.time_s = 0.0
         self._tick_s = tick_s
         self.reader = FrameReader()

@@ -49,7 +49,7 @@ class HostFlash:
         return ctypes.string_at(self._core.host_flash_bytes(page), PAGE_BYTES)
 
     def put(self, page: int, data: bytes) -> None:
-        """Write to the cells, whatever their content."""
+        """Write to the cells without a look at their content."""
         ctypes.memmove(self._core.host_flash_bytes(page), data, len(data))
 
     def tear(self, page: int, offset: int) -> None:

@@ -1,7 +1,7 @@
 """PTB's rules for a digital certificate: its schemas, if available, and its Schematron.
 
 The schemas (DCC 3.2.1, D-SI 2.1.0, LGPL-3, and the W3C's for signatures) are no part of this project. They are searched
-in the folder named by RIG_DCC_SCHEMAS, in tests/fixtures/dcc, and in shared/dcc beside the repository.
+in the folder named by RIG_DCC_SCHEMAS, in tests/fixtures/dcc, and in shared/dcc next to the repository.
 """
 
 import functools

@@ -1,4 +1,4 @@
-"""Dwells on an arm, with an inclinometer beside its sensors: python -m support.extensions.inclined_run FOLDER."""
+"""Dwells on an arm, with an inclinometer next to its sensors: python -m support.extensions.inclined_run FOLDER."""
 
 import json
 import sys

@@ -21,7 +21,7 @@ EARTH_RAD_S = 7.292e-5 * np.array([0.6, 0.0, 0.8])  # in room coordinates
 
 @dataclass(frozen=True)
 class World:
-    """A body that swings by `swing_rad` about all axes with periods of `fastest_s` and more, `duration_s` long.
+    """A body that oscillates by `swing_rad` about all axes with periods of `fastest_s` and more, `duration_s` long.
 
     `random_walk_rad_sqrt_s` and `bias_walk_rad_s_sqrt_s` of the gyroscope; the reference errs by `attitude_rad` about
     each axis at `looks_hz`, with the correlation time `colour_s`; its look stamped t was at t + `late_s`. From each of

@@ -24,7 +24,7 @@ IMU, POSE = "sensor_msgs/msg/Imu", "geometry_msgs/msg/PoseStamped"
 MAGIC = b"\x89MCAP0\r\n"
 GIGABYTE = 1 << 30
 TIMES = "time_s,x_rad_s,y_rad_s,z_rad_s\n"
-Makes = Callable[[Path], Path]  # the file made in that folder, as it is to be read
+Makes = Callable[[Path], Path]  # the file made in that folder, by the path to read
 
 
 def reading(length: int = 0) -> bytes:

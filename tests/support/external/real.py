@@ -1,7 +1,7 @@
 """Other people's recordings of sensors turned by hand and in front of cameras.
 
 They are no part of this project; their README names the owners. They are searched in the folder named by
-RIG_REAL_RECORDINGS and in shared/real beside the repository.
+RIG_REAL_RECORDINGS and in shared/real next to the repository.
 """
 
 import gzip

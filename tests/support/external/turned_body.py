@@ -1,6 +1,6 @@
 """A gyroscope that a hand turns about the edges of a box and lays down in between; no code is shared with the rig.
 
-Every turn consists of pushes of a raised cosine about an axis that leans a little in the body, and ends with an error.
+Every turn consists of pushes of a raised cosine about an axis tilted a little in the body, and ends with an error.
 """
 
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ REST_S, PAUSE_S = 1.5, 0.15
 class Hand:
     """Turns by `angle_rad` about each of `axes` (w, 3), `fastest_rad_s` at most, read at `rate_hz`.
 
-    A turn ends with an error of `ends_rad` about each axis; its axis leans by `leans_rad`.
+    A turn ends with an error of `ends_rad` about each axis; its axis is tilted by `leans_rad`.
     """
 
     axes: Array

@@ -18,7 +18,7 @@ from support.laboratories.worlds import fresh_host
 
 @dataclass(frozen=True, slots=True)
 class WholeRun:
-    """A run that passed: its configuration, its recording observed anew, and its result.json."""
+    """A run that passed: its configuration, its recording observed again, and its result.json."""
 
     document: dict[str, Any]
     observed: ObservedRun

@@ -20,7 +20,7 @@ from support.processes.warm import start_module
 
 END_S = 30.0  # that a world is given to end, before it is made to
 
-# What `world` makes of demo.yaml with this: a calibration beside a reference, and its verification, in few seconds.
+# What `world` makes of demo.yaml with this: a calibration with a reference, and its verification, in few seconds.
 QUICK_EXPERIMENT: dict[str, Any] = {
     "arm": {"transfer_speed_deg_s": 170},
     "sensors": {

@@ -160,7 +160,7 @@ class Samples:
 
 
 def record_samples(truth: Truth, poses: Poses, sweep: Sweep, sampling: Sampling, rng: np.random.Generator) -> Samples:
-    """Return one revolution as it is recorded."""
+    """Return one recorded revolution."""
     phases, speed = rng.uniform(0, 2 * np.pi, len(sampling.cycles)), find_signed_speed(sweep)
 
     def motion(time_s: Array) -> tuple[Array, Array, Array]:

@@ -62,7 +62,7 @@ class Session:
     """The session: sweeps about `axes` axes, with rests, then dwells of `dwell_s` (none for 0).
 
     The arm: errors `arm_rad` of geometry and encoders, hysteresis between both directions, a timing error `timing_s` at
-    each end of a turn, axes that lean by `leaning_rad`, drawn for each sweep, an RMS vibration about each of the
+    each end of a turn, axes that are tilted by `leaning_rad`, drawn for each sweep, an RMS vibration about each of the
     flange's axes.
     """
 

@@ -83,7 +83,7 @@ def band_rms(q_rad: Array, residuals_rad_s: Array, orders: Sequence[int]) -> flo
 
 
 def smooth_sine(time_s: Array, qd_rad_s: Array, period_s: float, harmonics: int = 19) -> Array:
-    """Return the smooth part of the rates (n,) of a joint that swings: a line and harmonics of the period."""
+    """Return the smooth part of the rates (n,) of a joint that oscillates: a line and harmonics of the period."""
     waves = [wave(2 * np.pi * h * time_s / period_s) for h in range(1, harmonics + 1) for wave in (np.cos, np.sin)]
     design = np.column_stack([np.ones(len(time_s)), time_s, *waves])
     smooth: Array = design @ np.linalg.lstsq(design, qd_rad_s, rcond=None)[0]

@@ -33,7 +33,7 @@ class Drawn:
 
     `hysteresis` (3,): the addition half-way during warming; `lag_s`: the thermometer's lag; `gradient_k`: the excess of
     the sensor's temperature over its thermometer's in use, compared with the run: at the middle of the range, and in
-    addition at its upper end. `leaning` (P, 3): the addition in each pose, such as by an arm's leaning axis.
+    addition at its upper end. `leaning` (P, 3): the addition in each pose, such as by an arm's tilted axis.
     """
 
     scale: Array

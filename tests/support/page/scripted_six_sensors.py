@@ -1,4 +1,4 @@
-"""An invented run with the sensors of three boards: three gyroscopes, and an accelerometer beside each."""
+"""An invented run with the sensors of three boards: three gyroscopes, and an accelerometer with each."""
 
 from collections.abc import Collection, Iterator
 from dataclasses import replace

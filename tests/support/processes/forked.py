@@ -1,10 +1,10 @@
-"""Processes that run a function beside a test, forked from one that has imported the needed modules."""
+"""Processes that run a function during a test, forked from one that has imported the needed modules."""
 
 import multiprocessing
 from multiprocessing.context import ForkServerContext
 
 # There is one such process for all tests, so it has what any of them needs. Before Python 3.12 it finds the rig and
-# what is installed, not what lies beside the tests, and it does not say what it has not found.
+# what is installed, not the files next to the tests, and it does not report a missing module.
 IMPORTED = (
     *("pytest", "h5py", "rig.data.recording.run_file", "rig.data.result_file"),
     *("rig.history.store", "rig.report.kinds.kind_registry"),

@@ -208,7 +208,7 @@ def old(every: int) -> Damage:
 
 
 def late(by_s: float, where: Callable[[Readings], Mask]) -> Damage:
-    """Delay the time stamps of a stretch, compressed at its end so that their order remains."""
+    """Delay the time stamps of an interval, compressed at its end so that their order remains."""
 
     def damage(readings: Readings) -> Readings:
         chosen = np.flatnonzero(where(readings))

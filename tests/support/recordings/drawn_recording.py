@@ -185,7 +185,7 @@ def _draw_true_motion(
     axis_rad, again_rad = np.radians([uncertainty.axis_deg, uncertainty.repeatability_deg])
     true, speed = q.copy(), qd.copy()
     once, twice = WAVE_SHARE * axis_rad / np.sqrt(3) * rng.standard_normal((2, 2, 6))
-    encoders = rng.spawn(1)[0].standard_normal((len(ARC_WAVES), 2, 6))  # drawn beside all else
+    encoders = rng.spawn(1)[0].standard_normal((len(ARC_WAVES), 2, 6))  # drawn in addition to the rest
     if motion.settings.has_arcs:
         encoders *= encoders_err * uncertainty.angle_std_rad / np.sqrt(len(ARC_WAVES))
         once, twice = np.zeros((2, 2, 6))  # are among them
@@ -229,7 +229,7 @@ def _sense(turned: Array, pull: Array, kind: Kind, rng: np.random.Generator, spe
     """
     part = PARTS[kind.sensor.part]
     rates = turned @ rotation(rng.normal(0, np.radians(2), 3)).T
-    most_rad = np.radians(part.non_orthogonality_deg) / 2  # the other axis of an angle may lean as far
+    most_rad = np.radians(part.non_orthogonality_deg) / 2  # the other axis of an angle may be tilted as far
     leaning = np.eye(3) + np.clip(rng.normal(0, np.sqrt(2) / 3 * most_rad, (3, 3)), -most_rad, most_rad)
     rates = rates @ leaning
     cube = part.nonlinearity_percent / 100 / CUBE_DEVIATION / kind.sensor.range_rad_s**2 * rng.uniform(-1, 1, 3)

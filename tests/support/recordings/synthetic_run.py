@@ -89,7 +89,7 @@ class Setup:
     follows_crystal: bool | None = False  # the board's word on its clock
     kinematics: DenavitHartenberg = NOMINAL  # how the arm is made
     procedure: tuple[tuple[str, str], ...] = ()  # further keys of its section, and their values
-    angle_std_deg: float | None = None  # as it is stated of the encoders
+    angle_std_deg: float | None = None  # stated for the encoders
     encoders_err: float = 1.0  # true errors relative to the stated ones
     odd_per_rad_s: float = 0.0  # of each axis
     even_per_rad_s: float = 0.0

@@ -290,7 +290,7 @@ def _what_was_said(name: str, answer: bytes, robot: Robot) -> str:
 
 
 def _recover(laboratory: Laboratory) -> None:
-    """Bring the controller back to power, without a stop or a program, whatever was ordered."""
+    """Bring the controller back to power, without a stop or a program."""
     robot = laboratory.robot
     robot.stop_program("")
     robot.release()
