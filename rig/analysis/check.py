@@ -10,8 +10,7 @@ from rig.data.meaning import Meaning
 from rig.errors import Fault
 from rig.estimation.statistics.coverage import COVERAGE_FACTOR, tail_probability
 
-# Faults of sensors that were only recorded, not to be calibrated.
-UNCALIBRATED_FAULTS = ("no_attitudes", "field_strength_unknown")
+UNCALIBRATED_FAULTS = ("no_attitudes", "field_strength_unknown")  # of sensors that were only recorded
 
 
 @dataclass(frozen=True, slots=True)

@@ -198,8 +198,7 @@ FIELD: Final = Quantity(
 RIG_QUANTITIES: Final = (RATE, ACCELERATION, FIELD)
 TEMPERATURE: Final = Scalar("temperature", "thermometer", "°C", "c", DisplayUnit("°C", 1.0))
 PRESSURE: Final = Scalar("pressure", "barometer", "Pa", "pa", DisplayUnit("hPa", 100.0))
-# range of the temperatures that a part survives; kelvins and counts are beyond it
-MIN_TEMPERATURE_C, MAX_TEMPERATURE_C = -273.15, 200.0
+MIN_TEMPERATURE_C, MAX_TEMPERATURE_C = -273.15, 200.0  # that a part survives; kelvins and counts are beyond
 SCALARS: Final = (TEMPERATURE, PRESSURE)
 
 

@@ -17,8 +17,7 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 OfJoints = Annotated[tuple[Finite, ...], Field(max_length=MAX_JOINTS)]  # beginning with the joint on the ground
 Kind = TypeVar("Kind")
 Document = TypeVar("Document", bound=BaseModel)
-# Values in a file: the largest of a run has 3,000; the message about each wrong one takes a kilobyte.
-MAX_VALUES = 200_000
+MAX_VALUES = 200_000  # the largest file of a run has 3,000; the message about each wrong one takes a kilobyte
 MAX_RECORDED_VALUES = 50_000  # in a text or an event of a recording, with the same cost
 SEPARATORS = (b",", b"[", b"{")  # characters before a value in JSON
 MAX_NUMBER = 1e100  # in SI units: larger than any measured value; the square of a larger one might overflow

@@ -24,8 +24,7 @@ YEAR_DAYS = 365.25
 # The probability that no change is reported for an unchanged sensor. The comparisons of a part's calibrations share
 # results: at 95 %, more than 5 of the 105 among 15 are significant in a third of all cases; at 98 % in 7 of 100.
 NO_CHANGE_PROBABILITY = 0.98
-# Least span from the first result to the last: a shorter one would give a drift per year that is only scatter.
-MIN_DRIFT_DAYS = 10.0
+MIN_DRIFT_DAYS = 10.0  # from the first result to the last: in a shorter span a drift per year is only scatter
 DAY_S = 86400.0
 
 Subject = tuple[str, str, str, float, bool]

@@ -4,8 +4,7 @@ import math
 
 from rig.motion.steps import Plan, Transfer
 
-# °/s. A lower number may be a speed in rad/s: no joint of the arm is faster than this in rad/s.
-SUSPICIOUS_SPEED_DEG_S = math.pi
+SUSPICIOUS_SPEED_DEG_S = math.pi  # a lower number may be rad/s: no joint of the arm is faster than this in rad/s
 
 
 def doubts(plan: Plan) -> list[str]:

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from rig.config.section import Direction, Vector3
 from rig.motion.turner_state import Joints
 
-# Joint angles closer than this are equal: well above the encoder's step, well below any relevant difference.
-POSE_TOLERANCE_RAD = 1e-4
+POSE_TOLERANCE_RAD = 1e-4  # well above the encoder's step, well below any relevant difference
 TURN_RAD = 2 * math.pi
 CLOSURE_TOLERANCE_RAD = 1e-6  # of a whole turn, for rounding
 

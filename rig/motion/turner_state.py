@@ -17,8 +17,7 @@ Joints = tuple[float, ...]  # a value for each joint, beginning with the joint o
 Row = tuple[float | int | Joints, ...]
 
 
-# A slower joint is at rest: 0.3°/s, above the noise of the velocity signal.
-REST_SPEED_RAD_S = 5e-3
+REST_SPEED_RAD_S = 5e-3  # 0.3°/s, above the noise of the velocity signal
 
 
 class State(Protocol):

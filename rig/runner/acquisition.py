@@ -21,8 +21,7 @@ from rig.station.events import SensorSamples
 KEPT_PARTS = 3
 CLOCK_DATA_S = 300.0  # before a sweep, from which its clock is determined: more take longer and add nothing
 FULL_RATE_S = 5.0  # beginning of a dwell, in which every state of the arm is recorded
-# Interval of the states recorded after that: all states of an arm at rest for hours would fill the disk.
-REST_INTERVAL_S = 0.25
+REST_INTERVAL_S = 0.25  # after that: all states of an arm at rest for hours would fill the disk
 
 
 @dataclass(slots=True)

@@ -21,8 +21,7 @@ from rig.motion.turner_state import Joints
 from rig.station.events import UncertaintySoFar
 
 WRITING_DELAY_S = 0.6  # after which the recorder has written everything
-# Fraction of the target: the complete recording determines clocks and noise slightly better than the present one.
-TARGET_RATIO = 0.99
+TARGET_RATIO = 0.99  # the complete recording determines clocks and noise slightly better than the present one
 
 
 @dataclass(slots=True)

@@ -18,8 +18,7 @@ from rig.world.ur10e.motion.flange_motion import BodyMotion, Components
 from rig.world.ur10e.motion.forward_kinematics import Vector
 
 DIFFERENCE_S = 5e-4  # half the interval of the central difference of the rate
-# the other mistakes occur in both
-MISTAKE_ACTION = {"short": "turn", "two_turns": "turn", "other_way": "turn", "wrong_face": "lay"}
+MISTAKE_ACTION = {"short": "turn", "two_turns": "turn", "other_way": "turn", "wrong_face": "lay"}  # others: both
 REREADING_S = 5.0  # time until a skipped instruction is read again
 ORIGIN: Vector = (0.0, 0.0, 0.0)
 ORIENTATION = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))

@@ -39,8 +39,7 @@ if TYPE_CHECKING:
 
 IDLE_POLL_S = 0.2
 BUSY_POLL_S = 0.001  # wall time between two polls of the sockets while ticks are due one after the other
-# The threshold of Python's cyclic garbage collection: about the number of objects that ten clients leave behind.
-GARBAGE_THRESHOLD = 5_000
+GARBAGE_THRESHOLD = 5_000  # of Python's cyclic collection: about the objects that ten clients leave behind
 MAX_LEAP_TICKS = 4  # in one go: a packet's interval at 125 Hz
 ARM_LAG_S = 0.04  # virtual time by which a reader of the arm's states may lag: five packets at 125 Hz
 SERIAL_LAG_S = 1.0  # virtual time by which a reader of a serial line may lag: the system buffers the bytes

@@ -21,8 +21,7 @@ COARSE_LAGS_S, FINE_LAGS_S = np.arange(-0.5, 0.501, 0.02), np.arange(-0.02, 0.02
 MIN_PAIRS, MAX_PAIRS = 30, 3000  # of rows
 MAX_PAIR_S = 1.0  # between the two rows of a pair
 MIN_RMS_RATE_RAD_S = 0.05  # a smaller one shows nothing
-# Least fraction of the rates' variance that is explained, and its lead over the other direction.
-MIN_EXPLAINED, MIN_LEAD = 0.7, 0.1
+MIN_EXPLAINED, MIN_LEAD = 0.7, 0.1  # of the rates' variance; lead over the other direction
 MIN_VERTICAL_GRAVITY = 0.97  # component along the vertical axis of the room
 
 

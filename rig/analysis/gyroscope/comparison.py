@@ -21,8 +21,7 @@ from rig.observation.consistency.movement_masks import mask_movement
 from rig.observation.observe import Observation
 from rig.observation.observed_run import Delay, ObservedRun
 
-# Largest delay between the filters of two sensors: if it is larger, their time stamps do not belong together.
-MAX_DELAY_S = 0.2
+MAX_DELAY_S = 0.2  # between the filters of two sensors: if it is larger, their time stamps do not belong together
 MAX_GAP_INTERVALS = 2.5  # of the reference: longer gaps are not interpolated
 MIN_COVERED_FRACTION = 0.9  # of the samples in motion, by the reference
 

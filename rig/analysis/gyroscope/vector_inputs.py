@@ -23,8 +23,7 @@ from rig.observation.statistics.mean import dof_by_axis
 
 ZERO_INDICES = tuple(index for index, name in enumerate(AXIS_ERRORS) if name.startswith("zero"))
 SAME_AXIS_COSINE = 1 - 1e-6  # the other joints return to 1.4 mrad
-# Size of an encoder's error once or twice a revolution, relative to that of the joint's zero; assumed.
-WAVE_RATIO = 0.3
+WAVE_RATIO = 0.3  # of an encoder's error once or twice a revolution to the error of the joint's zero; assumed
 
 
 @dataclass(frozen=True, slots=True)

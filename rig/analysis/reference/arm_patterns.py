@@ -18,8 +18,7 @@ from rig.estimation.reference.accelerometer_model import (
 from rig.motion.chain import DenavitHartenberg
 from rig.motion.geometry import WRIST_1, angle_waves, flange_attitude, flange_errors
 
-# Errors of each wrist; the first two are its twist and its zero, the others are waves of its angle.
-WRIST_ERRORS, CONSTANTS = 6, 2
+WRIST_ERRORS, CONSTANTS = 6, 2  # the first two are a wrist's twist and zero, the others waves of its angle
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,8 +27,7 @@ from rig.estimation.reference.triaxial import TriaxialSolution
 
 # Half-width of gravity that is computed from latitude and height alone: anomalies by rocks and terrain, 50 mGal.
 LOCAL_GRAVITY_ERROR_M_S2: Final = 0.0005
-# Half-width about the standard value: 9.780 at the equator to 9.832 at the poles, less on mountains.
-STANDARD_GRAVITY_ERROR_M_S2: Final = 0.03
+STANDARD_GRAVITY_ERROR_M_S2: Final = 0.03  # 9.780 at the equator to 9.832 at the poles, less on mountains
 UNSTATED_FIELD_ERROR: Final = 0.01  # relative half-width: that of an ordinary fluxgate
 UNTESTED_DRIFT_T: Final = 1e-7  # change of the field in a run: a magnetic storm, a lift some floors away
 TESTED_AXES: Final = 3  # axes of one measured change of the field: the degrees of freedom of its standard deviation

@@ -32,8 +32,7 @@ if TYPE_CHECKING:
 Reader = Callable[..., Iterator[Part]]
 
 MAX_FILES = 10_000  # in a folder: a bag is split into one for every minute or gigabyte
-# Largest ratio of unpacked to stored size: noisy readings unpack to a quarter of that, zeros to a thousand times.
-MAX_UNPACKED_RATIO = 20
+MAX_UNPACKED_RATIO = 20  # to stored size: noisy readings unpack to a quarter of that, zeros to a thousand times
 SPARE_BYTES = 32_000_000  # margin for small files, in addition to that ratio
 # Address space, half of which the libraries take; and more per byte of the file.
 MEMORY_BYTES, MEMORY_TIMES_STORED = 320 << 20, 2
@@ -45,8 +44,7 @@ MAX_STARVED_FACTOR = 6  # on that duration while the reading process gets no pro
 ENVIRONMENT = {f"{library}_NUM_THREADS": "1" for library in ("OPENBLAS", "OMP", "MKL")} | HDF5_PLUGINS
 MAX_COMPLAINT_BYTES = 65_536
 MAX_REASON_CHARACTERS = 300
-# The signal that the system sends to a process that has used up its time.
-TIME_LIMIT_SIGNAL = getattr(signal, "SIGXCPU", None)
+TIME_LIMIT_SIGNAL = getattr(signal, "SIGXCPU", None)  # to a process that has used up its time
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,8 +19,7 @@ from rig.data.recording.recorded_sensor import RecordedSensor
 MotionKind = Literal["sweeps", "attitudes", "turns"]
 Columns = Mapping[str, NDArray[np.float64]]
 
-# Largest absolute number in any SI unit: a larger one is a mistake, and its square might overflow.
-MAX_NUMBER = 1e12
+MAX_NUMBER = 1e12  # in any SI unit: a larger one is a mistake, and its square might overflow
 ItemWord = Annotated[str, Field(pattern="^[ -~]{1,40}$")]  # plain ASCII, as for sensors on a board
 TIME = "time_s"
 QUATERNION = ("qw", "qx", "qy", "qz")

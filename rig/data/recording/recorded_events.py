@@ -24,8 +24,7 @@ from rig.errors.quoting import quote
 from rig.motion.steps import Dwell, Sweep
 
 MAX_INTEGER = 2**63 - 1
-# Largest number of a sweep or dwell in rad, rad/s, rad/s² or s: ten days, and more turns than any joint makes.
-LIMIT = 1e6
+LIMIT = 1e6  # of a sweep's or dwell's numbers in SI units: ten days, and more turns than any joint makes
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,8 +7,7 @@ from rig.estimation.arrays import Array, axis_of
 from rig.estimation.by_hand.move_rotations import MoveIntegrals
 from rig.estimation.by_hand.session_parts import FACES, HandRecording, RestFaces, SessionConditions
 
-# Limit if there is an accelerometer: its offset tilts the vertical by up to 4°.
-MIN_FACE_COSINE = float(np.cos(np.radians(10.0)))
+MIN_FACE_COSINE = float(np.cos(np.radians(10.0)))  # an accelerometer's offset tilts the vertical by up to 4°
 MIN_RECKONED_COSINE = float(np.cos(np.radians(30.0)))  # dead reckoning: an error of 10 % makes 18° in half a turn
 MIN_FACE_FRACTION = 0.7  # of the rests, if the body is laid on faces at all
 WHOLE_TURN_TOLERANCE_RAD = float(np.radians(40.0))  # a turn that ends so near its beginning was meant to be a whole one

@@ -41,8 +41,7 @@ CAUSE_OF_STD = {
     "walk_rad_s_sqrt_s": (WALK, "walk"),
     "acceleration_m_s2": (ACCELERATION, "acceleration"),
 }
-# Not reduced: errors outside the model exist even if residuals do not show them.
-UNREDUCED_STDS = ("of_angle", "walk_rad_s_sqrt_s")
+UNREDUCED_STDS = ("of_angle", "walk_rad_s_sqrt_s")  # these errors exist even if residuals do not show them
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,8 +8,7 @@ from rig.estimation.by_hand.session_parts import HandRecording, nearest_face
 from rig.estimation.sensor_axes import nearest_rotation
 
 MAX_FLIP_COSINE = 0.3  # between the verticals before and after a quarter turn
-# least cosine between an axis of the gyroscope and the nearest one of the accelerometer, unless the frames are rotated
-MIN_ALIGNED_COSINE = 0.7
+MIN_ALIGNED_COSINE = 0.7  # between nearest axes of gyroscope and accelerometer, unless the frames are rotated
 # fewest flips; largest unexplained fraction of their rotation: above it, moves were merged or rests were missed
 MIN_FLIPS, MAX_UNEXPLAINED = 5, 0.2
 MAX_SKEW_COSINE = 0.3  # between two axes: those of a part are nearer to a right angle

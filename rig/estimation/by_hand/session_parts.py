@@ -108,8 +108,7 @@ class HandStds:
 
 
 STATED = HandStds()
-# The largest plausible errors of handling: beyond them, something else happened.
-MAX_STDS = HandStds(5e-3, 2e-2, 3e-3, 1e-3, 0.05)
+MAX_STDS = HandStds(5e-3, 2e-2, 3e-3, 1e-3, 0.05)  # plausible errors of handling: beyond, something else happened
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,8 +23,7 @@ from rig.estimation.sensor_axes import SensorAxes, parameter_jacobian
 MAX_REPEATABILITY_RATIO = 3.0  # to the stated value: faces that repeat worse may be different faces
 MAX_RESTS = 300  # their equations fill a gigabyte; a session has some twenty rests
 MAX_SCALE_U = 0.02  # k = 2: above it, there is no result
-# Standard uncertainty of the scale factor: recordings of real hands differ by as much between their parts.
-REAL_HAND_STD = 5e-4
+REAL_HAND_STD = 5e-4  # of the scale factor: recordings of real hands differ by as much between their parts
 MOVES_LEFT_OUT = "moves left out"  # begins a warning of moves without a rotation
 CLOCK, RECORDED_HANDS = "clock", "recordings of real hands"
 CONTRIBUTORS: dict[str, tuple[Literal["A", "B"], tuple[str, ...], str]] = {

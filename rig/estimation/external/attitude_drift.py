@@ -24,8 +24,7 @@ from rig.estimation.statistics.bias_process import walk_covariance
 from rig.estimation.statistics.variance_components import Mixed
 
 MATRIX, BIAS, CLOCK, EARTH, COMMON_PARAMETERS = slice(0, 9), slice(9, 12), 12, slice(13, 16), 16
-# prior std of the offset if one clock stamps readings and attitudes: delays of a controller, of cameras
-CLOCK_STD_S = 0.1
+CLOCK_STD_S = 0.1  # prior of the offset, if one clock stamps both: delays of a controller, of cameras
 MATRIX_PRECISION = 1.0  # prior of F's elements: keeps elements finite that no turn determines
 EARTH_PRECISION = 3 / EARTH_RATE_RAD_S**2  # its norm is known, its direction is unknown
 BIAS_INTERVALS = 6  # of a recording, within which the bias is correlated
@@ -48,8 +47,7 @@ CORRELATION_RAD = 1.5  # correlation length of an error that depends on the atti
 MIN_REST_TIME_S = 0.5  # total duration of the rests whose mean is the bias
 VISIT_CORRELATION_S = 5.0  # of errors that depend on more than the attitude: an arm's elbow, its load
 COMMON_JITTER_FRACTION = 0.1  # of its variance, which the samples of one fix have in common
-# Fractions of a fix's samples, at which its attitude-dependent error is averaged.
-AVERAGING_FRACTIONS = np.array([0.0, 0.34, 0.67])
+AVERAGING_FRACTIONS = np.array([0.0, 0.34, 0.67])  # of a fix's samples, for its attitude-dependent error
 MIN_ERROR_RAD = 1e-7  # of an increment: rounding
 OUTLIER_RATIO, MIN_FIX_SAMPLES = 6.0, 10  # ratio of an outlier to the fix's median error; fewest samples to decide
 MIN_STD_RATIO = 1e-3  # to the usual std, for a sample that is stated to be exact

@@ -16,11 +16,9 @@ from rig.estimation.statistics.variance_components import MixedFit, MixedModel, 
 
 PRIOR_MEDIAN_RAD = 5e-3  # of the half-Cauchy prior of the inclinations' standard deviation
 CORRELATION_SINE = 0.5  # of the angle between two axes: those within about this angle are inclined alike
-# grid of the inclinations' standard deviation over its prior's median: none exceeds 0.1 rad
-STD_RATIOS = np.geomspace(1e-6, 20, 120)
+STD_RATIOS = np.geomspace(1e-6, 20, 120)  # grid, over the prior's median: no inclination exceeds 0.1 rad
 MIN_RESPONSE_RATIO = 0.05  # to the largest response: smaller ones are the noise of the axes
-# least fraction of the information that the residuals keep: F imitates an inclination with less
-MIN_INFORMATION_FRACTION = 0.05
+MIN_INFORMATION_FRACTION = 0.05  # that the residuals keep: F imitates an inclination with less
 MIN_ROTATION_RAD2 = 1e-14  # sum of a fix's squared rotations: less is rounding
 
 

@@ -10,8 +10,7 @@ from rig.estimation.statistics.variance_components import MixedModel
 
 BIAS_STD_RAD_S = 5e-3  # prior of a change of the bias
 ATTITUDE_STD_RAD = 0.2  # prior of a rotation of the attitudes' coordinates
-# least rotation of the attitudes' coordinates that is reported: errors of attitudes may be as large
-MIN_RESET_RAD = 0.02
+MIN_RESET_RAD = 0.02  # that is reported: errors of attitudes may be as large
 MIN_LASTING_RATIO = 0.5  # rotation over all increments to the largest one: after a wild row the attitudes return
 
 

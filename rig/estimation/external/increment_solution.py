@@ -53,8 +53,7 @@ from rig.estimation.statistics.variance_components import Mixed, MixedFit, Mixed
 MAX_ITERATIONS, LAST_VARIANCE_ITERATION = 12, 3  # of the fit, and the last that estimates the variances
 CONVERGED_STEP_RATIO = 1e-2  # largest step, relative to the standard uncertainty
 OUTLIER_RATIO, MIN_OUTLIER_RAD = 4.0, 1e-3  # an outlier exceeds both: a ratio to the ninth decile, and an angle
-# Most outliers: number, or fraction if more; passes that leave out outliers.
-MAX_OUTLIERS, MAX_OUTLIER_FRACTION, OUTLIER_PASSES = 4, 0.1, 3
+MAX_OUTLIERS, MAX_OUTLIER_FRACTION, OUTLIER_PASSES = 4, 0.1, 3  # the number or, if more, the fraction
 MAX_ATTITUDE_ERROR_RAD = 0.1  # with larger errors, the attitudes are those of another body
 MAX_CLOCK_STDS = 3.0  # offset if one clock stamps readings and attitudes, in prior standard deviations
 MAX_IDENTIFIABLE_STD = 0.1  # of an element of F

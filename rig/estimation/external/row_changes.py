@@ -15,8 +15,7 @@ from rig.estimation.external.attitude_drift import correlate_effects
 from rig.estimation.statistics.variance_components import Mixed, MixedModel
 
 ERROR_MEDIAN = 1e-4  # of the prior of the rates' relative errors, and of the axes' inclinations in rad
-# ln of the Bayes factor of a change that counts if it is large, and of one that U is to contain
-MIN_LARGE_EVIDENCE, MIN_EVIDENCE = -2.0, 2.0
+MIN_LARGE_EVIDENCE, MIN_EVIDENCE = -2.0, 2.0  # ln of the Bayes factor; the second is for a change that U is to contain
 MIN_ROWS, MAX_ROWS = 6, 600  # fewer show no change; more would take too long
 MIN_EITHER_SIDE = 2  # rows: a single row that differs is a wrong row
 MIN_ROWS_FOR_ONE = 8  # rows that decide between a wrong first or last row and a bias that changes there

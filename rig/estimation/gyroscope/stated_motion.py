@@ -19,8 +19,7 @@ from rig.estimation.arrays import Array, bisect, perpendicular_unit_vectors
 from rig.estimation.statistics.coverage import PROBABILITY
 
 MIN_NOISE_RATIO = 0.1  # of an error to a sweep's noise, which it increases by half a percent
-# relative rate error, or axis error in rad: knee of the prior, and its end, as no rate table is worse
-PRIOR_KNEE_ERROR, MAX_ERROR = 1e-2, 0.1
+PRIOR_KNEE_ERROR, MAX_ERROR = 1e-2, 0.1  # of the rate (relative) or axis (rad): no rate table is worse than the second
 GRID_POINTS = 20  # for each kind of error
 
 

@@ -21,10 +21,8 @@ from rig.estimation.gyroscope.own_errors import KnownSensor, OwnError, list_own_
 from rig.estimation.gyroscope.vector_model import VectorSolution, check_identifiable, design_matrix, propagate_speed_std
 from rig.estimation.statistics.bias_process import BiasProcess, bias_process
 
-# Faults of a design with too many columns.
-DESIGN_FAULTS = ("rank_deficient", "ill_conditioned", "too_few_observations")
-# Fraction of the largest rate: a smaller one has less than a sixteenth of its weight in the scale factor.
-MIN_RATE_RATIO = 0.25
+DESIGN_FAULTS = ("rank_deficient", "ill_conditioned", "too_few_observations")  # of too many columns
+MIN_RATE_RATIO = 0.25  # to the largest rate: a smaller one has less than a sixteenth of its weight in the scale factor
 
 
 @dataclass(frozen=True, slots=True)

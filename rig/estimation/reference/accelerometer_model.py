@@ -35,8 +35,7 @@ from rig.estimation.reference.reference_model import BIAS, REFERENCE, matrix
 LEVER, DELAY, SECOND = slice(15, 18), 18, slice(19, 22)
 PARAMETERS = 22
 OWN_ERRORS = 3  # errors of a dwell: a small rotation of the flange
-# Errors of a station: a small rotation in the flange's frame, one in the base's, four waves of the angle.
-SHARED_ERRORS = 10
+SHARED_ERRORS = 10  # of a station: a small rotation in the flange's frame, one in the base's, four waves of the angle
 ROTATIONS = 6  # the first six of these ten: both rotations
 INDEPENDENT_FRACTION = 0.2  # of δ², for errors independent in each dwell; the rest is for constant errors of the wrists
 CROSS = np.swapaxes(np.cross(np.eye(3)[:, None], np.eye(3)), 1, 2)  # [v]× of the axes

@@ -26,8 +26,7 @@ from rig.estimation.reference.reference_model import REFERENCE, STEP_LIMIT, STEP
 from rig.estimation.reference.shared_errors import Decorrelation, decorrelate, estimate_common_error
 from rig.estimation.statistics.expected_variances import ResidualInputs, estimate_disturbances, estimate_variances
 
-# Prior odds that one dwell or sweep of a run is disturbed, or that all sweeps have another bias, against neither.
-DISTURBANCE_ODDS = 1 / 19
+DISTURBANCE_ODDS = 1 / 19  # prior: one dwell or sweep is disturbed, or all sweeps have another bias, against neither
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,8 +24,7 @@ from rig.estimation.refusals import check_finite
 Noise = Literal["white", "flicker", "random_walk"]
 
 COVERAGE = 0.95  # probability of the confidence intervals
-# Averaging time at which random walk is read: beyond the sensor's filter, before its bias drifts.
-RANDOM_WALK_TAU_S = 1.0
+RANDOM_WALK_TAU_S = 1.0  # beyond the sensor's filter, before its bias drifts
 MAX_RANDOM_WALK_STD = 0.1  # relative, of a random walk that is stated
 SLOPE_TOLERANCE = 0.05  # deviation from −1/2 in addition to the slope's uncertainty: an error of N by 5 %
 MAX_INSTABILITY_STD = 0.2

@@ -15,8 +15,7 @@ from rig.estimation.arrays import Array
 
 WALK_POINTS = 12
 WALK_SPAN = 100.0  # ratio of the largest to the smallest random walk
-# grid of δ: ends, the first better than any arm, and number of points
-MIN_ERROR_RAD, MAX_ERROR_RAD, ERROR_GRID_POINTS = 1e-5, 0.03, 25
+MIN_ERROR_RAD, MAX_ERROR_RAD, ERROR_GRID_POINTS = 1e-5, 0.03, 25  # grid of δ; the first is better than any arm
 
 INDEPENDENT_FRACTIONS = (0.001, 0.01, 0.1, 0.5)  # of δ²: between nearly all and half of an arm's errors may be constant
 # grid of a disturbance's size: the largest, in standard deviations of the noise, and the number of points

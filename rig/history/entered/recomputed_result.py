@@ -12,8 +12,7 @@ from rig.report.findings.history_records import BIASES, SCALES, HistoryRecord
 from rig.report.kinds.kind_registry import history_records
 
 ROUNDING_ERROR = 1e-15  # values that are zero except for rounding: no quantity of a result is as small
-# The same result may take other iterations, and has another time.
-UNCOMPARED_FIELDS = ("iterations", "solved_utc")
+UNCOMPARED_FIELDS = ("iterations", "solved_utc")  # the same result may take other iterations, and has another time
 
 
 def not_given(claimed: ResultDocument, recomputed: ResultDocument) -> list[str]:

@@ -17,8 +17,7 @@ Alarms = NDArray[np.bool_]
 
 MIN_RESULTS = 5  # before the first judgement: fewer do not determine the scatter
 SMOOTHING = 0.15  # λ: weight of the newest deviation
-# Standard deviations of the average; together with the other limit, an alarm in about 340 runs in control.
-EWMA_LIMIT = 2.8
+EWMA_LIMIT = 2.8  # standard deviations; together with the other limit, an alarm in about 340 runs in control
 SHEWHART_LIMIT = 4.0  # standard deviations: 3 together with an EWMA would halve the time between false alarms
 MIN_SCATTER = 1e-12  # relative to a value: the rounding of equal values is not scatter
 

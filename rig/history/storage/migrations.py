@@ -16,8 +16,7 @@ from rig.history.storage.triggers import create_triggers
 VERSION_KEY = "schema_version"
 DEVELOPMENT_KEY = "version"  # key in tables before 0.1.0, which are not migrated
 
-# From each version to the next one: version 1 is the first released version.
-MIGRATIONS: Mapping[int, Callable[[Connection], None]] = {}
+MIGRATIONS: Mapping[int, Callable[[Connection], None]] = {}  # version 1 is the first released version
 
 
 def version_of(connection: Connection, label: str) -> int:

@@ -18,8 +18,7 @@ from rig.errors import Refused
 from rig.history.storage.migrations import DEVELOPMENT_KEY, too_old
 from rig.history.storage.schema import APPLICATION_ID
 
-# Suffixes of SQLite's companion files: its log, and the log's index, which has separate locks.
-SUFFIXES = ("-wal", "-shm")
+SUFFIXES = ("-wal", "-shm")  # SQLite's log, and the log's index, which has separate locks
 
 
 def history_is_there(file: Path) -> bool:

@@ -23,8 +23,7 @@ MARGIN_S = 0.1  # time at either end of a rest that is assigned to the adjacent 
 MIN_GAP_READINGS = 2  # missing readings, from which on there is a gap
 MIN_SATURATED = 3  # equal readings in a row at the largest value
 SATURATION_FRACTION = 0.995
-# duration of a recording's beginning; largest scatter there of a body that no hand holds
-BEGINNING_S, MAX_STILL_SCATTER_RAD_S = 1.0, 0.03
+BEGINNING_S, MAX_STILL_SCATTER_RAD_S = 1.0, 0.03  # of a recording, and the scatter there without a hand
 MIN_REST_S, EVALUATION_S = 1.0, 0.25  # during a session; interval of the evaluations
 # A body held in the hand: least duration, largest rate; length of the blocks.
 MIN_HELD_S, MAX_HELD_RATE_RAD_S, BLOCK_S = 0.75, 0.15, 0.25

@@ -15,13 +15,11 @@ from rig.observation.statistics.coloured_noise import correlation_inflation
 
 MIN_SAMPLES = 100
 MAX_DRIFT_DIFFERENCE = 6.0  # standard deviations between the drifts of two fits
-# Ratio to the square of the fastest axis: a body that turns about one axis shows only rounding about others.
-MIN_ROTATION_RATIO = 1e-12
+MIN_ROTATION_RATIO = 1e-12  # to the square of the fastest axis: less is rounding
 # Steps in standard deviations; an offset may turn around with a small step while the drift still changes.
 CONVERGED_OFFSET, CONVERGED_DRIFT = 1e-3, 0.1
 MAX_FINE_STEPS = 400  # many: if the arm vibrates and hardly turns, a step may be nearly as long as the one before
-# Steps after which weights are kept: noise that seems correlated only at every second step would never settle.
-MAX_WEIGHING_STEPS = 60
+MAX_WEIGHING_STEPS = 60  # noise that seems correlated only at every second step would never settle
 SLOW_AVERAGE_S, FINE_AVERAGE_S = 0.1, 0.02  # over which rates are averaged in the first fit and in the second
 MEAN_RATES, STRIDE = 10, 2  # rates in one average; stride of the averages in the spline
 MIN_STEP_INTERVALS = 0.5  # between samples

@@ -37,8 +37,7 @@ MAX_STEP_S = 0.0105  # of samples that show the servo's vibration while it accel
 # / 2, at the fraction x of an interval (Euler and Maclaurin). B₂, the second Bernoulli polynomial, has the RMS
 # √(1/180); either end has two corners.
 CORNER_RMS = (2 / 180) ** 0.5 / 2
-# Time over which rates are averaged against encoder noise: 24 µrad make 4 mrad/s from angles 8 ms apart.
-SMOOTHING_S = 0.05
+SMOOTHING_S = 0.05  # against encoder noise: 24 µrad make 4 mrad/s from angles 8 ms apart
 MAX_LOST_FRACTION = 0.01  # of samples, by the nominal rate, which boards keep to about 1 %
 MIN_GAP_INTERVALS = 1.5  # a longer step between samples misses a sample
 TIME_STEPS = 48

@@ -23,10 +23,8 @@ from rig.observation.time_stamps.sampling import find_sampling
 WINDOW_S, MIN_WINDOW_S = 1.0, 0.5  # the errors of cameras are correlated over tenths of a second
 MIN_WINDOWS, MAX_WINDOWS = 40, 120  # unless they would be shorter than MIN_WINDOW_S
 MIN_GAP_READINGS = 2  # missing ones: a cubic spline through the others bridges a single one
-# Largest angle between two readings for which a cubic spline through the rates is correct to microradians.
-MAX_STEP_RAD = 0.35
-# Std of a hidden rotation, above which there is no increment; std of an unknown one.
-MAX_HIDDEN_STD_RAD, UNKNOWN_STD_RAD = 0.05, 10.0
+MAX_STEP_RAD = 0.35  # up to which a cubic spline through the rates is correct to microradians
+MAX_HIDDEN_STD_RAD, UNKNOWN_STD_RAD = 0.05, 10.0  # of a rotation, above which there is no increment
 BATCH_MEAN_S = 0.1  # at rest, over which correlated noise averages out
 MIN_MOVING_INCREMENTS = 6  # 18 numbers for 12 parameters
 MIN_ROW_RATIO = 0.25  # to a fix's usual number of rows

@@ -25,8 +25,7 @@ MAX_UNEXPLAINED_RATIO = 0.9  # a drift is accepted if it reduces the unexplained
 CRYSTAL_DRIFT_STD = 1e-4  # between two crystals
 # longest step of the rows: in intervals of the readings, or as a fraction of the total change by drift
 MAX_STEP_INTERVALS, MAX_STEP_DRIFT_FRACTION = 2.5, 0.2
-# least drift that is no crystal's, and least drift in standard deviations that is not chance
-MIN_DRIFT, MIN_DRIFT_STDS = 5e-4, 6.0
+MIN_DRIFT, MIN_DRIFT_STDS = 5e-4, 6.0  # more than any crystal's, and more than chance
 MAX_UNEXPLAINED = 0.1  # fraction, above which the rows may be inverse rotations
 MIN_EXPLAINED = 0.3  # fraction of the readings' variance, by the coarse offset
 

@@ -9,11 +9,9 @@ from rig.estimation.cubic_spline import CubicSpline
 from rig.estimation.refusals import RATE_UNIT_RATIOS, is_plausible, wrong_unit
 from rig.observation.motion.reference_motion import MIN_RATE_RAD_S, closely_followed
 
-# Longest step and largest angle between rows that show how the table turned: below half a turn.
-MAX_STEP_S, MAX_STEP_RAD = 0.3, 2.6
+MAX_STEP_S, MAX_STEP_RAD = 0.3, 2.6  # between rows that show how the table turned: below half a turn
 MIN_ROWS = 20
-# interval between two rows whose rates and attitudes are compared; fewest such pairs
-PAIR_INTERVAL_S, MIN_PAIRS = 0.25, 12
+PAIR_INTERVAL_S, MIN_PAIRS = 0.25, 12  # between two rows whose rates and attitudes are compared
 # least rotation of a pair; largest relative deviation from the median ratio; least fraction of pairs within it
 MIN_PAIR_RAD, MAX_RATIO_DEVIATION, MIN_PAIR_FRACTION = 0.02, 0.3, 0.8
 # °/rad, and its tolerance: this ratio is a wrong unit; any other one is a turn of over half a revolution per row

@@ -27,8 +27,7 @@ SUFFIX = ".ulg"
 TOPICS: dict[str, Quantity] = {"sensor_gyro": RATE, "sensor_accel": ACCELERATION}
 COMBINED_TOPIC = "sensor_combined"
 COMBINED_FIELDS = {RATE: "gyro_rad", ACCELERATION: "accelerometer_m_s2"}
-# Fraction of the rate of `sensor_combined`: a raw topic with a lower rate contains only some of the readings.
-MIN_RATE_RATIO = 0.5
+MIN_RATE_RATIO = 0.5  # to `sensor_combined`: a raw topic with a lower rate lacks some of the readings
 COMBINED_NOTE = (
     "sensor_combined of PX4: the selected sensor, which may change in flight, averaged, and corrected by the "
     "autopilot's own calibration (CAL_GYRO, CAL_ACC): the result is relative to that"

@@ -24,8 +24,7 @@ from rig.observation.windows import Window
 if TYPE_CHECKING:
     from rig.data.recording.recorded_turner import RecordedTurner
 
-# Shortest step of a rate from joint angles: a shorter one shows the encoders' noise more than the rate.
-RATE_STEP_S = 0.008
+RATE_STEP_S = 0.008  # a shorter one shows the encoders' noise more than the rate
 KNOT_S = 0.004  # interval between the knots of the rate: a ripple too fast for them would alias to a slower one
 MAX_STEP_S = 0.025  # samples that are farther apart alias a ripple of the servo
 REST_PARTS = 5  # if single readings scatter, the parts' means show whether a joint moved

@@ -20,8 +20,7 @@ from rig.observation.motion.turn_speed import MIN_PAIRS, turn_speed
 
 SMOOTHING_S = 0.12  # a straight line fits the angle in it: shorter than the gear's ripple
 MIN_ANGLES = 5
-# Quantile of the requests' durations that is usual; a delayed request takes this many times longer.
-USUAL_QUANTILE, DELAY_RATIO = 0.25, 4.0
+USUAL_QUANTILE, DELAY_RATIO = 0.25, 4.0  # of the requests' durations; a delayed one exceeds it by the ratio
 KNOT_STRIDE = 3  # of the smoothed angles, as adjacent ones share nearly all readings
 GUARD_RAD = float(np.radians(1.5))  # angle left out next to the ramps: the shaft's lag and its encoder's error
 

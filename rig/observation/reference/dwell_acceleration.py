@@ -24,8 +24,7 @@ from rig.observation.statistics.mean import Mean
 from rig.observation.statistics.vibration_noise import average_standstill
 from rig.observation.windows import Dwelt, Window, dwelt
 
-# Time removed before a dwell's end: the board's times include the gyroscope's delay, which is the longer one.
-LEAVING_S = 0.05
+LEAVING_S = 0.05  # before a dwell's end: the board's times include the gyroscope's delay, which is the longer one
 
 
 @dataclass(frozen=True, slots=True)

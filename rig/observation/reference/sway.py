@@ -12,8 +12,7 @@ from rig.observation.statistics.spectral_lines import harmonics
 
 HALF_WAVES = 8  # per fit: a faster sway is removed as a spectral line
 MIN_SINGULAR_RATIO = 1e-9  # waves that are nearly dependent are needed near the ends
-# fraction of the turn that is fitted before and after it: the curvature at the ends of a fit is mostly noise
-MARGIN_FRACTION = 0.05
+MARGIN_FRACTION = 0.05  # of the turn, before and after it: the curvature at the ends of a fit is mostly noise
 MIN_POWER_RATIO = 50.0  # of a sway's mean square, per column, to that of the encoders' noise
 
 

@@ -33,8 +33,7 @@ HEADERS = {
     "cross-origin-resource-policy": "same-origin",
     "cache-control": "no-store",
 }
-# Browsers obey it for loopback addresses; for others without TLS they warn.
-OPENER = {"cross-origin-opener-policy": "same-origin"}
+OPENER = {"cross-origin-opener-policy": "same-origin"}  # loopback addresses only: for others without TLS browsers warn
 
 
 def new_token() -> str:

@@ -24,8 +24,7 @@ FILE_EXCLUSIONS = ("the scale of the file's angles and of its time",)
 DEG = math.degrees(1)
 STATED_SUFFIX = ", as stated"
 UNKNOWN_TEMPERATURE = "a temperature that is not known"
-# Relative difference of rates that count as one speed: the effect of the arm's timing, and of a sensor tilted by 5°.
-SPEED_TOLERANCE = 0.005
+SPEED_TOLERANCE = 0.005  # relative: the effect of the arm's timing, and of a sensor tilted by 5°
 
 
 def when_words(when: ConditionsEntry) -> str:

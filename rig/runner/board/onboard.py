@@ -29,8 +29,7 @@ from rig.motion.steps import Sweep
 from rig.observation.onboard_window import find_board_averages, revolution_on_the_board
 from rig.runner.acquisition import Acquisition
 
-# Longest time from the request to keep readings to the arm's first motion, on a busy computer.
-KEEPING_MARGIN_S = 4.0
+KEEPING_MARGIN_S = 4.0  # from the request to keep readings to the arm's first motion, on a busy computer
 
 Revolution = tuple[int, int, float]  # two board times, µs, and the speed between them, rad/s
 

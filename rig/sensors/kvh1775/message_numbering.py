@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 from rig.sensors.errors import SensorError
 from rig.sensors.kvh1775.kvh_messages import SEQUENCE_NUMBERS
 
-# Error of the duration of a silence: a USB adapter buffers for 16 ms, and a clock is read every 20 ms.
-HOST_JITTER_S = 0.04
+HOST_JITTER_S = 0.04  # of a silence: a USB adapter buffers for 16 ms, and a clock is read every 20 ms
 _US_WRAP = 1 << 32
 
 

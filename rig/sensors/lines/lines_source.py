@@ -32,8 +32,7 @@ from rig.sensors.sample_source import OnSamples
 from rig.sensors.scales import DEGREES_PER_COUNT, FIELD_FULL_SCALE_T, FULL_SCALE_COUNTS, thermometer_channels
 from rig.sensors.thermometer import Thermometer
 
-# Fraction of the range from which on readings count as saturated: within a 16-bit count of the end.
-SATURATION_FRACTION = 1 - 1e-4
+SATURATION_FRACTION = 1 - 1e-4  # of the range: within a 16-bit count of the end
 LookResult = str | SensorError
 AXIS_NAMES = {RATE: GYROSCOPE, ACCELERATION: ACCELEROMETER, FIELD: MAGNETOMETER}
 _TriadSection = LineRateSection | LineAccelerationSection | LineFieldSection

@@ -24,11 +24,9 @@ ASSUMED_RATE_HZ = 100.0  # of a log without times
 MIN_COUNT = 500.0  # larger whole numbers are steps of a converter
 # A block is at rest if its scatter is at most this many times that of the quietest tenth.
 BLOCK_S, QUIETEST_FRACTION, QUIET_RATIO = 0.25, 0.1, 3.0
-# Larger than the readings of a gyroscope in rad/s, and than its scatter at rest.
-MAX_RATE_RAD_S, MAX_SCATTER_RAD_S = 40.0, 0.02
+MAX_RATE_RAD_S, MAX_SCATTER_RAD_S = 40.0, 0.02  # of a gyroscope; the scatter is that at rest
 NORM_TOLERANCE = 2e-3
-# of a counter: the fewest steps, and the least fraction of them that rise; none may fall
-MIN_STEPS, MIN_RISING = 10, 0.9
+MIN_STEPS, MIN_RISING = 10, 0.9  # of a counter; fraction of steps that rise; none may fall
 AXES = ("x", "y", "z")
 REFERENCE = {name for group in MOTIONS["attitudes"].optional for name in group} | {"start_s", "end_s"}
 QUATERNION_NAME = re.compile(r"(?:.*_)?(?:q|quat|quaternion|orientation|rot|rotation|attitude)_?([wxyz0-3])")

@@ -21,8 +21,7 @@ TIMEOUT_MARGIN_S = 0.020  # return delay (0.5 ms as delivered), latency of the a
 MAX_SETTLING_S = 0.1  # for a line to fall silent
 MAX_ATTEMPTS = 4  # a write without acknowledgement is read back, and repeated if it did not take effect
 ALERT_BIT = 0x80  # of the error byte: Hardware Error Status is not zero. The instruction itself has not failed
-# results of the packet handler; not sent: port busy, failed, wrong instruction
-SUCCESS, NOT_SENT = 0, (-1000, -1001, -2000)
+SUCCESS, NOT_SENT = 0, (-1000, -1001, -2000)  # not sent: port busy, failed, wrong instruction
 DAMAGED_PACKET = -3002
 ID, LENGTH, ERROR, DATA = 4, 5, 8, 9  # indices in a status packet of protocol 2.0
 EMPTY_LENGTH = 4  # of a status packet without data: instruction, error, checksum

@@ -28,8 +28,7 @@ from rig.turners.turner import watch_nothing
 
 WATCH_PERIOD_S = 0.02  # the caller's watch is called at least this often
 ARRIVAL_TOLERANCE_RAD = 15 * PULSE_RAD  # 1.3°: the position error at rest of a servo without an integral gain
-# longest move: ratio to its planned duration, plus a time for settling ("t4" of the manual)
-MAX_DURATION_RATIO, SETTLING_TIME_S = 1.1, 1.0
+MAX_DURATION_RATIO, SETTLING_TIME_S = 1.1, 1.0  # to the planned duration, and in addition ("t4" of the manual)
 MAX_FIRST_STATE_S = 5.0
 MAX_REST_PROOF_S = 3.0  # time within which states must show rest before control is taken
 MAX_UNWATCHED_S = 2.0  # without supervision, after which a move is stopped

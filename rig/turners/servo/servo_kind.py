@@ -21,8 +21,7 @@ from rig.turners.turner_kind import OnState, TurnerKind, Wording
 
 # The shaft is the z axis of its own frame and of the housing's; both have their origin at the mounting face.
 SHAFT = DenavitHartenberg(theta_rad=(0.0,), a_m=(0.0,), d_m=(0.0,), alpha_rad=(0.0,))
-# One reading of its encoder: steps of 0.088° and a noise of 0.06° (AS5045, data sheet: "transition noise").
-READING_STD_RAD = radians(0.065)
+READING_STD_RAD = radians(0.065)  # 0.088° steps, 0.06° noise (AS5045, data sheet: "transition noise")
 MAX_TRAVEL_RAD = 2 * pi
 
 

@@ -18,8 +18,7 @@ from rig.turners.servo.servo_state import ServoState, decode
 MAX_LOST_STATES, MAX_SILENCE_S = 5, 0.4  # in a row, and time without a state, that are tolerated
 SLOW_POLL_S = 0.1  # of what the state packet lacks: torque and watchdog, alternately
 MAX_TRANSACTION_S = 0.05  # a longer one leaves the time of the position unknown
-# Tolerance of the servo's clock relative to ours: with a larger difference the reply is late.
-TICK_S, TICK_FRACTION = 0.005, 0.02
+TICK_S, TICK_FRACTION = 0.005, 0.02  # by which the servo's clock may differ from ours, unless the reply is late
 MAX_UNLIKE_REPLIES = 4  # then the servo's clock has restarted
 MAX_JOB_WAIT_S = 5.0  # of a caller
 

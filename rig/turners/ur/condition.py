@@ -4,8 +4,7 @@ from rig.errors import Problem
 from rig.motion.carried import FlangeLoad
 from rig.motion.turner_state import ArmState, RobotMode, RuntimeState, SafetyMode
 
-# The slider is reported as a fraction; anything below 99.9 % stretches a sweep measurably.
-FULL_SPEED_FRACTION = 0.999
+FULL_SPEED_FRACTION = 0.999  # of the slider: anything lower prolongs a sweep measurably
 SIMULATOR_HOSTS = ("127.0.0.1", "localhost")  # at which the client skips the check of remote control
 
 LIMITED_REMEDY = (

@@ -24,10 +24,8 @@ from rig.turners.ur.controller.state_checks import clock_step, impossible_motion
 # The buffer holds ten seconds at the highest rate, if the system grants it. Further states wait at the controller, for
 # an undocumented time.
 BUFFER_BYTES = 1 << 20
-# Allowed ratio of a time by the controller's clock to that by this computer's: far more than their errors.
-MAX_CLOCK_RATIO = 1.05
-# Duration of a silence after which a controller on this computer may have sent states without a receiver.
-MIN_SILENCE_S = 0.3
+MAX_CLOCK_RATIO = 1.05  # of the controller's time to this computer's: far more than their errors
+MIN_SILENCE_S = 0.3  # after which a controller on this computer may have sent states without a receiver
 LOSS_PROOF_S = 2.0  # time after the gap within which states delayed or lost by a network show
 # The requested variables and their types. Nothing else is requested, which keeps the packets small.
 VARIABLES = {

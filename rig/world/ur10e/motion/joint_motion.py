@@ -16,8 +16,7 @@ from rig.world.ur10e.motion.vibration import Vibration
 # ROS 2 description of the UR10e, from the 5.8 manual: base and shoulder 120°/s, elbow and wrists 180°/s.
 JOINT_SPEED_LIMIT_RAD_S: Joints = (2.0943951, 2.0943951, 3.1415927, 3.1415927, 3.1415927, 3.1415927)
 JERK_TICKS = 6  # ticks in which a joint's force follows a change of its target's acceleration
-# slew rate of the speed fraction after the slider, pause or play: at most a quarter of a second in all
-SCALING_RATE_PER_S = 4.0
+SCALING_RATE_PER_S = 4.0  # after the slider, pause or play: at most a quarter of a second in all
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,8 +12,7 @@ from rig.world.ur10e.robot import Robot
 Steps = Iterator[None]
 
 MAX_NUMBER = 1e6  # angles, lengths, speeds and accelerations, all in SI units
-# lowest speeds of moves, rad/s and m/s; lowest accelerations have the same numbers
-MIN_SPEED, MIN_LINE_SPEED_M_S = 1e-6, 1e-3
+MIN_SPEED, MIN_LINE_SPEED_M_S = 1e-6, 1e-3  # rad/s; the least accelerations have the same numbers
 HAND_OVER_RAD_S2 = 4.0  # deceleration before a move that follows a killed one
 
 
