@@ -235,7 +235,7 @@ def _sample_turn(time_s: Array, motion: ArmMotion, turn: Revolution, covered: ND
         waves -= waves.mean(axis=0)  # over an arc, gravity's part remains in the mean; the attitudes account for it
     rates = motion.rates_at_samples(time_s)[covered]
     return SampledTurn(
-        share=fraction[covered],
+        fraction=fraction[covered],
         rates_rad_s=rates,
         uneven_rad_s=rates @ turn.axis_flange - turn.speed_rad_s,
         regressors=waves,

@@ -43,7 +43,7 @@ ENCODER_SEARCH = LineSearch(slowest=2.5, sidebands=0, most=5)
 class SampledTurn:
     """A turn or an arc at a sensor's n samples.
 
-    - `share` (n,): elapsed fraction of its time.
+    - `fraction` (n,): elapsed fraction of its time.
     - `rates_rad_s` (n, 3): the flange's mean rate around each sample, from the encoders.
     - `uneven_rad_s` (n,): that rate along the axis minus the turn's mean rate, which the angles at its ends determine.
     - `regressors` (n, k): columns of the turn's harmonics; for an arc minus their means.
@@ -53,7 +53,7 @@ class SampledTurn:
     - `complete`: whether samples follow each other closely, and no long gap is among them.
     """
 
-    share: Array
+    fraction: Array
     rates_rad_s: Array
     uneven_rad_s: Array
     regressors: Array
@@ -85,7 +85,7 @@ def turn_mean(readings: Array, steps: Steps, turn: SampledTurn) -> tuple[Mean, A
     ones = whole(readings)
     steady = np.column_stack([ones, turn.regressors])
     lines = _find_turn_lines(readings, steady, turn)
-    vibration = waves(lines.cycles, turn.share, turn.sidebands)
+    vibration = waves(lines.cycles, turn.fraction, turn.sidebands)
     weights = mean_weights(ones, np.column_stack([turn.regressors, lines.rate, vibration]))
     added = np.zeros(3)
     is_slow = np.repeat(lines.cycles < SLOW_CYCLES, column_count(turn.sidebands))
@@ -144,33 +144,35 @@ def _find_turn_lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines
     if not turn.complete:
         fixed = np.column_stack([steady, uneven])
         cycles = find_lines(
-            readings - fixed @ fit_columns(fixed, readings), LineSearch(sidebands=turn.sidebands), fraction=turn.share
+            readings - fixed @ fit_columns(fixed, readings),
+            LineSearch(sidebands=turn.sidebands),
+            fraction=turn.fraction,
         )
         return Lines(cycles, len(cycles), none, uneven)
     ripple_rate, residuals = (values - steady @ fit_columns(steady, values) for values in (uneven, readings))
     if not turn.encoders_true:
-        cycles = find_lines(residuals, LineSearch(sidebands=turn.sidebands), fraction=turn.share)
+        cycles = find_lines(residuals, LineSearch(sidebands=turn.sidebands), fraction=turn.fraction)
         return Lines(cycles, len(cycles), ripple_rate, none)
     search = replace(ENCODER_SEARCH, floor=median_power(residuals))
-    ripple = find_lines(ripple_rate, search, fraction=turn.share)
-    columns = waves(ripple, turn.share, ENCODER_SEARCH.sidebands)
+    ripple = find_lines(ripple_rate, search, fraction=turn.fraction)
+    columns = waves(ripple, turn.fraction, ENCODER_SEARCH.sidebands)
     sizes = fit_columns(columns, ripple_rate)
     fast = np.repeat(ripple >= SLOW_CYCLES, column_count(ENCODER_SEARCH.sidebands))
     slow = ripple_rate - columns[:, fast] @ sizes[fast]
-    smooth = _find_slow_ripple(slow, turn.share)
+    smooth = _find_slow_ripple(slow, turn.fraction)
     late = _changes(smooth) if turn.closed else none  # over an arc it resembles encoder errors
-    encoded = np.column_stack([smooth, late, slow - _fit_slow_part(slow, turn.share)])
+    encoded = np.column_stack([smooth, late, slow - _fit_slow_part(slow, turn.fraction)])
     explained = np.column_stack([steady, encoded, columns[:, fast]])
     residuals = fit_residuals(explained, readings)
     encoded_lines = ripple[ripple >= SLOW_CYCLES]
-    cycles = find_lines(residuals, SENSOR_SEARCH, encoded_lines, turn.share)
+    cycles = find_lines(residuals, SENSOR_SEARCH, encoded_lines, turn.fraction)
     return Lines(cycles, len(cycles) - len(encoded_lines), encoded, late)
 
 
-def lag_columns(rate: Array, columns: Array, share: Array) -> Array:
+def lag_columns(rate: Array, columns: Array, fraction: Array) -> Array:
     """Return columns (n, 0 or 2) of a lag behind the slow ripple of a rate (n,) that columns (n, k) do not explain."""
     residuals = rate[:, None] - columns @ fit_columns(columns, rate[:, None])
-    return _changes(_find_slow_ripple(residuals, share))
+    return _changes(_find_slow_ripple(residuals, fraction))
 
 
 def _changes(slow: Array) -> Array:
@@ -179,22 +181,22 @@ def _changes(slow: Array) -> Array:
     return np.column_stack([change, np.gradient(change, axis=0)])
 
 
-def _find_slow_ripple(rate: Array, share: Array) -> Array:
+def _find_slow_ripple(rate: Array, fraction: Array) -> Array:
     """Return the part (n, 1) of a rate (n, 1) with less than `SLOW_CYCLES` per turn, or no column if it is noise.
 
-    `share` (n,) is elapsed time. The encoders' noise is white in the angle, the sum of the rate.
+    `fraction` (n,) is elapsed time. The encoders' noise is white in the angle, the sum of the rate.
     """
     powers = np.abs(np.fft.rfft(apply_window(np.cumsum(rate, axis=0))[:, 0])) ** 2
     slow_bins = int(SLOW_CYCLES) + MAIN_LOBE
     noise = np.median(powers[slow_bins:])
-    return _fit_slow_part(rate, share) if powers[1:slow_bins].max() > MIN_POWER_RATIO * noise else rate[:, :0]
+    return _fit_slow_part(rate, fraction) if powers[1:slow_bins].max() > MIN_POWER_RATIO * noise else rate[:, :0]
 
 
-def _fit_slow_part(rate: Array, share: Array) -> Array:
+def _fit_slow_part(rate: Array, fraction: Array) -> Array:
     """Return the part of a rate (n, 1) with less than `SLOW_CYCLES` cycles per turn, by waves of half a turn.
 
     A vibration is not periodic in the turn.
     """
-    halves = harmonics(np.pi * share, int(2 * SLOW_CYCLES))
+    halves = harmonics(np.pi * fraction, int(2 * SLOW_CYCLES))
     slow: Array = halves @ fit_columns(halves, rate)
     return slow

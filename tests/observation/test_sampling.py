@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rig.observation.time_stamps.even_times import find_taken_times
+from rig.observation.time_stamps.even_times import find_sampling_times
 from rig.observation.time_stamps.sampling import find_sampling
 from support.external.loggers import Stamps
 
@@ -74,7 +74,7 @@ def test_a_gap_is_where_it_is(rate_hz: float, stamps: Stamps) -> None:
 def test_readings_that_arrive_together_were_taken_one_after_the_other(burst: int) -> None:
     time_s = taken(100)
     stamped_s, _ = Stamps(burst=burst).stamp(time_s)
-    even_s = find_taken_times(stamped_s, find_sampling(stamped_s))
+    even_s = find_sampling_times(stamped_s, find_sampling(stamped_s))
     off_s = even_s - time_s
     assert np.ptp(off_s) < 1e-3, "but for a latency that they all have"
     assert np.ptp(stamped_s - time_s) > 0.008
@@ -93,4 +93,4 @@ def test_a_few_long_gaps_are_no_bursts() -> None:
     time_s = (4.9 * np.arange(6)[:, None] + np.arange(120) / 63).ravel()
     found = find_sampling(time_s)
     assert found.interval_s == pytest.approx(1 / 63, rel=1e-6) and np.count_nonzero(found.missing) == 5
-    assert (find_taken_times(time_s, found) == time_s).all()
+    assert (find_sampling_times(time_s, found) == time_s).all()

@@ -42,29 +42,29 @@ def sampled(
     """Readings of a turn that begins and ends anywhere between two samples, by a sensor that lags."""
     rng = np.random.default_rng(seed)
     count = int(rate_hz / TURN_HZ)
-    share = (np.arange(count, dtype=np.float64) + rng.uniform()) / (rate_hz / TURN_HZ)
+    fraction = (np.arange(count, dtype=np.float64) + rng.uniform()) / (rate_hz / TURN_HZ)
     size = SPEED_RAD_S * ripple.fraction * np.sqrt(2 / len(ripple.orders))
     phases = rng.uniform(0, 2 * np.pi, len(ripple.orders))
     phases_seen = rng.uniform(0, 6, 3)
 
-    def rates_at(share: Array) -> Array:
-        uneven = size * np.sum(np.cos(2 * np.pi * np.outer(share, ripple.orders) + phases), axis=1)
-        seen = np.cos(2 * np.pi * ripple.seen_hz / TURN_HZ * share[:, None] + phases_seen)
+    def rates_at(fraction: Array) -> Array:
+        uneven = size * np.sum(np.cos(2 * np.pi * np.outer(fraction, ripple.orders) + phases), axis=1)
+        seen = np.cos(2 * np.pi * ripple.seen_hz / TURN_HZ * fraction[:, None] + phases_seen)
         found: Array = np.outer(SPEED_RAD_S + uneven, AXIS) + np.sqrt(2) * ripple.seen_rad_s * seen
         return found
 
-    rates, late = rates_at(share), rates_at(share - lag_s * TURN_HZ)
+    rates, late = rates_at(fraction), rates_at(fraction - lag_s * TURN_HZ)
     unseen = np.zeros((count, 3))
     for hertz in ripple.unseen_hz:
-        wave = np.cos(2 * np.pi * hertz / TURN_HZ * share[:, None] + rng.uniform(0, 6, 3))
+        wave = np.cos(2 * np.pi * hertz / TURN_HZ * fraction[:, None] + rng.uniform(0, 6, 3))
         unseen += ripple.unseen_rad_s * np.sqrt(2 / len(ripple.unseen_hz)) * wave
     readings = SCALE * (late + unseen) + BIAS_RAD_S + noise_rad_s * rng.standard_normal((count, 3))
     rates += rate_hz * encoder_noise_rad * np.outer(np.diff(rng.standard_normal(count + 1)), AXIS)
     turn = SampledTurn(
-        share=share,
+        fraction=fraction,
         rates_rad_s=rates,
         uneven_rad_s=rates @ AXIS - SPEED_RAD_S,
-        regressors=harmonics(2 * np.pi * share, 2 * SIDEBANDS),
+        regressors=harmonics(2 * np.pi * fraction, 2 * SIDEBANDS),
         sidebands=SIDEBANDS,
         closed=True,
         encoders_true=encoders_true,

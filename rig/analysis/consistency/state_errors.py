@@ -21,8 +21,10 @@ def build_time_patterns(segments: Segments, jitter_s: float) -> Array:
     """Return the patterns (P, N, 3) rad/s of errors in the times at which one segment of a sweep follows another."""
     lengths = np.diff(segments.times_s)
     by_rate = jitter_s * segments.rates_rad_s / lengths
-    shares = [share for sweep in np.unique(segments.sweep[segments.sweep > REST]) for share in _edges(segments, sweep)]
-    return np.reshape([share[:, None] * by_rate for share in shares], (-1, *segments.means_rad_s.shape))
+    effects = [
+        effect for sweep in np.unique(segments.sweep[segments.sweep > REST]) for effect in _edges(segments, sweep)
+    ]
+    return np.reshape([effect[:, None] * by_rate for effect in effects], (-1, *segments.means_rad_s.shape))
 
 
 def build_reading_patterns(segments: Segments, noise_rad: float) -> Array:
@@ -41,12 +43,12 @@ def build_reading_patterns(segments: Segments, noise_rad: float) -> Array:
         if sweep > REST:
             q_rad = first.motion.angles(np.array([first.start_s, last.end_s]))
             counted = first.motion.is_moving(first.start_s, last.end_s) & (np.abs(q_rad[1] - q_rad[0]) < STILL_RAD)
-        for share in _edges(segments, sweep):
-            interval = segments.intervals[np.flatnonzero(share)[0]]
-            at_s = interval.end_s if share[share != 0][0] > 0 else interval.start_s
+        for effect in _edges(segments, sweep):
+            interval = segments.intervals[np.flatnonzero(effect)[0]]
+            at_s = interval.end_s if effect[effect != 0][0] > 0 else interval.start_s
             directions, sizes, _ = np.linalg.svd(interval.motion.axes(interval.motion.angles(at_s))[:, counted])
             patterns.extend(
-                noise_rad * share[:, None] / lengths * axis for axis in (directions[:, : len(sizes)] * sizes).T
+                noise_rad * effect[:, None] / lengths * axis for axis in (directions[:, : len(sizes)] * sizes).T
             )
     return np.reshape(patterns, (-1, *segments.means_rad_s.shape))
 

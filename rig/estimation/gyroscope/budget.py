@@ -104,10 +104,10 @@ class Budget:
         return effective_dof(variances, np.array([[contributor.dof] for contributor in self.contributors]))
 
     @property
-    def shares(self) -> Array:
+    def variance_fractions(self) -> Array:
         """Each contributor's fraction of the variance, (contributors, 6)."""
-        shares: Array = np.array([contributor.std**2 for contributor in self.contributors]) / self.std**2
-        return shares
+        variance_fractions: Array = np.array([contributor.std**2 for contributor in self.contributors]) / self.std**2
+        return variance_fractions
 
 
 @dataclass(frozen=True, slots=True)

@@ -53,10 +53,10 @@ class ErrorSizes:
     independent_fraction: float
 
 
-def estimate_variances(fit: ResidualInputs, shares: Sequence[float]) -> ErrorSizes:
+def estimate_variances(fit: ResidualInputs, fractions: Sequence[float]) -> ErrorSizes:
     """Return the posterior mean squares of the variance components.
 
-    Priors: spike-and-slab for the random walk, log-uniform for its slab and for δ. The `shares`, possible fractions of
+    Priors: spike-and-slab for the random walk, log-uniform for its slab, for δ. The `fractions`, possible fractions of
     δ² that are independent in each dwell, are equally probable.
     """
     constant = np.diag(fit.walk) > 0
@@ -67,7 +67,7 @@ def estimate_variances(fit: ResidualInputs, shares: Sequence[float]) -> ErrorSiz
     free = np.linalg.qr(fit.slopes, mode="complete")[0][:, columns:].T  # contrasts, free of the columns
     residuals, covariance, walk = (free @ fit.residuals, free @ fit.covariance @ free.T, free @ fit.walk @ free.T)
     whiteners = [np.linalg.inv(np.linalg.cholesky(covariance + rate**2 * walk)) for rate in walks]
-    of_arm = [free @ fit.effects(share) for share in shares]
+    of_arm = [free @ fit.effects(fraction) for fraction in fractions]
     log_posterior = np.array(
         [[_find_likelihoods(residuals, whitener, effects, sizes) for whitener in whiteners] for effects in of_arm]
     )
@@ -75,7 +75,7 @@ def estimate_variances(fit: ResidualInputs, shares: Sequence[float]) -> ErrorSiz
     weights = np.exp(log_posterior - log_posterior.max())
     weights /= weights.sum()
     walk_square, attitude_square = weights.sum(axis=(0, 2)) @ walks**2, weights.sum(axis=1) @ sizes**2
-    fraction = attitude_square @ shares / attitude_square.sum()
+    fraction = attitude_square @ fractions / attitude_square.sum()
     return ErrorSizes(float(np.sqrt(walk_square)), float(np.sqrt(attitude_square.sum())), float(fraction))
 
 

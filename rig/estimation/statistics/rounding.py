@@ -107,11 +107,11 @@ def bound_rounding_variance(readings: Array, steps: Steps, smooth: Array, scatte
     coarse, bounds = np.flatnonzero((units > 0) & (scatter <= (LARGE_NOISE_STEPS * units) ** 2)), np.zeros(3)
     widths = steps.widths(readings) if len(coarse) else units
     for axis in coarse.tolist():
-        shares = np.sort(_count_fractions(readings[:, axis], units[axis]))
-        if shares[:-2].sum() < MIN_OTHER_FRACTION:
+        fractions = np.sort(_count_fractions(readings[:, axis], units[axis]))
+        if fractions[:-2].sum() < MIN_OTHER_FRACTION:
             # Readings change from one value to the next half-way between them. A mean of p times one value and 1 - p
             # times the other errs by less than p - 1/2 of a step; if there is only one value, by at most half a step.
-            half = 0.5 if widths[axis] > units[axis] else float(shares[-1]) - 0.5
+            half = 0.5 if widths[axis] > units[axis] else float(fractions[-1]) - 0.5
             bounds[axis] = (half * widths[axis]) ** 2 / 3
             continue
         angle = 2 * np.pi / units[axis]
@@ -139,8 +139,8 @@ def _count_fractions(axis: Array, unit: float) -> Array:
     """Return the fraction of readings (n,) at each distinct value."""
     values, often = np.unique(np.rint(axis / (SAME_VALUE_STEPS * unit)), return_counts=True)
     first = np.flatnonzero(np.diff(values, prepend=-np.inf) > 2)  # a record's rounding changes no value by more
-    shares: Array = np.add.reduceat(often, first) / len(axis)
-    return shares
+    fractions: Array = np.add.reduceat(often, first) / len(axis)
+    return fractions
 
 
 def _bound_zero_error(steps: Steps, axis: int, readings: Array) -> float:

@@ -272,7 +272,7 @@ class _ParameterFits:
         rate, direction = heating_rate(readings.windows_s, readings.temperature_c)
         self.slopes = slopes * rate[:, None]
         within = (readings.temperature_c - range_c[0]) / (range_c[1] - range_c[0])
-        self.both_ways = min(np.mean(direction > 0), np.mean(direction < 0)) >= MIN_FRACTION
+        self.has_both_directions = min(np.mean(direction > 0), np.mean(direction < 0)) >= MIN_FRACTION
         self.loop = (direction * 4 * within * (1 - within))[:, None]
         self._fit_inputs(readings, readings.means)
         self.process = self._process(readings, poses)
@@ -312,7 +312,7 @@ class _ParameterFits:
         """Return the bias process in the residuals of the polynomials of the highest order."""
         some = self.powers[:, 1 : self.highest + 1]
         turned = [readings.inputs * power[:, None] for power in some.T]
-        design = np.column_stack([poses, some, *turned, *([self.loop] if self.both_ways else [])])
+        design = np.column_stack([poses, some, *turned, *([self.loop] if self.has_both_directions else [])])
         basis, sizes, _ = np.linalg.svd(design, full_matrices=False)
         design = basis[:, sizes > 1e-9 * sizes[0]]
         return bias_process(
@@ -327,7 +327,7 @@ class _ParameterFits:
     def solve(self, orders: tuple[int, int]) -> _TemperatureFit:
         """Fit temperature polynomials of the given orders for k and c."""
         of_scale, of_bias = orders
-        loops = 2 if self.both_ways else 0
+        loops = 2 if self.has_both_directions else 0
         per_axis = of_scale + of_bias + loops
         values = np.zeros(3 * per_axis + 1)  # by axis, then the lag
         prior = np.zeros((1, len(values)))
@@ -360,14 +360,16 @@ class _ParameterFits:
         of_scale, of_bias = orders
         per_axis = (len(values) - 1) // 3
         by_axis, lag_s = values[axis * per_axis : (axis + 1) * per_axis], values[-1]
-        share, added, loop = np.split(by_axis, [of_scale, of_scale + of_bias])
+        scale, added, loop = np.split(by_axis, [of_scale, of_scale + of_bias])
         scales, biases = self.powers[:, 1 : of_scale + 1], self.powers[:, 1 : of_bias + 1]
-        inputs, relative = self.inputs[:, axis], 1 + scales @ share
+        inputs, relative = self.inputs[:, axis], 1 + scales @ scale
         fall = -inputs / relative**2
         loops = (
-            np.column_stack([inputs[:, None] * self.loop, self.loop]) if self.both_ways else np.zeros((len(inputs), 0))
+            np.column_stack([inputs[:, None] * self.loop, self.loop])
+            if self.has_both_directions
+            else np.zeros((len(inputs), 0))
         )
-        by_lag = self.slopes[:, :of_bias] @ added + fall * (self.slopes[:, :of_scale] @ share)
+        by_lag = self.slopes[:, :of_bias] @ added + fall * (self.slopes[:, :of_scale] @ scale)
         model = inputs * (1 / relative - 1) + biases @ added + loops @ loop + lag_s * by_lag
         moving = fall[:, None] * (scales + lag_s * self.slopes[:, :of_scale])
         design = np.column_stack([moving, biases + lag_s * self.slopes[:, :of_bias], loops, by_lag])
@@ -392,7 +394,7 @@ class _ParameterFits:
             for n in range(of_bias):
                 take[3 * MAX_ORDER + 3 * n + axis, axis * per_axis + of_scale + n] = size[n]
         loop = None
-        if self.both_ways:  # a fraction of the reading equals one of k with the opposite sign
+        if self.has_both_directions:  # a fraction of the reading equals one of k with the opposite sign
             stds = np.sqrt(np.diag(covariance))[:-1].reshape(3, per_axis)[:, -2:]
             loop = (by_axis[:, -2:] * [-1.0, 1.0]).T.ravel(), stds.T.ravel()
         lag_std_s = float(np.sqrt(covariance[-1, -1]))

@@ -52,7 +52,7 @@ def refuse_unlike(before: FileIdentity | None, file: Path, label: str) -> None:
         raise _history_exchanged(label)
 
 
-def refuse_anew(address: HistoryAddress) -> None:
+def refuse_emptied(address: HistoryAddress) -> None:
     """Raise Refused `history_gone` for a history that had tables before and no longer has any."""
     if address.where in _identities:
         raise _history_gone(address.label)

@@ -26,13 +26,13 @@ def engine_of(address: HistoryAddress) -> Iterator[Engine]:
     continuity.refuse_another_file(address)
     where = address.where
     if isinstance(where, Path) and not history_is_there(where):
-        continuity.refuse_anew(address)
+        continuity.refuse_emptied(address)
         _make(where, address.label)
     with share_engine(where, address.label) if isinstance(where, Path) else _server_engine(where) as engine:
         with engine.connect() as connection:
             version = version_of(connection, address.label)
         if version == 0:
-            continuity.refuse_anew(address)
+            continuity.refuse_emptied(address)
         if version < schema.VERSION:
             _bring_up_to_date(engine, address.label)
         with engine.connect() as connection:

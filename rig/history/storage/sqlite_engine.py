@@ -112,11 +112,11 @@ def _connect(file: Path, options: str) -> sqlite3.Connection:
     return sqlite3.connect(address_of(file, options), uri=True, timeout=MAX_WAIT_S, check_same_thread=False)
 
 
-def _begin_anew() -> None:
+def _drop_parents_engines() -> None:
     """Drop the parent's engines in a forked process."""
     _engines.clear()
     _sharing.release()
 
 
 if hasattr(os, "register_at_fork"):
-    os.register_at_fork(before=_sharing.acquire, after_in_parent=_sharing.release, after_in_child=_begin_anew)
+    os.register_at_fork(before=_sharing.acquire, after_in_parent=_sharing.release, after_in_child=_drop_parents_engines)

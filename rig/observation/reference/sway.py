@@ -52,6 +52,6 @@ def _positions_m(motion: ArmMotion, angles_rad: Array, extension_m: Array) -> Ar
     return positions_m
 
 
-def _half_waves(share: Array) -> Array:
+def _half_waves(fraction: Array) -> Array:
     """Return columns (n, 1 + 2 `HALF_WAVES`) of a constant and half waves, at fractions (n,) of the fitted time."""
-    return np.column_stack([np.ones(len(share)), harmonics(np.pi * share, HALF_WAVES)])
+    return np.column_stack([np.ones(len(fraction)), harmonics(np.pi * fraction, HALF_WAVES)])

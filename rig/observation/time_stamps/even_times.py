@@ -9,7 +9,7 @@ from rig.observation.time_stamps.sampling import Sampling
 AVERAGED_READINGS = 32  # whose time stamps err in either direction
 
 
-def find_taken_times(time_s: Array, sampling: Sampling) -> Array:
+def find_sampling_times(time_s: Array, sampling: Sampling) -> Array:
     """Return the strictly rising times (n,) at which readings were taken; good, distinct stamps are unchanged.
 
     Arrival times are never early, so the least late ones determine the times; coarse stamps err in both directions, so

@@ -256,10 +256,12 @@ def _walk_variance(walk: Array, apart: int) -> float:
 
     The largest second differences are omitted, because emptying a buffer at the start causes a large one.
     """
-    bends = (walk[2 * apart :] - 2 * walk[apart:-apart] + walk[: -2 * apart]) ** 2
-    if not len(bends):
+    curvatures = (walk[2 * apart :] - 2 * walk[apart:-apart] + walk[: -2 * apart]) ** 2
+    if not len(curvatures):
         return 0.0
-    return float(np.mean(bends[bends <= np.quantile(bends, TRIMMED_QUANTILE)]) / (2 * TRIMMED_MEAN_RATIO))
+    return float(
+        np.mean(curvatures[curvatures <= np.quantile(curvatures, TRIMMED_QUANTILE)]) / (2 * TRIMMED_MEAN_RATIO)
+    )
 
 
 def _merge_at_longest(missing: NDArray[np.intp], steps_s: Array) -> NDArray[np.intp]:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rig.errors import Refused
 from rig.estimation.arrays import Array, unwrap_counter
-from rig.observation.time_stamps.even_times import find_taken_times
+from rig.observation.time_stamps.even_times import find_sampling_times
 from rig.observation.time_stamps.moving_values import find_least_ahead
 from rig.observation.time_stamps.sampling import (
     COARSE_RATIO,
@@ -117,7 +117,7 @@ def order_stamps(stamps_s: Array, readings: Array, where: str = "the samples") -
     if len(log.rows) < 2:
         return OrderedStamps(log.rows, log.stamps_s, Sampling.even(len(log.rows)), log.findings)
     sampling = find_sampling(log.stamps_s)
-    return OrderedStamps(log.rows, find_taken_times(log.stamps_s, sampling), sampling, log.findings)
+    return OrderedStamps(log.rows, find_sampling_times(log.stamps_s, sampling), sampling, log.findings)
 
 
 def _drop_empty(log: _UnorderedLog) -> _UnorderedLog:

@@ -16,7 +16,7 @@ def budget_entry(budget: Budget) -> BudgetEntry:
     """Return the combined uncertainty and its contributors."""
     lines = [
         entry(ContributorEntry, line, variance_fraction=fraction, degrees_of_freedom=finite_or_none(line.dof))
-        for line, fraction in zip(budget.contributors, budget.shares, strict=True)
+        for line, fraction in zip(budget.contributors, budget.variance_fractions, strict=True)
     ]
     factors = budget.coverage_factors
     return entry(
