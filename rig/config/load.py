@@ -37,12 +37,12 @@ Sections = Mapping[str, type[ProcedureSection]] | None  # None: the reader does 
 Turners = Mapping[str, type[TurnerSection]] | None  # None: the reader needs only the stock turners
 # The stock kinds of turners, each a room of `rig.turners`, by name; `arm` is the section of the first.
 STOCK_TURNERS: Mapping[str, type[TurnerSection]] = {"ur": ArmSection, "hand": HandSection, "servo": ServoSection}
-TURNS = frozenset({"arm", "turner"})  # the sections of the turner, of which a configuration has one
-PROBLEMS_SHOWN = 25
-GIVE_CONFIGURATION = (
+TURNER_SECTIONS = frozenset({"arm", "turner"})  # of which a configuration has one
+MAX_PROBLEMS = 25
+CONFIGURATION_REMEDY = (
     "Give a configuration; rig new FILE writes one, and rig demo --files . copies those of the documentation"
 )
-NOT_A_CONFIGURATION = ("cannot be read: ", "is ")  # how a problem of the whole file begins
+WHOLE_FILE_PROBLEMS = ("cannot be read: ", "is ")  # how a problem of the whole file begins
 
 
 @dataclass(frozen=True, slots=True)

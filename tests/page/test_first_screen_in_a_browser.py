@@ -10,7 +10,7 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 
 from rig.cli import main
-from rig.data.run_folder import RESULT, TRUTH
+from rig.data.run_folder import RESULT, TRUTH_FILE
 from rig.errors import Fault
 from rig.station.events import DocumentWritten, Failed, Prompt
 from support.page.browser import TABLET, kind, legible, needs_browser, picture, screen, set_theme, text

@@ -19,8 +19,8 @@ from rig.observation.external.csv_samples import Samples
 from rig.observation.external.omission import Omitted
 from rig.observation.external.placements import Placements
 
-WHOLE = 2e-3  # relative error of the time that a sweep lasts
-NOISY_RAD_S = 0.04  # standard deviation of single readings, 2.3 °/s: SIX states 0.035 rad/s for an LSM9DS1
+MAX_ERROR = 2e-3  # relative, of the time that a sweep lasts
+NOISE_LIMIT_RAD_S = 0.04  # standard deviation of single readings, 2.3 °/s: SIX states 0.035 rad/s for an LSM9DS1
 
 
 def list_omitted(
@@ -63,7 +63,7 @@ def notes_on_speeds(data: ExternalData) -> Iterator[str]:
     # A sweep also shows what the body does on its way, a rest only the sensor.
     averages = data.all_rests or tuple(sweep.average for sweep in data.sweeps)
     noise_rad_s = float(np.median([average.noise_rad_s for average in averages]))
-    if noise_rad_s > NOISY_RAD_S:
+    if noise_rad_s > NOISE_LIMIT_RAD_S:
         yield f"the readings scatter by {noise_rad_s:.2g} rad/s, more than those of a gyroscope do: {remedy}"
 
 

@@ -56,7 +56,7 @@ def export_files(options: Namespace) -> list[Path]:
         raise Refused("bad_option", f"--at-temperature is for calibrations, but {name} holds readings", "Leave it out")
     if options.columns is not None and name not in READING_FORMATS:
         raise Refused("bad_option", f"--columns is for readings, but {name} holds calibrations", "Leave it out")
-    if name not in OF_READINGS and run.is_file() and find_logs(run):
+    if name not in READING_FORMATS and run.is_file() and find_logs(run):
         remedy = (
             "Solve it into a run folder by the command that rig look names, with --out RUN; then: "
             f"rig export RUN --format {name}"

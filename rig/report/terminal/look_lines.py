@@ -14,7 +14,7 @@ from rig.errors import RigError
 from rig.errors.quoting import shorten
 from rig.observation.formats.table_layout import TableLayout
 from rig.observation.log_survey import LogSurvey
-from rig.sensors.lines.log_columns import OPEN, LogColumns
+from rig.sensors.lines.log_columns import UNSTATED, LogColumns
 
 WIDTH = 14
 COLUMNS = (
@@ -56,7 +56,7 @@ def _describe_table(path: Path, layout: TableLayout, guess: LogColumns) -> Itera
         yield _row("note", "the rows have one cell more than the heading: columns are named by number")
     entries = {**guess.motion, **guess.samples}
     for name, *columns in COLUMNS:
-        if columns[0] in entries and entries[columns[0]].get("unit") != OPEN:
+        if columns[0] in entries and entries[columns[0]].get("unit") != UNSTATED:
             yield _row(name, _spell(*(entries[column] for column in columns)))
     if guess.others:
         yield _row("not read", shorten(" ".join(guess.others)))

@@ -99,7 +99,8 @@ def _guess_samples(
         if not samples and _is_undetermined(group.names, guessed):
             columns = [layout.name(index) for index in group.indices]
             samples |= {
-                axis + NAMES["g"]: {"column": column, "unit": OPEN} for axis, column in zip(AXES, columns, strict=True)
+                axis + NAMES["g"]: {"column": column, "unit": UNSTATED}
+                for axis, column in zip(AXES, columns, strict=True)
             }
             gaps.append(_describe_undetermined(columns, group.values))
             continue
