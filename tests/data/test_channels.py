@@ -147,3 +147,14 @@ def test_numbers_cut_toward_zero_are_twice_as_coarse_about_zero_alone() -> None:
     assert 0.7 < np.sqrt(np.mean(np.square(in_std))) < 1.3
     same = np.full((9, 3), offset)
     assert np.all(channel.steps(same).widths(same) == 2 * milli), "all the same tells nothing"
+
+
+@pytest.mark.parametrize("step", [None, 0.01])
+@pytest.mark.parametrize("trusts_counts", [False, True])
+def test_a_sensor_of_two_axes_is_averaged_as_one_of_three(step: float | None, *, trusts_counts: bool) -> None:
+    """As an inclinometer of somebody's own package has them."""
+    readings = np.round(np.random.default_rng(1).normal(0.3, 0.02, (200, 2)), 2)
+    channel = replace(triad_channel(FIELD, 0.01, 100, None), step=step)
+    mean = even_mean(readings, channel.steps(readings, trusts_counts=trusts_counts))
+    assert mean.mean == pytest.approx(readings.mean(axis=0), abs=0.01)
+    assert mean.variance == pytest.approx(np.full(2, 2e-6), rel=0.5)

@@ -61,7 +61,8 @@ class Channel:
         """
         if self.step is not None:
             return cut_steps(readings, self.step / 2)
-        return Steps(self.resolution if trusts_counts else np.maximum(self.resolution, find_steps(readings)))
+        found = np.zeros(readings.shape[1:]) if trusts_counts else find_steps(readings)
+        return Steps(np.maximum(self.resolution, found))
 
     def counts(self, samples: NDArray[Any]) -> NDArray[Any]:
         """Return the recorded numbers (n,) or (n, 3) of the channel in samples (n,), unconverted."""

@@ -41,8 +41,9 @@ class Steps:
 
     @property
     def units(self) -> Array:
-        """The unit (3,) of each axis."""
-        return np.broadcast_to(np.asarray(self.unit, dtype=np.float64), 3)
+        """The unit of each axis: (3,), unless stated for another number of axes."""
+        unit = np.asarray(self.unit, dtype=np.float64)
+        return unit if unit.ndim else np.broadcast_to(unit, 3)
 
     @property
     def variance(self) -> Array:
@@ -54,12 +55,12 @@ class Steps:
         """Return the widest interval (3,) of values that one of the readings (n, 3) may represent."""
         if not self.cut:
             return self.units
-        wide = [bool(self.reads_zero(axis, readings[:, axis]).any()) for axis in range(3)]
+        wide = [bool(self.reads_zero(axis, readings[:, axis]).any()) for axis in range(len(self.units))]
         return np.where(wide, 2 * self.units, self.units)
 
     def reads_zero(self, axis: int, readings: Array) -> NDArray[np.bool_]:
         """Return a mask (n,) of the readings (n,) of an axis that are zero; all if the value of zero is unknown."""
-        zero = float(np.broadcast_to(self.zero, 3)[axis])
+        zero = float(np.broadcast_to(self.zero, len(self.units))[axis])
         if not np.isfinite(zero):
             return np.ones(len(readings), dtype=np.bool_)
         beyond = readings / self.units[axis] - zero
@@ -75,8 +76,8 @@ def cut_steps(readings: Array, unit: float) -> Steps:
     """
     steps = find_steps(readings)
     units = np.where(np.abs(steps / unit - 1) < MAX_UNIT_CHANGE, steps, unit)
-    zero = np.full(3, np.nan)
-    for axis in range(3):
+    zero = np.full(len(units), np.nan)
+    for axis in range(len(units)):
         levels = np.unique(readings[:, axis]) / units[axis]
         if len(levels) >= MIN_ZERO_VALUES:
             halves = np.mean(np.exp(2j * np.pi * levels))
@@ -104,7 +105,7 @@ def bound_rounding_variance(readings: Array, steps: Steps, smooth: Array, scatte
     determine their noise, which may be zero.
     """
     units = steps.units
-    coarse, bounds = np.flatnonzero((units > 0) & (scatter <= (LARGE_NOISE_STEPS * units) ** 2)), np.zeros(3)
+    coarse, bounds = np.flatnonzero((units > 0) & (scatter <= (LARGE_NOISE_STEPS * units) ** 2)), np.zeros(len(units))
     widths = steps.widths(readings) if len(coarse) else units
     for axis in coarse.tolist():
         fractions = np.sort(_count_fractions(readings[:, axis], units[axis]))
