@@ -54,6 +54,10 @@ def test_parts_in_a_row_are_worked_off_by_the_keyboard_of_the_page(
             if number == unplugged:
                 answers(driver, AGAIN, "yes")
                 answers(driver, MOUNT, "")
+            if number == disturbed:
+                laboratory(
+                    "pace", time_scale=1
+                )  # a busy computer must see the end of the transfer before that of the sweep
             answers(driver, GO, "go")
             with time_block(motion_s):
                 wait_for(lambda: laboratory("state")["moving"], "the first motion")
