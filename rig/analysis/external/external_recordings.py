@@ -60,6 +60,7 @@ from rig.observation.statistics.mean import dof_by_axis
 BySweeps = Estimator | Literal["increments"]
 SWEEP_ESTIMATORS: tuple[BySweeps, ...] = (*ESTIMATORS, "increments")
 FROM_SCATTER = "scatter of the readings"
+MAX_SCALE_STD = 0.05  # u of a scale factor: more is no calibration, as of turns that are stated at wrong times
 SWEEPS, FROM_RESIDUALS = "sweeps", "contradictions of the sweeps"
 NO_SWEEPS = Fault("too_few_observations", "a file of attitudes contains no sweeps", "Give sweeps in six directions")
 
@@ -120,7 +121,7 @@ def _add_notes(sensor: OfSensor, read: ReadElsewhere, samples: Samples) -> OfSen
 
 
 def check_external(name: str, sensor: OfSensor) -> Iterator[Check]:
-    """Yield checks in addition to the solvers' own: the condition of the equations, the error of attitudes.
+    """Yield checks in addition to the solvers' own: the condition of the equations, u of scale, the error of attitudes.
 
     Every quantity without a solution has a failing check. There is no configuration with limits for more checks.
     """
@@ -128,6 +129,9 @@ def check_external(name: str, sensor: OfSensor) -> Iterator[Check]:
     if (gyroscope := sensor.gyroscope) is not None:
         largest = triaxial.MAX_CONDITION if sensor.rates is not None else rotations_by_angle.MAX_CONDITION
         yield fitness(name, RATE.name, "condition", gyroscope.solution.condition, largest)
+        if gyroscope.uncertainty is not None:
+            scale_std = float(gyroscope.uncertainty.std[:3].max())
+            yield fitness(name, RATE.name, "scale_std", scale_std, MAX_SCALE_STD)
     for quantity, result in sensor.at_rest.items():
         yield fitness(name, quantity.name, "condition", result.solution.condition, triaxial.MAX_CONDITION)
         if (error := result.solution.attitude_error) is not None:

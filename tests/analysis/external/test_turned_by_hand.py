@@ -141,3 +141,14 @@ def test_a_sweep_at_constant_speed_stays_a_mean(tmp_path: Path, capsys: pytest.C
 def test_turns_about_two_axes_do_not_tell_the_third(tmp_path: Path) -> None:
     with pytest.raises(Fault, match="rank_deficient"):
         solved(tmp_path, turn(Hand(BOTH_WAYS[[0, 1, 3, 4]]), 5))
+
+
+@pytest.mark.slow
+def test_turns_stated_a_second_late_do_not_pass(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """All turns are there, at times when the body did something else: U of a scale factor is about 1."""
+    samples, sweeps = write(tmp_path, turn(Hand(BOTH_WAYS), 1))
+    header, *rows = (line.split(",") for line in sweeps.read_text(encoding="utf-8").splitlines())
+    late = [[str(float(start) + 1), str(float(end) + 1), *rest] for start, end, *rest in rows[:-3]]
+    sweeps.write_text("\n".join(map(",".join, [header, *late])), encoding="utf-8")
+    assert main(["solve", str(samples), "--sweeps", str(sweeps)]) == 1
+    assert "FAILED imu.scale_std" in capsys.readouterr().out
