@@ -61,8 +61,8 @@ class Channel:
         """
         if self.step is not None:
             return cut_steps(readings, self.step / 2)
-        found = np.zeros(readings.shape[1:]) if trusts_counts else find_steps(readings)
-        return Steps(np.maximum(self.resolution, found))
+        steps = np.zeros(readings.shape[1:]) if trusts_counts else find_steps(readings)
+        return Steps(np.maximum(self.resolution, steps))
 
     def counts(self, samples: NDArray[Any]) -> NDArray[Any]:
         """Return the recorded numbers (n,) or (n, 3) of the channel in samples (n,), unconverted."""
