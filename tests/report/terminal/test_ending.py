@@ -121,7 +121,7 @@ def test_a_check_of_another_quantity_has_the_same_words_and_no_limit_that_nobody
             "the readings of an axis in a sweep or dwell contradict"
         )
     as_spelt = fitness("gyro.bias", "inclination", "scale_std", 2.0, 1.0)
-    assert (what_failed(entry_of(as_spelt), None) or "").startswith("the uncertainty of a scale factor is above")
+    assert (what_failed(entry_of(as_spelt), None) or "").startswith("a scale factor is too uncertain")
 
 
 def test_what_came_near_its_limit_is_named() -> None:
