@@ -64,8 +64,13 @@ class PrimarySession:
         pass
 
 
+def _timestamp_us(robot: Robot) -> int:
+    """Return the controller's time in a message, µs; a clock that is set to before its start sends zero."""
+    return max(int(robot.reported_time_s * 1e6), 0)
+
+
 def _message(robot: Robot, kind: int, payload: bytes) -> bytes:
-    return build_package(ROBOT_MESSAGE, struct.pack(">QbB", int(robot.reported_time_s * 1e6), -1, kind) + payload)
+    return build_package(ROBOT_MESSAGE, struct.pack(">QbB", _timestamp_us(robot), -1, kind) + payload)
 
 
 def _content(message: Message) -> bytes:
@@ -95,7 +100,7 @@ def _robot_mode(robot: Robot) -> bytes:
     playing = robot.runtime_state in (RuntimeState.PLAYING, RuntimeState.RESUMING, RuntimeState.STOPPING)
     return struct.pack(
         ">Q7?BB3dB",
-        int(robot.reported_time_s * 1e6),
+        _timestamp_us(robot),
         True,
         True,
         robot.robot_mode != RobotMode.POWER_OFF,
