@@ -8,7 +8,6 @@ import json
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from difflib import get_close_matches
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
@@ -425,6 +424,8 @@ def find_setting(item: str) -> str:
 
 def _suggest_setting(path: str) -> str:
     """Return a question for the setting that a wrong path may mean, or an empty text."""
+    from difflib import get_close_matches
+
     alike = get_close_matches(path, _settable(), n=1)
     return f"Did you mean {alike[0]}? " if alike else ""
 

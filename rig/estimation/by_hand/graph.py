@@ -145,6 +145,11 @@ class Graph:
         return np.asarray(np.swapaxes(self.state.attitudes[:-1], -1, -2) @ self.state.attitudes[1:], dtype=np.float64)
 
     @cached_property
+    def bias_changes_rad_s(self) -> Array:
+        """The change (N − 1, 3) of the gyroscope's bias in each move."""
+        return np.asarray(np.diff(self.state.biases, axis=0), dtype=np.float64)
+
+    @cached_property
     def rotations_rad(self) -> Array:
         """The rotation vectors (N − 1, 3) of `between`."""
         return rotation_vectors(self.between)
@@ -235,13 +240,12 @@ def _move(graph: Graph, row: int) -> Factor:
     design[:, NONLINEARITIES] = integrals.by_nonlinearity[row]
     design[:, first_bias] = design[:, second_bias] = integrals.by_bias[row] / 2
     design[:, first], design[:, second] = np.eye(3), -graph.between[row]
-    changes_rad_s = graph.state.biases[row + 1] - graph.state.biases[row]
     causes = {
         "noise": np.full(3, graph.walk_rad_sqrt_s * np.sqrt(integrals.durations_s[row])),
         "stamps": np.full(3, graph.stamp_std_s * integrals.changes_rad_s[row]),
         "of_angle": np.full(3, stds.of_angle * np.sqrt(QUARTER_RAD * integrals.paths_rad[row])),
         # A bias that jumps does so at any time of the move.
-        "jump": np.full(3, np.linalg.norm(changes_rad_s) * integrals.durations_s[row] / np.sqrt(12)),
+        "jump": np.full(3, np.linalg.norm(graph.bias_changes_rad_s[row]) * integrals.durations_s[row] / np.sqrt(12)),
     }
     return Factor(MOVE, row, graph.residuals_rad[row], design, causes)
 
@@ -281,8 +285,7 @@ def _bias_walk(graph: Graph, row: int) -> Factor:
     design[:, DRIFT] = -np.kron(drifted, np.eye(3))
     design[:, _rest_columns(row)[1]], design[:, _rest_columns(row + 1)[1]] = -np.eye(3), np.eye(3)
     causes = {"walk": np.full(3, stds.walk_rad_s_sqrt_s * np.sqrt(apart_s))}
-    changes_rad_s = state.biases[row + 1] - state.biases[row]
-    return Factor(WALK, row, changes_rad_s - drifted @ state.drift_rad_s, design, causes)
+    return Factor(WALK, row, graph.bias_changes_rad_s[row] - drifted @ state.drift_rad_s, design, causes)
 
 
 def _rest(graph: Graph, row: int) -> Factor:
@@ -339,14 +342,13 @@ def _priors(graph: Graph) -> Iterator[Factor]:
     """Yield a prior for each block of parameters, for the first bias, and for each heading that no move determines."""
     state, conditions, width = graph.state, graph.conditions, graph.width
 
-    def prior(name: str, columns: slice, residual: Array, std: float) -> Factor:
+    def prior(name: str, columns: slice, residual: Array, std: Array | float) -> Factor:
         return Factor(PRIOR, 0, residual, np.eye(width)[columns], {name: np.full(len(residual), std)})
 
     yield prior("matrix", MATRIX, (state.matrix - np.eye(3)).ravel(), MATRIX_STD)
     yield prior("g-sensitivity", GRAVITY, state.sensitivity.ravel(), SENSITIVITY_STD)
     yield prior("nonlinearity", NONLINEARITIES, state.nonlinearities, NONLINEARITY / HAND_RATE_RAD_S)
-    yield prior("drift", slice(DRIFT.start, DRIFT.start + 3), state.drift_rad_s[0], DRIFT_STD_RAD_S)
-    yield prior("drift", slice(DRIFT.start + 3, DRIFT.stop), state.drift_rad_s[1], CURVE_STD_RAD_S)
+    yield prior("drift", DRIFT, state.drift_rad_s.ravel(), np.repeat([DRIFT_STD_RAD_S, CURVE_STD_RAD_S], 3))
     yield prior("level", LEVEL, (state.level - np.eye(3)).ravel(), LEVEL_STD)
     yield prior("level", OFFSET, state.offset, OFFSET_STD_M_S2)
     yield prior("table", TABLE, state.table, TABLE_STD_RAD)

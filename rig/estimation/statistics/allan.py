@@ -74,18 +74,18 @@ class AllanAxis:
     bias_instability: AllanReading | Fault
 
 
-def allan_curve(intervals: Sequence[Array], interval_s: float) -> AllanCurve:
-    """Return the overlapping Allan deviation of intervals (nᵢ, 3) of readings at a period of `interval_s`.
+def allan_curve(series: Sequence[Array], interval_s: float) -> AllanCurve:
+    """Return the overlapping Allan deviation of series (nᵢ, 3) of readings that are `interval_s` apart.
 
-    τ takes values near powers of two, including 1 s. Raise Fault `not_finite`, and `recording_too_short` if no interval
+    τ takes values near powers of two, including 1 s. Raise Fault `not_finite`, and `recording_too_short` if no series
     has three readings.
     """
-    used = [np.asarray(interval, dtype=np.float64) for interval in intervals if len(interval) >= MIN_READINGS]
+    used = [np.asarray(readings, dtype=np.float64) for readings in series if len(readings) >= MIN_READINGS]
     if not used:
         raise too_short(f"no interval at rest has {MIN_READINGS} readings without a gap")
-    for interval in used:
-        check_finite(readings=interval)
-    phases = [np.vstack([np.zeros(3), np.cumsum(interval - interval.mean(axis=0), axis=0)]) for interval in used]
+    for readings in used:
+        check_finite(readings=readings)
+    phases = [np.vstack([np.zeros(3), np.cumsum(readings - readings.mean(axis=0), axis=0)]) for readings in used]
     longest = (max(map(len, phases)) - 1) // 2
     factors = {2**power for power in range(longest.bit_length())} | {round(RANDOM_WALK_TAU_S / interval_s)}
     chosen = np.array(sorted(factor for factor in factors if 1 <= factor <= longest))

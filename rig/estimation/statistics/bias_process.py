@@ -139,9 +139,7 @@ def average_posterior(sizes: Array, likelihood: Array) -> Array:
     would by chance be far too small in one run and too large in another (Mitchell and Beauchamp, J. Am. Stat. Assoc. 83
     (1988) 1023).
     """
-    log_posterior = likelihood - np.log(GRID_POINTS) * np.count_nonzero(sizes, axis=1)
-    weights = np.exp(log_posterior - log_posterior.max())
-    return np.asarray(np.sqrt(weights @ sizes**2 / weights.sum()), dtype=np.float64)
+    return _root_mean_square(sizes, likelihood - np.log(GRID_POINTS) * np.count_nonzero(sizes, axis=1))
 
 
 def average_walks(sizes: Array, likelihood: Array) -> Array:
@@ -153,7 +151,12 @@ def average_walks(sizes: Array, likelihood: Array) -> Array:
     Sizes are on a geometric grid, so a size's prior is proportional to the step to the next.
     """
     log_posterior = likelihood - np.log(GRID_POINTS) * np.count_nonzero(sizes[:, 1:], axis=1)
-    weights = sizes[:, 0] * np.exp(log_posterior - log_posterior.max())
+    return _root_mean_square(sizes, log_posterior, prior=sizes[:, 0])
+
+
+def _root_mean_square(sizes: Array, log_posterior: Array, prior: Array | float = 1.0) -> Array:
+    """Return the root-mean-square (2,) of sizes (K, 2); their weights are exp(`log_posterior`) times `prior` (K,)."""
+    weights = prior * np.exp(log_posterior - log_posterior.max())
     return np.asarray(np.sqrt(weights @ sizes**2 / weights.sum()), dtype=np.float64)
 
 
