@@ -13,8 +13,8 @@ In a notebook:
     rig.changes(rig.load("runs/of_last_year"), run)               # E_n
     rig.calibrations("LSM9DS1-001").to_frame()                    # a sensor's, from the history
 
-docs/how-to/with-code/notebook.md goes through all of it. These names are public; the modules that define them may
-change. Importing them loads no arm driver. A refusal raises `Refused`, a failure `Fault`: docs/errors.md lists each by
+docs/how-to/with-code/notebook.md goes through it. These names are public; the modules that define them may change.
+Importing them loads no arm driver. A refusal raises `Refused`, a failure `Fault`: docs/errors.md lists each by
 `error.name`.
 """
 

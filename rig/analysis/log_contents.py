@@ -34,8 +34,8 @@ class LookedFile:
 
     - layout, guess: those of a table; None for a bag or an autopilot's log.
     - columns: the map of its columns, in the form of `--columns`, incomplete if it contains "?".
-    - samples, survey: its readings, if any can be read; others: number of rows without readings; note: what the
-      readings lack.
+    - samples, survey: its readings, if any can be read; others: number of rows without any; note: what the readings
+      lack.
     - origin_s: origin of the readings' times; the attitudes' times are those of their own clock.
     - attitudes: the rows of its reference, if it has one.
     - refusals: why readings or attitudes could not be read.
@@ -85,7 +85,7 @@ def look_at(path: Path, stated: ColumnMap | None = None) -> LookedFile:
 
 
 def count_from(looked: LookedFile, origin_s: int) -> LookedFile:
-    """Return a reference's file whose attitudes' times count from the origin of a log's times."""
+    """Return a reference's file with its attitudes' times counted from the origin of a log's times."""
     if looked.attitudes is None or not origin_s:
         return looked
     times = {name: looked.attitudes[name] - origin_s for name in ("start_s", "end_s")}

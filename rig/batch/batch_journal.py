@@ -64,7 +64,10 @@ def open_journal(out: Path | None, parent: Path, entry: Begun) -> Journal:
 
 
 def resume_journal(folder: Path) -> Journal:
-    """Return the journal in `folder` without an incomplete last line. Raise Refused `no_batch` or for a link."""
+    """Return the journal in `folder` without an incomplete last line.
+
+    Raise Refused `no_batch`, and as `refuse_links` does.
+    """
     path = folder / JOURNAL
     try:
         text = read_regular_file(path, MAX_BYTES, follow_links=False)

@@ -101,7 +101,7 @@ class BatchPart:
 
 @dataclass(frozen=True, slots=True)
 class Batch:
-    """A batch: all parts so far, in order; the last may be in work."""
+    """A batch: all parts so far, in order; the last may be in progress."""
 
     begun: Begun
     parts: tuple[BatchPart, ...] = ()

@@ -17,8 +17,8 @@ class Operator:
     """The source of serial numbers and answers: an operator at a terminal or page (`voice`), or a list of `numbers`.
 
     An empty number ends the batch. Without a `voice` no questions are asked, so a doubt cannot be overridden. A refused
-    number of a list is entered in the table; a refused typed number is typed again. `asking` is open during a question
-    between two runs, with its subject, such as "to mount the part".
+    number from a list is entered in the table; the operator types another in place of a refused typed one. `asking` is
+    open during a question between two runs, with its subject, such as "to mount the part".
     """
 
     voice: Voice | None

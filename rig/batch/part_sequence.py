@@ -54,7 +54,7 @@ class Bench(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Desk:
-    """The questions of a run to the station before its arm moves."""
+    """The questions that a run asks the station before the arm moves."""
 
     work: "Work"
     part: BatchPart

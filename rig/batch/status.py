@@ -127,7 +127,7 @@ def update_by_batch(now: Now, batch: Batch) -> Now:
 
 
 def last(now: Now) -> Now:
-    """Return the last state. A batch that ended neither by itself nor by a fault gets the state "stopped"."""
+    """Return the state at the end; "stopped" for a batch that ended neither by itself nor by a fault."""
     return replace(now, state=now.state if now.state in FINAL_STATES else "stopped", left_s=None, over=True)
 
 

@@ -297,8 +297,7 @@ class BoardEntry(Entry):
 class GyroscopeEntry(Entry):
     """A sensor's calibration by the chosen estimator, its observations, and the solutions of the other estimators.
 
-    - covariance: due to noise and bias random walk; covariance_combined: to all contributors in the vector model's
-      budget.
+    - covariance: due to noise and bias random walk; covariance_combined: due to all contributors in the budget.
     - correction_matrix: M of g = M (m + b), by which the board and the C header correct readings.
     - speeds_rad_s: those of the sweeps. A calibration at one speed, in either direction, is valid at that speed,
       without nonlinearity. axis_rate_ranges_rad_s: smallest and largest rate along each of the sensor's axes in the

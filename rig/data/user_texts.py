@@ -12,7 +12,7 @@ from rig.errors import Refused
 
 
 def note_own(*texts: str) -> None:
-    """Record that this user has run the texts. If this fails, the user is asked again later."""
+    """Record that this user has run these configurations or scripts. If this fails, the user is asked again later."""
     with suppress(OSError, Refused):
         folder = _folder()
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)

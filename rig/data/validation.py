@@ -37,7 +37,10 @@ def validate(kind: type[Kind], document: Any, where: str) -> Kind:
 
 
 def read_document(kind: type[Document], file: Path, limit_bytes: int, *, what: str, remedy: str) -> Document:
-    """Return a JSON file as type `kind`, in messages a result of `what`. Raise Refused `no_result`, `not_a_result`."""
+    """Return a JSON file as type `kind`; messages call it a result of `what`.
+
+    Raise Refused `no_result`, `not_a_result`.
+    """
     try:
         return kind.model_validate(parse_json(read_regular_file(file, limit_bytes), MAX_VALUES))
     except (UnfitFile, OSError) as error:

@@ -1,4 +1,4 @@
-"""Independent attempts, some of which succeed: the only form in which a Fault is a value.
+"""Independent attempts, some of which may fail: only here is a Fault a value instead of an exception.
 
 A Fault is raised if nothing can continue. Otherwise `attempt_each` and `attempt` store it in `faults`, by the name of
 the attempt, never in place of a result.

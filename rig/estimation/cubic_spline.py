@@ -12,8 +12,7 @@ class CubicSpline:
     """The not-a-knot cubic spline through values at rising abscissae (de Boor, A Practical Guide to Splines, ch. IV).
 
     x: (n,), strictly rising, n ≥ 2; y: (n, …). Called with abscissae of any shape, the spline returns values of that
-    shape followed by …; beyond the ends it extrapolates the first and the last polynomial. Raise ValueError for other
-    x and y.
+    shape followed by …; beyond the ends it extrapolates the outer polynomials. Raise ValueError for other x and y.
     """
 
     def __init__(self, x: Array, y: Array) -> None:

@@ -62,7 +62,7 @@ def _follow(history: History, feed: Sections, over: threading.Event) -> None:
 
 
 def _read_past(history: History, today: date) -> dict[str, Any]:
-    """Return the past calibrations, or if rows cannot be read only the error; the rigs are shown nevertheless."""
+    """Return the past calibrations; if rows cannot be read, only the error, so that the rigs are shown nevertheless."""
     try:
         pasts = history.calibrations()
         recalls = floor_content.recalls(pasts, today)

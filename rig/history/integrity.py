@@ -34,7 +34,7 @@ class EntryState:
 
 
 def examine_history(history: History) -> Iterator[EntryState]:
-    """Yield the state of triggers, journal's numbers and rows, of each run compared with its result, and of files.
+    """Yield the state of triggers, of the journal and its rows, of each run compared with its result, and of files.
 
     Files are read at their last known location. A file of another computer that is not accessible here is `elsewhere`;
     a file in a run's folder that was not entered is `unknown`.

@@ -129,7 +129,11 @@ def open_history(where: str | HistoryAddress | None = None) -> Iterator["History
 
 @dataclass(frozen=True, slots=True)
 class History:
-    """An open history. Another connection reads each entry back before a method returns; else `entry_not_kept`."""
+    """An open history.
+
+    Before a method returns, another connection reads each entry back. If it is missing, the method raises Refused
+    `entry_not_kept`.
+    """
 
     address: HistoryAddress
     engine: Engine

@@ -72,7 +72,7 @@ def find_clearance_problems(
 
 
 def keeps_clear(start_q_rad: Joints, target_q_rad: Joints, carried: FlangeLoad, model: TurnerModel) -> bool:
-    """Return whether the load stays far enough from the arm on a straight path in joint space, in a sweep or between.
+    """Return whether the load stays far enough from the arm on a straight path in joint space, sweep or transfer.
 
     Lengths are those of the model's drawing, because plans are made before an arm is connected. Paths beyond the
     joints' limits count as clear; other checks refuse them.

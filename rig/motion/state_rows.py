@@ -1,4 +1,4 @@
-"""The rows in which the states of a turner are recorded: NumPy's types of them."""
+"""The NumPy types of the rows in which a turner's states are recorded."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -137,7 +137,7 @@ class Stage:
     """A part of a plan with its own recording, before which the operator mounts the item by the `instruction`.
 
     `mount` (3 rows of 3): nominal rotation from the flange's frame to the item's, to which sensors' mountings refer.
-    `indices`: those of its sweeps in the whole procedure; `begins`: the number of earlier steps.
+    `indices`: the indices of its sweeps in the whole procedure; `begins`: the number of earlier steps.
     """
 
     mount: tuple[Vector3, Vector3, Vector3]

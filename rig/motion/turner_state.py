@@ -147,7 +147,7 @@ class TurnerIdentity:
     """A turner's maker and model (None if unknown), and the geometry with which results are computed.
 
     `tcp_offset`: an arm's tool centre point in the flange's frame, for information. `reading_std_rad`: the noise of one
-    reading of an angle, if too large for single readings; a revolution then ends where a reading recurs.
+    reading of an angle, stated only if it is too large to ignore; a revolution then ends where a reading recurs.
     """
 
     maker: str

@@ -107,8 +107,8 @@ class Calibration:
     def apply(self, readings: ArrayLike) -> Array:
         """Return the corrected readings (n, 3) of this sensor, from readings (n, 3) in the SI unit of its quantity.
 
-        A gyroscope's are g = M (m + b), with M = K if only scale factors are corrected; an accelerometer's and a
-        magnetometer's M (m − b). They are in the frame of `correction_matrix` in `result.json`, like those of
+        For a gyroscope they are g = M (m + b), with M = K if only scale factors are corrected; for an accelerometer or
+        a magnetometer, M (m − b). They are in the frame of `correction_matrix` in `result.json`, like those of
         `calibration.h`. A row with a NaN becomes NaN. Raise Refused `not_readings` for counts and other shapes,
         `wrong_unit` for numbers that are impossible in SI units, such as °/s, g or µT.
         """

@@ -145,8 +145,7 @@ def changes(before: Run | Result, now: Run | Result) -> Changes:
     """Return the changes from a run to a later one, sensor by sensor, as `rig history compare` prints them.
 
     Sensors are the same if part, serial number, quantity and range are equal. A run is solved by its usual estimator;
-    for another estimator, pass a result instead of the run. Raise Refused `not_comparable` if the runs have no sensor
-    in common.
+    for another estimator, pass a result instead of the run. Raise Refused `not_comparable` without a common sensor.
     """
     first, second = ({_subject(record): record for record in _records(source)} for source in (before, now))
     by_sensor = {}

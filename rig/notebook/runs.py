@@ -103,8 +103,7 @@ def load(path: str | Path, script: str | Path | None = None) -> Run:
 def read_log(path: str | Path, columns: str | Path | None = None) -> Readings:
     """Read a log of another program (CSV, a bag, `.ulg` or `.mat`) as `rig solve` does.
 
-    Values are in SI units. `columns` is the file of `--columns` for other names and units. Raise Refused as `rig
-    solve`.
+    Values are in SI units. `columns` is the file of `--columns` for other names and units. Raise as `rig solve`.
     """
     column_map = STANDARD_NAMES if columns is None else load_as(ColumnMap, columns, MAP_REMEDY)
     recording = read_external_log(Path(path), column_map)

@@ -24,8 +24,7 @@ def average_rests(
 ) -> tuple[Average, ...]:
     """Average all sufficiently long rests of the arm, except those next to a step in `superseded`.
 
-    The means are corrected for the resting arm's oscillation, which `response` (3, 3) converts from encoders to
-    readings.
+    The means are corrected for the resting arm's oscillation, which `response` (3, 3) converts to readings.
     """
     rests = (_average_rest(stream, motion, window, response) for window in iterate_rests(run, superseded))
     return tuple(rest for rest in rests if rest is not None)
@@ -59,8 +58,7 @@ def add_attitude(average: Average, motion: ArmMotion) -> Average:
 def estimate_bias_drift(rests: Sequence[Average]) -> Array:
     """Return the variance (3,) of the bias between rests, (rad/s)², in excess of the noise of a rest.
 
-    The variance is zero unless χ² over all axes is significant at 0.999, so noise does not inflate a steady sensor's
-    variance.
+    The variance is zero unless χ² over all axes is significant at 0.999, so noise inflates no steady sensor's variance.
     """
     from scipy.special import chdtri
 

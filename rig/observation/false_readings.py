@@ -32,7 +32,7 @@ TOGGLE_READINGS = 10  # readings between two opposite jumps that noise causes cl
 
 
 def check_possible(readings: Array, rows: NDArray[np.intp], quantity: Quantity, where: str) -> None:
-    """Raise Refused `not_a_number` if a few readings (n, 3) are far beyond all others and most parts' range.
+    """Raise Refused `not_a_number` if a few readings (n, 3) far exceed all others, and the range of most sensors.
 
     `rows` (n,) are the readings' numbers in the file, from 0; messages call the file `where`. Many such readings raise
     nothing here: they are due to a wrong unit.
@@ -69,8 +69,7 @@ def check_temperatures(temperature_c: Array, rows: NDArray[np.intp], where: str)
 def check_unwrapped(time_s: Array, readings: Array, rows: NDArray[np.intp], quantity: Quantity, where: str) -> None:
     """Raise Refused `readings_overflow` if an axis of readings (n, 3) jumps from one end of its span to the other.
 
-    A number of too few bits overflows, a signed one of 16 bits after 32767. Arguments: see `check_possible`; times
-    (n,).
+    A number of too few bits overflows: if it has 16 bits and a sign, after 32767. Arguments: see `check_possible`.
     """
     if quantity not in MIN_SPAN or len(readings) < 2:
         return

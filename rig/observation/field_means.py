@@ -37,8 +37,7 @@ def find_dwelling_companion(run: RunData, name: str, sensors: Iterable[str]) -> 
 def field_readings(recording: ObservedRun, name: str, thresholds: ObservationThresholds) -> tuple[StaticReading, ...]:
     """Average a magnetometer's readings in the dwells in which an accelerometer on its clock was read.
 
-    The gyroscope's time base serves both: a delay does not affect a mean at rest. Raise Fault `lost_samples`,
-    `saturation`.
+    The gyroscope's time base serves both: a delay changes no mean at rest. Raise Fault `lost_samples`, `saturation`.
     """
     other = find_companion(recording, name)
     if other is None:
@@ -117,6 +116,6 @@ def _mean(run: RunData, name: str, samples: NDArray[Any], where: str, thresholds
 
 
 def _samples(run: RunData, name: str, time_s: Array, window: Window) -> NDArray[Any]:
-    """Return a sensor's samples (n,) in a window, by the times (N,) of all its samples on the arm's clock."""
+    """Return a sensor's samples (n,) in a window; `time_s` (N,) are the times of all its samples on the arm's clock."""
     samples: NDArray[Any] = run.samples[name]
     return samples[inside(time_s, window)]

@@ -1,4 +1,4 @@
-"""The page's facts about a run before its first event."""
+"""The facts about a run that its page shows before the first event."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -6,10 +6,10 @@ from typing import Any
 
 @dataclass(frozen=True, slots=True)
 class About:
-    """Facts about a run before its first event.
+    """The facts about a run that are known before its first event.
 
-    - `folder`, `procedure`: those of the run. `replayed`: whether it is a recording. `simulated`: whether the
-      laboratory is simulated.
+    - `folder`, `procedure`: the run's folder and procedure. `replayed`: whether it is a recording. `simulated`: whether
+      the laboratory is simulated.
     - `may_answer`: whether the page may answer the operator's questions.
     - `parts`: each sensor's part and serial number.
     - `storing`: the command that stores a calibration on the board, if possible.

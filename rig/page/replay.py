@@ -1,4 +1,4 @@
-"""A recorded run as its events, in the controller's time."""
+"""A recorded run, converted to events at the controller's times."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace

@@ -18,7 +18,10 @@ Motion = tuple[tuple[object, ...], float, Mapping[str, object]]
 
 
 def vary_arm(config: RigConfig) -> Iterator[Motion]:
-    """Yield sweeps about three or six axes, at one or two speeds, over turns or arcs; keep several speeds of a file."""
+    """Yield sweeps about three or six axes, at one or two speeds, over turns or arcs.
+
+    If the file states several speeds, the sweeps keep them.
+    """
     procedure = config.procedure
     assert isinstance(procedure, SixSweepsSection)
     axes = (3, 6) if procedure.axes == 3 and not procedure.mountings else (procedure.axes,)

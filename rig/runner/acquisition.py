@@ -151,10 +151,10 @@ class Acquisition:
             self._kept.append(_Part(defaultdict(list), []))
 
     def collect_kept(self, sensor: str) -> tuple[np.ndarray, list[State], int]:
-        """Return the kept samples (n,) of one sensor, the kept states of the arm, and the number of new states.
+        """Return the samples (n,) of one sensor and the states of the arm in memory, and the number of new states.
 
-        States since the latest `keep` are new. Older states are from at most `CLOCK_DATA_S` before it, however long
-        the run has waited.
+        States since the latest `keep` are new. Older states go back at most `CLOCK_DATA_S` before it, however long the
+        run has waited.
         """
         with self._lock:
             batches = [batch for part in self._kept for batch in part.batches[sensor]]

@@ -34,7 +34,7 @@ class PortSilence:
         self._clock_then_s: float | None = None  # time of the other clock at the last data
 
     def note(self, count: int) -> None:
-        """Record a read with `count` of the awaited items."""
+        """Record one read of the port, which brought `count` of the awaited items."""
         self._idle_reads += 1
         if count:
             self._idle_reads, self._clock_then_s = 0, self._clock_s

@@ -34,8 +34,7 @@ class Log:
 def log(path: Path) -> Iterator[Log]:
     """Open the log at `path` for the block; existing lines remain.
 
-    Raise Refused `run_folder` if the log cannot be written, because the recording in the same folder could not be
-    either.
+    Raise Refused `run_folder` if the log cannot be written, because the recording next to it could not be either.
     """
     try:
         file = os.fdopen(open_to_append(path), "a", encoding="utf-8")

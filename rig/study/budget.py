@@ -42,8 +42,8 @@ WARM_UP_S, STEP_K = 300.0, 1 / 16  # duration of warm-up; resolution of an LSM9D
 class Effects:
     """Magnitudes of the effects: standard deviations; for clock, offset, nonlinearity and warming half-widths.
 
-    - `g_sensitivity_rad_s_g`: that of every element; `axis_rad`: twist of each wrist's axis; `jitter_s`: jitter of the
-      states' times.
+    - `g_sensitivity_rad_s_g`: every element of the g-sensitivity; `axis_rad`: twist of each wrist's axis; `jitter_s`:
+      jitter of the states' times.
     - `clock`, `clock_known`: error of the controller's clock, and standard uncertainty of its correction.
     - `walk_rad_s_sqrt_s`: bias random walk; `offset_m`: the sensor's offset from the flange's centre, by axis.
     - `nonlinearity`: as a fraction of full scale; `warming_k`: change of temperature, which affects bias and scale.

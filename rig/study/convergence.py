@@ -104,7 +104,7 @@ def _build_rows(example: str, scale: Array, bias_rad_s: Array, speed_rad_s: floa
 
 
 def _count_passes(scale: float, ratio: float) -> int | None:
-    """Return the number of passes until four decimals of k (1 ± Γⁿ/2) are final, or None."""
+    """Return the number of passes until four decimals of k (1 ± Γⁿ/2) stay the same, or None if they never do."""
     factor = ratio / (1 - ratio) if ratio < 0.5 else 1.0
     return None if factor == 1 else int(np.ceil(np.log(2 * FOUR_DECIMALS / scale) / np.log(factor)))
 

@@ -92,8 +92,8 @@ class DriftingSensor:
     def simulate_repeats(self, rng: np.random.Generator, unit: float, unit_name: str) -> list[dict[str, Any]]:
         """Return one row per repeat, with the bias in `unit`, as in TRIAX, Figs. 4 and 6.
 
-        Columns `held_…` have the bias estimated with F and the reference of an earlier calibration; for `free_…` all
-        parameters are estimated from the ten attitudes, with the reference's norm given.
+        Columns `held_…` have the bias estimated with the matrix F and the reference of an earlier calibration. For
+        columns `free_…`, all parameters are estimated from the ten attitudes, with the reference's norm given.
         """
         attitudes = draw_attitudes(ATTITUDES)
         force = project(attitudes, self.reference)

@@ -78,7 +78,7 @@ def build_whole_turn(speed_rad_s: float, noise_rad_s: float, vibration: Vibratio
 
 
 def draw_mountings(rng: np.random.Generator, runs: int, largest: float = MAX_MISALIGNMENT) -> Array:
-    """Draw rotations (runs, 3, 3) from flange to sensor axes, about random axes, the sine of the angle U(0, largest).
+    """Draw rotations (runs, 3, 3) from flange to sensor axes, about random axes, sine of the angle from U(0, largest).
 
     SIX states only "misalignment U(0 %, 10 %)", taken here as the fraction of a rate that other axes sense.
     """

@@ -27,7 +27,7 @@ def pass_on(results: Iterable[Any], total: int) -> Iterable[Any]:
 class Settings:
     """A study's settings: seed, `runs` per parameter set (None: the paper's or the study's own), distribution of work.
 
-    `jobs` is joblib's `n_jobs`; None leaves it to the surrounding `joblib.parallel_config`, one process without any.
+    `jobs` is joblib's `n_jobs`; None leaves it to the surrounding `joblib.parallel_config`, or else to one process.
     """
 
     seed: int = 1

@@ -58,7 +58,7 @@ class InstrumentMount:
 
 
 def sensor_seed(world: WorldSection, name: str, *more: int) -> np.random.SeedSequence:
-    """Return the seed of the noise and drift of the sensor `name`; `more` numbers distinguish sensors with one name."""
+    """Return the seed of the noise and drift of the sensor `name`; `more` distinguishes sensors with the same name."""
     return np.random.SeedSequence([world.seed, sorted(world.sensors).index(name), *more])
 
 

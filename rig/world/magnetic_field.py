@@ -47,7 +47,7 @@ class Dipole:
     moment_a_m2: Vector
 
     def flux_density_at(self, position_m: Vector, frames: Frames) -> Vector:
-        """Return the iron's flux density, T, at a position in the base frame, m; nearer than 1 mm, that at 1 mm."""
+        """Return the iron's flux density, T, at a position in the base frame, m; below 1 mm as at 1 mm."""
         rotation, origin = frames[self.carried_by]
         source, moment = rotate(rotation, self.position_m), rotate(rotation, self.moment_a_m2)
         x, y, z = (target - base - offset for target, base, offset in zip(position_m, origin, source, strict=True))

@@ -82,7 +82,7 @@ FAULT_MODES: tuple[FaultMode[Means], ...] = (  # (k, N, 3) each
 
 
 def changes(segments: Segments, axis_rates: Array) -> Alternatives:
-    """Return columns (3, N, k) for each check of a scale factor or a mounting that changes with time."""
+    """Return the effects (3, N, k) of a scale factor or a mounting that changes with time, by the name of the check."""
     time = normalise_time(segments)
     for sweep in np.unique(segments.sweep):  # a change within a sweep is tested for that sweep
         time[segments.sweep == sweep] = time[segments.sweep == sweep].mean()
@@ -94,7 +94,7 @@ def changes(segments: Segments, axis_rates: Array) -> Alternatives:
 
 
 def differences(segments: Segments, axis_rates: Array, whole: Array | None) -> dict[str, Array | None]:
-    """Return columns (3, N, k) for each check of a difference between directions, sweeps or rests.
+    """Return the effects (3, N, k) of a difference between directions, sweeps or rests, by the name of the check.
 
     The check `residuals` has the columns `whole` (3, N, k), which give each sweep its own mean. If `whole` is None, it
     uses all residuals, including the scatter within sweeps.
@@ -110,7 +110,7 @@ def differences(segments: Segments, axis_rates: Array, whole: Array | None) -> d
 
 
 def single_axis_columns(segments: Segments, axis_rates: Array) -> Array:
-    """Return a column (3, N, k) for each axis and each start of a sweep or transfer: a change of its scale factor."""
+    """Return the effect (3, N, k) of a changed scale factor, for each axis and each start of a sweep or transfer."""
     starts = np.unique(
         [segments.times_s[segments.sweep == sweep].min() for sweep in np.unique(segments.sweep[segments.sweep != REST])]
     )
@@ -119,20 +119,20 @@ def single_axis_columns(segments: Segments, axis_rates: Array) -> Array:
 
 
 def quarter_columns(means: Means) -> Array:
-    """Return columns (3, N, 9) for a scale factor that changes after 1, 2 or 3 quarters of the recording."""
+    """Return the effects (3, N, 9) of a scale factor that changes after 1, 2 or 3 quarters of the recording."""
     middle, (begin, end) = means.times_s.mean(axis=1), (means.times_s.min(), means.times_s.max())
     edges = np.linspace(begin, end, 5)[1:-1]
     return np.concatenate([split_per_axis(means.sensed_rad_s * (middle > edge)[:, None]) for edge in edges], axis=2)
 
 
 def sweep_columns(segments: Segments, sweep: int) -> Array:
-    """Return columns (3, N, 6) for an offset of one sweep, and for a difference between its halves."""
+    """Return the effects (3, N, 6) of an offset of one sweep, and of a difference between its halves."""
     inside = (segments.sweep == sweep).astype(np.float64)
     return repeat_per_axis(np.column_stack([inside, inside * segments.position]))
 
 
 def step_columns(segments: Segments) -> list[Array]:
-    """Return a step (N, 1) for each end of a sweep with rests on both sides: 0 before the end, then 1."""
+    """Return a step (N, 1) at each end of a sweep that has rests on both sides: 0 before the end, 1 after it."""
     middle = segments.times_s.mean(axis=1)
     ends = [segments.times_s[segments.sweep == sweep].max() for sweep in np.unique(segments.sweep[segments.sweep >= 0])]
     steps = [np.where(middle < end, 0.0, 1.0)[:, None] for end in ends]

@@ -42,7 +42,7 @@ class ConsistencyChecks:
 
     @property
     def disturbed(self) -> frozenset[int]:
-        """The indices of the plan's sweeps that the checks name."""
+        """The indices of the plan's sweeps that the checks name as disturbed."""
         return frozenset(check.means.sweep for check in self.checks if check.means.sweep is not None)
 
 

@@ -73,7 +73,9 @@ def _means_of_solve(explained: Explained) -> Means:
 
 
 def _error_over_expanded(patterns: Array, explained: Explained, mounting: Array, inputs: Unknown) -> float | None:
-    """Return a result's error over U due to the fault with the worst of `patterns` (k, N, 3); None without a solution.
+    """Return the error of a result, divided by U, due to the worst of the fault's `patterns` (k, N, 3).
+
+    Return None without a solution.
 
     The means are solved again with the fault, which may also look like bias drift and increase U.
     """

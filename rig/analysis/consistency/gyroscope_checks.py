@@ -176,10 +176,11 @@ def _free_disturbed_transfers(
     bias: BiasProcess,
     false_alarm_probability: float,
 ) -> tuple[_Tested, Statistic | None]:
-    """Return `_inflate_transfers` with a separate mean for each outlying transfer, and the test of a changed axis.
+    """Return the result of `_inflate_transfers` with a separate mean for each outlying transfer, and the axis test.
 
-    A ripple at the data rate shifts the mean of one transfer. A change of a scale factor shifts all later transfers, so
-    a transfer is an outlier only if its own mean explains clearly more of the residuals than any such change.
+    The axis test is for a scale factor of one axis that changes. A ripple at the data rate shifts the mean of one
+    transfer. A change of a scale factor shifts all later transfers, so a transfer is an outlier only if its own mean
+    explains clearly more of the residuals than any such change.
     """
     disturbed: list[int] = []
     while True:
@@ -201,7 +202,7 @@ def _free_disturbed_transfers(
 def _inflate_transfers(
     segments_only: _Tested, matrix: Array, allowance: ErrorPatterns, bias: BiasProcess, disturbed: Sequence[int]
 ) -> _Tested:
-    """Return `_whiten_with_transfers` with the transfers' variance inflated until their χ² equals their number.
+    """Whiten like `_whiten_with_transfers`, with the transfers' variance inflated until their χ² equals their number.
 
     Their χ² is that of all segments minus that of the segments without transfers. The factor is at most
     `MAX_RIPPLE_INFLATION`.

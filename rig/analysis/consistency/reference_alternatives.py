@@ -58,7 +58,7 @@ def alternatives(model: ReferenceModel) -> Alternatives:
 
 
 def segment_columns(model: ReferenceModel, segment: int) -> Array:
-    """Return columns (3 K, 3 or 9) that leave the readings of one dwell or sweep free."""
+    """Return the columns (3 K, 3 or 9) by which the readings of one dwell or sweep may differ from the model."""
     first, wide = (3 * segment, 3) if segment < model.dwells else (3 * model.dwells + 9 * (segment - model.dwells), 9)
     columns = np.zeros((model.movement.readings().size, wide))
     columns[first : first + wide] = np.eye(wide)
@@ -84,7 +84,7 @@ def _half_step(model: ReferenceModel) -> Array:
 
 
 def _dwell_columns(model: ReferenceModel) -> Array:
-    """Return columns (3 K, 3 N) that leave the reading of every axis in every dwell free."""
+    """Return the columns (3 K, 3 N) by which each axis' reading in each dwell may differ from the model."""
     count = 3 * model.dwells
     return np.eye(model.movement.readings().size)[:, :count]
 

@@ -64,8 +64,7 @@ class WhitenedReference:
 
         The statistic is twice the logarithm of the ratio, χ² if δ is given. Both likelihoods have their own restricted
         maximum-likelihood δ (Welham and Thompson, J. R. Stat. Soc. B 59 (1997) 701). If δ is estimated, the limit
-        approaches the quantile of F in proportion to δ's part of the variance. Columns None stand for the χ² of all
-        residuals.
+        approaches the quantile of F with δ's part of the variance. Columns None stand for the χ² of all residuals.
         """
         from scipy.special import chdtri
 

@@ -1,4 +1,4 @@
-"""The checks of accelerometers and magnetometers: bits and noise of readings, halves of dwells, and the model's fit."""
+"""The checks of accelerometers and magnetometers: bits and noise of readings, halves of dwells, fit of the model."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

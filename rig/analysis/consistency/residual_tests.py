@@ -29,7 +29,7 @@ class FaultMode(Generic[Subject]):
     """A possible fault, the `check` that detects it, and the `unit` of its size: None for the readings' unit.
 
     `patterns` returns the changes of the readings by one unit of the fault, a column for each form that it may have. A
-    change half-way through has zero mean, as a calibration absorbs the rest.
+    change half-way through the recording has zero mean, because the calibration absorbs any mean.
     """
 
     what: str
@@ -42,7 +42,8 @@ class FaultMode(Generic[Subject]):
 class TestResults:
     """The statistics of one sensor by the name of their check, each with its critical value.
 
-    - `worst`: that of the segment that differs most from the others; `disturbed`: those of all outliers, by index.
+    - `worst`: the statistic of the segment that differs most from the others; `disturbed`: the statistics of all
+      outliers, by index.
     - `detection_limits`: the minimal detectable size of fault modes, by name, if known.
     """
 

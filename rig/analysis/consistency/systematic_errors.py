@@ -1,8 +1,7 @@
 """The known systematic errors of arm and sensor in the segments of a recording: one pattern for each unknown.
 
 A pattern is the effect of one standard deviation of one error on all readings, as in the model of common errors
-(`rig.estimation.gyroscope.common_errors`). Along the swept axis only the arm's clock, encoders and times may have
-errors.
+(`rig.estimation.gyroscope.common_errors`). Along the swept axis only clock, encoders and times of the arm may err.
 """
 
 from collections.abc import Sequence
@@ -296,7 +295,7 @@ def _wave_indices(motion: ArmMotion) -> dict[int, int]:
 
 
 def _end_patterns(interval: MotionInterval) -> list[Array]:
-    """Return the rate errors (3,), rad/s per rad, of a transfer by angle errors of its moved joints at either end."""
+    """Return the errors (3,) of a transfer's rate, rad/s per rad, due to angle errors of its joints at its two ends."""
     q_rad = interval.motion.angles(np.array([interval.start_s, interval.end_s]))
     axes = interval.motion.axes(q_rad) / (interval.end_s - interval.start_s)
     moved = [joint for joint in _wave_indices(interval.motion) if np.ptp(q_rad[:, joint]) >= STILL_RAD]

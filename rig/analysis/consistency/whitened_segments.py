@@ -123,8 +123,7 @@ def build_whitener(segments: Segments, scatter: Scatter, bias: BiasProcess) -> A
 
     Noise and bias drift of each axis are whitened first, then the shared errors. Shared errors may be 10⁵ times the
     noise (a free nonlinearity), so one decomposition of both would lose the noise to rounding. No variance of the first
-    part is below the smallest noise: after a clock was set back, windows overlap, and the computed matrix is no
-    covariance.
+    part is below the smallest noise: after a clock was set back, windows overlap, and the matrix is no covariance.
     """
     count, bias_covariance = len(segments.sweep), bias.covariance(segments.times_s)
     noise_whitener, least = np.zeros((3, count, 3, count)), segments.variances_rad2_s2.min()

@@ -130,7 +130,7 @@ class Shortest:
 
     - `before`: the procedure in the file, None if its uncertainty cannot be predicted.
     - `nearest`: the candidate with the smallest ratio to the target if none meets it.
-    - `endless`: the budgets of all evaluated plans, and of a run of unlimited length for each family.
+    - `endless`: the budgets of all evaluated plans and, for each family of candidates, of a run of unlimited length.
     - `unreachable`: whether no run of this kind meets the target, however long.
     - `directions` (N, 3): those of the sweeps, None if there are none.
     """

@@ -18,7 +18,7 @@ from rig.observation.motion.arm_motion import ArmMotion
 
 @dataclass(frozen=True, slots=True)
 class PlannedSegments:
-    """The segments of sweeps and rests, and these with the transfers between them."""
+    """The segments of sweeps and rests, without and with the transfers between them."""
 
     segments: Segments
     with_transfers: Segments

@@ -23,8 +23,7 @@ class Equations:
     """The readings of a sensor and the attitudes in which they were taken.
 
     - `means`, `variances` (N, 3), with `dof` (N, 3) degrees of freedom of the variances.
-    - `attitudes` (N, 3, 3); `std_rad` (N,): their stated standard deviation; `reference`: the norm of the reference, or
-      its vectors.
+    - `attitudes` (N, 3, 3); `std_rad` (N,): their stated standard deviation; `reference`: its norm, or its vectors.
     """
 
     means: Array
@@ -103,8 +102,8 @@ class Equations:
 def _estimate_variances(rows: Rows, reference: KnownVector) -> tuple[Array, Array]:
     """Return the variances (N, 3) of the means and their dof, from one variance for all samples.
 
-    The residuals determine that variance. Rows are weighted equally: a model with attitude errors would take noise for
-    such errors. Raise Fault `too_few_observations` without redundant rows.
+    The residuals determine that variance. Rows are weighted equally, because a model with attitude errors would mistake
+    noise for such errors. Raise Fault `too_few_observations` without redundant rows.
     """
     counts = rows.samples[:, None]
     quiet = np.full_like(rows.means, (1e-9 * np.abs(rows.means).max()) ** 2) / counts

@@ -30,10 +30,9 @@ def check_sweeps_steady(data: ExternalData) -> None:
 
 
 def estimate_changes(data: ExternalData, matrix: Array) -> Array:
-    """Return the covariance (12, 12) that changes over the rows add to F `matrix` (3, 3), row by row, and bias.
+    """Return the covariance (12, 12) that the changes over the rows add to F (`matrix`, row by row) and bias.
 
-    The covariance includes an abrupt change, and changes of the bias from rest to rest; zero if the rows show no
-    change.
+    The covariance includes an abrupt change, and bias changes from rest to rest; it is zero if the rows show no change.
     """
     change = data.change
     abrupt = change.find_covariance(matrix) if change is not None and _counts(change) else np.zeros((12, 12))

@@ -234,7 +234,7 @@ def budget_of(solution: Estimate, data: ExternalData) -> Budget:
 
 
 def _fewest_of_means(data: ExternalData) -> float:
-    """Return the smallest degrees of freedom that the noise of a mean has."""
+    """Return the smallest degrees of freedom of any mean's noise."""
     return float(dof_by_axis(average.dof for average in [*(sweep.average for sweep in data.sweeps), *data.rests]).min())
 
 

@@ -25,9 +25,9 @@ MAX_ITERATIONS = 3  # the clock of one determines the increments of the next
 
 @dataclass(frozen=True, slots=True)
 class InIncrements:
-    """The solution, the duration of the windows of fixes, and the increments left out.
+    """The solution, the duration over which each attitude is averaged, and the increments left out.
 
-    `increments`: the number of increments if none were left out.
+    `increments`: the number of all increments, including those left out.
     """
 
     solution: KnownIncrements
@@ -57,7 +57,7 @@ class InIncrements:
 
     @property
     def notes(self) -> Iterator[str]:
-        """A note on attitudes that are turned from some time on."""
+        """A note if all attitudes after some time are rotated relative to those before it."""
         if (reset := self.solution.reset) is not None:
             yield (
                 f"from {reset[0]:.2f} s on, all attitudes are rotated by {np.degrees(reset[1]):.2g}° relative to "

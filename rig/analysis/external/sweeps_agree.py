@@ -76,7 +76,7 @@ class SweepErrors:
 def sweep_errors(solution: VectorSolution, data: ExternalData) -> SweepErrors | None:
     """Return the effect of the stated motion's errors, and of the sensor's changes, on the vector model's `solution`.
 
-    None for means corrected to one temperature: the polynomials include the contradictions of repeats.
+    Return None for means corrected to one temperature: their polynomials already include the contradictions of repeats.
     """
     if data.at_reference:
         return None

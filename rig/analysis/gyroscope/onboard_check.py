@@ -144,7 +144,8 @@ def _count_missing(sequence: NDArray[np.uint32]) -> int:
 def _solve(observations: Sequence[_BoardObservation]) -> tuple[Array, Array] | None:
     """Return scale and bias by the board's method, with equal weights.
 
-    None with too few observations, with other samples than the board reports, or if no mean could be checked.
+    Return None if there are too few observations, if the samples are not those that the board reports, or if no mean
+    could be checked.
     """
     accumulated = Accumulator.empty()
     if not any(observation.averaged for observation in observations):

@@ -18,8 +18,7 @@ from rig.observation.consistency.transfers import WristTransfer
 class Segments:
     """N segments of revolutions and rests: means of their readings.
 
-    - sweep (N,): index of the revolution, −1 of a rest; transfers between sweeps and rests have numbers from −2
-      downwards.
+    - sweep (N,): index of the revolution, −1 of a rest; transfers between these have numbers from −2 downwards.
     - position (N,): from −1 in the first segment of a window to 1 in the last.
     - means_rad_s, variances_rad2_s2 (N, 3): mean readings and their variances.
     - rates_rad_s (N, 3): angular rate of the flange in inertial space, in its frame.

@@ -156,8 +156,8 @@ def _return_errors(turns: Sequence[Observation], rests: int, uncertainty: Uncert
 def _encoder_errors(turns: Sequence[Observation], rests: int, uncertainty: Uncertainty) -> Array | None:
     """Return the errors (P, N, 3), as in `VectorInputs`, of a joint's encoder at each angle where arcs begin or end.
 
-    Sweeps in both directions share these angles, so repeats do not average the errors. None if all sweeps are whole
-    revolutions.
+    Sweeps in both directions share these angles, so repeats do not average the errors. Return None if all are whole
+    turns.
     """
     arcs = [None if turn.arc_rad is None else (turn.joint_name, *turn.arc_rad) for turn in turns]
     marks = list(dict.fromkeys((arc[0], end) for arc in arcs if arc is not None for end in arc[1:]))
@@ -174,7 +174,7 @@ def _encoder_errors(turns: Sequence[Observation], rests: int, uncertainty: Uncer
 
 
 def list_mount_rotations(stages: Sequence[int], rests: int, mount_deg: float) -> Array | None:
-    """Return the rotations (3 S, N, 3) of `VectorInputs`: mounts wrong by `mount_deg`; None with one stage."""
+    """Return the rotations (3 S, N, 3) of `VectorInputs` for mounts wrong by `mount_deg`; None with one stage."""
     first, *others = dict.fromkeys(stages)
     if not others:
         return None

@@ -43,14 +43,17 @@ ORDER_REMEDY = "Set procedure.second_order: false, which makes the bias much bet
 
 @dataclass(frozen=True, slots=True)
 class ValidationRepeat:
-    """The unused last repeat of the attitudes; `error_m_s2` (N,): norm of each calibrated acceleration less gravity."""
+    """The last repeat of the attitudes, which is held out of the solution to validate it.
+
+    `error_m_s2` (N,): the norm of each calibrated acceleration, minus gravity.
+    """
 
     dwells: tuple[DwellReading, ...]
     error_m_s2: Array
 
     @property
     def rms_m_s2(self) -> float:
-        """The root mean square of the attitudes' errors."""
+        """The root mean square of `error_m_s2`."""
         return float(np.sqrt(np.mean(self.error_m_s2**2)))
 
 
@@ -83,8 +86,8 @@ class AccelerometerResult:
     def correction_matrix(self) -> Array:
         """The matrix M (3, 3) of s = M (a − b).
 
-        M leads to the orthogonal frame nearest to the gyroscope's axes, which corrected rates and accelerations then
-        share; without an alignment, to the frame nearest to the accelerometer's own axes.
+        M takes readings to the orthogonal frame nearest to the gyroscope's axes, which corrected rates and
+        accelerations then share; without an alignment, to the frame nearest to the accelerometer's own axes.
         """
         matrix = self.triad.correction_matrix
         return matrix if self.alignment is None else self.alignment.rotation.T @ matrix

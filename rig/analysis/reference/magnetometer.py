@@ -35,8 +35,7 @@ class MagnetometerResult:
     """One magnetometer's calibration m = F B + b, in the axes of its nominal mounting.
 
     - `field_t`: the size of the field; `extension_m` (3,): the sensor's position on the flange.
-    - `triad`: scale, relative to `field_t`, and axes, with the solution's uncertainty; `budget`: uncertainty of all
-      causes.
+    - `triad`: scale, relative to `field_t`, and axes, with the solution's uncertainty; `budget`: the uncertainty.
     - `uniformity`: the test of the field over the attitudes; `drift`: between tests at home, None with fewer than two.
     - `measurements`: the means from which the solution is estimated, in tesla.
     - `other_methods`: the solutions by the other methods, or the Fault of a method that fails.

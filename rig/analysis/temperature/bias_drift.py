@@ -43,8 +43,7 @@ class BiasDrift:
     A gyroscope's bias includes the Earth's rate times the scale error, or all of the Earth's rate if none is stated
     (`earth_rate_known`); both are the same in every repeat.
 
-    - `scale_fixed`: biases with scale, axes and reference of the first repeat (accelerometers) or nominal ones
-      (gyroscopes).
+    - `scale_fixed`: biases with scale, axes and reference of the first repeat (accelerometer) or nominal (gyroscope).
     - `common_std` (3,): a further standard deviation common to all biases.
     - `scale_free`: the bias by a separate solution of every repeat, by the repeat's index.
     - `time_s`, `temperature_c` (R,): means over every repeat, times since the first repeat.
@@ -206,7 +205,7 @@ def _combine(
     *,
     earth_rate_known: bool,
 ) -> BiasDrift:
-    """Return the drift: biases with the scale fixed, those of `solve` by repeat, and the temperature slope."""
+    """Return the drift: biases with the scale fixed, biases by a separate `solve` of each repeat, temperature slope."""
     times = np.array([np.mean([mean.time_s for mean in repeat]) for repeat in repeats], dtype=np.float64)
     temperatures = np.array([np.mean([mean.temperature_c for mean in repeat]) for repeat in repeats], dtype=np.float64)
     faults = dict[str, Fault]()

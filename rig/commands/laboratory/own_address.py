@@ -23,8 +23,7 @@ def find_own_address(config: SensorsConfig, laboratory: str | None) -> Iterator[
     """Yield the overrides that give a configuration's laboratory an address of its own during the block.
 
     `laboratory` is the file with all defaults if it simulates a laboratory, else None. There are no overrides if the
-    address is free, the laboratory is real, or no candidate is free; in the last case a later claim of the address
-    fails.
+    address is free, the laboratory is real, or no candidate is free; in the last case a later claim fails.
     """
     if laboratory is None or not isinstance(config, RigConfig):
         yield []
@@ -42,7 +41,7 @@ def find_own_address(config: SensorsConfig, laboratory: str | None) -> Iterator[
 
 @contextmanager
 def load_at_own_address(path: Path, overrides: Sequence[str]) -> Iterator[Loaded]:
-    """Load a configuration, procedure excluded, with a laboratory address of its own. Raise as `load` does."""
+    """Load a configuration without its procedure, with a laboratory address of its own. Raise as `load` does."""
     loaded = load(path, overrides, sections=None)
     with find_own_address(loaded.config, loaded.laboratory) as moved:
         yield load(path, [*overrides, *moved], sections=None) if moved else loaded

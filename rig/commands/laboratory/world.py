@@ -22,8 +22,7 @@ def add(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     """Run only the world of a configuration, until Ctrl-C; return its exit status.
 
-    Raise Refused `only_on_linux`, as `load` does, and with `--faults` as `run_simulated_laboratory` does; Fault
-    `world_ended`.
+    Raise Refused `only_on_linux`, as `load` does, with `--faults` as `run_simulated_laboratory`; Fault `world_ended`.
     """
     refuse_unless_linux("the simulated laboratory")
     from rig.config.load import load

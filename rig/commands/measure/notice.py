@@ -1,4 +1,4 @@
-"""A user's command at the end of a run: a message, a mail or a lamp after hours of measurement."""
+"""The command of the user's own that ends a run, for example to send a mail after hours of measurement."""
 
 import os
 import subprocess

@@ -172,7 +172,7 @@ def _adopt(columns: dict[str, Any], *, inverse: bool, scalar_last: bool) -> None
 
 
 def _write(path: Path, looks: "Sequence[LookedFile]", columns: Mapping[str, Any]) -> None:
-    """Write the map, if one is needed, to a new file. Raise Refused `configuration_not_written`."""
+    """Write the column map, if one is needed, to a new file. Raise Refused `configuration_not_written`."""
     import yaml
 
     from rig.config.files.safe_writing import write_new

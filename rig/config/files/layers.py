@@ -19,8 +19,8 @@ Places = Mapping[Location, str]  # position of each key, in words: "line 3", "de
 class Layered:
     """The merged layers: the `document`, the `places` of its keys in files, and the `problems` of merging.
 
-    `written` is the text of every value that YAML reads as something other than text. `text` is that of a single file;
-    None if several are merged.
+    `written` is the text of every value that YAML reads as something other than text. `text` is the text of a single
+    file; None if several are merged.
     """
 
     document: dict[str, Any]
@@ -63,7 +63,7 @@ def merge_layers(text: str, path: Path | None, overrides: Sequence[str] = ()) ->
 
 
 def merge(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
-    """Merge `over` into `base`: sections key by key, lists and values complete; null removes a key."""
+    """Merge `over` into `base`: sections key by key, lists and values as a whole; null removes a key."""
     merged = dict(base)
     for key, value in over.items():
         below = merged.get(key)

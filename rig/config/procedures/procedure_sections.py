@@ -413,7 +413,7 @@ class ThermalSection(SixSweepsSection, AttitudesSection):
 
     @model_validator(mode="after")
     def check_temperature_range(self) -> Self:
-        """Refuse a range with too few sets for polynomials, a reference near its ends, and a limit within it."""
+        """Refuse a range too narrow for polynomials, a reference temperature near its ends, and a limit within it."""
         gaps, other = (2, "") if self.both_directions else (3, " with both_directions: false")
         if self.to_c - self.from_c < gaps * self.max_step_k:
             raise ValueError(

@@ -12,9 +12,9 @@ HEADROOM = 0.1  # fraction of the link: for replies, and for a clock that is sli
 
 @dataclass(frozen=True, slots=True)
 class LinkLoad:
-    """The stream of one sensor on the link: samples per second, raw or `calibrated`, raw ones also with accelerations.
+    """The stream of one sensor on the link: `rate_hz` samples per second, raw or `calibrated`.
 
-    `field`: whether the samples are a magnetometer's.
+    `acceleration`: whether raw samples also contain accelerations. `field`: whether the samples are a magnetometer's.
     """
 
     rate_hz: float

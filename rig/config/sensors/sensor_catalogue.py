@@ -29,7 +29,7 @@ class PartSpec:
 
     - rates_hz, ranges_deg_s: all data rates and ranges of its gyroscope.
     - rates_rule: the permitted rates in words.
-    - default_rate_hz, default_range_deg_s: those without a setting.
+    - default_rate_hz, default_range_deg_s: the values used if the configuration sets none.
     - g_sensitivity_deg_s_g: change of a reading by 1 g.
     - nonlinearity_percent: deviation from the best straight line, of full scale.
     - asymmetry_percent: the even part of the nonlinearity.

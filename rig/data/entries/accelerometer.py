@@ -49,7 +49,7 @@ class DwellEntry(Entry):
 
 
 class ValidationEntry(Entry):
-    """The last repeat of the attitudes, unused by the calibration: norm of the acceleration minus gravity."""
+    """The last repeat of the attitudes, which the calibration does not use: norm of the acceleration, minus gravity."""
 
     dwells: int
     rms_m_s2: float

@@ -11,7 +11,10 @@ class BiasEntry(Entry):
 
 
 class BiasStepEntry(Entry):
-    """A step of the bias before `repeat`, counted from 1, by `change` with `std`; most along `axis`."""
+    """A step of the bias before `repeat`, counted from 1.
+
+    `change` and its `std` are those of the `axis` with the largest part of the step.
+    """
 
     repeat: int
     axis: str

@@ -18,8 +18,8 @@ Freedom6 = Annotated[tuple[float | None, ...], Field(min_length=6, max_length=6)
 class ContributorEntry(Entry):
     """One line of the budget; `half_width`, in `unit`, is null for a contributor estimated from readings.
 
-    For a normal distribution it is the stated expanded uncertainty (k = 2). `std` and `variance_fraction` (of the
-    variance) are for kx ky kz bx by bz, in units of 1 and of the bias.
+    For a normal distribution, `half_width` is the stated expanded uncertainty (k = 2). `std` and `variance_fraction`
+    are in the order kx ky kz bx by bz; scale factors have the unit 1.
     """
 
     name: str

@@ -34,8 +34,7 @@ class OverTemperatureEntry(Entry):
     """Scale and bias of one quantity of a sensor: Σ coefficient (T − reference)ⁿ, n from 0 to 3, in SI units per Kⁿ.
 
     - The bias has the sign that it has in the calibration, and its unit.
-    - range_c: the range in which both are valid, from the part's own thermometer; table: values from one end to the
-      other.
+    - range_c: the valid range, by the part's own thermometer; table: values from one end to the other.
     - orders: those of the polynomials of scale and bias, as the readings require.
     - covariance (24, 24): in the order scale n = 0 x y z, n = 1 x y z, …, then the bias.
     - hysteresis: largest difference of a warming sensor from the mean of warming and cooling; null, and not in the

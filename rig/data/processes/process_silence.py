@@ -39,8 +39,7 @@ class Silence:
     def tick(self, unheard: bool = False) -> None:
         """Count one more interval without a sign of life.
 
-        Call this at even intervals. `unheard`: whether an unread answer has arrived, so that the process was not
-        silent.
+        Call this at even intervals. `unheard`: whether an unread answer waits, so that the process was not silent.
         """
         self._all_ticks += 1
         # The first tick of a silence means nothing yet; from the second on the process' threads are examined.

@@ -132,7 +132,7 @@ class Elsewhere:
     - `find_clock`: whether the attitudes have a clock of their own; `exact_rates`: whether their rates are exact, as of
       a rate table; `window_s`: duration over which attitudes are averaged for a gyroscope's increments, None for an
       automatic choice.
-    - `estimator`: None for the one that suits each quantity.
+    - `estimator`: its name; None to choose the one that suits each quantity.
     - `only`: the kinds of sensors to calibrate; empty for all that are recorded.
     """
 

@@ -3,9 +3,8 @@
 A fault hypothesis is that some factors are wrong: each of their equations gets its own column (Baarda's mean-shift
 model, 1968), and the decreases of χ² are compared. The largest decrease is reported.
 
-A single large outlier inflates the hand's standard deviations and is masked by them: the result holds, with a larger U.
-`find_masked_fault` finds it with standard deviations estimated without it. Biases are excluded, because real biases
-jump.
+A single large outlier inflates the hand's standard deviations, which then mask it: the result holds, with a larger U.
+`find_masked_fault` finds it by standard deviations without it. Biases are excluded, because real biases jump.
 """
 
 from collections.abc import Iterator, Sequence

@@ -93,11 +93,9 @@ class SessionConditions:
 class HandStds:
     """Standard deviations of a hand's errors, and of a sensor's errors outside the model.
 
-    - `repeat_rad`: that of the attitude when a face is laid down again; `closure_rad`: that of the heading after a
-      whole turn.
-    - `of_angle`: that of the angle of a quarter turn, about each axis; `walk_rad_s_sqrt_s`: that of the bias from rest
-      to rest.
-    - `acceleration_m_s2`: that of an accelerometer's reading at rest, across the vertical.
+    - `repeat_rad`: of the attitude when a face is laid down again; `closure_rad`: of the heading after a whole turn.
+    - `of_angle`: of the angle of a quarter turn, about each axis; `walk_rad_s_sqrt_s`: of the bias from rest to rest.
+    - `acceleration_m_s2`: of an accelerometer's reading at rest, across the vertical.
     """
 
     repeat_rad: float = 3e-4

@@ -57,7 +57,7 @@ def triaxial_bound(
 ) -> Array:
     """Return the Cramér–Rao bound (15, 15) of F by rows, v_ref and b; (18, 18) if `second_order` φ (3,) is given.
 
-    TRIAX (3), (10). Arguments have the shapes of `solve_triaxial` and true values. `known_references` (N, 3) are v̄;
+    TRIAX (3), (10). The arguments are true values, in the shapes of `solve_triaxial`. `known_references` (N, 3) are v̄;
     without them the norm of `reference` is given.
     """
     parts = [np.ravel(matrix), np.asarray(reference), np.asarray(bias)]

@@ -27,8 +27,7 @@ MIN_FITTED_EVIDENCE = 1.0  # ln of the Bayes factor with the sizes of the model 
 class AbruptChange:
     """A change of `what` at the time `from_s`; "attitude" is a rotation of the reference's own coordinates.
 
-    - `sizes` (3,): the change of each axis, in the readings' unit, relative to the scale factor, or rad; zero if
-      unknown.
+    - `sizes` (3,): the change of each axis, in the readings' unit, as a fraction, or in rad; zero if unknown.
     - `evidence`: ln of the Bayes factor minus ln of the number of possible changes (Bonferroni's correction).
     """
 

@@ -96,7 +96,7 @@ class AttitudeSamples:
 
 @dataclass(frozen=True, slots=True)
 class DriftState:
-    """An iterate of F (3, 3), b (3,), τ."""
+    """One iterate of the fit: the matrix F (3, 3), the bias b (3,) and the clock's offset τ."""
 
     matrix: Array
     bias: Array
@@ -110,9 +110,9 @@ class DriftState:
 
 @dataclass(frozen=True, slots=True)
 class FixedAttitudes:
-    """The integrated attitudes at N fixes: E (N, 3, 3), S (N, 3, 12), C ω (N, 3), middle times (N,), windows (N, 2).
+    """The integrated attitudes at N fixes, in the symbols of this module.
 
-    Of all samples: E (k, 3, 3) and C ω (k, 3).
+    E (N, 3, 3), S (N, 3, 12), C ω (N, 3), middle times (N,), windows (N, 2). Of all samples: E (k, 3, 3), C ω (k, 3).
     """
 
     attitudes: Array

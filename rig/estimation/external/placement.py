@@ -54,7 +54,8 @@ NOISE, ATTITUDES, PLACEMENTS, CHANGE = "noise", "attitudes", "placements", "abru
 class _Linear:
     """The linearised readings of N placements.
 
-    Residuals (N, 3), design (N, 3, q), variances of the noise (N, 3), E, and the stated standard deviations (N,).
+    Residuals (N, 3), design (N, 3, q), variances of the noise (N, 3), the effects E of a rotation, and the stated
+    standard deviations (N,).
     """
 
     residuals: Array

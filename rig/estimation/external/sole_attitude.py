@@ -1,7 +1,6 @@
 """The attitude on which a scale factor depends: no other attitude determines it, so none contradicts its error.
 
-Repeated rests in one attitude agree even if the attitude is wrong: they show that placements repeat, not that it is
-right.
+Repeated rests in one attitude agree even if the attitude is wrong: they show that placements repeat, no more.
 """
 
 import numpy as np

@@ -167,7 +167,7 @@ def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributo
         return covariance
 
     def evaluate_b(name: str, half_width: float, unit: str, source: str, patterns: Array) -> Contributor:
-        """Return a contributor of type B from `patterns` of its half-width."""
+        """Return a type B contributor, whose half-width changes the readings by `patterns` (k, N, 3), rad/s."""
         spread = propagate(patterns / np.sqrt(3))
         return Contributor(name, "B", "rectangular", half_width, unit, source, np.inf, spread)
 

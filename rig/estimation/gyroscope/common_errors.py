@@ -55,10 +55,10 @@ def solve_with_common_errors(
 ) -> tuple[VectorSolution, CommonErrors]:
     """Return the solution of the vector model corrected for common errors, and the estimated errors.
 
-    `effects` returns B (P, N, 3), in rad/s per standard deviation, from F (3, 3); the other arguments are described in
-    `solve_vector_model`. The solution's `covariance`, `matrix_covariance` and `response` contain the effect of the
-    readings; only `angles_covariance_rad2` also contains the remaining errors. Raise Fault as `solve_vector_model`
-    does.
+    `effects` takes F (3, 3) and returns B (P, N, 3): the change of the readings, rad/s, by one standard deviation of
+    each error. The other arguments are those of `solve_vector_model`. The solution's `covariance`, `matrix_covariance`
+    and `response` are due to the readings alone; `angles_covariance_rad2` includes the common errors that remain. Raise
+    Fault as `solve_vector_model` does.
     """
     means, rates, variances = (np.asarray(a, dtype=np.float64) for a in (means_rad_s, rates_rad_s, variances_rad2_s2))
 

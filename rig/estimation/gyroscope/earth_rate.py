@@ -9,8 +9,7 @@ estimated: F, c and ω_E.
 
 e contains the arm's errors: its angles, as in `explain`, and its repeatability, which tilts the axis of each sweep
 independently. A tilt of a hundred microradians at 1 rad/s is 20 °/h across the axis, where a sweep determines only its
-bias, so the attitudes determine the Earth's rate. An error in the end time of a revolution is a wrong speed, along the
-axis.
+bias, so the attitudes determine the Earth's rate. An error in a revolution's end time is a wrong speed, along the axis.
 
 Gravity and the Earth's axis are both fixed in the room. A g-sensitivity G = λ F has the same effect as an Earth's rate
 along the vertical, so one of them must be given: G, which is zero for an optical gyroscope, or the vertical component
@@ -89,7 +88,7 @@ class EarthRate:
 
     @property
     def latitude_rad(self) -> float:
-        """The latitude, from the rate's angle to the vertical, or from its level part if its vertical part is fixed."""
+        """The latitude: from the angle to the vertical, or from the horizontal part if the vertical part is fixed."""
         return float(np.arcsin(self.up @ self.rate_rad_s / self.norm_rad_s))
 
     @property
@@ -119,7 +118,10 @@ class EarthRate:
         return self._std((forward * to_left - sideways * ahead) / (forward**2 + sideways**2))
 
     def _level(self) -> tuple[Array, Array] | None:
-        """Return two level unit vectors: the projected x axis of the base, and to its left; None if x is vertical."""
+        """Return two horizontal unit vectors: the projection of the base's x axis, and the one 90° to its left.
+
+        Return None if the x axis is vertical.
+        """
         ahead = np.array([1.0, 0.0, 0.0]) - self.up[0] * self.up
         size = float(np.linalg.norm(ahead))
         return None if size < MIN_LEVEL_SINE else (ahead / size, np.cross(self.up, ahead / size))
@@ -257,7 +259,7 @@ def _condition(inputs: VectorInputs, directions: Array, gravity: Array | None) -
 def check_earth_rate(
     free_rad_s: Array, covariance_rad2_s2: Array, expected_rad_s: float = EARTH_RATE_RAD_S, component: str = "it"
 ) -> None:
-    """Check that an estimate (3,) of the Earth's rate, or a component, is significant and of the expected size.
+    """Check that an estimate (3,) of the Earth's rate, or of one component, is significant and of the expected size.
 
     Raise Fault `earth_rate_not_observable`.
     """

@@ -7,7 +7,7 @@ from rig.estimation.arrays import Array
 
 @runtime_checkable
 class Estimate(Protocol):
-    """A result of g = K (m + b): scale (3,), bias_rad_s (3,), covariance (6, 6) in the order kx ky kz bx by bz."""
+    """A solution of g = K (m + b): scale (3,), bias_rad_s (3,), covariance (6, 6) in the order kx ky kz bx by bz."""
 
     @property
     def estimator(self) -> str: ...

@@ -13,8 +13,7 @@ The second term corrects the trapezoidal rule, the third is coning (Bortz, IEEE 
 step, not per second, so they stay as small as the readings' differences if time stamps jitter. The amplitude of an
 oscillation with n readings per period is underestimated by (2π/n)⁴/720: 5e-6 at n = 25.
 
-A small error of the parameters δθ = (δF row by row, δb) adds δω = −F⁻¹ (δF ω + δb) to the rate and rotates the
-attitude:
+A small error of the parameters δθ = (δF row by row, δb) adds δω = −F⁻¹ (δF ω + δb) to the rate and rotates C:
 
     exp(S(t) δθ) C(t),   S(t) = −∫ C F⁻¹ [ω ⊗ 1, 1] dt        in coordinates of the first reading
 

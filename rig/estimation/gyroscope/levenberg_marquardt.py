@@ -22,7 +22,7 @@ REMEDY = "Sweep every wrist in both directions; a second sweep in one direction 
 
 @dataclass(frozen=True, slots=True)
 class LevenbergMarquardtSolution:
-    """A result of g = K (m + b): scale (3,), bias_rad_s (3,), covariance (6, 6) in the order kx ky kz bx by bz.
+    """A solution of g = K (m + b): scale (3,), bias_rad_s (3,), covariance (6, 6) in the order kx ky kz bx by bz.
 
     `iterations` counts evaluations of the model. `rank` and `condition` belong to the scaled design.
     """

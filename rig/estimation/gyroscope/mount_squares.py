@@ -30,8 +30,7 @@ def propagate_mount_squares(explained: Explained) -> Array:
 def _find_curvatures(explained: Explained, turns_rad: Array) -> Array:
     """Return the second derivatives (6, E, E) of scale and bias with respect to E mount errors, per prior std.
 
-    Errors of the rates change the estimate of F to F + D + S, with D of first and S of second order; k is 1 / ‖row of
-    F‖.
+    Errors of the rates change the estimate of F to F + D + S, with D of first and S of second order; k = 1/‖row of F‖.
     """
     inputs, matrix = explained.inputs, explained.solution.matrix
     inverse = _find_regression(explained)  # (3, 4, N)

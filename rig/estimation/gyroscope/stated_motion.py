@@ -78,7 +78,7 @@ class MotionErrors:
         """Return the expanded uncertainty U (q,) of values at 95.45 %, over all sizes of the motion errors.
 
         For given sizes the values have a normal distribution. `fixed` (q,) are the variances that do not depend on the
-        sizes, `of_rate` and `of_axis` (q,) those per squared size.
+        sizes, `of_rate` and `of_axis` (q,) the variances per squared size.
         """
         from scipy.special import ndtr
 

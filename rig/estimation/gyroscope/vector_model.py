@@ -49,19 +49,19 @@ class VectorSolution:
 
     - scale, bias_rad_s (3,): the diagonal of K, and b.
     - covariance (6, 6): in the order kx ky kz bx by bz.
-    - matrix (3, 3): F.
-    - matrix_covariance (12, 12): that of the rows of F, then c.
+    - matrix (3, 3): F of m = F ω + c, the scale factors and axes in one.
+    - matrix_covariance (12, 12): covariance of the rows of F, then c.
     - non_orthogonality_rad (3,): 90° minus the angles between y and z, z and x, x and y.
-    - mounting (3, 3): rotation from the flange frame to the sensor frame nearest to the three axes.
-    - angles_covariance_rad2 (6, 6): that of non_orthogonality_rad, then of small rotations of mounting about sensor x y
-      z.
+    - mounting (3, 3): rotation from the flange frame to the orthogonal frame nearest to the three axes.
+    - angles_covariance_rad2 (6, 6): covariance of non_orthogonality_rad, then of small rotations of mounting about
+      sensor x y z.
     - g_sensitivity (3, 3): in rad/s per m/s², None if not estimated.
-    - g_sensitivity_covariance (9, 9): that of its rows.
+    - g_sensitivity_covariance (9, 9): covariance of its elements, row by row.
     - response (6, N, 3): derivative of scale and bias with respect to the mean readings.
     - residuals_rad_s (N, 3): readings minus model.
-    - rank: that of the scaled design.
-    - condition: that of the design's part for axes and bias, without gravity.
-    - observations, iterations: numbers of means and of solutions.
+    - rank: rank of the scaled design.
+    - condition: condition number of the design's part for axes and bias, without gravity.
+    - observations, iterations: number of mean readings, and of solutions.
     - warnings: sentences for people.
     - estimator: the estimator's name.
     """

@@ -18,17 +18,17 @@ from rig.estimation.arrays import Array
 
 @dataclass(frozen=True, slots=True)
 class AccelerometerErrors:
-    """One standard uncertainty of each error, the same for all axes, and the records of K' dwells and sweeps.
+    """The standard uncertainty of each error, the same for all axes, and the records of K' dwells and sweeps.
 
-    - even_s2_m: φ, zero if it is estimated.
-    - odd_s4_m2: χ.
-    - norm_m_s2: g.
-    - bias_m_s2_k, scale_per_k: β and κ.
-    - warmer_k (K',): ΔT as recorded.
-    - unseen_k (K',): ΔT below the recorded steps.
+    - even_s2_m: quadratic nonlinearity φ, zero if it is estimated.
+    - odd_s4_m2: cubic nonlinearity χ.
+    - norm_m_s2: norm of gravity.
+    - bias_m_s2_k, scale_per_k: changes of bias and scale with temperature.
+    - warmer_k (K',): recorded deviation from the mean temperature.
+    - unseen_k (K',): deviation of the temperature below the recorded steps.
     - windows_s (K', 2): start and end of each dwell or sweep.
-    - instability_m_s2: the least Allan deviation of the flicker in w.
-    - walk_m_s2_sqrt_s: random walk of w, estimated from the readings.
+    - instability_m_s2: the least Allan deviation of the bias' flicker.
+    - walk_m_s2_sqrt_s: random walk of the bias, estimated from the readings.
     - louder (K',): estimated extra variance of a disturbed dwell or sweep, relative to its noise.
     - turning_m_s2: estimated difference of the bias in sweeps from that in dwells.
     """

@@ -56,9 +56,8 @@ class Sweeps:
     """Whole revolutions at nearly constant speed.
 
     - `harmonics_m_s2` (M, 3, 3): mean, cosine and sine over the joint's angle (rows) of the axes x y z.
-    - `covariances_m2_s4` (M, 9, 9): that of these nine, row by row, by `rig.estimation.reference.sweep_harmonics`.
-    - `axes_flange` (M, 3): unit vector of a rotation with increasing angle; `speeds_rad_s` (M,): negative if it
-      decreases.
+    - `covariances_m2_s4` (M, 9, 9): their covariances, row by row, from `rig.estimation.reference.sweep_harmonics`.
+    - `axes_flange` (M, 3): unit vector of a growing angle; `speeds_rad_s` (M,): negative if the angle falls.
     - `attitudes` (M, 3, 3): flange to base at the angle zero.
     - `arms_m` (M, 3): p, from the axis to the flange's origin, in flange coordinates.
     - `stations` (M,): a number for each joint and pose; sweeps of one station, in either direction, share errors.

@@ -36,7 +36,7 @@ CONVERGED_CHANGE_RATIO = 1e-3  # of δ
 class AttitudeError:
     """The std δ of attitudes about each axis, rad, beyond their stated uncertainty; `uncertainty_rad` is δ's own std.
 
-    Near zero the likelihood is one-sided, and `uncertainty_rad` is the std upwards.
+    Near zero the likelihood is one-sided, and `uncertainty_rad` is the std towards larger values.
     """
 
     std_rad: float

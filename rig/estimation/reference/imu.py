@@ -56,14 +56,14 @@ class ImuSolution:
     - reference_m_s2 (3,): v_ref in base coordinates.
     - lever_arm_m (3,), delay_s: r in the flange's frame, and τ; None without sweeps.
     - second_order_s2_m (3,): φ, or None.
-    - covariance (22, 22): that of F by rows, v_ref, b, r, τ, φ; zero for fixed ones.
+    - covariance (22, 22): in the order F by rows, v_ref, b, r, τ, φ; zero for fixed parameters.
     - response (22, 3 K): derivative of the parameters with respect to the readings.
     - attitude_error: δ of the arm, about each axis.
     - dwell_residuals_m_s2 (N, 3): readings minus model.
-    - chi_square, dof: those of these residuals and the sweeps'.
-    - rank, condition: those of the readings' derivatives, each column scaled to its norm.
+    - chi_square, dof: χ² of the residuals of dwells and sweeps, and its degrees of freedom.
+    - rank, condition: rank and condition number of the readings' derivatives, each column scaled to its norm.
     - sensor_errors: the sensor's own errors with those estimated, None if unknown.
-    - own_share: the independent fraction of δ².
+    - independent_fraction: the fraction of δ² that is independent in each dwell.
     - iterations: number of Gauss-Newton steps.
     - warnings: sentences for people.
     """

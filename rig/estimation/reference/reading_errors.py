@@ -109,7 +109,7 @@ def walking(sensor: AccelerometerErrors, movement: Movement) -> Array:
 
 
 def _expand_bias(covariance: Array, movement: Movement) -> Array:
-    """Return the covariance (3 K, 3 K) of the readings from that (N + M, N + M) of biases, independent by axis."""
+    """Return the covariance (3 K, 3 K) of readings due to biases of `covariance` (N + M, N + M), axes independent."""
     steady = movement.constant() > 0
     expanded = np.zeros((len(steady),) * 2)
     expanded[np.ix_(steady, steady)] = covariance

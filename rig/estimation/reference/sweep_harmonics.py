@@ -62,10 +62,10 @@ def first_harmonic(
 
     - time_s (n,): on the arm's clock.
     - readings_m_s2 (n, 3): the specific force.
-    - angle_rad, speed_rad_s (n,): the joint's at these times, from the arm's states; the angle is zero in the known
-      attitude.
-    - coloured: returns the ratio of the variance of a mean of residuals (n,) to that of white noise.
-    - swings: returns the columns (n, k) of spectral lines in residuals (n, 3).
+    - angle_rad, speed_rad_s (n,): angle and speed of the joint at these times, from the arm's states; the angle is zero
+      in the known attitude.
+    - coloured: takes residuals (n,); returns the variance of their mean, relative to that of white noise.
+    - swings: takes residuals (n, 3); returns the columns (n, k) of their spectral lines.
 
     Raise Fault `not_finite`, `incomplete_revolution`; ValueError for a wrong shape.
     """
@@ -100,7 +100,7 @@ def first_harmonic(
 
 
 def evenly_turning(speed_rad_s: float) -> Array:
-    """Return the motion terms (6, 3), `FirstHarmonic.turning_rad2_s2`, of a joint at constant speed."""
+    """Return `FirstHarmonic.turning_rad2_s2` (6, 3) of a joint that turns at constant speed."""
     turning = np.zeros((6, 3))
     turning[0, 0] = speed_rad_s**2
     return turning

@@ -68,7 +68,10 @@ class AllanReading:
 
 @dataclass(frozen=True, slots=True)
 class AllanAxis:
-    """The noise of one axis: N in the readings' unit times √s, B in their unit; or the Fault that prevents either."""
+    """The noise of one axis: random walk N in the readings' unit times √s, and bias instability B in that unit.
+
+    Each may be the Fault that prevents it.
+    """
 
     random_walk: AllanReading | Fault
     bias_instability: AllanReading | Fault
@@ -171,7 +174,7 @@ def _bounds(deviation: Array, dof: Array) -> tuple[Array, Array]:
 
 
 def _random_walk(curve: AllanCurve, axis: int) -> AllanReading | Fault:
-    """Return N = σ(τ) √τ at the τ nearest to 1 s, if the curve falls there as white noise does (1/√τ)."""
+    """Return the random walk N = σ(τ) √τ at the τ nearest to 1 s, if the curve falls there like white noise (1/√τ)."""
     index = int(np.argmin(np.abs(curve.tau_s - RANDOM_WALK_TAU_S)))
     tau_s, relative_std = float(curve.tau_s[index]), float(curve.relative_std[index, axis])
     if abs(tau_s - RANDOM_WALK_TAU_S) > RANDOM_WALK_TAU_S / 2:
@@ -205,7 +208,7 @@ def _random_walk(curve: AllanCurve, axis: int) -> AllanReading | Fault:
 
 
 def _instability(curve: AllanCurve, axis: int, walk: AllanReading | Fault) -> AllanReading | Fault:
-    """Return B from the minimum of σ, if that lies in the well-determined part of the curve."""
+    """Return the bias instability B from the minimum of σ, if that lies in the well-determined part of the curve."""
     relative_std = curve.relative_std[:, axis]
     usable = np.flatnonzero(relative_std <= MAX_INSTABILITY_STD)
     if not len(usable):

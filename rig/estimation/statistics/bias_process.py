@@ -136,8 +136,7 @@ def average_posterior(sizes: Array, likelihood: Array) -> Array:
     """Return the root-mean-square (2,) of sizes (K, 2) over the posterior.
 
     The prior is spike-and-slab, log-uniform in the slab. The maximum of the likelihood, and with it every uncertainty,
-    would by chance be far too small in one run and too large in another (Mitchell and Beauchamp, J. Am. Stat. Assoc. 83
-    (1988) 1023).
+    would by chance be far too small or too large (Mitchell and Beauchamp, J. Am. Stat. Assoc. 83 (1988) 1023).
     """
     return _root_mean_square(sizes, likelihood - np.log(GRID_POINTS) * np.count_nonzero(sizes, axis=1))
 

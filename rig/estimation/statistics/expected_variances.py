@@ -1,9 +1,9 @@
-"""Expected instead of most likely variance components of readings with shared errors.
+"""Variance components of readings with shared errors: expected values instead of the most likely ones.
 
-These are the arm's errors, the bias random walk, and the disturbance of single dwells, as in
-`rig.estimation.statistics.bias_process` and `rig.estimation.reference.shared_errors`, together. Only a few readings
-determine them: the most likely values, and with them every uncertainty, would by chance be too small in one run and too
-large in the next.
+The components are the arm's errors, the bias random walk, and the disturbance of single dwells, as in
+`rig.estimation.statistics.bias_process` and `rig.estimation.reference.shared_errors`, estimated together. Only a few
+readings determine a component. Its most likely value, and with it every uncertainty, would be too small in one run and
+too large in the next.
 """
 
 from collections.abc import Callable, Sequence
@@ -26,7 +26,7 @@ MAX_DISTURBANCE_RATIO, DISTURBANCE_GRID_POINTS = 30.0, 8
 class ResidualInputs:
     """Residuals (n,) of a fit, its columns `slopes` (n, q), and the covariances of the errors.
 
-    - `covariance` (n, n): without arm and random walk.
+    - `covariance` (n, n): covariance of all errors except the arm's and the random walk.
     - `effects(fraction)` (n, P): effects of the arm's errors, of which this fraction is independent in each dwell.
     - `walk` (n, n): covariance of a random walk of rate 1.
     - `noise` (n,): variances of the readings' own noise.
@@ -44,8 +44,8 @@ class ResidualInputs:
 class ErrorSizes:
     """The sizes of errors.
 
-    `walk`: the bias random walk in one second; `std_rad`: δ; `independent_fraction`: that of δ² which is independent in
-    each dwell.
+    `walk`: the bias random walk in one second; `std_rad`: δ; `independent_fraction`: the fraction of δ² that is
+    independent in each dwell.
     """
 
     walk: float
@@ -56,8 +56,8 @@ class ErrorSizes:
 def estimate_variances(fit: ResidualInputs, fractions: Sequence[float]) -> ErrorSizes:
     """Return the posterior mean squares of the variance components.
 
-    Priors: spike-and-slab for the random walk, log-uniform for its slab, for δ. The `fractions`, possible fractions of
-    δ² that are independent in each dwell, are equally probable.
+    The prior of the random walk is spike-and-slab, with a log-uniform slab; that of δ is log-uniform. The `fractions`,
+    possible fractions of δ² that are independent in each dwell, are equally probable.
     """
     constant = np.diag(fit.walk) > 0
     typical = np.sqrt(np.median(fit.noise[constant]) / np.median(np.diag(fit.walk)[constant]))
@@ -82,9 +82,9 @@ def estimate_variances(fit: ResidualInputs, fractions: Sequence[float]) -> Error
 def estimate_disturbances(
     fit: ResidualInputs, sizes: ErrorSizes, causes: Sequence[Array], odds: Sequence[float]
 ) -> Array:
-    """Return the expected variance (k,) of each of `causes`, which hold the columns (n, …) of one std.
+    """Return the expected variance (k,) of each of `causes`: the effects (n, …) of one std on the readings.
 
-    Priors: log-uniform, with `odds` (k,) that the cause exists.
+    The priors are log-uniform, with `odds` (k,) that the cause exists.
     """
     effects = sizes.std_rad * fit.effects(sizes.independent_fraction)
     whitener = np.linalg.inv(np.linalg.cholesky(fit.covariance + sizes.walk**2 * fit.walk + effects @ effects.T))

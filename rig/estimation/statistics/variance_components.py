@@ -147,9 +147,9 @@ class MixedModel:
         return [*(weights.T @ part @ weights for part in parts), fit.covariance * self.mixed.precision @ fit.covariance]
 
     def expand(self, maxima: Array, wanted: Array) -> Array:
-        """Return the half-widths (q,) of 95.45 % intervals of `wanted` (q, p) combinations of θ about their estimates.
+        """Return the half-widths (q,) of the 95.45 % intervals of q combinations of θ, the rows of `wanted` (q, p).
 
-        The estimates are those at the first of `maxima` (n, k); the intervals integrate over all standard deviations.
+        The intervals are about the estimates at the first of `maxima` (n, k), and integrate over all σ.
         """
         top = wanted @ self.solve(maxima[0]).theta
         offsets = []

@@ -22,8 +22,8 @@ MIN_REPEATS = 4  # for three parameters
 class BiasOverTemperature:
     """The `slope` (3,) per °C, its standard deviation (3,), and the range of temperatures in which it is valid.
 
-    `dof` (3,): degrees of freedom of the deviations, finite if they come from residuals. `correlation` is that of
-    temperature and time, whose slopes are estimated together.
+    `dof` (3,): degrees of freedom of the deviations, finite if they come from residuals. `correlation` is the
+    correlation of temperature and time, whose slopes are estimated together.
     """
 
     slope: Array

@@ -45,8 +45,7 @@ class RepeatedMeans:
     """Mean readings of repeated poses.
 
     - `means` (N, 3) and their `variances` (N, 3); `inputs` (N, 3): rates or specific forces in body axes.
-    - `poses` (N,): the number of the plan's pose, from 0; `windows_s` (N, 2); `temperature_c` (N,) from the
-      thermometer.
+    - `poses` (N,): the number of the plan's pose, from 0; `windows_s` (N, 2); `temperature_c` (N,), as measured.
     - `instability`: the Allan deviation of the bias' flicker.
     """
 
@@ -86,7 +85,7 @@ class OverTemperature:
 
     - `scale`, `bias` (4, 3): the coefficients of k and c, SI units per Kⁿ; `orders` of k and of c.
     - `range_c`: the only range in which both are valid. `zero` (3,): the readings at the reference for zero input.
-    - `lag_s`, `lag_std_s`: the thermometer's.
+    - `lag_s`, `lag_std_s`: the thermometer's lag and its standard deviation.
     - `hysteresis`: in mid-range, the difference (6,) of a warming sensor from the mean of both directions, and its
       standard deviation; None with one direction only.
     """
@@ -246,7 +245,10 @@ def heating_rate(windows_s: Array, temperature_c: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, slots=True)
 class _TemperatureFit:
-    """Coefficients (3 orders, 3) in T − reference, of k (relative) and c; covariances (18, 18) with, without lag."""
+    """One fit: the coefficients (3 orders, 3) of k, relative, and of c, in powers of T − reference.
+
+    `covariance` (18, 18) includes the effect of the fitted lag, `without_lag` does not.
+    """
 
     relative: Array
     bias: Array
@@ -379,7 +381,7 @@ class _ParameterFits:
     def _fit(
         self, orders: tuple[int, int], values: Array, covariance: Array, fixed: Array, aicc: float
     ) -> _TemperatureFit:
-        """Return the fit of `orders` from its `values` (p,): scale, bias and loop of each axis, then the lag."""
+        """Return the fit of `orders` from its `values` (p,): scale, bias and hysteresis of each axis, then the lag."""
         of_scale, of_bias = orders
         per_axis = (len(values) - 1) // 3
         by_axis = values[:-1].reshape(3, per_axis)
@@ -408,7 +410,7 @@ class _ParameterFits:
         return centre
 
     def covariance(self, covariance: Array, centre: Array) -> Array:
-        """Return all coefficients' covariance (24, 24), from that (18, 18) of orders 1 to 3."""
+        """Return the covariance (24, 24) of all coefficients, from the `covariance` (18, 18) of orders 1 to 3."""
         take = np.vstack([_coefficients_from_changes(centre, 0), _coefficients_from_changes(centre, 1)])
         return self.rescale(take @ covariance @ take.T)
 
@@ -420,9 +422,10 @@ class _ParameterFits:
 
 
 def _coefficients_from_changes(centre: Array, which: int) -> Array:
-    """Return the matrix (12, 18) from changes of k (0) or c (1) to its coefficients at a fixed mean of the readings.
+    """Return the matrix (12, 18) from the orders 1 to 3 of k and c to all four orders of k (`which` 0) or c (1).
 
-    An overestimated change makes the value at the reference too small, hence the negative mean power.
+    The mean over the readings is fixed. So if an order is overestimated, the value at the reference is too small by its
+    mean power (`centre`): hence the minus.
     """
     matrix = np.zeros((3 * (MAX_ORDER + 1), 6 * MAX_ORDER))
     first = 3 * MAX_ORDER * which

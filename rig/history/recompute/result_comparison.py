@@ -66,7 +66,7 @@ Answer = RecomputedResult | Unsolved
 
 @dataclass(frozen=True, slots=True)
 class ParameterMove:
-    """One parameter as stated (`before`) and as recomputed (`now`); `now` is None if no longer in the result."""
+    """One parameter as stated (`before`) and as recomputed (`now`); `now` is None if the result lacks it."""
 
     before: Parameter
     now: Parameter | None

@@ -31,8 +31,7 @@ def rig_effects(rigs: Sequence[str], sensors: Sequence[str], values: Array, std:
     """Return the effects of rigs on results (n,) with stds (n,), by `rigs` (n) and `sensors` (n).
 
     The two-way model is value = sensor + rig + run, with random runs (`random_effects.fit`). Within each group of rigs
-    connected by sensors, effects are relative to the rig with the most results; a rig without shared sensors has no
-    effect.
+    connected by sensors, effects are relative to the rig with the most results; a rig without any has no effect.
     """
     effects: list[RigEffect] = []
     names = np.array(rigs)

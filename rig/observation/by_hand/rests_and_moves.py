@@ -58,8 +58,8 @@ def range_of(sensor: RecordedSensor) -> float | None:
 class NotCounted:
     """The parts of a session that are left out, in the session's seconds.
 
-    `moves` and `rests`: their intervals; `seams`: the middles between recordings; `from_s`: the time before which
-    everything is left out. Events have times in microseconds of `microsecond_s`.
+    `moves` and `rests`: their intervals; `seams`: the middles of the gaps between recordings; `from_s`: the time before
+    which everything is left out. Events have times in microseconds of `microsecond_s`.
     """
 
     moves: list[tuple[float, float]] = field(default_factory=list)

@@ -62,8 +62,8 @@ class _Match:
 
     - `share`: the fraction of the sum of squares of all readings that the arm's motion explains. A wrong offset, which
       matches each sweep with the next, explains fewer sweeps.
-    - `fraction`: that of the readings taken while the arm's motion was recorded. `enough`: whether `fraction` is at
-      least `MIN_EXPLAINED`.
+    - `fraction`: the same fraction of the readings taken while the arm's motion was recorded. `enough`: whether
+      `fraction` is at least `MIN_EXPLAINED`.
     """
 
     enough: bool

@@ -24,7 +24,7 @@ class RawReadings:
     - counts (n, 3): the readings as recorded.
     - residual_counts (m, 3): readings minus their segment's mean and the vibration, for samples with recorded motion.
     - vibration_counts (3,): RMS of the arm's vibration.
-    - swing_rad2 (3,): mean square difference of the vibration's angle between two times in a rest.
+    - vibration_rad2 (3,): mean square difference of the vibration's angle between two times in a rest.
     """
 
     sweep: int
@@ -35,7 +35,7 @@ class RawReadings:
 
 
 def counts_of(stream: Stream, quantity: Quantity, inside: slice) -> NDArray[np.int64]:
-    """Return the counts (n, 3) of a quantity in the samples inside, as recorded."""
+    """Return the counts (n, 3) of a quantity in the samples `inside`, as recorded."""
     counts: NDArray[np.int64] = stream.sensor.channel(quantity).counts(stream.raw)[inside].astype(np.int64)
     return counts
 

@@ -67,7 +67,7 @@ class Segment:
     """A part of a revolution or rest, averaged.
 
     - position: from −1 in the first segment to 1 in the last.
-    - mean: that of the readings, rad/s.
+    - mean: the mean of the readings, rad/s.
     - rate_rad_s (3,): the flange's mean rate relative to the base, in the flange's frame, by the weights of `mean`.
     - attitude (3, 3): mean rotation from the base into the flange's frame.
     """

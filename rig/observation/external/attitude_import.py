@@ -79,8 +79,8 @@ class PlacedReadings:
     """The contents of the two files, for the `quantities` that were recorded.
 
     - `rows`: a gyroscope's averages; `turning`: its readings and all rows, for a solution by rotation angles.
-    - `placements`: those of the other sensors, or the fault.
-    - `clock`: that of the table, if it had to be found.
+    - `placements`: the placements of the other sensors, or the fault.
+    - `clock`: the table's clock, if it had to be found.
     - `omitted`: rows that the recording does not cover; `incomplete`: rows with missing samples and no mean rate.
     """
 
@@ -190,7 +190,7 @@ def average_placements(samples: Samples, table: Mapping[str, Array], *, find_clo
 class _ReferenceRows:
     """The rows of a reference: `windows` (N, 2), `attitudes` (N, 3, 3), and if given rates (N, 3) and stds (N,).
 
-    `numbers` (N,) are those of the rows in the file, from 1.
+    `numbers` (N,) are the rows' numbers in the file, from 1.
     """
 
     windows: list[Window]

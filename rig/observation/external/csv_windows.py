@@ -149,7 +149,7 @@ def check_complete(count: int, expected: float, window: Window, where: str, leas
 
 
 def is_complete(count: int, expected: float, least: int = MIN_SAMPLES) -> bool:
-    """Return whether a window holds the samples that are expected in it."""
+    """Return whether a window holds at least `least` samples, and nearly all of the `expected` ones."""
     return count >= max(least, (1 - MAX_LOST_FRACTION) * expected - 1)
 
 

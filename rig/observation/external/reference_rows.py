@@ -26,7 +26,7 @@ class Turning:
     """A gyroscope's `readings_rad_s` (n, 3) at `time_s` (n,), and the rows of a reference.
 
     `rows_s` (N, 2): start and end of each row; `attitudes` (N, 3, 3), body to table; `std_rad` (N,) as stated.
-    `on_arrival`: the readings' times are evened stamps of arrival, which hide single lost readings.
+    `on_arrival`: the readings' times are smoothed arrival times, which hide single lost readings.
     """
 
     time_s: Array

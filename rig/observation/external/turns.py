@@ -34,8 +34,8 @@ BY_HAND_AXIS_RAD = 0.02  # default tilt during the turn
 class TurnedData:
     """The input of a solution by increments.
 
-    - `gyroscope`: the gyroscope's readings; `turns`: those from rest to rest, with the numbers `rows` in the file;
-      `means`: those of the sweeps.
+    - `gyroscope`: the gyroscope's readings; `turns`: the turns from rest to rest, with the numbers `rows` in the file;
+      `means`: the means of the sweeps.
     - `noise_dof`, `bias_dof`: degrees of freedom of the noise, and of the bias' change between `rests`.
     - `hiding`: numbers of omitted rows, in which missing readings may hide a part of the turn.
     """

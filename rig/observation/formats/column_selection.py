@@ -16,8 +16,7 @@ from rig.observation.formats.csv_cells import DAY_S, is_value
 class Mapped:
     """The columns of another program's file.
 
-    - columns: each column's name in the file, or its number from 1, and the factor to SI, by the rig's name of the
-      column.
+    - columns: each column's name in the file, or its number from 1, and the factor to SI, by the rig's own name.
     - skip_lines: lines before the heading.
     - wraps: the number at which a counter of time begins again at 0, by the rig's name of the time.
     - rate_hz: rows per second, for a file without times.
@@ -124,7 +123,7 @@ def _select_mapped(path: Path, headings: Sequence[str], width: int, header: Head
 
 
 def _find_column(path: Path, headings: Sequence[str], width: int, name: str, column: str) -> int:
-    """Return the index of a column that the map names by heading or number from 1. Raise Refused `wrong_columns`."""
+    """Return the index of a column that the map names by its heading or its number. Raise Refused `wrong_columns`."""
     named = [index for index, heading in enumerate(headings) if heading == column]
     named = named or [index for index, heading in enumerate(headings) if heading.strip() == column.strip(" #%")]
     if not named and column.isdecimal():

@@ -67,7 +67,7 @@ def origin_of(times_s: Iterable[float]) -> int:
 
 
 def since(cell: str, factor: float, origin_s: int) -> float:
-    """Return the time in a cell, in units of `factor` s, from `origin_s` on, exactly. Raise as `seconds_of` does."""
+    """Return the exact time in a cell, in units of `factor` s, counted from `origin_s`. Raise as `seconds_of` does."""
     return float(seconds_of(cell, factor) - origin_s)
 
 

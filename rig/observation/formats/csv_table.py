@@ -40,7 +40,7 @@ LINE = "line"  # an additional column: the number of each row's line
 class CsvTable:
     """A file's `columns` (n,) by name, NaN for a blank cell, and the `lines` (n,) of its rows.
 
-    Times are relative to `origin_s`, whole seconds: 0, except in files whose clock began in 1970 or so.
+    Times are relative to `origin_s`, in whole seconds. It is 0, except for a clock that began in 1970 or so.
     """
 
     columns: dict[str, Array]

@@ -65,7 +65,7 @@ def _raise_no_file(path: Path) -> Iterator[None]:
 def _text(file: BinaryIO | GzipFile) -> TextIOWrapper:
     """Return a file's text, unpacked, in the encoding that its beginning shows.
 
-    Raise UnfitFile if it is not text. A text that is not UTF-8 is taken for the Windows encoding. Later damaged
+    Raise UnfitFile if it is not text. A text that is not UTF-8 is read in the Windows encoding. Later damaged
     characters are replaced; the row that contains them is refused by its line number.
     """
     if _read_beginning(file).startswith(GZIP):

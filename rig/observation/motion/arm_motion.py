@@ -36,8 +36,8 @@ class ArmMotion:
     """The `KnownMotion` of a chain of k joints: `angles(t)` (n, k) rad, and `rate(t)` (n, 3) rad/s of the flange.
 
     Rates come from the recorded joint angles, because the controller filters its velocity signal. `states` (m,) are
-    rows of `state_dtype`; `kinematics` and `names` are those of the joints. `mount` (3, 3) transforms all vectors in
-    the flange's frame to the item's: the identity unless a stage mounts the item differently. If single readings of an
+    rows of `state_dtype`; `kinematics` and `names` describe the joints. `mount` (3, 3) transforms all vectors in the
+    flange's frame to the item's: the identity unless a stage mounts the item differently. If single readings of an
     angle scatter (`reading_std_rad`), angles and rates are fitted over a window, and a turn ends where the reading
     recurs. Raise Fault `no_motion`, `not_finite`, `impossible_times`, `arm_clock_stepped`.
     """

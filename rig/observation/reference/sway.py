@@ -19,7 +19,7 @@ MIN_POWER_RATIO = 50.0  # of a sway's mean square, per column, to that of the en
 def sway_acceleration(
     motion: ArmMotion, joint: int, time_s: Array, window_s: tuple[float, float], extension_m: Array
 ) -> Array:
-    """Return the acceleration (n, 3), m/s², in the flange's frame, of a point by all joints but `joint`.
+    """Return the acceleration (n, 3), m/s², in the flange's frame, of a point moved by all joints but `joint`.
 
     - time_s (n,): in the turn, which begins and ends at `window_s`.
     - extension_m (3,): the point in the flange's frame.

@@ -1,9 +1,10 @@
 """The mean over a rest in which the arm vibrates, with weights that rise and fall smoothly at either end.
 
-In a plain mean over T the remainder of a vibration is its change of angle between both ends, divided by T: 2 mrad/s at
-14 Hz leave 0.7 deg/h RMS in ten seconds, three times the noise of a KVH 1775. Weights with raised-cosine flanks of
-length L (Tukey's window) divide it by 4 (f L)² − 1, two hundred with half a second. White noise averages a little
-worse, by n Σ w² with Σ w = 1: 4 % in variance in ten seconds, 10 % in the shortest rests.
+In a plain mean over the time T, a vibration leaves a remainder: the change of its angle from start to end, divided by
+T. 2 mrad/s at 14 Hz leave 0.7 deg/h RMS in ten seconds, three times the noise of a KVH 1775. Weights with raised-cosine
+flanks of length L (Tukey's window) reduce it by the factor 4 (f L)² − 1: 200 for half a second. White noise averages
+out a little worse. Its variance grows by the factor n Σ w², where Σ w = 1: by 4 % in ten seconds, by 10 % in the
+shortest rests.
 """
 
 from functools import lru_cache

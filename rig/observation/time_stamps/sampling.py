@@ -199,10 +199,10 @@ def _count_missing(time_s: Array, width: int, quantile: float) -> _PeriodCandida
 
 
 def _is_beat(missing: NDArray[np.intp]) -> bool:
-    """Return whether the missing readings (n − 1,) come more regularly than by chance.
+    """Return whether the missing readings (n − 1,) are a beat: they come more regularly than by chance.
 
-    Stamps of a polled port, multiples of a time shorter than the interval, cause such a beat. So does a logger that
-    loses every n-th reading, but it hardly loses as many.
+    The stamps of a polled port cause a beat, if they are multiples of a time shorter than the interval. A logger that
+    loses every n-th reading causes one too, but hardly loses as many.
     """
     missing = np.minimum(missing, 1)  # a gap counts once
     lost = int(missing.sum())
@@ -217,8 +217,7 @@ def _is_beat(missing: NDArray[np.intp]) -> bool:
 def _interval_s(time_s: Array, missing: NDArray[np.intp], width: int) -> float:
     """Return the mean interval between readings, including the missing ones, over the whole recording.
 
-    The recording lasts from the most punctual of its first `width` readings to the most punctual of its last `width`
-    readings.
+    The recording lasts from the most punctual of its first `width` readings to the most punctual of its last `width`.
     """
     steps_s, few = np.diff(time_s), missing <= MAX_COUNTED_LOSS
     interval_s = float(steps_s[few].sum() / (1 + missing[few]).sum())

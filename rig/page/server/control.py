@@ -57,9 +57,9 @@ class Control:
             return True
 
     def ask(self, announcement: Sequence[str], to_do: str) -> bool | None:
-        """Wait for the operator's answer from a browser; return None if no page is left to answer.
+        """Wait for the operator's answer from a browser, whether to do `to_do`; None if no page is left to answer.
 
-        The page shows the question like all events.
+        The page shows the question, with the `announcement` before it, as it shows every event.
         """
         with self._changed:
             self._question += 1

@@ -22,7 +22,7 @@ INTEGRAL_TIME_S = 30.0  # of the controller
 class TemperatureCourse:
     """The course through a range of temperatures with gaps of at most `max_step_k`.
 
-    `sets`: those measured. `warming`: the present direction, None before a temperature is known.
+    `sets`: the measured sets. `warming`: the present direction, None before a temperature is known.
     """
 
     from_c: float

@@ -48,14 +48,14 @@ def temperature_rows(entry: OverTemperatureEntry, unit: DisplayUnit) -> list[Tem
 
 
 def scale_curves(entry: OverTemperatureEntry) -> Curves:
-    """Return the change of the scale factors from the reference temperature."""
+    """Return curves of the change of the scale factors relative to the reference temperature."""
     first = np.array(entry.scale[0])
     values = np.array([row.scale for row in entry.table]) / first - 1
     return _curves(entry, values, np.array([row.expanded_scale for row in entry.table]) / first, FRACTION_UNITS)
 
 
 def bias_curves(entry: OverTemperatureEntry, quantity: Quantity) -> Curves:
-    """Return the change of the biases from the reference temperature."""
+    """Return curves of the change of the biases relative to the reference temperature."""
     values = np.array([row.bias for row in entry.table]) - np.array(entry.bias[0])
     return _curves(entry, values, np.array([row.expanded_bias for row in entry.table]), quantity.residuals)
 

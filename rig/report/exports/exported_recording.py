@@ -132,8 +132,7 @@ Exported = WithMotion | ReadingsAlone
 def export_recordings(runs: Sequence[RunData]) -> tuple[Exported, ...]:
     """Return the recordings of one run for export.
 
-    Raise Fault as `observe_runs` does; Refused `nothing_to_export` without a finished sweep or dwell, or without
-    readings.
+    Raise Fault as `observe_runs` does; Refused `nothing_to_export` without a finished step, or without readings.
     """
     recordings: tuple[Exported, ...]
     if all(run.turner is not None and run.turner.joints for run in runs):

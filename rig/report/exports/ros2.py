@@ -90,7 +90,7 @@ def _messages(types: Mapping[str, Any], recording: Exported, name: str, frame: s
 
 
 def _covariance(noises: Sequence[Array]) -> Array:
-    """Return the covariance (9,) of one sample by rows; without rests zeros, which ROS reads as "unknown"."""
+    """Return the covariance (9,) of one sample, row by row; zeros without rests, which ROS reads as "unknown"."""
     variance = np.mean(np.square(noises), axis=0) if noises else np.zeros(3)
     return np.diag(variance).ravel()
 

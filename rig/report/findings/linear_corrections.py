@@ -42,7 +42,7 @@ class Corrected:
 
     - `full_scale` is None if it was not stated.
     - `scale` (3,) is the factor along each axis, for programs that take no matrix.
-    - `g_sensitivity` (3, 3): that of a gyroscope, rad/s per m/s².
+    - `g_sensitivity` (3, 3): a gyroscope's g-sensitivity, rad/s per m/s².
     - `second_order`: whether an accelerometer has quadratic terms, which no other program supports.
     """
 

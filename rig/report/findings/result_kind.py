@@ -44,7 +44,7 @@ class DisplayRow:
     """A row of page and notebook: numbers, with scale factors if there are any.
 
     - sensor, quantity: the sensor and what it measures.
-    - name, unit: those of the row.
+    - name, unit: the row's name and unit.
     - numbers: the values with U.
     - combined: whether U includes all contributors; otherwise it is two standard deviations of the noise.
     - scale: the scale factors with U.
@@ -107,7 +107,7 @@ class ResultKind(Generic[EntryT]):
     - name: its name for people.
     - key: its key in result.json.
     - entries: builds the entries there, if the run has any.
-    - find: finds them in a document.
+    - find: finds the entries in a document.
     - printed: yields tables and lines for the terminal.
     - shown: builds the row of page and notebook.
     - followed: builds the record of a history.

@@ -69,7 +69,10 @@ def not_as_signed(name: str, why: str) -> Refused:
 
 
 def list_signer_doubts(name: str, report: SignatureReport, why: str) -> list[Refused]:
-    """Return the problem of an unaltered file whose signer is unknown, or not trusted: `why`, empty if trusted."""
+    """Return the problem of an unaltered file: its signer is unknown, or not trusted.
+
+    `why`: the reason of the distrust, empty if the signer is trusted.
+    """
     if report.trusted is None:
         return [
             Refused(

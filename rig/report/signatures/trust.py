@@ -113,8 +113,7 @@ def _other_name(certificate: "Certificate", expected: str | None) -> str:
 def find_unvouched(chain: "Sequence[Certificate]", trust: Trust) -> list["Certificate"]:
     """Return those certificates of a signer's `chain` whose content nothing verifies, apart from the first.
 
-    The signature itself identifies the first. The others must be trusted, or issued by a trusted one or one of the
-    chain.
+    The signature itself identifies the first. The others must be trusted, or issued by a trusted one or by another.
     """
     from cryptography.hazmat.primitives.serialization import Encoding
     from cryptography.x509 import load_der_x509_certificate

@@ -14,13 +14,13 @@ class KvhInfo:
     """A KVH 1775 and its stream.
 
     - sensor: the sensor's name.
-    - port, baud: its line.
-    - serial_number: the instrument's.
-    - settings: those in its memory.
-    - built_in_test: the result, None without one.
+    - port, baud: its serial line.
+    - serial_number: the instrument's serial number.
+    - settings: the settings in its memory.
+    - built_in_test: the result of its built-in test, None without one.
     - messages, lost: numbers of received and lost messages.
     - rotation, acceleration_g (3,): means over the messages, in the instrument's units.
-    - status: that of the messages, None without messages.
+    - status: the status in the messages, None without messages.
     - problem: why no stream was received, or None.
     """
 

@@ -207,5 +207,5 @@ def _motion(step: Step) -> tuple[str, str, str]:
 
 
 def _names(q_rad: Joints) -> Sequence[str]:
-    """Return the names of joints: those of an arm, else numbers."""
+    """Return the names of the joints: an arm's names, or else numbers."""
     return JOINT_NAMES if len(q_rad) == len(JOINT_NAMES) else [f"joint {i + 1}" for i in range(len(q_rad))]

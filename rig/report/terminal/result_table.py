@@ -28,7 +28,7 @@ ALL_OF_IT = "the same command with --all"
 def print_outcome(document: ResultDocument, *, as_json: bool, whole: bool = False, folder: Path | None = None) -> None:
     """Print a result that is not stored: as JSON for machines; for people its ending or, if `whole`, all tables.
 
-    `folder` is that of its run, for remedies.
+    `folder` is the folder of its run, which remedies name.
     """
     console = Console(highlight=False)
     if as_json:

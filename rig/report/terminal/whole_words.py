@@ -1,4 +1,4 @@
-"""Fits a table into a terminal without cutting words: columns shrink to their longest word, then the frame ends."""
+"""Fits a table into a terminal without cutting words: columns shrink to their longest word, then lose the frame."""
 
 from rich import box
 from rich.cells import cell_len

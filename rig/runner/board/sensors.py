@@ -56,7 +56,7 @@ class BoardSource:
         self.board.check(clock_s)
 
     def catch_up(self) -> None:
-        """Wait for samples before an answer (see `SampleSource`). Raises BoardError."""
+        """Wait for the samples that precede the board's answer to a request (see `SampleSource`). Raise BoardError."""
         self.board.status()
 
 

@@ -138,7 +138,7 @@ class Kvh1775:
             raise self._why_no_answer() from error
 
     def _why_no_answer(self) -> SensorError:
-        """Return the error of an instrument that does not answer: by what it sends instead, if anything."""
+        """Return the error of an instrument that does not answer, judged by what it sends instead, if anything."""
         if self._message_count:
             does_not_hear = f"{self._where} sends, but does not answer"
             return SensorError("kvh_does_not_hear", does_not_hear, "Check the pair of wires to its receiver")

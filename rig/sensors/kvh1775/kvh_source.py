@@ -40,7 +40,7 @@ class Kvh1775Source:
     def __init__(
         self, name: str, section: SensorSection, on_samples: OnSamples, *, patience: Patience = PATIENCE
     ) -> None:
-        """Connect and set up the instrument. Raise SensorError `kvh_other_serial_number`, and as `refusals` yields."""
+        """Connect and set up the instrument. Raise SensorError `kvh_other_serial_number`, and those of `refusals`."""
         self._name, self._on_samples = name, on_samples
         line = _port_section(section)
         self._required = make_settings(section)

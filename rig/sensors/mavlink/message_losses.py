@@ -48,7 +48,7 @@ class ImuCounter:
     - `name`, `interval_us`: the sensor, and the nominal interval of its samples.
     - `unit_us`: the unit of the autopilot's time.
     - `repeated`: the count of messages without a new time.
-    - `number`, `time_us`: those of the last sample; the time is unwrapped (32 bits wrap after 49.7 days).
+    - `number`, `time_us`: number and time of the last sample; the time is unwrapped (32 bits wrap after 49.7 days).
     """
 
     name: str

@@ -19,7 +19,7 @@ RIGHT_ANGLES = {
 
 @cache
 def board_rotation(number: float) -> Array | None:
-    """Return the rotation (3, 3) from the board's axes to the vehicle's, None unless all entries are 0 or ±1."""
+    """Return the rotation (3, 3) from the board's axes to the vehicle's, None if an entry is neither 0 nor ±1."""
     angles = RIGHT_ANGLES.get(int(number)) if number == int(number) else None
     if angles is None:
         return None

@@ -25,7 +25,7 @@ NOT_REPORTED = "not reported"
 
 
 def stop_problem(host: str, version: tuple[int, ...]) -> Problem | None:
-    """Return why the rig could not stop the arm at this controller without its client; None if it could."""
+    """Return why the rig could not stop the arm at this controller if the client failed; None if it could."""
     interface = PrimaryStop if is_polyscope_x(version) else Dashboard
     try:
         interface(host, CLOSED_PORT_TIMEOUT_S).close()

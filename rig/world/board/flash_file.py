@@ -48,7 +48,10 @@ def open_flash(path: Path | None) -> FlashMemory:
 
 
 def _check(data: bytes) -> None:
-    """Raise UnfitFile unless `data` is a flash. This protects other files, because the named file will be replaced."""
+    """Raise UnfitFile unless `data` is the content of a flash.
+
+    The named file will be replaced, so this protects another file that is named by mistake.
+    """
     if len(data) < FLASH_BYTES or len(data) % 4:
         raise UnfitFile(f"it has {len(data)} bytes")
     stack, reset = struct.unpack_from("<II", data)

@@ -83,9 +83,9 @@ Action = FlipAction | TurnAction | WaitAction
 class Habits:
     """How a hand moves and lays down a body. Values that are drawn for every action are standard deviations.
 
-    `tilt_mrad`: repeatability of a face put down again; `closure_mrad`, `heading_mrad`: heading errors after a turn
-    against an edge, and after a flip; `faces_mrad`: the box' deviation from squareness; `table_mrad`: the table's tilt;
-    `lever_arm_m`: the sensor's position from the point of rotation.
+    `tilt_mrad`: repeatability of a face put down again; `closure_mrad`: heading error after a turn against an edge;
+    `heading_mrad`: heading error after a flip; `faces_mrad`: the faces' deviation from right angles; `table_mrad`: the
+    table's tilt; `lever_arm_m`: the sensor's position from the point of rotation.
     """
 
     peak_deg_s: float = 250.0

@@ -70,7 +70,7 @@ class OutOfReach(ProgramError):
 
 
 class Messages:
-    """The newest messages, numbered."""
+    """The controller's newest messages, numbered."""
 
     def __init__(self) -> None:
         self._messages: deque[Message] = deque(maxlen=KEPT_MESSAGES)
@@ -94,5 +94,5 @@ class Messages:
         self._messages.append(message)
 
     def after(self, number: int) -> list[Message]:
-        """Return the messages after number `number`; all with 0."""
+        """Return the messages after number `number`; all messages for 0."""
         return [message for message in self._messages if message.number > number] if self.last > number else []

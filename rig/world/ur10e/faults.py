@@ -23,8 +23,7 @@ class ArmFaults:
     """Faults of the arm, each until it is set again. `payload_stays`: programs cannot change the payload.
 
     `safety_limit`: the fraction of the programmed speed that a safety limit permits. `clock_step_s`: the sum of all
-    steps of the controller's clock. `encoder_error_rad`: errors of reported joint angles by joint (0 to 5), which may
-    be NaN.
+    steps of the controller's clock. `encoder_error_rad`: errors of reported angles by joint (0 to 5), possibly NaN.
     """
 
     safety_limit: float = 1.0

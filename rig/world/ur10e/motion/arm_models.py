@@ -27,8 +27,8 @@ class ArmModel:
     """One arm model.
 
     `limit_rad` and `speed_rad_s`: greatest joint angles, to either side, and speeds. `home_deg` and `polyscope`:
-    initial pose and software version, if the configuration has none. `name` is the dashboard's. `encoder_step_rad`:
-    that of a UR3 of the CB3 series, from its logs; the e-Series' step is only known to be finer.
+    initial pose and software version, if the configuration has none. `name` is the dashboard's. `encoder_step_rad`: the
+    encoders' step, for a UR3 of the CB3 series from its logs; the e-Series' step is only known to be finer.
     """
 
     robot_type: int

@@ -27,7 +27,10 @@ Shaken = tuple[int, float, float, float]
 
 
 class Yielding(NamedTuple):
-    """The yielding of one joint, rad, at a time t (s) after a tick's start: end + (start + slope t) exp(−t/τ)."""
+    """The deflection, rad, of a joint that yields to its acceleration, at a time t (s) in a tick.
+
+    It is end + (start + slope t) exp(−t/τ).
+    """
 
     joint: int
     end_rad: float
@@ -73,9 +76,9 @@ class JointDrive:
         return shaken
 
     def advance(self, yielding: Sequence[Yielding], change_rad_s: Sequence[float]) -> tuple[Yielding, ...]:
-        """Return the yielding of the joints in the next tick, if their targets' rates change by `change_rad_s`.
+        """Return the joints' deflections in the next tick, if their targets' rates change by `change_rad_s`.
 
-        `yielding` is their yielding in the last tick.
+        `yielding` are the deflections in the last tick. Joints without a deflection are left out.
         """
         if not self.yield_s2 or not (yielding or any(change_rad_s)):
             return ()
@@ -89,7 +92,7 @@ class JointDrive:
         return tuple(joints)
 
     def yield_at(self, yielding: Yielding, elapsed_s: float) -> Derivatives:
-        """Return a joint's yielding `elapsed_s` after the start of the tick, and its derivatives."""
+        """Return a joint's deflection `elapsed_s` after the start of the tick, and its derivatives."""
         per_s = 1.0 / self.yield_time_s
         decay = exp(-elapsed_s * per_s)
         remainder = (yielding.start_rad + yielding.slope_rad_s * elapsed_s) * decay

@@ -1,8 +1,7 @@
 """The servo's vibration: a position ripple locked to the joint's angle, so that whole turns integrate exactly.
 
 q = u + Σ Aₙ sin(n u + φₙ), with u the smooth angle that drives the joint and n whole cycles a turn. After a turn of u
-the joint has made a turn too, regardless of the ripple; the mean speed in SIX, section on vibration, requires exactly
-this.
+the joint has made a turn too, regardless of the ripple; the mean speed in SIX, section on vibration, requires this.
 """
 
 from collections.abc import Sequence
