@@ -26,7 +26,7 @@ Ratio = Annotated[float, Field(json_schema_extra=RATIO)]
 WholeNumber = Annotated[int, Field(json_schema_extra=RATIO)]
 
 
-def no_number_is_true(cls: type[BaseModel], value: Any, info: ValidationInfo) -> Any:
+def refuse_boolean_number(cls: type[BaseModel], value: Any, info: ValidationInfo) -> Any:
     """Refuse true and false for numbers: YAML reads yes and on as true, which counts as 1."""
     field = cls.model_fields.get(info.field_name or "")
     if isinstance(value, bool) and field is not None:
@@ -46,7 +46,7 @@ class Section(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
 
-    _numbers = field_validator("*", mode="before")(classmethod(no_number_is_true))
+    _numbers = field_validator("*", mode="before")(classmethod(refuse_boolean_number))
 
 
 def check_host(name: str) -> str:

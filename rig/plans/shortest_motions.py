@@ -25,18 +25,18 @@ def vary_arm(config: RigConfig) -> Iterator[Motion]:
     procedure = config.procedure
     assert isinstance(procedure, SixSweepsSection)
     axes = (3, 6) if procedure.axes == 3 and not procedure.mountings else (procedure.axes,)
-    several, some = procedure.speeds_deg_s, _speeds_deg_s(config)
-    speeds: list[tuple[float, Mapping[str, object]]] = [
-        *((speed, {"speed_deg_s": speed, "speeds_deg_s": None}) for speed in some),
-        *((speed, {"speeds_deg_s": (speed, some[-1])}) for speed in some[:-1]),
+    possible = _speeds_deg_s(config)
+    slowest_and_keys: list[tuple[float, Mapping[str, object]]] = [
+        *((speed, {"speed_deg_s": speed, "speeds_deg_s": None}) for speed in possible),
+        *((speed, {"speeds_deg_s": (speed, possible[-1])}) for speed in possible[:-1]),
     ]
-    if several is not None:
-        speeds = [(min(several), {})]
-    turned = TURNS_DEG if config.uncertainty.angle_std_deg is None or config.magnetometers else (*ARCS_DEG, *TURNS_DEG)
-    for count, (slowest, keys), arc_deg in product(axes, speeds, turned):
+    if procedure.speeds_deg_s is not None:
+        slowest_and_keys = [(min(procedure.speeds_deg_s), {})]
+    arcs = TURNS_DEG if config.uncertainty.angle_std_deg is None or config.magnetometers else (*ARCS_DEG, *TURNS_DEG)
+    for count, (slowest, keys), arc_deg in product(axes, slowest_and_keys, arcs):
         if arc_deg / slowest <= MAX_SWEEP_S:
-            closed = arc_deg % 360 == 0
-            yield (count, *keys.values(), closed), arc_deg, {**keys, "axes": count, "arc_deg": arc_deg}
+            family = (count, *keys.values(), arc_deg % 360 == 0)
+            yield family, arc_deg, {**keys, "axes": count, "arc_deg": arc_deg}
 
 
 def vary_attitudes(config: RigConfig) -> Iterator[Motion]:

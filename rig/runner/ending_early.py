@@ -81,10 +81,10 @@ class EndingEarly:
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
 
-    def conclude(self, looked: "Future[ReachedUncertainty | None]") -> UncertaintySoFar | None:
+    def conclude(self, assessment: "Future[ReachedUncertainty | None]") -> UncertaintySoFar | None:
         """Return the uncertainty if it was computed in time; end the run if the target is met."""
         self._due = False
-        reached = looked.result() if looked.done() else None
+        reached = assessment.result() if assessment.done() else None
         if reached is None:
             return None
         self.ended = self.wanted.ratio_to_target(reached) <= TARGET_RATIO

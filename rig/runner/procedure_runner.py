@@ -292,11 +292,14 @@ class Rig:
         if self.early.due():
             turner = self.devices.turner
             host_s, turner_s = time.monotonic(), turner.latest.time_s
-            with self.early.look_in_background() as looked:
+            with self.early.look_in_background() as assessment:
                 # By both clocks: this computer may be busy, and the controller's clock may be simulated.
-                while not looked.done() and min(time.monotonic() - host_s, turner.latest.time_s - turner_s) < SOLVING_S:
+                while (
+                    not assessment.done()
+                    and min(time.monotonic() - host_s, turner.latest.time_s - turner_s) < SOLVING_S
+                ):
                     turner.rest(SETTLING_POLL_S, self._check)
-                reached = self.early.conclude(looked)
+                reached = self.early.conclude(assessment)
             if reached is not None:
                 self.recording.station.event(reached)
         return self.early.skips(motion)
@@ -308,10 +311,10 @@ class Rig:
         if self.warming is None:
             revolutions = self.onboard.revolutions(sweep)
         else:
-            with self.onboard.look_in_background(sweep) as looked:
-                while not looked.done():
+            with self.onboard.look_in_background(sweep) as windows:
+                while not windows.done():
                     self.devices.turner.rest(SETTLING_POLL_S, self._check)
-            revolutions = looked.result()
+            revolutions = windows.result()
         self.onboard.observe(sweep, revolutions)
 
     def rest(self, rest: Rest) -> None:

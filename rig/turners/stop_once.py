@@ -74,7 +74,7 @@ def stopping_on_error(stop: Callable[[], StopOutcome]) -> Iterator[None]:
         raise
 
 
-def tell_of_stop(error: BaseException, stop: Callable[[], StopOutcome]) -> None:
+def stop_and_note(error: BaseException, stop: Callable[[], StopOutcome]) -> None:
     """Stop, and add the outcome as a note to the error that caused the stop."""
     try:
         outcome = stop()

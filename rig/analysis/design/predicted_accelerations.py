@@ -42,17 +42,15 @@ def _budget(accelerometer: PlannedAccelerometer) -> Budget:
     covariance, response = covariance_bound(model.theta, movement, delta_rad, second_order=model.second_order)
     scale = scale_of(matrix(model.theta))
     to_scale_and_bias = scale_and_bias(matrix(model.theta), scale, len(model.theta))
-    attitude_error = AttitudeError(delta_rad, 0.0)
-    dof = np.full(response.shape[1], np.inf)
     spread = FitUncertainty(
-        scale,
-        to_scale_and_bias @ covariance @ to_scale_and_bias.T,
-        to_scale_and_bias @ response,
-        movement.noise(),
-        attitude_error,
-        0.0,
-        0,
-        dof,
+        scale=scale,
+        covariance=to_scale_and_bias @ covariance @ to_scale_and_bias.T,
+        response=to_scale_and_bias @ response,
+        noise=movement.noise(),
+        attitude_error=AttitudeError(delta_rad, 0.0),
+        chi_square=0.0,
+        dof=0,
+        noise_dof=np.full(response.shape[1], np.inf),
     )
     lag_s = 1e-3 * run.uncertainty.acceleration_lag_ms
     return combine_errors(spread, model.theta, movement, run.site, lag_s, datasheet=accelerometer.datasheet)

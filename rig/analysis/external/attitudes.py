@@ -92,9 +92,9 @@ def solve_placed(
     def solve_reference(quantity: Quantity, placements: Placements | Fault) -> Result | OfKind:
         if not isinstance(placements, Fault):
             _check_noisy(placements, quantity)
-        if quantity in solvers and not isinstance(placements, Fault):
-            of_kind: OfKind = solvers[quantity](name, placements, site)
-            return of_kind
+            if quantity in solvers:
+                of_kind: OfKind = solvers[quantity](name, placements, site)
+                return of_kind
         norm = gravity_reference(site) if quantity == ACCELERATION else field_reference(site, "--field-t, in tesla")
         if isinstance(placements, Fault):
             raise placements

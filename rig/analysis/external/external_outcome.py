@@ -6,11 +6,11 @@ from rig.analysis.estimator_names import DEFAULT_ESTIMATOR
 from rig.analysis.external.external_recordings import check_external, solve_external
 from rig.analysis.outcome import Outcome, origin_of
 from rig.data.quantity import RATE
-from rig.data.recording.motion_file import ReadElsewhere
+from rig.data.recording.motion_file import ExternalReadings
 from rig.data.recording.run_data import RunData
 
 
-def calibrate_external(runs: Sequence[RunData], external: ReadElsewhere, estimator: str) -> Outcome:
+def calibrate_external(runs: Sequence[RunData], external: ExternalReadings, estimator: str) -> Outcome:
     """Solve and judge readings whose motion a file describes; by default with the configured estimator.
 
     Raise as `solve_external` does.

@@ -33,7 +33,7 @@ from rig.analysis.gyroscope.correction import diagonal_correction, matrix_correc
 from rig.analysis.installed_solvers import KindFound, OfKind
 from rig.analysis.temperature.over_temperature import add_rate_polynomials, correct_files
 from rig.data.quantity import RATE, Quantity
-from rig.data.recording.motion_file import Item, ReadElsewhere
+from rig.data.recording.motion_file import ExternalReadings, Item
 from rig.data.recording.settings import RunSettings
 from rig.errors import Fault, Refused
 from rig.errors.attempts import attempt
@@ -93,7 +93,7 @@ class OfSensor:
     notes: tuple[str, ...] = ()
 
 
-def solve_external(read: ReadElsewhere, settings: RunSettings, estimator: str | None) -> OfSensor:
+def solve_external(read: ExternalReadings, settings: RunSettings, estimator: str | None) -> OfSensor:
     """Return the solution of readings whose motion a file describes; `estimator` None chooses one.
 
     Raise Refused `unknown_estimator`, Fault as the observers do. If no quantity has a solution, raise the estimator's
@@ -112,7 +112,7 @@ def solve_external(read: ReadElsewhere, settings: RunSettings, estimator: str | 
     return _add_notes(solved, read, samples)
 
 
-def _add_notes(sensor: OfSensor, read: ReadElsewhere, samples: Samples) -> OfSensor:
+def _add_notes(sensor: OfSensor, read: ExternalReadings, samples: Samples) -> OfSensor:
     return replace(
         sensor,
         omitted=(*((None, part) for part in samples.omitted), *sensor.omitted),
@@ -139,13 +139,13 @@ def check_external(name: str, sensor: OfSensor) -> Iterator[Check]:
             yield fitness(name, quantity.name, "attitude_error", at_least, MAX_ATTITUDE_ERROR_RAD, unit="rad")
 
 
-def _solve_turns(read: ReadElsewhere, samples: Samples, name: str | None) -> OfSensor:
+def _solve_turns(read: ExternalReadings, samples: Samples, name: str | None) -> OfSensor:
     if name not in (None, "by_hand"):
         choose_estimator(("by_hand",), str(name))
     return OfSensor(read.item, solve_hand_samples(read.item, samples, read.motion), None, {}, {})
 
 
-def _solve_sweeps(read: ReadElsewhere, samples: Samples, name: str | None, reference_c: float | None) -> OfSensor:
+def _solve_sweeps(read: ExternalReadings, samples: Samples, name: str | None, reference_c: float | None) -> OfSensor:
     """Solve a file's sweeps and rests, corrected to `reference_c` if given; estimator `name` (None: automatic)."""
     chosen = None if name is None else choose_estimator(SWEEP_ESTIMATORS, name)
     data, polynomials = average_sweeps(samples, read.motion), None
@@ -242,7 +242,7 @@ def _vector(data: ExternalData) -> VectorSolution:
     return solve_vector(data.sweeps, data.rests)
 
 
-def _solve_attitudes(read: ReadElsewhere, samples: Samples, settings: RunSettings, name: str | None) -> OfSensor:
+def _solve_attitudes(read: ExternalReadings, samples: Samples, settings: RunSettings, name: str | None) -> OfSensor:
     """Solve all quantities of readings in known attitudes by the method `name` (None: one for each quantity)."""
     method, site, options = find_method(name), settings.site, settings.elsewhere
     assert options is not None, "of readings of others"

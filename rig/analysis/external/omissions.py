@@ -8,7 +8,7 @@ from rig.analysis.external.attitudes import InAttitudes, Result
 from rig.analysis.external.increment_calibration import InIncrements
 from rig.analysis.installed_solvers import OfKind
 from rig.data.quantity import RATE, Quantity
-from rig.data.recording.motion_file import ReadElsewhere
+from rig.data.recording.motion_file import ExternalReadings
 from rig.estimation.arrays import Array
 from rig.estimation.external.row_changes import MAX_ROWS
 from rig.estimation.gyroscope.estimate import Estimate
@@ -36,7 +36,7 @@ def list_omitted(
         yield from ((solved[0], omitted) for omitted in placed.placements.omitted)
 
 
-def notes_on_reading(read: ReadElsewhere, samples: Samples) -> Iterator[str]:
+def notes_on_reading(read: ExternalReadings, samples: Samples) -> Iterator[str]:
     """Yield notes on changes made to the files' times and rows."""
     if read.note:
         yield read.note

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Generic, Literal, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
-from rig.config.section import Positive, Ratio, no_number_is_true
+from rig.config.section import Positive, Ratio, refuse_boolean_number
 
 JUDGING_MODEL = ConfigDict(frozen=True, allow_inf_nan=False, defer_build=True)
 NonNegative = Annotated[float, Field(ge=0)]
@@ -168,13 +168,13 @@ class UncertaintyKeys(BaseModel, Generic[OfSensors]):
 class ObservationSection(ObservationKeys, extra="forbid"):
     """The requirements on a revolution to be averaged."""
 
-    _numbers = field_validator("*", mode="before")(classmethod(no_number_is_true))
+    _numbers = field_validator("*", mode="before")(classmethod(refuse_boolean_number))
 
 
 class UncertaintySection(UncertaintyKeys[NonNegative | None], extra="forbid"):
     """Sizes of errors that no recording shows: half-widths, except `angle_std_deg` and both bias instabilities."""
 
-    _numbers = field_validator("*", mode="before")(classmethod(no_number_is_true))
+    _numbers = field_validator("*", mode="before")(classmethod(refuse_boolean_number))
 
 
 def refuse_missing_keys(cls: type[BaseModel], document: Any) -> Any:

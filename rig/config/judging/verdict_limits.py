@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, GetJsonSchemaHandler, field_validator
 from pydantic_core import CoreSchema
 
-from rig.config.section import Positive, no_number_is_true
+from rig.config.section import Positive, refuse_boolean_number
 
 Kind = Literal["conformity", "fitness"]
 Parameter = Literal["scale", "bias", "bias_drift"]
@@ -145,4 +145,4 @@ def limit_of(limits: Limits | None, quantity: str, what: str) -> tuple[Limit, fl
 class LimitsSection(Limits, extra="forbid"):
     """The limits of the verdict, for every sensor that is calibrated. They have no defaults: state them all."""
 
-    _numbers = field_validator("*", mode="before")(classmethod(no_number_is_true))
+    _numbers = field_validator("*", mode="before")(classmethod(refuse_boolean_number))

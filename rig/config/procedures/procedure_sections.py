@@ -238,7 +238,7 @@ class VerifySection(SixSweepsSection):
         return True
 
 
-def set_of_that_name(value: Any) -> Any:
+def look_up_attitude_set(value: Any) -> Any:
     """Return the attitudes of a named set; a list is returned unchanged."""
     if not isinstance(value, str):
         return value
@@ -254,7 +254,7 @@ AsWritten = Literal["eighteen", "faces", "magnetic"] | Attitudes  # the names ar
 class AttitudesSection(ProcedureSection):
     """Attitudes in which the arm is at rest: which, how long, how often."""
 
-    attitudes: Annotated[Attitudes, BeforeValidator(set_of_that_name, json_schema_input_type=AsWritten)] = Field(
+    attitudes: Annotated[Attitudes, BeforeValidator(look_up_attitude_set, json_schema_input_type=AsWritten)] = Field(
         default=ATTITUDE_SETS["eighteen"],
         min_length=1,
         max_length=100,

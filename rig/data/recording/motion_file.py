@@ -117,7 +117,7 @@ class Item:
 
 
 @dataclass(frozen=True, slots=True)
-class ReadElsewhere:
+class ExternalReadings:
     """The `readings` (n,) of an item, and the rows (N,) of sweeps or of attitudes of its `motion`, by column.
 
     For "turns" by hand the readings show the motion, and one row has the user's declarations. Times are relative to
@@ -164,7 +164,7 @@ class ReadElsewhere:
 
 @dataclass(frozen=True, slots=True)
 class ExternalHeader:
-    """The description of external readings in a run file, without their tables: see `ReadElsewhere`."""
+    """The description of external readings in a run file, without their tables: see `ExternalReadings`."""
 
     item: Item
     tells: MotionKind

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from rig.data.quantity import Quantity, Scalar
-    from rig.data.recording.motion_file import ReadElsewhere
+    from rig.data.recording.motion_file import ExternalReadings
     from rig.data.recording.provenance import Provenance
     from rig.data.recording.recorded_events import TimedEvent
     from rig.data.recording.recorded_sensor import RecordedSensor
@@ -32,7 +32,7 @@ class RunData:
     samples: dict[str, NDArray[Any]]
     states: NDArray[Any]
     events: "tuple[TimedEvent, ...]"
-    external: "ReadElsewhere | None" = None
+    external: "ExternalReadings | None" = None
 
     def measuring(self, quantity: "Quantity | Scalar") -> "dict[str, RecordedSensor]":
         """Return the sensors whose samples hold the given quantity, by name."""

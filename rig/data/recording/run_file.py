@@ -24,7 +24,7 @@ from rig.data.quantity import ACCELERATION, RATE
 from rig.data.recording.extract import reason
 from rig.data.recording.layout import Contents, append, check_rows, empty, lay_out, table_of
 from rig.data.recording.layout_keys import EVENTS_DTYPE, EXTERNAL_SCHEMA, SCHEMA, TABLES
-from rig.data.recording.motion_file import MOTIONS, ExternalHeader, ReadElsewhere, samples_header
+from rig.data.recording.motion_file import MOTIONS, ExternalHeader, ExternalReadings, samples_header
 from rig.data.recording.provenance import Provenance
 from rig.data.recording.recorded_events import Event, TimedEvent, decode_events, encode_event
 from rig.data.recording.recorded_sensor import RecordedSensor
@@ -285,13 +285,15 @@ def _turner(contents: Contents, provenance: Provenance) -> RecordedTurner:
     return turner
 
 
-def _read_external(contents: Contents) -> ReadElsewhere:
+def _read_external(contents: Contents) -> ExternalReadings:
     tables = [contents.tables[name] for name in TABLES]
     readings, motion = ({name: rows[name] for name in rows.dtype.names or ()} for rows in tables)
     header = validate(ExternalHeader, parse_json(contents.texts["elsewhere"]), "elsewhere")
     samples_header().check(readings)
     MOTIONS[header.tells].check(motion)
-    return ReadElsewhere(header.item, readings, header.tells, motion, header.origin_s, header.other_rows, header.note)
+    return ExternalReadings(
+        header.item, readings, header.tells, motion, header.origin_s, header.other_rows, header.note
+    )
 
 
 def _whole_rows(rows: NDArray[Any]) -> NDArray[Any]:

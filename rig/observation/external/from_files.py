@@ -10,7 +10,7 @@ import numpy as np
 from rig.config.column_map import STANDARD_NAMES, ColumnMap
 from rig.data.installed_kinds import quantities
 from rig.data.quantity import ACCELERATION, RATE, TEMPERATURE
-from rig.data.recording.motion_file import TIME, Columns, Item, MotionKind, ReadElsewhere
+from rig.data.recording.motion_file import TIME, Columns, ExternalReadings, Item, MotionKind
 from rig.data.recording.provenance import Provenance, provenance_of_files
 from rig.data.recording.run_data import RunData
 from rig.data.recording.settings import Elsewhere, ObservationThresholds, RunSettings, Site
@@ -75,9 +75,9 @@ def build_recording(
     columns = {name: table.columns[name] for name in names if name in table.columns}
     start = files.recorded or datetime.fromtimestamp(whole(files.readings).stat().st_mtime, UTC)
     motion = _motion(files, table.origin_s)
-    read_elsewhere = ReadElsewhere(files.item, columns, files.tells, motion, table.origin_s, table.others, table.note)
+    external = ExternalReadings(files.item, columns, files.tells, motion, table.origin_s, table.others, table.note)
     return _recording(
-        read_elsewhere,
+        external,
         RunSettings(
             procedure=files.tells,
             then_verify=False,
@@ -109,7 +109,7 @@ def read_log(path: Path, columns: ColumnMap = STANDARD_NAMES, item: Item = UNNAM
     """
     table = read_sample_table(path, (), map_samples(columns))
     samples_in(table.columns, str(path))
-    read_elsewhere = ReadElsewhere(item, table.columns, "turns", {}, table.origin_s, table.others, table.note)
+    external = ExternalReadings(item, table.columns, "turns", {}, table.origin_s, table.others, table.note)
     written = datetime.fromtimestamp(whole(path).stat().st_mtime, UTC)
     settings = RunSettings(
         procedure="turns",
@@ -126,10 +126,10 @@ def read_log(path: Path, columns: ColumnMap = STANDARD_NAMES, item: Item = UNNAM
         elsewhere=None,
         reference_c=None,
     )
-    return _recording(read_elsewhere, settings, provenance_of_files(entry_of(path), None, item, written))
+    return _recording(external, settings, provenance_of_files(entry_of(path), None, item, written))
 
 
-def _recording(read: ReadElsewhere, settings: RunSettings, provenance: Provenance) -> RunData:
+def _recording(read: ExternalReadings, settings: RunSettings, provenance: Provenance) -> RunData:
     return RunData(
         config="",
         settings=settings,

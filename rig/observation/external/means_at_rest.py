@@ -35,7 +35,9 @@ def means_at_rest(turning: Turning, clock_s: float) -> MeansAtRest | None:
     readings = []
     rates = []
     rests = find_rests(turning.time_s, {RATE: turning.readings_rad_s}, lying=lying)
-    for rest in _split_single([*rests, *find_rests_otherwise(turning.time_s, turning.readings_rad_s, lying, rests)]):
+    for rest in _split_single(
+        [*rests, *find_rests_at_other_bias(turning.time_s, turning.readings_rad_s, lying, rests)]
+    ):
         rows = np.flatnonzero((rows_s >= rest.start_s) & (rows_s <= rest.end_s))
         if not len(rows):
             continue
@@ -50,7 +52,7 @@ def means_at_rest(turning: Turning, clock_s: float) -> MeansAtRest | None:
     return MeansAtRest(np.array(readings), np.array(rates))
 
 
-def find_rests_otherwise(
+def find_rests_at_other_bias(
     time_s: Array, readings: Array, lying: Sequence[Window], rests: Sequence[Window]
 ) -> list[Window]:
     """Return the declared rests that are quiet, but whose readings are not those of a rest: the bias changed.

@@ -15,7 +15,7 @@ from rig.observation.arm_rests import estimate_bias_drift
 from rig.observation.average import Average
 from rig.observation.by_hand.rests import find_rests
 from rig.observation.external.csv_windows import average_of
-from rig.observation.external.means_at_rest import find_rests_otherwise
+from rig.observation.external.means_at_rest import find_rests_at_other_bias
 from rig.observation.observe import Observation
 from rig.observation.time_stamps.gaps import hidden_angles_rad
 from rig.observation.time_stamps.sampling import find_sampling
@@ -120,7 +120,7 @@ def _find_other_bias(
         Window(pause.start_s + (pause.end_s - pause.start_s) / 4, pause.end_s - (pause.end_s - pause.start_s) / 4)
         for pause in pauses
     ]
-    for window in find_rests_otherwise(time_s, rates, middles, lying):
+    for window in find_rests_at_other_bias(time_s, rates, middles, lying):
         if np.linalg.norm(rates[inside(time_s, window)].mean(axis=0)) < MAX_BIAS_RAD_S:
             yield window
 

@@ -123,7 +123,7 @@ def find_sampling(time_s: Array) -> Sampling:
     typical_s, rounded_s = find_typical_interval_s(time_s), find_resolution_s(time_s)
     is_uneven = float(np.quantile(np.diff(time_s), MIN_SHORT_FRACTION)) < SHORT_STEP * typical_s
     single = _count_missing(time_s, 1, MEDIAN)
-    is_credible = not (_is_misleading(time_s, typical_s, rounded_s) or _is_beat(single.missing))
+    is_credible = not (_is_misleading(time_s, typical_s, rounded_s) or _lost_regularly(single.missing))
     is_good = is_credible and single.fit >= MIN_FIT and not _has_late(time_s, single)
     if is_good and (not is_uneven or single.median_run_s(time_s) > PACKET_S):
         return Sampling(single.interval_s, single.missing, 0.0, 1, on_arrival=False)
@@ -147,10 +147,10 @@ def _has_late(time_s: Array, single: _PeriodCandidate) -> bool:
 
 
 def _list_wider(time_s: Array) -> list[_PeriodCandidate]:
-    """Return the candidates that span several readings, narrowest first, except those with a beat (`_is_beat`)."""
+    """Return the candidates that span several readings, narrowest first, without those with a beat."""
     widths = takewhile(lambda width: 4 * width <= len(time_s), WIDTHS[1:])
     wider = (_count_missing(time_s, width, quantile) for width in widths for quantile in (MEDIAN, LOW_QUANTILE))
-    return [candidate for candidate in wider if not _is_beat(candidate.missing)]
+    return [candidate for candidate in wider if not _lost_regularly(candidate.missing)]
 
 
 def _select_candidate(candidates: Sequence[_PeriodCandidate], typical_s: float) -> _PeriodCandidate | None:
@@ -198,11 +198,11 @@ def _count_missing(time_s: Array, width: int, quantile: float) -> _PeriodCandida
     return _PeriodCandidate(width, interval_s, missing, fit)
 
 
-def _is_beat(missing: NDArray[np.intp]) -> bool:
-    """Return whether the missing readings (n − 1,) are a beat: they come more regularly than by chance.
+def _lost_regularly(missing: NDArray[np.intp]) -> bool:
+    """Return whether readings (n − 1,) are missing more regularly than by chance: a beat of two clocks, not losses.
 
-    The stamps of a polled port cause a beat, if they are multiples of a time shorter than the interval. A logger that
-    loses every n-th reading causes one too, but hardly loses as many.
+    It occurs if the stamps of a polled port are multiples of a time shorter than the interval. A logger that loses
+    every n-th reading looks alike, but hardly loses as many.
     """
     missing = np.minimum(missing, 1)  # a gap counts once
     lost = int(missing.sum())

@@ -36,7 +36,7 @@ ORDER = (
 )
 
 
-def accelerometers_elsewhere(outcome: Outcome) -> dict[str, AccelerometerEntry]:
+def list_external_accelerometers(outcome: Outcome) -> dict[str, AccelerometerEntry]:
     """Return the entries, by name, of the accelerometers that were calibrated in attitudes stated by a file."""
     return {
         name: attitudes_entry(ACCELEROMETER_MODELS, result, item,
@@ -55,7 +55,7 @@ def accelerometers_elsewhere(outcome: Outcome) -> dict[str, AccelerometerEntry]:
     }  # fmt: skip
 
 
-def magnetometers_elsewhere(outcome: Outcome) -> dict[str, MagnetometerEntry]:
+def list_external_magnetometers(outcome: Outcome) -> dict[str, MagnetometerEntry]:
     """Return the entries, by name, of the magnetometers that were calibrated in attitudes stated by a file."""
     return {
         name: attitudes_entry(MAGNETOMETER_MODELS, result, item,

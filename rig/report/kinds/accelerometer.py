@@ -29,9 +29,9 @@ def _entries(outcome: Outcome) -> dict[str, AccelerometerEntry]:
     on_arm = {name: _entry(outcome, name, result) for name, result in outcome.accelerometers.items()}
     if not outcome.external:
         return on_arm
-    from rig.report.entries.external import accelerometers_elsewhere
+    from rig.report.entries.external import list_external_accelerometers
 
-    return accelerometers_elsewhere(outcome) | on_arm
+    return list_external_accelerometers(outcome) | on_arm
 
 
 def _entry(outcome: Outcome, name: str, result: "AccelerometerResult") -> AccelerometerEntry:

@@ -34,9 +34,9 @@ def _entries(outcome: Outcome) -> dict[str, MagnetometerEntry | ErrorEntry]:
     }
     if not outcome.external:
         return on_arm
-    from rig.report.entries.external import magnetometers_elsewhere
+    from rig.report.entries.external import list_external_magnetometers
 
-    return {**magnetometers_elsewhere(outcome), **on_arm}
+    return {**list_external_magnetometers(outcome), **on_arm}
 
 
 def _entry(outcome: Outcome, name: str, result: "MagnetometerResult") -> MagnetometerEntry:

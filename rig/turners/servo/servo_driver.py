@@ -23,7 +23,7 @@ from rig.turners.servo.servo_preflight import servo_problems
 from rig.turners.servo.servo_registers import WATCHDOG, WATCHDOG_MAX, WATCHDOG_S, WATCHDOG_TRIPPED
 from rig.turners.servo.servo_state import ServoReport, ServoState, stands
 from rig.turners.servo.stopping import SURE, ShaftStop
-from rig.turners.stop_once import StopOnce, StopOutcome, stopping_on_error, tell_of_stop
+from rig.turners.stop_once import StopOnce, StopOutcome, stop_and_note, stopping_on_error
 from rig.turners.turner import watch_nothing
 
 WATCH_PERIOD_S = 0.02  # the caller's watch is called at least this often
@@ -228,7 +228,7 @@ class Servo:
     ) -> None:
         is_reported = self._problem is not None and isinstance(error, RigError)  # reported with the outcome of the stop
         if error is not None and not is_reported:
-            tell_of_stop(error, self.stop)
+            stop_and_note(error, self.stop)
         self.close()
 
     # Inside -----------------------------------------------------------------------------------------------------

@@ -11,7 +11,7 @@ from rig.errors import Fault, Problem, Refused, RigError
 from rig.motion.carried import FlangeLoad
 from rig.motion.steps import Motion, travel
 from rig.motion.turner_state import ArmState, RuntimeState
-from rig.turners.stop_once import StopOnce, StopOutcome, stopping_on_error, tell_of_stop
+from rig.turners.stop_once import StopOnce, StopOutcome, stop_and_note, stopping_on_error
 from rig.turners.turner import watch_nothing
 from rig.turners.ur.arm_report import ArmReport
 from rig.turners.ur.child.child_link import ChildLink
@@ -265,7 +265,7 @@ class Arm:
     ) -> None:
         is_reported = self._problem is not None and isinstance(error, RigError)  # reported with the outcome of the stop
         if error is not None and not is_reported:
-            tell_of_stop(error, self.stop)
+            stop_and_note(error, self.stop)
         warning = self._close()
         if error is not None and warning is not None:
             error.add_note(warning)

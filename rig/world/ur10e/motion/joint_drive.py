@@ -82,14 +82,15 @@ class JointDrive:
         """
         if not self.yield_s2 or not (yielding or any(change_rad_s)):
             return ()
-        before = {motion.joint: self.yield_at(motion, TICK_S) for motion in yielding}
-        joints = []
+        at_tick_end = {deflection.joint: self.yield_at(deflection, TICK_S) for deflection in yielding}
+        deflections = []
         for joint, change in enumerate(change_rad_s):
-            angle, rate, _ = before.get(joint, (0.0, 0.0, 0.0))
+            angle, rate, _ = at_tick_end.get(joint, (0.0, 0.0, 0.0))
             if change or abs(angle) > NEGLIGIBLE_RAD or abs(rate) > NEGLIGIBLE_RAD_S:
                 end = -max(-MAX_YIELD_RAD, min(self.yield_s2 * change / TICK_S, MAX_YIELD_RAD))
-                joints.append(Yielding(joint, end, angle - end, rate + (angle - end) / self.yield_time_s))
-        return tuple(joints)
+                start, slope = angle - end, rate + (angle - end) / self.yield_time_s
+                deflections.append(Yielding(joint, end, start, slope))
+        return tuple(deflections)
 
     def yield_at(self, yielding: Yielding, elapsed_s: float) -> Derivatives:
         """Return a joint's deflection `elapsed_s` after the start of the tick, and its derivatives."""
