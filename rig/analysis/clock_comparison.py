@@ -29,8 +29,8 @@ CLOCK_NAMES = {COMPUTER_CLOCK: "computer", CRYSTAL_CLOCK: "crystal"}
 class ClockComparison:
     """The relative error of the controller's clock according to another clock, and its standard uncertainty.
 
-    `half_width`: that of the other clock's stated error. `noise_std`: the uncertainty from the recording's noise, with
-    `dof` degrees of freedom.
+    `half_width`: the half-width of the other clock's stated error. `noise_std`: the uncertainty from the recording's
+    noise, with `dof` degrees of freedom.
     """
 
     by: str

@@ -1,7 +1,7 @@
 """The degrees of freedom of estimates without a budget of their own: angles, sensitivity to gravity.
 
 Their variance is divided among the budget's contributors of type A, each with its degrees of freedom (Welch and
-Satterthwaite, JCGM 100, G.4); the remainder, by arm errors of a stated size, has infinite degrees of freedom.
+Satterthwaite, JCGM 100, G.4); the remainder, due to arm errors of a stated size, has infinite degrees of freedom.
 """
 
 from typing import TYPE_CHECKING
@@ -109,7 +109,7 @@ def _reading_parts(noise: Array, walk: Array, explained: Explained) -> dict[str,
 
 
 def _split(whole: Array, parts: dict[str, Array], budget: Budget) -> Array:
-    """Return the degrees of freedom (…) of variances (…): those of their `parts`, infinite for the remainder.
+    """Return the degrees of freedom (…) of variances (…), by those of their `parts`; the remainder's are infinite.
 
     Raise KeyError if the budget has no such contributor.
     """

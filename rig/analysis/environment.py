@@ -18,7 +18,7 @@ SPLINE_NOISE_RATIO = 0.935  # the same for an angle between two readings, by the
 class MeasurementEnvironment:
     """The site, the stated uncertainty, the controller's clock, and its states' jitter in s.
 
-    - `clock`: the comparison that corrects the speeds; `clocks`: those of all recordings, for the checks.
+    - `clock`: the comparison that corrects the speeds; `clocks`: the comparisons of all recordings, for the checks.
     - `extension_m` (3,): the sensors' position from the flange, in its frame.
     - `reading_noise_rad`: noise of a joint's angle at any time, from the noise of its encoder.
     - `finds_earth_rate`: whether the Earth's rate is estimated, not taken from the site.

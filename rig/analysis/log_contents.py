@@ -32,11 +32,11 @@ from rig.sensors.lines.log_columns import UNSTATED, LogColumns, guess_columns
 class LookedFile:
     """The contents of a file.
 
-    - layout, guess: those of a table; None for a bag or an autopilot's log.
+    - layout, guess: for a table; None for a bag or an autopilot's log.
     - columns: the map of its columns, in the form of `--columns`, incomplete if it contains "?".
     - samples, survey: its readings, if any can be read; others: number of rows without any; note: what the readings
       lack.
-    - origin_s: origin of the readings' times; the attitudes' times are those of their own clock.
+    - origin_s: origin of the readings' times; the attitudes' times are on their own clock.
     - attitudes: the rows of its reference, if it has one.
     - refusals: why readings or attitudes could not be read.
     """
@@ -161,7 +161,7 @@ def _read_contents(looked: LookedFile, column_map: ColumnMap, *, has_readings: b
 
 
 def _read_samples(looked: LookedFile, column_map: ColumnMap) -> LookedFile:
-    """Return the file with its readings; if sensors' rows differ, with those of the gyroscope alone."""
+    """Return the file with its readings; if sensors' rows differ, only with the gyroscope's rows."""
     mapped = map_samples(column_map)
     try:
         table = read_sample_table(looked.path, (), mapped)

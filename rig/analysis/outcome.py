@@ -60,8 +60,8 @@ def origin_of(runs: "Sequence[RunData]") -> Origin:
 class Outcome:
     """The results of a run's recordings, by sensor name.
 
-    - settings, provenance: those of the recordings.
-    - recordings: those of the calibration with a finished sweep; empty if stored calibrations were verified.
+    - settings, provenance: of the recordings.
+    - recordings: of the calibration, with a finished sweep; empty if stored calibrations were verified.
     - checks: the limits of the verdict.
     - results: the calibrations of gyroscopes; empty if stored calibrations were verified.
     - onboard: the board's own calibrations, compared with the host's; empty if stored ones were verified.
@@ -70,8 +70,8 @@ class Outcome:
     - accelerometers: the calibrations of accelerometers.
     - magnetometers: the calibrations of magnetometers, without limits of scale and bias.
     - drifts: biases by repeat, if attitudes were repeated.
-    - detection_limits: those of the gyroscopes' checks.
-    - reference_detection_limits: those of the checks of accelerometers and magnetometers.
+    - detection_limits: of the gyroscopes' checks.
+    - reference_detection_limits: of the checks of accelerometers and magnetometers.
     - external: the results of external recordings; their gyroscopes are in results too.
     - installed_kinds: the results of the solvers of installed kinds.
     - mounts: the item's mount in each stage after the first.

@@ -186,7 +186,7 @@ class VectorEntry(Entry):
     """The vector model's solution: the six parameters, and the directions of the three axes.
 
     - residuals_std_rad_s: expected standard deviation of each residual.
-    - …_degrees_of_freedom: those of the standard deviations of that name, null if infinite.
+    - …_degrees_of_freedom: of the standard deviations of that name, null if infinite.
     - Both are absent without a budget, as for sweeps of a file.
     """
 
@@ -299,9 +299,9 @@ class GyroscopeEntry(Entry):
 
     - covariance: due to noise and bias random walk; covariance_combined: due to all contributors in the budget.
     - correction_matrix: M of g = M (m + b), by which the board and the C header correct readings.
-    - speeds_rad_s: those of the sweeps. A calibration at one speed, in either direction, is valid at that speed,
-      without nonlinearity. axis_rate_ranges_rad_s: smallest and largest rate along each of the sensor's axes in the
-      sweeps that determine its scale factor.
+    - speeds_rad_s: of the sweeps. A calibration at one speed, in either direction, is valid at that speed, without
+      nonlinearity. axis_rate_ranges_rad_s: smallest and largest rate along each of the sensor's axes in the sweeps that
+      determine its scale factor.
     - temperature_c: mean over the samples of all sweeps. scale_conditions, bias_conditions: times and temperatures of
       the readings: scale factors come from sweeps, biases from rests too.
     - board: null for a reference sensor, for which the board does not solve.

@@ -5,7 +5,7 @@ from pathlib import Path
 
 
 def read_rows(table: Path, form: str, column: int = 0, allowed: Collection[str] | None = None) -> Iterator[list[str]]:
-    """Yield the cells of each row; those of `column` must be in `allowed`, if given.
+    """Yield the cells of each row; the cell of `column` must be in `allowed`, if given.
 
     Raise ValueError naming a line that does not have the cells of `form`.
     """

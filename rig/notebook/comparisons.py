@@ -72,8 +72,8 @@ class SensorComparison:
 def compare(run: Run, sensor: str, reference: str) -> SensorComparison:
     """Compare two sensors of a run sample by sample; the reference's readings are corrected.
 
-    The reference's calibration is that of the turntable if the run states one, otherwise that of this run. Raise
-    Refused `no_such_sensor`, `nothing_to_compare`; Fault as `rig.analysis.gyroscope.comparison.compare` does.
+    The reference's calibration is the turntable's if the run states one, otherwise this run's. Raise Refused
+    `no_such_sensor`, `nothing_to_compare`; Fault as `rig.analysis.gyroscope.comparison.compare` does.
     """
     for name in (sensor, reference):
         if RATE.name not in run[name].quantities:

@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 class Result(Mapping[str, Calibration]):
     """A run's result, by calibration.
 
-    `result["gyro"]` is a sensor's calibration, `result["gyro, accelerometer"]` that of another quantity. If a sensor
-    has only one quantity, its name is enough. `document` is the complete `result.json`.
+    `result["gyro"]` is a sensor's calibration, `result["gyro, accelerometer"]` another quantity's. If a sensor has only
+    one quantity, its name is enough. `document` is the complete `result.json`.
     """
 
     document: ResultDocument

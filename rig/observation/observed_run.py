@@ -55,8 +55,8 @@ class ObservedRun:
     def time_s(self, sensor: str, gyroscope: str | None = None) -> Array:
         """Return the times (n,) of all samples of a sensor on the arm's clock.
 
-        They use the time base of `gyroscope`, by default the sensor's own, or else that of the first gyroscope on the
-        same clock. Without any time base, arrival times at the computer relate samples to arm states, to milliseconds.
+        They use the time base of `gyroscope`, by default the sensor's own, or else the first gyroscope's on the same
+        clock. Without any time base, arrival times at the computer relate samples to arm states, to milliseconds.
         """
         bases = {name: observations.time_base for name, observations in self.sensors.items()}
         return times_s(self.run, sensor, bases, gyroscope)
@@ -129,10 +129,10 @@ def observe_runs(runs: Sequence[RunData], corrections: Mapping[int, Array] = NO_
 
 
 def _clock_offsets_s(recordings: Sequence[ObservedRun]) -> list[float]:
-    """Return the offset of each recording's clock to that of the first; the controller may restart in between.
+    """Return the offset of each recording's clock to the first one's; the controller may restart in between.
 
-    A recording begins after the previous one has ended, even if the computer's clock, which may have been set,
-    disagrees; time in an accelerated laboratory passes faster.
+    A recording begins after the previous one has ended, even if the computer's clock disagrees, because that may have
+    been set. Time in an accelerated laboratory passes faster.
     """
     offsets_s = [0.0] * bool(recordings)
     for last, recording in pairwise(recordings):

@@ -69,9 +69,8 @@ class Lines:
 
     - `encoded` (n, m): columns of a slow ripple that the encoders measure, its changes, and the remainder of their
       rate, mostly noise.
-    - `rate` (n, 0 to 2): columns to remove: the rate itself if few samples or a gap do not sample a ripple evenly;
-      otherwise the changes of the slow ripple in a whole turn, which a lagging sensor reads too, and which weights
-      without slow lines do not cancel.
+    - `rate` (n, 0 to 2): further columns to remove. If few samples or a gap do not sample a ripple evenly, the rate
+      itself; otherwise the changes of the slow ripple in a whole turn, which a lagging sensor reads too.
     """
 
     cycles: Array

@@ -35,9 +35,9 @@ class Phase:
 def first_phase(procedure: AnyProcedure, config: RigConfig, procedures: Procedures) -> Phase:
     """Return the phase with which a run of `procedure` begins; the next phase repeats its movement.
 
-    Raise Refused `no_such_procedure`. The phase's `plan` raises Refused as the procedure's does; also `script_failed`;
-    `rank_deficient`, `ill_conditioned` if the whole plan's attitudes do not determine the requested parameters;
-    `other_turner` if the procedure needs another kind of turner.
+    Raise Refused `no_such_procedure`. The phase's `plan` raises Refused as the procedure's does, and `script_failed`.
+    It raises `rank_deficient`, `ill_conditioned` if the whole plan's attitudes do not determine the requested
+    parameters, and `other_turner` if the procedure needs another kind of turner.
     """
 
     def plan(start_q_rad: Joints | None = None, done: Collection[int] = ()) -> Plan:

@@ -61,7 +61,7 @@ class RunSearch(Protocol):
     """The candidate runs of a procedure, with their predictions.
 
     - `predict`: returns the budgets, None for a run that is not possible.
-    - `per_repeat`: the contributors with a new error in each repeat, which a run repeated without end lacks.
+    - `per_repeat`: the contributors with a new error in each repeat; endless repetition averages them out.
     - `ending`: the keys that end a run before its last repeat, when the target is reached.
     """
 

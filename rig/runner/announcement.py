@@ -74,7 +74,7 @@ def announcement(
 
 
 def _joint_names(plan: Plan) -> list[str]:
-    """Return a name for each joint: that of its sweeps, or else its number."""
+    """Return a name for each joint: its name in the sweeps, or else its number."""
     names = {sweep.joint: sweep.joint_name for sweep in plan.sweeps}
     return [names.get(joint, f"joint {joint + 1}") for joint in range(len(plan.home_q_rad))]
 

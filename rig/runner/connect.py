@@ -68,7 +68,7 @@ class Connector:
     connecting: Connecting | None = None
 
     def _find_omitted(self, whole_plan: Plan) -> frozenset[int]:
-        """Return the indices of sweeps and dwells to omit now: those finished, and those of other stages."""
+        """Return the indices of sweeps and dwells to omit now: finished ones, and those of other stages."""
         others = (stage.indices for index, stage in enumerate(whole_plan.stages) if index != self.settings.stage)
         return self.resumed.done.union(*others)
 

@@ -61,9 +61,9 @@ def contradictions(
 ) -> ConsistencyChecks:
     """Return the checks for contradictions in the gyroscopes' recordings.
 
-    `environment` are those of the recordings, `false_alarms` is the fraction of undamaged runs that may fail. The
-    check of a disturbed sweep has the sweep's index in its name, `gyro.disturbed_sweep.3`, and in its meaning.
-    `has_limits`: whether to compute the detection limits, which takes a third of the time.
+    `false_alarms` is the fraction of undamaged runs that may fail. The check of a disturbed sweep has the sweep's index
+    in its name, `gyro.disturbed_sweep.3`, and in its meaning. `has_limits`: whether to compute the detection limits,
+    which takes a third of the time.
     """
     checks: list[Check] = []
     detection_limits: dict[str, tuple[DetectionLimit, ...]] = {}

@@ -94,7 +94,7 @@ class _Tested:
 
     @property
     def means(self) -> Means:
-        """The rates in the segments, as means that a fault may change."""
+        """The rates along the sensor's axes in each segment, with the segments' times and sweeps."""
         return Means(self.axis_rates, self.segments.times_s, self.segments.sweep)
 
 
@@ -204,8 +204,7 @@ def _inflate_transfers(
 ) -> _Tested:
     """Whiten like `_whiten_with_transfers`, with the transfers' variance inflated until their χ² equals their number.
 
-    Their χ² is that of all segments minus that of the segments without transfers. The factor is at most
-    `MAX_RIPPLE_INFLATION`.
+    Their χ² is the difference of χ² with and without them. The factor is at most `MAX_RIPPLE_INFLATION`.
     """
     transfers, (segments_chi_square, segments_dof) = allowance.transfers, _residual_chi_square(segments_only)
     with_transfers = _whiten_with_transfers(matrix, allowance, bias, disturbed)
@@ -295,8 +294,8 @@ def _test_bias_jump(
     """Return the χ² of the largest bias jump between two rests, beyond drift; None with fewer than three rests.
 
     The drift is re-estimated with the best jump in the model; otherwise it would contain the jump. Few rests determine
-    the drift poorly, so the critical value is from F with one degree of freedom per possible jump, which simulated
-    random walks exceed about as often.
+    the drift poorly. So the critical value is from F with one degree of freedom per possible jump; simulated random
+    walks exceed it about as often.
     """
     steady_columns, steps = _steady_columns(segments), step_columns(segments)
     if len(steps) < 2:

@@ -20,8 +20,8 @@ def compare_dwell_halves(
 
     The limit is a quantile of the F distribution, because the noise is estimated from the dwells' readings. Flicker
     with the Allan deviation `flicker_counts` makes the halves differ by √2 times as much. A slow oscillation that no
-    encoder measures affects every dwell, a knock only one; so the differences in the other dwells are added to the
-    variance, with degrees of freedom by Welch–Satterthwaite. `steps` are those of the counts.
+    encoder measures affects every dwell, a knock only one. So the other dwells' differences are added to the variance,
+    with degrees of freedom by Welch–Satterthwaite. `steps`: the steps of the counts.
     """
     from scipy.special import fdtri
 

@@ -73,7 +73,7 @@ class ReferenceReadings:
 class ReferenceStatistics:
     """The statistics of a sensor with their critical values, and the detection limits by fault mode.
 
-    `segments`: the dwells and sweeps that contradict the others, or the worst one; `statistics`: those of all segments
+    `segments`: the dwells and sweeps that contradict the others, or the worst one; `statistics`: of all segments
     together, by the check's name.
     """
 

@@ -132,7 +132,7 @@ class Shortest:
     - `nearest`: the candidate with the smallest ratio to the target if none meets it.
     - `endless`: the budgets of all evaluated plans and, for each family of candidates, of a run of unlimited length.
     - `unreachable`: whether no run of this kind meets the target, however long.
-    - `directions` (N, 3): those of the sweeps, None if there are none.
+    - `directions` (N, 3): the sweeps' directions, None if there are none.
     """
 
     wanted: TargetUncertainty

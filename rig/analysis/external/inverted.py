@@ -31,7 +31,7 @@ def solve_unless_inverted(attitudes: Array, solve: Callable[[Array], Solved], co
     """Return the result of `solve` with attitudes (N, 3, 3).
 
     Raise its Faults. A Fault among `contradicting` is replaced by `inverted_attitudes` if the inverse attitudes agree
-    with the readings; the message then names the cause, an inversion or the order of the quaternions' numbers.
+    with the readings. Its message names the cause: an inversion, or the order of the quaternions' numbers.
     """
     try:
         return solve(attitudes)

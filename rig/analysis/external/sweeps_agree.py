@@ -63,7 +63,7 @@ def _name_contradiction(worst: int, data: ExternalData) -> str:
 class SweepErrors:
     """The covariances that errors of the stated motion and changes of the sensor add to a solution, with `dof`.
 
-    `covariance` (6, 6): that of scale and bias; `matrix_covariance` (12, 12) and `angles_covariance_rad2` (6, 6): as in
+    `covariance` (6, 6): of scale and bias; `matrix_covariance` (12, 12) and `angles_covariance_rad2` (6, 6): as in
     `VectorSolution`, scaled so that twice a standard uncertainty is U.
     """
 

@@ -1,6 +1,6 @@
 """The verification of calibrated readings by a reference sensor: SIX, Section IV-B, Tables IV and V.
 
-Only the rotation between the two sensors, determined in the calibration's revolutions, is removed: the
+Only the rotation between the two sensors is removed, as determined in the calibration's revolutions. The
 non-orthogonality that the board's correction leaves, and the cross-axis errors of both sensors, remain.
 """
 

@@ -86,8 +86,8 @@ class AccelerometerResult:
     def correction_matrix(self) -> Array:
         """The matrix M (3, 3) of s = M (a − b).
 
-        M takes readings to the orthogonal frame nearest to the gyroscope's axes, which corrected rates and
-        accelerations then share; without an alignment, to the frame nearest to the accelerometer's own axes.
+        M takes readings to the orthogonal frame nearest to the gyroscope's axes, so that corrected rates and
+        accelerations share a frame. Without an alignment it is the frame nearest to the accelerometer's own axes.
         """
         matrix = self.triad.correction_matrix
         return matrix if self.alignment is None else self.alignment.rotation.T @ matrix
@@ -214,7 +214,7 @@ def _select_planned(dwells: Sequence[DwellReading], settings: RunSettings) -> tu
 def _split_dwells(
     dwells: Sequence[DwellReading], planned: Sequence[PlannedDwell]
 ) -> tuple[tuple[DwellReading, ...], tuple[DwellReading, ...]]:
-    """Return the dwells to use, and those of the last of several repeats. Raise Fault `not_all_attitudes`."""
+    """Return the dwells to use, and the dwells of the last of several repeats. Raise Fault `not_all_attitudes`."""
     if missing := {dwell.index for dwell in planned} - {dwell.index for dwell in dwells}:
         raise Fault(
             "not_all_attitudes",

@@ -163,7 +163,7 @@ def separate_sensor_errors(
 ) -> tuple[FitUncertainty, list[Contributor]]:
     """Return the `spread` due to noise and arm, and the contributors of the sensor's own errors in this `movement`.
 
-    The spread's response is that of a fit of all parameters including φ, so the noise has a larger effect.
+    The spread is from a fit of all parameters including φ, so the noise has a larger effect.
     """
     drift, flicker = (
         spread.response @ shared @ spread.response.T

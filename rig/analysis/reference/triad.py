@@ -26,7 +26,7 @@ MIN_SECOND_ORDER_STDS = 3.0  # size of the largest second-order term, in its sta
 class Triad:
     """Three axes from a solution's matrix F and bias, with the uncertainty of the solution alone.
 
-    - `scale` (3,): 1/‖row of F‖; `covariance` (6, 6): that of scale and bias.
+    - `scale` (3,): 1/‖row of F‖; `covariance` (6, 6): of scale and bias.
     - `correction_matrix` M (3, 3): from a reading minus its bias to the orthogonal frame nearest to the axes.
     """
 

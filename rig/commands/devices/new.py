@@ -133,7 +133,7 @@ def _literals(annotation: object) -> Mapping[str, str]:
 
 
 def _port(question: str, option: str, chosen_port: str | None) -> str:
-    """Return a serial port that the user chooses from those of this computer, or types."""
+    """Return a serial port that the user chooses from this computer's ports, or types."""
     from firmware_host.serial_port import describe_ports, find_ports
     from rig.config.section import check_port
 

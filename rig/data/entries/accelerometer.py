@@ -57,7 +57,7 @@ class ValidationEntry(Entry):
 
 
 class AlignmentEntry(Entry):
-    """The small rotation vector that takes the gyroscope's frame into that of the accelerometer in the same device."""
+    """The small rotation vector that takes the gyroscope's frame into the frame of the same device's accelerometer."""
 
     rotation_rad: Vector3
     std_rad: Vector3
@@ -66,7 +66,7 @@ class AlignmentEntry(Entry):
 class AccelerometerEntry(Entry):
     """A calibration a = F (s + φ s²) + b of the specific force s in the flange's frame.
 
-    - covariance: that of scale and bias from the solution alone; covariance_combined: from all contributors in budget.
+    - covariance: of scale and bias, from the solution alone; covariance_combined: from all contributors in budget.
     - gravity_m_s2: the gravity to which the scale is relative.
     - scale, bias_m_s2: if the budget contains the nonlinearity, the scale is that between the readings at +1 g and −1
       g, and the bias is the reading at 0 g.

@@ -10,8 +10,8 @@ class EarthRateEntry(Entry):
     - `heading_rad`: direction of the base's x axis, clockwise from north; null if that axis is vertical.
     - `vertical_fixed`: whether a given latitude fixed the vertical part, to identify the g-sensitivity; `latitude_rad`
       is then from the horizontal part alone.
-    - `birge_ratio`: that of the residuals; if above 1, it has inflated `covariance_rad2_s2`.
-    - `degrees_of_freedom`: those of the standard deviations; null if infinite.
+    - `birge_ratio`: of the residuals; if above 1, it has inflated `covariance_rad2_s2`.
+    - `degrees_of_freedom`: of the standard deviations; null if infinite.
     """
 
     rate_rad_s: Vector3

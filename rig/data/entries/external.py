@@ -62,7 +62,7 @@ class AttitudesEntry(Entry):
     - `earth_rate_rad_s`: in the axes of the table, with standard deviations, or `earth_rate_error`: why it is missing.
     - `by_increments`: results from increments of angle between attitudes, null if the rates were exact.
     - `other_methods`: the solutions of the other methods.
-    - `covariance`: that of F row by row, the Earth's rate and c of m = F ω + c.
+    - `covariance`: of F row by row, the Earth's rate and c of m = F ω + c.
     """
 
     earth_rate_rad_s: Vector3 | None

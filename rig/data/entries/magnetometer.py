@@ -85,7 +85,7 @@ class MagnetometerEntry(Entry):
       shows; runs with the sensor turned over separate it (`rig reversal`).
     - extension_m: its position on the flange; uniformity: test that the field was the same in all attitudes; drift:
       test that it remained the same, null without tests.
-    - covariance: that of scale and bias from the solution alone; covariance_combined: from all contributors in budget.
+    - covariance: of scale and bias, from the solution alone; covariance_combined: from all contributors in budget.
       field_t: the norm of the field to which the scale is relative.
     - field_base_t: the field in the arm's base frame; attitude_error_rad: error of the arm's attitudes about each axis,
       estimated from the readings.
@@ -147,9 +147,9 @@ class ReversalEntry(Entry):
 
     - bias_t: the sensor's own bias; on an axis that was never turned over (arm_field_in_bias) the bias as mounted.
     - arm_field_t: the arm's field in the sensor's axes as it was mounted in the first run; 0 on such an axis.
-    - covariance: that of bias and arm's field; chi_square: agreement of the runs on their common parameters.
-    - scale, correction_matrix: means over the runs. …_degrees_of_freedom: those of the standard deviations of that
-      name, null if infinite.
+    - covariance: of bias and arm's field; chi_square: agreement of the runs on their common parameters.
+    - scale, correction_matrix: means over the runs. …_degrees_of_freedom: of the standard deviation of that name, null
+      if infinite.
     """
 
     part: str

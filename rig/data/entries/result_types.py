@@ -69,7 +69,7 @@ class PlacementEntry(Entry):
     - `placement_std`: standard deviation of a reading from placement to placement, not due to attitude errors; null if
       the method does not estimate it. `rests_without_attitude` further rests contributed to it.
     - `rows_omitted`: number of rows left out because the body moved.
-    - `covariance`: that of all estimates, in `covariance_order`.
+    - `covariance`: of all estimates, in `covariance_order`.
     """
 
     placement_std: float | None

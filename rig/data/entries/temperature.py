@@ -10,7 +10,7 @@ Cubic = Annotated[tuple[Vector3, ...], Field(min_length=4, max_length=4)]
 
 
 class TemperatureContributorEntry(Entry):
-    """Contributions to the uncertainty; `std` is that of kx ky kz bx by bz at the reference temperature."""
+    """Contributions to the uncertainty; `std` is for kx ky kz bx by bz at the reference temperature."""
 
     name: str
     kind: Literal["A", "B"]
@@ -35,7 +35,7 @@ class OverTemperatureEntry(Entry):
 
     - The bias has the sign that it has in the calibration, and its unit.
     - range_c: the valid range, by the part's own thermometer; table: values from one end to the other.
-    - orders: those of the polynomials of scale and bias, as the readings require.
+    - orders: of the polynomials of scale and bias, as the readings require.
     - covariance (24, 24): in the order scale n = 0 x y z, n = 1 x y z, …, then the bias.
     - hysteresis: largest difference of a warming sensor from the mean of warming and cooling; null, and not in the
       uncertainty, unless both were measured.

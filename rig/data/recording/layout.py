@@ -1,7 +1,7 @@
 """The layout of a run in HDF5 (schema "rig.run/1").
 
 - `/samples/<sensor>`: its stamps and a column for each channel; attributes describe the sensor (`channels` in JSON).
-- `/states`: those of the turner, of the type that `turner` describes (`rig.data.recording.recorded_turner`).
+- `/states`: the turner's states, of the type that `turner` describes (`rig.data.recording.recorded_turner`).
 - `/events`: bytes, a line of JSON for each event, because SWMR forbids data of variable length.
 - attributes of the file: `schema`, `config` (YAML), and in JSON `settings`, `provenance` and `turner`.
 
@@ -36,7 +36,7 @@ class Contents:
 
     - `texts`: the attributes named in `TEXTS`; `described`: the attributes of each sensor.
     - `samples` (n,) by sensor, `states` (n,) of the turner, `events` (n,) in bytes.
-    - `tables` (n,): those of external readings, by the names in `TABLES`.
+    - `tables` (n,): of external readings, by the names in `TABLES`.
     """
 
     schema: str

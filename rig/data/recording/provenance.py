@@ -43,7 +43,7 @@ class Provenance:
     - script, script_sha256, script_installed: the procedure's script, its hash, and whether a package provided it.
     - arm_kinematics: the turner's geometry, None without one.
     - tcp_offset: the controller's tool centre point in the flange's frame, unused; None if unknown.
-    - arm_maker, arm_model: those of the connected turner.
+    - arm_maker, arm_model: of the connected turner.
     - turner_kind: its registered kind.
     - board_follows_crystal: the board's statement on its clock, None without a board.
     - readings_file, motion_file: the files of an external recording.

@@ -1,7 +1,7 @@
 """The run file: all data of a run, as received, in HDF5.
 
 The file survives `kill -9` because it is written in HDF5's single-writer/multiple-reader (SWMR) mode: all datasets and
-attributes exist before that mode begins, afterwards rows are only appended, and the library writes every block before
+attributes exist before that mode begins. Afterwards rows are only appended, and the library writes every block before
 anything that points to it. See `rig.data.recording.layout` for the layout.
 """
 
@@ -104,7 +104,7 @@ class RunRecorder:
             self._pending.states.append(state)
 
     def add(self, event: Event, *, controller_time_s: float | None = None) -> None:
-        """Append an event at the present time; its controller time is by default that of the newest state."""
+        """Append an event at the present time; its controller time is by default the newest state's."""
         with self._lock:
             time_s = self._controller_time_s if controller_time_s is None else controller_time_s
             self._pending.events.append(encode_event(TimedEvent(event, time.monotonic(), time_s)))

@@ -190,7 +190,7 @@ class RunSettings:
     - to_calibrate: names of the sensors to calibrate.
     - reference: the sensor with a given calibration.
     - home_q_rad: angles of the turner's joints, of which there may be none.
-    - planned_sweeps, planned_dwells: those of the complete procedure, even if the run was interrupted.
+    - planned_sweeps, planned_dwells: of the complete procedure, even if the run was interrupted.
     - site: location of the arm.
     - matrix_corrected: names of the sensors whose readings the complete matrix corrects.
     - second_order: whether the accelerometers' model has terms of second order.

@@ -55,8 +55,8 @@ MOVE, REST, WALK, FLAT, CLOSURE, TILT, ACCELERATION, PRIOR = (
 class GraphState:
     """The current values of all unknowns.
 
-    - matrix: F (3, 3).
-    - sensitivity: G (3, 3) in rad/s per g.
+    - matrix (3, 3): F, the scale factors and axes.
+    - sensitivity (3, 3): G, the g-sensitivity in rad/s per g.
     - nonlinearities: the even and the odd nonlinearity (6,), s/rad.
     - drift_rad_s: the bias' drift from the first rest to the last, and its deviation in the middle of it (2, 3).
     - level: F_a (3, 3) of the accelerometer.

@@ -41,7 +41,7 @@ class MoveIntegrals:
 
 @dataclass(frozen=True, slots=True)
 class GyroscopeModel:
-    """A gyroscope's F (3, 3), biases (N, 3) at the rests, G (3, 3), even and odd nonlinearity (6,) in s/rad."""
+    """A gyroscope's matrix F (3, 3), biases (N, 3) at the rests, g-sensitivity (3, 3), nonlinearities (6,) in s/rad."""
 
     matrix: Array
     biases: Array

@@ -56,7 +56,7 @@ class BoardMove:
 
 @dataclass(frozen=True, slots=True)
 class BoardSolution:
-    """The solution of the board's equations: C (3, 3) and b (3,) of g = C (m + b).
+    """The solution of the board's equations: matrix C (3, 3) and bias b (3,) of g = C (m + b).
 
     `scale_std` is the largest standard uncertainty on the diagonal of C.
     """
@@ -122,7 +122,7 @@ def _rest_equations(centre: Array, rest: BoardRest, noise_rad_s: float) -> Itera
 
 
 def _move_equations(centre: Array, move: BoardMove) -> Iterator[Equation]:
-    """Yield the equations of a move: its integrated rotation must turn the vertical of one rest to that of the next."""
+    """Yield the equations of a move: its integrated rotation must turn one rest's vertical to the next rest's."""
     matrix, sensitivity = centre[MATRIX].reshape(3, 3), centre[GRAVITY].reshape(3, 3)
     (up, up_axes), (after, after_axes) = (
         _vertical_on_face(centre, move.before.face),

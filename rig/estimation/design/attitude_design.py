@@ -54,7 +54,7 @@ class Identifiability:
 
 @dataclass(frozen=True, slots=True)
 class ExpectedStds:
-    """Standard deviations by Cramér–Rao, RMS of three axes: relative scale, angle between axes, bias, φ."""
+    """Standard deviations by Cramér–Rao, RMS of three axes: relative scale, angle between axes, bias, nonlinearity."""
 
     scale_std: float
     non_orthogonality_std_rad: float

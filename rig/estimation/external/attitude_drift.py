@@ -181,7 +181,7 @@ class DriftModel:
     causes: tuple[str, ...]
 
     def std_of(self, cause: str, std: Array) -> float:
-        """Return the standard deviation of a cause from those of all causes (k,); 0 if the model has no such cause."""
+        """Return the standard deviation of a cause out of `std` (k,); 0 if the model has no such cause."""
         return float(std[self.causes.index(cause)]) if cause in self.causes else 0.0
 
 
@@ -286,7 +286,7 @@ def matern(distances: Array, reach: float) -> Array:
 def correlate_effects(effects: Array, correlation: Array) -> Array:
     """Return the covariance (3n, 3n) of n increments, from the effects (n, 3, p) of p unit causes on them.
 
-    `correlation` (n, n) is that of each cause between the increments; the causes are independent.
+    `correlation` (n, n): of each cause between the increments; the causes are independent.
     """
     flat = effects.reshape(-1, effects.shape[-1])
     return np.asarray((flat @ flat.T) * np.kron(correlation, np.ones((3, 3))), dtype=np.float64)

@@ -26,7 +26,7 @@ MIN_ROTATION_RAD2 = 1e-14  # sum of a fix's squared rotations: less is rounding
 class Inclinations:
     """Inclinations of a reference's axes of motion.
 
-    - `response` (m, r): that of the m components of all increments to r independent inclinations of 1 rad.
+    - `response` (m, r): of the m components of all increments to r independent inclinations of 1 rad.
     - `prior_median_rad`: the prior median of their standard deviation.
     """
 

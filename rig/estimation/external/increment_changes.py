@@ -19,7 +19,7 @@ def find_increment_change(
 ) -> AbruptChange | None:
     """Return the abrupt change that the increments show, None if they show none.
 
-    `model` is that of the increments between `fixes`, with the errors' most probable standard deviations `std` (k,);
+    `model` describes the increments between `fixes`, with the errors' most probable standard deviations `std` (k,);
     `matrix` (3, 3) is F. The time is on the attitudes' clock.
     """
     sensitivities = np.diff(averaged.sensitivities, axis=0)[fixes.joined]

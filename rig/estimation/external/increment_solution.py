@@ -4,8 +4,8 @@ The reference's rates are not used: noise in the regressors would bias the scale
 between fixes (measured attitudes) is used (`attitude_drift`); the gyroscope's part of its noise grows only with the
 square root of time.
 
-Variance components are estimated from the residuals (`variance_components`): of the errors of fixes and gyroscope, and
-of the changes of matrix and bias between intervals of the recording (by nonlinearity, g-sensitivity, temperature).
+The variances of the errors of fixes and gyroscope are estimated from the residuals (`variance_components`). So are
+those of changes of matrix and bias between intervals of the recording (by nonlinearity, g-sensitivity, temperature).
 Matrix and bias are their means over the intervals, with the uncertainty that follows from these variances.
 """
 
@@ -83,19 +83,19 @@ class EarthRateEstimate:
 class KnownIncrements:
     """A gyroscope's matrix and bias from its increments, with their covariance and variance components.
 
-    - matrix (3, 3), bias (3,): F and b.
-    - covariance (15, 15): that of F row by row, ω_E, b.
+    - matrix (3, 3), bias (3,): F, the scale factors and axes; b, the reading at rest.
+    - covariance (15, 15): of F row by row, the Earth's rate, b.
     - causes: parts (15, 15) of the covariance, by name.
     - earth: the Earth's rate from the increments, or the fault.
-    - clock_s, clock_std_s: τ; the reference's attitude with the time stamp t belongs to the readings' time t + τ.
+    - clock_s, clock_std_s: the reference's attitude with the time stamp t belongs to the readings' time t + `clock_s`.
     - fix_std_rad: error of a fix about each axis.
     - random_walk_rad_sqrt_s: random walk of the gyroscope's angle.
     - matrix_scatter, bias_scatter_rad_s: standard deviation of each element between intervals of the recording.
-    - residuals_rad (n, 3): those of the increments.
+    - residuals_rad (n, 3): of the increments.
     - aside_s (k,): start of each omitted outlier.
     - reset: the time from which all attitudes are rotated relative to the earlier ones, as after a new origin, and the
       angle; None if there is none.
-    - condition: that of the scaled design.
+    - condition: condition number of the scaled design.
     - iterations: number of Gauss-Newton steps.
     - change: an abrupt change, on the attitudes' clock; U contains both states of the gyroscope. None without one.
     """

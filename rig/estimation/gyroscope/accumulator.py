@@ -29,7 +29,7 @@ class Solution:
     """Scale factors (3,) and biases (3,) in rad/s of the six-observation model, with their covariance.
 
     - `covariance` (6, 6): in the order kx ky kz bx by bz, in units of 1, rad/s and (rad/s)².
-    - `rank` and `condition`: those of the scaled design.
+    - `rank` and `condition`: of the scaled design.
     - `iterations`: Newton steps, or passes of Algorithm 1.
     """
 

@@ -35,7 +35,7 @@ class Contributor:
     - `kind`: the type of evaluation (JCGM 100, 4.2 and 4.3).
     - `half_width`: as assumed, in `unit`; for a normal distribution the stated U (k = 2); None if estimated.
     - `dof`: degrees of freedom, infinite for an exact uncertainty.
-    - `covariance` (6, 6): that of kx ky kz bx by bz.
+    - `covariance` (6, 6): of kx ky kz bx by bz.
     """
 
     name: str

@@ -208,7 +208,7 @@ def _extract_earth_rate(fit: _EarthRateFit, directions: int) -> tuple[Array, Arr
 
 
 def _find_birge_ratio(fit: _EarthRateFit, dof: int) -> float:
-    """Return the Birge ratio of residuals, with the degrees of freedom reduced by those of the arm's errors."""
+    """Return the Birge ratio of residuals; the arm's estimated errors reduce the degrees of freedom."""
     squares = float(np.sum(fit.solution.residuals_rad_s**2 / fit.expected_rad2_s2))
     return float(np.sqrt(squares / dof)) if dof > 0 else 1.0
 

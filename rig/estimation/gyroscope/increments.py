@@ -48,7 +48,10 @@ class IntegratedAttitudes:
 
 @dataclass(frozen=True, slots=True)
 class Track:
-    """Integrated attitudes (n, 3, 3) and rates (n, 3) at each of n readings, and S (3, 12) at the last."""
+    """Integrated attitudes (n, 3, 3), rates (n, 3) at each of n readings, and the `sensitivity` (3, 12) at the last.
+
+    The sensitivity is S of `IntegratedAttitudes`.
+    """
 
     attitudes: Array
     rates_rad_s: Array

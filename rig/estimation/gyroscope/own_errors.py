@@ -44,7 +44,7 @@ class KnownSensor:
 
 @dataclass(frozen=True, slots=True)
 class OwnError:
-    """A contributor of the budget: the effects `patterns` (P, N, 3), rad/s, on readings of an error of `half_width`.
+    """A contributor of the budget: an error of `half_width` adds `patterns` (P, N, 3), rad/s, to the readings.
 
     `half_width` is in `unit`; `source` explains it.
     """

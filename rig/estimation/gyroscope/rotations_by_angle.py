@@ -38,8 +38,7 @@ NOISE, BIAS, ENDS, AXES = "noise", "bias from rest to rest", "ends of the turns"
 class Turn:
     """A rotation from rest to rest: from `start_s` to `end_s` about the unit `axis` (3,) of the body by `angle_rad`.
 
-    `angle_std_rad`: standard uncertainty of the end attitude about any axis; `axis_std_rad`: that of the axis in the
-    body.
+    `angle_std_rad`: standard uncertainty of the end attitude about any axis; `axis_std_rad`: of the axis in the body.
     """
 
     start_s: float
@@ -73,7 +72,7 @@ class Gyroscope:
 class TurnedSolution:
     """A solution with the fields of `vector_model.VectorSolution`; `budget` divides its covariance by cause.
 
-    - `residuals_rad_s` (N, 3): those of the means, then of the rotations as mean rates.
+    - `residuals_rad_s` (N, 3): of the means, then of the rotations as mean rates.
     - `inflation`: the Birge ratio of the rotations, at least 1, with `inflation_dof` degrees of freedom.
     - `estimator`: the name of the method, "increments" or "by_hand".
     """
@@ -181,7 +180,7 @@ def solve_turned(
 def _equate(
     gyroscope: Gyroscope, turns: Sequence[Turn], means: Sequence[RateMean], state: _TurnsEstimate
 ) -> list[_NormalEquations]:
-    """Return the equations of the means, then those of the rotations as mean rates."""
+    """Return the equations of the means, then of the rotations as mean rates."""
     windows_s = np.array([(turn.start_s, turn.end_s) for turn in turns])
     turned = increments(gyroscope.time_s, gyroscope.readings, state.matrix, state.offset, windows_s)
     return [

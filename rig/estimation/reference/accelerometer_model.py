@@ -315,7 +315,7 @@ def _read(changes: Array, s: Array, theta: Array, movement: Movement) -> Array:
 
 
 def _product(one: Array, other: Array, movement: Movement) -> Array:
-    """Return the elementwise product (K, 3, …), in sweeps that of two harmonics up to the first order."""
+    """Return the elementwise product (K, 3, …); in sweeps, the product of two harmonics up to the first order."""
     count = len(movement.dwells.readings_m_s2)
     mean, cos, sin = np.moveaxis(_harmonics_of_sweeps(one, movement), 1, 0)
     others = np.moveaxis(_harmonics_of_sweeps(other, movement), 1, 0)

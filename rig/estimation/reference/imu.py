@@ -52,13 +52,13 @@ MODEL = "m = F (s + φ s²) + b, s = Rᵀ v_ref + ω × (ω × (p + r)) + α × 
 class ImuSolution:
     """An accelerometer's calibration from dwells and sweeps.
 
-    - matrix (3, 3), bias_m_s2 (3,): F and b.
-    - reference_m_s2 (3,): v_ref in base coordinates.
-    - lever_arm_m (3,), delay_s: r in the flange's frame, and τ; None without sweeps.
-    - second_order_s2_m (3,): φ, or None.
+    - matrix (3, 3), bias_m_s2 (3,): F, the scale factors and axes; b, part of the reading.
+    - reference_m_s2 (3,): v_ref, the specific force at rest, in base coordinates.
+    - lever_arm_m (3,), delay_s: r in the flange's frame, and the filter's lag τ; None without sweeps.
+    - second_order_s2_m (3,): quadratic terms φ, or None.
     - covariance (22, 22): in the order F by rows, v_ref, b, r, τ, φ; zero for fixed parameters.
     - response (22, 3 K): derivative of the parameters with respect to the readings.
-    - attitude_error: δ of the arm, about each axis.
+    - attitude_error: standard deviation δ of the arm's attitudes, about each axis.
     - dwell_residuals_m_s2 (N, 3): readings minus model.
     - chi_square, dof: χ² of the residuals of dwells and sweeps, and its degrees of freedom.
     - rank, condition: rank and condition number of the readings' derivatives, each column scaled to its norm.

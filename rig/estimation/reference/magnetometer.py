@@ -57,7 +57,7 @@ def uniformity(
 ) -> Uniformity:
     """Return the test of a uniform field: a fit of the readings with the given error of the attitudes.
 
-    `solution` is that of the `readings_t` with `variances_t2` (N, 3) in `attitudes` (N, 3, 3). Raise Fault
+    `solution` fits the `readings_t` with `variances_t2` (N, 3) in `attitudes` (N, 3, 3). Raise Fault
     `attitude_untrustworthy` if no fit exists.
     """
     from scipy.special import chdtri

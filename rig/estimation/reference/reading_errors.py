@@ -1,6 +1,6 @@
 """The errors of readings other than the arm's attitude errors: noise, repeatability, the sensor's own errors.
 
-All are zero on average with prior variances, so they are part of the readings' covariance: they are predicted together
+All are zero on average with prior variances, so they are part of the readings' covariance. They are predicted together
 with θ, whose uncertainty includes their undetermined part (Henderson, Biometrics 31 (1975) 423).
 """
 

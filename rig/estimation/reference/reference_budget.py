@@ -1,8 +1,8 @@
 """The uncertainty budget of a sensor calibrated in a constant reference of given norm: gravity, a field.
 
 The readings determine their noise and the error of the arm's attitudes. They do not determine the error of the
-reference's norm, the attenuation of the sensor's filter and the drift of the reference, which the solution's response
-propagates to scale and bias (JCGM 100, 5.1).
+reference's norm, the attenuation of the sensor's filter and the drift of the reference. The solution's response
+propagates these to scale and bias (JCGM 100, 5.1).
 """
 
 from collections.abc import Sequence

@@ -24,7 +24,7 @@ MOUNTING_TOLERANCE = 1e-6  # mountings are nominal and exact
 
 @dataclass(frozen=True, slots=True)
 class Reversal:
-    """The bias (3,) in the sensor's axes, the arm's field (3,) in those of the first run, and their covariance (6, 6).
+    """The bias (3,) in the sensor's axes, the arm's field (3,) in the first run's axes, and their covariance (6, 6).
 
     If an axis was not turned over, `arm_field_in_bias` is True: the bias contains the sum of both, the field is 0.
     `chi_square` tests the agreement of the runs.

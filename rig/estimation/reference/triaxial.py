@@ -63,15 +63,15 @@ class TriaxialSolution:
     """A tri-axial sensor's calibration, in the unit of the readings.
 
     - method: the method's name.
-    - matrix (3, 3), bias (3,): F and b.
-    - reference (3,): v_ref in table coordinates.
-    - second_order (3,): φ, the diagonal of F̄ in 1/unit, or None.
-    - covariance (15, 15) or (18, 18): that of the rows of F, v_ref, b, φ.
+    - matrix (3, 3), bias (3,): F, the scale factors and axes; b, part of the reading.
+    - reference (3,): the reference v_ref in table coordinates.
+    - second_order (3,): quadratic terms φ, the diagonal of F̄ in 1/unit, or None.
+    - covariance (15, 15) or (18, 18): of the rows of F, v_ref, b, φ.
     - residuals (N, 3): readings minus model.
-    - rank, condition: those of the scaled X; the full rank is 15 (18), one less if ‖v_ref‖ is given.
+    - rank, condition: of the scaled design; the full rank is 15 (18), one less if ‖v_ref‖ is given.
     - iterations: number of linear solutions or Gauss-Newton steps.
     - attitude_error: estimated by the method "attitude_weighted", else None.
-    - observations: N.
+    - observations: number N of readings.
     - warnings: sentences for people.
     """
 

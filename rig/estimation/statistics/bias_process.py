@@ -2,7 +2,7 @@
 
 The readings are averaged over windows. A random walk of rate q (rad/s per √s) changes the bias more the longer the time
 between two windows; a scatter s has no memory; flicker noise is in between. The size of the flicker is given, because a
-few averages do not determine it; q and s are estimated from the averages by restricted maximum likelihood (Patterson
+few averages do not determine it. q and s are estimated from the averages by restricted maximum likelihood (Patterson
 and Thompson, Biometrika 58 (1971) 545), the likelihood of the contrasts that do not depend on the fitted parameters.
 """
 

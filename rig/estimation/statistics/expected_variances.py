@@ -44,8 +44,8 @@ class ResidualInputs:
 class ErrorSizes:
     """The sizes of errors.
 
-    `walk`: the bias random walk in one second; `std_rad`: δ; `independent_fraction`: the fraction of δ² that is
-    independent in each dwell.
+    `walk`: the bias random walk in one second; `std_rad`: the attitude error δ; `independent_fraction`: the fraction of
+    δ² that is independent in each dwell.
     """
 
     walk: float

@@ -1,8 +1,8 @@
 """The journal of entries: a line for each entry, with the hash of its rows, numbered without gaps and chained.
 
 So a row changed, added or removed outside of the rig is detected. A changed line is detected too: a line contains its
-own hash and that of the chain before it. A user who may write all tables can write a consistent new journal, or cut off
-its end, which only a `Head` stored elsewhere detects: a signed certificate names one.
+own hash and the hash of the chain before it. A user who may write all tables can write a consistent new journal, or cut
+off its end, which only a `Head` stored elsewhere detects: a signed certificate names one.
 """
 
 import hashlib

@@ -132,7 +132,7 @@ class Live:
 
 
 class Segmenter:
-    """A segmentation in progress. At any time its result equals that of `segment_session` for the readings so far.
+    """A segmentation in progress. At any time its result equals what `segment_session` returns for the readings so far.
 
     A rest is settled after `MIN_REST_S`. `range_rad_s` is the range of the gyroscope, None if unknown.
     """

@@ -209,7 +209,7 @@ class _ReferenceRows:
 
 
 def _select_different_times(rows: Mapping[str, Array]) -> NDArray[np.intp]:
-    """Return the numbers, from 1, of the rows, without those of zero length at the time of another row."""
+    """Return the rows' numbers, from 1, without rows of zero length at the time of another row."""
     middles_s = (rows["start_s"] + rows["end_s"]) / 2
     lasting = rows["end_s"] != rows["start_s"]
     return 1 + np.flatnonzero(lasting | ~np.isin(middles_s, middles_s[lasting]))

@@ -1,6 +1,6 @@
 """External data: a CSV file of samples and one of sweeps, solved like the rig's own recordings.
 
-samples: a gyroscope's, see `rig.observation.external.csv_samples`; those of other sensors are not used.
+samples: a gyroscope's, see `rig.observation.external.csv_samples`; other sensors' samples are not used.
 
 sweeps: `start_s`, `end_s` on the same clock, `axis_x`, `axis_y`, `axis_z` (unit vector of the turn in a frame fixed to
 the sensor's carrier, right-handed), and either `speed_rad_s` (mean speed) or `angle_rad` (angle turned from start to

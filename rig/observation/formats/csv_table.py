@@ -73,12 +73,12 @@ def read_table(
 ) -> CsvTable:
     """Return the columns of a file by the names in its header; each group of optional columns is complete or absent.
 
-    The first row holds the names. Its separators, commas, tabs, or semicolons as in spreadsheets with a decimal comma,
-    are those of all rows. Empty rows, rows of units below the heading, and repetitions of the heading are skipped. If
-    the file is `mapped`, only columns in the map, or with the rig's names, are returned. A file packed by gzip is
-    unpacked. Times count from `origin_s`, by default determined by the first time. A packed or long file is read in a
-    process of its own, because it might exhaust the memory. Raise Refused `no_file`, `file_too_costly`,
-    `temporary_folder_full`, `wrong_columns`, `wrong_unit`, `not_a_number`.
+    The first row holds the names. All rows have its separators: commas, tabs, or semicolons as in spreadsheets with a
+    decimal comma. Empty rows, rows of units below the heading, and repetitions of the heading are skipped. If the file
+    is `mapped`, only columns in the map, or with the rig's names, are returned. A file packed by gzip is unpacked.
+    Times count from `origin_s`, by default determined by the first time. A packed or long file is read in a process of
+    its own, because it might exhaust the memory. Raise Refused `no_file`, `file_too_costly`, `temporary_folder_full`,
+    `wrong_columns`, `wrong_unit`, `not_a_number`.
     """
     rate_hz = None if mapped is None else mapped.rate_hz
     if rate_hz is not None:

@@ -164,7 +164,7 @@ class ArmMotion:
     def state_gain(self, time_s: Array, weights: Array) -> float:
         """Return the ratio of the states' noise in a weighted mean of `rates_at_samples` to their noise in Δθ/T.
 
-        `weights` (n,) are those of the mean. Angles between states are interpolated, here linearly.
+        `weights` (n,) belong to the mean. Angles between states are interpolated, here linearly.
         """
         lasting_s = _averaging_time(time_s)
         # A rate at a sample is the difference of two interpolated angles; `by_state` is the weight of each state.

@@ -137,7 +137,7 @@ def fit_residuals(columns: Array, values: Array) -> Array:
 def find_angle_change_rad2(residuals: Array, columns: Array, lines_hz: Array) -> Array:
     """Return the mean square (3,), rad², of the change of the lines' angle between two moments.
 
-    The lines are those of columns (n, w k) in residuals (n, 3). A line of mean square P and frequency f has the angle
+    The lines are the columns (n, w k) fitted to residuals (n, 3). A line of mean square P and frequency f has the angle
     amplitude √(2 P) / (2π f), so its mean square change is P / (2 π² f²).
     """
     width = columns.shape[1] // max(len(lines_hz), 1)

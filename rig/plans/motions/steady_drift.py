@@ -32,8 +32,8 @@ def drift_effect(steps: Sequence[Step]) -> float:
     """Return the change of the calibration, rad/s, for a bias that rises by 1 rad/s from first sweep to last step.
 
     The vector model m = F ω + c (+ G a if there are rests; `rig.estimation.gyroscope.vector_model`) is fitted to this
-    ramp, which is zero in its middle. The change of the scale, at the mean speed of the sweeps, and that of the bias
-    are added in quadrature. The base is upright; weights are for white noise.
+    ramp, which is zero in its middle. The changes of scale, at the mean speed of the sweeps, and of bias are added in
+    quadrature. The base is upright; weights are for white noise.
     """
     looks = list(_list_averages(steps))
     rates = np.array([look.rate_rad_s for look in looks])

@@ -58,7 +58,7 @@ def is_integer(imu: str) -> bool:
 
 
 def decode_reading(message: Any) -> ImuReading:
-    """Decode a message of pymavlink. The temperature is that of the IMU, in HIGHRES_IMU that of the barometer."""
+    """Decode a message of pymavlink. The temperature is the IMU's, in HIGHRES_IMU the barometer's."""
     kind = message.get_type()
     sent: Mapping[Field, Array] = {
         "rate": np.array([message.xgyro, message.ygyro, message.zgyro], dtype=np.float64),

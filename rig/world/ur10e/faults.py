@@ -8,7 +8,7 @@ from rig.world.clock import TICK_S
 
 @dataclass(frozen=True, slots=True)
 class AtProgramStart:
-    """An action a fixed time after the start of every program, like that of a fieldbus adapter without a connection."""
+    """An action a fixed time after each program's start, as a fieldbus adapter without a connection performs it."""
 
     act: Callable[[], object]
     after_s: float

@@ -1,9 +1,9 @@
 """The supervised process, the only place of the `ur_rtde` client.
 
 After a lost connection the client can block for minutes, loop or crash the interpreter, which here harms only this
-process. The main thread reads states and sends heartbeats and never waits for the client; other threads serve the
-parent's requests, so that a stop is served during a move, and await the end of a move. If the parent is gone, the arm
-is stopped and the process ends.
+process. The main thread reads states and sends heartbeats, and never waits for the client. Other threads serve the
+parent's requests, so that a stop is served during a move, and await the end of moves. If the parent is gone, the arm is
+stopped and the process ends.
 """
 
 import os

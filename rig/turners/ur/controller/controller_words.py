@@ -1,8 +1,8 @@
 """Messages of the controller's primary interface, in words: errors by their code, and ends of programs. Pure.
 
-(Client interface description of the maker: a robot message holds a time stamp, a source and its kind. An error code,
-kind 6, continues with code, argument, level, a type and a value; a runtime exception, kind 10, with line and column; a
-key message, kind 7, with code, argument and a title. Each ends with a text.)
+Source: the maker's client interface description. A robot message holds a time stamp, a source and its kind. An error
+code (kind 6) continues with code, argument, level, a type and a value. A runtime exception (kind 10) continues with
+line and column, a key message (kind 7) with code, argument and a title. Each ends with a text.
 """
 
 import struct

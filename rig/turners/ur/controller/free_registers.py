@@ -2,8 +2,8 @@
 
 The client talks to its script through integers 0 to 7 and doubles 0 to 17, or the same from 24 on. A client keeps its
 registers until it disconnects: fieldbuses take the lower half (EtherNet/IP all 24 of each kind), URCaps usually some of
-the upper half. (RTDE guide of the maker: setting up an input recipe. `ur_rtde`: FLAG_UPPER_RANGE_REGISTERS, which its
-version 1.6.5 ignores if the controller's software is 5.23 or newer, as its recipes show.)
+the upper half. Sources: the maker's RTDE guide, on input recipes; `ur_rtde` 1.6.5, whose recipes ignore
+FLAG_UPPER_RANGE_REGISTERS if the controller's software is 5.23 or newer.
 """
 
 import socket

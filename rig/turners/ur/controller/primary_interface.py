@@ -1,11 +1,13 @@
 """The controller's description of its arm and tool frame, from the primary interface, port 30001. Receives only.
 
-Every UR is measured in the factory, and its controller uses the result. (Client interface description of the maker for
-PolyScope 5: packages of a big-endian size, i32, a type, u8, and a payload; a robot state, type 16, contains
-sub-packages of the same form. Of these KinematicsInfo, type 5, and Configuration Data, type 6, are sent once after
-connecting: the factory's measurement of this arm, and the arm that the controller is set up for; Cartesian Info, type
-4, in every state: the tool centre point's pose in the base's frame and in the flange's. A robot message, type 20, holds
-a time stamp, a source and its kind; the version message, kind 3, is sent once after connecting.)
+Every UR is measured in the factory, and its controller uses the result.
+
+Source: the maker's client interface description for PolyScope 5. A package is a big-endian size (i32), a type (u8) and
+a payload. A robot state (type 16) contains sub-packages of the same form. Two are sent once, after connecting:
+KinematicsInfo (type 5), the factory's measurement of this arm, and Configuration Data (type 6), the arm for which the
+controller is set up. Cartesian Info (type 4) comes in every state: the tool centre point's pose in the base's frame and
+in the flange's. A robot message (type 20) holds a time stamp, a source and its kind. The version message (kind 3) is
+sent once, after connecting.
 """
 
 import socket

@@ -56,7 +56,7 @@ class StatePacket:
 
 
 class NotSupported(ConnectionError):
-    """The error of a controller that answers but does not support `what`; `version` is that of its software."""
+    """The error of a controller that answers but does not support `what`; `version` is its software's version."""
 
     def __init__(self, what: str, version: tuple[int, ...]) -> None:
         super().__init__(f"it does not know {what}")

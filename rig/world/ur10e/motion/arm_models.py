@@ -52,7 +52,7 @@ def _model(
 
 
 def _build_bodies(*links: tuple[float, float, float, float]) -> Bodies:
-    """Return the bodies for mass, kg, and centre, m, of each link in its own frame."""
+    """Return the bodies of links that are given by mass, kg, and centre of mass, m, in the link's own frame."""
     return Bodies(tuple(mass for mass, *_ in links), tuple((x, y, z) for _, x, y, z in links))
 
 

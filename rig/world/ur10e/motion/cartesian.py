@@ -111,7 +111,7 @@ def _sample_line(
 ) -> Generator[None, None, tuple[list[MotionSegment], float]]:
     """Sample a line at the speed `top_m_s`, some knots per tick; return its segments and a joint's largest speed ratio.
 
-    The ratio is that of a joint's speed to its limit.
+    The ratio is a joint's speed over its limit.
     """
     length = _length(twist)
     ramp_s = top_m_s / acceleration
