@@ -8,7 +8,7 @@ from typing import Any
 
 
 def main() -> int:
-    """Run `rig` as `rig.cli.main` does; from the first moment on, Ctrl-C prints one line."""
+    """Run `rig` as `rig.cli.main` does; from the first moment, Ctrl-C prints one line."""
     signal.signal(signal.SIGINT, _exit_at_once)  # until `rig.cli.run_guarded` installs its own
     from rig.cli import main as command
     from rig.errors import INTERRUPTED_STATUS

@@ -120,7 +120,7 @@ class StoredCalibrationEntry(Entry):
 
 
 class KinematicsEntry(Entry):
-    """The Denavit–Hartenberg parameters of the turner, from the ground on, as used in the calculation."""
+    """The Denavit–Hartenberg parameters of the turner, joint 0 at the ground, as used in the calculation."""
 
     theta_rad: OfJoints
     a_m: OfJoints

@@ -161,7 +161,7 @@ class Report(Protocol):
     """A turner's report about itself.
 
     `host`: its address or port; `software`: its controller's version; `model`: None if unknown; `kinematics`: its
-    reported geometry, or None; `joints`: their names, from the ground on; `words`: its name in a sentence.
+    reported geometry, or None; `joints`: their names, the first at the ground; `words`: its name in a sentence.
     """
 
     @property

@@ -95,7 +95,7 @@ def next_instruction(remaining: Open, face: Face | None) -> Instruction | None:
 
 
 def simulate_session(wanted: WantedMoves) -> Iterator[Instruction]:
-    """Yield the requests to an operator who follows all of them, from +z up on."""
+    """Yield the requests to an operator who follows all of them and begins with +z up."""
     moves, faces_up = list[HandMove](), list[Face](["+z"])
     while (instruction := next_instruction(still_open(wanted, moves, faces_up), faces_up[-1])) is not None:
         yield instruction

@@ -22,7 +22,7 @@ RAW, CORRECTED = "six_observation", "verify"  # procedures that judge any record
 class RecordedRun:
     """The recordings of a run, oldest first: of `raw` readings, and of those the board `corrected`.
 
-    `path` is the run folder, or the run file of a single recording (`alone`). `script` is the one that the user has
+    `path` is the run folder, or the run file of a single recording (`alone`). `script` is the script that the user has
     named for it, or None.
     """
 

@@ -20,7 +20,7 @@ LOCAL_ONLY = ("missing_extra", "another_script", "no_script", "not_a_script", "s
 class Task:
     """Recordings to solve again, with the program's version, estimator (None: the procedure's own) and settings.
 
-    `key` names the result to compare with; `places` are pairs of computer and folder; `recordings`: the entered ones.
+    `key` names the result to compare with; `places` are pairs of computer and folder; `recordings`: as entered.
     """
 
     key: str

@@ -47,7 +47,7 @@ class Silence:
         self.ticks += not (starved or unheard)
 
     def lasts_over(self, limit: float) -> bool:
-        """Return whether there were more than `limit` silent ticks, or more than `spared` × `limit` ticks in all.
+        """Return whether there were more than `limit` silent ticks, or more than `spared` × `limit` ticks of any kind.
 
         The `limit` is for a machine with a processor for every program; the machine's load extends it.
         """

@@ -93,7 +93,7 @@ def calls_itself_simulated(software: str) -> bool:
 
 
 def provenance_of_files(readings: FileEntry, motion: FileEntry | None, item: Item, start: datetime) -> Provenance:
-    """Return the provenance of an item's external readings from `start` on: without arm and board."""
+    """Return the provenance of an item's external readings that begin at `start`: without arm and board."""
     return Provenance(
         started_utc=start.astimezone(UTC).isoformat(timespec="seconds"),
         **_program(),

@@ -43,7 +43,7 @@ class SweepFinished:
 
 @dataclass(frozen=True, slots=True)
 class RestStarted:
-    """The arm is at rest from this time on."""
+    """The arm has come to rest."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,7 @@ for each rest the attitude Q (body to table) and the gyroscope's bias. A factor 
 deviation of each cause of their errors (Dellaert and Kaess, Factor Graphs for Robot Perception, 2017).
 
 - move: Log(R (Qᵢᵀ Qⱼ)ᵀ), with the gyroscope's noise and an error in proportion to the angle
-- rest: m̄ − b − G f; walk: the change of the bias from rest to rest, less that of a drift by a parabola
+- rest: m̄ − b − G f; walk: the change of the bias from rest to rest, minus the change of a parabolic drift
 - flat: the table's normal in the body equals the face's normal; box: the face's normal equals the nominal one
 - closure: the heading after a whole turn; lean: the mean axis of a turn is the face's normal
 - acceleration: ā − F_a Qᵀ g − b_a, used as a level, so the component along the vertical has little weight

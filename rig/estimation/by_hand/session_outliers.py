@@ -46,7 +46,7 @@ class FaultHypothesis:
 
 
 def find_contradiction(fit: GraphFit, since: int | None = None) -> Fault | None:
-    """Return the fault of a session, or of its part from the rest `since` on; None without one."""
+    """Return the fault of a session, or of its part that begins at the rest `since`; None without one."""
     worst = max(_test_hypotheses(fit, since), key=lambda hypothesis: hypothesis.chi_square_drop, default=None)
     if worst is not None and worst.chi_square_drop > (CHI_SQUARE_DROP_LIMIT if since is None else LIVE_DROP_LIMIT):
         return describe_fault(fit, worst)
@@ -68,7 +68,7 @@ def find_masked_fault(fit: GraphFit) -> Fault | None:
 
 
 def _hypotheses(fit: GraphFit, since: int | None) -> Iterator[tuple[str, int]]:
-    """Yield the possible faults of a session, or of its part from the rest `since` on."""
+    """Yield the possible faults of a session, or of its part that begins at the rest `since`."""
     count = len(fit.session.rests)
     first = 0 if since is None else since
     for index in range(max(first - 1, 0), count - 1):

@@ -125,7 +125,7 @@ class FixedAttitudes:
 
 
 def average_fixes(recorded: AttitudeSamples, state: DriftState) -> FixedAttitudes:
-    """Return the mean attitude of each fix, less the motion that the gyroscope measures with a state's parameters."""
+    """Return the mean attitude of each fix, minus the motion that the gyroscope measures with a state's parameters."""
     fixes, time_s = recorded.fixes, recorded.time_s
     at_s = np.clip(fixes.at_s + state.clock_s, time_s[0], time_s[-1])
     integrated = course(time_s, recorded.readings, state.matrix, state.bias, at_s)

@@ -67,7 +67,7 @@ REMEDY = "Turn the body about all its axes, by a right angle and more"
 
 @dataclass(frozen=True, slots=True)
 class EarthRateEstimate:
-    """The Earth's rate (3,) in table coordinates, determined to a tenth, and its covariance (3, 3)."""
+    """The Earth's rate (3,) in table coordinates, determined to within 10 %, and its covariance (3, 3)."""
 
     rate_rad_s: Array
     covariance_rad2_s2: Array

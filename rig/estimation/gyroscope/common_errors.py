@@ -116,7 +116,7 @@ def _gain(design: Array, effects: Array, noise: Array) -> tuple[Array, Array]:
 def _add_covariances(
     solution: VectorSolution, gain: Array, rest: Array, noise: Array, speed_noise: Array
 ) -> VectorSolution:
-    """Return the solution with the covariances and the response of F, c, G and the errors estimated together.
+    """Return the solution with the covariances and the response of all coefficients and errors, estimated together.
 
     `gain` (3, p, 3, N) maps readings to the coefficients; `rest` (3, p, P) is the coefficients' error due to the
     unresolved part of the common errors. `noise` (3, N, N) excludes `speed_noise` (N, 3), which the three axes share.

@@ -2,8 +2,8 @@
 
     m = F (s + φ s²) + b,   s = Rᵀ v_ref + ω × (ω × (p + r)) + α × (p + r)
 
-in flange coordinates; F includes the mounting. v_ref is the specific force at rest, in base coordinates; p, from the
-rotation axis to the flange, is given by the arm; r, the lever arm, from the flange to the sensor.
+in flange coordinates; F includes the mounting. v_ref is the specific force at rest, in base coordinates. The lever arm
+p, from the rotation axis to the flange, is given by the arm; r leads from the flange to the sensor.
 
 If a joint turns by θ about the flange-fixed axis a, from the attitude R₀, at the constant rate ω, the specific force
 has a mean, a cosine and a sine over its angle. With u = R₀ᵀ v_ref and c = ω² (a aᵀ − 1) (p + r):

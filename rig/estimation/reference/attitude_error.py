@@ -158,7 +158,7 @@ def maximise_likelihood(
 ) -> tuple[float, float]:
     """Return the restricted-maximum-likelihood estimate of δ, rad, and the negative log-likelihood up to a constant.
 
-    Residuals (n,) are independent with variances 1 + δ² γ, of which `growth` (n,) is γ; `slopes` (n, q) are the model's
+    Residuals (n,) are independent with variances 1 + δ² γ, `growth` (n,) being γ; `slopes` (n, q) are the model's
     columns, `nuisance` (n, k) further explanatory ones. The constant depends on the slopes alone. The search takes the
     best δ of a grid and refines it between its neighbours.
     """

@@ -13,7 +13,7 @@ from rig.observation.windows import Window, iterate_rests, swept
 
 @dataclass(frozen=True, slots=True)
 class MovementMasks:
-    """Masks (n,) of samples: from the first sweep on, in sweeps, in rests, and in the middle of each rest."""
+    """Masks (n,) of samples: after the first sweep's start, in sweeps, in rests, and in the middle of each rest."""
 
     moving: NDArray[np.bool_]
     sweeping: NDArray[np.bool_]

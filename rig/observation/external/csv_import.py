@@ -87,7 +87,7 @@ class ExternalData:
 
 
 def read_sweeps(path: Path, mapped: Mapped | None = None, origin_s: int = 0) -> dict[str, Array]:
-    """Return the columns (k,) of a file of sweeps, times from `origin_s` on.
+    """Return the columns (k,) of a file of sweeps, with times that count from `origin_s`.
 
     Raise Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`.
     """

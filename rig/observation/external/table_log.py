@@ -16,7 +16,7 @@ from rig.observation.formats.csv_table import read_columns
 def read_table_log(
     path: Path, table: TableSection, columns: ColumnMap = STANDARD_NAMES, origin_s: int = 0
 ) -> dict[str, Array]:
-    """Return the columns of attitudes (`motion_file.MOTIONS`) from the log of a table, times from `origin_s` on.
+    """Return the columns of attitudes (`motion_file.MOTIONS`) from a table's log; times count from `origin_s`.
 
     Raise Refused `no_file`, `wrong_columns`, `not_a_number`, `time_not_increasing`.
     """

@@ -215,7 +215,7 @@ class ArmMotion:
         return {"time_s": self.time_s, **angles, **rates}
 
     def _mean_rates(self, time_s: Array, lasting_s: float, standing_rad: Array) -> Array:
-        """Return the `mean_rates` with joints at `standing_rad` (k,), as `_standing_rad` returns it."""
+        """Return `mean_rates`, with joints at rest at the angles `standing_rad` (k,); NaN stands for a moving joint."""
         before, middle, after = (
             np.where(np.isnan(standing_rad), self.angles(time_s + shift_s), standing_rad)
             for shift_s in (-lasting_s / 2, 0.0, lasting_s / 2)

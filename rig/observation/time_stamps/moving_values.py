@@ -17,7 +17,7 @@ def find_least_around(values: Array, width: int) -> Array:
 
 
 def find_least_ahead(values: Array, width: int) -> Array:
-    """Return the minima (n,) of `width` values, from each value on."""
+    """Return the minima (n,) of `width` values that begin with each value."""
     least, covered = values.copy(), 1
     while covered < min(width, len(values)):
         more = min(covered, width - covered)
@@ -27,7 +27,7 @@ def find_least_ahead(values: Array, width: int) -> Array:
 
 
 def find_least_behind(values: Array, width: int) -> Array:
-    """Return the minima (n,) of `width` values, up to each value."""
+    """Return the minima (n,) of `width` values that end with each value."""
     return find_least_ahead(values[::-1], width)[::-1]
 
 

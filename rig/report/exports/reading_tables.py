@@ -15,7 +15,7 @@ from rig.report.exports.exported_recording import Exported
 
 
 def tables_of(recordings: Sequence[Exported]) -> Iterator[ExportTable]:
-    """Yield the tables of each recording; from the second recording on, names contain the recording's number."""
+    """Yield the tables of each recording; after the first recording, names contain the recording's number."""
     for number, recording in enumerate(recordings, start=1):
         for table in recording.tables():
             yield table if number == 1 else replace(table, name=f"{table.name}-{number}")

@@ -108,7 +108,7 @@ class Kvh1775:
         )
 
     def start(self, settings: Kvh1775Settings) -> None:
-        """Pass messages to `on_messages` from the next one on."""
+        """Pass messages to `on_messages`, beginning with the next one."""
         with self.own_port.news:
             self._counter = MessageCounter(self._where, 1e6 / settings.rate_hz, timed=settings.message == "B")
             self._format = settings.message.encode()

@@ -112,7 +112,7 @@ class LinesDevice:
         return find_time_step_s(printed, self._lines.time_decimals, self._section.time.unit)
 
     def start(self) -> None:
-        """Pass values to `on_values` from the next line on."""
+        """Pass values to `on_values`, beginning with the next line."""
         with self.own_port.news:
             self._stamper = Stamper(self._section, self._rate_hz, self.where, self.time_step_s)
             self._skipped = 0

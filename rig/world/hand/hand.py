@@ -30,7 +30,7 @@ class HandMotion:
 
 
 class SimulatedHand:
-    """A body that rests on a table with the axis `face` upwards from time 0 on, and is handled from then on.
+    """A body that rests on a table at time 0, with the axis `face` upwards, and is then handled.
 
     Only `seed` determines the random draws, action by action.
     """
@@ -50,7 +50,7 @@ class SimulatedHand:
         self._add(build_course(self._attitude, np.array([-STEP_S, 0.0]), np.zeros((2, 3)), habits), 0.0)
 
     def act(self, action: Action, start_s: float) -> float:
-        """Perform the action from `start_s` on; return its end, s. Raise ValueError during another action."""
+        """Perform the action that begins at `start_s`; return its end, s. Raise ValueError during another action."""
         if start_s < self.lies_from_s:
             raise ValueError(f"the hand is busy until {self.lies_from_s:.2f} s")
         mistake = action.mistake

@@ -1,9 +1,9 @@
 """The script line that ends a program, sent to the primary interface over plain TCP: a stop in every PolyScope.
 
-The controller itself reads it, not the program on its screen that serves the dashboard. It accepts lines only in remote
-control, and acknowledges none; in local control it answers each with an error, C210. Its states, ten a second, show
-whether a program runs. (The maker's client library, `PrimaryClient::commandStop`; client interface description: robot
-mode data, sub-package 0 of a robot state.)
+The controller itself reads the line, not the program on its screen that serves the dashboard. The controller accepts
+lines only in remote control, and acknowledges none. In local control it answers each with an error, C210. Its states,
+ten a second, show whether a program runs. Sources: the maker's client library, `PrimaryClient::commandStop`; client
+interface description: robot mode data, sub-package 0 of a robot state.
 """
 
 import socket

@@ -1,7 +1,7 @@
 """A trial of the stop before anything moves, on a PolyScope X, whose only independent stop gives no acknowledgement.
 
-The primary interface accepts lines only in remote control, which controllers before 10.12 do not report, and
-acknowledges none. So the trial starts a program that moves nothing, and ends it by the line that would stop the arm.
+The primary interface acknowledges no line, and accepts lines only in remote control, which controllers before 10.12 do
+not report. So the trial starts a program that moves nothing, and ends it by the line that would stop the arm.
 """
 
 from collections.abc import Callable
