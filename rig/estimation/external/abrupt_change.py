@@ -72,23 +72,23 @@ def find_change(
     the model's errors. The search for the row is made with each: the first is the most probable one without a change.
     """
     count = sum(int(effect.possible.any(axis=1).sum()) for effect in effects)
-    without, change = model.evaluate_posterior(starts[0]) + float(np.log(max(count, 1))), None
+    log_without, change = model.evaluate_posterior(starts[0]) + float(np.log(max(count, 1))), None
     for std in starts:
         inverse, innovation = model.restrict(std)
         evidence = [_weigh_rows(effect, inverse, innovation) for effect in effects]
-        most = max(range(len(effects)), key=lambda index: float(evidence[index].max()))
-        first, changed = int(np.argmax(evidence[most])), effects[most]
-        if evidence[most][first] < MIN_FITTED_EVIDENCE:
+        best = max(range(len(effects)), key=lambda index: float(evidence[index].max()))
+        first, effect = int(np.argmax(evidence[best])), effects[best]
+        if evidence[best][first] < MIN_FITTED_EVIDENCE:
             continue
         row = np.arange(len(begins_s))
-        shows = (row >= first if changed.lasts else row == first)[:, None, None]
-        columns = changed.of_axes * changed.possible[first] * shows
+        is_affected = (row >= first if effect.lasts else row == first)[:, None, None]
+        columns = effect.of_axes * effect.possible[first] * is_affected
         with_change = MixedModel(_add_columns(model.mixed, columns.reshape(-1, 3)))
-        own_std = with_change.find_maxima(std)[0]
-        odds = with_change.evaluate_posterior(own_std) - without
-        if odds > (least_evidence if change is None else change.evidence):
-            sizes = changed.size * with_change.solve(own_std).theta[-3:]
-            change = AbruptChange(changed.what, float(begins_s[first]), sizes, odds)
+        std_with_change = with_change.find_maxima(std)[0]
+        log_odds = with_change.evaluate_posterior(std_with_change) - log_without
+        if log_odds > (least_evidence if change is None else change.evidence):
+            sizes = effect.size * with_change.solve(std_with_change).theta[-3:]
+            change = AbruptChange(effect.what, float(begins_s[first]), sizes, log_odds)
     return change
 
 

@@ -65,7 +65,7 @@ class _Linear:
     std_rad: Array
 
     def fits(self, delta: float, zetas: Array) -> "_PlacementFits":
-        """Return the fits for δ and all ζ (k,): steps, covariances by causes, restricted log-likelihoods."""
+        """Return the fits with the attitude error δ and each placement error ζ (k,), by one Gauss–Newton step each."""
         tilts = self.turned * np.hypot(self.std_rad, delta)[:, None, None]
         errors = {
             NOISE: np.eye(3) * self.variances[:, :, None],

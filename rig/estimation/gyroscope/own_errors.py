@@ -65,15 +65,15 @@ def list_own_errors(
     along the axis, so its scale may differ. With several speeds the model contains the nonlinearity.
     """
     if len(speeds_rad_s) == 1:
-        curved = bending(matrix, turns_rad_s, sensor.full_scale_rad_s, speeds_rad_s[0])
-        sizes = sensor.nonlinearity / np.repeat([CUBE_DEVIATION, SQUARE_DEVIATION], 3)[:, None, None]
-        yield OwnError(NONLINEARITY, 100 * sensor.nonlinearity, "% of full scale", sizes * curved)
+        unit_curves = bending(matrix, turns_rad_s, sensor.full_scale_rad_s, speeds_rad_s[0])
+        coefficients = sensor.nonlinearity / np.repeat([CUBE_DEVIATION, SQUARE_DEVIATION], 3)[:, None, None]
+        yield OwnError(NONLINEARITY, 100 * sensor.nonlinearity, "% of full scale", coefficients * unit_curves)
     duration_s = np.diff(windows_s)[:, 0]
     source = "; ".join(filter(None, (PART_SOURCE, sensor.temperature_words)))
     warmer_k = _temperature_deviations_k(sensor, windows_s, duration_s)
     patterns = sensor.bias_rad_s_per_k * np.einsum("kn,ij->kinj", warmer_k, np.eye(3))
-    by_k = float(np.degrees(sensor.bias_rad_s_per_k))
-    yield OwnError(BIAS_OVER_TEMPERATURE, by_k, "°/s/K", patterns.reshape(6, -1, 3), source)
+    bias_deg_s_k = float(np.degrees(sensor.bias_rad_s_per_k))
+    yield OwnError(BIAS_OVER_TEMPERATURE, bias_deg_s_k, "°/s/K", patterns.reshape(6, -1, 3), source)
     warmer_k = _temperature_deviations_k(sensor, windows_s, duration_s * turns_rad_s.any(axis=1))
     patterns = sensor.scale_per_k * np.einsum("kn,ni,ij->kinj", warmer_k, turns_rad_s @ matrix.T, np.eye(3))
     yield OwnError(SCALE_OVER_TEMPERATURE, 1e6 * sensor.scale_per_k, "ppm/K", patterns.reshape(6, -1, 3), source)

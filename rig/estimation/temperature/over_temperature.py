@@ -335,7 +335,7 @@ class _ParameterFits:
         prior = np.zeros((1, len(values)))
         prior[0, -1] = 1 / LAG_STD_S
         for _ in range(GAUSS_NEWTON_STEPS):
-            rows, rests = zip(*(self._rows(axis, orders, values) for axis in range(3)), strict=True)
+            rows, residuals = zip(*(self._rows(axis, orders, values) for axis in range(3)), strict=True)
             design = np.vstack(
                 [
                     np.pad(row[:, :-1], ((0, 0), (axis * per_axis, (2 - axis) * per_axis)))
@@ -343,18 +343,18 @@ class _ParameterFits:
                 ]
             )
             design = np.column_stack([design, np.concatenate([row[:, -1] for row in rows])])
-            right_side = np.concatenate([*rests, -prior @ values])
+            right_side = np.concatenate([*residuals, -prior @ values])
             step, *_ = np.linalg.lstsq(np.vstack([design, prior]), right_side)
             values = values + step
         residuals = [self._rows(axis, orders, values)[1] for axis in range(3)]
-        square = float(sum(rest @ rest for rest in residuals) + (values[-1] / LAG_STD_S) ** 2)
+        chi_square = float(sum(residual @ residual for residual in residuals) + (values[-1] / LAG_STD_S) ** 2)
         information = design.T @ design  # pyrefly: ignore[unbound-name]  # GAUSS_NEWTON_STEPS > 0
         covariance = np.asarray(np.linalg.inv(information + prior.T @ prior), dtype=np.float64)
         fixed = np.zeros_like(covariance)
         if len(values) > 1:
             fixed[:-1, :-1] = np.linalg.inv(information[:-1, :-1])
-        free = 3 * (of_scale + of_bias)
-        aicc = square + 2 * free + 2 * free * (free + 1) / (self.count - free - 3 * loops - 2)
+        count = 3 * (of_scale + of_bias)  # of free coefficients
+        aicc = chi_square + 2 * count + 2 * count * (count + 1) / (self.count - count - 3 * loops - 2)
         return self._fit(orders, values, covariance, fixed, aicc)
 
     def _rows(self, axis: int, orders: tuple[int, int], values: Array) -> tuple[Array, Array]:

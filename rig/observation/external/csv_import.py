@@ -65,9 +65,10 @@ SWEEPS_MB = 1  # some ten thousand sweeps
 class ExternalData:
     """The contents of the two files: averaged sweeps and rests, in the order of the rows, and turns by angle.
 
-    - `at_reference`: whether means are corrected to one temperature by polynomials, which include the repeats'
-      contradictions.
-    - `by_mean`: numbers of the rows with an angle solved by mean speed, because the body moved before or after.
+    - `at_reference`: whether means are corrected to one temperature, by polynomials whose uncertainty includes the
+      contradictions of repeats.
+    - `by_mean`: numbers of rows that state an angle but are solved by mean speed, because the body moved before or
+      after.
     - `omitted`: rows left out for missing readings, and the readings missing in the others.
     - `change`: an abrupt change of the gyroscope that the rows show.
     """

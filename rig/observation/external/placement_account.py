@@ -85,7 +85,7 @@ class Account:
         yield from self._missing(kept)
 
     def _missing(self, kept: Sequence[NDArray[np.intp]]) -> Iterator[Omitted]:
-        """Yield an entry for the readings missing in dwells with the samples `kept`, if any."""
+        """Yield one entry for all readings that are missing in the dwells, if any; `kept` are each dwell's samples."""
         sampling = find_sampling(self.time_s)
         windows_s = np.array([(window.start_s, window.end_s) for window in self.rows.windows]).reshape(-1, 2)
         expected = np.floor(sampling.count_expected(self.time_s, windows_s[self._kept])).astype(int)

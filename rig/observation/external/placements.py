@@ -102,20 +102,20 @@ def find_placements(time_s: Array, readings: Mapping[Quantity, Array], rows: Att
     for window in rows.windows:
         near = slice(int(np.searchsorted(ends, window.start_s)), int(np.searchsorted(starts, window.end_s)))
         matches.append(_find_rest(time_s, window, rests[near]))
-    rest, cuts = np.array([number for number, _ in matches]), [cut for _, cut in matches]
-    inner = dwells | _mask_inner(rest, windows_s, starts, ends)
-    groups = _group_by_placement(np.where(inner, rest, -1), rows.attitudes)
-    account = Account(time_s, rows, rest, cuts, dwells)
+    rest_numbers, cuts = np.array([number for number, _ in matches]), [cut for _, cut in matches]
+    is_inner = dwells | _mask_inner(rest_numbers, windows_s, starts, ends)
+    groups = _group_by_placement(np.where(is_inner, rest_numbers, -1), rows.attitudes)
+    account = Account(time_s, rows, rest_numbers, cuts, dwells)
     account.check_mostly_at_rest()
     covered = [np.unique(np.concatenate([cuts[row] for row in group])) for group in groups]
-    named = {int(number) for number in rest}
+    named = {int(number) for number in rest_numbers}
     read, knocked = _read(time_s, readings, covered)
     return Placements(
         read,
         np.array([nearest_rotation(rows.attitudes[group].mean(axis=0)) for group in groups]),
         None if rows.std_rad is None else np.array([np.sqrt(np.mean(rows.std_rad[group] ** 2)) for group in groups]),
         _read(time_s, readings, [placed.samples for placed in rests if placed.number not in named])[0],
-        int((rest < 0).sum()),
+        int((rest_numbers < 0).sum()),
         tuple(account.list_omitted(knocked)),
     )
 

@@ -198,11 +198,10 @@ def _refine(cycles: Array, residuals: Array, fixed: int, fraction: Array, sideba
     only, which have no phase, are unchanged.
     """
     for _ in range(PASSES):
-        sizes = fit_columns(waves(cycles, fraction, sidebands), residuals).reshape(
-            len(cycles), column_count(sidebands), -1
-        )
-        cosine, sine, cosine_grown, sine_grown = np.moveaxis(sizes, 1, 0)[:4]
-        power = np.sum(sizes[:, :2] ** 2, axis=(1, 2)) + np.sum(sizes[:, LINE_COLUMNS:] ** 2, axis=(1, 2))
-        late = np.sum(cosine_grown * sine - sine_grown * cosine, axis=1) / (power + np.finfo(np.float64).tiny)
-        cycles = cycles + np.where(np.arange(len(cycles)) < fixed, 0.0, np.clip(late / np.pi, -0.5, 0.5))
+        fitted = fit_columns(waves(cycles, fraction, sidebands), residuals)
+        amplitudes = fitted.reshape(len(cycles), column_count(sidebands), -1)
+        cosine, sine, cosine_growth, sine_growth = np.moveaxis(amplitudes, 1, 0)[:4]
+        power = np.sum(amplitudes[:, :2] ** 2, axis=(1, 2)) + np.sum(amplitudes[:, LINE_COLUMNS:] ** 2, axis=(1, 2))
+        drift = np.sum(cosine_growth * sine - sine_growth * cosine, axis=1) / (power + np.finfo(np.float64).tiny)
+        cycles = cycles + np.where(np.arange(len(cycles)) < fixed, 0.0, np.clip(drift / np.pi, -0.5, 0.5))
     return cycles

@@ -264,7 +264,7 @@ def _walk_variance(walk: Array, apart: int) -> float:
 
 
 def _merge_at_longest(missing: NDArray[np.intp], steps_s: Array) -> NDArray[np.intp]:
-    """Return the missing readings (n − 1,), with a loss that neighbouring steps share counted once, at the longest."""
+    """Return the missing readings (n − 1,) so that a loss counts once: at the longest of the steps that it affects."""
     merged = np.zeros_like(missing)
     steps = np.flatnonzero(missing)
     if not len(steps):

@@ -1,1 +1,1 @@
-"""The interface of kinds of results to all outlets, and the characteristics in entries."""
+"""The common form of all kinds of results, for every output of the rig, and the characteristics in entries."""

@@ -1,4 +1,4 @@
-"""A characteristic of a sensor: a quantity other than scale factor and bias, for every outlet. Pure."""
+"""A characteristic of a sensor: a quantity other than scale factor and bias, for every output. Pure."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""The interface of a kind of result to all outlets: terminal, page, notebook, certificate, history, header, exports."""
+"""The outputs of a kind of result (outlets): terminal, page, notebook, certificate, history, header, exports."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -102,7 +102,7 @@ class Standard:
 
 @dataclass(frozen=True, slots=True)
 class ResultKind(Generic[EntryT]):
-    """A kind of result: for each outlet the function that serves it, or the reason why it has no such outlet.
+    """A kind of result: for each output (outlet) its function, or the reason why the kind has no such output.
 
     - name: its name for people.
     - key: its key in result.json.
@@ -121,7 +121,7 @@ class ResultKind(Generic[EntryT]):
     - templates: the folder of the block's template.
     - unsolved: yields the reasons why sensors have no solution.
     - in_short: yields lines for the end of a run, if the kind has no row.
-    - characteristics: quantities other than scale and bias, for all outlets.
+    - characteristics: quantities other than scale and bias, for all outputs.
     """
 
     name: str

@@ -1,1 +1,1 @@
-"""The kinds of results, one file each, and the registry that every outlet walks."""
+"""The kinds of results, one file each, and their registry, which every output uses."""

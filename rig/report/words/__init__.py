@@ -1,1 +1,1 @@
-"""Numbers and findings in words for all outlets: rounding, checks, glossary."""
+"""Numbers and findings in words for all outputs: rounding, checks, glossary."""

@@ -1,4 +1,4 @@
-"""A calibration over temperature in words, for all outlets."""
+"""A calibration over temperature in words, for all outputs."""
 
 from collections.abc import Iterator, Sequence
 

@@ -91,7 +91,7 @@ def guess_columns(layout: TableLayout, values: Array, time: Array | None) -> Log
 def _guess_samples(
     layout: TableLayout, values: Array, quaternion: Mapping[str, int], rate_hz: float
 ) -> tuple[dict[str, ColumnEntry], list[str]]:
-    """Return the map of the columns of readings, of the first of two sensors, and sentences on what is undetermined."""
+    """Return the column map of the readings (of the first of two sensors), and sentences on doubtful columns."""
     samples: dict[str, ColumnEntry] = {}
     gaps: list[str] = []
     for group in _group_columns(layout, values, quaternion, rate_hz):

@@ -1,7 +1,7 @@
 """The Robot API of a PolyScope X, HTTP at port 80, for items that no other interface reports, and for the stop.
 
-(The maker's client library, `DashboardClientImplX`: programs are stopped from 10.11 on, the control mode is reported
-from 10.12 on, the serial number from 10.14 on. In local control an order is answered by 403.)
+It can stop programs since version 10.11, and reports the control mode since 10.12, the serial number since 10.14. In
+local control it answers an order with 403. Source: the maker's client library, `DashboardClientImplX`.
 """
 
 import json
