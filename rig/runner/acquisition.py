@@ -130,7 +130,7 @@ class Acquisition:
 
     @contextmanager
     def thin_states(self) -> Iterator[None]:
-        """Record few of the arm's states in the block, during which it is at rest, after the first seconds.
+        """Record only a few of the arm's states in the block, after its first seconds, because the arm is at rest.
 
         Page and supervision still receive all states.
         """

@@ -14,8 +14,7 @@ class FirstSamples:
     """A wait counted in polls, `look_s` apart, and by the turner's clock, if any.
 
     Elapsed time does not suffice: the threads that poll and read samples may be delayed. The limit grows with the load
-    of this computer, on which the simulated laboratory may run. A simulated turner's clock stops while its world is
-    late.
+    of this computer, on which the simulated laboratory may run. A simulated turner's clock stops if its world is late.
     """
 
     look_s: float

@@ -21,8 +21,7 @@ CONTROL_TIMEOUT_S = 30.0
 def run_simulated_laboratory(config_text: str, late: Path | None = None, truth: Path | None = None) -> Iterator[str]:
     """Run the world of a configuration text during the block; yield the address of its control channel.
 
-    The world writes the causes of late steps to the file `late`, or else to stderr, and the truth on request to
-    `truth`.
+    The world writes the causes of late steps to the file `late`, or to stderr, and the truth on request to `truth`.
 
     The world ends when its standard input closes, so it cannot outlive this process. Raise Refused: `only_on_linux`,
     the world's own refusal, or `world_not_ready` if it ends without one.

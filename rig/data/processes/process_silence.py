@@ -18,8 +18,8 @@ class Silence:
 
     Ticks are counted, not seconds, because the counting process may itself be delayed. A tick is ignored if the thread
     that is expected to answer (`thread`, any if None) mostly waited for a processor, unless the process was stopped.
-    Linux shows this (proc(5)); on other systems no tick is ignored. However busy the machine, a silence lasts at most
-    `spared` times LARGEST_LOAD_FACTOR times its limit: the arm must not be left alone.
+    Linux shows this (proc(5)); on other systems no tick is ignored. However busy the machine, a silence ends at its
+    limit times LARGEST_LOAD_FACTOR and the factor `spared`, because the arm must not be left alone.
     """
 
     def __init__(self, pid: int, *, spared: int, thread: int | None = None) -> None:

@@ -30,8 +30,7 @@ class Channel:
     - full_scale_counts: number at which it saturates; range: the nominal end of scale, in the unit; None if unknown.
     - step: largest distance of neighbouring readings, in the unit, if it is more than a count. Numbers truncated toward
       zero have this step at zero, and half of it elsewhere.
-    - stated: whether the user stated the value. All numbers are then equal, and a count is the possible change of the
-      true value.
+    - stated: whether the user stated the value. All numbers are then equal, and a count is the value's possible change.
     """
 
     quantity: str

@@ -43,8 +43,7 @@ def separate(biases_t: Array, covariances_t2: Array, matrices: Array, mountings:
     """Separate the sensor's own bias from the arm's field by K ≥ 2 runs with the sensor in different mountings.
 
     Each run has a bias (K, 3) with its covariance (K, 3, 3), a matrix F (K, 3, 3), and a mounting M (K, 3, 3). Raise
-    Refused `mounting_not_turned` if all mountings are equal, Fault `reversal_contradicts` if runs contradict each
-    other.
+    Refused `mounting_not_turned` if all mountings are equal, Fault `reversal_contradicts` if runs disagree.
     """
     from scipy.special import chdtri
 

@@ -111,8 +111,7 @@ def compute_published_covariance(
     """Return the covariance (p, p) of θ by the published method, to first order in errors of `variances` (N, 3).
 
     An error e of a reading also changes the matrix X of the equations, so it enters equation k as F⁻¹ e_k: δβ = −X⁺ F⁻¹
-    e, projected to the normalisation. With second-order terms the change of s² with v_ref counts. F and b follow from
-    β.
+    e, projected to the normalisation. With second-order terms s² changes with v_ref. F and b follow from β.
     """
     second_order = len(theta) > 15
     norm_known = isinstance(prior, KnownNorm)

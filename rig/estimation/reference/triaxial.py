@@ -232,7 +232,7 @@ def _check_scale(scale: Array, m: Array, prior: ReferencePrior) -> None:
 
 
 def _conditioning(scaled: Array, m: Array, v: Array, needed: int) -> refusals.Conditioning:
-    """Return the conditioning of the scaled X. Directions that noise dominates do not count towards the rank."""
+    """Return the conditioning of the scaled design. Directions that noise dominates do not count towards the rank."""
     noise = np.sqrt(v.max() / np.mean(m**2)) * (np.sqrt(len(m)) + np.sqrt(3))
     return refusals.condition_of(scaled, needed, float(noise))
 

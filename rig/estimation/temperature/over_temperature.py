@@ -458,7 +458,8 @@ def _gradient(polynomials: OverTemperature, half_width_k: float) -> TemperatureL
     """Return the contributor of the temperature difference between sensor and thermometer.
 
     A difference changes each value by the slope of its polynomial. One part is the same over the range; an independent
-    part has opposite signs at the ends of the range, as a heater's power and the loss to the air grow with temperature.
+    part has opposite signs at the ends of the range, because a heater's power and the loss to the air grow with
+    temperature.
     """
     both = np.array([polynomials.scale, polynomials.bias])
     steep = np.arange(1, MAX_ORDER + 1)[:, None] * both[:, 1:]

@@ -1,8 +1,7 @@
 """Transfers between sweeps and rests, each averaged as a whole: rotations about other axes than the sweeps around them.
 
 The sweeps about an axis follow each other, so they do not show a change of its scale factor at another time. In a
-transfer two wrists turn by half a revolution, from standstill to standstill, and the arm states the mean rate as in a
-sweep.
+transfer two wrists turn by half a revolution, from rest to rest, and the arm states the mean rate as in a sweep.
 
 No spectral lines are sought in a transfer: it is short, and the frequency of the servo's vibration rises and falls. A
 vibration at the data rate aliases to zero, an error of the mean that the scatter does not show: see

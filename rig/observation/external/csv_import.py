@@ -67,8 +67,7 @@ class ExternalData:
 
     - `at_reference`: whether means are corrected to one temperature, by polynomials whose uncertainty includes the
       contradictions of repeats.
-    - `by_mean`: numbers of rows that state an angle but are solved by mean speed, because the body moved before or
-      after.
+    - `by_mean`: numbers of rows that state an angle but are solved by mean speed, as the body moved before or after.
     - `omitted`: rows left out for missing readings, and the readings missing in the others.
     - `change`: an abrupt change of the gyroscope that the rows show.
     """

@@ -37,7 +37,7 @@ class Turning:
     on_arrival: bool = False
 
     def select(self, rows: NDArray[np.intp]) -> "Turning":
-        """Return the readings with only some rows, by index."""
+        """Return the readings with only the `rows` of these indices."""
         std_rad = None if self.std_rad is None else self.std_rad[rows]
         return replace(self, rows_s=self.rows_s[rows], attitudes=self.attitudes[rows], std_rad=std_rad)
 

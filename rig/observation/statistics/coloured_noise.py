@@ -34,9 +34,8 @@ def correlation_inflation(residuals: Array) -> float:
 def fit_noise_factor(residuals: Array) -> float:
     """Return the factor on a mean's variance from an autoregressive model, below 1 if residuals are mostly vibration.
 
-    Over many periods a vibration averages out, regardless of the sum of its correlations. The variance of a long mean
-    is the spectrum at zero: with coefficients a and innovations e, var(e) / (1 − Σ a)². Akaike's criterion sets the
-    order.
+    Over many periods a vibration averages out, regardless of the sum of its correlations. A long mean's variance is the
+    spectrum at zero: with coefficients a and innovations e, var(e) / (1 − Σ a)². Akaike's criterion sets the order.
     """
     return fit_autoregression(residuals).factor
 

@@ -1,4 +1,4 @@
-"""Entries of three-axis sensors that were measured at rest in attitudes, of an arm or of a file."""
+"""Entries of three-axis sensors that were measured at rest, in attitudes that an arm or a file states."""
 
 from dataclasses import dataclass
 from functools import partial

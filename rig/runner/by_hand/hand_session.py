@@ -108,8 +108,7 @@ class HandSession:
     def carry_out(self, check: Callable[[], None]) -> None:
         """Request the wanted moves until all are made or U reaches the target.
 
-        `check` is called many times a second. Raise Fault for an error that no move corrects, or after ten errors in a
-        row.
+        `check` is called many times a second. Raise Fault for an error that no move corrects, or after ten in a row.
         """
         heard = self.acquisition.hear()
         self._ask(next_instruction(self._open, None))
@@ -209,8 +208,8 @@ class HandSession:
     def _refuse_move(self, wrong: Fault, move: Move | None, rest: HandRest) -> bool:
         """Omit the move, the rest, or everything before, depending on the fault. Return whether the rest is kept.
 
-        If the bias has changed at one rest, the item may have crept, and the rest is omitted; if at the next rest too,
-        the bias itself has changed. Raise a fault that no move can correct.
+        If the bias has changed at a single rest, the item may have crept, and the rest is omitted. If it has changed at
+        the next rest too, the bias itself jumped. Raise a fault that no move can correct.
         """
         self._refused += 1
         if wrong.name not in REPEATABLE:

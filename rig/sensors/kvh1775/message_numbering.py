@@ -18,8 +18,7 @@ class MessageCounter:
     """The numbers of one stream's messages from 0, with lost ones included.
 
     Formats A and C have only the sequence number, modulo 128: a loss of 128 messages in a row would not be noticed. So
-    a silence of that length on the computer's clock is refused. Format B also has microseconds, so its count is
-    certain.
+    a silence of that length on the computer's clock is refused. Format B also has microseconds.
     """
 
     where: str  # the name of the instrument in messages

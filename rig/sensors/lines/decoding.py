@@ -37,8 +37,7 @@ class LineBatch:
     """Decoded lines: `values` (n, columns) of the samples, as printed, and counts of all other lines.
 
     A value that the device does not provide is NaN, as is text in an unused column. `samples_before` (m,): the number
-    of this block's samples before each rejected line (no sample, no comment). `first_rejected`: the first one's
-    beginning.
+    of this block's samples before each rejected line (no sample, no comment). `first_rejected`: how it begins.
     """
 
     values: Array

@@ -125,7 +125,7 @@ class Servo:
         ]
 
     def check(self) -> None:
-        """Raise the first problem or a requested stop, if any; stop a controlled shaft first."""
+        """Raise the first problem, or the error of a requested stop, if any; before that, stop a controlled shaft."""
         if self._link is not None and (problem := self._thread_problem(self._link)) is not None:
             self._fail(problem)
         if self._problem is None and not (self._link is not None and self._stopper.begun):

@@ -83,7 +83,7 @@ class SensorTruth:
         return (*rate, *(component / STANDARD_GRAVITY_M_S2 for component in self.rotate_rate(force)))
 
     def readings(self, time_s: np.ndarray, flange: BodyMotion, seed: int | np.random.SeedSequence) -> np.ndarray:
-        """Return the readings (n, 3), rad/s, at times (n,), unrounded. `flange`: its motion as arrays (n,)."""
+        """Return the readings (n, 3), rad/s, at times (n,), unrounded. `flange`: the flange's motion as arrays (n,)."""
         columns = [np.broadcast_to(component, time_s.shape) for component in self.sense(flange)]
         return readings(self.gyro, time_s, np.column_stack(columns), seed, self.temperature_c)
 

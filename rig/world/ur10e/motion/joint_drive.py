@@ -1,6 +1,6 @@
-"""The response of a joint to its target: lag, yielding to acceleration, and the ripple of its harmonic drive.
+"""The response of a joint to its target: lag, deflection by acceleration, and the ripple of its harmonic drive.
 
-The joint's angle is u(t − lag) + y + p. u is the target. y is the yielding: a critically damped system of second order
+The joint's angle is u(t − lag) + y + p. u is the target. y is the deflection: a critically damped second-order system
 follows −k times the target's mean acceleration of the last 12 ms, within a bound. p is the ripple, a function of angle
 and speed v: p = v/(v² + v₀²) Σ Rₙ/n sin(n u + φₙ). For v ≫ v₀ its rate is Σ Rₙ cos(n u + φₙ) at every speed; a joint at
 rest is exactly on its target. Over a whole turn at constant speed p adds nothing.
@@ -19,14 +19,14 @@ RIPPLE_SPEED_RAD_S = 0.1  # v₀ of the ripple
 RIPPLE_SPEED_SQUARED = RIPPLE_SPEED_RAD_S**2
 PARALLEL_JOINTS = {1: (2,), 2: (1, 3), 3: (2,)}  # shoulder, elbow and wrist 1 have parallel axes
 MAX_YIELD_RAD = 3e-4  # in logs no joint errs by more than 0.7 to 1 mrad, including the lag
-NEGLIGIBLE_RAD, NEGLIGIBLE_RAD_S = 1e-9, 1e-7  # a smaller yielding counts as none
+NEGLIGIBLE_RAD, NEGLIGIBLE_RAD_S = 1e-9, 1e-7  # a smaller deflection counts as none
 RippleOrders = tuple[tuple[int, float, float], ...]  # cycles a turn, Rₙ/n in rad/s, phase in rad
 Derivatives = tuple[float, float, float]  # an angle in rad and its first two derivatives
 # A joint, and the angle and its derivatives that are added to its smooth angle.
 Shaken = tuple[int, float, float, float]
 
 
-class Yielding(NamedTuple):
+class Deflection(NamedTuple):
     """The deflection, rad, of a joint that yields to its acceleration, at a time t (s) in a tick.
 
     It is end + (start + slope t) exp(−t/τ).
@@ -75,30 +75,30 @@ class JointDrive:
             shaken += [(other, c * angle, c * rate, c * change) for other in PARALLEL_JOINTS[joint]]
         return shaken
 
-    def advance(self, yielding: Sequence[Yielding], change_rad_s: Sequence[float]) -> tuple[Yielding, ...]:
+    def advance(self, before: Sequence[Deflection], change_rad_s: Sequence[float]) -> tuple[Deflection, ...]:
         """Return the joints' deflections in the next tick, if their targets' rates change by `change_rad_s`.
 
-        `yielding` are the deflections in the last tick. Joints without a deflection are left out.
+        `before` are the deflections in the last tick. Joints without a deflection are left out.
         """
-        if not self.yield_s2 or not (yielding or any(change_rad_s)):
+        if not self.yield_s2 or not (before or any(change_rad_s)):
             return ()
-        at_tick_end = {deflection.joint: self.yield_at(deflection, TICK_S) for deflection in yielding}
+        at_tick_end = {deflection.joint: self.deflection_at(deflection, TICK_S) for deflection in before}
         deflections = []
         for joint, change in enumerate(change_rad_s):
             angle, rate, _ = at_tick_end.get(joint, (0.0, 0.0, 0.0))
             if change or abs(angle) > NEGLIGIBLE_RAD or abs(rate) > NEGLIGIBLE_RAD_S:
                 end = -max(-MAX_YIELD_RAD, min(self.yield_s2 * change / TICK_S, MAX_YIELD_RAD))
                 start, slope = angle - end, rate + (angle - end) / self.yield_time_s
-                deflections.append(Yielding(joint, end, start, slope))
+                deflections.append(Deflection(joint, end, start, slope))
         return tuple(deflections)
 
-    def yield_at(self, yielding: Yielding, elapsed_s: float) -> Derivatives:
+    def deflection_at(self, deflection: Deflection, elapsed_s: float) -> Derivatives:
         """Return a joint's deflection `elapsed_s` after the start of the tick, and its derivatives."""
         per_s = 1.0 / self.yield_time_s
         decay = exp(-elapsed_s * per_s)
-        remainder = (yielding.start_rad + yielding.slope_rad_s * elapsed_s) * decay
-        slope = yielding.slope_rad_s * decay
-        return yielding.end_rad + remainder, slope - remainder * per_s, (remainder * per_s - 2.0 * slope) * per_s
+        remainder = (deflection.start_rad + deflection.slope_rad_s * elapsed_s) * decay
+        slope = deflection.slope_rad_s * decay
+        return deflection.end_rad + remainder, slope - remainder * per_s, (remainder * per_s - 2.0 * slope) * per_s
 
 
 def build_drive(section: SimulatedDriveSection, seed: int) -> JointDrive:

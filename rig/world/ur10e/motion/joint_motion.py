@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from rig.world.clock import TICK_S
 from rig.world.ur10e.motion.encoders import Encoders
-from rig.world.ur10e.motion.joint_drive import JointDrive, Yielding
+from rig.world.ur10e.motion.joint_drive import Deflection, JointDrive
 from rig.world.ur10e.motion.ripple import Ripple
 from rig.world.ur10e.motion.trajectory import ZERO, Joints, Trajectory, build_rest, plan_joint_move, plan_speed_change
 from rig.world.ur10e.motion.vibration import Vibration
@@ -40,7 +40,7 @@ class _Tick(NamedTuple):
     trajectory: Trajectory
     offset: Joints
     gain: Joints
-    yielding: tuple[Yielding, ...] = ()
+    deflections: tuple[Deflection, ...] = ()
 
 
 class JointMotion:
@@ -192,7 +192,7 @@ class JointMotion:
         for joint in moving:
             if drive.orders[joint]:
                 shaken.extend(drive.shake(joint, smooth[joint], speed[joint], change[joint]))
-        shaken.extend((motion.joint, *drive.yield_at(motion, elapsed)) for motion in tick.yielding)
+        shaken.extend((deflection.joint, *drive.deflection_at(deflection, elapsed)) for deflection in tick.deflections)
         for joint, angle, rate, bend in shaken:
             q[joint] += angle
             qd[joint] += rate
@@ -232,11 +232,11 @@ class JointMotion:
             mean = 0.5 * (begin_fraction + self._fraction) if self._scales else 1.0
             self._trajectory_s += mean * TICK_S
             self._now = None
-        yielding = self._yield(standing)
+        deflections = self._deflect(standing)
         self._ticks.append(
-            _Tick(end_s - TICK_S, begin_s, fraction, slope, self._trajectory, self._offset, self._gain, yielding)
+            _Tick(end_s - TICK_S, begin_s, fraction, slope, self._trajectory, self._offset, self._gain, deflections)
         )
-        if not standing or yielding:
+        if not standing or deflections:
             self._moving_ticks = self._ticks.maxlen or 1
             self._now = None
         elif self._moving_ticks:
@@ -244,9 +244,9 @@ class JointMotion:
             self._now = None
         self._encoders.step()
 
-    def _yield(self, standing: bool) -> tuple[Yielding, ...]:
-        """Return the yielding of the joints in the tick just simulated."""
-        before, last, changes = self.smooth_qd_rad_s, self._ticks[-1].yielding, self._changes
+    def _deflect(self, standing: bool) -> tuple[Deflection, ...]:
+        """Return the joints' deflections in the tick just simulated."""
+        before, last, changes = self.smooth_qd_rad_s, self._ticks[-1].deflections, self._changes
         if standing and before is ZERO:
             changes.append(ZERO)
             return self._drive.advance(last, _mean(changes)) if last else ()
