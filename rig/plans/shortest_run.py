@@ -308,7 +308,7 @@ class _HandSearch:
             return None
 
     def ending(self, procedure: ProcedureSection, wanted: TargetUncertainty) -> Mapping[str, float]:
-        """Return the key that ends a session at the target, without the part of U that no session can reduce."""
+        """Return the key that ends a session at the target; the part of U that no session can reduce is subtracted."""
         remaining = wanted.scale**2 - (2 * REAL_HAND_STD) ** 2
         return {"target_scale_u": round(remaining**0.5, 7)} if 0 < remaining < inf else {}
 

@@ -30,7 +30,7 @@ class SimulatedInstrument(Device, Protocol):
 
 @dataclass(slots=True)
 class InstrumentMount:
-    """The socket of an instrument.
+    """The place of an instrument in the laboratory, with its port.
 
     - kind: its name in control requests.
     - build: returns the instrument with power, at a virtual time in s; its non-volatile memory is bound in `build`.

@@ -112,8 +112,8 @@ def compare(
 ) -> Comparison:
     """Return the comparison of a sensor's recorded readings with the reference's.
 
-    `rotation` (3, 3) takes the reference's into the sensor's frame. `gravity_rad_s` (N, 3): the effect of gravity on
-    the readings of each revolution, if given. Raise Fault `no_overlap`, `different_clocks`.
+    `rotation` (3, 3) takes vectors from the reference's frame into the sensor's. `gravity_rad_s` (N, 3): the effect of
+    gravity on the readings of each revolution, if given. Raise Fault `no_overlap`, `different_clocks`.
     """
     parts = [_align_recording(recording, sensor, reference, rotation) for recording in recordings]
     return Comparison(

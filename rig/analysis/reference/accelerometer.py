@@ -105,7 +105,7 @@ class AccelerometerResult:
 
     @property
     def lever_arm_std_m(self) -> Array | None:
-        """The standard deviations (3,) of the lever arm, in the flange's axes: a nominal mounting permutes them."""
+        """The standard deviations (3,) of the lever arm, in the flange's axes instead of the nominal sensor axes."""
         if self.solution.lever_arm_m is None:
             return None
         std: Array = np.abs(np.array(self.sensor.mounting)).T @ np.sqrt(np.diag(self.solution.covariance)[LEVER])

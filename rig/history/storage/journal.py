@@ -2,7 +2,7 @@
 
 So a row changed, added or removed outside of the rig is detected. A changed line is detected too: a line contains its
 own hash and the hash of the chain before it. A user who may write all tables can write a consistent new journal, or cut
-off its end, which only a `Head` stored elsewhere detects: a signed certificate names one.
+off its end. Only a `Head` stored elsewhere detects that: a signed certificate names one.
 """
 
 import hashlib

@@ -16,7 +16,7 @@ def build_kvh_mounts(config: RigConfig, world: WorldSection) -> dict[str, Instru
 
 
 def _mount(config: RigConfig, world: WorldSection, name: str) -> InstrumentMount:
-    """Return the socket of one KVH 1775. Raise Refused `kvh_settings`."""
+    """Return the place of one KVH 1775 in the laboratory. Raise Refused `kvh_settings`."""
     sensor, simulated = config.sensors[name], world.sensors[name]
     section = simulated.kvh1775 or SimulatedKvhSection()
     try:

@@ -15,7 +15,7 @@ def build_printer_mounts(config: RigConfig, world: WorldSection) -> dict[str, In
 
 
 def _mount(config: RigConfig, world: WorldSection, name: str) -> InstrumentMount:
-    """Return the socket of the device that prints the lines of the sensor `name`."""
+    """Return the place in the laboratory of the device that prints the lines of the sensor `name`."""
     sensor, simulated = config.sensors[name], world.sensors[name]
     section = simulated.lines or SimulatedLinesSection()
 

@@ -3,7 +3,7 @@
 Source: the maker's Dashboard Server manual, e-Series. In local control it answers questions and refuses every order,
 including `stop`; so does a connection that was opened in local control, until it is reopened (Universal Robots ROS
 Driver, issues 125 and 262). A CB3 has neither local control nor operational modes, nor the commands about them; it has
-user roles, which the e-Series has not (the maker's client library, `dashboard_client_implementation_g5.cpp`).
+user roles, which the e-Series lacks (the maker's client library, `dashboard_client_implementation_g5.cpp`).
 """
 
 from collections.abc import Callable
