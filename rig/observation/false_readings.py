@@ -100,8 +100,8 @@ def _find_overflows(time_s: Array, axis: Array, narrowest: float) -> NDArray[np.
     if span < narrowest or not large.any() or abs(axis.max() + axis.min()) > MAX_ASYMMETRY * span:
         return none
     jumps = np.flatnonzero(large & (steps_s <= MAX_STEP_INTERVALS * np.median(steps_s)))
-    others = np.abs(steps[~large])
-    if not len(jumps) or others.max(initial=0.0) > SMOOTH_SPAN_FRACTION * span:
+    small_steps = np.abs(steps[~large])
+    if not len(jumps) or small_steps.max(initial=0.0) > SMOOTH_SPAN_FRACTION * span:
         return none
     if span < MIN_SPAN_STEPS * float(np.diff(np.unique(axis)).min()):
         return none

@@ -197,15 +197,15 @@ def _stds_of_rows(rows: Sequence[Factor], step: Array, covariance: Array, now: H
     stds: dict[str, float] = {}
     for name, (kind, cause) in CAUSE_OF_STD.items():
         stated = getattr(STATED, name)
-        square = dof = PRIOR_DOF
+        squares = dof = PRIOR_DOF
         if rows_of_kind := [row for row in rows if row.kind == kind]:
             design, residual = whiten_rows(rows_of_kind)
             fraction = np.concatenate([np.square(row.causes[cause] / row.std) for row in rows_of_kind])
-            free = np.clip(1 - _leverages(design, covariance), 0.0, 1.0)
-            sum_squares = np.square(residual + design @ step) - free * (1 - fraction)
-            square += float(sum_squares.sum()) * (getattr(now, name) / stated) ** 2
-            dof += float(fraction @ free)
+            redundancy = np.clip(1 - _leverages(design, covariance), 0.0, 1.0)
+            sum_squares = np.square(residual + design @ step) - redundancy * (1 - fraction)
+            squares += float(sum_squares.sum()) * (getattr(now, name) / stated) ** 2
+            dof += float(fraction @ redundancy)
         least = stated * (1.0 if name in UNREDUCED_STDS else MIN_STATED_RATIO)
-        size = stated * float(np.sqrt(max(square, 0.0) / dof))
-        stds[name] = min(max(least, size), getattr(MAX_STDS, name))
+        estimate = stated * float(np.sqrt(max(squares, 0.0) / dof))
+        stds[name] = min(max(least, estimate), getattr(MAX_STDS, name))
     return HandStds(**stds)

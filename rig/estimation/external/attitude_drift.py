@@ -238,25 +238,25 @@ def _list_errors(averaged: FixedAttitudes, fixes: Fixes, correlation: Array, ste
     count = len(fixes.placement)
     first = np.searchsorted(fixes.fix, np.arange(count))
     ratio = _relative(fixes)[first]
-    same = (fixes.placement[:, None] == fixes.placement) * ratio[:, None] * ratio
+    same_placement = (fixes.placement[:, None] == fixes.placement) * ratio[:, None] * ratio
     at_rest = fixes.placement < 0
-    late = np.zeros((count, 3, 3))
-    np.add.at(late, fixes.fix, averaged.rates[:, :, None] * averaged.rates[:, None, :])
-    late /= np.bincount(fixes.fix).astype(np.float64)[:, None, None]
+    jitter_blocks = np.zeros((count, 3, 3))
+    np.add.at(jitter_blocks, fixes.fix, averaged.rates[:, :, None] * averaged.rates[:, None, :])
+    jitter_blocks /= np.bincount(fixes.fix).astype(np.float64)[:, None, None]
     elapsed_s = (step @ averaged.middles_s)[:, None, None]
-    hastened = elapsed_s * np.tensordot(np.abs(step) / 2, late, 1)
-    late /= np.bincount(fixes.fix).astype(np.float64)[:, None, None]
+    lost_time_blocks = elapsed_s * np.tensordot(np.abs(step) / 2, jitter_blocks, 1)
+    jitter_blocks /= np.bincount(fixes.fix).astype(np.float64)[:, None, None]
     _, rest = np.unique(fixes.placement, return_inverse=True)  # the error does not change while the body lies still
     at_s = (np.bincount(rest, weights=averaged.middles_s) / np.bincount(rest))[rest]
     same_visit = matern(np.abs(at_s[:, None] - at_s), VISIT_CORRELATION_S)
-    together = averaged.turning[:, :, None] * averaged.turning[:, None, :]
+    common_blocks = averaged.turning[:, :, None] * averaged.turning[:, None, :]
     return {
         ATTITUDE_ERROR: _expand_axes(step @ correlation @ step.T),
         VISIT_ERROR: _expand_axes(step @ (correlation * same_visit) @ step.T),
-        REST_ERROR: _expand_axes(step @ (same * at_rest * at_rest[:, None]) @ step.T),
-        MOTION_ERROR: _expand_axes(step @ (same * ~at_rest * ~at_rest[:, None]) @ step.T),
-        JITTER: _combine_blocks(step, late + COMMON_JITTER_FRACTION * together),
-        LOST_TIMES: fixes.on_arrival * _combine_blocks(np.eye(len(step)), hastened),
+        REST_ERROR: _expand_axes(step @ (same_placement * at_rest * at_rest[:, None]) @ step.T),
+        MOTION_ERROR: _expand_axes(step @ (same_placement * ~at_rest * ~at_rest[:, None]) @ step.T),
+        JITTER: _combine_blocks(step, jitter_blocks + COMMON_JITTER_FRACTION * common_blocks),
+        LOST_TIMES: fixes.on_arrival * _combine_blocks(np.eye(len(step)), lost_time_blocks),
     }
 
 
