@@ -31,7 +31,7 @@ UNIT_RATIOS = (
 )
 MIN_SIDE_COSINE = 0.05  # between the reference and the direction that determines its sign
 NO_FIT = "the readings contradict the attitudes so much that no fit converges"
-MAX_CONSISTENT_RATIO = 3.0  # of residuals to their standard deviations, from which on a warning is given
+MAX_CONSISTENT_RATIO = 3.0  # least ratio of residuals to their standard deviations that causes a warning
 
 
 def require_shape(name: str, array: Array, shape: tuple[int, ...]) -> None:

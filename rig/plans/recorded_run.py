@@ -20,7 +20,7 @@ RAW, CORRECTED = "six_observation", "verify"  # procedures that judge any record
 
 @dataclass(frozen=True, slots=True)
 class RecordedRun:
-    """The recordings of a run, oldest first: of `raw` readings, and of those the board `corrected`.
+    """The recordings of a run, oldest first: `raw` as measured, and `corrected` by the board.
 
     `path` is the run folder, or the run file of a single recording (`alone`). `script` is the script that the user has
     named for it, or None.

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class _Example:
-    """An example of SIX, Table I: parameters, true and after the last and the first pass, and the number of passes."""
+    """An example of SIX, Table I: the true parameters, those after the last and first pass, the number of passes."""
 
     scale: tuple[float, float, float]
     bias_rad_s: tuple[float, float, float]

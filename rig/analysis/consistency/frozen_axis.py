@@ -6,7 +6,7 @@ from rig.data.quantity import RATE
 from rig.estimation.arrays import Array, equal_runs
 from rig.observation.observed_run import ObservedRun
 
-MIN_EQUAL_READINGS = 25  # in a row, from which on the motion is examined
+MIN_EQUAL_READINGS = 25  # in a row: fewest after which the motion is examined
 LAG_S = 0.15  # at either end of them: a sensor's filter lags, and the clock's offset is known to milliseconds only
 SMOOTHING_S = 0.1
 MIN_CHANGE_STEPS, MIN_CHANGE_RAD_S = 10.0, 0.02  # of the rate about the axis, in the nominal mounting

@@ -219,18 +219,19 @@ def budget_of(solution: Estimate, data: ExternalData) -> Budget:
     """Return the budget of a sensor's covariance: the scatter of means, and the errors of the stated motion."""
     if data.turned is None or not isinstance(solution, TurnedSolution):
         vector = solution if isinstance(solution, VectorSolution) else _vector(data)
-        more, covariance = sweep_errors(vector, data), solution.covariance
+        errors, covariance = sweep_errors(vector, data), solution.covariance
         dof = noise_dof(vector, data) if vector is solution else _fewest_of_means(data)
-        if more is not None and vector is solution:
-            covariance = covariance - more.covariance
+        if errors is not None and vector is solution:
+            covariance = covariance - errors.covariance
         noise = Contributor(NOISE, "A", "normal", None, "", FROM_SCATTER, dof, covariance)
-        if more is None:
+        if errors is None:
             return Budget((noise,))
-        return Budget((noise, Contributor(SWEEPS, "A", "normal", None, "", FROM_RESIDUALS, more.dof, more.covariance)))
+        sweeps = Contributor(SWEEPS, "A", "normal", None, "", FROM_RESIDUALS, errors.dof, errors.covariance)
+        return Budget((noise, sweeps))
     dof_by_name = {NOISE: float(data.turned.noise_dof), BIAS: float(data.turned.bias_dof)}
     dof_by_name |= dict.fromkeys((rotations_by_angle.ENDS, rotations_by_angle.AXES), solution.inflation_dof)
-    lines = solution.budget.contributors
-    return Budget(tuple(replace(line, dof=dof_by_name.get(line.name, line.dof)) for line in lines))
+    parts = solution.budget.contributors
+    return Budget(tuple(replace(part, dof=dof_by_name.get(part.name, part.dof)) for part in parts))
 
 
 def _fewest_of_means(data: ExternalData) -> float:

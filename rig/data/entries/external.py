@@ -25,9 +25,9 @@ class IncrementsEntry(Entry):
 
     - window_s: length of the windows over which attitudes were averaged; attitude_std_rad: error of a mean about each
       axis; clock_offset_s: corrected offset of the attitudes' clock from the readings'.
-    - angle_random_walk_rad_sqrt_s: the gyroscope's own; matrix_scatter, bias_scatter_rad_s: scatter of F and b between
-      intervals of the recording.
-    - omitted: increments that could not be made; rejected: number of increments that contradicted all others.
+    - angle_random_walk_rad_sqrt_s: of the gyroscope's noise; matrix_scatter, bias_scatter_rad_s: scatter of F and b
+      between intervals of the recording.
+    - omitted: increments that could not be made; rejected: number of increments left out as outliers.
     """
 
     increments: int

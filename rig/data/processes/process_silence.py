@@ -42,12 +42,12 @@ class Silence:
         Call this at even intervals. `unheard`: whether an unread answer waits, so that the process was not silent.
         """
         self._all_ticks += 1
-        # The first tick of a silence means nothing yet; from the second on the process' threads are examined.
+        # The first tick of a silence means nothing yet; after the second, the process' threads are examined.
         starved = self._all_ticks > 1 and self._is_starved(has_previous=self._all_ticks > 2)
         self.ticks += not (starved or unheard)
 
     def lasts_over(self, limit: float) -> bool:
-        """Return whether there were more than `limit` silent ticks, or more than `spared` × `limit` ticks of any kind.
+        """Return whether more than `limit` ticks were silent, or more than `spared` × `limit` passed in all.
 
         The `limit` is for a machine with a processor for every program; the machine's load extends it.
         """

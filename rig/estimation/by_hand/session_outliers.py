@@ -20,7 +20,7 @@ from rig.estimation.by_hand.session_parts import MAX_STDS, STATED, HandRest, Han
 
 EQUATION_CHI_SQUARE_DROP = 4.0  # expected for each equation left out
 CHI_SQUARE_DROP_LIMIT = 16.0  # further decrease that shows an outlier: false-alarm probability 1 in 10^5
-AT_LIMIT_RATIO = 0.99  # to the largest size, from which on a size is at its limit
+AT_LIMIT_RATIO = 0.99  # least fraction of the largest standard deviation that counts as at its limit
 FACTORS_OF = {
     "turn_not_closed": (CLOSURE, TILT),
     "lost_in_move": (MOVE, CLOSURE, TILT),
@@ -28,7 +28,7 @@ FACTORS_OF = {
     "not_flat": (FLAT, ACCELERATION),
 }
 JUMP_RAD_S = 1e-3  # change of the mean reading between two rests: no bias drifts by as much
-# the standard deviations that one outlier inflates, and the ratio to the usual from which on it does
+# the standard deviations that one outlier inflates, and their least ratio to the stated ones if it does
 INFLATION_RATIO, INFLATED_STDS = 3.0, ("repeat_rad", "closure_rad")
 HIDEABLE_OUTLIERS = ("not_flat", "table_moved", "accelerometer_jumped", "turn_not_closed")
 MIN_REDUNDANCY = 1e-9  # redundancy below which the other equations do not check an equation
@@ -54,7 +54,7 @@ def find_contradiction(fit: GraphFit, since: int | None = None) -> Fault | None:
 
 
 def find_masked_fault(fit: GraphFit) -> Fault | None:
-    """Return the fault of the one rest or turn that inflates the hand's standard deviations and U, or None."""
+    """Return the fault of the one rest or turn that inflates the stds of the hand's moves, or None."""
     if not _much_larger(fit.stds, STATED):
         return None
     hypotheses = sorted(_test_hypotheses(fit, None), key=lambda hypothesis: hypothesis.chi_square_drop)

@@ -20,7 +20,7 @@ MIN_ROWS, MAX_ROWS = 6, 600  # fewer show no change; more would take too long
 MIN_EITHER_SIDE = 2  # rows: a single row that differs is a wrong row
 MIN_ROWS_FOR_ONE = 8  # rows that decide between a wrong first or last row and a bias that changes there
 SMALL_ERROR_RATIO = 0.01  # scale of the errors tried in addition to the estimate, which the change may have inflated
-MIN_LARGE_RATIO = 0.5  # to an axis' largest reading, from which on a row determines its scale factor
+MIN_LARGE_RATIO = 0.5  # least fraction of an axis' largest reading at which a row determines its scale factor
 
 
 def find_row_change(

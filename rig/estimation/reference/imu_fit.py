@@ -60,7 +60,7 @@ class Fit:
 def covariance_bound(
     theta: Array, movement: Movement, attitude_std_rad: float, *, second_order: bool = False
 ) -> tuple[Array, Array]:
-    """Return the Cramér–Rao bound (22, 22) at the true θ (22,) and δ, and ∂θ/∂readings (22, 3 K).
+    """Return the Cramér–Rao bound (22, 22) at the true θ (22,) and attitude error δ, and ∂θ/∂readings (22, 3 K).
 
     Both depend on movement and noise, not on the readings.
     """

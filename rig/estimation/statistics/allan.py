@@ -31,7 +31,7 @@ MAX_INSTABILITY_STD = 0.2
 FLICKER_RATIO = float(np.sqrt(2 * np.log(2) / np.pi))  # 0.664: ratio of the least σ to the bias instability
 MIN_EXCESS_STDS = 3.0  # by which the least σ must exceed that of white noise alone
 MIN_READINGS = 3  # of an interval
-MIN_DURATION_S = 40.0  # from which on white noise determines a random walk to `MAX_RANDOM_WALK_STD`
+MIN_DURATION_S = 40.0  # shortest recording whose white noise determines a random walk to `MAX_RANDOM_WALK_STD`
 MIN_FLOOR_DURATION_S = 600.0  # few gyroscopes reach their least deviation sooner
 
 

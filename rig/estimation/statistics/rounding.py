@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from rig.estimation.arrays import Array
 
 MIN_LEVELS = 3  # different readings of an axis that is not constant
-MIN_OTHER_FRACTION = 0.01  # of readings beyond the two most frequent values, from which on they determine the noise
+MIN_OTHER_FRACTION = 0.01  # least share of readings beyond the two most frequent values that determines the noise
 # Fewest occurrences of a repeated value; least fraction of readings with repeated values that shows steps.
 MIN_REPEATS, MIN_REPEATED_FRACTION = 3, 0.25
-LARGE_NOISE_STEPS = 4.0  # from which on all rounding averages out
+LARGE_NOISE_STEPS = 4.0  # least noise, in steps, that averages out all rounding
 MAX_READINGS = 20_000  # readings used to find the steps
 SAME_VALUE_STEPS = 1e-3  # values closer than this are equal
 HALF_STEP_TOLERANCE = 0.25  # in steps: whole and half-way values are half a step apart

@@ -20,7 +20,7 @@ from rig.observation.time_stamps.sampling import find_sampling
 from rig.observation.windows import Window
 
 MARGIN_S = 0.1  # time at either end of a rest that is assigned to the adjacent moves
-MIN_GAP_READINGS = 2  # missing readings, from which on there is a gap
+MIN_GAP_READINGS = 2  # fewest missing readings that count as a gap
 MIN_SATURATED = 3  # equal readings in a row at the largest value
 SATURATION_FRACTION = 0.995
 BEGINNING_S, MAX_STILL_SCATTER_RAD_S = 1.0, 0.03  # of a recording, and the scatter there without a hand

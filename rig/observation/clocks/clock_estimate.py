@@ -20,7 +20,7 @@ from rig.observation.motion.reference_motion import KnownMotion, check_span, not
 LONG_RUN_S = 1800.0  # the part of a recording that the coarse search uses first; it takes more only if that fails
 MIN_TURN_RATE_RAD_S = 0.05  # RMS over a recording, of an axis that was turned
 BLOCK_S, BLOCK_RATES = 0.1, 5  # whose mean speed is compared with the highest; number of rates in it
-MOVING_SPEED_RATIO = 0.02  # to the highest speed, from which on the turner moves
+MOVING_SPEED_RATIO = 0.02  # least speed of a moving turner, as a fraction of its highest
 NEAR_MOTION_S = 0.5  # rest around motion that is used: longer than a coarse clock's error
 
 
@@ -128,7 +128,7 @@ def _count_until(board_time_s: Array, span_s: float) -> int:
 
 @dataclass(frozen=True, slots=True)
 class _MovingTimes:
-    """The blocks of `BLOCK_S` from `start_s` on in or near which a body turns: a mask `near` (m,).
+    """The m blocks of `BLOCK_S` after `start_s`; `near` (m,) marks those in or near which a body turns.
 
     At rest there are only vibrations, which the turner's encoders and the sensor show differently.
     """

@@ -23,7 +23,7 @@ MAX_WEIGHING_STEPS = 60  # noise that seems correlated only at every second step
 SLOW_AVERAGE_S, FINE_AVERAGE_S = 0.1, 0.02  # over which rates are averaged in the first fit and in the second
 MEAN_RATES, STRIDE = 10, 2  # rates in one average; stride of the averages in the spline
 MIN_STEP_INTERVALS = 0.5  # between samples
-# Step from which on, and interval at which, the fit extrapolates; largest number of steps it skips.
+# The first step at which the fit extrapolates, the steps between extrapolations, and the most steps that one skips.
 FIRST_LEAP_STEP, LEAP_INTERVAL, MAX_LEAP_STEPS = 300, 20, 100.0
 
 

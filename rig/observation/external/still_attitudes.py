@@ -5,7 +5,7 @@ import numpy as np
 from rig.estimation.arrays import Array, rotation_vectors
 from rig.observation.windows import Window
 
-MIN_DWELL_S = 0.5  # from which on a row declares that the body lay still
+MIN_DWELL_S = 0.5  # shortest row that declares that the body lay still
 MIN_APART_S = 0.5  # between two short rows that show whether it did
 MAX_TIME_ERROR_S = 0.2  # of a row's attitude
 MAX_STILL_RATE_RAD_S = 0.02  # between them; a camera's errors amount to half of it

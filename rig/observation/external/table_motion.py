@@ -17,7 +17,7 @@ MIN_PAIR_RAD, MAX_RATIO_DEVIATION, MIN_PAIR_FRACTION = 0.02, 0.3, 0.8
 # °/rad, and its tolerance: this ratio is a wrong unit; any other one is a turn of over half a revolution per row
 DEG_PER_RAD, DEG_TOLERANCE = 180 / np.pi, 0.05  # a wrong unit; any other ratio: turns of over half a revolution
 MAX_SPEED_RATIO = 2.0  # fastest to slowest: above it, turns of over half a revolution have no common ratio
-# Scatter of the steps relative to their median, above which it matters in a rate; median from which on it does not.
+# Scatter of the steps relative to their median, above which it matters in a rate; least median at which it does not.
 STEP_SCATTER, COARSE_STEP_S = 0.2, 0.05
 
 

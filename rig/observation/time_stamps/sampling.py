@@ -30,7 +30,7 @@ LONG_WIDTHS = (64, 512)  # over which the interval is estimated first: more than
 LONG_STEP_INTERVALS = 6.0  # a longer step is a gap; among uneven stamps, a reading with a longer delay was buffered
 PACKET_S = 0.5  # readings that follow each other evenly for longer have not arrived at once
 MULTIPLE_TOLERANCE, MIN_FIT = 0.25, 0.8  # in intervals; fraction of differences that must be whole multiples
-MIN_LOSS_INTERVALS = 0.6  # difference of delays from which on a reading is lost
+MIN_LOSS_INTERVALS = 0.6  # least difference of delays that shows a lost reading
 COARSE_RATIO = 1 / 3  # resolution in intervals, above which the stamps are worse than `MULTIPLE_TOLERANCE`
 # Fraction of the interval; if this fraction of steps is shorter, readings are stamped on arrival.
 SHORT_STEP, MIN_SHORT_FRACTION = 0.6, 0.05

@@ -11,7 +11,7 @@ from itertools import pairwise, zip_longest
 
 from rig.data.recording.thermal_events import SetMeasured
 
-NEXT_SET_FRACTION = 0.5  # of the largest step from which on a set begins: its own change of temperature is added
+NEXT_SET_FRACTION = 0.5  # of the largest step, after which a set begins: its own change of temperature is added
 END_FRACTION = 0.25  # largest distance from an end of the range, as a fraction of the largest step
 FULL_POWER_K = 2.0  # control error at which the heater has full power
 MAX_LAG_K = 3.0  # between the ramp and the heated sensor
