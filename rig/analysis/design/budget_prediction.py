@@ -65,9 +65,9 @@ def predict_budgets(config: RigConfig, plan: Plan, turner: TurnerIdentity) -> di
 def _budget(config: RigConfig, run: PlannedRun, turner: TurnerIdentity, name: str, sensor: SensorSection) -> Budget:
     """Return the predicted budget of a gyroscope, by the analysis of simulated readings of the plan."""
     uncertainty, mounting = run.uncertainty, mounting_matrix(sensor.mounting)
-    scatters = turner.reading_std_rad > 0
+    noisy_angles = turner.reading_std_rad > 0
     # The scatter of the readings already includes the jitter.
-    jitter_s = 0.0 if scatters else predict_state_jitter(run.plan)
+    jitter_s = 0.0 if noisy_angles else predict_state_jitter(run.plan)
     environment = MeasurementEnvironment(
         run.site, uncertainty, _clock(uncertainty, on_board=sensor.on_board), jitter_s, run.settings.extension_m
     )
@@ -82,7 +82,7 @@ def _budget(config: RigConfig, run: PlannedRun, turner: TurnerIdentity, name: st
     )
     explained = explain(inputs, mounting, BiasProcess(0.0, 0.0, 0, constant_sensor.instability_rad_s))
     uncertainty_inputs = list_uncertainties(environment, name, None)
-    if not scatters:
+    if not noisy_angles:
         return budget(explained, uncertainty_inputs)
     turns = [turn for part in parts for turn in part.turns]
     readings = [

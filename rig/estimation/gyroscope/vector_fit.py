@@ -218,7 +218,7 @@ def _explain(
     arm_errors = inputs.arm_errors_rad_s
 
     def arm_and_speed_patterns(matrix: Array) -> Array:
-        """Return the effects (P, N, 3) on readings of one std of each arm error, and of curvature at several speeds."""
+        """Return effects (P, N, 3) on readings: of one std of each arm error, and of the curvature if speeds differ."""
         curved = [curvature(matrix, inputs.rates_rad_s)] if several else []
         return np.concatenate([arm_errors @ matrix.T, *curved])
 

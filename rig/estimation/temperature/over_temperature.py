@@ -86,7 +86,7 @@ class OverTemperature:
     - `scale`, `bias` (4, 3): the coefficients of k and c, SI units per Kⁿ; `orders` of k and of c.
     - `range_c`: the only range in which both are valid. `zero` (3,): the readings at the reference for zero input.
     - `lag_s`, `lag_std_s`: the thermometer's lag and its standard deviation.
-    - `hysteresis`: in mid-range, the difference (6,) of a warming sensor from the mean of both directions, and its
+    - `hysteresis`: scale and bias (6,) while warming minus their mean of warming and cooling, in mid-range, and its
       standard deviation; None with one direction only.
     """
 

@@ -100,7 +100,7 @@ def read_sample_table(
 
 
 def _convert(path: Path, columns: Columns, mapped: Mapped | None) -> Columns:
-    """Return the columns named as in the rig's files, in the order and with the factors of a map.
+    """Return columns renamed as in the rig's files, and multiplied by the factors of a map.
 
     The map can state a mirrored axis, or a topic in another unit. Raise Refused `wrong_columns`.
     """

@@ -51,9 +51,9 @@ class ArmMotion:
         reading_std_rad: float = 0.0,
     ) -> None:
         """Fit splines to the joint angles and the flange's rates; mark the times that the states cover."""
-        self.kinematics, self.names, self._scatters = kinematics, names, reading_std_rad > 0
+        self.kinematics, self.names, self._noisy_angles = kinematics, names, reading_std_rad > 0
         self.mount: Array = np.eye(3) if mount is None else mount
-        states = well_timed(states) if self._scatters else states
+        states = well_timed(states) if self._noisy_angles else states
         _check_order(states["time_s"])
         self.time_s, first = np.unique(states["time_s"], return_index=True)
         self._states = states[first]
@@ -63,7 +63,7 @@ class ArmMotion:
         if not (np.isfinite(self.time_s).all() and np.isfinite(self._states["q_rad"]).all()):
             raise not_finite("an arm state")
         check_span(self.time_s, "the arm's states")
-        if self._scatters:
+        if self._noisy_angles:
             times_s, angles, joint_rates = fit_lines(self.time_s, self._states["q_rad"])
             self.angles = CubicSpline(times_s, angles)
             rates = flange_rate(angles, joint_rates, kinematics) @ self.mount.T
@@ -75,7 +75,7 @@ class ArmMotion:
         if not np.linalg.norm(rates, axis=1).max() > MIN_RATE_RAD_S:
             raise Fault("no_motion", "the arm is at rest in the whole recording", "Record a run with sweeps")
         self.rate = CubicSpline(times_s, rates)
-        close = np.diff(self.time_s) <= (SMOOTHING_S / 3 if self._scatters else MAX_STATE_STEP_S)
+        close = np.diff(self.time_s) <= (SMOOTHING_S / 3 if self._noisy_angles else MAX_STATE_STEP_S)
         self._covered = close & np.append(close[1:], True) & np.append(True, close[:-1])
 
     @property
@@ -112,7 +112,7 @@ class ArmMotion:
     @property
     def has_accurate_angles(self) -> bool:
         """Whether single angles are accurate, not only the difference between equal readings a turn apart."""
-        return not self._scatters
+        return not self._noisy_angles
 
     def travel_rad(self, window: Window) -> float | None:
         """Return the travel, rad, of the joint that moved most in a window; None for fewer than two states.
@@ -120,7 +120,7 @@ class ArmMotion:
         The oscillation of an arm at rest is excluded, because means are corrected for it.
         """
         q_rad = self._q_rad(window)
-        if self._scatters and len(q_rad) >= REST_PARTS:
+        if self._noisy_angles and len(q_rad) >= REST_PARTS:
             q_rad = np.array([part.mean(axis=0) for part in np.array_split(q_rad, REST_PARTS)])
         if len(q_rad) < 2:
             return None
@@ -191,7 +191,7 @@ class ArmMotion:
         `other_joint_moved`.
         """
         begin, end = np.searchsorted(self.time_s, [window.start_s, window.end_s])
-        find = find_even_turn if self._scatters else find_revolution
+        find = find_even_turn if self._noisy_angles else find_revolution
         ends = find(self._states[max(begin - 1, 0) : end + 1], sweep, thresholds)
         start_q_rad = self.angles(ends.start_s)
         rate = self.rate(ends.time_s).mean(axis=0)
@@ -205,7 +205,7 @@ class ArmMotion:
             arm_m=self.mount @ flange_arm(start_q_rad, sweep.joint, self.kinematics),
             station=(sweep.joint, *np.round(np.delete(start_q_rad, sweep.joint), 2).tolist()),
             angle_rad=sweep.angle_rad,
-            uneven=self._scatters,
+            uneven=self._noisy_angles,
         )
 
     def table(self) -> dict[str, Array]:

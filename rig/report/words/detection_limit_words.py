@@ -14,7 +14,7 @@ FACTORS = {"1": (100.0, " %"), "rad": (math.degrees(1), "°"), "T": (1e6, " µT"
 
 
 def detection_limit_field(limits: "Sequence[DetectionLimit]") -> dict[str, tuple[DetectionLimitEntry, ...]]:
-    """Return the field of `result.json`, empty without limits."""
+    """Return `detection_limits`, the field of `result.json`; no field if there are no limits."""
     return {"detection_limits": detection_limit_entries(limits)} if limits else {}
 
 

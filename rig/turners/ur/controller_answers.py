@@ -54,7 +54,7 @@ def no_states(host: str, error: OSError) -> Problem:
 
 
 def reports_local_control(host: str, version: tuple[int, ...]) -> bool:
-    """Return whether a dashboard reports local control. Other controllers show it in the trial of the stop."""
+    """Return whether a dashboard reports local control; False if there is none: then the trial of the stop shows it."""
     if is_polyscope_x(version) or host in SIMULATOR_HOSTS:
         return False
     try:

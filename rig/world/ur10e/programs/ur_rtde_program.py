@@ -28,7 +28,7 @@ Command = Callable[[], Steps]
 
 @dataclass(frozen=True, slots=True)
 class SpeedTarget:
-    """Joint speeds in rad/s and rad/s²; with `of_tool` the tool's in the base's frame, m/s, rad/s and m/s²."""
+    """Target speeds of the joints, rad/s, or `of_tool` in the base frame, m/s and rad/s; acceleration, rad/s² or m/s²."""
 
     speed: Joints
     acceleration: float
