@@ -160,7 +160,7 @@ def find_shortest(
 ) -> Searched:
     """Return the shortest candidate whose predicted U meets the target.
 
-    A candidate that meets the target excludes all longer ones; one that fails excludes all that it contains. `predict`
+    If a candidate meets the target, longer ones are not tried; if it fails, those that it contains are not. `predict`
     returns None for a candidate that cannot be run.
     """
     remaining = sorted(

@@ -237,7 +237,7 @@ class LinesSection(Section):
 
     @model_validator(mode="after")
     def require_clock_column(self) -> Self:
-        """Refuse a clock whose column is missing, and a checksum over a prefix whose digits change."""
+        """Refuse a clock whose column is missing, and a checksum if the prefix contains changing digits."""
         if self.clock == "device" and self.time is None:
             raise ValueError(
                 "the clock is the device's, but there is no column time: write clock: counted if the device samples by "

@@ -142,7 +142,7 @@ def _average_squares(phases: Sequence[Array], factor: int) -> Array:
 
 
 def _dof(points: Sequence[int], factor: int, noise: Noise) -> float:
-    """Return the dof of all independent intervals together, weighted by their numbers of pairs (Satterthwaite)."""
+    """Return the dof of the mean of independent intervals, weighted by their numbers of pairs (Satterthwaite)."""
     reach = [n for n in points if n > 2 * factor]
     pairs = np.array([n - 2 * factor for n in reach], dtype=np.float64)
     of_interval = np.array([equivalent_dof(n, factor, noise) for n in reach])

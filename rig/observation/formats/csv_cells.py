@@ -40,9 +40,9 @@ def is_time_of_day(cell: str) -> bool:
 
 
 def seconds_of(cell: str, factor: float) -> Decimal:
-    """Return the time, s, in a cell: a number in units of `factor` s, or a text, counted from 1970 or midnight.
+    """Return the time, s, in a cell: a number in units of `factor` s, or a date or time of day as text.
 
-    Raise ValueError or ArithmeticError for another cell, or a text with a unit.
+    A date counts from 1970, a time of day from midnight. Raise ValueError or ArithmeticError for any other text.
     """
     match = TIME_OF_DAY.fullmatch(cell.strip())
     if match is None:

@@ -28,7 +28,10 @@ Command = Callable[[], Steps]
 
 @dataclass(frozen=True, slots=True)
 class SpeedTarget:
-    """Target speeds of the joints, rad/s, or `of_tool` in the base frame, m/s and rad/s; acceleration, rad/s² or m/s²."""
+    """Target speeds of the joints, rad/s, and their acceleration, rad/s².
+
+    With `of_tool` the speeds are the tool's velocity in the base frame, m/s and rad/s; the acceleration is in m/s².
+    """
 
     speed: Joints
     acceleration: float
