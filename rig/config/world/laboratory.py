@@ -155,7 +155,7 @@ class SimulatedArmSection(Section):
     polyscope: str | None = Field(
         default=None,
         pattern=r"^[0-9]{1,5}\.[0-9]{1,5}\.[0-9]{1,5}\.[0-9]{1,5}$",
-        description="version of the controller's software; from 10 on it is a PolyScope X",
+        description="version of the controller's software; 10 and newer are PolyScope X",
         json_schema_extra={
             "allowed": "four numbers with dots between them",
             "usual": "`5.14.0.0`, of a `ur10_cb3` `3.15.8.0`",

@@ -109,9 +109,9 @@ def _temperature_deviations_k(sensor: KnownSensor, windows_s: Array, weights: Ar
 
 
 def unseen_k(step_k: float, windows_s: Array, weights: Array) -> Array:
-    """Return the temperature change (N,), K, below the thermometer's resolution: ± half a step as a linear drift.
+    """Return the temperature changes (N,), K, of a linear drift by one step of the thermometer, which it does not show.
 
-    The change is relative to the mean over the windows (N, 2) with weights (N,).
+    They are relative to the mean over the windows (N, 2) with weights (N,).
     """
     middle = windows_s.mean(axis=1)
     return np.asarray(step_k * subtract_mean(middle, weights) / np.ptp(middle), dtype=np.float64)

@@ -95,7 +95,7 @@ NO_SWEEPS = Sweeps(
 class Movement:
     """Dwells and sweeps together.
 
-    - `repeatability_rad`: standard deviation of each sweep's independent rotations; a station shares all other errors.
+    - `repeatability_rad`: std of each sweep's independent rotations; the sweeps of one station share all other errors.
     - `sensor_errors`: errors of the sensor itself; None if unknown.
     - `arm_turns` (P, 3 N + 10 M): effects of P errors of the arm per δ, in the order of `effects`; None if unknown.
     - `independent_fraction`: the fraction of δ² that is independent in each dwell.

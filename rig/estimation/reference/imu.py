@@ -62,7 +62,7 @@ class ImuSolution:
     - dwell_residuals_m_s2 (N, 3): readings minus model.
     - chi_square, dof: χ² of the residuals of dwells and sweeps, and its degrees of freedom.
     - rank, condition: rank and condition number of the readings' derivatives, each column scaled to its norm.
-    - sensor_errors: the sensor's own errors with those estimated, None if unknown.
+    - sensor_errors: errors of the sensor itself, partly estimated; None if unknown.
     - independent_fraction: the fraction of δ² that is independent in each dwell.
     - iterations: number of Gauss-Newton steps.
     - warnings: sentences for people.

@@ -61,7 +61,7 @@ class WithMotion:
     def tables(self) -> Iterator[ExportTable]:
         """Yield the arm, then each sensor's readings, with accelerations in a table of their own, and its sweeps."""
         remark = f"Times are seconds of {self.clock}. {OMITTED_NOTE}"
-        yield ExportTable("arm", self.observed.motion.table(), f"Joint angles and rates, from the ground on. {remark}")
+        yield ExportTable("arm", self.observed.motion.table(), f"Joint angles and rates, from the ground up. {remark}")
         for name, sensor in self.run.sensors.items():
             forces = [
                 channel
@@ -114,7 +114,7 @@ class ReadingsAlone:
         return ()
 
     def tables(self) -> Iterator[ExportTable]:
-        """Yield the readings of each sensor in one table, as `rig solve` reads them, and the motion of a file."""
+        """Yield a table of each sensor's readings, as `rig solve` reads them, and the motion that a file describes."""
         external = self.run.external
         remark = f"Times are seconds of {self.clock}. {OMITTED_NOTE if external is None else OMITTED_FROM_FILES_NOTE}"
         for name, sensor in self.run.sensors.items():

@@ -211,7 +211,7 @@ class Stamper:
 
 @dataclass(slots=True)
 class SmoothedClock:
-    """A clock that slowly follows input times by the number of samples: a phase-locked loop of second order."""
+    """A clock that counts samples and slowly adapts to their coarse times: a second-order phase-locked loop."""
 
     rate_hz: float
     number: int = -1

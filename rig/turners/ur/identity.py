@@ -64,7 +64,7 @@ def series_problem(host: str, version: tuple[int, ...]) -> Problem | None:
         return Problem(
             "polyscope_x",
             f"the controller at {host} is a PolyScope X {version_text(version)}, and the rig can stop an arm "
-            f"there only from {since} on",
+            f"there only since version {since}",
             f"Update it to {since} or newer, or turn the sensors by a servo or by hand: `rig new FILE` writes that",
         )
     if version[0] < E_SERIES:

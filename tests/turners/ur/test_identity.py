@@ -107,7 +107,7 @@ def refusal(host: str) -> Problem:
         (
             {"polyscope": "10.9.9.0"},
             "polyscope_x",
-            "PolyScope X 10.9.9, and the rig can stop an arm there only from 10.10",
+            "PolyScope X 10.9.9, and the rig can stop an arm there only since version 10.10",
         ),
         ({"polyscope": "10.10.0.0", "primary": False}, "no_primary_interface", "stops a PolyScope X there"),
         ({"polyscope": "10.9.9.0", "primary": False}, "polyscope_x", "PolyScope X 10.9.9"),
