@@ -102,6 +102,7 @@ def _predict_sweep(timed_step: Timed[Sweep], arm: DenavitHartenberg, walk_m_s_sq
     waves = np.diag(np.repeat([1.0, 2.0, 2.0], 3))  # weights of the mean, the cosine and the sine over a revolution
     harmonic = FirstHarmonic(
         harmonic_m_s2=np.zeros((3, 3)),
+        swayed_m_s2=np.zeros((3, 3)),
         covariance_m2_s4=walk_m_s_sqrt_s**2 / turn.duration_s * waves,
         speed_rad_s=timed_step.step.growing * turn.speed_rad_s,
         noise_m_s2=np.zeros(3),

@@ -239,6 +239,7 @@ def stack_sweeps(swept: Sequence[SweptAcceleration], mounting: Array) -> Sweeps:
     stations = list(dict.fromkeys(sweep.station for sweep in swept))
     return Sweeps(
         harmonics_m_s2=np.array([sweep.harmonic.harmonic_m_s2 for sweep in swept]),
+        swayed_m_s2=np.array([sweep.harmonic.swayed_m_s2 for sweep in swept]),
         covariances_m2_s4=np.array([sweep.harmonic.covariance_m2_s4 for sweep in swept]),
         axes_flange=np.array([sweep.axis_flange for sweep in swept]) @ mounting.T,
         speeds_rad_s=np.array([sweep.harmonic.speed_rad_s for sweep in swept]),

@@ -56,6 +56,7 @@ class Sweeps:
     """Whole revolutions at nearly constant speed.
 
     - `harmonics_m_s2` (M, 3, 3): mean, cosine and sine over the joint's angle (rows) of the axes x y z.
+    - `swayed_m_s2` (M, 3, 3): those of the specific force due to the sway of other joints, by the encoders.
     - `covariances_m2_s4` (M, 9, 9): their covariances, row by row, from `rig.estimation.reference.sweep_harmonics`.
     - `axes_flange` (M, 3): unit vector of a growing angle; `speeds_rad_s` (M,): negative if the angle falls.
     - `attitudes` (M, 3, 3): flange to base at the angle zero.
@@ -65,6 +66,7 @@ class Sweeps:
     """
 
     harmonics_m_s2: Array
+    swayed_m_s2: Array
     covariances_m2_s4: Array
     axes_flange: Array
     speeds_rad_s: Array
@@ -81,6 +83,7 @@ class Sweeps:
 NO_DWELLS = Dwells(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3, 3)))
 NO_SWEEPS = Sweeps(
     harmonics_m_s2=np.zeros((0, 3, 3)),
+    swayed_m_s2=np.zeros((0, 3, 3)),
     covariances_m2_s4=np.zeros((0, 9, 9)),
     axes_flange=np.zeros((0, 3)),
     speeds_rad_s=np.zeros(0),
@@ -159,7 +162,7 @@ def find_force(theta: Array, movement: Movement) -> Array:
     """Return the specific force s (K, 3), m/s², in dwells and sweeps."""
     gravity, lever = project_reference(theta[DELAY], movement), project_lever_arm(theta[DELAY], movement)
     s: Array = gravity @ theta[REFERENCE] + lever @ theta[LEVER]
-    return s + find_flange_acceleration(theta[DELAY], movement)
+    return s + find_flange_force(theta[DELAY], movement)
 
 
 def project_reference(delay_s: float, movement: Movement) -> Array:
@@ -202,10 +205,11 @@ def _around_axes(turning_rad2_s2: Array, movement: Movement) -> Array:
     return np.concatenate([np.zeros((len(movement.dwells.readings_m_s2), 3, 3)), waves.reshape(-1, 3, 3)])
 
 
-def find_flange_acceleration(delay_s: float, movement: Movement) -> Array:
-    """Return the acceleration (K, 3) of the flange itself in m/s²."""
-    acceleration: Array = (project_lever_arm(delay_s, movement) @ _arms(np.zeros(3), movement))[..., 0]
-    return acceleration
+def find_flange_force(delay_s: float, movement: Movement) -> Array:
+    """Return the specific force (K, 3) of the flange itself in m/s²: its distance from the axis, and other joints."""
+    force: Array = (project_lever_arm(delay_s, movement) @ _arms(np.zeros(3), movement))[..., 0]
+    force[len(movement.dwells.readings_m_s2) :] += movement.sweeps.swayed_m_s2.reshape(-1, 3)
+    return force
 
 
 def _arms(lever_m: Array, movement: Movement) -> Array:

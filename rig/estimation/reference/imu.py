@@ -196,6 +196,7 @@ def _check(movement: Movement, parameters: int) -> None:
         ("variances", dwells.variances_m2_s4, (count, 3)),
         ("attitudes", dwells.attitudes, (count, 3, 3)),
         ("harmonics", sweeps.harmonics_m_s2, (swept, 3, 3)),
+        ("sway", sweeps.swayed_m_s2, (swept, 3, 3)),
         ("covariances", sweeps.covariances_m2_s4, (swept, 9, 9)),
         ("axes", sweeps.axes_flange, (swept, 3)),
         ("speeds", sweeps.speeds_rad_s, (swept,)),

@@ -15,7 +15,7 @@ from rig.estimation.reference.accelerometer_model import (
     LEVER,
     PARAMETERS,
     Movement,
-    find_flange_acceleration,
+    find_flange_force,
     project_lever_arm,
     project_reference,
 )
@@ -32,7 +32,7 @@ def linear_start(movement: Movement, norm: float, up: Array) -> Array:
     Raise Fault `rank_deficient`, `ill_conditioned`, `sign_unknown`.
     """
     theta = _linear(movement, movement.readings(), norm, up)
-    return _linear(movement, movement.readings() - find_flange_acceleration(0.0, movement) @ matrix(theta).T, norm, up)
+    return _linear(movement, movement.readings() - find_flange_force(0.0, movement) @ matrix(theta).T, norm, up)
 
 
 def _linear(movement: Movement, readings: Array, norm: float, up: Array) -> Array:

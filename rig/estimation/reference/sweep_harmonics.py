@@ -31,6 +31,7 @@ class FirstHarmonic:
     """The first harmonic of n samples, its uncertainty, and the joint's motion.
 
     - `harmonic_m_s2` (3, 3): mean, cosine, sine (rows) of the axes x y z; `covariance_m2_s4` (9, 9), row by row.
+    - `swayed_m_s2` (3, 3): those of the force due to the sway of other joints, in the sensor's nominal axes.
     - `speed_rad_s`: 2π over the time of a revolution, negative if the angle falls.
     - `noise_m_s2` (3,): std of one sample, with `dof` degrees of freedom; `residuals_m_s2` (n, 3).
     - `vibration_m_s2` (3,): RMS of the removed vibration of servo and arm.
@@ -40,6 +41,7 @@ class FirstHarmonic:
     """
 
     harmonic_m_s2: Array
+    swayed_m_s2: Array
     covariance_m2_s4: Array
     speed_rad_s: float
     noise_m_s2: Array
@@ -54,6 +56,7 @@ def first_harmonic(
     readings_m_s2: ArrayLike,
     angle_rad: ArrayLike,
     speed_rad_s: ArrayLike,
+    swayed_m_s2: ArrayLike,
     *,
     coloured: Callable[[Array], float],
     swings: Callable[[Array], Array],
@@ -64,18 +67,26 @@ def first_harmonic(
     - readings_m_s2 (n, 3): the specific force.
     - angle_rad, speed_rad_s (n,): angle and speed of the joint at these times, from the arm's states; the angle is zero
       in the known attitude.
+    - swayed_m_s2 (n, 3): the specific force due to the sway of other joints, in the sensor's nominal axes.
     - coloured: takes residuals (n,); returns the variance of their mean, relative to that of white noise.
     - swings: takes residuals (n, 3); returns the columns (n, k) of their spectral lines.
 
     Raise Fault `not_finite`, `incomplete_revolution`; ValueError for a wrong shape.
     """
-    t, m, angle, speed = (
-        np.asarray(values, dtype=np.float64) for values in (time_s, readings_m_s2, angle_rad, speed_rad_s)
+    t, readings, angle, speed, swayed = (
+        np.asarray(values, dtype=np.float64) for values in (time_s, readings_m_s2, angle_rad, speed_rad_s, swayed_m_s2)
     )
     count = len(t)
-    for name, array, shape in (("readings", m, (count, 3)), ("angle", angle, (count,)), ("speed", speed, (count,))):
+    shapes = (
+        ("readings", readings, (count, 3)),
+        ("angle", angle, (count,)),
+        ("speed", speed, (count,)),
+        ("sway", swayed, (count, 3)),
+    )
+    for name, array, shape in shapes:
         require_shape(name, array, shape)
-    check_finite(time=t, readings=m, angle=angle, speed=speed)
+    check_finite(time=t, **{name: array for name, array, _ in shapes})
+    m = readings - swayed
     mean_speed = _mean_speed(t, angle)
     uneven = _smooth(t, speed, mean_speed)
     columns = np.hstack([_fourier_columns(angle, HARMONICS), _list_vibration(uneven, angle, mean_speed)])
@@ -88,7 +99,8 @@ def first_harmonic(
     vibration = columns[:, 1 + 2 * HARMONICS :] @ (inverse[1 + 2 * HARMONICS :] @ m)
     long_run = _find_long_run_covariance(residuals, scatter, coloured)
     return FirstHarmonic(
-        harmonic_m_s2=gain @ m,
+        harmonic_m_s2=gain @ readings,
+        swayed_m_s2=gain @ swayed,
         covariance_m2_s4=np.asarray(np.kron(gain @ gain.T, long_run), dtype=np.float64),
         speed_rad_s=mean_speed,
         noise_m_s2=np.sqrt(np.diag(scatter)),

@@ -40,8 +40,8 @@ def swept_acceleration(
 ) -> SweptAcceleration:
     """Fit the first harmonic of one sweep's revolution, together with its vibrations.
 
-    In the model only the sweep's joint moves; other joints may sway, so the difference of gravity and the acceleration
-    due to them, by the encoders, are subtracted. Raise Fault `saturation`, `stuck_sensor`, `incomplete_revolution` or
+    In the model only the sweep's joint moves. The sway of others, by the encoders, changes gravity and accelerates: a
+    further specific force, which the model adds. Raise Fault `saturation`, `stuck_sensor`, `incomplete_revolution` or
     `not_finite`.
     """
     inside = slice_time(stream, turn.start_s, turn.end_s)
@@ -56,9 +56,10 @@ def swept_acceleration(
     swayed = sway_acceleration(motion, sweep.joint, time_s, (turn.start_s, turn.end_s), np.array(settings.extension_m))
     harmonic = first_harmonic(
         time_s,
-        accelerations(stream, inside)[covered] - by_gravity - swayed @ np.array(stream.sensor.mounting).T,
+        accelerations(stream, inside)[covered],
         angle_rad,
         motion.angle(sweep, time_s, 1),
+        by_gravity + swayed @ np.array(stream.sensor.mounting).T,
         coloured=fit_inflation,
         swings=line_columns,
     )

@@ -45,9 +45,17 @@ def reduced(samples: Samples) -> FirstHarmonic:
     return reduced_with(samples, samples.readings_m_s2, lambda _: 1.0)
 
 
-def reduced_with(samples: Samples, readings_m_s2: Array, coloured: Callable[[Array], float]) -> FirstHarmonic:
+def reduced_with(
+    samples: Samples, readings_m_s2: Array, coloured: Callable[[Array], float], swayed_m_s2: Array | None = None
+) -> FirstHarmonic:
     return first_harmonic(
-        samples.time_s, readings_m_s2, samples.angle_rad, samples.speed_rad_s, coloured=coloured, swings=line_columns
+        samples.time_s,
+        readings_m_s2,
+        samples.angle_rad,
+        samples.speed_rad_s,
+        np.zeros_like(readings_m_s2) if swayed_m_s2 is None else swayed_m_s2,
+        coloured=coloured,
+        swings=line_columns,
     )
 
 
@@ -201,3 +209,24 @@ def test_what_is_no_number_is_refused() -> None:
     samples.readings_m_s2[7, 1] = np.nan
     with pytest.raises(Fault, match="not_finite"):
         reduced(samples)
+
+
+def test_a_sway_of_other_joints_is_read_along_the_true_axes_of_the_sensor() -> None:
+    """Sensors are mounted askew by degrees: along nominal axes a sway of 2 mrad would be wrong by a mm/s²."""
+    sweeps, even = plan_sweeps(6), replace(sampling(0.0, 0.0), encoder_step_rad=1e-15)
+    turns = []
+    for sweep in sweeps:
+        samples = record_samples(TRUTH, EXACT, sweep, even, np.random.default_rng(1))
+        fraction = (samples.time_s - samples.time_s[0]) / np.ptp(samples.time_s)
+        swayed_m_s2 = 0.02 * np.sin(2 * np.pi * np.outer(fraction, [1.05, 0.6, 2.05]) + [0.0, 1.0, 2.0])
+        readings_m_s2 = samples.readings_m_s2 + swayed_m_s2 @ TRUTH.matrix.T
+        turns.append([reduced(samples), reduced_with(samples, readings_m_s2, lambda _: 1.0, swayed_m_s2)])
+    off_m_s2 = []
+    for still in (True, False):
+        harmonics = [steady if still else swaying for steady, swaying in turns]
+        read = make_sweeps(np.array([turn.harmonic_m_s2 for turn in harmonics]), np.tile(np.eye(9), (12, 1, 1)), sweeps)
+        swayed_m_s2 = np.array([turn.swayed_m_s2 for turn in harmonics])
+        movement = Movement(NO_DWELLS, replace(read, swayed_m_s2=swayed_m_s2))
+        off_m_s2.append(movement.readings() - predicted(TRUTH.theta(), movement))
+    np.testing.assert_allclose(off_m_s2[1], off_m_s2[0], atol=1e-6)
+    assert np.abs(turns[0][1].swayed_m_s2).max() > 0.005

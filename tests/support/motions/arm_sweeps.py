@@ -112,6 +112,7 @@ def make_sweeps(harmonics: Array, covariances: Array, sweeps: tuple[Sweep, ...])
     poses = flange_pose(joints)
     return Sweeps(
         harmonics_m_s2=harmonics,
+        swayed_m_s2=np.zeros_like(harmonics),
         covariances_m2_s4=covariances,
         axes_flange=flange_axes(joints)[places],
         speeds_rad_s=np.array([find_signed_speed(sweep) for sweep in sweeps]),
