@@ -246,7 +246,7 @@ from rig.commands.history import history_answer, run_serials, remember
 from rig.config.judging.judging_sections import HistorySection
 from rig.config.load import load
 
-answer, late = history_answer.answer_of, []
+answer, late = history_answer.await_answer, []
 
 def timed(work, within_s):
     before = set(sys.modules)
@@ -255,7 +255,7 @@ def timed(work, within_s):
     finally:
         late.extend(sorted(set(sys.modules) - before))
 
-history_answer.answer_of = timed
+history_answer.await_answer = timed
 config = load(Path(sys.argv[1])).config
 run_serials.remembered(config, frozenset())
 for _ in range(2):

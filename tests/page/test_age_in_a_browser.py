@@ -39,6 +39,7 @@ TURNERS: dict[str, tuple[str, str, Report, RunEvent]] = {
     "servo": ("servo.yaml", "lsm9ds1", servo_report(SERVO_SEEN), ArmSeen(SERVO_SEEN, 0)),
     "lines": ("by_hand.yaml", "lines", load_turner_kinds()["hand"].look(load_turner_kinds()["hand"].section()), HAND),
 }
+SLOW = {"world": {"time_scale": 0.5}}  # a busy computer must show the page before the run's end
 WATCHED_MS = 4000  # twice what the page takes for old: an age that nothing renews has been said by then
 
 
@@ -76,28 +77,28 @@ def test_readings_that_arrive_are_of_now_and_those_told_again_are_not(
 
 def by_hand(folder: Path) -> Path:
     """configs/by_hand.yaml at an address of its own, without haste."""
-    return written(folder, "by_hand.yaml", {"board": {"port": f"socket://{fresh_host()}:7321"}}, 2)
+    return written(folder, "by_hand.yaml", {"board": {"port": f"socket://{fresh_host()}:7321"}})
 
 
 def of_lines(folder: Path) -> Path:
     """configs/own_port/lines.yaml so."""
     host = fresh_host()
     port = {"serial": {"port": f"socket://{host}:7341"}}
-    return written(folder, "own_port/lines.yaml", {"arm": {"host": host}, "sensors": {"imu": port}}, 2)
+    return written(folder, "own_port/lines.yaml", {"arm": {"host": host}, "sensors": {"imu": port}})
 
 
-def written(folder: Path, name: str, changes: dict[str, Any], time_scale: float) -> Path:
+def written(folder: Path, name: str, changes: dict[str, Any]) -> Path:
     document = yaml.safe_load(load(CONFIGS / name, turners=sections()).text)
     path = folder / Path(name).name
-    path.write_text(yaml.safe_dump(merge(merge(document, changes), {"world": {"time_scale": time_scale}})))
+    path.write_text(yaml.safe_dump(merge(merge(document, changes), SLOW)))
     return path
 
 
 RUNS: dict[str, Callable[[Path], Path]] = {
     "hand": by_hand,
     "lines": of_lines,
-    "servo": configure,
-    "arm": lambda folder: configuration(folder, {"world": {"time_scale": 2}}),
+    "servo": lambda folder: configure(folder, SLOW),
+    "arm": lambda folder: configuration(folder, SLOW),
 }
 
 

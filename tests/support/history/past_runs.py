@@ -2,12 +2,14 @@
 
 import json
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 
 import numpy as np
 
 from rig.data.result_file import ResultDocument, VectorEntry
+from rig.errors import Refused
 from rig.history.entered.finished_run import EnteredRecording, FinishedRun, compact
 from rig.history.store import open_history
 from support.documents.results import SENSOR, VERIFIED
@@ -86,14 +88,19 @@ def document(
 
 
 def enter_many(url: str, worker: int, entries: int) -> int:
-    """Enter runs that no other `worker` has, and return how many were new. Processes cannot import a test module."""
+    """Enter runs that no other `worker` has, and return how many were new. Processes cannot import a test module.
+
+    A server that is too busy to answer in time is asked again, as `rig history import` would.
+    """
     first = finish_run(worker)
     began = first.document.provenance.started_utc
-    new = 0
-    with open_history(url) as history:
-        for i in range(entries):
-            started = f"{began[:11]}{i // 60 + 8:02}:{i % 60:02}:00+00:00"
-            provenance = first.document.provenance.model_copy(update={"started_utc": started})
-            document = first.document.model_copy(update={"provenance": provenance})
-            new += history.enter(replace(first, text=first.text.replace(began, started), document=document)).new
+    new = entered = 0
+    while entered < entries:
+        with suppress(Refused), open_history(url) as history:
+            for i in range(entered, entries):
+                started = f"{began[:11]}{i // 60 + 8:02}:{i % 60:02}:00+00:00"
+                provenance = first.document.provenance.model_copy(update={"started_utc": started})
+                document = first.document.model_copy(update={"provenance": provenance})
+                new += history.enter(replace(first, text=first.text.replace(began, started), document=document)).new
+                entered += 1
     return new
