@@ -257,10 +257,10 @@ def timed(work, within_s):
 
 history_answer.await_answer = timed
 config = load(Path(sys.argv[1])).config
-run_serials.remembered(config, frozenset())
+run_serials.recall_sensors(config, frozenset())
 for _ in range(2):
     event, _ = remember.remember(Path(sys.argv[2]), HistorySection())
-    run_serials.remembered(config, frozenset())
+    run_serials.recall_sensors(config, frozenset())
 print(type(event).__name__, late)
 """
 
