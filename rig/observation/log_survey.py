@@ -1,6 +1,6 @@
 """A survey of a log's readings: their sampling, the rests of the body, and its turns."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -18,11 +18,20 @@ MIN_AXIS_FRACTION = 0.9  # of a turn's angle about one axis
 
 
 @dataclass(frozen=True, slots=True)
+class SurveyedTurn:
+    """A turn from rest to rest, as the readings show it: `window`; `axis` ("+x"; "other" without one); `angle_rad`."""
+
+    window: Window
+    axis: str
+    angle_rad: float
+
+
+@dataclass(frozen=True, slots=True)
 class LogSurvey:
     """A log's sampling, rests and turns.
 
     - rests: windows in which the body lay still.
-    - turns: the number of turns from rest to rest by axis ("+x"; "other" without an axis).
+    - turns: from rest to rest, in the order of time.
     - at_rest: by quantity, the median over the rests of the norm of the mean reading.
     - largest: by quantity, the largest absolute reading of any axis.
     - faces: the number of directions of gravity at rest more than 45° apart.
@@ -31,7 +40,7 @@ class LogSurvey:
     span_s: float
     sampling: Sampling
     rests: tuple[Window, ...]
-    turns: dict[str, int]
+    turns: tuple[SurveyedTurn, ...]
     at_rest: dict[Quantity, float]
     largest: dict[Quantity, float]
     faces: int
@@ -52,7 +61,7 @@ def survey_log(samples: Samples) -> LogSurvey:
         span_s=float(time_s[-1] - time_s[0]),
         sampling=sampling,
         rests=rests,
-        turns=_count_turns(time_s, readings[RATE], rests) if RATE in readings else {},
+        turns=tuple(_find_turns(time_s, readings[RATE], rests)) if RATE in readings else (),
         at_rest=at_rest,
         largest={quantity: float(np.abs(values).max()) for quantity, values in readings.items()},
         faces=_count_faces([readings[ACCELERATION][cut].mean(axis=0) for cut in cuts])
@@ -61,24 +70,23 @@ def survey_log(samples: Samples) -> LogSurvey:
     )
 
 
-def _count_turns(time_s: Array, rates: Array, rests: Sequence[Window]) -> dict[str, int]:
-    """Count the turns from rest to rest by their axis and sign; see `LogSurvey.turns`."""
-    counts: dict[str, int] = {}
+def _find_turns(time_s: Array, rates: Array, rests: Sequence[Window]) -> Iterator[SurveyedTurn]:
+    """Yield the turns between adjacent rests, by the integral of the rates less the bias of both rests."""
     for before, after in pairwise(rests):
         bias = np.mean([rates[inside(time_s, rest)].mean(axis=0) for rest in (before, after)], axis=0)
-        cut = inside(time_s, Window(before.end_s, after.start_s))
+        window = Window(before.end_s, after.start_s)
+        cut = inside(time_s, window)
         if cut.stop - cut.start < 2:
             continue
         turned = rates[cut] - bias
         angles = ((turned[1:] + turned[:-1]) / 2 * np.diff(time_s[cut])[:, None]).sum(axis=0)
-        size = float(np.linalg.norm(angles))
-        if size < MIN_TURN_RAD:
+        angle_rad = float(np.linalg.norm(angles))
+        if angle_rad < MIN_TURN_RAD:
             continue
         axis = int(np.argmax(np.abs(angles)))
-        is_about_one = abs(angles[axis]) >= MIN_AXIS_FRACTION * size
+        is_about_one = abs(angles[axis]) >= MIN_AXIS_FRACTION * angle_rad
         name = f"{'+' if angles[axis] > 0 else '-'}{'xyz'[axis]}" if is_about_one else "other"
-        counts[name] = counts.get(name, 0) + 1
-    return dict(sorted(counts.items(), key=lambda item: (item[0][-1], item[0])))
+        yield SurveyedTurn(window, name, angle_rad)
 
 
 def _count_faces(directions: Sequence[Array]) -> int:

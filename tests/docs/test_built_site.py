@@ -52,6 +52,7 @@ def test_the_search_answers_questions_and_finds_names(site: Path) -> None:
         "run again one sweep": "docs/how-to/at-the-rig/resume-and-repeat.html#repeat-one-sweep-run-it-again",
         "print certificate pdf": "docs/how-to/finished-runs/read-a-certificate.html#print-the-certificate-again",
         "temperature missing": "docs/how-to/at-the-rig/lines.html#the-temperature-is-missing",
+        "How long does a run take": "docs/how-to/at-the-rig/no-longer-than-needed.html#how-long-does-a-run-take",
         "resume an interrupted run": "docs/how-to/at-the-rig/resume-and-repeat.html",
         "arm_moved": "docs/errors.html#error-arm-moved",
         "scale_changed": "docs/checks.html#check-scale-changed",

@@ -16,6 +16,7 @@ from rig.analysis.external.omissions import (
     list_omitted,
     notes_on_changes,
     notes_on_reading,
+    notes_on_scale,
     notes_on_speeds,
     notes_on_turns,
 )
@@ -183,7 +184,7 @@ def _solve_sweeps(read: ExternalReadings, samples: Samples, name: str | None, re
     by_turns = data.turned if isinstance(solution, TurnedSolution) else None
     if polynomials is not None:
         gyroscope, polynomials = add_rate_polynomials(gyroscope, polynomials)
-    notes = (*notes_on_speeds(data), *notes_on_changes(data))
+    notes = (*notes_on_speeds(data), *notes_on_scale(solution.scale), *notes_on_changes(data))
     notes += tuple(notes_on_turns(data, solution)) if chosen in (None, "increments") else ()
     omitted = tuple((RATE, part) for part in data.omitted)
     return OfSensor(read.item, gyroscope, None, {}, {}, by_turns, polynomials=polynomials, omitted=omitted, notes=notes)

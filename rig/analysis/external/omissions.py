@@ -20,6 +20,7 @@ from rig.observation.external.omission import Omitted
 from rig.observation.external.placements import Placements
 
 MAX_ERROR = 2e-3  # relative, of the time that a sweep lasts
+UNUSUAL_SCALE_RATIO = 1.6  # of all axes; datasheets state less than a tenth of this deviation from 1
 NOISE_LIMIT_RAD_S = 0.04  # standard deviation of single readings, 2.3 °/s: SIX states 0.035 rad/s for an LSM9DS1
 
 
@@ -65,6 +66,15 @@ def notes_on_speeds(data: ExternalData) -> Iterator[str]:
     noise_rad_s = float(np.median([average.noise_rad_s for average in averages]))
     if noise_rad_s > NOISE_LIMIT_RAD_S:
         yield f"the readings scatter by {noise_rad_s:.2g} rad/s, more than those of a gyroscope do: {remedy}"
+
+
+def notes_on_scale(scale: Array) -> Iterator[str]:
+    """Yield a note if all scale factors (3,) are far above 1, or all far below, as with half turns stated as whole."""
+    if np.all(scale > UNUSUAL_SCALE_RATIO) or np.all(scale < 1 / UNUSUAL_SCALE_RATIO):
+        yield (
+            f"the scale factors are near {np.median(scale):.2g}, and those of readings in rad/s near 1: check the "
+            "stated angles or speeds (half turns given as whole ones?) and the sensor's range"
+        )
 
 
 def _are_whole(turned: Array, part: float) -> bool:

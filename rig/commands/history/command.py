@@ -38,7 +38,9 @@ def add(history: argparse.ArgumentParser) -> None:
     form.add_argument("--json", action="store_true", help="print JSON")
     form.add_argument("--csv", action="store_true", help="print CSV, one line per parameter")
     show_parser = add_command("show", "show one calibration with its run")
-    show_parser.add_argument("number", type=int, metavar="NUMBER", help="as `rig history` has it")
+    show_parser.add_argument(
+        "calibration", metavar="NUMBER|SERIAL", help="as `rig history` has it; of a serial number, the last run's"
+    )
     show_parser.add_argument("--json", action="store_true", help="the result.json of its run, as it was entered")
     plot_parser = add_command("plot", "draw a sensor's calibrations over time, drift and charts (extra `study`)")
     plot_parser.add_argument("serial_number", metavar="SERIAL", help="this sensor")
@@ -60,14 +62,14 @@ def add(history: argparse.ArgumentParser) -> None:
     _add_selection(again_parser)
     _add_recompute(again_parser)
     compare_parser = add_command("compare", "compare two calibrations of one sensor by E_n")
-    compare_parser.add_argument("first", type=int, metavar="A", help="number of the earlier one in `rig history`")
-    compare_parser.add_argument("second", type=int, metavar="B", help="number of the later one")
+    compare_parser.add_argument("first", type=_number, metavar="A", help="number of the earlier one in `rig history`")
+    compare_parser.add_argument("second", type=_number, metavar="B", help="number of the later one")
     compare_parser.add_argument(
         "--plot", type=Path, metavar="DIR", help="draw the differences into this folder (extra `study`)"
     )
     add_json(compare_parser)
     void_parser = add_command("void", "mark a calibration as void, and say why; nothing is deleted")
-    void_parser.add_argument("number", type=int, metavar="NUMBER", help="as `rig history` has it")
+    void_parser.add_argument("number", type=_number, metavar="NUMBER", help="as `rig history` has it")
     void_parser.add_argument("--reason", required=True, metavar="TEXT", help="why, in a few words")
 
 
@@ -108,6 +110,15 @@ def _day(text: str) -> date:
         return date.fromisoformat(text)
     except ValueError:
         raise argparse.ArgumentTypeError(f"{text!r} is not a date; write it as 2026-11-20") from None
+
+
+def _number(text: str) -> int:
+    try:
+        return int(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not the number of a calibration; `rig history {text}` lists those of a serial number"
+        ) from None
 
 
 def run(options: argparse.Namespace) -> int:

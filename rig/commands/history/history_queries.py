@@ -4,7 +4,7 @@ import json
 import sys
 from argparse import Namespace
 from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, suppress
 from pathlib import Path
 
 from rich.console import Console
@@ -35,6 +35,7 @@ from rig.history.terminal.history_tables import (
 from rig.station.plain_text import plain, say
 
 DISAGREEMENT_STATUS = 1
+MAX_NUMBER_DIGITS = 18  # a database's numbers have no more; serial numbers do
 
 
 def list_calibrations(options: Namespace) -> int:
@@ -64,23 +65,36 @@ def list_calibrations(options: Namespace) -> int:
 
 
 def show(options: Namespace) -> int:
-    """Print one calibration, and the location of its run. Raise Refused `not_in_history`."""
+    """Print one calibration, or those of a sensor's last run, and the run's location. Raise `not_in_history`."""
     with open_named_history(options) as history:
-        past = history.calibration(options.number)
-        (kept,) = history.kept(past.run_id)
+        pasts = _find_shown(history, options.calibration)
+        (kept,) = history.kept(pasts[-1].run_id)
     if options.json:
         print(json.dumps(json.loads(kept.result), indent=2))
         return 0
     console = Console(highlight=False)
-    console.print(calibrations_table([past]))
-    console.print(parameters_table(past))
-    for line in run_lines(past, kept):
+    console.print(calibrations_table(pasts))
+    for past in pasts:
+        console.print(parameters_table(past))
+    for line in run_lines(pasts[-1], kept):
         console.print(plain(line))
     for computer, path in kept.places:
         console.print(plain(f"stored on {computer} in {path}"))
     for recording in kept.recordings:
         console.print(plain(f"{recording.name}: {recording.size} bytes, SHA-256 {recording.sha256}"))
     return 0
+
+
+def _find_shown(history: History, named: str) -> list[Past]:
+    """Return the calibration of this number, or those of the last run of this serial number.
+
+    Raise Refused `not_in_history`.
+    """
+    if named.isdecimal() and len(named) <= MAX_NUMBER_DIGITS:
+        with suppress(Refused):
+            return [history.calibration(int(named))]
+    pasts = _select_pasts(history, Selection(named))
+    return [past for past in pasts if past.run_id == pasts[-1].run_id]
 
 
 def plot(options: Namespace) -> int:
@@ -236,8 +250,7 @@ def _select_pasts(history: History, selection: Selection) -> list[Past]:
         raise Refused(
             "not_in_history",
             f"no calibration of {selection.serial_number} in the history matches",
-            "List all with `rig history`, show one by its number with `rig history show`, or enter runs with "
-            "`rig history import`",
+            "List all with `rig history`, or enter runs with `rig history import`",
         )
     return pasts
 

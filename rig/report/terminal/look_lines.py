@@ -1,5 +1,6 @@
 """The contents of another program's file, and its possible solutions, as lines for a terminal of 80 columns."""
 
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,6 +29,7 @@ COLUMNS = (
 MAX_NAME_CHARACTERS = 46
 PLACEHOLDER = "ATTITUDES.csv"
 MIN_LAG_S = 0.004
+MAX_LISTED_TURNS = 24
 
 
 def describe_file(looked: LookedFile) -> Iterator[str]:
@@ -118,7 +120,7 @@ def describe_solutions(looked: LookedFile | None, reference: LookedFile | None, 
         why = tried.turns.obstacle
         yield _row("by hand", command if why is None else f"no: {why}")
     if RATE in looked.quantities:
-        yield from _describe_sweeps(looked.survey, f"rig solve {log} --sweeps SWEEPS.csv{option}")
+        yield from _describe_sweeps(looked, f"rig solve {log} --sweeps SWEEPS.csv{option}", listed=reference is None)
     if reference is None:
         yield _row("attitudes", f"rig solve {log} --attitudes {PLACEHOLDER}{option}")
         yield _row("", f"{PLACEHOLDER} gives the attitudes of the body: time_s qw qx qy qz")
@@ -131,13 +133,23 @@ def describe_solutions(looked: LookedFile | None, reference: LookedFile | None, 
         yield _row("attitudes", command if why is None else f"no: {why}")
 
 
-def _describe_sweeps(survey: LogSurvey, command: str) -> Iterator[str]:
-    if turns := sum(survey.turns.values()):
-        yield _row("sweeps", command)
-        number = "1 turn" if turns == 1 else f"{turns} turns"
-        yield _row("", f"SWEEPS.csv states the {number}: start_s end_s axis_x axis_y axis_z angle_rad")
-    else:
+def _describe_sweeps(looked: LookedFile, command: str, *, listed: bool) -> Iterator[str]:
+    """Yield the command for sweeps, and, if `listed`, the turns with their times as `SWEEPS.csv` has them."""
+    turns = () if looked.survey is None else looked.survey.turns
+    if not turns:
         yield _row("sweeps", "no turn from rest to rest; steady turns need a file that states them")
+        return
+    yield _row("sweeps", command)
+    number = "1 turn" if len(turns) == 1 else f"{len(turns)} turns"
+    yield _row("", f"SWEEPS.csv states the {number}: start_s end_s axis_x axis_y axis_z angle_rad")
+    if not listed:
+        return
+    yield _row("", "start_s, end_s, axis, angle by the readings (state the true one):")
+    for turn in turns[:MAX_LISTED_TURNS]:
+        start_s, end_s = (looked.origin_s + time_s for time_s in (turn.window.start_s, turn.window.end_s))
+        yield _row("", f"{start_s:10.2f} {end_s:10.2f}  {turn.axis:<5} {np.degrees(turn.angle_rad):7.1f}°")
+    if len(turns) > MAX_LISTED_TURNS:
+        yield _row("", f"and {len(turns) - MAX_LISTED_TURNS} more")
 
 
 def _row(name: str, text: str) -> str:
@@ -179,7 +191,8 @@ def _describe_readings(looked: LookedFile, survey: LogSurvey) -> Iterator[str]:
     else:
         yield _row("rests", "none")
     if survey.turns:
-        turns = ", ".join(f"{axis} {count}" for axis, count in survey.turns.items())
+        counts = Counter(turn.axis for turn in sorted(survey.turns, key=lambda turn: (turn.axis[-1], turn.axis)))
+        turns = ", ".join(f"{axis} {count}" for axis, count in counts.items())
         yield _row("turns", f"from rest to rest, by axis: {turns}")
 
 

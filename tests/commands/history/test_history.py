@@ -130,6 +130,7 @@ def test_trends_are_told_for_people_and_for_machines(year: str, capsys: pytest.C
 def test_a_calibration_is_shown_and_compared(year: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert "stored on bench in /runs/0" in told(capsys, "show", "1")
     assert json.loads(told(capsys, "show", "1", "--json"))["schema"] == "rig.result/1"
+    assert told(capsys, "show", "G-1") == told(capsys, "show", "12")
     found = json.loads(told(capsys, "compare", "1", "12", "--json"))["parameters"]
     assert found["kx"]["normalised_error"] > 1 > found["bx"]["normalised_error"]
     assert found["kx"]["changed"] and not found["bx"]["changed"]
@@ -140,6 +141,9 @@ def test_a_calibration_is_shown_and_compared(year: str, capsys: pytest.CaptureFi
         history.enter(finish_run(400, serial_number="G-2"))
     assert main(["history", "compare", "1", "13"]) == 2
     assert "not_comparable" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        main(["history", "compare", "G-1", "G-2"])
+    assert "`rig history G-1` lists those of a serial number" in capsys.readouterr().err
 
 
 @pytest.mark.slow
@@ -161,7 +165,7 @@ def test_a_wrong_entry_is_voided_not_deleted(year: str, capsys: pytest.CaptureFi
 def test_what_was_never_entered_is_refused_by_name(place: str, capsys: pytest.CaptureFixture[str]) -> None:
     with open_history(place):
         pass
-    for arguments in (["nobody"], ["show", "7"], ["plot", "nobody"], ["compare", "1", "2"]):
+    for arguments in (["nobody"], ["show", "7"], ["show", "nobody"], ["plot", "nobody"], ["compare", "1", "2"]):
         assert main(["history", *arguments]) == 2
         assert "not_in_history" in capsys.readouterr().err
 

@@ -454,3 +454,12 @@ def test_a_rate_that_few_gyroscopes_read_is_said(tmp_path: Path, capsys: pytest.
     samples, sweeps = write_rates(tmp_path, replace(log, readings=np.degrees(log.readings), rows=rows))
     said = in_brief(capsys, samples, "--sweeps", sweeps)
     assert "the sweeps turn at up to 90 rad/s (5157 °/s), faster than most gyroscopes can read: if both files" in said
+
+
+@pytest.mark.slow
+def test_half_turns_given_as_whole_ones_are_suspected(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log = swept(50)
+    for angle, is_said in ((1.0, False), (2.0, True), (0.5, True)):
+        stated = replace(log, rows=log.rows * [1, 1, 1, 1, 1, angle])
+        said = in_brief(capsys, *_interleave(write_rates(tmp_path, stated)))
+        assert ("half turns given as whole ones?" in said) == is_said, said

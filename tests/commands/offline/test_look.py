@@ -1,6 +1,7 @@
 """`rig look` says what a file holds, and the map that it writes solves the file as its plain form does."""
 
 import json
+import re
 from argparse import Namespace
 from collections.abc import Callable
 from pathlib import Path
@@ -15,7 +16,9 @@ from rig.commands.offline import look
 from rig.config.column_map import ColumnMap
 from rig.errors import Refused
 from rig.report.terminal.look_lines import describe_file
+from support.external.csv_tables import write_table
 from support.external.robot_log import make_log, write_log
+from support.external.turned_body import Hand, turn
 from support.laboratories.commands import rig_here
 from support.paths import DOCS
 
@@ -179,6 +182,25 @@ def test_row_numbers_and_positions_of_a_pose_file_are_no_gyroscope(tmp_path: Pat
     looked = rig_here("look", tmp_path / "robot_log.txt", poses).stdout.partition(f"{poses}:")[2]
     assert "gyroscope" not in looked.partition("what it allows:")[0] and "not read      column 1 x y z" in looked
     assert "direction     body to room: " in looked  # the headings say which number is which
+
+
+def test_turns_have_their_times_as_the_file_of_sweeps_needs_them(tmp_path: Path) -> None:
+    session = turn(Hand(np.vstack([np.eye(3), -np.eye(3)])), seed=1)
+    time_s = 1_800_000_000 + session.time_s
+    log = write(tmp_path / "log.csv", "time_s,x_rad_s,y_rad_s,z_rad_s", [time_s, *session.readings.T])
+    looked = rig_here("look", log).stdout
+    found = re.findall(r"^ +(\d+\.\d\d) +(\d+\.\d\d) +([+-])([xyz]) +(\d+\.\d)°$", looked, re.MULTILINE)
+    assert [sign + axis for *_, sign, axis, _ in found] == ["+x", "+y", "+z", "-x", "-y", "-z"]
+    rows = [
+        [float(start), float(end), *(float(f"{sign}1") * np.eye(3)["xyz".index(axis)]), 2 * np.pi]
+        for start, end, sign, axis, _ in found
+    ]
+    assert all(float(angle) == pytest.approx(360, abs=40) for *_, angle in found)
+    columns = ("start_s", "end_s", "axis_x", "axis_y", "axis_z", "angle_rad")
+    sweeps = write_table(tmp_path / "sweeps.csv", columns, np.array(rows))
+    solved = rig_here("solve", log, "--sweeps", sweeps, "--json")
+    scale = json.loads(solved.stdout)["gyroscopes"]["imu"]["scale"]
+    assert scale == pytest.approx(1 / np.linalg.norm(session.matrix, axis=1), rel=5e-3)
 
 
 def test_gaps_are_told_with_row_and_time(tmp_path: Path) -> None:
