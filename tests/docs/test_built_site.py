@@ -73,12 +73,15 @@ def test_the_search_answers_questions_and_finds_names(site: Path) -> None:
 
 @needs_browser
 @pytest.mark.parametrize("name", ["README", "docs/errors", "docs/configuration", "docs/how-to/finished-runs/export"])
-def test_a_telephone_shows_tables_without_scrolling_sideways(site: Path, name: str) -> None:
-    with browser() as driver, screen(driver, 390, 844):
+def test_no_screen_shows_a_table_that_scrolls_sideways_and_a_telephone_shows_cards(site: Path, name: str) -> None:
+    widest = "Math.max(...[...document.querySelectorAll('.table-wrapper')].map(t => t.scrollWidth - t.clientWidth))"
+    with browser() as driver:
         driver.get((site / f"{name}.html").as_uri())
-        widest = "Math.max(...[...document.querySelectorAll('.table-wrapper')].map(t => t.scrollWidth - t.clientWidth))"
-        assert driver.execute_script(f"return {widest}") <= 1
-        cell = driver.find_element(By.CSS_SELECTOR, "table:has(th:nth-child(3)) td:nth-child(2)")
-        heading = driver.find_element(By.CSS_SELECTOR, "table:has(th:nth-child(3)) th:nth-child(2)")
-        before = driver.execute_script("return getComputedStyle(arguments[0], '::before').content", cell)
-        assert before.startswith(f'"{heading.get_property("textContent")}')
+        for size in ((1920, 1080), (1280, 800), (768, 1024), (390, 844)):
+            with screen(driver, *size):
+                assert driver.execute_script(f"return {widest}") <= 1, size
+        with screen(driver, 390, 844):
+            cell = driver.find_element(By.CSS_SELECTOR, "table:has(th:nth-child(3)) td:nth-child(2)")
+            heading = driver.find_element(By.CSS_SELECTOR, "table:has(th:nth-child(3)) th:nth-child(2)")
+            before = driver.execute_script("return getComputedStyle(arguments[0], '::before').content", cell)
+            assert before.startswith(f'"{heading.get_property("textContent")}')

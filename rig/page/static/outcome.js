@@ -1,6 +1,6 @@
 // The results: one row per sensor with its values ± U, a plot of them, and the values of the previous calibration.
 
-import { labelCells } from "./tables.js";
+import { labelCells, withoutName } from "./tables.js";
 
 const SVG = "http://www.w3.org/2000/svg";
 const WIDTH = 84, LANE = 11; // of a picture, in CSS pixels; one lane per axis
@@ -25,7 +25,7 @@ export function showOutcome(box, rows, since) {
 
 function makeSummary(row, past, since) {
   return make("summary", {},
-    make("span", { className: "of" }, make("strong", { textContent: row.name }), make("small", { textContent: row.part })),
+    make("span", { className: "of" }, make("strong", { textContent: row.name }), make("small", { textContent: withoutName(row.part, row.name) })),
     ...makeTriad("scale factor", row.scale, "", past?.scale, "scale"),
     ...makeTriad(row.scale ? "bias" : "value", row.bias, row.unit, past?.bias, "bias"),
     make("span", { className: `since ${past?.changed.length ? "bad" : ""}` }, ...describeComparison(past, since)));

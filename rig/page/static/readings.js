@@ -2,6 +2,7 @@
 
 import { formatSigned } from "./arm.js";
 import { drawPlot } from "./plot.js";
+import { withoutName } from "./tables.js";
 
 const $ = (id) => document.getElementById(id);
 const points = { first: 0, times: [], lines: {} };
@@ -59,7 +60,7 @@ function drawReadings(name, values) {
   const description = sensors.find((candidate) => candidate.name === sensor);
   const [title, unit, digits] = UNITS[quantity] ?? [...(description?.units?.[quantity] ?? [quantity, ""]), 2];
   if (!$(id)) $("readings").append(makePanel(id, sensor, title, unit));
-  $(`${id}-about`).textContent = [description?.part, description?.mode === "calibrated" ? "corrected by the board" : ""].filter(Boolean).join(" · ");
+  $(`${id}-about`).textContent = [withoutName(description?.part, sensor), description?.mode === "calibrated" ? "corrected by the board" : ""].filter(Boolean).join(" · ");
   const last = values.findLast((value) => value);
   const canvas = $(`${id}-canvas`);
   const axes = last?.length === 1 ? [["x", ""]] : [..."xyz"].map((axis) => [axis, `${axis} `]); // a quantity without axes has no letter

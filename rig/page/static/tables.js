@@ -37,6 +37,12 @@ export function labelCells(table) {
     for (const cell of cells) if (cell.colSpan === 1) cell.dataset.label = headings[cell.cellIndex];
 }
 
+/** Return a part and its serial number, without the part if the sensor, or what is measured of it, is named after it. */
+export function withoutName(part, name) {
+  const [sensor] = name.split(",");
+  return part?.startsWith(`${sensor} `) ? part.slice(sensor.length + 1) : part;
+}
+
 export const formatMinus = (text) => text.replace("-", "−");
 const formatFixed = (value, digits) => (typeof value === "number" ? formatMinus(value.toFixed(digits)) : "–");
 export const formatNumber = (value) => (typeof value === "number" ? formatMinus(String(Number(value.toPrecision(4)))) : "–");
