@@ -16,15 +16,14 @@ HEAD_BYTES = 200  # enough to detect the type of a file
 
 def inspect_file(name: str, content: bytes, trust: Trust) -> FileInspection:
     """Inspect a file by its content: PDF, XML, or without a signature. Raise Refused `missing_extra`."""
-    with requiring(EXTRA):
-        from rig.report.signatures.pdf_signatures import inspect_pdf
-        from rig.report.signatures.xml_signature import inspect_xml
-    if content.startswith(b"%PDF-"):
-        inspect = inspect_pdf
-    elif _is_xml(content):
-        inspect = inspect_xml
-    else:
+    is_pdf = content.startswith(b"%PDF-")
+    if not is_pdf and not _is_xml(content):
         return FileInspection(problems=(not_signed(name),))
+    with requiring(EXTRA):
+        if is_pdf:
+            from rig.report.signatures.pdf_signatures import inspect_pdf as inspect
+        else:
+            from rig.report.signatures.xml_signature import inspect_xml as inspect
     try:
         with warnings.catch_warnings(action="ignore"):  # warnings of the libraries about the file's content
             return inspect(name, content, trust)
@@ -43,6 +42,8 @@ def _is_xml(content: bytes) -> bool:
 
 def read_trusted_certificates(files: Sequence[Path]) -> tuple[bytes, ...]:
     """Return the certificates in these files, PEM or DER, as DER. Raise Refused `trust_file`, `missing_extra`."""
+    if not files:
+        return ()
     with requiring(EXTRA):
         from cryptography.hazmat.primitives.serialization import Encoding
         from cryptography.x509 import load_der_x509_certificate, load_pem_x509_certificates

@@ -1,4 +1,4 @@
-"""Commands without an arm, run by an interpreter without the modules that only Linux has."""
+"""Commands without an arm, run by an interpreter without the modules that only Linux has, and without optional ones."""
 
 import os
 import shutil
@@ -13,6 +13,8 @@ from support.processes.waiting import PATIENCE_S
 HIDDEN = """
 import os, signal, sys
 for name in ("fcntl", "grp", "pty", "pwd", "readline", "resource", "syslog", "termios", "tty"):
+    sys.modules[name] = None
+for name in ("cryptography", "lxml", "matplotlib", "pandas", "psycopg", "pyhanko", "segno", "signxml", "unicorn"):
     sys.modules[name] = None
 del os.getloadavg, os.pidfd_open, os.O_NOFOLLOW, os.O_NONBLOCK, os.setsid
 for name in ("SIGHUP", "SIGQUIT", "SIGTSTP", "SIGUSR1", "SIGALRM", "SIGRTMIN", "pthread_kill", "setitimer"):
