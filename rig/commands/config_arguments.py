@@ -36,11 +36,12 @@ def add_run(
 ) -> None:
     """Add an argument that names a run; `latest` is this user's last one."""
     text += "; latest: your last one"
-    action = parser.add_argument(name, type=_parse_run, metavar=metavar, nargs=nargs, help=text, **more)
+    action = parser.add_argument(name, type=parse_run, metavar=metavar, nargs=nargs, help=text, **more)
     action.completer = _complete_runs  # pyrefly: ignore[missing-attribute]  # as argcomplete asks for it
 
 
-def _parse_run(text: str) -> Path:
+def parse_run(text: str) -> Path:
+    """Return the path that an argument names; raise ArgumentTypeError for `latest` without a run."""
     from rig.data.latest_run import meant_run
 
     try:

@@ -278,6 +278,10 @@ def _validate(model: type[Model], data: Any, prefix: Location, layered: Layered)
 
 
 SHAPES = {
+    "float_parsing": "a number",
+    "float_type": "a number",
+    "int_parsing": "a whole number",
+    "int_type": "a whole number",
     "tuple_type": "a list in brackets, such as [a, b, c]",
     "dict_type": "a section that holds others by their names",
 }

@@ -34,8 +34,12 @@ def latest_run() -> Path:
 
 
 def meant_run(path: str | Path) -> Path:
-    """Return the run that a user names: a path, or `latest` unless a file here is called so. Raise as `latest_run`."""
-    return latest_run() if str(path) == LATEST and not Path(LATEST).exists() else Path(path)
+    """Return the path that a user names; `latest` begins one in the latest run, unless a file here is called so.
+
+    Raise as `latest_run`.
+    """
+    first, *rest = Path(path).parts or (".",)
+    return latest_run().joinpath(*rest) if first == LATEST and not Path(LATEST).exists() else Path(path)
 
 
 def _read_noted() -> list[str]:

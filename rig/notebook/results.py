@@ -105,7 +105,9 @@ class Result(Mapping[str, Calibration]):
         by_name = self._calibrations
         of_sensor = [calibration for calibration in by_name.values() if calibration.finding.sensor == name]
         if name not in by_name and len(of_sensor) != 1:
-            choices = f"Choose one of: {', '.join(by_name)}" if by_name else "Solve the recording of a calibration"
+            choices = (
+                f"Choose one of: {', '.join(map(repr, by_name))}" if by_name else "Solve the recording of a calibration"
+            )
             raise NoSuchSensor("no_such_sensor", f"this result has no calibration of {name}", choices)
         return by_name[name] if name in by_name else of_sensor[0]
 

@@ -294,7 +294,7 @@ def test_a_value_that_was_given_by_an_override_is_refused_as_that() -> None:
     for section in ("sensors=3", "sensors.gyro=lsm9ds1"):
         assert "must be a section" in problems_of(demo_text(), section)[0]
     told = str(caught.value)
-    assert "procedure.speed_deg_s (--set): 'fast': " in told
+    assert "procedure.speed_deg_s (--set): 'fast': must be a number" in told
     assert "arm.home_deg (--set): 1: must be a list in brackets" in told
     assert "sensors.lsm9ds1.part: missing; sensors.lsm9ds1 comes from --set alone; the file has gyro" in told
     assert "Correct the command line" in told

@@ -21,6 +21,7 @@ def test_it_is_the_newest_that_is_still_there(tmp_path: Path) -> None:
         folder.mkdir(parents=True)
         note_run(folder)
     assert latest_run() == Path("runs/2")
+    assert meant_run("latest") == Path("runs/2") and meant_run("latest/run.h5") == Path("runs/2/run.h5")
     note_run(first)  # resumed
     assert latest_run() == Path("runs/1")
     first.rmdir()
@@ -35,15 +36,17 @@ def test_a_folder_of_that_name_is_meant_by_its_name(tmp_path: Path) -> None:
     note_run(tmp_path)
     (tmp_path / "latest").mkdir()
     assert meant_run("latest") == Path("latest")
+    assert meant_run("latest/run.h5") == Path("latest/run.h5")
     assert meant_run("another") == Path("another")
 
 
 @pytest.mark.parametrize(
     "words",
     ["show", "show latest", "solve latest", "report latest", "export latest --format csv", "resume latest",
-     "watch latest", "allan latest", "reversal latest latest", "history import latest"],
+     "watch latest", "allan latest", "reversal latest latest", "history import latest",
+     "verify latest/certificate.html"],
 )  # fmt: skip
 def test_every_command_that_takes_a_run_takes_the_latest(words: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit, match="2"):
         main(words.split())
-    assert "latest: no run folder of yours is known" in capsys.readouterr().err
+    assert ": no run folder of yours is known" in capsys.readouterr().err

@@ -24,6 +24,21 @@ ELSEWHERE = {
     "rig check my.yaml": "hardware",
     "rig run my.yaml": "hardware",
 }
+# Commands in its sentences and its table.
+IN_SENTENCES = {
+    "uvx --from 'calibration-rig[world]' rig demo": "needs a release; tests/installation/test_wheel.py runs the wheel",
+    "rig": "tests/commands/test_cli.py",
+    "rig demo": "tests/installation/test_wheel.py",
+    "rig demo --files .": "tests/installation/test_wheel.py",
+    "rig lines PORT --write my.yaml": "tests/commands/devices/test_new.py",
+    "rig run my.yaml": "needs hardware",
+    "rig board flash": "needs hardware",
+    "rig new my.yaml": "tests/commands/devices/test_new.py",
+    "rig check my.yaml": "needs hardware",
+    "rig look LOG": "tests/commands/offline/test_look.py",
+    "rig explain NAME": "tests/report/terminal/test_ending.py",
+    "rig show": "tests/report/terminal/test_ending.py",
+}
 ON_A_RUN = (
     "rig show latest --all",
     "rig report latest",
@@ -68,6 +83,14 @@ def test_every_command_of_a_block_is_run_somewhere() -> None:
     assert shown == {*ELSEWHERE, *ON_A_RUN}
     for place in ELSEWHERE.values():
         assert "/" not in place or (ROOT / place).exists(), f"{place} is not there"
+
+
+def test_every_command_of_a_sentence_is_run_somewhere_or_says_what_it_needs() -> None:
+    prose = re.sub(r"^```.*?^```$", "", README, flags=re.MULTILINE | re.DOTALL)
+    shown = {command for command in re.findall(r"`([^`]+)`", prose) if re.match(r"(make|uvx|rig)\b(?!\.)", command)}
+    assert shown == IN_SENTENCES.keys()
+    for place in IN_SENTENCES.values():
+        assert place.startswith("needs ") or (ROOT / place).exists(), f"{place} is not there"
 
 
 @pytest.mark.slow

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rig.commands.config_arguments import add_json, read_history_name
+from rig.commands.config_arguments import add_json, parse_run, read_history_name
 from rig.errors import Refused
 from rig.station.plain_text import say
 
@@ -34,9 +34,10 @@ def add(parser: ArgumentParser) -> None:
     parser.add_argument(
         "files",
         nargs="+",
-        type=Path,
+        type=parse_run,
         metavar="FILE",
-        help="a signed certificate.pdf or certificate.xml; with it, files attached to it, such as result.json",
+        help="a signed certificate.pdf or certificate.xml, such as latest/certificate.pdf; with it, files attached to "
+        "it, such as result.json",
     )
     parser.add_argument(
         "--trust",
