@@ -133,4 +133,4 @@ def test_a_run_whose_pages_helper_is_killed_ends_with_its_verdict(start: Start, 
     os.kill(helper, signal.SIGKILL)
     stdout, _ = running.process.communicate(timeout=PATIENCE_S)
     assert running.process.returncode == 0, running.told()
-    assert "verdict: PASS" in stdout and "The page shows no more of observations" in running.told()
+    assert "verdict: PASS" in stdout and "The page shows no new observations" in running.told()
