@@ -98,7 +98,7 @@ def test_the_verification_stands_as_a_run_of_its_own(run: rig.Run) -> None:
 @pytest.mark.slow
 def test_what_is_not_there_is_refused_by_name(run: rig.Run, result: rig.Result) -> None:
     for ask in (lambda: run["accelerometer"], lambda: result["accelerometer"], lambda: rig.compare(run, "gyro", "x")):
-        with pytest.raises(Refused, match=r"no_such_sensor: .*'gyro', 'reference'"):
+        with pytest.raises(Refused, match=r"no_such_sensor: .*gyro'?, '?reference"):
             ask()
     assert "gyro" in run and "accelerometer" not in run and run.get("accelerometer") is None
     assert "gyro" in result and result.get("accelerometer") is None
