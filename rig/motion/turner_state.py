@@ -98,8 +98,8 @@ class RuntimeState(IntEnum):
 class ArmState:
     """One packet of the controller: a `State` with six joints, base to wrist 3.
 
-    - `target_speed_fraction`: the speed slider (1 = 100 %); `speed_scaling`: the actual scaling.
-    - modes: the controller's numbers; see `RobotMode`, `SafetyMode`, `RuntimeState`.
+    - target_speed_fraction: the speed slider (1 = 100 %); speed_scaling: the actual scaling.
+    - robot_mode, safety_mode, runtime_state: the controller's numbers, as in `RobotMode` and its neighbours.
 
     The field names are those of `ARM_STATE_DTYPE`.
     """

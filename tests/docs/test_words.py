@@ -33,6 +33,8 @@ POINTS_ELSEWHERE = (
     *(".", ","),
 )
 WITHOUT_SUBJECT = re.compile(rf"({'|'.join(map(re.escape, POINTS_ELSEWHERE))})(\W|$)|$", re.IGNORECASE)
+# The names before a colon or a shape: at the beginning of an item of a list, and in backticks also within it.
+LISTED = re.compile(r"(?:^- |; )(`\w+`(?:, `\w+`)*)(?=:| \()|^- (\w+(?:, \w+)*)(?=:| \()", re.MULTILINE)
 WIDE, IN_PROSE = 8, 10  # fields of a class, and names in the prose of its docstring
 CAPABILITIES = frozenset(WORDS["capabilities"])
 DOCUMENTED = ast.FunctionDef | ast.AsyncFunctionDef
@@ -103,6 +105,20 @@ def test_a_wide_class_lists_its_fields() -> None:
     ] == []
 
 
+def test_the_list_of_a_class_names_its_own_fields() -> None:
+    """A renamed field is renamed in its line too: "- `name`, `other` (shape): meaning", with or without backticks."""
+    assert [
+        f"{file}:{node.lineno}: {node.name} has no field {name}, which its docstring lists"
+        for file, nodes in modules()
+        for node in nodes
+        if isinstance(node, ast.ClassDef) and (fields := fields_of(node))
+        if (text := ast.get_docstring(node)) and "\n- " in text
+        for names in LISTED.findall(text)
+        for name in re.findall(r"\w+", " ".join(names))
+        if name not in fields
+    ] == []
+
+
 def test_the_summary_of_a_docstring_is_one_line() -> None:
     """PEP 257."""
     assert [
@@ -162,6 +178,13 @@ def begins_with_verb(name: str) -> bool:
     word = name.strip("_").split("_")[0]
     is_participle = word.endswith("ed") and word not in NOT_PARTICIPLES
     return word not in PREPOSITIONS and not is_participle and word not in NEVER_BOUND
+
+
+def fields_of(node: ast.ClassDef) -> set[str]:
+    """Return the names that a class annotates in its body."""
+    return {
+        item.target.id for item in node.body if isinstance(item, ast.AnnAssign) and isinstance(item.target, ast.Name)
+    }
 
 
 def is_property(function: DOCUMENTED) -> bool:

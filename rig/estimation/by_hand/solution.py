@@ -67,7 +67,7 @@ class MoveSummary:
 class HandSolution:
     """The solution of a session by hand.
 
-    - `turned`: the solution in the form of a solution from known rotations; `budget`: its budget.
+    - `turned`: the solution in the form of a solution from known rotations.
     - `stds`: standard deviations of the hand by name: estimated, stated, and largest allowed.
     - `creeping_s`: times at which the body crept during intended rests, which are left out.
     - `expanded_scale` (3,): U (k = 2) from this session and its clock; the budget adds recordings of real hands.

@@ -32,15 +32,15 @@ MISTAKE_SIZES: dict[MistakeKind, float] = {
 class Mistake:
     """A mistake of magnitude `size`; None takes the usual magnitude of its kind (`MISTAKE_SIZES`).
 
-    - `short`: the turn ends this many degrees early, as if the edge had slipped.
-    - `two_turns`: two turns in place of one; `other_way`: a turn in the other direction; `wrong_face`: another face up;
-      `skipped`: no action.
-    - `crumb`: the face is tilted by this many mrad; `table_pushed`: the table's tilt changes by this many mrad.
-    - `held`: the body is held in the air for this many seconds in place of a rest; `lifted`: it is lifted by this many
+    - "short": the turn ends this many degrees early, as if the edge had slipped.
+    - "two_turns": two turns in place of one; "other_way": a turn in the other direction; "wrong_face": another face up;
+      "skipped": no action.
+    - "crumb": the face is tilted by this many mrad; "table_pushed": the table's tilt changes by this many mrad.
+    - "held": the body is held in the air for this many seconds in place of a rest; "lifted": it is lifted by this many
       degrees during a rest.
-    - `dropped`: the body falls and its biases jump by this many °/s; `cable_pulled`: readings are lost for this many
-      seconds; `left`: the hand waits for this many seconds before the action.
-    - `too_fast`: the peak rate is higher by this factor.
+    - "dropped": the body falls and its biases jump by this many °/s; "cable_pulled": readings are lost for this many
+      seconds; "left": the hand waits for this many seconds before the action.
+    - "too_fast": the peak rate is higher by this factor.
     """
 
     kind: MistakeKind
