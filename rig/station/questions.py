@@ -81,7 +81,7 @@ def question_before(announcement: Sequence[str], to_do: str) -> Question:
     """Return the question before an announced action: the answer `go` permits motion, `yes` any other action."""
     from rig.station.events import Prompt
 
-    if to_do == Prompt(()).to_do:
+    if to_do == Prompt(()).to_do:  # the default action, which permits motion
         return Question("go", f"Type go to {to_do}, or no:", tuple(announcement))
     return Question("doubt", f"Type yes to {to_do}, or no:", tuple(announcement))
 

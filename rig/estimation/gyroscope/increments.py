@@ -103,10 +103,10 @@ def track(time_s: Array, readings: Array, matrix: Array) -> Track:
     interval = _find_slopes(time_s, readings @ inverse.T)
     steps = _whole_steps(interval)
     attitudes = _running_product(steps.vectors)
-    middle = attitudes[:-1] @ steps.middle(inverse)
-    by_matrix = np.tensordot(middle, steps.turned, (0, 0)).reshape(3, 9)
-    by_bias = np.tensordot(middle, steps.lasting_s, (0, 0))[..., 0]
-    return Track(attitudes, interval.rates, np.hstack([by_matrix, by_bias]))
+    per_rate_error = attitudes[:-1] @ steps.differentiate(inverse)
+    per_matrix = np.tensordot(per_rate_error, steps.integrals_rad, (0, 0)).reshape(3, 9)
+    per_bias = np.tensordot(per_rate_error, steps.durations_s, (0, 0))[..., 0]
+    return Track(attitudes, interval.rates, np.hstack([per_matrix, per_bias]))
 
 
 def increments(time_s: Array, readings: Array, matrix: Array, bias: Array, windows_s: Array) -> Increments:
@@ -163,14 +163,14 @@ def _integrate_block(interval: _Interval, at_s: Array, inverse: Array) -> tuple[
 
 @dataclass(frozen=True, slots=True)
 class _IncrementSteps:
-    """Steps that begin at readings: rotation vectors φ (k, 3), `turned` (k, 3) without coning, durations (k, 1)."""
+    """Steps that begin at readings: rotation vectors φ (k, 3), integrals (k, 3) of the rate, durations (k, 1)."""
 
     vectors: Array
-    turned: Array
-    lasting_s: Array
+    integrals_rad: Array
+    durations_s: Array
 
-    def middle(self, inverse: Array) -> Array:
-        """Return the rotation (k, 3, 3) of each step per unit of rate error, in the body's coordinates at its start.
+    def differentiate(self, inverse: Array) -> Array:
+        """Return the rotation (k, 3, 3) per unit of integrated error of the readings, in body coordinates at the start.
 
         The attitude half-way stands for the whole step, with an error of about φ²/24.
         """
@@ -178,17 +178,17 @@ class _IncrementSteps:
 
     def sensitivities(self, attitudes: Array, inverse: Array) -> Array:
         """Return S (k, 3, 12) of each step, which starts at its element of `attitudes` (k, 3, 3)."""
-        middle = (attitudes @ self.middle(inverse))[..., None]
-        by_matrix = middle * self.turned[:, None, None, :]
-        return np.concatenate([by_matrix.reshape(-1, 3, 9), middle[..., 0] * self.lasting_s[..., None]], axis=2)
+        per_rate_error = (attitudes @ self.differentiate(inverse))[..., None]
+        per_matrix = (per_rate_error * self.integrals_rad[:, None, None, :]).reshape(-1, 3, 9)
+        return np.concatenate([per_matrix, per_rate_error[..., 0] * self.durations_s[..., None]], axis=2)
 
 
 def _whole_steps(interval: _Interval) -> _IncrementSteps:
     """Return the steps from each reading to the next."""
     h = np.diff(interval.time_s)[:, None]
     (w0, w1), (d0, d1) = ((values[:-1], values[1:]) for values in (interval.rates, interval.slopes))
-    turned = h * ((w0 + w1) / 2 + (d0 - d1) / 12)
-    return _IncrementSteps(turned + h**2 * np.cross(w0, w1) / 12, turned, h)
+    integrals = h * ((w0 + w1) / 2 + (d0 - d1) / 12)
+    return _IncrementSteps(integrals + h**2 * np.cross(w0, w1) / 12, integrals, h)
 
 
 def _steps_from(interval: _Interval, start: NDArray[np.intp], fraction: Array) -> tuple[_IncrementSteps, Array]:
@@ -196,15 +196,15 @@ def _steps_from(interval: _Interval, start: NDArray[np.intp], fraction: Array) -
     u = fraction[:, None]
     h = np.diff(interval.time_s)[start][:, None]
     w0, w1, d0, d1 = (values[index] for values in (interval.rates, interval.slopes) for index in (start, start + 1))
-    # The rate is a cubic Hermite polynomial between readings; `turned` is its integral. The cross product adds coning.
-    turned = h * (
+    # The rate is a cubic Hermite polynomial between readings; the cross product adds coning to its integral.
+    integrals = h * (
         (u - u**3 + u**4 / 2) * w0
         + (u**3 - u**4 / 2) * w1
         + (u**2 / 2 - 2 * u**3 / 3 + u**4 / 4) * d0
         + (u**4 / 4 - u**3 / 3) * d1
     )
     rates = w0 + u**2 * (3 - 2 * u) * (w1 - w0) + u * (1 - u) * ((1 - u) * d0 - u * d1)
-    return _IncrementSteps(turned + (u * h) ** 2 * np.cross(w0, rates) / 12, turned, u * h), rates
+    return _IncrementSteps(integrals + (u * h) ** 2 * np.cross(w0, rates) / 12, integrals, u * h), rates
 
 
 def _matrices(vectors: Array) -> Array:

@@ -101,13 +101,13 @@ class VectorInputs:
     def mount_errors_rad_s(self) -> Array | None:
         """The effects (3 S, N, 3) of one standard uncertainty of each mount on the rates.
 
-        The first stage defines the item's frame, so an error of the first mount changes all other stages.
+        The first stage defines the item's frame, so an error of its mount (the last three) changes only other stages.
         """
         if self.mount_turns_rad is None:
             return None
-        against_first = self.mount_turns_rad.copy()
-        against_first[-3:] -= against_first[-3:, :1]
-        return np.cross(against_first, self.turns_rad_s)
+        in_item_frame = self.mount_turns_rad.copy()
+        in_item_frame[-3:] -= in_item_frame[-3:, :1]  # then zero in the first stage, to which the first reading belongs
+        return np.cross(in_item_frame, self.turns_rad_s)
 
     @property
     def arm_errors_rad_s(self) -> Array:

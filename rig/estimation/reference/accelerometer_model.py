@@ -250,8 +250,8 @@ def jacobian(theta: Array, movement: Movement) -> Array:
 def effects(theta: Array, movement: Movement) -> Array:
     """Return the effect (3 K, P) of each of the arm's errors on the readings, per radian; P = 3 N + 10 per station.
 
-    Each dwell has three errors. The sweeps of a station share ten: small rotations of flange and base, and waves of the
-    joint's angle, A cos θ + B sin θ + C cos 2θ + D sin 2θ. The wrists' constant errors (`Movement.arm_turns`), if
+    Each dwell has three errors. The sweeps of a station share ten: small rotations of flange and base, and the
+    joint's angle error A cos θ + B sin θ + C cos 2θ + D sin 2θ. The wrists' constant errors (`Movement.arm_turns`), if
     known, come last and are common to all stations.
     """
     return combine_effects(*split_effects(theta, movement), movement.independent_fraction)
@@ -291,23 +291,23 @@ def turned(theta: Array, movement: Movement) -> Array:
 
 
 def _differentiate_angle(apparent: Array, theta: Array, sweeps: Sweeps) -> Array:
-    """Return the change (3 M, 3, 4) of the specific force due to waves w of the angle.
+    """Return the harmonics (3 M, 3, 4) of the specific force by errors w of the angle: cos θ, sin θ, cos 2θ, sin 2θ.
 
-    Gravity `apparent` changes by w times the derivative of its first harmonic. The rate grows by ω w′, so waves of one
-    period per revolution also add the first harmonics of the centripetal acceleration 2 ω² w′ (a aᵀ − 1) (p + r) and
-    the Euler acceleration ω² w″ a × (p + r). The effect of the delay on these is neglected.
+    Gravity `apparent` changes by w times the derivative of its first harmonic. The rate grows by ω w′, so the first two
+    errors also add the first harmonics of the centripetal acceleration 2 ω² w′ (a aᵀ − 1) (p + r) and the Euler
+    acceleration ω² w″ a × (p + r). The effect of the delay on these is neglected.
     """
     axes, arms, squares = sweeps.axes_flange, sweeps.arms_m + theta[LEVER], sweeps.speeds_rad_s[:, None] ** 2
     _, cos, sin = np.moveaxis(apparent.reshape(-1, 3, 3), 1, 0)
     centripetal = squares * (axes * np.sum(axes * arms, axis=1, keepdims=True) - arms)
     euler, zeros = squares * np.cross(axes, arms), np.zeros_like(arms)
-    waves = [
+    harmonics = [  # mean, cosine and sine, for each of the four errors
         (sin / 2, -euler, -2 * centripetal),
         (-cos / 2, 2 * centripetal, -euler),
         (zeros, sin / 2, cos / 2),
         (zeros, -cos / 2, sin / 2),
     ]
-    return np.moveaxis(np.array(waves), (0, 1, 2), (3, 1, 0)).reshape(-1, 3, 4)
+    return np.moveaxis(np.array(harmonics), (0, 1, 2), (3, 1, 0)).reshape(-1, 3, 4)
 
 
 def _read(changes: Array, s: Array, theta: Array, movement: Movement) -> Array:

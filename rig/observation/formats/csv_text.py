@@ -30,14 +30,14 @@ def read_rows(path: Path, largest_mb: int, skipped: int = 0) -> Iterator[list[st
         first = next(islice(lines, skipped, None), "")
         second = next(lines, "")
         first = first.lstrip(f"{COMMENT_MARKS} ") or first
-        delimiter = next((mark for mark in SEPARATORS if mark in first and (mark in second or "," not in first)), None)
-        if delimiter is None and is_divided_by_spaces(second):
+        other = next((mark for mark in SEPARATORS if mark in first and (mark in second or "," not in first)), None)
+        if other is None and is_divided_by_spaces(second):
             yield from (line.split() for line in chain([first, second], lines))
             return
-        rows = csv.reader(chain([first, second], lines), delimiter=delimiter or ",")
-        for number, row in enumerate(rows):
-            points = row if delimiter is None else [cell.replace(",", ".") for cell in row]
-            yield points if number or all(map(is_value, points)) else row
+        for number, row in enumerate(csv.reader(chain([first, second], lines), delimiter=other or ",")):
+            values = [cell.replace(",", ".") for cell in row] if other else row  # decimal commas
+            is_heading = number == 0 and not all(map(is_value, values))
+            yield row if is_heading else values
 
 
 def is_divided_by_spaces(line: str) -> bool:

@@ -21,6 +21,7 @@ HEARTBEAT_S, ATTITUDE_S = 1.0, 0.1
 QUADROTOR, ACTIVE, STANDBY = 2, 4, 3
 AUTOPILOTS = {"ardupilot": 3, "px4": 12}
 VERSIONS = {"ardupilot": 0x04050700, "px4": 0x010E03FF}
+SET_MESSAGE_INTERVAL, REQUEST_MESSAGE = 511, 512  # commands
 ACCEPTED, DENIED, UNSUPPORTED = 0, 2, 3
 SCALED = {26: 0, 116: 1, 129: 2}  # index of the IMU in SCALED_IMU, SCALED_IMU2, SCALED_IMU3
 RAW_IMU, HIGHRES_IMU, AUTOPILOT_VERSION = 27, 105, 148
@@ -218,23 +219,22 @@ class SimulatedAutopilot:
         self._send(message)
 
     def _command(self, message: Any) -> int:
-        """Carry out a command and return its result: version, message interval, or one message."""
-        if message.command == 512 and int(message.param1) == AUTOPILOT_VERSION:
+        """Carry out a command for the version, a message's interval, or one message; return the command's result."""
+        if message.command == REQUEST_MESSAGE and int(message.param1) == AUTOPILOT_VERSION:
             uid = list(self._uid.ljust(18, b"\0"))
-            zeros = [0] * 8
-            version = VERSIONS[self._firmware]
+            version, zeros = VERSIONS[self._firmware], [0] * 8
             self._send(
                 self._mavlink.MAVLink_autopilot_version_message(0, version, 0, 0, 0, zeros, zeros, zeros, 0, 0, 0, uid)
             )
             return ACCEPTED
-        if message.command not in (511, 512):
+        if message.command not in (SET_MESSAGE_INTERVAL, REQUEST_MESSAGE):
             return UNSUPPORTED
         number, interval_us = int(message.param1), message.param2
         if number not in IMU_INDEX or IMU_INDEX[number] >= len(self._imus) or isnan(interval_us):
             return DENIED
         if number == RAW_IMU and self._firmware == "px4":
             return DENIED
-        if message.command == 512:
+        if message.command == REQUEST_MESSAGE:
             self._send_imu(number, round((self._on_for_s + self._steps / RATE_HZ) * 1e6))
         elif interval_us <= 0:  # a disabled message, or the default, which is also disabled
             self._intervals_s.pop(number, None)
