@@ -1,4 +1,4 @@
-"""The model of `result.json`, which writes and reads it and is the source of docs/result.schema.json.
+"""The model by which `result.json` is written and read; the source of docs/result.schema.json.
 
 SI units, the unit in every name; vectors and matrices are lists, rows first. Keys are in the order of the fields.
 """

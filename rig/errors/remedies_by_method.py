@@ -1,4 +1,4 @@
-"""The remedies of errors that differ by the method of calibration: the table remedies_by_method.txt."""
+"""The remedies that differ by the method of calibration, from the table remedies_by_method.txt."""
 
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,7 +1,7 @@
 """The relative rotation of two triads on one flange, above all of a gyroscope and an accelerometer.
 
 A triad's right-angled frame is the one nearest to its axes, the orthogonal factor of their polar decomposition, as in
-`rig.estimation.sensor_axes`. Both F include the mounting on the same flange.
+`rig.estimation.sensor_axes`. The matrices F of both triads include the mounting on this flange.
 """
 
 from dataclasses import dataclass

@@ -160,7 +160,7 @@ def _change(section: SectionT, **keys: object) -> SectionT:
 
 
 def _add_target(planned: Planned, keys: Mapping[str, float]) -> Planned:
-    """Return the planned run with `keys` set in its procedure, which make the run end when it reaches the target."""
+    """Return the planned run with `keys` set in its procedure, so that it ends when it reaches the target."""
     procedure = planned.candidate.procedure
     with suppress(ValidationError):  # the target is larger than a configuration may state
         procedure = _change(procedure, **keys)

@@ -28,7 +28,7 @@ class Row:
 
 
 def _row(*classes: str, same: str = "", **renamed: str) -> Row:
-    """Return the row of `classes`: fields `same`, filled by attributes of the same name, and `renamed` ones."""
+    """Return the row of `classes`; a field's attribute has the same name (`same`) or another (`renamed`, by field)."""
     return Row(classes, {**{name: name for name in same.split()}, **renamed})
 
 

@@ -11,7 +11,7 @@ TIMEOUT_S = 2.0
 
 @dataclass(slots=True)
 class FirstSamples:
-    """A wait counted in polls, `look_s` apart, and by the turner's clock, if any.
+    """The wait for first samples: the number of polls times `look_s`, or less if the turner's clock says so.
 
     Elapsed time does not suffice: the threads that poll and read samples may be delayed. The limit grows with the load
     of this computer, on which the simulated laboratory may run. A simulated turner's clock stops if its world is late.

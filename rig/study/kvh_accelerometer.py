@@ -61,10 +61,10 @@ def study(settings: Settings) -> StudyReport:
 
 
 def _calibrate(rng: np.random.Generator, _: int) -> tuple[Array, Array, Array]:
-    """Return θ (18,), its standard deviations (18,), and residuals (3,) in m/s².
+    """Return θ (18,), its standard deviations (18,), and three numbers in m/s².
 
-    The residuals: largest standard deviation of corrected samples, and largest mean in any attitude, with and without
-    second-order terms.
+    These are the largest standard deviation of corrected samples, and the largest residual of an attitude's mean: with
+    second-order terms, then without.
     """
     attitudes = rt.draw_attitudes(REST_ATTITUDES)
     force = rt.project(attitudes, rt.ACCELEROMETER_REFERENCE_M_S2)

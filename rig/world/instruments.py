@@ -63,7 +63,7 @@ def sensor_seed(world: WorldSection, name: str, *more: int) -> np.random.SeedSeq
 
 
 def mount_magnetometer(config: RigConfig, world: WorldSection, name: str) -> MountedMagnetometer:
-    """Return the magnetometer inside an instrument, which is configured as the sensor `name`."""
+    """Return an instrument's own magnetometer, which is configured as the sensor `name`."""
     simulated = world.sensors[name]
     return MountedMagnetometer(
         config.sensors[name].mounting, simulated.magnetometer, simulated.mounting_error_deg, simulated.offset_mm

@@ -58,12 +58,12 @@ class Datasheet:
 
     @property
     def even_s2_m(self) -> float:
-        """The half-width of φ if there is no odd part: the best line deviates from φ v² within ± V by φ V²/2."""
+        """The half-width of φ if there is no odd part: up to |v| = V, the best line deviates from φ v² by φ V²/2."""
         return 0.02 * self.nonlinearity_percent / (self.over_g * STANDARD_GRAVITY_M_S2)
 
     @property
     def odd_s4_m2(self) -> float:
-        """The half-width of χ if there is no even part: the best line deviates from χ v³ within ± V by χ V³/4."""
+        """The half-width of χ if there is no even part: up to |v| = V, the best line deviates from χ v³ by χ V³/4."""
         return 0.04 * self.nonlinearity_percent / (self.over_g * STANDARD_GRAVITY_M_S2) ** 2
 
 

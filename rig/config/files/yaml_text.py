@@ -1,6 +1,6 @@
 """Reads YAML from any source: plain data and the line of every key, or a sentence that explains a refusal.
 
-No text makes reading slow, large or deep: text much longer than a usual configuration (about a page) is refused.
+A text much longer or more deeply nested than a usual configuration is refused, as reading it could take long.
 """
 
 import unicodedata

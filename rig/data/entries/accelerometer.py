@@ -49,7 +49,7 @@ class DwellEntry(Entry):
 
 
 class ValidationEntry(Entry):
-    """The last repeat of the attitudes, which the calibration does not use: norm of the acceleration, minus gravity."""
+    """The error of the specific force's norm in the last repeat of the attitudes, not used for the calibration."""
 
     dwells: int
     rms_m_s2: float

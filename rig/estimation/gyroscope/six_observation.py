@@ -10,7 +10,7 @@ with s the three squares and l the three linear terms. The columns of X have the
 the noise's variance to every square and shrinks the scale.
 
 β depends on the unknown β0 = γ through one scalar only: β(γ) = p − γ q with p = X⁺ω² and q = X⁺1 (X⁺: least squares).
-Both solvers find the fixed point of γ: `solve_by_newton`, and `solve_by_algorithm_1` as SIX publishes it.
+Both solvers find the fixed point of γ: `solve_by_newton`, and `solve_by_algorithm_1` as published in SIX.
 `rig.estimation.gyroscope.accumulator` computes p and q from any number of revolutions.
 """
 

@@ -83,7 +83,7 @@ class AttitudeWeighted:
 
 
 def solve_attitude_weighted(start: Array, placed: Placed) -> AttitudeWeighted:
-    """Return θ and δ of maximum likelihood from `start` (p,), by alternating steps until δ converges."""
+    """Return the most likely θ and attitude error δ, from `start` (p,), by alternating steps until δ converges."""
     r, v_bar, norm_known = placed.attitudes, placed.v_bar, placed.norm_known
     theta, steps, delta, last = start, 0, 0.0, np.inf
     for _ in range(MAX_ITERATIONS):

@@ -78,7 +78,7 @@ def slopes(theta: Array, movement: Movement, *, second_order: bool) -> Array:
 
 
 def most_likely(start: Array, movement: Movement, fixed: list[int], attitude_std_rad: float | None) -> Fit:
-    """Return θ and δ of maximum likelihood from `start` (22,), by alternating steps until δ converges.
+    """Return the most likely θ and attitude error δ, from `start` (22,), by alternating steps until δ converges.
 
     `fixed`: indices of elements of θ that keep their value.
     """

@@ -30,9 +30,9 @@ MIN_MEAN_LENGTH = 0.5  # of unit vectors that have one direction
 class Steps:
     """The steps of rounded numbers: `unit` (3,) of each axis, or one of all.
 
-    A number truncated (`cut`) toward zero is shifted to the middle of its interval. Zero then represents all values
-    within one unit in either direction, so its neighbours are a unit and a half away. `zero` (3,): the present value of
-    readings that were zero at truncation, in units modulo 1; NaN if unknown.
+    A number truncated (`cut`) toward zero is shifted to the middle of its interval. Zero represents all values
+    within one unit in either direction, so the next values are one and a half units away from it. `zero` (3,): the
+    value that readings truncated to zero have now, in units modulo 1; NaN if unknown.
     """
 
     unit: Array | float

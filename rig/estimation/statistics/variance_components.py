@@ -92,7 +92,7 @@ class MixedModel:
         return self._whiten(std)[-1] + self._log_prior(np.log(std))
 
     def restrict(self, std: Array) -> tuple[Array, Array]:
-        """Return P (m, m) and P y (m,) of the restricted likelihood: C⁻¹ less its projection onto the design."""
+        """Return P (m, m) and P y (m,) of the restricted likelihood: C⁻¹ minus its projection onto the design."""
         lower, _, _, information, _ = self._whiten(std)
         return self._project(lower, information)
 
@@ -190,7 +190,7 @@ class MixedModel:
         return lower, design, observed, information, -0.5 * (determinant + square)
 
     def _project(self, lower: Array, information: Array) -> tuple[Array, Array]:
-        """Return P (m, m) and P y (m,), as `restrict`, from L (m, m) and the information (p, p) of `_whiten`."""
+        """Return the P (m, m) and P y (m,) of `restrict`, from the L (m, m) and the information (p, p) of `_whiten`."""
         from scipy.linalg.lapack import dpotri
 
         half = dpotri(lower, lower=1)[0]

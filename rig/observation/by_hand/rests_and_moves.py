@@ -84,7 +84,7 @@ class NotCounted:
         return shift_s + self.microsecond_s * begin_us, shift_s + self.microsecond_s * end_us
 
     def filter_session(self, session: HandRecording) -> HandRecording:
-        """Return the session without the `rests`; the moves before and after each become one move with a pause."""
+        """Return the session without the `rests`; the two moves around a rest are merged into one with a pause."""
         rests, moves, through = list[HandRest](), list[Move](), list[Move]()
         for index, rest in enumerate(session.rests):
             if _middle_s(rest) < self.from_s:

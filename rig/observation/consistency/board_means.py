@@ -2,8 +2,8 @@
 
 Both average the same samples, with different weights. The board's weights are equal over whole blocks of readings, so
 its window begins and ends a little before or after the turn; the computer's weights cancel the spectral lines that it
-found. From the board's average, the arm's rotation and the spectral lines, both under the board's weights, are
-subtracted. The rest must agree with the computer's mean.
+found. The arm's rotation and the spectral lines, averaged with the board's weights, are subtracted from the board's
+average. The rest must agree with the computer's mean.
 """
 
 from collections.abc import Sequence

@@ -146,7 +146,7 @@ def _recording(read: ExternalReadings, settings: RunSettings, provenance: Proven
 def _motion(files: Files, origin_s: int) -> Columns:
     """Return the motion by column, with times that count from `origin_s`.
 
-    Raise Refused as the readers of motion do, and `bad_option` for a table's log of sweeps.
+    Raise Refused as the readers of motion do, and `bad_option` if a rate table's log is given as sweeps.
     """
     column_map = files.columns
     if not isinstance(files.motion, Path):

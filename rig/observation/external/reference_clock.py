@@ -58,7 +58,7 @@ def _estimate_clock(turning: Turning, rates_rad_s: Array | None) -> TimeBase:
 
 
 def check_one_clock(turning: Turning, rates_rad_s: Array | None) -> None:
-    """Raise Fault `clocks_apart` if the rotation shows that the rows' clock runs at another rate than the readings'.
+    """Raise Fault `clocks_apart` if the rotation shows that the clocks of rows and readings run at different rates.
 
     A gap of the readings may also be a step of a clock, which looks like another rate.
     """

@@ -1,7 +1,7 @@
 """MATLAB's files (`.mat`) as tables: each column of a variable, or of a struct's field, is a column of the table.
 
 Columns have the names that they have in MATLAB: `t` of a vector, `gyro(:,2)` of a matrix, `imu.gyro(:,2)` of a struct.
-SciPy reads versions 4 to 7, h5py version 7.3. Both run in a process of its own, and read numbers only: no object, no
+SciPy reads versions 4 to 7, h5py version 7.3. They run in a separate process, and read numbers only: no object, no
 function, no link to another file.
 """
 

@@ -93,7 +93,7 @@ def _axes_of_items(mounted: Iterable[Mounted]) -> Iterator[Array]:
 
 
 def _trials(sweeps: Sequence[Sweep], home: Joints) -> Iterator[Step]:
-    """Yield a small turn, and its reverse, of each joint that is swept, which show the item's mounting."""
+    """Yield a small turn of each swept joint, and its reverse; they show the item's mounting."""
     for joint, name in dict.fromkeys((sweep.joint, sweep.joint_name) for sweep in sweeps):
         station = SweepPose(joint, name, home)
         yield from trial(f"trial of {name}", f"back from the trial of {name}", station, TRIAL_RAD, TRIAL_PACE)

@@ -75,7 +75,7 @@ def connect_sweeps(
 
 
 def trial(name: str, return_name: str, station: SweepPose, by_rad: float, pace: Pace) -> Iterator[Transfer]:
-    """Yield a small turn and its reverse, under these names, which show the item's mounting."""
+    """Yield a small turn and its reverse, under these names; they show the item's mounting."""
     home, tried = station.pose_q_rad, station.rotate_joint(by_rad)
     for step in transfer(name, home, tried, pace):
         yield replace(step, tries=True)

@@ -16,10 +16,10 @@ FIELD = "Laboratory"  # the form field that readers show
 def sign_as_pades(
     pdf: bytes, by: Signatory, reason: Reason, time_server: str | None = None, authorities: Authorities | None = None
 ) -> bytes:
-    """Return the PDF with a certification signature that permits no changes: B-B, or B-T with a time server's URL.
+    """Return the PDF with a certification signature that permits no changes, at PAdES level B-B.
 
-    With `authorities` it is B-LT, and the signature covers their revocation lists. Raise Refused `time_server` without
-    a time stamp by the server, `revocation_list` if the lists do not cover every certificate.
+    With a time server's URL it is B-T; with `authorities` it is B-LT, and their revocation lists are signed too. Raise
+    Refused `time_server` without the server's time stamp, `revocation_list` if the lists do not cover all certificates.
     """
     from pyhanko.pdf_utils.incremental_writer import IncrementalPdfFileWriter
     from pyhanko.sign.fields import MDPPerm, SigSeedSubFilter

@@ -44,11 +44,11 @@ class Device(Protocol):
 
 
 class SerialLine:
-    """A line between a device of the laboratory (None: without power) and the host's end.
+    """The line between the host and a device of the laboratory; `device` returns None for a device without power.
 
-    `host_baud`: the host's baud rate if the transport does not carry it (None: the device's). A `silent` line loses
-    everything. Each bit from the device is wrong with the probability `bit_error_rate`; with the probability `stolen`
-    another program on the same port takes the end of a tick's bytes.
+    `host_baud`: the host's baud rate if the transport does not carry it; None if it equals the device's. A `silent`
+    line loses everything. Each bit from the device is wrong with the probability `bit_error_rate`. In a tick, another
+    program on the same port takes the last of the device's bytes with the probability `stolen`.
     """
 
     def __init__(self, device: Callable[[], Device | None], seed: int = 0) -> None:

@@ -1,4 +1,4 @@
-"""The parent's end of the supervised child: it starts the child, passes messages on, and detects its silence."""
+"""The parent's end of the link to the supervised child. It starts the child, passes messages, and detects silence."""
 
 import multiprocessing
 import os

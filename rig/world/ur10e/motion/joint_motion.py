@@ -94,7 +94,7 @@ class JointMotion:
 
     @property
     def standing(self) -> bool:
-        """Whether no trajectory is being played (a paused one is)."""
+        """Whether the last trajectory has ended; a paused one has not."""
         return self._trajectory.is_over(self._trajectory_s)
 
     @property
