@@ -77,10 +77,10 @@ def reversal_dof(reversal: "MagnetometerReversal") -> tuple[Array, Array]:
     For bias and field they are the lowest of any run's bias, a lower bound for a sum of independent parts.
     """
     budgets = [run.result.budget for run in reversal.runs]
-    # (Σ u_i²)² / ν of one run is Σ u_i⁴ / ν_i: errors common to the runs have infinite ν and add nothing.
-    scarce = np.sum([budget.std[:3] ** 4 / budget.dof[:3] for budget in budgets], axis=0) / len(budgets) ** 4
+    # Welch–Satterthwaite: u⁴ / ν = Σ u_i⁴ / ν_i. Errors common to the runs have infinite ν and add nothing.
+    fourths = np.sum([budget.std[:3] ** 4 / budget.dof[:3] for budget in budgets], axis=0) / len(budgets) ** 4
     with np.errstate(divide="ignore"):
-        scale: Array = reversal.scale_std**4 / scarce
+        scale: Array = reversal.scale_std**4 / fourths
     return scale, np.full(6, min(float(budget.dof[3:].min()) for budget in budgets))
 
 

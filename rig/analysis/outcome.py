@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """The equipment and times of the measurements; `recorded` is the time of the run's first recording."""
+    """The equipment and times of the measurements; `recorded` has those of the run's first recording."""
 
     recorded: "Provenance"
     stored_calibrations: "Mapping[str, StoredCalibrationEntry]"

@@ -40,11 +40,11 @@ class Header:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """All columns that such a file may have."""
+        """All columns that the file may have."""
         return (*self.needed, *self.one_of, *(name for group in self.optional for name in group))
 
     def check(self, columns: Columns) -> None:
-        """Raise ValueError for columns or numbers that such a file cannot have."""
+        """Raise ValueError for columns or numbers that the file cannot have."""
         names = columns.keys()
         groups = [group for group in self.optional if names & set(group)]
         allowed = {*self.needed, *self.one_of, *(name for group in groups for name in group)}

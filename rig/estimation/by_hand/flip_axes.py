@@ -54,7 +54,7 @@ def check_axes(session: HandRecording) -> None:
 
 
 def _check_turned(unit: Array) -> None:
-    """Raise Fault `wrong_mounting` if the gyroscope's axes, rows (3, 3), are turned too far from the accelerometer's."""
+    """Raise Fault `wrong_mounting` if the gyroscope's axes, rows (3, 3), are rotated far from the accelerometer's."""
     angle_rad = float(np.linalg.norm(rotation_vectors(nearest_rotation(unit)[None])[0]))
     if angle_rad > MAX_FRAME_ANGLE_RAD:
         raise Fault(

@@ -2,8 +2,8 @@
 
 If sweeps do not determine an item's mounting, only the size of the rates' angular errors is known. Their first order is
 a pattern of error like any other. The mean and the covariance of their second order, 150 ppm for 1°, follow from the
-covariance of the angles (JCGM 100, 5.1.2, note). Here every stage has its own angles, even the first. So a rotation
-common to all stages, which changes no scale, adds nothing.
+covariance of the angles (JCGM 100, 5.1.2, note). Every stage has angles of its own, so that a rotation common to all
+stages, which changes no scale, adds nothing.
 """
 
 import numpy as np

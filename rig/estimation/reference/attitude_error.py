@@ -134,7 +134,7 @@ def effects(theta: Array, attitudes: Array, v_bar: Array) -> Array:
 
 
 def find_whiteners(variances: Array, rotations: Array, std_rad: Array) -> Array:
-    """Return whiteners (N, 3, 3) for noise `variances` (N, 3) and attitude errors `std_rad` (N,); `rotations` is E."""
+    """Return whiteners (N, 3, 3) for noise `variances` (N, 3) and attitude errors `std_rad` (N,) with effects E."""
     scaled = rotations * std_rad[:, None, None]
     covariance = np.eye(3) * variances[:, :, None] + scaled @ np.swapaxes(scaled, -1, -2)
     return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)), dtype=np.float64)

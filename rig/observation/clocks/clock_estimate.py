@@ -149,7 +149,7 @@ class _MovingTimes:
         return cls(start_s, around >= MOVING_SPEED_RATIO * speed.max())
 
     def mask(self, time_s: Array) -> NDArray[np.bool_]:
-        """Return a mask of the times (n,) that lie in such a block."""
+        """Return a mask of the times (n,) that lie in or near a block with motion."""
         index = np.clip((time_s - self.start_s) / BLOCK_S, 0, len(self.near) - 1).astype(np.intp)
         mask: NDArray[np.bool_] = self.near[index]
         return mask

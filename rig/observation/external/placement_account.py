@@ -140,7 +140,7 @@ class Account:
     def _find_moved(self, row: int) -> NDArray[np.intp]:
         """Return the samples of a dwell in which the body moves.
 
-        The ends of a rest are uncertain by a block, also at the ends of the dwell and at a gap.
+        Readings within `BLOCK_S` of an end of the dwell or of a gap are not counted: a rest's ends are that uncertain.
         """
         window, samples = self.rows.windows[row], self._inside(row)
         gaps = np.flatnonzero(np.diff(self.time_s[samples]) > BLOCK_S)

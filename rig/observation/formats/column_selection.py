@@ -161,7 +161,7 @@ def check_headings(path: Path, headings: Sequence[str]) -> None:
 
 
 def _check_columns(path: Path, names: Sequence[str], header: Header) -> None:
-    """Raise Refused `wrong_unit`, `wrong_columns` for names that no column of such a file has."""
+    """Raise Refused `wrong_unit`, `wrong_columns` for names that no column of a file with this header has."""
     for name in names:
         _check_unit(path, name, names, header)
     problems = [*_list_missing(names, header), *_find_unexpected(names, header)]

@@ -1,10 +1,10 @@
 """An autopilot's corrections of its readings, from its parameters: undone, or refused by name. Pure.
 
-ArduPilot, AP_InertialSensor_Backend.cpp (_rotate_and_correct_gyro, _rotate_and_correct_accel): readings in the sensor's
-axes by the board's definition, minus the temperature's part, minus an offset, accelerations then times a scale, all
-rotated by AHRS_ORIENTATION; then notches and a low-pass of second order (apply_gyro_filters). PX4,
-src/lib/sensor_calibration (`Correct`): the same order, rotated by SENS_BOARD_ROT; its messages contain unfiltered means
-over IMU_INTEG_RATE (VehicleIMU), and in HIGHRES_IMU these minus its estimator's bias (HIGHRES_IMU.hpp).
+ArduPilot (AP_InertialSensor_Backend.cpp: _rotate_and_correct_gyro and _accel, apply_gyro_filters) subtracts the effect
+of temperature and an offset, scales accelerations, and rotates by AHRS_ORIENTATION from the axes of the board's
+definition. Then it filters by notches and a low-pass of second order. PX4 (src/lib/sensor_calibration, `Correct`) has
+the same order and rotates by SENS_BOARD_ROT. Its messages contain unfiltered means over IMU_INTEG_RATE (VehicleIMU); in
+HIGHRES_IMU its estimator's bias is subtracted (HIGHRES_IMU.hpp).
 """
 
 from collections.abc import Iterator, Mapping, Sequence
