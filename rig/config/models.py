@@ -338,7 +338,7 @@ class RigConfig(SensorsConfig):
 
 
 def _device_sensor_names(sensors: Mapping[str, SensorSection]) -> list[str]:
-    """Return the names of the further sensors in the devices of `sensors`: magnetometers and scalars."""
+    """Return the names of the further sensors in the devices of `sensors`: magnetometers and sensors of one number."""
     return [bundled for name, sensor in sensors.items() for bundled in sensor.brings(name)]
 
 

@@ -12,7 +12,7 @@ _DEGREES_OF_FREEDOM = re.compile(r"(.+)_degrees_of_freedom")
 
 @cache
 def meanings() -> Mapping[str, str]:
-    """Return the meaning of each key of `result.json`, also of `Entry.key` where it differs in that entry."""
+    """Return the meanings by key of `result.json`. A key with another meaning in one entry is listed as `Entry.key`."""
     lines = _TABLE.read_text(encoding="utf-8").splitlines()
     rows = (line.partition(" | ") for line in lines if line and not line.startswith("#"))
     return {key: meaning for key, _, meaning in rows}

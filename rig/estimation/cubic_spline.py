@@ -77,7 +77,7 @@ def _slopes(step: Array, secants: Array) -> Array:
 
 
 def _end_condition(step: float, following: float, secant: Array, next_secant: Array) -> Array:
-    """Return the right side of a not-a-knot end condition: `following` s₀ + (step + following) s₁."""
+    """Return r (k,) of the not-a-knot end condition `following` s₀ + (step + following) s₁ = r."""
     both = step + following
     end: Array = ((step + 2 * both) * following * secant + step**2 * next_secant) / both
     return end

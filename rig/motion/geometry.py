@@ -48,8 +48,8 @@ def axis_errors(q_rad: ArrayLike, joint: int, arm: DenavitHartenberg = NOMINAL) 
     q = np.asarray(q_rad, dtype=np.float64)
     frames = [frame[..., :3, :3] for frame in _frames(q, arm)]
     wrists = _last_three(arm)
-    twists, zeros = [frames[link + 1][..., 0] for link in wrists], [frames[link][..., 2] for link in wrists[1:]]
-    rotated = np.cross(frames[joint][..., 2], [*twists, *zeros])
+    twist_axes, zero_axes = [frames[link + 1][..., 0] for link in wrists], [frames[link][..., 2] for link in wrists[1:]]
+    rotated = np.cross(frames[joint][..., 2], [*twist_axes, *zero_axes])
     for index, link in enumerate((*wrists, *wrists[1:])):
         if joint > link:  # an error beyond the link does not rotate the joint's axis
             rotated[index] = 0.0

@@ -34,8 +34,8 @@ class Calibrations(Sequence[Past]):
     def to_frame(self) -> "DataFrame":
         """Return one row for each calibration, indexed by its number, as a pandas table.
 
-        `started_utc` are times; every parameter has two columns, `kx` and its expanded uncertainty `kx_expanded`, in SI
-        units, NaN if a calibration lacks it. Raise Refused `missing_extra`.
+        `started_utc` are times. Every parameter has two columns in SI units, for example `kx` and, for its expanded
+        uncertainty, `kx_expanded`; both are NaN if a calibration lacks it. Raise Refused `missing_extra`.
         """
         names = dict.fromkeys(name for past in self.pasts for name in past.parameters)
         columns: dict[str, Any] = {name: [_property_of(past, name) for past in self.pasts] for name in DESCRIPTION}

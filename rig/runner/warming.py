@@ -116,13 +116,13 @@ class Warming:
     def begin_waiting(self) -> None:
         """Report the temperature to wait for; the operator or the heater brings it about."""
         now_c = self.now_c()
-        nearest = self._nearest(now_c)
+        farthest_c = self._farthest_c(now_c)
         if self.course.warming is None:
-            self.course.begin(nearest)
-            nearest = self._nearest(now_c)
+            self.course.begin(farthest_c)
+            farthest_c = self._farthest_c(now_c)
         if not self.course.is_due(now_c):
             heated = self.heater is not None
-            self.note(TemperatureWanted(bool(self.course.warming), nearest, self.course.next_c(nearest), heated))
+            self.note(TemperatureWanted(bool(self.course.warming), farthest_c, self.course.next_c(farthest_c), heated))
 
     @property
     def is_due(self) -> bool:
@@ -152,8 +152,8 @@ class Warming:
         if self.heater is not None:
             self.heater.keep_heating(0.0)
 
-    def _nearest(self, now_c: Mapping[str, float]) -> float:
-        """Return the temperature of the sensor with the largest part of the range ahead."""
+    def _farthest_c(self, now_c: Mapping[str, float]) -> float:
+        """Return the temperature of the sensor that is farthest from the end of the range."""
         return max(now_c.values()) if self.course.warming is False else min(now_c.values())
 
     def _refuse_hot(self, now_c: Mapping[str, float]) -> None:

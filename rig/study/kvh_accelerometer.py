@@ -61,7 +61,7 @@ def study(settings: Settings) -> StudyReport:
 
 
 def _calibrate(rng: np.random.Generator, _: int) -> tuple[Array, Array, Array]:
-    """Return θ (18,), its standard deviations (18,), and three numbers in m/s².
+    """Return the parameters θ (18,), their standard deviations (18,), and three numbers in m/s².
 
     These are the largest standard deviation of corrected samples, and the largest residual of an attitude's mean: with
     second-order terms, then without.

@@ -11,5 +11,5 @@ CHECKS = (*gyroscope_checks.CHECKS, DISTURBED_SWEEP, *converter_tests.CHECKS, NO
 
 
 def false_alarm_per_check(kinds: int, *, of_all: float = FALSE_ALARM_PROBABILITY) -> float:
-    """Return the false-alarm probability of each statistic, for a number of kinds of readings."""
+    """Return the false-alarm probability of one check if all checks, of `kinds` kinds of readings, share `of_all`."""
     return false_alarm_of_each(of_all, len(CHECKS) * kinds)

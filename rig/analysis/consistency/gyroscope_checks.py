@@ -222,7 +222,7 @@ def _inflate_transfers(
 def _residual_chi_square(tested: _Tested) -> tuple[float, int]:
     """Return the residuals' χ² after a fit of the model and of all tested changes, and its degrees of freedom.
 
-    Without transfers, some changes differ from the model's effects only by the noise of the rates. They are dropped.
+    If transfers are absent, some changes differ from the model's effects only by the rates' noise. These are dropped.
     """
     changed = [*changes(tested.segments, tested.axis_rates).values(), quarter_columns(tested.means)]
     columns = [apply_whitener(tested.model.whitener, change) for change in changed if change is not None]

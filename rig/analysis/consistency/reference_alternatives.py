@@ -17,7 +17,7 @@ from rig.estimation.reference.reference_model import REFERENCE, matrix
 
 @dataclass(frozen=True, slots=True)
 class ReferenceModel:
-    """The model of readings in a reference: θ (22,), estimated from the `movement`, and the known errors.
+    """The model of readings in a reference: parameters θ (22,), estimated from the `movement`, and the known errors.
 
     `error_patterns` (P, 3 K): independent errors of the readings, each of one standard uncertainty; `times_s` (N + M,):
     the middles of dwells and sweeps.
@@ -41,7 +41,7 @@ class ReferenceModel:
 
 
 def alternatives(model: ReferenceModel) -> Alternatives:
-    """Return the columns (3 K, k) of each alternative, by the check's name; None stands for all residuals."""
+    """Return every alternative's effects (3 K, k) on readings, by the check's name; None stands for all residuals."""
     s, f, time = find_force(model.theta, model.movement), matrix(model.theta), _time(model)
     columns: dict[str, Array | None] = {
         "bias_changed": bias_drift_columns(model),

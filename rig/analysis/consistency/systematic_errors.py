@@ -328,7 +328,7 @@ def _mount_patterns(segments: Segments, mount_rad: float) -> list[Array]:
 
 
 def _nonlinearity_patterns(intervals: Sequence[MotionInterval], matrix: Array, curve: NonlinearityPrior) -> Array:
-    """Return the patterns (6, N, 3) of cube and square, one standard deviation each, averaged over each interval."""
+    """Return the patterns (6, N, 3) of the rate's cube and square, each one standard deviation, as interval means."""
     by_interval = []
     for interval in intervals:
         edges = np.linspace(interval.start_s, interval.end_s, TRANSFER_STEPS + 1)

@@ -149,11 +149,11 @@ def add_errors(solution: VectorSolution, data: ExternalData) -> VectorSolution:
 def _derivatives(design: Array, means: Array, variances: Array) -> Array:
     """Return the derivative (12, N, 3) of F, row by row, then c, with respect to each mean reading."""
     _, inverse = regress(design, means, variances)  # (3, 4, N)
-    of_matrix, _ = index_coefficients(4)
+    order, _ = index_coefficients(4)  # F row by row, then c
     gain = np.zeros((3, 4, len(means), 3))
     for axis in range(3):
         gain[axis, :, :, axis] = inverse[axis]
-    return np.asarray(gain.reshape(12, len(means), 3)[of_matrix], dtype=np.float64)
+    return np.asarray(gain.reshape(12, len(means), 3)[order], dtype=np.float64)
 
 
 def _contradictions(stated: StatedMotion, sizes: MotionErrors, design: Array) -> Array:

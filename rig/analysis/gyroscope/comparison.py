@@ -173,7 +173,7 @@ def _align_recording(recording: ObservedRun, sensor: str, reference: Reference, 
 
 
 def _find_delay(recording: ObservedRun, sensor: str, reference: str) -> Delay | None:
-    """Return the filter's delay between the sensors. Raise Fault `different_clocks` if it is implausibly long."""
+    """Return the delay of the sensor behind the reference. Raise Fault `different_clocks` if it is implausibly long."""
     delay = recording.delay(sensor, behind=reference)
     if delay is not None and abs(delay.delay_s) > MAX_DELAY_S:
         raise Fault(

@@ -51,7 +51,7 @@ class AtReference:
 
 
 def correct_recordings(recordings: Sequence[ObservedRun], settings: RunSettings, reference_c: float) -> AtReference:
-    """Correct every sensor to calibrate: its rates, and its accelerations in dwells.
+    """Correct the rates and the dwells' accelerations of the sensors to calibrate, to the temperature `reference_c`.
 
     Raise Fault `temperature_not_recorded`, and as `fit_over_temperature` does.
     """

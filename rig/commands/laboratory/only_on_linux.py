@@ -1,4 +1,4 @@
-"""Refusal on other systems of everything that needs Linux: an arm, a servomotor, the simulated laboratory."""
+"""Refusal of what needs Linux if the system is another: an arm, a servomotor, the simulated laboratory."""
 
 import sys
 from importlib.util import find_spec

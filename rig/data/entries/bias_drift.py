@@ -53,7 +53,7 @@ class DriftEntry(Entry):
     - largest_change: the largest change between any two repeats.
     - temperature_slope: the slope of the bias, or why there is none.
     - earth_rate_known: whether the Earth's rate was subtracted.
-    - degrees_of_freedom: of the standard deviations with the scale fixed, null if infinite.
+    - degrees_of_freedom: of the standard deviations in the repeats' scale_fixed; null if infinite.
     - part, serial_number, full_scale: properties of the sensor.
     - temperature_stated: whether the temperatures are stated, not measured.
     """

@@ -78,7 +78,7 @@ class Provenance:
         return ScriptIdentity(self.script or "", self.script_sha256 or "")
 
     def document(self) -> dict[str, Any]:
-        """Return the provenance as plain JSON values, without unknown fields."""
+        """Return the provenance as plain JSON values, without the fields whose values are unknown."""
         stored = {name: entry.model_dump(mode="json") for name, entry in self.stored_calibrations.items()}
         files = {name: value.model_dump() for name in FILE_KEYS if (value := getattr(self, name)) is not None}
         document = {**asdict(self), "stored_calibrations": stored, **files}

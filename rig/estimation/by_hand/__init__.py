@@ -1,4 +1,4 @@
-"""Calibration of a gyroscope by hand: a body is turned on a table and lies still in between, as a factor graph."""
+"""Calibration of a gyroscope that a hand turns on a table and lays down in between. The model is a factor graph."""
 
 from rig.estimation.by_hand.progress import SessionProgress, assess_progress
 from rig.estimation.by_hand.session_parts import HandRecording, HandRest, Move, SessionConditions

@@ -136,7 +136,7 @@ def _rms(variances: Array) -> float:
 
 
 def _ideal(reference: Array, order: Order) -> Array:
-    """Return θ of an ideal sensor."""
+    """Return the parameters θ (p,) of an ideal sensor."""
     theta = np.zeros(18 if order == 2 else 15)
     theta[[0, 4, 8]] = 1.0
     theta[REFERENCE] = reference

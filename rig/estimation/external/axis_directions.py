@@ -34,7 +34,7 @@ class Inclinations:
     prior_median_rad: float
 
     def widen(self, model: MixedModel, std: Array, fit: MixedFit, wanted: Array, variances: Array) -> Array:
-        """Return the covariance (q, q) that inclinations add to `wanted` (q, p) combinations of θ.
+        """Return the covariance (q, q) that inclinations add to `wanted` (q, p) combinations of the parameters.
 
         Only inclinations that the residuals do not show are added. `variances` (q,) are due to the model's other
         errors, with standard deviations `std` (k,), which contain the visible inclinations. With the sum of the two, 2

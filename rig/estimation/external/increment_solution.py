@@ -301,7 +301,7 @@ def _build_result(settled: _Settled, aside_s: Array) -> KnownIncrements:
 
 
 def _widen_by_axes(settled: _Settled, wanted: Array, covariance: Array) -> Array:
-    """Return the covariance (q, q) that the reference's inclined axes add to `wanted` (q, p) combinations of θ."""
+    """Return the covariance (q, q) that the reference's inclined axes add to combinations `wanted` (q, p) of θ."""
     inclinations = find_inclinations(settled.averaged, settled.fixes, settled.state.matrix)
     return inclinations.widen(settled.model, settled.std, settled.solved, wanted, np.diag(covariance))
 

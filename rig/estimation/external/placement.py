@@ -28,7 +28,7 @@ UNKNOWN_ATTITUDE_STD_RAD = 1.0
 
 @dataclass(frozen=True, slots=True)
 class LaidDown:
-    """The solution θ (p,) with placement errors: its covariance (p, p) is the sum of `causes`, by name.
+    """The parameters θ (p,) with placement errors: their covariance (p, p) is the sum of `causes`, by name.
 
     `placement_std` is ζ in the unit of the readings, `attitude_error` δ.
     """

@@ -109,7 +109,7 @@ def _temperature_deviations_k(sensor: KnownSensor, windows_s: Array, weights: Ar
 
 
 def unseen_k(step_k: float, windows_s: Array, weights: Array) -> Array:
-    """Return the temperature changes (N,), K, of a linear drift by one step of the thermometer, which it does not show.
+    """Return the temperature changes (N,), K, in a linear drift that the thermometer does not show: by `step_k` in all.
 
     They are relative to the mean over the windows (N, 2) with weights (N,).
     """

@@ -73,7 +73,7 @@ class Placed:
 
 @dataclass(frozen=True, slots=True)
 class AttitudeWeighted:
-    """The solution θ (p,), its covariance (p, p), the attitude error, the readings' whiteners (N, 3, 3), iterations."""
+    """The parameters θ (p,), their covariance (p, p), the attitude error, and the readings' `whiteners` (N, 3, 3)."""
 
     theta: Array
     covariance: Array

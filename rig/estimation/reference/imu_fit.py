@@ -31,7 +31,7 @@ DISTURBANCE_ODDS = 1 / 19  # prior: one dwell or sweep is disturbed, or all swee
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """The fitted θ (22,), decorrelated readings, the Jacobian (3 K, q) of free directions (22, q), δ, iterations."""
+    """Parameters θ (22,), the attitude error δ `std_rad`, and the Jacobian (3 K, q) of `free` directions (22, q)."""
 
     theta: Array
     readings: Decorrelation

@@ -27,7 +27,7 @@ REMEDY = "Take attitudes turned about at least two axes, or sweep about more axe
 
 
 def linear_start(movement: Movement, norm: float, up: Array) -> Array:
-    """Return θ (22,) with ‖v_ref‖ = `norm` in the half-space of `up` (3,).
+    """Return the initial parameters θ (22,): v_ref has the length `norm` and is on the side of `up` (3,).
 
     Raise Fault `rank_deficient`, `ill_conditioned`, `sign_unknown`.
     """

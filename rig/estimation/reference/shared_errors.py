@@ -2,8 +2,8 @@
 
     y = J x + E e + n,   n ~ N(0, V),   e ~ N(0, δ² 1)
 
-In coordinates in which V is 1 and E Eᵀ is diagonal, `growth` γ, the readings are independent with variance 1 + δ² γ for
-any δ. δ is estimated by restricted maximum likelihood (Patterson and Thompson, Biometrika 58 (1971) 545).
+In coordinates in which V is 1 and E Eᵀ is diagonal (γ, `growth`), the readings are independent with variance 1 + δ² γ
+for any δ. δ is estimated by restricted maximum likelihood (Patterson and Thompson, Biometrika 58 (1971) 545).
 """
 
 from dataclasses import dataclass

@@ -77,7 +77,7 @@ def to_theta(beta: Array) -> Array:
 def estimate_as_published(
     readings: Array, attitudes: Array, prior: ReferencePrior, *, second_order: bool
 ) -> tuple[Array, int]:
-    """Return θ (…, 15 or 18) by the method as published in TRIAX, and the number of linear solutions.
+    """Return the parameters θ (…, 15 or 18) by the method as published in TRIAX, and the number of linear solutions.
 
     With second-order terms the linear solution is repeated until it converges, with s² computed from the last v_ref.
     """

@@ -48,7 +48,7 @@ class BiasProcess:
         return not self.is_drifting and self.instability_rad_s == 0.0
 
     def covariance(self, windows_s: ArrayLike) -> Array:
-        """Return the added covariance (N, N) of means over windows (N, 2), about the mean over their whole span."""
+        """Return the drift's covariance (N, N) in means over windows (N, 2), about the mean over their whole span."""
         walk = self.walk_rad_s_sqrt_s**2 * walk_covariance(windows_s)
         drift: Array = walk + self.scatter_rad_s**2 * np.eye(len(walk))
         return drift if self.instability_rad_s == 0.0 else drift + _flicker(self.instability_rad_s, windows_s)

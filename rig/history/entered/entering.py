@@ -1,4 +1,4 @@
-"""The rows of a run, within a caller's transaction."""
+"""Adds the rows of a run to a history, within the caller's transaction."""
 
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING

@@ -205,10 +205,10 @@ def _segment_revolution(
 
 
 def _slow_line_variance(slow: Array, weights: Array, residuals: Array) -> Array:
-    """Return the variance (3,) that slow lines, columns (n, k) fitted to residuals (n, 3), add to means.
+    """Return the variance (3,) that slow spectral lines, columns (n, k) fitted to residuals (n, 3), add to means.
 
-    The means have weights (p, n). The frequencies of slow spectral lines are uncertain, so the variance is at least the
-    means' scatter around a straight line in time; that line itself would be a fault, not a vibration.
+    The means have weights (p, n). The frequencies of slow lines are uncertain, so the variance is at least the means'
+    scatter around a linear drift in time; the drift itself would be a fault, not a vibration.
     """
     fitted = np.mean((weights @ slow @ fit_columns(slow, residuals)) ** 2, axis=0)
     if len(weights) <= MIN_SCATTER_SEGMENTS:

@@ -115,7 +115,7 @@ def average_sweeps(samples: Samples, sweeps: Mapping[str, Array]) -> ExternalDat
 
 
 def _add_turns(samples: Samples, sweeps: Mapping[str, Array], data: ExternalData) -> ExternalData:
-    """Return the data with the turns from rest to rest among the rows that state an angle."""
+    """Return the data with the turns that have a stated angle, and that start and end at rest."""
     declared = DeclaredTurns(sweeps["angle_rad"], *(sweeps.get(name) for name in STD_COLUMNS))
     by_angle = find_turns(samples.time_s, samples.readings[RATE], declared, data.sweeps, data.rests)
     if by_angle is None:

@@ -62,7 +62,7 @@ class DeclaredTurns:
 def find_turns(
     time_s: Array, readings: Array, declared: DeclaredTurns, sweeps: Sequence[Observation], rests: Sequence[Average]
 ) -> TurnedData | None:
-    """Return the turns from rest to rest among sweeps, if any. `readings` (n, 3) in rad/s at `time_s`."""
+    """Return the turns, if any, that start and end at rest. `readings` (n, 3) in rad/s at `time_s`."""
     pauses = _find_pauses(time_s, sweeps)
     lying = find_rests(time_s, {RATE: readings}, lying=pauses)
     if not lying:

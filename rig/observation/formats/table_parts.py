@@ -39,7 +39,7 @@ def read_blocks(
 
 
 def columns_of(parts: Iterable[Part]) -> dict[str, Array]:
-    """Return the columns (n,) in parts, by name."""
+    """Join the parts of a table; return its columns (n,) by name."""
     *blocks, last = parts
     arrays, names = cast("list[Array]", blocks), cast("dict[str, Any]", last)["columns"]
     return {

@@ -16,7 +16,7 @@ Mounted = tuple[StageSection | ServoStageSection, Sequence[Sweep]]  # a stage of
 
 @dataclass(frozen=True, slots=True)
 class SweepPose:
-    """A joint that is swept, and the pose around which it turns."""
+    """A joint that is swept, and the pose in the middle of its sweeps."""
 
     joint: int
     joint_name: str

@@ -1,4 +1,4 @@
-"""A run's calibrations for exports: corrections of all kinds, and IMUs of gyroscope and accelerometer."""
+"""A run's calibrations for exports: corrections of all kinds, and gyroscopes paired with accelerometers as IMUs."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

@@ -66,7 +66,7 @@ class Characteristic:
     remark: Callable[[Any], str] = lambda _: ""
 
     def term_of(self, finding: Finding[Any]) -> "Term":
-        """Return this characteristic with its numbers in a finding's entry. Raise ValueError if the entry has none."""
+        """Return this characteristic with the numbers that a finding has for it. Raise ValueError if it has none."""
         if (numbers := self.read(finding.entry)) is None:
             raise ValueError(f"{finding.sensor} has no {self.name}")
         return Term(finding, self, numbers)

@@ -52,16 +52,16 @@ def correct_rates(name: str, raw: RecordedSensor, calibration: Calibration, on_s
     per_count = raw.channel(RATE).unit_per_count
     described = describe_corrected(raw, calibration, per_count)
     matrix, bias = np.array(calibration.matrix), np.array(calibration.bias_rad_s) / per_count
-    rate, dtype = described.channel(RATE).column, described.sample_dtype
+    column, dtype = described.channel(RATE).column, described.sample_dtype
 
     def take(sensor: str, samples: NDArray[Any]) -> None:
         if sensor != name:
             on_samples(sensor, samples)
             return
-        rates = np.zeros(len(samples), dtype)
+        corrected = np.zeros(len(samples), dtype)
         for field in dtype.names or ():
-            rates[field] = samples[field]
-        rates[rate] = np.rint((samples[rate] + bias) @ matrix.T)
-        on_samples(sensor, rates)
+            corrected[field] = samples[field]
+        corrected[column] = np.rint((samples[column] + bias) @ matrix.T)
+        on_samples(sensor, corrected)
 
     return take

@@ -74,7 +74,7 @@ class LinesSource:
 
     @property
     def sensors(self) -> Mapping[str, RecordedSensor]:
-        """The device's sensors by name: gyroscope, magnetometer if printed, and scalars."""
+        """The device's sensors by name: gyroscope, magnetometer if printed, and sensors of one number."""
         return {name: sensor for name, (sensor, _) in self._readers.items()}
 
     def start(self) -> None:
@@ -244,7 +244,7 @@ def _make_triad(
 
 
 def _make_thermometer(lines: LinesSection, *, provides: bool) -> Iterator[tuple[Channel, _Printed]]:
-    """Yield the channel of the printed temperature, or of the stated one; nothing without both."""
+    """Yield the channel of the printed temperature, else of the stated one; nothing if there is neither."""
     printed, printed_channel = None, _Printed(())
     if provides and "temperature" in lines.columns:
         temperature = lines.temperature

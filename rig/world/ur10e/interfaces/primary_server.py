@@ -136,7 +136,7 @@ def _cartesian(robot: Robot) -> bytes:
 
 
 def _list_parameters(links: Links) -> list[float]:
-    """Return the Denavit–Hartenberg parameters a, d, alpha of all links, in the order of both sub-packages."""
+    """Return the Denavit–Hartenberg parameters of all links: every a, then every d, then every alpha."""
     return [*(link.a_m for link in links), *(link.d_m for link in links), *(link.alpha_rad for link in links)]
 
 
