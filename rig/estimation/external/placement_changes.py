@@ -1,6 +1,6 @@
 """An abrupt change of a sensor between two of the placements in which it measured a constant reference.
 
-    v_m = F s + b + (h  or  diag(h) F s) [m ≥ r] + errors of the placements + noise
+    v_m = F s + b + (h  or  diag(h) F s,  from one placement on) + errors of the placements + noise
 
 The errors are those of `rig.estimation.external.placement_model`, whose sizes the placements themselves determine.
 """

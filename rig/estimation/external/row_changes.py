@@ -1,6 +1,6 @@
 """An abrupt change of a sensor between two of the rows that state its motion.
 
-    m_j = F ω_j + c + (h  or  diag(h) F ω_j) [j ≥ r] + errors of the stated motion + noise
+    m_j = F ω_j + c + (h  or  diag(h) F ω_j,  from one row on) + errors of the stated motion + noise
 
 The stated rates and axes err by a fraction that the rows themselves determine.
 """

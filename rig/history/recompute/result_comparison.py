@@ -179,7 +179,7 @@ class RecomputeOutcome:
 
     @property
     def unconfirmed(self) -> tuple[Issued, ...]:
-        """The certificates that could not be checked, of all results."""
+        """The certificates, of any result, that could not be checked."""
         return tuple(issued for comparison in self.compared for issued in comparison.unconfirmed)
 
     @property

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 def verification_entry(verification: "Verification") -> VerificationEntry:
-    """Return the statistics of both comparisons, without their curves."""
+    """Return the statistics of the comparisons before and after calibration, without their curves."""
     before, reference = verification.before, verification.reference
     return entry(
         VerificationEntry, verification,
