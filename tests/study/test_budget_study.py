@@ -19,7 +19,9 @@ def test_the_stated_uncertainty_covers_the_truth(speed_deg_s: float, noise_rad_s
     found = errors(effects, Settings(runs=1500 if thorough else 60))[:, 0]
     coverage, rms = 100 * np.mean(np.abs(found) < 2, axis=0), np.sqrt(np.mean(found**2, axis=0))
     print(f"{speed_deg_s}°/s, {noise_rad_s} rad/s: ± 2 u covers {coverage} %; RMS of error over u {rms}")
-    within = 2.0 if thorough else 9.0  # by chance alone they differ by 0.6 and 2.8
+    # By chance alone they differ by 0.6 and 2.8. U of a bias that hardly drifts is up to a tenth too wide: it holds the
+    # drift that the run cannot exclude.
+    within = 3.0 if thorough else 9.0
     assert np.all(np.abs(coverage - 95) <= within)
     assert np.all(np.abs(rms - 1) < (0.1 if thorough else 0.3))
 
