@@ -141,7 +141,7 @@ NAMED: dict[str, Callable[[int], Made]] = {
     "not_flat": by_mistake("crumb", 5, 80.0),
     "swapped_axes": read_otherwise(lambda seen: replace(seen, rates=seen.rates[:, [1, 0, 2]])),
     "table_moved": by_mistake("table_pushed", 5, 80.0),
-    "bias_jumped": by_mistake("dropped", 5),
+    "bias_jumped": by_mistake("dropped", 5, level=False),  # a drop may change the accelerometer too
     "too_few_moves": lambda seed: (handle(TWELVE[:2], seed), True, TOLD),
     "turn_not_closed": by_mistake("short", 12, 10.0),
     "wrong_face": read_otherwise(lambda seen: seen, replace(TOLD, first_face="+x"), level=False),

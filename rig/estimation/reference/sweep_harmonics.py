@@ -1,8 +1,8 @@
 """The first harmonic of one revolution: mean, cosine and sine of accelerometer readings over the joint's angle.
 
 For an accelerometer it replaces the mean of a gyroscope's revolution. The effects of the servo's vibration follow from
-the joint's own speed: centripetal acceleration by ω² minus the square of its mean, Euler acceleration by the angular
-acceleration α, and gravity by the joint's extra rotation during the filter's lag. One regression removes them all, so
+the joint's own speed: centripetal acceleration by the change of ω², Euler acceleration by the angular acceleration α,
+and gravity by the joint's extra rotation during the filter's lag. One regression removes them all, so
 they neither bias the result nor count as noise. It also removes the second and the third harmonic, due to angle errors
 and a nonlinear sensor. Changes of the speed with one to four periods per revolution cannot be separated from gravity;
 their effect remains. An oscillation of the arm that its encoders do not measure is a spectral line of the residuals. It
@@ -23,7 +23,21 @@ REVOLUTION_TOLERANCE = 0.05  # of the samples' angle, in revolutions
 HARMONICS = 3  # of the angle; only the first is used
 VIBRATION_HARMONICS = 100  # per revolution: up to 17 Hz at 60°/s
 MIN_SAMPLES = 50
+SPEED_MEAN_RAD = float(np.radians(2.0))  # a speed is averaged over it: half lies outside the revolution at its ends
 EMPTY_COLUMN_RATIO = 1e-9  # relative size below which a column is zero, as for an arm without vibration
+
+
+@dataclass(frozen=True, slots=True)
+class JointTurn:
+    """The motion of the joint that turns, at n times.
+
+    - `angle_rad`, `speed_rad_s` (n,): by the arm's states; the angle is zero in the known attitude.
+    - `acceleration_rad_s2` (n,): see `estimate_acceleration`.
+    """
+
+    angle_rad: Array
+    speed_rad_s: Array
+    acceleration_rad_s2: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,8 +68,7 @@ class FirstHarmonic:
 def first_harmonic(
     time_s: ArrayLike,
     readings_m_s2: ArrayLike,
-    angle_rad: ArrayLike,
-    speed_rad_s: ArrayLike,
+    turn: JointTurn,
     swayed_m_s2: ArrayLike,
     *,
     coloured: Callable[[Array], float],
@@ -65,22 +78,20 @@ def first_harmonic(
 
     - time_s (n,): on the arm's clock.
     - readings_m_s2 (n, 3): the specific force.
-    - angle_rad, speed_rad_s (n,): angle and speed of the joint at these times, from the arm's states; the angle is zero
-      in the known attitude.
+    - turn: the joint's motion at these times.
     - swayed_m_s2 (n, 3): the specific force due to the sway of other joints, in the sensor's nominal axes.
     - coloured: takes residuals (n,); returns the variance of their mean, relative to that of white noise.
     - swings: takes residuals (n, 3); returns the columns (n, k) of their spectral lines.
 
     Raise Fault `not_finite`, `incomplete_revolution`; ValueError for a wrong shape.
     """
-    t, readings, angle, speed, swayed = (
-        np.asarray(values, dtype=np.float64) for values in (time_s, readings_m_s2, angle_rad, speed_rad_s, swayed_m_s2)
-    )
-    count = len(t)
+    t, readings, swayed = (np.asarray(values, dtype=np.float64) for values in (time_s, readings_m_s2, swayed_m_s2))
+    angle, speed, count = turn.angle_rad, turn.speed_rad_s, len(t)
     shapes = (
         ("readings", readings, (count, 3)),
         ("angle", angle, (count,)),
         ("speed", speed, (count,)),
+        ("acceleration", turn.acceleration_rad_s2, (count,)),
         ("sway", swayed, (count, 3)),
     )
     for name, array, shape in shapes:
@@ -107,8 +118,25 @@ def first_harmonic(
         dof=count - int(rank),
         residuals_m_s2=residuals,
         vibration_m_s2=np.sqrt(np.mean(vibration**2, axis=0)),
-        turning_rad2_s2=_motion_terms(uneven, angle, mean_speed) @ gain.T,
+        turning_rad2_s2=_motion_terms(uneven, turn, mean_speed) @ gain.T,
     )
+
+
+def estimate_acceleration(angle_rad: Callable[[Array], Array], time_s: Array, speed_rad_s: float) -> Array:
+    """Return a joint's angular acceleration (n,), rad/s², as differences of its mean speeds between even samples.
+
+    - angle_rad: returns the joint's angles (n,) at times (n,), also shortly before and after the samples.
+    - time_s (n,): of the samples. speed_rad_s: of the joint, without its sign.
+
+    Each speed is a mean over `SPEED_MEAN_RAD`. The sum of the accelerations depends only on the speeds at both ends of
+    the revolution, so the encoders' noise stays small.
+    """
+    step_s, half_s = float(np.median(np.diff(time_s))), SPEED_MEAN_RAD / 2 / speed_rad_s
+
+    def mean_speed(middle_s: Array) -> Array:
+        return (angle_rad(middle_s + half_s) - angle_rad(middle_s - half_s)) / (2 * half_s)
+
+    return (mean_speed(time_s + step_s / 2) - mean_speed(time_s - step_s / 2)) / step_s
 
 
 def evenly_turning(speed_rad_s: float) -> Array:
@@ -160,13 +188,12 @@ def _fourier_columns(angle_rad: Array, count: int) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class _Uneven:
-    """The unevenness of a joint's motion: `rate` (n,) minus its mean, `acceleration` and `jerk` (n,), SI units.
+    """The unevenness of a joint's motion: `rate` (n,) minus its mean, and `jerk` (n,), SI units.
 
     `fast` (4, n): the rate and its first three derivatives, without the lowest four harmonics of a revolution.
     """
 
     rate: Array
-    acceleration: Array
     jerk: Array
     fast: Array
 
@@ -186,31 +213,38 @@ def _smooth(time_s: Array, speed_rad_s: Array, mean_speed_rad_s: float) -> _Unev
     derivatives = [fast]
     for _ in range(3):
         derivatives.append(mean_speed_rad_s * _differentiate(derivatives[-1]))
-    acceleration = mean_speed_rad_s * _differentiate(excess)
-    jerk = mean_speed_rad_s * _differentiate(acceleration)
-    return _Uneven(waves @ excess, waves @ acceleration, waves @ jerk, np.array(derivatives) @ waves.T)
+    jerk = mean_speed_rad_s**2 * _differentiate(_differentiate(excess))
+    return _Uneven(waves @ excess, waves @ jerk, np.array(derivatives) @ waves.T)
 
 
-def _motion_terms(uneven: _Uneven, angle_rad: Array, mean_speed_rad_s: float) -> Array:
-    """Return the terms (6, n) of the joint's motion in the specific force; see `FirstHarmonic.turning_rad2_s2`."""
-    rate = mean_speed_rad_s + uneven.rate
+def _motion_terms(uneven: _Uneven, turn: JointTurn, mean_speed_rad_s: float) -> Array:
+    """Return the terms (6, n) of the joint's motion in the specific force; see `FirstHarmonic.turning_rad2_s2`.
+
+    Harmonics of the revolution have equal speeds at both ends. A vibration without a whole number of periods does not,
+    so α has a mean, and `uneven` has no acceleration.
+    """
+    rate, acceleration = mean_speed_rad_s + uneven.rate, turn.acceleration_rad_s2
     return np.stack(
         [
             rate**2,
-            uneven.acceleration,
-            2 * rate * uneven.acceleration / mean_speed_rad_s,
+            acceleration,
+            2 * rate * acceleration / mean_speed_rad_s,
             uneven.jerk / mean_speed_rad_s,
-            mean_speed_rad_s * uneven.rate * np.cos(angle_rad),
-            mean_speed_rad_s * uneven.rate * np.sin(angle_rad),
+            mean_speed_rad_s * uneven.rate * np.cos(turn.angle_rad),
+            mean_speed_rad_s * uneven.rate * np.sin(turn.angle_rad),
         ]
     )
 
 
 def _list_vibration(uneven: _Uneven, angle_rad: Array, mean_speed_rad_s: float) -> Array:
-    """Return the specific force (n, 6) of the joint's vibration, with derivatives of α for the filter's lag."""
+    """Return the specific force (n, 6) of the joint's vibration, with derivatives of α for the filter's lag.
+
+    For the centripetal acceleration its linear part stands, 2 ω₀ (ω − ω₀). The square of the vibration has a mean: of a
+    vibration at one frequency the columns could form it alone, and the regression would take it from the mean of the
+    readings. It is left to the model, by `FirstHarmonic.turning_rad2_s2`.
+    """
     rate, *derivatives = uneven.fast
-    squared = (2 * mean_speed_rad_s + rate) * rate
-    return np.column_stack([squared, *derivatives, rate * np.cos(angle_rad), rate * np.sin(angle_rad)])
+    return np.column_stack([rate, *derivatives, rate * np.cos(angle_rad), rate * np.sin(angle_rad)])
 
 
 def _differentiate(coefficients: Array) -> Array:

@@ -1,12 +1,13 @@
 """The first harmonic of an accelerometer's readings in sweeps, over the measured joint angle."""
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from rig.data.recording.settings import RunSettings
 from rig.estimation.arrays import Array
-from rig.estimation.reference.sweep_harmonics import FirstHarmonic, first_harmonic
+from rig.estimation.reference.sweep_harmonics import FirstHarmonic, JointTurn, estimate_acceleration, first_harmonic
 from rig.estimation.sensor_axes import nearest_rotation
 from rig.motion.steps import Sweep
 from rig.observation.average import Stream, slice_time
@@ -54,11 +55,11 @@ def swept_acceleration(
     began = nearest_rotation((rotations.swapaxes(1, 2) @ attitudes).mean(axis=0))
     by_gravity = gravity_difference(attitudes, rotations @ began, stream.sensor, settings.site)
     swayed = sway_acceleration(motion, sweep.joint, time_s, (turn.start_s, turn.end_s), np.array(settings.extension_m))
+    acceleration = estimate_acceleration(partial(motion.angle, sweep), time_s, sweep.speed_rad_s)
     harmonic = first_harmonic(
         time_s,
         accelerations(stream, inside)[covered],
-        angle_rad,
-        motion.angle(sweep, time_s, 1),
+        JointTurn(angle_rad, motion.angle(sweep, time_s, 1), acceleration),
         by_gravity + swayed @ np.array(stream.sensor.mounting).T,
         coloured=fit_inflation,
         swings=line_columns,

@@ -1,7 +1,7 @@
 """From a revolution's samples to mean, cosine and sine: ripple, encoder steps, a clock that errs."""
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import astuple, replace
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ from rig.estimation.reference.accelerometer_model import DELAY, LEVER, NO_DWELLS
 from rig.estimation.reference.imu import solve_imu
 from rig.estimation.reference.imu_fit import covariance_bound
 from rig.estimation.reference.reference_model import BIAS, REFERENCE
-from rig.estimation.reference.sweep_harmonics import FirstHarmonic, first_harmonic
+from rig.estimation.reference.sweep_harmonics import FirstHarmonic, JointTurn, first_harmonic
 from rig.observation.statistics.vibration_noise import fit_inflation, line_columns
 from support.motions.arm_attitudes import draw_true_arm
 from support.motions.arm_sweeps import (
@@ -51,8 +51,7 @@ def reduced_with(
     return first_harmonic(
         samples.time_s,
         readings_m_s2,
-        samples.angle_rad,
-        samples.speed_rad_s,
+        samples.turn,
         np.zeros_like(readings_m_s2) if swayed_m_s2 is None else swayed_m_s2,
         coloured=coloured,
         swings=line_columns,
@@ -111,6 +110,25 @@ def test_what_a_slow_ripple_adds_is_what_the_model_makes_of_the_same_weights(cyc
         movement = Movement(NO_DWELLS, read)
         off.append(movement.readings() - predicted(TRUTH.theta(), movement))
     assert np.abs(off[0] - off[1]).max() < 3e-5
+
+
+@pytest.mark.kernels
+@pytest.mark.slow
+@pytest.mark.parametrize("cycles", [(50,), (6.5,), (5.4, 9.1), (50.3,), (97.4,)])
+def test_a_ripple_of_any_order_leaves_the_mean_of_a_turn_right(cycles: tuple[float, ...]) -> None:
+    """The mean of α, as the speed differs at both ends of a turn, and of ω², which one frequency alone could hide."""
+    rippled = replace(sampling(23.0), cycles=cycles, encoder_step_rad=83e-6, rate_hz=100.0, clock_error_s=0.0)
+    found: list[Array] = []
+    stated: list[Array] = []
+    for seed, sweep in enumerate(plan_sweeps(6)):
+        turn = reduced(record_samples(TRUTH, EXACT, sweep, rippled, np.random.default_rng(seed)))
+        read = make_sweeps(turn.harmonic_m_s2[None], np.eye(9)[None], (sweep,))
+        movement = Movement(NO_DWELLS, replace(read, turning_rad2_s2=turn.turning_rad2_s2[None]))
+        found.append((movement.readings() - predicted(TRUTH.theta(), movement)).reshape(3, 3)[0])
+        stated.append(turn.covariance_m2_s4.diagonal()[:3])
+    noise = sampling(23.0).noise_m_s2 / np.sqrt(600)
+    assert np.sqrt(np.mean(np.square(found))) < 2 * noise, cycles
+    assert np.sqrt(np.mean(np.square(found) / stated)) < 2, cycles
 
 
 def test_the_model_s_derivatives_are_those_of_its_readings_in_an_uneven_turn() -> None:
@@ -196,12 +214,9 @@ def test_a_calibration_from_samples_reaches_the_bound_of_their_noise(part: str, 
 def test_half_a_revolution_is_refused() -> None:
     samples = revolution(1, 300.0)
     half = slice(0, len(samples.time_s) // 2)
+    turn = JointTurn(*(values[half] for values in astuple(samples.turn)))
     with pytest.raises(Fault, match="incomplete_revolution"):
-        reduced(
-            Samples(
-                samples.time_s[half], samples.readings_m_s2[half], samples.angle_rad[half], samples.speed_rad_s[half]
-            )
-        )
+        reduced(Samples(samples.time_s[half], samples.readings_m_s2[half], turn))
 
 
 def test_what_is_no_number_is_refused() -> None:

@@ -15,7 +15,7 @@ from rig.config.load import parse
 from rig.config.procedures.procedure_sections import SixSweepsSection
 from rig.estimation.arrays import Array
 from rig.estimation.reference.accelerometer_model import Dwells, Sweeps
-from rig.estimation.reference.sweep_harmonics import evenly_turning
+from rig.estimation.reference.sweep_harmonics import JointTurn, estimate_acceleration, evenly_turning
 from rig.motion.geometry import flange_arm, flange_axes, flange_pose
 from rig.motion.steps import Sweep
 from rig.plans.motions.six_sweeps import plan_six_observation
@@ -145,19 +145,18 @@ class Sampling:
     rate_hz: float = 238.0
     state_rate_hz: float = 125.0
     vibration: float = 0.05
-    cycles: tuple[int, ...] = (18, 31, 50)
+    cycles: tuple[float, ...] = (18, 31, 50)
     encoder_step_rad: float = 6e-6
     clock_error_s: float = 2e-4
 
 
 @dataclass(frozen=True, slots=True)
 class Samples:
-    """Samples of one revolution: time (n,), readings (n, 3); the joint's angle and speed (n,) by the arm's states."""
+    """Samples of one revolution: time (n,), readings (n, 3), and the joint's motion by the arm's states."""
 
     time_s: Array
     readings_m_s2: Array
-    angle_rad: Array
-    speed_rad_s: Array
+    turn: JointTurn
 
 
 def record_samples(truth: Truth, poses: Poses, sweep: Sweep, sampling: Sampling, rng: np.random.Generator) -> Samples:
@@ -186,4 +185,6 @@ def record_samples(truth: Truth, poses: Poses, sweep: Sweep, sampling: Sampling,
         poses, sweep, motion(true_s[inside] - truth.delay_s), truth.reference_m_s2, truth.lever_arm_m
     )
     readings = forces @ truth.matrix.T + truth.bias_m_s2 + sampling.noise_m_s2 * rng.normal(size=forces.shape)
-    return Samples(time_s[inside], readings, spline(time_s[inside]), spline(time_s[inside], 1))
+    time_s = time_s[inside]
+    acceleration = estimate_acceleration(spline, time_s, sweep.speed_rad_s)
+    return Samples(time_s, readings, JointTurn(spline(time_s), spline(time_s, 1), acceleration))
