@@ -95,12 +95,11 @@ def test_its_recording_is_solved_shown_and_exported(recorded: Path, installed: d
     assert len([row for row in turns if not row.endswith(",0")]) == 2
 
 
-@pytest.mark.thorough
 def test_it_is_planned_and_looked_at_by_its_configuration(recorded: Path, installed: dict[str, str]) -> None:
     config = str(recorded / "config.yaml")
     plan = ran(installed, "-m", "rig", "plan", config)
     assert "joint 1 +0.0 → " in plan and "2 sweeps" in plan
-    assert "that the checks notice in 95 of 100 runs" in " ".join(plan.split())
+    assert "that the checks detect in 95 of 100 runs" in " ".join(plan.split())
     told = json.loads(ran(installed, "-m", "rig", "plan", config, "--json"))["detection_limits"]["gyro"]
     assert all(each["size"] is None or each["size"] > 0 for each in told) and any(each["size"] for each in told)
     assert "joint_speed" in ran(installed, "-m", "rig", "plan", config, "--set", "procedure.speed_deg_s=400", status=2)

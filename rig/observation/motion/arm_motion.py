@@ -149,7 +149,7 @@ class ArmMotion:
         Rates are differences of joint angles, so an angle's error cancels between adjacent rates, and the mean over
         consecutive samples depends only on the first and the last angle.
         """
-        return self._mean_rates(time_s, lasting_s, np.full(len(self.names), np.nan))
+        return self._mean_rates(time_s, lasting_s, np.full(self.kinematics.joints, np.nan))
 
     def rates_at_samples(self, time_s: Array) -> Array:
         """Return the flange's rate (n, 3), rad/s, around consecutive evenly spaced samples at rising times (n,).
@@ -227,7 +227,7 @@ class ArmMotion:
         """Return the mean angle (k,) of each joint that stands still between two times, NaN for others."""
         q_rad = self._q_rad(Window(start_s, end_s))
         if len(q_rad) < 2:
-            return np.full(len(self.names), np.nan)
+            return np.full(self.kinematics.joints, np.nan)
         noise_rad = np.sqrt(np.mean(np.diff(q_rad, axis=0) ** 2, axis=0))
         return np.where(np.ptp(q_rad, axis=0) > MAX_RANGE_RATIO * noise_rad, np.nan, q_rad.mean(axis=0))
 
