@@ -195,7 +195,9 @@ def test_a_calibration_from_samples_reaches_the_bound_of_their_noise(part: str, 
         harmonics, covariances = (
             np.array([getattr(turn, name) for turn in turns]) for name in ("harmonic_m_s2", "covariance_m2_s4")
         )
-        solution = solve_imu(NO_DWELLS, make_sweeps(harmonics, covariances, sweeps), gravity_m_s2=NORM)
+        turning = np.array([turn.turning_rad2_s2 for turn in turns])
+        recorded = replace(make_sweeps(harmonics, covariances, sweeps), turning_rad2_s2=turning)
+        solution = solve_imu(NO_DWELLS, recorded, gravity_m_s2=NORM)
         assert solution.lever_arm_m is not None and solution.delay_s is not None
         found = np.concatenate([solution.matrix.ravel(), solution.reference_m_s2, solution.bias_m_s2])
         off.append(np.concatenate([found, solution.lever_arm_m, [solution.delay_s]]) - theta[: DELAY + 1])
