@@ -31,12 +31,13 @@ EMPTY_COLUMN_RATIO = 1e-9  # relative size below which a column is zero, as for 
 class JointTurn:
     """The motion of the joint that turns, at n times.
 
-    - `angle_rad`, `speed_rad_s` (n,): by the arm's states; the angle is zero in the known attitude.
+    - `speed_rad_s`: 2π over the time of a revolution, negative if the angle falls.
+    - `angle_rad` (n,): by the arm's states, zero in the known attitude.
     - `acceleration_rad_s2` (n,): see `estimate_acceleration`.
     """
 
+    speed_rad_s: float
     angle_rad: Array
-    speed_rad_s: Array
     acceleration_rad_s2: Array
 
 
@@ -46,7 +47,7 @@ class FirstHarmonic:
 
     - `harmonic_m_s2` (3, 3): mean, cosine, sine (rows) of the axes x y z; `covariance_m2_s4` (9, 9), row by row.
     - `swayed_m_s2` (3, 3): those of the force due to the sway of other joints, in the sensor's nominal axes.
-    - `speed_rad_s`: 2π over the time of a revolution, negative if the angle falls.
+    - `speed_rad_s`: that of `JointTurn`.
     - `noise_m_s2` (3,): std of one sample, with `dof` degrees of freedom; `residuals_m_s2` (n, 3).
     - `vibration_m_s2` (3,): RMS of the removed vibration of servo and arm.
     - `turning_rad2_s2` (6, 3): mean, cosine and sine, by the same weights, of ω² and α. For the filter's lag the
@@ -86,11 +87,10 @@ def first_harmonic(
     Raise Fault `not_finite`, `incomplete_revolution`; ValueError for a wrong shape.
     """
     t, readings, swayed = (np.asarray(values, dtype=np.float64) for values in (time_s, readings_m_s2, swayed_m_s2))
-    angle, speed, count = turn.angle_rad, turn.speed_rad_s, len(t)
+    angle, count = turn.angle_rad, len(t)
     shapes = (
         ("readings", readings, (count, 3)),
         ("angle", angle, (count,)),
-        ("speed", speed, (count,)),
         ("acceleration", turn.acceleration_rad_s2, (count,)),
         ("sway", swayed, (count, 3)),
     )
@@ -98,8 +98,9 @@ def first_harmonic(
         require_shape(name, array, shape)
     check_finite(time=t, **{name: array for name, array, _ in shapes})
     m = readings - swayed
-    mean_speed = _mean_speed(t, angle)
-    uneven = _smooth(t, speed, mean_speed)
+    _require_revolution(angle)
+    mean_speed = turn.speed_rad_s
+    uneven = _smooth(t, angle, mean_speed)
     columns = np.hstack([_fourier_columns(angle, HARMONICS), _list_vibration(uneven, angle, mean_speed)])
     columns = np.hstack([columns, swings(_regression(columns, m)[1])])
     inverse, residuals = _regression(columns, m)
@@ -166,8 +167,8 @@ def _find_long_run_covariance(residuals: Array, scatter: Array, coloured: Callab
     return np.asarray((directions * long_run) @ directions.T, dtype=np.float64)
 
 
-def _mean_speed(time_s: Array, angle_rad: Array) -> float:
-    """Return the mean speed of a revolution, which vibration does not change. Raise Fault `incomplete_revolution`."""
+def _require_revolution(angle_rad: Array) -> None:
+    """Raise Fault `incomplete_revolution` unless angles (n,) of even samples cover one revolution."""
     travel = angle_rad[-1] - angle_rad[0] if len(angle_rad) else 0.0
     covered_rad = abs(travel) * len(angle_rad) / max(len(angle_rad) - 1, 1)  # with the last sample's interval
     if len(angle_rad) < MIN_SAMPLES or abs(covered_rad / (2 * np.pi) - 1) > REVOLUTION_TOLERANCE:
@@ -176,7 +177,6 @@ def _mean_speed(time_s: Array, angle_rad: Array) -> float:
             f"{len(angle_rad)} samples cover {np.degrees(covered_rad):.0f}° and not one whole revolution",
             "Give the samples of exactly one revolution, or repeat the sweep",
         )
-    return float(travel / (time_s[-1] - time_s[0]))
 
 
 def _fourier_columns(angle_rad: Array, count: int) -> Array:
@@ -198,15 +198,17 @@ class _Uneven:
     fast: Array
 
 
-def _smooth(time_s: Array, speed_rad_s: Array, mean_speed_rad_s: float) -> _Uneven:
+def _smooth(time_s: Array, angle_rad: Array, mean_speed_rad_s: float) -> _Uneven:
     """Return the deviations of the joint from constant speed.
 
-    Differences of encoder steps are noise, so the speed is smoothed by harmonics of the revolution and then
-    differentiated.
+    Its angle is smoothed by harmonics of the revolution and then differentiated, which leaves slow deviations nearly
+    without the encoders' noise.
     """
-    waves = _fourier_columns(mean_speed_rad_s * (time_s - time_s[0]), min(VIBRATION_HARMONICS, len(time_s) // 4))
+    passed_s = time_s - time_s[0]
+    waves = _fourier_columns(mean_speed_rad_s * passed_s, min(VIBRATION_HARMONICS, len(time_s) // 4))
     normal = waves.T @ waves  # nearly diagonal: over a turn the waves are orthogonal
-    excess = np.asarray(np.linalg.solve(normal, waves.T @ (speed_rad_s - mean_speed_rad_s)), dtype=np.float64)
+    ahead_rad = angle_rad - angle_rad[0] - mean_speed_rad_s * passed_s
+    excess = mean_speed_rad_s * _differentiate(np.linalg.solve(normal, waves.T @ ahead_rad))
     fast = excess.copy()
     # Multiplied by cos θ, these slow waves would become the mean or a harmonic of the model.
     fast[: 1 + 2 * (HARMONICS + 1)] = 0.0

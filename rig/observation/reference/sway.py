@@ -17,10 +17,17 @@ MIN_POWER_RATIO = 50.0  # of a sway's mean square, per column, to that of the en
 
 
 def sway_acceleration(
-    motion: ArmMotion, joint: int, time_s: Array, window_s: tuple[float, float], extension_m: Array
+    motion: ArmMotion,
+    joint: int,
+    pose_rad: Array,
+    time_s: Array,
+    *,
+    window_s: tuple[float, float],
+    extension_m: Array,
 ) -> Array:
     """Return the acceleration (n, 3), m/s², in the flange's frame, of a point moved by all joints but `joint`.
 
+    - pose_rad (j,): the joints' angles from which they sway; that of `joint` does not matter.
     - time_s (n,): in the turn, which begins and ends at `window_s`.
     - extension_m (3,): the point in the flange's frame.
 
@@ -31,7 +38,7 @@ def sway_acceleration(
     start_s, end_s = window_s[0] - margin_s, window_s[1] + margin_s
     states_s = motion.time_s[(motion.time_s >= start_s) & (motion.time_s <= end_s)]
     angles_rad = motion.angles(states_s)
-    steady_rad = np.tile(angles_rad.mean(axis=0), (len(states_s), 1))
+    steady_rad = np.tile(pose_rad, (len(states_s), 1))
     steady_rad[:, joint] = angles_rad[:, joint]
     swayed_m = _positions_m(motion, angles_rad, extension_m) - _positions_m(motion, steady_rad, extension_m)
     columns = _half_waves((states_s - start_s) / (end_s - start_s))

@@ -8,7 +8,7 @@ import numpy as np
 from rig.data.recording.settings import RunSettings
 from rig.estimation.arrays import Array
 from rig.estimation.reference.sweep_harmonics import FirstHarmonic, JointTurn, estimate_acceleration, first_harmonic
-from rig.estimation.sensor_axes import nearest_rotation
+from rig.motion.geometry import flange_arm, flange_attitude
 from rig.motion.steps import Sweep
 from rig.observation.average import Stream, slice_time
 from rig.observation.motion.arm_motion import ArmMotion
@@ -41,9 +41,9 @@ def swept_acceleration(
 ) -> SweptAcceleration:
     """Fit the first harmonic of one sweep's revolution, together with its vibrations.
 
-    In the model only the sweep's joint moves. The sway of others, by the encoders, changes gravity and accelerates: a
-    further specific force, which the model adds. Raise Fault `saturation`, `stuck_sensor`, `incomplete_revolution` or
-    `not_finite`.
+    In the model only the sweep's joint moves, and the others stand at their mean angles. Their sway about these, by the
+    encoders, changes gravity and accelerates: a further specific force, which the model adds. Raise Fault `saturation`,
+    `stuck_sensor`, `incomplete_revolution` or `not_finite`.
     """
     inside = slice_time(stream, turn.start_s, turn.end_s)
     check_acceleration(stream, inside, describe(sweep), turning=True)
@@ -51,20 +51,29 @@ def swept_acceleration(
     covered = motion.covered(time_s)
     time_s = time_s[covered]
     angle_rad = motion.angle(sweep, time_s) - motion.angle(sweep, turn.start_s)
-    attitudes, rotations = motion.attitudes(time_s), _rotations(-sweep.growing * turn.axis_flange, angle_rad)
-    began = nearest_rotation((rotations.swapaxes(1, 2) @ attitudes).mean(axis=0))
-    by_gravity = gravity_difference(attitudes, rotations @ began, stream.sensor, settings.site)
-    swayed = sway_acceleration(motion, sweep.joint, time_s, (turn.start_s, turn.end_s), np.array(settings.extension_m))
+    pose_rad = motion.angles(time_s).mean(axis=0)
+    axis = motion.axes(pose_rad)[:, sweep.joint]
+    attitudes, rotations = motion.attitudes(time_s), _rotations(-axis, angle_rad)
+    start_rad = np.where(np.arange(len(pose_rad)) == sweep.joint, motion.angles(turn.start_s), pose_rad)
+    began = motion.mount @ flange_attitude(start_rad, motion.kinematics)
+    steady = rotations @ began
+    by_gravity = gravity_difference(attitudes, steady, stream.sensor, settings.site)
+    window_s, extension_m = (turn.start_s, turn.end_s), np.array(settings.extension_m)
+    swayed = sway_acceleration(motion, sweep.joint, pose_rad, time_s, window_s=window_s, extension_m=extension_m)
+    arm_m = motion.mount @ flange_arm(pose_rad, sweep.joint, motion.kinematics)
+    centripetal = turn.speed_rad_s**2 * (np.outer(axis, axis) - np.eye(3)) @ (arm_m + motion.mount @ extension_m)
+    swayed += (attitudes @ steady.swapaxes(1, 2) - np.eye(3)) @ centripetal
     acceleration = estimate_acceleration(partial(motion.angle, sweep), time_s, sweep.speed_rad_s)
     harmonic = first_harmonic(
         time_s,
         accelerations(stream, inside)[covered],
-        JointTurn(angle_rad, motion.angle(sweep, time_s, 1), acceleration),
+        JointTurn(sweep.growing * turn.speed_rad_s, angle_rad, acceleration),
         by_gravity + swayed @ np.array(stream.sensor.mounting).T,
         coloured=fit_inflation,
         swings=line_columns,
     )
-    return turn_harmonic(sweep, replace(turn, attitude=began), harmonic)
+    in_pose = replace(turn, attitude=began, axis_flange=sweep.growing * axis, arm_m=arm_m)
+    return turn_harmonic(sweep, in_pose, harmonic)
 
 
 def _rotations(axis: Array, angle_rad: Array) -> Array:

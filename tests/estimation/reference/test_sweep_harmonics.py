@@ -1,7 +1,7 @@
 """From a revolution's samples to mean, cosine and sine: ripple, encoder steps, a clock that errs."""
 
 from collections.abc import Callable
-from dataclasses import astuple, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -109,7 +109,7 @@ def test_what_a_slow_ripple_adds_is_what_the_model_makes_of_the_same_weights(cyc
         read = replace(read, turning_rad2_s2=np.array([turn.turning_rad2_s2 for turn in turns]))
         movement = Movement(NO_DWELLS, read)
         off.append(movement.readings() - predicted(TRUTH.theta(), movement))
-    assert np.abs(off[0] - off[1]).max() < 3e-5
+    assert np.abs(off[0] - off[1]).max() < 6e-5  # α is a mean over 2°
 
 
 @pytest.mark.kernels
@@ -216,7 +216,8 @@ def test_a_calibration_from_samples_reaches_the_bound_of_their_noise(part: str, 
 def test_half_a_revolution_is_refused() -> None:
     samples = revolution(1, 300.0)
     half = slice(0, len(samples.time_s) // 2)
-    turn = JointTurn(*(values[half] for values in astuple(samples.turn)))
+    turn = samples.turn
+    turn = JointTurn(turn.speed_rad_s, turn.angle_rad[half], turn.acceleration_rad_s2[half])
     with pytest.raises(Fault, match="incomplete_revolution"):
         reduced(Samples(samples.time_s[half], samples.readings_m_s2[half], turn))
 

@@ -187,4 +187,6 @@ def record_samples(truth: Truth, poses: Poses, sweep: Sweep, sampling: Sampling,
     readings = forces @ truth.matrix.T + truth.bias_m_s2 + sampling.noise_m_s2 * rng.normal(size=forces.shape)
     time_s = time_s[inside]
     acceleration = estimate_acceleration(spline, time_s, sweep.speed_rad_s)
-    return Samples(time_s, readings, JointTurn(spline(time_s), spline(time_s, 1), acceleration))
+    order = np.argsort(spline(states_s))
+    ends_s = np.interp([0.0, 2 * np.pi], spline(states_s)[order], states_s[order])
+    return Samples(time_s, readings, JointTurn(2 * np.pi / np.diff(ends_s)[0], spline(time_s), acceleration))
