@@ -63,7 +63,7 @@ class Fixes:
     - `std_rad` (k,): the stated standard deviation of each sample, None if none is stated.
     - `blind_rad` (N − 1,): standard deviation of the rotation that missing readings hide, None if none are missing.
     - `walk`: sum of squares in rad²/s, and dof, of the gyroscope's random walk at rest; zeros without rests.
-    - `on_arrival`: whether the readings' times are smoothed arrival times, which do not show single lost readings.
+    - `hides_losses`: whether the readings' stamps do not show single lost readings.
     """
 
     at_s: Array
@@ -74,7 +74,7 @@ class Fixes:
     std_rad: Array | None = None
     blind_rad: Array | None = None
     walk: tuple[float, float] = (0.0, 0.0)
-    on_arrival: bool = False
+    hides_losses: bool = False
 
     @property
     def stated_std_rad(self) -> float | None:
@@ -256,7 +256,7 @@ def _list_errors(averaged: FixedAttitudes, fixes: Fixes, correlation: Array, ste
         REST_ERROR: _expand_axes(step @ (same_placement * at_rest * at_rest[:, None]) @ step.T),
         MOTION_ERROR: _expand_axes(step @ (same_placement * ~at_rest * ~at_rest[:, None]) @ step.T),
         JITTER: _combine_blocks(step, jitter_blocks + COMMON_JITTER_FRACTION * common_blocks),
-        LOST_TIMES: fixes.on_arrival * _combine_blocks(np.eye(len(step)), lost_time_blocks),
+        LOST_TIMES: fixes.hides_losses * _combine_blocks(np.eye(len(step)), lost_time_blocks),
     }
 
 

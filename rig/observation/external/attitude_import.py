@@ -134,7 +134,7 @@ def average_placements(samples: Samples, table: Mapping[str, Array], *, find_clo
     `too_few_observations`, `wrong_unit`, and with `find_clock` those of `find_reference_clock`.
     """
     time_s, readings = samples.time_s, samples.readings
-    on_arrival = samples.sampling is not None and samples.sampling.on_arrival
+    hides_losses = samples.sampling is not None and samples.sampling.hides_losses
     numbers = _select_different_times(table)
     total = len(table["start_s"])
     table = {name: column[numbers - 1] for name, column in table.items()}
@@ -178,7 +178,7 @@ def average_placements(samples: Samples, table: Mapping[str, Array], *, find_clo
         None if rate is None else _rows(time_s, rate, whole),
         None
         if rate is None
-        else Turning(time_s, rate, rows_found.rows_s, rows_found.attitudes, rows_found.std_rad, on_arrival),
+        else Turning(time_s, rate, rows_found.rows_s, rows_found.attitudes, rows_found.std_rad, hides_losses),
         None if set(readings) == {RATE} else or_fault(find),  # a gyroscope needs none
         clock,
         (*_list_repeated(numbers, total), *_list_omitted(all_rows, covered, "not covered by the recording")),

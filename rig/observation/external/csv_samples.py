@@ -235,6 +235,7 @@ def _describe_stamps(ordered: OrderedStamps, total: int) -> Iterator[str]:
         )
     even_words = f"they count as taken every {1e3 * sampling.interval_s:.4g} ms"
     if sampling.late is not None:
+        yield "the stamps are too uneven to show which readings are missing: the times are used as they are"
         return
     if sampling.on_arrival:
         yield f"the readings are stamped on arrival, several at once: {even_words}"

@@ -62,13 +62,23 @@ def find_rests_at_other_bias(
     if not rests:
         return []
     noise = np.median([readings[inside(time_s, rest)].std(axis=0) for rest in rests], axis=0)
-    inner = [Window(window.start_s + MAX_TIME_ERROR_S, window.end_s - MAX_TIME_ERROR_S) for window in lying]
+    first_s, last_s = float(time_s[0]), float(time_s[-1])
+    # The recording may begin later than the attitudes, or end before them.
+    inner = [
+        Window(max(window.start_s + MAX_TIME_ERROR_S, first_s), min(window.end_s - MAX_TIME_ERROR_S, last_s))
+        for window in lying
+    ]
+
+    def is_quiet(window: Window) -> bool:
+        within = readings[inside(time_s, window)]
+        return len(within) > 1 and bool((within.std(axis=0) <= MAX_NOISE_RATIO * noise).all())
+
     return [
         window
         for window in inner
         if window.end_s - window.start_s >= MIN_REST_S
         and all(rest.end_s <= window.start_s or rest.start_s >= window.end_s for rest in rests)
-        and (readings[inside(time_s, window)].std(axis=0) <= MAX_NOISE_RATIO * noise).all()
+        and is_quiet(window)
     ]
 
 

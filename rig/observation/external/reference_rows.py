@@ -26,7 +26,7 @@ class Turning:
     """A gyroscope's `readings_rad_s` (n, 3) at `time_s` (n,), and the rows of a reference.
 
     `rows_s` (N, 2): start and end of each row; `attitudes` (N, 3, 3), body to table; `std_rad` (N,) as stated.
-    `on_arrival`: the readings' times are smoothed arrival times, which hide single lost readings.
+    `hides_losses`: the readings' stamps do not show single lost readings.
     """
 
     time_s: Array
@@ -34,7 +34,7 @@ class Turning:
     rows_s: Array
     attitudes: Array
     std_rad: Array | None = None
-    on_arrival: bool = False
+    hides_losses: bool = False
 
     def select(self, rows: NDArray[np.intp]) -> "Turning":
         """Return the readings with only the `rows` of these indices."""

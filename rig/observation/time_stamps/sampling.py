@@ -70,6 +70,11 @@ class Sampling:
     on_arrival: bool
     late: NDArray[np.bool_] | None = None
 
+    @property
+    def hides_losses(self) -> bool:
+        """Whether the stamps do not show single lost readings: they are smoothed arrival times, or too bad."""
+        return self.on_arrival or self.late is not None
+
     def gaps(self, time_s: Array, fewest: int = 1) -> NDArray[np.bool_]:
         """Return a mask (n − 1,) of steps between readings at times (n,) with at least `fewest` readings missing.
 

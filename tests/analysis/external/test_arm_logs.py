@@ -135,7 +135,7 @@ def test_readings_lost_behind_stamps_of_arrival_widen_the_scale() -> None:
     readings = np.delete(recorded.readings, lost, axis=0)
     time_s = np.linspace(recorded.time_s[0], recorded.time_s[-1], len(readings))
     spoilt = replace(recorded, time_s=time_s, readings=readings)
-    found = solve_turning(replace(turning(spoilt), on_arrival=True), None, any_mounting=False)
+    found = solve_turning(replace(turning(spoilt), hides_losses=True), None, any_mounting=False)
     error, std = errors(found, recorded)
     assert (np.abs(error[:3]) < 5 * std[:3]).all()
 
