@@ -22,6 +22,7 @@ from rig.observation.external.csv_samples import SAMPLES_MB, Samples, read_sampl
 from rig.observation.external.from_files import Files, build_recording
 from rig.observation.formats.column_selection import Mapped, map_motion, map_samples
 from rig.observation.formats.csv_table import read_table
+from rig.observation.formats.mat_table import is_mat
 from rig.observation.formats.sample_files import is_in_format
 from rig.observation.formats.table_layout import TableLayout, find_layout
 from rig.observation.log_survey import LogSurvey, survey_log
@@ -104,9 +105,11 @@ def is_incomplete(columns: Mapping[str, Any]) -> bool:
 def _read_numbers(path: Path, layout: TableLayout) -> tuple[Array, Array | None]:
     """Return all numbers (n, k) of a table, NaN if missing, and the times (n,) in their column's unit, or None."""
     unit_s = 1.0 if layout.time_unit is None else UNITS[layout.time_unit].size
-    columns = {f"column_{index}": (str(index + 1), 1.0) for index in layout.numbers if index != layout.time}
+    # A workspace of MATLAB has columns of other tables too: there a column's number is not that in the layout.
+    names = layout.headings if is_mat(path) else [str(index + 1) for index in range(len(layout.headings))]
+    columns = {f"column_{index}": (names[index], 1.0) for index in layout.numbers if index != layout.time}
     if layout.time is not None:
-        columns[TIME] = (str(layout.time + 1), unit_s)
+        columns[TIME] = (names[layout.time], unit_s)
     mapped = Mapped(columns, layout.skip_lines, missing=layout.missing, in_any_unit=True)
     table = read_table(path, Header(tuple(columns)), SAMPLES_MB, mapped, None if layout.time_unit is None else 0)
     values = np.full((len(table.lines), len(layout.headings)), np.nan)

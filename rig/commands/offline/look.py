@@ -53,9 +53,7 @@ def run(options: Namespace) -> int:
         _refuse_run(path)
     stated = None if options.columns is None else read_column_map(options.columns)
     looks = [look_at(path, stated) for path in options.files]
-    columns: dict[str, Any] = {}
-    for looked in reversed(looks):  # if there are two files, the first has the readings
-        columns |= looked.columns
+    columns = _join_maps(looks)
     _print(looks, columns, stated, options.write or options.columns)
     if options.write is not None:
         _write(options.write, looks, columns)
@@ -94,7 +92,7 @@ def _print(
         for line in describe_file(looked):
             say(line)
     log = next((looked for looked in looks if looked.samples is not None), None)
-    reference = next((looked for looked in looks if looked.attitudes is not None), None)
+    reference = _find_reference(looks)
     convention = None
     if log is not None and reference is not None:
         reference = count_from(reference, log.origin_s)
@@ -112,6 +110,26 @@ def _print(
         print(printable(line))  # not wrapped: a command must stay in one line
     if needs_map and named is None:
         say(f"--write {PLACEHOLDER} writes the map of these columns")
+
+
+def _find_reference(looks: "Sequence[LookedFile]") -> "LookedFile | None":
+    """Return the file with the attitudes: one with readings too only if no other file has any."""
+    with_attitudes = [looked for looked in looks if looked.attitudes is not None]
+    return min(with_attitudes, key=_has_readings, default=None)
+
+
+def _has_readings(looked: "LookedFile") -> bool:
+    return looked.samples is not None or "samples" in looked.columns
+
+
+def _join_maps(looks: "Sequence[LookedFile]") -> dict[str, Any]:
+    """Return the map of all files' columns; a log's own attitudes are left out if another file has the attitudes."""
+    reference = _find_reference(looks)
+    columns: dict[str, Any] = {}
+    for looked in reversed(looks):  # if there are two files, the first has the readings
+        is_other = reference is not None and _has_readings(looked) > _has_readings(reference)
+        columns |= {key: value for key, value in looked.columns.items() if not (is_other and key.startswith("motion"))}
+    return columns
 
 
 def _names_order(reference: "LookedFile") -> bool:

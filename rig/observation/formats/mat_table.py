@@ -22,6 +22,7 @@ SUFFIX = ".mat"
 HDF5_HEADER = b"MATLAB 7.3"
 MAX_DEPTH = 4  # of structs inside structs
 MAX_COLUMNS = 1000
+NAN = "NaN"  # as MATLAB spells it
 BLOCK_ROWS = 8192  # rows whose cells are in memory at a time
 OBJECT_FIELDS = ("s0", "s1", "s2", "arr")  # fields by which SciPy represents a MATLAB object
 
@@ -34,8 +35,8 @@ def is_mat(path: Path) -> bool:
 def read_mat_rows(path: Path, header: Header, mapped: Mapped | None) -> Iterator[list[str]]:
     """Yield the names of all columns of a file, then its rows, in which cells of unneeded columns are blank.
 
-    The needed columns are those in the map or with the rig's names. Raise Refused `wrong_columns` if they differ in
-    length, and any error of the parser for a damaged file.
+    The needed columns are those in the map or with the rig's names. NaN is spelt as the map does. Raise Refused
+    `wrong_columns` if they differ in length, and any error of the parser for a damaged file.
     """
     columns = read_mat_columns(path)
     names = [*columns]
@@ -52,12 +53,19 @@ def read_mat_rows(path: Path, header: Header, mapped: Mapped | None) -> Iterator
                 f"{path}: {quote(first)} has {len(columns[first])} rows, and {quote(second)} {len(columns[second])}",
                 "Name columns of one table, with one time",
             )
+    missing = () if mapped is None else mapped.missing
+    nan = next((text for text in missing if text.upper() == NAN.upper()), NAN)
     count = len(columns[wanted[0]]) if wanted else 0
     for start in range(0, count, BLOCK_ROWS):
         block = slice(start, start + BLOCK_ROWS)
         blank = [""] * (min(count, start + BLOCK_ROWS) - start)
-        cells = [[*map(repr, columns[name][block].tolist())] if name in wanted else blank for name in names]
+        cells = [spell_numbers(columns[name][block], nan) if name in wanted else blank for name in names]
         yield from map(list, zip(*cells, strict=True))
+
+
+def spell_numbers(numbers: Array, nan: str = NAN) -> list[str]:
+    """Return the cells of a column of numbers, with `nan` for NaN."""
+    return [repr(number) if number == number else nan for number in numbers.tolist()]  # noqa: PLR0124
 
 
 def _is_number_of(column: str, names: list[str]) -> bool:

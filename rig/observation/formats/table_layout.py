@@ -1,7 +1,8 @@
 """The layout of a text table of unknown origin: its heading, its columns of numbers, and its column of time."""
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -14,13 +15,15 @@ from rig.config.units import TIME, UNITS
 from rig.data.processes.reading_parts import Part
 from rig.data.recording.motion_file import MAX_NUMBER
 from rig.errors import Refused
+from rig.estimation.arrays import Array
 from rig.observation.formats.csv_cells import is_number, is_value, repeats, seconds_of, unit_of
 from rig.observation.formats.csv_text import is_harmless, read_rows
-from rig.observation.formats.mat_table import is_mat, read_mat_columns
+from rig.observation.formats.mat_table import NAN, is_mat, read_mat_columns, spell_numbers
 from rig.observation.formats.table_parts import parts_read_apart
 
 MAX_SKIPPED_LINES = 100  # before the heading
 SAMPLED_ROWS = 400
+FEWEST_ROWS = 20  # of a table: matrices and vectors of parameters are shorter
 MISSING_WORDS = frozenset({"NaN", "nan", "NAN", "NA", "N/A", "null", "None", "-", "--"})
 TIME_NAME = re.compile(
     r"(sys|sample|sensor|elapsed|header|gps)?_?(time|timestamp|t|ts|stamp|millis|micros|sec|seconds)_?\w{0,3}"
@@ -85,13 +88,11 @@ def layout_parts(path: Path, largest_mb: int) -> Iterator[Part]:
     """Yield the layout of a file as one part. Raise Refused `wrong_columns` if the file has no rows of numbers."""
     if is_mat(path):
         columns = read_mat_columns(path)
-        rows = max(map(len, columns.values()))
+        rows = _find_table_rows(columns)
         columns = {name: column for name, column in columns.items() if len(column) == rows}
         count = min(rows, SAMPLED_ROWS)
-        cells = list(
-            map(list, zip(*([*map(repr, column[:count].tolist())] for column in columns.values()), strict=True))
-        )
-        yield _describe(0, [*columns], [""] * len(columns), cells, ["nan"] if _have_nan(columns) else [], rows)
+        cells = [list(row) for row in zip(*(spell_numbers(column[:count]) for column in columns.values()), strict=True)]
+        yield _describe(0, [*columns], [""] * len(columns), cells, [NAN] if _have_nan(columns) else [], rows)
         return
     skip, heading = _find_beginning(path, largest_mb)
     data = read_rows(path, largest_mb, skip)
@@ -117,6 +118,13 @@ def layout_parts(path: Path, largest_mb: int) -> Iterator[Part]:
     units = [""] * shift + units + [""] * (width - shift - len(units))
     cells = [[*row[:width], *[""] * (width - len(row))] for row in sampled]
     yield {**_describe(skip, headings, units, cells, sorted(missing), count), "is_shifted": bool(shift)}
+
+
+def _find_table_rows(columns: Mapping[str, Array]) -> int:
+    """Return the number of rows of the table among the variables of a workspace: the one with the most columns."""
+    lengths = Counter(map(len, columns.values()))
+    longest = max(lengths)
+    return max(lengths, key=lambda length: (length >= min(longest, FEWEST_ROWS), lengths[length], length))
 
 
 def _have_nan(columns: Any) -> bool:

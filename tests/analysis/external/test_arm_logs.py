@@ -120,6 +120,15 @@ def test_rests_in_a_dense_stream_tell_the_bias() -> None:
     assert (2 * std[3:] < 5e-4).all()
 
 
+@pytest.mark.filterwarnings("error")
+def test_attitudes_at_rest_before_the_first_reading_show_no_rest() -> None:
+    recorded = record(CLEAR, 1)
+    late = recorded.time_s > recorded.time_s[0] + 5
+    begun = replace(recorded, time_s=recorded.time_s[late], readings=recorded.readings[late])
+    error, std = errors(solved(begun), recorded)
+    assert (np.abs(error) < 5 * std).all()
+
+
 def test_a_bias_is_that_of_the_rests() -> None:
     recorded = record(CLEAR, 1)
     moves = np.linalg.norm(recorded.readings - np.median(recorded.readings, axis=0), axis=1) > 0.1

@@ -56,6 +56,15 @@ def matlab(folder: Path) -> Path:
     return folder / "log.mat"
 
 
+def workspace(folder: Path) -> Path:
+    """A log among other variables of a workspace, with a row of NaN."""
+    rates = np.vstack([RATES_DEG_S, np.full((1, 3), np.nan)])
+    time_s = np.append(TIME_S, TIME_S[-1] + 0.02)
+    others = {"raw": np.ones((2, len(TIME_S) + 300)), "axes": np.eye(3), "k": np.eye(3), "home": np.eye(4)}
+    savemat(folder / "log.mat", {**others, "t": time_s, "gyro": rates})
+    return folder / "log.mat"
+
+
 def units_below(folder: Path) -> Path:
     return write(folder / "log.csv", "t;Gx;Gy;Gz\ns;°/s;°/s;°/s", [TIME_S, *RATES_DEG_S.T], ";")
 
@@ -66,7 +75,7 @@ def telephone(folder: Path) -> Path:
     return write(folder / "log.csv", heading, [TIME_S, TIME_S - TIME_S[0], *RATES_DEG_S.T[::-1]])
 
 
-@pytest.mark.parametrize("make", [two_imus, counter, matlab, units_below, telephone])
+@pytest.mark.parametrize("make", [two_imus, counter, matlab, workspace, units_below, telephone])
 def test_the_map_that_it_writes_solves_the_file(make: Callable[[Path], Path], tmp_path: Path) -> None:
     log, columns = make(tmp_path), tmp_path / "columns.yaml"
     looked = rig_here("look", log, "--write", columns)
@@ -182,6 +191,17 @@ def test_row_numbers_and_positions_of_a_pose_file_are_no_gyroscope(tmp_path: Pat
     looked = rig_here("look", tmp_path / "robot_log.txt", poses).stdout.partition(f"{poses}:")[2]
     assert "gyroscope" not in looked.partition("what it allows:")[0] and "not read      column 1 x y z" in looked
     assert "direction     body to room: " in looked  # the headings say which number is which
+
+
+def test_a_file_of_attitudes_counts_before_those_in_the_log(tmp_path: Path) -> None:
+    log, columns = make_log(), tmp_path / "columns.yaml"
+    write_log(log, tmp_path)
+    interpolated = np.tile([0.5, 0.0, 0.0, 0.0], (len(log.time_ms), 1))  # through zero, between q and -q
+    readings = {"t": log.time_ms / 1e3, "gyro": log.rates_deg_s, "acc": log.forces_g}
+    savemat(tmp_path / "log.mat", {**readings, "quat": interpolated})
+    looked = rig_here("look", tmp_path / "log.mat", tmp_path / "robot_poses.csv", "--write", columns)
+    assert "attitudes     rig solve " in looked.stdout, looked.stdout
+    assert "direction     room to body (motion_inverse)" in looked.stdout and "quat" not in columns.read_text("utf-8")
 
 
 def test_turns_have_their_times_as_the_file_of_sweeps_needs_them(tmp_path: Path) -> None:

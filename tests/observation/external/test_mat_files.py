@@ -77,6 +77,18 @@ def test_columns_of_two_tables_are_not_joined(tmp_path: Path) -> None:
         read_samples(path, [RATE], map_samples(ColumnMap.model_validate({"samples": columns})))
 
 
+@pytest.mark.parametrize("spelt", ["NaN", "nan"])
+def test_a_row_of_nan_is_missing_however_the_map_spells_it(spelt: str, tmp_path: Path) -> None:
+    path = tmp_path / "log.mat"
+    savemat(path, {"t": TIME_S, "gyro": np.where(TIME_S[:, None] == TIME_S[7], np.nan, RATES)})
+    columns = {"time_s": {"column": "t"}} | {
+        f"{axis}_rad_s": {"column": f"gyro(:,{column + 1})"} for column, axis in enumerate("xyz")
+    }
+    stated = ColumnMap.model_validate({"samples": columns, "samples_missing": [spelt]})
+    samples = read_samples(path, [RATE], map_samples(stated))
+    assert np.array_equal(samples.readings[RATE], np.delete(RATES, 7, axis=0))
+
+
 def test_a_link_to_another_file_is_not_followed(tmp_path: Path) -> None:
     newest(tmp_path / "log.mat", {"t": TIME_S[:, None]})
     with h5py.File(tmp_path / "other.h5", "w") as other:
