@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from rig.data.quantity import RATE
+from rig.observation.external.csv_samples import samples_in
 from rig.observation.time_stamps.even_times import find_sampling_times
 from rig.observation.time_stamps.sampling import find_sampling
 from support.external.loggers import Stamps
@@ -94,3 +96,14 @@ def test_a_few_long_gaps_are_no_bursts() -> None:
     found = find_sampling(time_s)
     assert found.interval_s == pytest.approx(1 / 63, rel=1e-6) and np.count_nonzero(found.missing) == 5
     assert (find_sampling_times(time_s, found) == time_s).all()
+
+
+def test_stamps_too_uneven_to_count_losses_say_so() -> None:
+    rng = np.random.default_rng(51)
+    arrived_s = np.maximum.accumulate(taken(100) + rng.exponential(0.015, size=COUNT)) + 1e-6 * np.arange(COUNT)
+    lost = rng.choice(COUNT, size=COUNT // 60, replace=False)[:, None] + np.arange(3)
+    stamps_s = np.delete(arrived_s, np.minimum(lost, COUNT - 1).ravel())
+    readings = rng.normal(size=(3, len(stamps_s)))
+    samples = samples_in({"time_s": stamps_s, **dict(zip(RATE.columns, readings, strict=True))}, "log.csv")
+    assert samples.sampling is not None and samples.sampling.hides_losses
+    assert any("too uneven to show which readings are missing" in note for note in samples.notes)
