@@ -35,7 +35,8 @@ class LookedFile:
 
     - layout, guess: for a table; None for a bag or an autopilot's log.
     - columns: the map of its columns, in the form of `--columns`, incomplete if it contains "?".
-    - samples, survey: its readings, if any can be read; others: number of rows without any; note: what they lack.
+    - samples, survey: its readings, if any can be read; others: number of rows without readings; note: what the
+      readings lack.
     - origin_s: origin of the readings' times; the attitudes' times are on their own clock.
     - attitudes: the rows of its reference, if it has one.
     - refusals: why readings or attitudes could not be read.

@@ -42,9 +42,9 @@ class AtRest:
 
 @dataclass(frozen=True, slots=True)
 class SensorAtRest:
-    """A sensor, None if the readings do not name it, and each quantity's noise, or the Fault that prevents it.
+    """The noise of each quantity of a sensor at rest, or the Fault that prevents it.
 
-    `notes`: what was left out of a log, and how its time stamps were interpreted.
+    `sensor`: None if the readings do not name it; `notes`: what was left out of a log, and how its stamps were read.
     """
 
     sensor: RecordedSensor | None

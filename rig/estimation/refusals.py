@@ -223,7 +223,7 @@ def check_rotations(attitudes: Array) -> None:
 
 
 def check_side(reference: Array, side: Array) -> None:
-    """Raise Fault `sign_unknown` if a direction (3,) nearly perpendicular to v_ref (3,) leaves the sign unknown."""
+    """Raise Fault `sign_unknown` if a direction (3,) nearly perpendicular to v_ref (3,) leaves its sign unknown."""
     if abs(reference @ side) < MIN_SIDE_COSINE * np.linalg.norm(reference) * np.linalg.norm(side):
         raise Fault(
             "sign_unknown",

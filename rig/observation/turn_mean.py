@@ -111,9 +111,9 @@ def _gain(weights: Array) -> float:
 def _slow_line_variance(readings: Array, turn: SampledTurn, slow: Array, change: Array, explained: Array) -> Array:
     """Return the variance (3,) of the mean due to slow spectral lines, with columns `slow` (n, k).
 
-    The readings determine these lines poorly. With weights that do not remove them, the mean is another. The used
-    weights minus these are `change` (n,). The variance is the larger of two: the square of the means' difference, and
-    its variance for the lines' fitted amplitudes at random phases. `explained` (n, m): columns of everything else.
+    The readings determine these lines poorly. Weights that do not remove them give another mean; the used weights minus
+    those are `change` (n,). The variance is the larger of two: the square of the means' difference, and its variance
+    for the lines' fitted amplitudes at random phases. `explained` (n, m): columns of everything else.
     """
     without_ripple = fit_residuals(np.column_stack([whole(readings), turn.uneven_rad_s]), readings)
     residuals = fit_residuals(explained, readings)

@@ -78,9 +78,9 @@ class RunSearch(Protocol):
 def shortest_run(config: RigConfig, wanted: TargetUncertainty) -> Shortest:
     """Return the shortest run of this configuration whose predicted uncertainty meets the target.
 
-    A family is skipped if its endless run misses the target by more than the factor `MAX_U_REDUCTION`. If all are, only
-    the longest run of the best family is evaluated. Raise Refused `not_predictable` if the uncertainty of the procedure
-    or of the target's quantity is not predicted.
+    A family of candidates is skipped if even its run of unlimited length misses the target by more than the factor
+    `MAX_U_REDUCTION`. If all are, only the longest run of the best family is evaluated. Raise Refused `not_predictable`
+    if the uncertainty of the procedure or of the target's quantity is not predicted.
     """
     what = find_search(config)
     _refuse_others(wanted, config)

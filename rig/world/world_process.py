@@ -243,9 +243,9 @@ class World:
     def _tick(self) -> None:
         """Simulate one tick, or all that are due, at most `MAX_LEAP_TICKS`, while only a client can make the arm move.
 
-        With a board, ticks are simulated one at a time: several at once would not be faster, because of the board's
-        core, and clients would receive their packets in bursts. If the arm is at rest, its motion is sensed once at the
-        end of several ticks, with the same bytes as a result. Every session is called at every tick.
+        If a board is emulated, ticks are simulated one at a time: its processor takes most of the time, and clients
+        would receive packets in bursts. If the arm is at rest, its motion is sensed once at the end of several ticks,
+        with the same bytes as a result. Every session is called at every tick.
         """
         for remaining in reversed(range(MAX_LEAP_TICKS if self.board_listener is None else 1)):
             self.clock.count()

@@ -53,7 +53,7 @@ def find_gyroscope_limits(
 
 
 def find_reference_limits(sizes: Mapping[str, float], quantity: Quantity) -> tuple[DetectionLimit, ...]:
-    """Return the detection limits of a calibration in gravity or a field; the names of checks contain the quantity."""
+    """Return the detection limits in gravity or a field, from the minimal detectable `sizes` by fault mode."""
     from rig.analysis.consistency.reference_alternatives import FAULT_MODES as REFERENCE_FAULT_MODES
 
     return tuple(

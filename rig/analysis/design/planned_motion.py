@@ -43,7 +43,7 @@ class PlannedRun:
 
 
 def plan_run(config: RigConfig, plan: Plan, arm: DenavitHartenberg) -> PlannedRun:
-    """Return a new run of the plan. Raise Refused as `settings_of` does."""
+    """Return the plan as a recording with the configuration's settings. Raise Refused as `settings_of` does."""
     return PlannedRun(plan, arm, settings_of(config, plan), site_of(config.site), uncertainty_of(config))
 
 

@@ -273,7 +273,7 @@ def _solve_attitudes(read: ExternalReadings, samples: Samples, settings: RunSett
 
 
 def _gyroscope(item: Item, result: Result, clock: TimeBase | None) -> SensorResult:
-    """Return the calibration of a gyroscope from attitudes, in the form of one from sweeps."""
+    """Return a gyroscope's `result` in attitudes in the form of a calibration from sweeps."""
     solution = _describe_as_swept(result)
     if clock is not None and isinstance(result, InIncrements):
         clock = clock.correct(-result.solution.clock_s, result.solution.clock_std_s)

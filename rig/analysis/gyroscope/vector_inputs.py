@@ -1,4 +1,4 @@
-"""The inputs of the vector model and its budget, from recordings and their surroundings."""
+"""The inputs of the vector model and its budget, from recordings and their environment."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -195,7 +195,7 @@ def _group_by_axis(turns: Sequence[Observation]) -> list[list[int]]:
 
 
 def list_given(environment: MeasurementEnvironment, name: str) -> EarthRatePrior:
-    """Return the given values of surroundings and sensor for an estimate of the Earth's rate."""
+    """Return the given values of environment and sensor for an estimate of the Earth's rate."""
     site, uncertainty = environment.site, environment.uncertainty
     return EarthRatePrior(
         up=np.array(site.up),

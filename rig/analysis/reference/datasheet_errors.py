@@ -43,9 +43,9 @@ MICRO_G_PER_MILLI_G = 1000
 
 @dataclass(frozen=True, slots=True)
 class Datasheet:
-    """The data sheet of one accelerometer: half-widths, and the bias instability as the Allan deviation's minimum.
+    """One accelerometer's data sheet: the half-widths of its errors, and the minimum of its Allan deviation.
 
-    `nonlinearity_percent`: nonlinearity relative to `over_g`, in either direction. `temperature_words`: see
+    `nonlinearity_percent`: nonlinearity from −`over_g` to `over_g`, in % of `over_g`. `temperature_words`: see
     `KnownSensor`.
     """
 
@@ -161,9 +161,9 @@ def add_errors(
 def separate_sensor_errors(
     spread: FitUncertainty, theta: Array, movement: Movement, datasheet: Datasheet
 ) -> tuple[FitUncertainty, list[Contributor]]:
-    """Return the `spread` due to noise and arm, and the contributors of the sensor's own errors in this `movement`.
+    """Return the uncertainty due to noise and arm, and the contributors of the sensor's own errors in this `movement`.
 
-    The spread is from a fit of all parameters including φ, so the noise has a larger effect.
+    `spread` is the uncertainty of a fit that includes φ, so the noise has a larger effect.
     """
     drift, flicker = (
         spread.response @ shared @ spread.response.T

@@ -65,7 +65,7 @@ def accelerometer_budget(
 def combine_errors(
     spread: FitUncertainty, theta: Array, movement: Movement, site: Site, lag_s: float, *, datasheet: Datasheet | None
 ) -> Budget:
-    """Return the budget of scale and bias from their `spread`; θ (22,) is the solution of the `movement`."""
+    """Return the budget of scale and bias from a fit's uncertainty, `spread`; θ (22,) is the `movement`'s solution."""
     others = [_lag(spread, movement, lag_s)] if len(movement.sweeps.speeds_rad_s) else []
     if movement.sensor_errors is None or datasheet is None:
         return reference_budget(spread, _gravity(site), others)
@@ -104,9 +104,10 @@ def _propagate(
     *,
     noise_dof: Array,
 ) -> FitUncertainty:
-    """Return the spread of scale and bias, from the `response` (p, n) of all parameters.
+    """Return the uncertainty of scale and bias, from the `response` (p, n) of all parameters to the readings.
 
-    `chi_square`: χ² of the residuals, and its degrees of freedom.
+    `noise` (n, n): the readings' covariance; `error`: that of attitudes; `chi_square`: χ² of the residuals, and its
+    dof.
     """
     scale = scale_of(solution.matrix)
     rows = scale_and_bias(solution.matrix, scale, len(solution.covariance))

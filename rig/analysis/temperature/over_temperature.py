@@ -51,7 +51,7 @@ class AtReference:
 
 
 def correct_recordings(recordings: Sequence[ObservedRun], settings: RunSettings, reference_c: float) -> AtReference:
-    """Correct the rates and the dwells' accelerations of the sensors to calibrate, to the temperature `reference_c`.
+    """Return the recordings with rates and dwells' accelerations as at `reference_c`, for the sensors to calibrate.
 
     Raise Fault `temperature_not_recorded`, and as `fit_over_temperature` does.
     """

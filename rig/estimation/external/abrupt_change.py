@@ -51,7 +51,7 @@ class AbruptChange:
 
 @dataclass(frozen=True, slots=True)
 class PossibleChanges:
-    """Possible changes of `what`, by a standard deviation `size`; `of_axes` (n, 3, 3) are their effects on n rows.
+    """Possible changes of `what`, of prior standard deviation `size`; `of_axes` (n, 3, 3) are their effects on n rows.
 
     `possible` (n, 3): whether the axis may have changed just before the row. `lasts`: whether it affects later rows.
     """

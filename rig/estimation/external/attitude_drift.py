@@ -263,8 +263,8 @@ def _list_errors(averaged: FixedAttitudes, fixes: Fixes, correlation: Array, ste
 def _correlate(fixes: Fixes) -> Array:
     """Return the correlation (N, N) between fixes of an error that varies smoothly with attitude, averaged in each fix.
 
-    Matérn's function, ν = 3/2, of the chordal distance ‖R − R′‖/√2, about the angle if small; it is positive definite
-    on SO(3) (Rasmussen and Williams, Gaussian Processes for Machine Learning (2006), 4.2).
+    Matérn's function, ν = 3/2, of the chordal distance ‖R − R′‖/√2, which is nearly the angle if small; it is positive
+    definite on SO(3) (Rasmussen and Williams, Gaussian Processes for Machine Learning (2006), 4.2).
     """
     counts = np.bincount(fixes.fix)
     begins = np.cumsum(counts) - counts
@@ -315,10 +315,10 @@ def _weigh_bias(averaged: FixedAttitudes, fixes: Fixes) -> Array:
 
 
 def _find_bias_changes(sensitivities: Array, nearby: Array, middles_s: Array, weights: Array) -> Array:
-    """Return the covariance (3n, 3n) of the increments due to unit changes of b with attitude and time.
+    """Return the covariance (3n, 3n) of the increments due to unit changes of the bias b with attitude and time.
 
-    `nearby` (n, n) is the correlation by attitude, `middles_s` (n,) are the increments' middle times. Changes are
-    relative to b, the mean with `weights` (n,).
+    `sensitivities` (n, 3, 12) are those to F and b, `nearby` (n, n) the correlation by attitude, `middles_s` (n,) the
+    middle times. Changes are relative to the mean bias with `weights` (n,).
     """
     apart = np.abs(middles_s[:, None] - middles_s) / (np.ptp(middles_s) / BIAS_INTERVALS + 1e-9)
     from_mean = np.eye(len(weights)) - weights

@@ -37,8 +37,8 @@ class Inclinations:
         """Return the covariance (q, q) that inclinations add to `wanted` (q, p) combinations of the parameters.
 
         Only inclinations that the residuals do not show are added. `variances` (q,) are due to the model's other
-        errors, with standard deviations `std` (k,), which contain the visible inclinations. With the sum of the two, 2
-        u is the half-width of the 95.45 % interval.
+        errors, with standard deviations `std` (k,), which contain the visible inclinations. With both covariances
+        added, 2 u is the half-width of the 95.45 % interval.
         """
         from scipy.linalg import cho_factor, cho_solve
 

@@ -103,13 +103,13 @@ def rounding_errors(means_rad_s: Array, roundings_rad_s: Array | float, variance
 
 
 def _temperature_deviations_k(sensor: KnownSensor, windows_s: Array, weights: Array) -> Array:
-    """Return the deviations (2, N), K, from the weighted mean temperature: recorded ones, then those below a step."""
+    """Return the deviations (2, N), K, from the weighted mean temperature: recorded, then hidden below a step."""
     recorded = subtract_mean(sensor.temperature_c, weights)
     return np.array([recorded, unseen_k(sensor.temperature_step_k, windows_s, weights)])
 
 
 def unseen_k(step_k: float, windows_s: Array, weights: Array) -> Array:
-    """Return the temperature changes (N,), K, in a linear drift that the thermometer does not show: by `step_k` in all.
+    """Return the temperature changes (N,), K, of a linear drift by `step_k` in all, which the thermometer hides.
 
     They are relative to the mean over the windows (N, 2) with weights (N,).
     """

@@ -7,7 +7,7 @@ The rate during a rotation does not matter, so a hand may turn the gyroscope. It
 
 R is the body's rotation by its gyroscope (m = F ω + c), n the axis in the body's frame, α the angle. e contains the end
 attitude's error about all three axes, the effect of a tilted axis, and the gyroscope's noise. A whole revolution
-determines nᵀ F n alone; the mean reading determines the components across it, if the axis is fixed in the body:
+determines nᵀ F n alone; the mean reading determines the components across n, if the axis is fixed in the body:
 
     m̄ = F n α/T + c                                                      across F n
 
@@ -51,7 +51,7 @@ class Turn:
 
 @dataclass(frozen=True, slots=True)
 class RateMean:
-    """A `reading` (3,) with its `variance` (3,) at the constant `rate` (3,), of given direction, or at rest."""
+    """A mean `reading` (3,) with its `variance` (3,) at the constant `rate` (3,), zero at rest."""
 
     reading: Array
     variance: Array

@@ -4,11 +4,11 @@
 
 ρ is the relative error of a sweep's rate, α the tilt of its axis: random effects of unknown variance. Few sweeps
 determine a variance badly: the restricted maximum likelihood is often at zero, and its U covers the true value in only
-60 to 85 of 100 cases. So the result averages over all pairs of sizes, weighted by the restricted likelihood (Harville,
-J. Am. Stat. Assoc. 72 (1977) 320) and a prior: log-uniform from a tenth of the noise, below which a size changes
-nothing, to `PRIOR_KNEE_ERROR`; beyond, it falls as 1/size. If the sweeps determine the size, U approaches that of
-Student's t with the dof of the redundant sweeps (Box and Tiao, Bayesian Inference in Statistical Analysis, 1973, 5.2;
-Gelman, Bayesian Analysis 1 (2006) 515).
+60 to 85 of 100 cases. So the result averages over all pairs (ρ, α), weighted by the restricted likelihood (Harville, J.
+Am. Stat. Assoc. 72 (1977) 320) and a prior: log-uniform from a tenth of the noise, below which ρ and α change nothing,
+to `PRIOR_KNEE_ERROR`; beyond, it falls as the inverse. If the sweeps determine ρ and α, U approaches that of Student's
+t with the dof of the redundant sweeps (Box and Tiao, Bayesian Inference in Statistical Analysis, 1973, 5.2; Gelman,
+Bayesian Analysis 1 (2006) 515).
 """
 
 from dataclasses import dataclass
@@ -60,9 +60,9 @@ class StatedMotion:
 
 @dataclass(frozen=True, slots=True)
 class MotionErrors:
-    """The posterior distribution of the sizes of errors of the stated motion.
+    """The posterior distribution of the standard deviations ρ and α of errors of the stated motion.
 
-    `rate` and `axis_rad` (G,) are pairs of sizes, `weights` (G,) their posterior probabilities.
+    `rate` (G,) and `axis_rad` (G,) are pairs (ρ, α), `weights` (G,) their posterior probabilities.
     """
 
     rate: Array
@@ -71,14 +71,14 @@ class MotionErrors:
 
     @property
     def median_variances(self) -> tuple[float, float]:
-        """The squares of the posterior medians of both sizes."""
+        """The squares of the posterior medians of ρ and α."""
         return _median(self.rate**2, self.weights), _median(self.axis_rad**2, self.weights)
 
     def expanded(self, fixed: Array, of_rate: Array, of_axis: Array) -> Array:
-        """Return the expanded uncertainty U (q,) of values at 95.45 %, over all sizes of the motion errors.
+        """Return the expanded uncertainty U (q,) of values at 95.45 %, over all pairs (ρ, α).
 
-        For given sizes the values have a normal distribution. `fixed` (q,) are the variances that do not depend on the
-        sizes, `of_rate` and `of_axis` (q,) the variances per squared size.
+        For given ρ and α the values have a normal distribution. `fixed` (q,) are the variances that do not depend on
+        them, `of_rate` and `of_axis` (q,) the variances per ρ² and per α².
         """
         from scipy.special import ndtr
 
@@ -95,7 +95,7 @@ class MotionErrors:
 
 
 def motion_errors(motion: StatedMotion) -> MotionErrors:
-    """Return the posterior sizes of the errors of the stated motion, from the residuals of sweeps and rests."""
+    """Return the posterior distribution of ρ and α from the residuals of sweeps and rests."""
     smallest = min(MIN_NOISE_RATIO * motion.relative_noise, MAX_ERROR / 10)
     sizes = np.geomspace(smallest, MAX_ERROR, GRID_POINTS)
     prior = -np.log(np.maximum(sizes / PRIOR_KNEE_ERROR, 1.0))
@@ -109,7 +109,7 @@ def motion_errors(motion: StatedMotion) -> MotionErrors:
 
 
 def _likelihoods(motion: StatedMotion, axis_rad: float, rates: Array) -> Array:
-    """Return the restricted log-likelihoods (k,) of sizes `rates` (k,) of rate errors, for one size of axis errors.
+    """Return the restricted log-likelihoods (k,) of the values `rates` (k,) of ρ, for α = `axis_rad`.
 
     A rate error changes the covariance of a sweep by one dyad, so each inverse has a rank-one update (Sherman and
     Morrison, Ann. Math. Stat. 21 (1950) 124).

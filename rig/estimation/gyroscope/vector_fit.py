@@ -39,7 +39,8 @@ class VectorInputs:
     - joints (N): the joint that turned, None for a rest.
     - axis_errors_rad_s (P, N, 3): effect of one standard uncertainty of each of the arm's angles on the rates.
     - return_errors_rad_s (P, N, 3): effect of one standard uncertainty of each return of a joint to an angle.
-    - mount_turns_rad (3 S, N, 3): rotation vectors of an item by one std of each mount of S stages, the first last.
+    - mount_turns_rad (3 S, N, 3): rotation vectors of an item by one std of each mount of S stages; the first stage is
+      last.
     - arms_m (N, 3): lever arms from the rotation axis to the sensor in the flange frame, None to neglect them.
     - noise_dof (N, 3): degrees of freedom of the variances.
     - sensor: the sensor's properties from the data sheet, None if unknown.

@@ -217,7 +217,7 @@ def _unit(design: Array) -> Array:
 
 
 def regress(design: Array, means: Array, variances: Array, shared: Array | None = None) -> tuple[Array, Array]:
-    """Return coefficients (…, p, 3) and their linear map (…, 3, p, N): one weighted regression for each axis."""
+    """Return coefficients (…, p, 3) and the map (…, 3, p, N) to them, axis by axis; `shared` (N, N) adds covariance."""
     transposed = np.swapaxes(design, -1, -2)[..., None, :, :]
     if shared is None:
         weights = 1 / np.swapaxes(variances, -1, -2)  # (…, 3, N)

@@ -206,7 +206,7 @@ def _around_axes(turning_rad2_s2: Array, movement: Movement) -> Array:
 
 
 def find_flange_force(delay_s: float, movement: Movement) -> Array:
-    """Return the specific force (K, 3) of the flange itself in m/s²: its distance from the axis, and other joints."""
+    """Return the specific force (K, 3), m/s², of the flange due to its distance from the axis and to other joints."""
     force: Array = (project_lever_arm(delay_s, movement) @ _arms(np.zeros(3), movement))[..., 0]
     force[len(movement.dwells.readings_m_s2) :] += movement.sweeps.swayed_m_s2.reshape(-1, 3)
     return force
@@ -291,7 +291,7 @@ def turned(theta: Array, movement: Movement) -> Array:
 
 
 def _differentiate_angle(apparent: Array, theta: Array, sweeps: Sweeps) -> Array:
-    """Return the harmonics (3 M, 3, 4) of the specific force by errors w of the angle: cos θ, sin θ, cos 2θ, sin 2θ.
+    """Return the harmonics (3 M, 3, 4) of the specific force due to angle errors w: cos θ, sin θ, cos 2θ, sin 2θ.
 
     Gravity `apparent` changes by w times the derivative of its first harmonic. The rate grows by ω w′, so the first two
     errors also add the first harmonics of the centripetal acceleration 2 ω² w′ (a aᵀ − 1) (p + r) and the Euler

@@ -104,7 +104,7 @@ def find_drift_covariance(movement: Movement) -> Array:
 
 
 def walking(sensor: AccelerometerErrors, movement: Movement) -> Array:
-    """Return the covariance (3 K, 3 K) of a random walk of each axis, of 1 m/s² after one second."""
+    """Return the covariance (3 K, 3 K) of a random walk of each axis, 1 m/s² (std) after one second."""
     return _expand_bias(walk_covariance(sensor.windows_s), movement)
 
 

@@ -108,7 +108,7 @@ def response_in_attitudes(solution: TriaxialSolution, dwells: Dwells) -> Array:
 
 
 def reference_budget(spread: FitUncertainty, size: KnownSize, others: Sequence[Contributor] = ()) -> Budget:
-    """Return the budget of the readings, of the reference's norm, and of other contributors."""
+    """Return the budget of a fit's uncertainty `spread`, the norm's uncertainty `size`, and `others`."""
     noise = spread.response @ spread.noise @ spread.response.T
     contributors = [
         evaluate_a(NOISE, "scatter of the readings", noise, spread.noise_dof_min),

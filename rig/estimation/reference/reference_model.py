@@ -37,7 +37,7 @@ class KnownVector:
 
 @dataclass(frozen=True, slots=True)
 class KnownNorm:
-    """The prior v̄ = 0 and ‖v_ref‖ = `norm`, with a table vector `side` (3,) whose product with v_ref is positive."""
+    """The prior v̄ = 0 and ‖v_ref‖ = `norm`, with a table vector `side` (3,) whose dot product with v_ref is > 0."""
 
     norm: float
     side: ArrayLike

@@ -27,7 +27,7 @@ class Reversal:
     """The bias (3,) in the sensor's axes, the arm's field (3,) in the first run's axes, and their covariance (6, 6).
 
     If an axis was not turned over, `arm_field_in_bias` is True: the bias contains the sum of both, the field is 0.
-    `chi_square` tests the agreement of the runs.
+    `chi_square`, at most `limit`, tests the agreement of the runs.
     """
 
     bias_t: Array

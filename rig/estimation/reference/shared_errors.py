@@ -22,7 +22,7 @@ class Decorrelation:
     growth: Array
 
     def whitener(self, std_rad: float) -> Array:
-        """Return the matrix (n, n) that whitens readings for errors of the size δ."""
+        """Return the matrix (n, n) that whitens readings whose errors have the standard deviation δ."""
         return np.asarray(self.transform / np.sqrt(1 + std_rad**2 * self.growth)[:, None], dtype=np.float64)
 
 

@@ -192,7 +192,7 @@ def solve_triaxial_batch(
 
 
 def _check(m: Array, r: Array, v: Array, prior: ReferencePrior, parameters: int) -> None:
-    """Raise ValueError or Fault for inputs of a wrong shape, number or value."""
+    """Raise as `solve_triaxial` does for inputs of a wrong shape, number or value."""
     count = len(m)
     refusals.require_shape("readings", m, (count, 3))
     refusals.require_shape("attitudes", r, (count, 3, 3))

@@ -42,7 +42,7 @@ class ResidualInputs:
 
 @dataclass(frozen=True, slots=True)
 class ErrorSizes:
-    """The sizes of errors.
+    """The estimated standard deviations of the shared errors.
 
     `walk`: the bias random walk in one second; `std_rad`: the attitude error δ; `independent_fraction`: the fraction of
     δ² that is independent in each dwell.
@@ -108,7 +108,7 @@ def estimate_disturbances(
 
 
 def _find_likelihoods(residuals: Array, whitener: Array, effects: Array, sizes: Array) -> Array:
-    """Return log-likelihoods (k,) of residuals (n,), up to a constant, for `sizes` (k,) of δ.
+    """Return log-likelihoods (k,) of residuals (n,), up to a constant, for the values `sizes` (k,) of δ.
 
     `whitener` (n, n), triangular, whitens all modelled errors except the arm's `effects` (n, P).
     """

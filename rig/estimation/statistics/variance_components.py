@@ -264,7 +264,7 @@ def sample_adaptively(log_density: Callable[[Array], float], begins: Sequence[tu
 
 
 def _adapt(points: Array, logs: Array, proposals: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
-    """Return the mean (k,) and a root (k, k) of the covariance of weighted samples (s, k)."""
+    """Return the mean (k,) and a root (k, k) of the covariance of samples (s, k), weighted as by `_find_weights`."""
     tempered = _temper(_find_weights(points, logs, proposals), 2 * points.shape[1])
     mean = tempered @ points
     deviations = points - mean

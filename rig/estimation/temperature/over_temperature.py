@@ -447,7 +447,7 @@ def _centre_coefficients(fit: _TemperatureFit, centre: Array) -> Array:
 
 
 def _loop_covariance(size: Array, std: Array) -> Array:
-    """Return the covariance (24, 24) of values due to the hysteresis, without the part due to noise."""
+    """Return the coefficients' covariance (24, 24) due to hysteresis `size` (6,), less that due to its `std` (6,)."""
     variances = np.zeros(COEFFICIENT_COUNT)
     half = np.maximum(size**2 - std**2, 0.0) / 3
     variances[:3], variances[COEFFICIENT_COUNT // 2 : COEFFICIENT_COUNT // 2 + 3] = half[:3], half[3:]

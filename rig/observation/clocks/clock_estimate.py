@@ -77,7 +77,7 @@ def _check_samples(board_time_s: Array, readings: Array, motion: KnownMotion) ->
 
 
 def _turns_every_axis(motion: KnownMotion) -> bool:
-    """Return whether the motion turns every sensor axis in any mounting; only then must its readings change."""
+    """Return whether the motion turns every sensor axis in any mounting, so that the readings of each must change."""
     rates = motion.rate(motion.time_s[motion.covered(motion.time_s)])
     return bool(np.linalg.eigvalsh(rates.T @ rates).min() > MIN_TURN_RATE_RAD_S**2 * len(rates))
 

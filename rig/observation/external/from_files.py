@@ -38,8 +38,8 @@ class Files:
     """The files of `readings` and of their motion, and their item.
 
     `recorded` is the time of recording, None for the time at which the readings' file was last written. `columns` map
-    columns with other names than the rig's. "turns" have no file of motion: `motion` holds the user's declarations, by
-    column.
+    columns with other names than the rig's. `tells` is the kind of motion; for "turns", which have no file, `motion`
+    holds the user's declarations, by column.
     """
 
     readings: Path

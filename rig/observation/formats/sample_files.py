@@ -68,7 +68,7 @@ def whole(path: Path) -> Path:
 
 @dataclass(frozen=True, slots=True)
 class FormatColumns:
-    """The `columns` (n,) of a file, ordered by time; `others`: the number of rows without any.
+    """The `columns` (n,) of a file, ordered by time; `others`: the number of rows without readings.
 
     The reader's `note` states what the readings lack, "" if nothing.
     """

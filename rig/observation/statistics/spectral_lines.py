@@ -120,9 +120,9 @@ def unit_columns(columns: Array) -> Array:
 
 
 def fit_columns(columns: Array, values: Array) -> Array:
-    """Return the least-squares coefficients (k, m) of values (n, m) by columns (n, k), some nearly collinear.
+    """Return the least-squares coefficients (k, m) of values (n, m) by columns (n, k), which may be nearly collinear.
 
-    The normal equations take a third of the time. Their precision suffices for columns that `TOLERANCE` separates.
+    Normal equations take a third of a decomposition's time, and suffice for columns that `TOLERANCE` separates.
     """
     return np.asarray(np.linalg.lstsq(columns.T @ columns, columns.T @ values, rcond=TOLERANCE**2)[0], dtype=np.float64)
 
@@ -154,7 +154,7 @@ def _sampling_step(fraction: Array) -> float:
 
 
 def _find_strongest(residuals: Array, previous: Array, fraction: Array, search: LineSearch) -> float | None:
-    """Return the cycles of the strongest line in residuals (n, axes) other than `previous` lines, or None."""
+    """Return the number of cycles of the strongest line in residuals (n, axes), apart from `previous`, or None."""
     from scipy.ndimage import median_filter
 
     powers = np.abs(np.fft.rfft(apply_window(residuals).T)) ** 2

@@ -235,10 +235,10 @@ def _interval_s(time_s: Array, missing: NDArray[np.intp], width: int) -> float:
 
 
 def _estimate_unlocated_losses(time_s: Array) -> Sampling:
-    """Return the sampling for losses that cannot be located because of bad stamps or their number.
+    """Return the sampling for losses that cannot be located: the stamps are bad, or the losses too many.
 
-    Random losses of a fraction p of all readings give the lateness the variance p m T² over m readings. This grows
-    fourfold from m to 4 m; the variance of errors that do not accumulate is constant, and that of a clock's random walk
+    If a fraction p of all readings is lost at random, the variance of the lateness over m readings is p m T². From m to
+    4 m it grows fourfold. The variance of errors that do not accumulate is constant, that of a clock's random walk
     grows much more.
     """
     mean_s = float(time_s[-1] - time_s[0]) / (len(time_s) - 1)

@@ -285,5 +285,5 @@ def _separate_equal(log: _UnorderedLog) -> _UnorderedLog:
 
 
 def _estimate_usual_delay_s(late_s: Array, interval_s: float) -> float:
-    """Return the delay, s, behind the least late of the following readings, that only buffered readings exceed."""
+    """Return the largest usual delay, s, behind the least late following reading; only buffered readings exceed it."""
     return DELAY_RATIO * float(np.median(late_s - find_least_ahead(late_s, LONG_WIDTHS[-1]))) + MAX_DELAY * interval_s

@@ -57,13 +57,13 @@ def move(start: Array, end: Array, vector: Array, habits: Habits, rng: np.random
 
 
 def nudge(vector: Array, lasting_s: float) -> tuple[Array, Array]:
-    """Return times that begin at 0, and rates of one smooth rotation by `vector` (3,), rad."""
+    """Return times (n,) from 0, and rates (n, 3), rad/s, of one smooth rotation by `vector` (3,), rad."""
     time_s = np.arange(0.0, lasting_s + STEP_S, STEP_S)
     return time_s, np.outer(_pulse(time_s, 0.0, lasting_s), vector)
 
 
 def hold(lasting_s: float, habits: Habits, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Return times that begin at 0, and rates of a body that is held in the air."""
+    """Return times (n,) from 0, and rates (n, 3), rad/s, of a body that is held in the air."""
     time_s = np.arange(0.0, lasting_s + STEP_S, STEP_S)
     whole = (0.0, float(time_s[-1]))
     rates = np.radians(2 * habits.tremor_deg) * _oscillate(time_s, whole, TREMOR_HZ, rng, 3)

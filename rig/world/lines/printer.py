@@ -43,7 +43,7 @@ class PrinterFaults:
 
 
 class Printer:
-    """A device switched on at the virtual time `time_s`, when its clock reads `uptime_s`.
+    """A device that prints its samples, switched on at the virtual time `time_s`, when its clock reads `uptime_s`.
 
     - `motion_at`: its motion over time, rate in rad/s and specific force in g.
     - `field_at`: flux density in its axes over time, T; `magnetometer`: the errors of its reading.

@@ -74,7 +74,7 @@ class JointErrors:
         self._rest: tuple[Joints, Joints] = ((), ())  # encoder and true angles at the last rest
 
     def step(self, time_s: float, smooth_qd_rad_s: Joints, q_rad: Callable[[], Joints]) -> None:
-        """Update the errors with the joints' smooth speeds at the end of a tick, and their angles.
+        """Update the errors with the joints' speeds without ripple at the end of a tick, and their angles.
 
         `q_rad` is called only at reversals. A joint's own speed changes its sign where the joint settles or is shaken.
         """

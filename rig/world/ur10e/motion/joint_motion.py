@@ -204,7 +204,7 @@ class JointMotion:
     ) -> tuple[list[float], list[float], list[float]]:
         """Return angles, speeds and accelerations with the ripples that are proportional to speed.
 
-        The lists `target`, `speed` and `change` are changed to the smooth angles, speeds and accelerations.
+        The lists `target`, `speed` and `change` are changed to those without ripple.
         """
         qd, qdd = [0.0] * 6, [0.0] * 6
         for joint, (offset, gain) in enumerate(zip(tick.offset, tick.gain, strict=True)):

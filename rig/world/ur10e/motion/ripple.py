@@ -1,7 +1,7 @@
 """The servo's vibration: a position ripple locked to the joint's angle, so that whole turns integrate exactly.
 
-q = u + Σ Aₙ sin(n u + φₙ), with u the smooth angle that drives the joint and n whole cycles a turn. After a turn of u
-the joint has made a turn too, regardless of the ripple; the mean speed in SIX, section on vibration, requires this.
+q = u + Σ Aₙ sin(n u + φₙ), with u the angle without ripple and n whole cycles a turn. After a turn of u the joint has
+made a turn too, regardless of the ripple; the mean speed in SIX, section on vibration, requires this.
 """
 
 from collections.abc import Sequence
@@ -17,28 +17,28 @@ class Ripple:
     components: tuple[tuple[int, float, float], ...] = ()
 
     def angle(self, smooth_rad: float) -> float:
-        """Return the joint's angle, rad, for a smooth angle."""
+        """Return the joint's angle, rad, from its angle without ripple."""
         ripple = 0.0
         for n, a, phase in self.components:
             ripple += a * sin(n * smooth_rad + phase)
         return smooth_rad + ripple
 
     def gain(self, smooth_rad: float) -> float:
-        """Return the exact derivative of the joint's angle with respect to the smooth angle."""
+        """Return the exact derivative of the joint's angle with respect to its angle without ripple."""
         ripple = 0.0
         for n, a, phase in self.components:
             ripple += a * n * cos(n * smooth_rad + phase)
         return 1.0 + ripple
 
     def bend(self, smooth_rad: float) -> float:
-        """Return the second derivative of the joint's angle with respect to the smooth angle."""
+        """Return the second derivative of the joint's angle with respect to its angle without ripple."""
         ripple = 0.0
         for n, a, phase in self.components:
             ripple += a * n * n * sin(n * smooth_rad + phase)
         return -ripple
 
     def smooth(self, angle_rad: float) -> float:
-        """Return a smooth angle for which the joint's angle is `angle_rad`, by bisection, valid for any amplitude."""
+        """Return an angle without ripple for the joint's angle `angle_rad`, by bisection, valid for any amplitude."""
         if not self.components:
             return angle_rad
         reach = sum(a for _, a, _ in self.components)
