@@ -47,7 +47,7 @@ class ColumnSection(Section):
     @field_validator("unit")
     @classmethod
     def refuse_unknown_unit(cls, value: str | None) -> str | None:
-        """Refuse a unit that is not in the table."""
+        """Refuse a unit that is not in `ALLOWED_UNITS`."""
         if value is not None and value not in ALLOWED_UNITS:
             raise ValueError(f"this unit is not known; allowed: {', '.join(ALLOWED_UNITS)}")
         return value

@@ -78,7 +78,7 @@ def _add_kind(section: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _chosen(key: str, sections: Mapping[str, Mapping[str, Any]], text: str) -> dict[str, Any]:
-    """Return the schema of a section whose keys depend on one key; all others are allowed if its value is unknown."""
+    """Return the schema of a section: the value of `key` selects one of `sections`; another value allows any keys."""
     names = {"anyOf": [{"enum": [*sections]}, {"type": "string"}], "description": f"one of {', '.join(sections)}"}
     branches = [
         {"if": {"properties": {key: {"const": name}}, "required": [key], "type": "object"}, "then": section}

@@ -62,7 +62,7 @@ class Loaded:
 
     @property
     def laboratory(self) -> str | None:
-        """The file with all defaults if it has a `world:` section, else None."""
+        """The file's text with all defaults filled in, if it has a `world:` section, else None."""
         return self.text if self.simulated else None
 
 
@@ -106,7 +106,7 @@ def load(
 
 
 def load_sensors(path: str | Path, overrides: Sequence[str] = ()) -> tuple[SensorsConfig, str | None]:
-    """Read the sensors' part of a configuration, and the file with defaults if it has a `world:` section, else None.
+    """Read the sensors' part of a configuration; also return its text as `Loaded.laboratory` does.
 
     A file with this section must be complete, because the laboratory simulates all of it. Raise `ConfigurationRefused`.
     """

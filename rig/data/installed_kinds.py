@@ -31,7 +31,7 @@ class InstalledKind(Protocol):
 
 @cache
 def installed_kinds() -> tuple[InstalledKind, ...]:
-    """Return the kinds of the packages installed here. Raise Refused `kind_not_loaded`."""
+    """Return the kinds of sensors that installed packages add. Raise Refused `kind_not_loaded`."""
     return tuple(kind for _, kind in load_entry_points(GROUP, _not_loaded))
 
 

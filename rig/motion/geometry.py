@@ -98,7 +98,7 @@ def _twists(arm: DenavitHartenberg) -> tuple[Array, Array]:
 
 @lru_cache
 def _link_coefficients(arm: DenavitHartenberg) -> Array:
-    """Return the coefficients (n, 3, 4, 4) of cosine, sine and 1 of a joint's angle in its link's transform.
+    """Return coefficients (n, 3, 4, 4): a link's transform is their sum, weighted by cos θ, sin θ, 1 of its joint.
 
     A link's transform is a rotation about z, translations along z and x, and a rotation about x.
     """
@@ -148,7 +148,7 @@ def distance_to_upper_arm(
 ) -> Array:
     """Return distances (…,), m, from a point of the flange's frame to the middle of the upper arm.
 
-    The middle is the drawing's line from shoulder to elbow, offset by `offset_m` towards wrist 1.
+    The middle is the nominal line from shoulder to elbow, offset by `offset_m` towards wrist 1.
     """
     frames = _frames(q_rad, arm)
     shoulder, elbow, _ = _find_bends(frames)

@@ -42,8 +42,8 @@ def find_clearance_problems(
 ) -> list[Problem]:
     """Return the problems of steps that bring flange, payload's centre or extension too near to forearm or upper arm.
 
-    Lengths are those of `arm` if given, otherwise of the model's drawing. A motion from or to an attitude must keep
-    `dwell_room_m` from the forearm, all others `sweep_room_m`.
+    Lengths are those of `arm` if given, otherwise nominal. A motion from or to an attitude must keep `dwell_room_m`
+    from the forearm, all others `sweep_room_m`.
     """
     problems = []
     for path in _list_paths(plan, model):
@@ -74,8 +74,8 @@ def find_clearance_problems(
 def keeps_clear(start_q_rad: Joints, target_q_rad: Joints, carried: FlangeLoad, model: TurnerModel) -> bool:
     """Return whether the load stays far enough from the arm on a straight path in joint space, sweep or transfer.
 
-    Lengths are those of the model's drawing, because plans are made before an arm is connected. Paths beyond the
-    joints' limits count as clear; other checks refuse them.
+    Lengths are nominal, because plans are made before an arm is connected. Paths beyond the joints' limits count as
+    clear; other checks refuse them.
     """
     if not _is_within(model.limits, start_q_rad, target_q_rad):
         return True
@@ -95,7 +95,7 @@ def _measure_to_forearm(
 ) -> tuple[str, float]:
     """Return the nearest part of the load to the forearm in the poses (N, 6), and its distance, m."""
     names, points = _list_load_points(carried)
-    offset_m, lengths = model.forearm.offset_m, arm or model.drawing
+    offset_m, lengths = model.forearm.offset_m, arm or model.nominal_geometry
     return _find_nearest(names, distance_to_forearm(q_rad, points, lengths, offset_m=offset_m))
 
 
@@ -104,7 +104,7 @@ def _measure_to_upper_arm(
 ) -> tuple[str, float]:
     """Return the nearest part of the load to the upper arm in the poses (N, 6), and its distance, m."""
     names, points = _list_load_points(carried)
-    offset_m, lengths = model.upper_arm.offset_m, arm or model.drawing
+    offset_m, lengths = model.upper_arm.offset_m, arm or model.nominal_geometry
     return _find_nearest(names, distance_to_upper_arm(q_rad, points, lengths, offset_m=offset_m))
 
 

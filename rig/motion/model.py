@@ -20,7 +20,7 @@ CLIENT_SPEED_RAD_S = 3.14  # the highest speed that `ur_rtde` accepts, slightly 
 
 @dataclass(frozen=True, slots=True)
 class Tube:
-    """A link of `radius_m`, whose middle is `offset_m` from its line in the drawing, towards wrist 1."""
+    """A link of `radius_m`, whose middle is `offset_m` from its nominal line, towards wrist 1."""
 
     offset_m: float
     radius_m: float
@@ -41,7 +41,7 @@ class TurnerModel:
     series: Series
     robot_type: int
     joints: tuple[str, ...]
-    drawing: DenavitHartenberg
+    nominal_geometry: DenavitHartenberg
     limits: JointLimits
     payload_kg: float
     forearm: Tube
@@ -69,7 +69,7 @@ def load_turner_model(key: ModelName) -> TurnerModel:
         series=row["series"],
         robot_type=row["robot_type"],
         joints=joints,
-        drawing=DenavitHartenberg(
+        nominal_geometry=DenavitHartenberg(
             theta_rad=(0.0,) * len(joints),
             a_m=tuple(row["a_m"]),
             d_m=tuple(row["d_m"]),

@@ -337,7 +337,7 @@ class NotRemembered:
 
 @dataclass(frozen=True, slots=True)
 class Advice:
-    """The next step after a failure, with data in `folder`: `command` continues, or `repeats` refused sweeps."""
+    """The `command` to give after a failure with data in `folder`; `repeats`: it repeats refused sweeps."""
 
     folder: Path
     command: str

@@ -108,7 +108,7 @@ def _solve_levenberg_marquardt(means: Array, sweep: sim.SimulatedSweep) -> Array
 
 
 def _summarise(errors: Array) -> dict[str, float]:
-    """Return a box plot's numbers: quartiles, and whiskers at the last errors within 1.5 boxes of the box."""
+    """Return a box plot's numbers: quartiles, and whiskers at the last errors within 1.5 interquartile ranges."""
     low, median, high = np.percentile(errors, [25, 50, 75])
     reach = WHISKER * (high - low)
     inside = errors[(errors >= low - reach) & (errors <= high + reach)]

@@ -47,14 +47,14 @@ class OnArm:
             vibration=_build_vibration(arm, world.seed),
             speed_limit_rad_s=model.speed_rad_s,
         )
-        self.arm = TrueArm(arm, build_site(world.site), motion, random, model.drawing)
+        self.arm = TrueArm(arm, build_site(world.site), motion, random, model.nominal_geometry)
         about_x, about_y, about_z = arm.tcp_rotation_deg
         self.robot = Robot(
             RobotIdentity(arm.serial_number, model.polyscope),
             motion,
             arm.remote_control,
             arm.speed_slider,
-            build_calibrated_links(arm.calibration, drawing=model.drawing),
+            build_calibrated_links(arm.calibration, nominal_geometry=model.nominal_geometry),
             model=model,
             tool_rotation_rad=(radians(about_x), radians(about_y), radians(about_z)),
         )

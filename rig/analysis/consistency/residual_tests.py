@@ -118,9 +118,9 @@ def remaining_directions(model_basis: Array, columns: Array) -> Array:
 
 
 def chi_square_of(readings: Array, base: Array, columns: Array | None) -> tuple[float, int]:
-    """Return the χ² that columns explain of the residuals of `base`, and its degrees of freedom.
+    """Return the χ² of readings (n,) that columns (n, k) explain after a fit of `base` (n, p), and its dof.
 
-    None stands for all residuals, without a decomposition, which would be slow and need not converge.
+    Columns None stand for all residuals, without a decomposition, which would be slow and need not converge.
     """
     model_basis = orthonormal_basis(base)
     unexplained = readings - model_basis @ (model_basis.T @ readings)

@@ -134,9 +134,9 @@ def _look_up(
 def _judge(
     file: Path, content: bytes, looks: "Mapping[Path, FileInspection]", history_answer: "FileEntries | None"
 ) -> VerifiedFile:
-    """Judge one file by its signature; without a signature, by a signed file that contains it, or by the history.
+    """Judge a file by its signature or, without one, by a signed file that contains it, or by the history.
 
-    `looks` are the inspections of all files. If the history confirms an unsigned file, a signer need not be trusted.
+    `looks` are the inspections of all files. An unsigned file that the history confirms needs no trusted signer.
     """
     look, attached_to = looks[file], None
     problems = look.problems

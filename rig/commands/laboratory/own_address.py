@@ -22,8 +22,8 @@ MAX_CANDIDATES = 250
 def find_own_address(config: SensorsConfig, laboratory: str | None) -> Iterator[list[str]]:
     """Yield the overrides that give a configuration's laboratory an address of its own during the block.
 
-    `laboratory` is the file with all defaults if it simulates a laboratory, else None. There are no overrides if the
-    address is free, the laboratory is real, or no candidate is free; in the last case a later claim fails.
+    `laboratory` is as in `Loaded`. There are no overrides if the address is free, the laboratory is real, or no
+    candidate is free; in the last case a later claim fails.
     """
     if laboratory is None or not isinstance(config, RigConfig):
         yield []

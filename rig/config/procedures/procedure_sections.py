@@ -198,7 +198,7 @@ class SixObservationSection(SixSweepsSection):
         return self.stages
 
     def problems(self, config: RigConfig) -> Iterator[str]:
-        """Yield the problems of sweeps, of stages with a target or verification, of magnetometers with stages or arcs.
+        """Yield the problems of sweeps, and what stages exclude: a target, a verification, magnetometers (as do arcs).
 
         With stages or arcs a magnetometer is recorded, but cannot be calibrated. Without this check only the end of the
         run would show it.

@@ -48,7 +48,7 @@ class ShortestSection(Section):
 
 
 def alternative_procedure(document: Mapping[str, Any]) -> str | None:
-    """Return the procedure to use instead with a turner that is not an arm; None for an arm."""
+    """Return the procedure to recommend for a turner that is not an arm; None for an arm."""
     turner = document.get("turner")
     kind = str(turner.get("kind")) if isinstance(turner, dict) else ""
     if kind not in UNREPEATED_PROCEDURES:

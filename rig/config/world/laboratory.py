@@ -94,7 +94,7 @@ class WorldSiteSection(Section):
 
 
 class CalibrationSection(Section):
-    """Deviations of the arm from its drawing, as measured by its maker. The controller reports and uses them."""
+    """Deviations of the arm from its nominal geometry, measured by its maker. The controller reports and uses them."""
 
     delta_theta_rad: Joints = Field(default=NO_ANGLES, description="added to the angle of each joint")
     delta_a_mm: Lengths = Field(default=NO_LENGTHS, description="added to the length a of each link in the drawing")

@@ -84,7 +84,7 @@ class ForkedReader:
 
 
 def _run_forked(read: Callable[[], NoReturn], out: int, complaints: int, environment: Mapping[str, str]) -> NoReturn:
-    """Redirect the files and signals of a forked process, then call `read`, which ends it."""
+    """Redirect stdout, stderr (`complaints`) and signals of a forked process; then call `read`, which ends it."""
     try:
         os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
         os.dup2(out, 1)

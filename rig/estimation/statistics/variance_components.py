@@ -273,7 +273,7 @@ def _adapt(points: Array, logs: Array, proposals: Sequence[tuple[Array, Array]])
 
 
 def _find_weights(points: Array, logs: Array, proposals: Sequence[tuple[Array, Array]]) -> Array:
-    """Return the normalised weights (s,) of samples (s, k), each drawn by one of the proposals."""
+    """Return normalised weights (s,) of samples (s, k) with log-densities `logs` (s,), each drawn from a proposal."""
     densities = []
     for middle, root in proposals:
         standard = np.linalg.solve(root, (points - middle).T)

@@ -91,7 +91,7 @@ class ParameterMove:
 
 @dataclass(frozen=True)
 class Compared:
-    """A stated result, and the present `answer` from its recordings; None without an answer."""
+    """A stated result, and the present `answer` from its recordings, or None; `of_u` as in `RecomputeOutcome`."""
 
     stated: StatedResult
     answer: Answer | None

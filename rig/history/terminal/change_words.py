@@ -64,5 +64,5 @@ def _size_words(change: Change) -> str:
 
 
 def add_sign(value: float) -> str:
-    """Return a value as text with a sign and at most three digits."""
+    """Return a value as text with a sign and at most three significant digits."""
     return f"{'−' if value < 0 else '+'}{figures(abs(value))}"

@@ -32,7 +32,7 @@ def _nearest_neighbours(between_s: Array, first: int) -> list[int]:
 
 
 def _improve(order: list[int], between_s: Array) -> list[int]:
-    """Return the order after repeatedly reversing the part between two edges that shortens it most."""
+    """Improve a tour by 2-opt: reverse the part between two edges that shortens it most, until none does."""
     while True:
         starts, ends = np.array(order), np.roll(order, -1)
         durations_s = between_s[starts, ends]

@@ -170,7 +170,7 @@ def _make_readers(
 def stamp_std_s(lines: LinesSection, rate_hz: float, step_s: float = 0.0) -> float | None:
     """Return the standard uncertainty of a sample's time on the clock that stamps it; None if it is negligible.
 
-    The device prints its time in steps of `step_s`; 0 for whole units, except seconds.
+    The device prints its time in steps of `step_s`; 0 stands for steps of the time's unit, or for none in seconds.
     """
     if lines.clock == "arrival":
         return 1e-3 * lines.jitter_ms / 3**0.5

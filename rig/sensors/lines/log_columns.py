@@ -154,7 +154,7 @@ def _map_triad(
 
 
 def _list_others(layout: TableLayout, entries: Sequence[ColumnEntry]) -> list[str]:
-    """Return the columns with a heading or numbers that the map does not contain."""
+    """Return the columns that no entry of the map reads, if they have a heading or numbers."""
     read = {entry["column"] for entry in entries}
     return [
         heading or f"column {index + 1}"
@@ -258,7 +258,7 @@ def _group_columns(
 
 
 def _order_axes(indices: Sequence[int], names: Sequence[str]) -> list[int]:
-    """Return the columns; if their names are x, y and z alone, in this order, because some loggers write z first."""
+    """Return the columns, in the order x, y, z if these are their names: some loggers write z first."""
     axes = iter(sorted((index for index in indices if _is_axis(names[index])), key=lambda index: names[index]))
     return [next(axes) if _is_axis(names[index]) else index for index in indices]
 

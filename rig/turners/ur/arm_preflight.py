@@ -106,7 +106,7 @@ def _tool_problems(plan: Plan, report: ArmReport) -> list[Problem]:
 def kinematics_problems(arm: ArmSection, report: ArmReport) -> list[Problem]:
     """Return the problems of the controller's description of its arm, if the configuration uses it.
 
-    These are a missing description, and wrists whose axes in the flange's frame at home differ from the drawing's.
+    These are a missing description, and wrists whose axes in the flange's frame at home differ from the nominal ones.
     """
     if arm.kinematics == "nominal":
         return []
@@ -120,7 +120,7 @@ def kinematics_problems(arm: ArmSection, report: ArmReport) -> list[Problem]:
             )
         ]
     home, model = find_home(arm), model_of(arm)
-    actual, nominal = (flange_axes(home, chain)[:, WRISTS] for chain in (report.kinematics, model.drawing))
+    actual, nominal = (flange_axes(home, chain)[:, WRISTS] for chain in (report.kinematics, model.nominal_geometry))
     angles = np.arctan2(np.linalg.norm(np.cross(actual, nominal, axis=0), axis=0), np.sum(actual * nominal, axis=0))
     return [
         Problem(
@@ -141,5 +141,9 @@ def make_recorded(arm: ArmSection, report: ArmReport) -> TurnerIdentity:
 
 
 def _geometry(arm: ArmSection, report: ArmReport) -> DenavitHartenberg:
-    """Return the geometry for all computations: the factory's measurement of this arm, or the drawing of its model."""
-    return model_of(arm).drawing if arm.kinematics == "nominal" or report.kinematics is None else report.kinematics
+    """Return the geometry for all computations: the factory's measurement of this arm, or its model's nominal one."""
+    return (
+        model_of(arm).nominal_geometry
+        if arm.kinematics == "nominal" or report.kinematics is None
+        else report.kinematics
+    )

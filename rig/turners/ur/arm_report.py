@@ -13,7 +13,7 @@ class ArmSetup:
     """The arm for which the controller is set up: the maker's type number, lengths, joint limits."""
 
     robot_type: int
-    drawing: DenavitHartenberg
+    nominal_geometry: DenavitHartenberg
     limits: JointLimits
 
 

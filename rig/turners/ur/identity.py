@@ -31,7 +31,7 @@ E_SERIES_MODELS = {
     9: "UR15",
 }
 CB3_MODELS = {1: "UR5", 2: "UR10", 3: "UR3"}
-LENGTH_TOLERANCE_M = 0.01  # a factory's measurement differs from the drawing by a few millimetres
+LENGTH_TOLERANCE_M = 0.01  # a factory's measurement differs from nominal by a few millimetres
 OTHER_ARM_REMEDY = "Correct arm.host, or name the arm that is there in arm.model"
 
 
@@ -85,7 +85,7 @@ def identity_problems(arm: "ArmSection", report: ArmReport) -> list[Problem]:
     elif model.series == "CB3":
         return [_mismatch(arm, report, f"by its software, {version_text(report.version)}")]
     setup, kinematics = report.setup, report.kinematics
-    chains = [] if setup is None else [setup.drawing]
+    chains = [] if setup is None else [setup.nominal_geometry]
     if kinematics is not None and (setup is None or arm.kinematics == "controller"):
         chains.append(kinematics)
     if not chains and robot_type is None:
@@ -128,7 +128,7 @@ def _other_length(arm: DenavitHartenberg, model: TurnerModel) -> str | None:
 
     from rig.motion.geometry import LENGTHS, lengths_m
 
-    lengths, nominal = lengths_m(arm), lengths_m(model.drawing)
+    lengths, nominal = lengths_m(arm), lengths_m(model.nominal_geometry)
     worst = int(np.argmax(np.abs(lengths - nominal)))
     if abs(lengths[worst] - nominal[worst]) <= LENGTH_TOLERANCE_M:
         return None

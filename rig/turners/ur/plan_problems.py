@@ -22,7 +22,7 @@ def plan_problems(
     """Return the problems of a plan: invalid steps, and limits of position, speed, acceleration, payload and clearance.
 
     Clearance is the distance of the flange and its payload from the arm. The narrower of the `controller`'s and the
-    `model`'s limits is used. Lengths are those of `arm` if given, otherwise of the drawing.
+    `model`'s limits is used. Lengths are those of `arm` if given, otherwise nominal.
     """
     problems = find_step_problems(plan)
     moving = [motion for motion in plan.motions if travels(motion)]

@@ -72,7 +72,7 @@ class StopOrder:
         return self._deadline_s - time.monotonic()
 
     def _give(self, path: StopPath) -> None:
-        """Stop the program by this path, and note and ask whether the controller has done so."""
+        """Stop the program by this path, record the answer, and poll whether the program has ended."""
         try:
             # At any time, however late: ending a program needlessly is better than an arm that goes on.
             with closing(path.open(max(MIN_TIMEOUT_S, min(PATH_TIMEOUT_S, self._remaining_s)))) as connection:
@@ -174,7 +174,7 @@ class ArmStop:
 
 
 def _add_refusals(what: str, refusals: str) -> str:
-    """Return a sentence with the paths that refused the stop."""
+    """Return the sentence `what` with the refusals of the stop, if any, in brackets."""
     return f"{what} ({refusals})" if refusals else what
 
 

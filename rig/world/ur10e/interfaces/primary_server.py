@@ -143,18 +143,18 @@ def _list_parameters(links: Links) -> list[float]:
 def _kinematics(robot: Robot) -> bytes:
     """Return the arm's own links, including the calibration, and whether they are calibrated."""
     angles = [link.theta_rad for link in robot.links]
-    status = CALIBRATED if robot.links != links(drawing=robot.model.drawing) else NOT_CALIBRATED
+    status = CALIBRATED if robot.links != links(nominal_geometry=robot.model.nominal_geometry) else NOT_CALIBRATED
     return struct.pack(">6I24dI", *[1] * 6, *angles, *_list_parameters(robot.links), status)
 
 
 def _configuration(robot: Robot) -> bytes:
-    """Return the configuration: the model's drawing, and its joint limits restricted by the safety settings."""
+    """Return the configuration: nominal geometry, and joint limits as restricted by the safety settings."""
     model = robot.model
     positions = [value for limit in model.limit_rad for value in (-limit, limit)]
     speeds = [value for speed in model.speed_rad_s for value in (speed, ACCELERATION_LIMIT_RAD_S2)]
     defaults = [1.05, 1.4, 0.25, 1.2, 0.5]  # joint speed and acceleration, tool speed and acceleration, radius
-    drawing = _list_parameters(links(drawing=model.drawing))
-    numbers = [*positions, *speeds, *defaults, *drawing, *[0.0] * 6]
+    nominal_geometry = _list_parameters(links(nominal_geometry=model.nominal_geometry))
+    numbers = [*positions, *speeds, *defaults, *nominal_geometry, *[0.0] * 6]
     return struct.pack(f">{len(numbers)}d4i", *numbers, 0, 0, model.robot_type, 0)
 
 

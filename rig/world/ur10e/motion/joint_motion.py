@@ -291,7 +291,7 @@ class JointMotion:
         self._now = None
 
     def _map(self, start: Joints, end: Joints) -> tuple[Joints, Joints]:
-        """Return offset and gain from target to smooth angle, such that the joints rest exactly at the path's ends."""
+        """Return offset and gain from target to angle without ripple; joints rest exactly at the path's ends."""
         first = [r.smooth(q) for r, q in zip(self._ripples, start, strict=True)]
         last = [r.smooth(q) for r, q in zip(self._ripples, end, strict=True)]
         gain = tuple(  # a path shorter than any useful precision has none
