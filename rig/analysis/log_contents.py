@@ -20,7 +20,7 @@ from rig.observation.by_hand.steadiness import check_at_rest
 from rig.observation.external.attitude_import import read_attitudes
 from rig.observation.external.csv_samples import SAMPLES_MB, Samples, read_sample_table, samples_in
 from rig.observation.external.from_files import Files, build_recording
-from rig.observation.formats.column_selection import Mapped, map_motion, map_samples
+from rig.observation.formats.column_selection import MappedColumns, map_motion, map_samples
 from rig.observation.formats.csv_table import read_table
 from rig.observation.formats.mat_table import is_mat
 from rig.observation.formats.sample_files import is_in_format

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from rig.analysis.check import Check
     from rig.analysis.clock_comparison import ClockCheck
     from rig.analysis.consistency.detection_limits import DetectionLimit
-    from rig.analysis.external.external_recordings import OfSensor
+    from rig.analysis.external.external_recordings import ExternalResult
     from rig.analysis.gyroscope.calibration import SensorResult
     from rig.analysis.gyroscope.onboard_check import Agreement
     from rig.analysis.gyroscope.stage_mounts import EstimatedMount
@@ -91,7 +91,7 @@ class Outcome:
     drifts: "Drifts" = field(default_factory=dict)
     detection_limits: "Mapping[str, tuple[DetectionLimit, ...]]" = field(default_factory=dict)
     reference_detection_limits: "Mapping[str, tuple[DetectionLimit, ...]]" = field(default_factory=dict)
-    external: "Mapping[str, OfSensor]" = field(default_factory=dict)
+    external: "Mapping[str, ExternalResult]" = field(default_factory=dict)
     installed_kinds: "tuple[KindFound, ...]" = ()
     mounts: "tuple[EstimatedMount, ...]" = ()
     polynomials: "Polynomials" = field(default_factory=dict)

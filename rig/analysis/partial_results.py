@@ -44,7 +44,7 @@ class PartialGyroscope:
 
 
 @dataclass(frozen=True, slots=True)
-class SoFar:
+class PartialResults:
     """The partial results of a run: of every gyroscope, and of other sensors in finished dwells."""
 
     gyroscopes: Mapping[str, PartialGyroscope]
@@ -61,7 +61,7 @@ class _RecordedPart:
     rests: Sequence[Average]
 
 
-def so_far(runs: Sequence[RunData]) -> SoFar:
+def so_far(runs: Sequence[RunData]) -> PartialResults:
     """Return the partial results of raw readings. If a sweep or dwell was repeated, only its last execution is used."""
     sweeps: dict[str, Attempts[int, Observation]] = {}
     rests: dict[str, list[Average]] = {}
@@ -76,7 +76,7 @@ def so_far(runs: Sequence[RunData]) -> SoFar:
             sweeps[name] = sweeps.get(name, Attempts()).merge(sensor.sweeps)
             rests.setdefault(name, []).extend(sensor.rests)
         at_rest = at_rest.merge(_accelerations(run, recorded)).merge(_fields(run, recorded))
-    return SoFar(
+    return PartialResults(
         {
             name: _solve_gyroscope(attempts, rests[name], np.array(runs[-1].sensors[name].mounting))
             for name, attempts in sweeps.items()

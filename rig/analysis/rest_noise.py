@@ -25,7 +25,7 @@ MIN_READINGS = 20  # fewer may be equal by chance
 
 
 @dataclass(frozen=True, slots=True)
-class AtRest:
+class QuantityNoise:
     """The Allan deviation of one quantity at rest, in its SI unit, and the noise parameters of each axis.
 
     `longest_s`: the longest interval without a gap; `total_s`: the sum of all; `temperature_c`: lowest and highest,
@@ -48,7 +48,7 @@ class SensorAtRest:
     """
 
     sensor: RecordedSensor | None
-    quantities: Attempts[Quantity, AtRest]
+    quantities: Attempts[Quantity, QuantityNoise]
     notes: tuple[str, ...] = ()
 
 
@@ -95,7 +95,7 @@ def log_at_rest(samples: Samples) -> SensorAtRest:
     )
 
 
-def _summarise_streams(intervals: Sequence[tuple[Stream, slice]], quantity: Quantity) -> AtRest:
+def _summarise_streams(intervals: Sequence[tuple[Stream, slice]], quantity: Quantity) -> QuantityNoise:
     long = [(stream, inside) for stream, inside in intervals if inside.stop - inside.start > 2]
     readings = [_readings(stream, inside, quantity) for stream, inside in long]
     summary = _summarise_noise([stream.time_s[inside] for stream, inside in long], readings, quantity)
@@ -103,7 +103,7 @@ def _summarise_streams(intervals: Sequence[tuple[Stream, slice]], quantity: Quan
     return replace(summary, temperature_c=(min(low for low, _ in temperatures), max(high for _, high in temperatures)))
 
 
-def _summarise_noise(times_s: Sequence[Array], readings: Sequence[Array], quantity: Quantity) -> AtRest:
+def _summarise_noise(times_s: Sequence[Array], readings: Sequence[Array], quantity: Quantity) -> QuantityNoise:
     """Return the noise of intervals at rest with times (nᵢ,) and readings (nᵢ, 3). Raise Fault `stuck_sensor`."""
     if not readings:
         raise too_short("nothing stood still for longer than a few readings")
@@ -117,7 +117,7 @@ def _summarise_noise(times_s: Sequence[Array], readings: Sequence[Array], quanti
     durations_s = [float(time_s[-1] - time_s[0]) for time_s in times_s]
     interval_s = float(np.sum(durations_s) / np.sum([len(reading) - 1 for reading in readings]))
     curve = allan_curve(readings, interval_s)
-    return AtRest(
+    return QuantityNoise(
         curve=curve,
         axes=(read_axis(curve, 0), read_axis(curve, 1), read_axis(curve, 2)),
         intervals=len(readings),

@@ -18,7 +18,7 @@ REMEDY = (
 
 
 @dataclass(frozen=True, slots=True)
-class AsMounted:
+class ReversalRun:
     """The result of the run named `run`."""
 
     run: str
@@ -30,7 +30,7 @@ class AsMounted:
 class MagnetometerReversal:
     """One magnetometer in several runs; `scale` (3,) and `correction_matrix` (3, 3) are means over the runs."""
 
-    runs: tuple[AsMounted, ...]
+    runs: tuple[ReversalRun, ...]
     separation: Reversal
     scale: Array
     scale_std: Array
@@ -52,17 +52,17 @@ def reversals(runs: Sequence[tuple[str, Outcome]]) -> dict[str, MagnetometerReve
     return {name: _reversal([_require_calibrated(run, outcome, name) for run, outcome in runs]) for name in names}
 
 
-def _require_calibrated(run: str, outcome: Outcome, name: str) -> AsMounted:
+def _require_calibrated(run: str, outcome: Outcome, name: str) -> ReversalRun:
     magnetometers = outcome.magnetometers
     if name in magnetometers.results:
-        return AsMounted(run, outcome, magnetometers.results[name])
+        return ReversalRun(run, outcome, magnetometers.results[name])
     if name in magnetometers.faults:
         why = f"in {run} {name} was not calibrated: {magnetometers.faults[name]}"
         raise Refused("no_magnetometer", why, "Correct that, and run again")
     raise Refused("no_magnetometer", f"{run} has no recording of a magnetometer {name}", REMEDY)
 
 
-def _reversal(runs: Sequence[AsMounted]) -> MagnetometerReversal:
+def _reversal(runs: Sequence[ReversalRun]) -> MagnetometerReversal:
     """Separate the magnetometer's bias from the arm's field. Raise Refused `runs_do_not_match`."""
     first = _list_common(runs[0])
     for other in runs[1:]:
@@ -93,7 +93,7 @@ def _scale_std(results: Sequence[MagnetometerResult]) -> Array:
     return std
 
 
-def _list_common(run: AsMounted) -> dict[str, object]:
+def _list_common(run: ReversalRun) -> dict[str, object]:
     """Return the values, by name, in which the runs of a reversal must agree."""
     sensor, settings = run.result.sensor, run.outcome.settings
     return {

@@ -22,7 +22,7 @@ MAX_ANSWER = 200  # characters
 CHECK_INTERVAL_S = 0.5  # of whether the page still exists
 
 
-class OnPage:
+class PageOperator:
     """The `Voice` of an operator who answers on a page; the page also shows the station's state."""
 
     def __init__(self, sections: Sections, control: Control) -> None:
@@ -87,13 +87,13 @@ class OnPage:
 
 
 @contextmanager
-def open_page(present: Present, address: PageAddress) -> Iterator[tuple[OnPage, str]]:
+def open_page(present: Present, address: PageAddress) -> Iterator[tuple[PageOperator, str]]:
     """Open the page that shows `present` during the block; yield the page and its URL.
 
     The page's last state shows how the station ended. Raise Refused `page_address`.
     """
     sections, control = Sections(), Control(may_answer=False)
-    voice = OnPage(sections, control)
+    voice = PageOperator(sections, control)
     with serving(sections, control, None, address, Page("station.html", voice.routes)) as url:
         present.listeners = (*present.listeners, voice.hear)
         voice.hear(present.now)

@@ -14,7 +14,7 @@ from urllib.parse import urlsplit
 import yaml
 from pydantic import BaseModel, ValidationError
 
-from rig.config.files.layers import BASE_KEY, SET, Layered, Places, merge_layers, read_layers
+from rig.config.files.layers import BASE_KEY, SET, MergedLayers, Places, merge_layers, read_layers
 from rig.config.files.verbatim_text import take_text_as_written
 from rig.config.files.yaml_text import Location, Unreadable, format_path
 from rig.config.models import ArmSection, ProcedureSection, RigConfig, SensorsConfig, StatementConfig, TurnerSection
@@ -160,7 +160,7 @@ def _refusing_unreadable(source: str, give: str = CONFIGURATION_REMEDY) -> Itera
         raise ConfigurationRefused(source, [str(error)], give) from None
 
 
-def _require(model: type[Model], data: Any, layered: Layered, source: str, more: Sequence[str] = ()) -> Model:
+def _require(model: type[Model], data: Any, layered: MergedLayers, source: str, more: Sequence[str] = ()) -> Model:
     """Return `data` as a `model`. Raise `ConfigurationRefused` listing every problem, and those given as `more`."""
     section, problems = _validate(model, data, (), layered)
     if layered.problems or more or section is None:
@@ -168,7 +168,7 @@ def _require(model: type[Model], data: Any, layered: Layered, source: str, more:
     return section
 
 
-def _validate_all(layered: Layered, source: str, sections: Sections, turners: Turners) -> Loaded:
+def _validate_all(layered: MergedLayers, source: str, sections: Sections, turners: Turners) -> Loaded:
     """Return the valid configuration. Raise ConfigurationRefused with all problems of all sections."""
     document = layered.document
     rig_part = {key: value for key, value in document.items() if key != "world"}
@@ -196,7 +196,7 @@ def _dump(document: Mapping[str, Any]) -> str:
 
 
 def _validate_rig(
-    document: Mapping[str, Any], sections: Sections, turners: Turners, layered: Layered
+    document: Mapping[str, Any], sections: Sections, turners: Turners, layered: MergedLayers
 ) -> tuple[RigConfig | None, list[str]]:
     """Validate all sections except the world's. The procedure's name and the turner's kind select their models."""
     procedure, problems = _validate_procedure(document.get("procedure", {}), sections, layered)
@@ -210,7 +210,9 @@ def _validate_rig(
     return (None if problems else config), problems
 
 
-def _validate_procedure(data: Any, sections: Sections, layered: Layered) -> tuple[ProcedureSection | None, list[str]]:
+def _validate_procedure(
+    data: Any, sections: Sections, layered: MergedLayers
+) -> tuple[ProcedureSection | None, list[str]]:
     """Validate the procedure's section; if its name is unknown, by the keys of the procedure with the nearest name."""
     name = data.get("name", DEFAULT_PROCEDURE) if isinstance(data, dict) else DEFAULT_PROCEDURE
     if sections is None:
@@ -239,7 +241,7 @@ def _validate_procedure(data: Any, sections: Sections, layered: Layered) -> tupl
 
 
 def _validate_turner(
-    document: Mapping[str, Any], turners: Turners, layered: Layered
+    document: Mapping[str, Any], turners: Turners, layered: MergedLayers
 ) -> tuple[TurnerSection | None, list[str]]:
     """Validate the turner's section: `arm`, or `turner` with its kind. A wrong kind is a single problem."""
     if "turner" not in document:
@@ -267,7 +269,7 @@ def _validate_turner(
     return None, [problem]
 
 
-def _validate(model: type[Model], data: Any, prefix: Location, layered: Layered) -> tuple[Model | None, list[str]]:
+def _validate(model: type[Model], data: Any, prefix: Location, layered: MergedLayers) -> tuple[Model | None, list[str]]:
     take_text_as_written(model, data, prefix, layered.written)
     try:
         return model.model_validate(data), []
@@ -287,7 +289,7 @@ SHAPES = {
 }
 
 
-def _explain(model: type[BaseModel], item: Any, prefix: Location, layered: Layered) -> str:
+def _explain(model: type[BaseModel], item: Any, prefix: Location, layered: MergedLayers) -> str:
     """Return one validation error as a line: path, line number, fault, allowed values, nearest spelling."""
     location: Location = item["loc"]
     where = _describe_location((*prefix, *location), layered.places)
@@ -312,7 +314,7 @@ def _explain(model: type[BaseModel], item: Any, prefix: Location, layered: Layer
     return f"{where}: {words}" if (*prefix, *location) else words  # what concerns the whole file has no place in it
 
 
-def _hint_at_override(section: Location, layered: Layered) -> str:
+def _hint_at_override(section: Location, layered: MergedLayers) -> str:
     """Return the sensors that a misspelt `--set sensors.NAME.…` may mean; none if a file has this section."""
     if layered.places.get(section) != SET:
         return ""

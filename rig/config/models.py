@@ -107,7 +107,7 @@ class ArmSection(TurnerSection):
     kinematics: Literal["controller", "nominal"] = Field(
         default="controller",
         description="source of the arm's geometry: `controller`, as the factory measured this arm; "
-        "`nominal`, the drawing of every arm of its model (the controller must still say that it drives one)",
+        "`nominal`, the same for every arm of its model (the controller must still say that it drives one)",
     )
 
     @field_validator("host")

@@ -14,7 +14,7 @@ from rig.data.result_file import ResultDocument
 from rig.data.run_folder import RESULT, recordings
 from rig.history.entered.finished_run import CERTIFICATES, DOCUMENTS, content_sha256, document_sha256, recording_of
 from rig.history.entered.index import run_row, unlike
-from rig.history.store import History, Kept, Past
+from rig.history.store import History, KeptRun, Past
 from rig.report.findings.history_records import HistoryRecord
 from rig.station.words import calibrations_in_words
 
@@ -56,7 +56,7 @@ def examine_history(history: History) -> Iterator[EntryState]:
             yield from _unknown(folder, documents)
 
 
-def _contradictions(run: Kept, pasts: Sequence[Past]) -> Iterator[str]:
+def _contradictions(run: KeptRun, pasts: Sequence[Past]) -> Iterator[str]:
     """Yield the first contradictions between the rows of a run and its result, then the number of others."""
     try:
         if content_sha256(run.result) != run.content_sha256:
@@ -86,7 +86,7 @@ def _files_by_folder(history: History) -> Mapping[str, set[tuple[str, str]]]:
 
 
 def _files(
-    run: Kept, folder: Path | None, this_computer: str, entered: Mapping[str, set[tuple[str, str]]]
+    run: KeptRun, folder: Path | None, this_computer: str, entered: Mapping[str, set[tuple[str, str]]]
 ) -> Iterator[EntryState]:
     """Yield the state of each recording and document of the run."""
     if not run.recordings and not run.documents:
@@ -132,7 +132,7 @@ def _unknown(folder: Path, entered: Mapping[str, set[tuple[str, str]]]) -> Itera
             yield EntryState(str(folder / name), "unknown", "no run in this history was entered with it")
 
 
-def _names(run: Kept, folder: Path) -> set[str]:
+def _names(run: KeptRun, folder: Path) -> set[str]:
     """Return the names of the entered files; of those that may be on another computer, only the present ones."""
     possible = {RESULT, *(name for certificate in run.certificates for name, _ in certificate.files)}
     return {name for name, _ in run.documents} | {name for name in possible if (folder / name).exists()}

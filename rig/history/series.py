@@ -13,7 +13,7 @@ from rig.data.installed_kinds import quantities
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.coverage import effective_dof, joint_factors
 from rig.history.statistics.charts import MIN_RESULTS, Chart, chart, merge_charts
-from rig.history.statistics.random_effects import CONFIDENCE, Fitted, fit
+from rig.history.statistics.random_effects import CONFIDENCE, FittedModel, fit
 from rig.history.statistics.rig_effects import RigEffect, rig_effects
 from rig.history.store import Past
 from rig.report.findings.history_records import Parameter, is_scale, nominal
@@ -74,12 +74,12 @@ class Trend:
         return np.array([parameter.std_statistical for parameter in self.parameters])
 
     @cached_property
-    def mean(self) -> Fitted | None:
+    def mean(self) -> FittedModel | None:
         """The mean of the values, with an uncertainty that includes the scatter between runs."""
         return fit(np.ones((self.count, 1)), self.values, self.std) if self.enough else None
 
     @cached_property
-    def line(self) -> Fitted | None:
+    def line(self) -> FittedModel | None:
         """The straight line over time: value at the first result and slope per day; None with few results or days."""
         if not self.enough or np.ptp(self.days) < MIN_DRIFT_DAYS:
             return None
@@ -241,7 +241,9 @@ def time_of(past: Past) -> datetime:
     return datetime.fromisoformat(past.started_utc).astimezone(UTC)
 
 
-def days_to_limit(line: Fitted, last_days: float, expanded: float, max_deviation: float, nominal: float) -> int | None:
+def days_to_limit(
+    line: FittedModel, last_days: float, expanded: float, max_deviation: float, nominal: float
+) -> int | None:
     """Return the days after the last result until |value − nominal| + U reaches `max_deviation`, or None.
 
     None means more than ten years. `line` is value = c₀ + c₁ t, t in days like `last_days`. U combines the line's

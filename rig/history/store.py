@@ -19,7 +19,7 @@ from rig.errors import Refused
 from rig.history.entered import certificates
 from rig.history.entered.entering import enter_run, note_place, now_utc
 from rig.history.entered.finished_run import EnteredRecording, FinishedRun
-from rig.history.entered.issued_certificate import Issued
+from rig.history.entered.issued_certificate import IssuedCertificate
 from rig.history.storage import journal, read_back, row_numbers, schema, triggers
 from rig.history.storage.address import HistoryAddress, resolve_address
 from rig.history.storage.engine import connection_apart, engine_of
@@ -89,7 +89,7 @@ class Entered:
 
 
 @dataclass(frozen=True, slots=True)
-class Kept:
+class KeptRun:
     """A run as it was entered: its result, its recordings, and its folder's locations, the newest first.
 
     `certificates`: in the order of entry; `documents`: name and SHA-256 of its folder's other files; `row`: all other
@@ -101,7 +101,7 @@ class Kept:
     result: str
     recordings: tuple[EnteredRecording, ...]
     places: tuple[tuple[str, str], ...]
-    certificates: tuple[Issued, ...]
+    certificates: tuple[IssuedCertificate, ...]
     documents: tuple[tuple[str, str], ...]
     row: Mapping[str, Any]
 
@@ -170,7 +170,7 @@ class History:
         with self.engine.connect() as connection:
             return self._run_id(connection, content_sha256) is not None
 
-    def certify(self, content_sha256: str, certificate: Issued) -> bool:
+    def certify(self, content_sha256: str, certificate: IssuedCertificate) -> bool:
         """Add a run's certificate; return False if the run is not in the history. Raise Refused `entry_not_kept`."""
         with self._writing() as connection:
             run_id = self._run_id(connection, content_sha256)
@@ -211,7 +211,7 @@ class History:
             connection.execute(insert(schema.voided).values(row))
             journal.note(connection, schema.voided, number)
 
-    def kept(self, run_id: int | None = None) -> Iterator[Kept]:
+    def kept(self, run_id: int | None = None) -> Iterator[KeptRun]:
         """Yield all runs, or one, as they were entered, in the order of entry."""
         question = select(schema.run).order_by(schema.run.c.id)
         if run_id is not None:
@@ -287,13 +287,13 @@ _ROWS = schema.run.join(schema.calibration).outerjoin(schema.voided)
 _IN_TIME = (_RUN.started_utc, _RUN.id, _CALIBRATION.id)
 
 
-def _read_kept(connection: Connection, number: int) -> Kept:
+def _read_kept(connection: Connection, number: int) -> KeptRun:
     places, files, documents = schema.location.c, schema.recording.c, schema.document.c
     row = connection.execute(select(schema.run).where(_RUN.id == number)).mappings().one()
     locations = select(places.computer, places.path).where(places.run_id == number).order_by(places.id.desc())
     recorded = select(files.name, files.bytes, files.sha256).where(files.run_id == number).order_by(files.name)
     documented = select(documents.name, documents.sha256).where(documents.run_id == number).order_by(documents.name)
-    return Kept(
+    return KeptRun(
         number,
         row["content_sha256"],
         row["result"],

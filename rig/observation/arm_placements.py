@@ -10,13 +10,13 @@ from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.sensor_axes import nearest_rotation
 from rig.observation.average import steps_of
-from rig.observation.external.placements import Placements, Rested
+from rig.observation.external.placements import Placements, RestMeans
 from rig.observation.observed_run import ObservedRun
 from rig.observation.reference.dwell_acceleration import check_complete, trim_dwell
 from rig.observation.statistics.mean import Mean, even_mean
-from rig.observation.windows import Dwelt, Window, dwelt, inside
+from rig.observation.windows import FinishedDwell, Window, dwelt, inside
 
-NO_RESTS = Rested({}, {}, {}, (), ())
+NO_RESTS = RestMeans({}, {}, {}, (), ())
 
 
 def placements_on_arm(
@@ -40,7 +40,7 @@ def placements_on_arm(
         )
     windows, means, attitudes = zip(*readings.values(), strict=True)
     dof = np.array([np.broadcast_to(mean.dof, mean.mean.shape) for mean in means])
-    rested = Rested(
+    rested = RestMeans(
         {quantity: np.array([mean.mean for mean in means])},
         {quantity: np.array([mean.variance for mean in means])},
         {quantity: dof},
@@ -51,7 +51,7 @@ def placements_on_arm(
 
 
 def _average_dwell(
-    recording: ObservedRun, name: str, quantity: Quantity, dwell: Dwelt, thresholds: ObservationThresholds
+    recording: ObservedRun, name: str, quantity: Quantity, dwell: FinishedDwell, thresholds: ObservationThresholds
 ) -> Mean:
     """Return the mean of a dwell. Raise Fault `saturation`, and as `check_complete` does."""
     where = f"dwell {dwell.dwell.index} ({dwell.dwell.name}) of {name}"

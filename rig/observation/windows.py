@@ -44,7 +44,7 @@ class FinishedSweep:
 
 
 @dataclass(frozen=True, slots=True)
-class Dwelt:
+class FinishedDwell:
     """A dwell that was started and finished, and its window."""
 
     dwell: Dwell
@@ -72,10 +72,10 @@ def iterate_rests(run: RunData, superseded: Collection[int] = ()) -> Iterator[Wi
     yield from sorted([*rests, *dwells], key=lambda window: window.start_s)
 
 
-def dwelt(run: RunData) -> Iterator[Dwelt]:
+def dwelt(run: RunData) -> Iterator[FinishedDwell]:
     """Yield the dwells that were started and finished, in order."""
     for event, window in _pair_events(run, DwellStarted, DwellFinished):
-        yield Dwelt(event.dwell, window)
+        yield FinishedDwell(event.dwell, window)
 
 
 def _is_superseded(run: RunData, rest: Window, superseded: Collection[int]) -> bool:

@@ -6,11 +6,11 @@ from typing import Any
 from rig.data.recording.hand_events import (
     HandAsked,
     HandBegunAnew,
+    HandEvent,
     HandMoveAccepted,
     HandMoveRefused,
     HandRested,
     HandRestRefused,
-    OfTheHand,
 )
 from rig.motion.by_hand import FACES
 from rig.station.by_hand_words import RED_FRACTION, open_moves_words
@@ -50,7 +50,7 @@ def step(event: HandSeen) -> Section:
     }
 
 
-def update(before: Section, event: OfTheHand) -> Section:
+def update(before: Section, event: HandEvent) -> Section:
     """Return the page section after an event of a session by hand; rests, moves and reminders play a tone."""
     match event:
         case HandAsked(instruction, again, why):

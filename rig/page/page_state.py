@@ -7,7 +7,7 @@ from typing import Any
 from rig.analysis.check import Check
 from rig.data.installed_kinds import channel_contents
 from rig.data.quantity import TEMPERATURE, DisplayUnit, Quantity, Scalar, select_displayed
-from rig.data.recording.hand_events import HandAsked, OfTheHand
+from rig.data.recording.hand_events import HandAsked, HandEvent
 from rig.data.recording.recorded_events import BoardNotObserved, BoardObserved
 from rig.data.result_file import ResultDocument, read_result
 from rig.data.run_folder import CERTIFICATE, RESULT, TRUTH_FILE
@@ -139,7 +139,7 @@ class PageState:
                 self._add_readings(state.time_s)
             case Progress():
                 self._newest[Progress] = event
-            case _ if isinstance(event, OfTheHand):
+            case _ if isinstance(event, HandEvent):
                 self.put("hand", by_hand.update(self.sections["hand"] or {}, event))
                 if isinstance(event, HandAsked):
                     self._state("by_hand", event.instruction.words)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from rig.analysis.partial_results import PartialGyroscope, SoFar
+from rig.analysis.partial_results import PartialGyroscope, PartialResults
 from rig.data.quantity import RATE, DisplayUnit
 from rig.data.result_file import ResultDocument
 from rig.errors.attempts import Attempts
@@ -77,7 +77,7 @@ def _dwell(dwell: QuantityInDwell) -> Row:
     return {"sensor": dwell.quantity.label(dwell.sensor), "sweep": dwell.index, "by": "host", "dwell": dwell.dwell}
 
 
-def look_of(partial: SoFar) -> Look:
+def look_of(partial: PartialResults) -> Look:
     """Return the page's rows of a run in progress."""
     sensors = partial.gyroscopes
     observations = [row for name, sensor in sensors.items() for row in _sweep_rows(name, sensor.sweeps)]

@@ -21,9 +21,9 @@ from rig.analysis.design.candidate_search import (
     TARGET_NAMES,
     Budgets,
     Candidate,
-    Planned,
-    Searched,
-    Shortest,
+    PlannedCandidate,
+    SearchResult,
+    ShortestRun,
     TargetUncertainty,
     find_shortest,
 )
@@ -75,7 +75,7 @@ class RunSearch(Protocol):
     def ending(self, procedure: ProcedureSection, wanted: TargetUncertainty) -> Mapping[str, float]: ...
 
 
-def shortest_run(config: RigConfig, wanted: TargetUncertainty) -> Shortest:
+def shortest_run(config: RigConfig, wanted: TargetUncertainty) -> ShortestRun:
     """Return the shortest run of this configuration whose predicted uncertainty meets the target.
 
     A family of candidates is skipped if even its run of unlimited length misses the target by more than the factor
@@ -98,15 +98,15 @@ def shortest_run(config: RigConfig, wanted: TargetUncertainty) -> Shortest:
     unreachable = not any(wanted.is_met_by(budgets.reached) for budgets in evaluated)
     if coarse.best is None and unreachable and able and wanted.at_most_s < inf:
         unreachable = find_shortest(hopeful, what.predict, replace(wanted, at_most_s=inf)).best is None
-    fine = find_shortest(what.finer(coarse.best.candidate), what.predict, wanted) if coarse.best else Searched()
+    fine = find_shortest(what.finer(coarse.best.candidate), what.predict, wanted) if coarse.best else SearchResult()
     best = fine.best or coarse.best
     best = best and _add_target(best, what.ending(best.candidate.procedure, wanted))
     shown = best or coarse.nearest
     before = Candidate(config.procedure, (), (), what.duration_s(config.procedure))
     configured = what.predict(before)
-    return Shortest(
+    return ShortestRun(
         wanted,
-        None if configured is None else Planned(before, configured),
+        None if configured is None else PlannedCandidate(before, configured),
         best,
         coarse.nearest,
         evaluated,
@@ -159,7 +159,7 @@ def _change(section: SectionT, **keys: object) -> SectionT:
     return kind.model_validate({**dict(section), **keys})
 
 
-def _add_target(planned: Planned, keys: Mapping[str, float]) -> Planned:
+def _add_target(planned: PlannedCandidate, keys: Mapping[str, float]) -> PlannedCandidate:
     """Return the planned run with `keys` set in its procedure, so that it ends when it reaches the target."""
     procedure = planned.candidate.procedure
     with suppress(ValidationError):  # the target is larger than a configuration may state

@@ -103,7 +103,7 @@ SOURCES: Final[Mapping[type[BaseModel], tuple[Row, ...]]] = {
             "AccelerometerResult",
             same="gravity_m_s2 bias_m_s2 lever_arm_m lever_arm_std_m sweeps temperature_c correction_matrix",
         ),
-        _row("InAttitudes"),
+        _row("AttitudeCalibration"),
         _ITEM,
         _TRIAD,
         _row("ImuSolution", same="matrix second_order_s2_m reference_m_s2 delay_s rank condition warnings"),
@@ -118,7 +118,7 @@ SOURCES: Final[Mapping[type[BaseModel], tuple[Row, ...]]] = {
     accelerometer.AlignmentEntry: (_row("Alignment", rotation_rad="vector_rad"),),
     magnetometer.MagnetometerEntry: (
         _row("MagnetometerResult", same="extension_m field_t"),
-        _row("InAttitudes"),
+        _row("AttitudeCalibration"),
         _ITEM,
         _TRIAD,
         _TRIAXIAL,
@@ -132,10 +132,10 @@ SOURCES: Final[Mapping[type[BaseModel], tuple[Row, ...]]] = {
         _row("MagnetometerReversal", same="scale scale_std correction_matrix"),
         _ITEM,
     ),
-    magnetometer.AsMountedEntry: (_row("AsMounted", same="run"), _row("RecordedSensor", same="mounting")),
+    magnetometer.AsMountedEntry: (_row("ReversalRun", same="run"), _row("RecordedSensor", same="mounting")),
     attitude.IncrementsEntry: (
         _row(
-            "KnownIncrements",
+            "IncrementSolution",
             same="matrix_scatter bias_scatter_rad_s",
             clock_offset_s="clock_s",
             clock_offset_std_s="clock_std_s",
@@ -143,7 +143,7 @@ SOURCES: Final[Mapping[type[BaseModel], tuple[Row, ...]]] = {
             angle_random_walk_rad_sqrt_s="random_walk_rad_sqrt_s",
             rejected="set_aside",
         ),
-        _row("InIncrements", same="window_s"),
+        _row("IncrementCalibration", same="window_s"),
     ),
     attitude.RateSolutionEntry: (_row("TriaxialSolution", same="rank condition"),),
     budget.ContributorEntry: (_row("Contributor", same="name kind distribution half_width unit source std"),),
@@ -159,7 +159,7 @@ SOURCES: Final[Mapping[type[BaseModel], tuple[Row, ...]]] = {
     hand.MoveByHandEntry: (
         _row("MoveSummary", same="kind angle_rad turns normalised_residual", closure_error_rad="closure_rad"),
     ),
-    shared.ConditionsEntry: (_row("When", same="temperature_c temperature_range_c"),),
+    shared.ConditionsEntry: (_row("ReadingConditions", same="temperature_c temperature_range_c"),),
     shared.DetectionLimitEntry: (
         _row("DetectionLimit", same="check unit", fault="what", error_over_expanded="off_by_expanded"),
     ),

@@ -16,7 +16,7 @@ from rig.turners.turner_kind import OnState
 Connecting = Callable[[OnState, Path], AbstractContextManager[Turner]]
 
 
-class Ahead:
+class EarlyConnection:
     """A connection by `connect`, logged in `log`, made before the run that takes it over.
 
     If it fails or is lost, the run connects by itself and reports the error.

@@ -14,9 +14,9 @@ import numpy as np
 
 from rig.estimation.arrays import Array
 from rig.estimation.earth import EARTH_RATE_RAD_S, STANDARD_GRAVITY_M_S2
-from rig.estimation.gyroscope.budget import Unknown, budget
+from rig.estimation.gyroscope.budget import UnobservedErrors, budget
 from rig.estimation.gyroscope.nonlinearity import CUBE_DEVIATION, SQUARE_DEVIATION
-from rig.estimation.gyroscope.own_errors import KnownSensor
+from rig.estimation.gyroscope.own_errors import SensorProperties
 from rig.estimation.gyroscope.six_observation import PARAMETERS
 from rig.estimation.gyroscope.vector_fit import VectorInputs, centripetal_m_s2, explain
 from rig.estimation.gyroscope.vector_model import solve_vector_model
@@ -154,7 +154,7 @@ def _simulate_session(effects: Effects, rng: np.random.Generator) -> Array:
         windows_s=nominal.windows_s,
         joints=nominal.joints,
         arms_m=nominal.arms_m,
-        sensor=KnownSensor(
+        sensor=SensorProperties(
             nonlinearity=effects.nonlinearity,
             full_scale_rad_s=effects.full_scale_rad_s,
             bias_rad_s_per_k=effects.bias_rad_s_per_k,
@@ -165,7 +165,7 @@ def _simulate_session(effects: Effects, rng: np.random.Generator) -> Array:
         ),
     )
     fit = explain(inputs, np.eye(3))
-    unknown = Unknown(
+    unknown = UnobservedErrors(
         clock_std=effects.clock_known,
         clock_source="",
         state_jitter_s=effects.jitter_s,

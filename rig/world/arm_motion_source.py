@@ -23,7 +23,7 @@ from rig.world.ur10e.robot import Robot, RobotIdentity
 JOINTS = 6
 
 
-class OnArm:
+class ArmMotionSource:
     """A `MotionSource`: the `robot` to which clients talk, and the `arm` as it really moves."""
 
     def __init__(self, config: RigConfig, world: WorldSection) -> None:

@@ -47,7 +47,7 @@ from dataclasses import fields
 from functools import partial
 from typing import Any, Protocol
 
-from rig.world.arm_motion_source import OnArm
+from rig.world.arm_motion_source import ArmMotionSource
 from rig.world.arm_orders import build_arm_orders, robot_state
 from rig.world.board.heat import HeatedBody
 from rig.world.board.serial_line import SerialLine
@@ -130,7 +130,7 @@ class ControlSession:
     def _motion_orders(self) -> dict[str, Callable[..., Reply | None]]:
         """Return the orders that the laboratory's turner obeys."""
         match self._world.laboratory.motion_source:
-            case OnArm():
+            case ArmMotionSource():
                 return {
                     **self._clock_orders(),
                     "state": self._arm_state,

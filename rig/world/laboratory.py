@@ -12,7 +12,7 @@ from rig.config.models import ArmSection, RigConfig
 from rig.config.procedures.servo_section import ServoSection
 from rig.config.procedures.stage_section import mount_matrix
 from rig.config.world.laboratory import SimulatedPartSection, WorldSection
-from rig.world.arm_motion_source import OnArm
+from rig.world.arm_motion_source import ArmMotionSource
 from rig.world.autopilot.mounted_autopilots import build_autopilot_mounts
 from rig.world.board.flash_file import open_flash
 from rig.world.board.heat import HeatedBody
@@ -67,9 +67,9 @@ class Laboratory:
         return self._config.board is not None
 
     @property
-    def on_arm(self) -> OnArm:
+    def on_arm(self) -> ArmMotionSource:
         """The arm that turns the sensors. Raise TypeError if something else turns them."""
-        if not isinstance(self.motion_source, OnArm):
+        if not isinstance(self.motion_source, ArmMotionSource):
             raise TypeError("no arm turns the sensors in this laboratory")
         return self.motion_source
 
@@ -210,7 +210,7 @@ def _build_motion_source(config: RigConfig, world: WorldSection) -> MotionSource
     """Build the simulation of the configured turner."""
     match config.turner:
         case ArmSection():
-            return OnArm(config, world)
+            return ArmMotionSource(config, world)
         case ServoSection() as section:
             return ServoBench(section, world)
         case _:

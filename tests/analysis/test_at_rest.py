@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rig.analysis.rest_noise import AtRest, log_at_rest, rest_noises
+from rig.analysis.rest_noise import QuantityNoise, log_at_rest, rest_noises
 from rig.data.quantity import RATE
 from rig.data.recording.run_data import RunData
 from rig.errors import Fault
@@ -26,7 +26,7 @@ def run() -> RunData:
     return synthetic_run(SETUP)
 
 
-def rates(run: RunData) -> AtRest:
+def rates(run: RunData) -> QuantityNoise:
     return rest_noises([run])["gyro"].quantities.results[RATE]
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from rig.batch.batch_state import BatchPart
 from rig.batch.operators import Operator
-from rig.batch.page_operator import OnPage
+from rig.batch.page_operator import PageOperator
 from rig.page.server.control import Control
 from rig.page.server.sections import Sections
 from rig.page.server.serving import Page, PageAddress, serving
@@ -31,7 +31,7 @@ def answers() -> "SimpleQueue[str | None]":
 def ask(answers: "SimpleQueue[str | None]") -> Iterator[Asking]:
     """Asks the page of a station that waits for a number."""
     sections, control = Sections(), Control(may_answer=False)
-    voice = OnPage(sections, control)
+    voice = PageOperator(sections, control)
     with serving(sections, control, None, PageAddress(port=0, token=TOKEN), Page("station.html", voice.routes)) as url:
         port = urlsplit(url).port or 0
 
@@ -68,7 +68,7 @@ def test_an_answer_needs_the_token_the_page_and_the_question(ask: Asking, answer
 
 def test_a_page_that_is_lost_mounts_nothing_and_agrees_to_nothing() -> None:
     control = Control(may_answer=False)
-    voice = OnPage(Sections(), control)
+    voice = PageOperator(Sections(), control)
     control.leave()
     assert voice.answer(Question("number", "part 1, serial number:")) is None
     operator = Operator(voice)

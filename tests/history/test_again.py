@@ -15,7 +15,7 @@ from rig.history.recompute.recompute_journal import JOURNAL, RecomputeJournal, R
 from rig.history.recompute.recompute_report import counts, recompute_csv, recompute_page
 from rig.history.recompute.result_comparison import (
     Answer,
-    Compared,
+    ComparedResult,
     RecomputedResult,
     Unsolved,
     match_answers,
@@ -41,7 +41,7 @@ def given(run: FinishedRun, verdict: str = "pass") -> RecomputedResult:
     return RecomputedResult(verdict, (), history_records(run.document))
 
 
-def again(history: History, answers: Sequence[tuple[FinishedRun, Answer]], of_u: float = 0.1) -> list[Compared]:
+def again(history: History, answers: Sequence[tuple[FinishedRun, Answer]], of_u: float = 0.1) -> list[ComparedResult]:
     by_key = {run.content_sha256: answer for run, answer in answers}
     return list(match_answers(list_stated_results(history, Selection()), by_key, of_u).compared)
 

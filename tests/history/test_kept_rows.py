@@ -13,7 +13,7 @@ from sqlalchemy.exc import DBAPIError
 
 from rig.cli import main
 from rig.history.entered.finished_run import content_sha256, read_finished_run
-from rig.history.entered.issued_certificate import Issued
+from rig.history.entered.issued_certificate import IssuedCertificate
 from rig.history.integrity import WRONG_STATES, examine_history
 from rig.history.storage import journal, schema
 from rig.history.storage.journal import Head
@@ -28,7 +28,9 @@ from support.history.past_runs import finish_run
 from support.history.postgres import postgresql
 from support.paths import CONFIGS, RECORDINGS
 
-ISSUED = Issued("RIG-1", "Calibration certificate", "2025-01-06", None, "", (("certificate.html", "ab" * 32),))
+ISSUED = IssuedCertificate(
+    "RIG-1", "Calibration certificate", "2025-01-06", None, "", (("certificate.html", "ab" * 32),)
+)
 GAPS = ("run", "location", "calibration")
 TABLES = [table.name for table in schema.metadata.sorted_tables]
 

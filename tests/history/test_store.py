@@ -19,7 +19,7 @@ from rig.data.result_file import read_result
 from rig.errors import Refused
 from rig.estimation.gyroscope.budget import Budget, Contributor
 from rig.history.entered.finished_run import FinishedRun, compact, content_sha256, read_finished_run
-from rig.history.entered.issued_certificate import Issued
+from rig.history.entered.issued_certificate import IssuedCertificate
 from rig.history.series import Trend, changes_between, effects, rig_states, subjects, trends
 from rig.history.storage import schema
 from rig.history.storage.address import choose_history_address, resolve_address
@@ -30,7 +30,7 @@ from rig.report.kinds.kind_registry import history_records
 from support.history.past_runs import FIRST, finish_run
 from support.paths import DEMO, RECORDINGS
 
-ISSUED = Issued(
+ISSUED = IssuedCertificate(
     "RIG-20250106-AAAAAAAAAAAA", "Calibration certificate", "2025-01-06", None, "", (("certificate.html", "ab" * 32),)
 )
 

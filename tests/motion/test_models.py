@@ -54,7 +54,7 @@ def test_two_tables_made_apart_say_the_same_of_an_arm(name: ModelName) -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_every_row_says_where_its_figures_are_from(name: ModelName) -> None:
     row = load_turner_model(name)
-    wanted = {"nominal_geometry", "limits", "acceleration", "payload", "room", "state_rate", "home"}
+    wanted = {"drawing", "limits", "acceleration", "payload", "room", "state_rate", "home"}
     assert row.sources.keys() == wanted and all(len(source) > 10 for source in row.sources.values())
     height, upper_arm, forearm, *_ = lengths_m(row.nominal_geometry)
     assert 0.1 < height < 0.3 and 0.2 < forearm < upper_arm < 0.9

@@ -9,7 +9,7 @@ from typing import cast
 from weakref import ref
 
 from rig.motion.turner_state import State
-from rig.runner.early_connection import Ahead
+from rig.runner.early_connection import EarlyConnection
 from rig.turners.turner import Turner
 from rig.turners.turner_kind import OnState
 
@@ -32,7 +32,7 @@ def connect(on_state: OnState, log: Path) -> Iterator[Turner]:
 
 
 def test_what_a_run_has_read_is_let_go_with_it(tmp_path: Path) -> None:
-    ahead = Ahead(connect, tmp_path / "arm.log")
+    ahead = EarlyConnection(connect, tmp_path / "arm.log")
     gc.disable()
     try:
         for _ in range(3):

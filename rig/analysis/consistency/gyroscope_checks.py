@@ -85,7 +85,7 @@ class ErrorPatterns:
 
 
 @dataclass(frozen=True, slots=True)
-class _Tested:
+class _TestedSegments:
     """Segments, their mean rates (N, 3) along the sensor's axes, and the whitened model."""
 
     segments: Segments
@@ -114,7 +114,7 @@ def check_gyroscope(
     encoders = np.moveaxis(allowance.encoders_rad_s, 0, -1)
     steady_columns = _steady_columns(segments, encoders.reshape(len(encoders), -1))
     bias = _estimate_bias_process(segments, axis_rates, steady_columns, scatter)
-    segments_only = _Tested(segments, axis_rates, whiten_segments(segments, scatter, bias))
+    segments_only = _TestedSegments(segments, axis_rates, whiten_segments(segments, scatter, bias))
     with_transfers, axis_changed = _free_disturbed_transfers(
         segments_only, matrix, allowance, bias, false_alarm_probability
     )
@@ -163,19 +163,19 @@ def predict_detection_limits(
     """Return the detection limits of segments without a fault, whose bias drifts only by its instability (flicker)."""
     bias = BiasProcess(0.0, 0.0, 0, allowance.instability_rad_s)
     scatter = _build_scatter(segments, allowance.patterns_rad_s, allowance)
-    segments_only = _Tested(segments, segments.rates_rad_s @ matrix.T, whiten_segments(segments, scatter, bias))
+    segments_only = _TestedSegments(segments, segments.rates_rad_s @ matrix.T, whiten_segments(segments, scatter, bias))
     return dict(
         _detection_limits(segments_only, _whiten_with_transfers(matrix, allowance, bias), false_alarm_probability)
     )
 
 
 def _free_disturbed_transfers(
-    segments_only: _Tested,
+    segments_only: _TestedSegments,
     matrix: Array,
     allowance: ErrorPatterns,
     bias: BiasProcess,
     false_alarm_probability: float,
-) -> tuple[_Tested, Statistic | None]:
+) -> tuple[_TestedSegments, Statistic | None]:
     """Return the result of `_inflate_transfers` with a separate mean for each outlying transfer, and the axis test.
 
     The axis test is for a scale factor of one axis that changes. A ripple at the data rate shifts the mean of one
@@ -200,8 +200,8 @@ def _free_disturbed_transfers(
 
 
 def _inflate_transfers(
-    segments_only: _Tested, matrix: Array, allowance: ErrorPatterns, bias: BiasProcess, disturbed: Sequence[int]
-) -> _Tested:
+    segments_only: _TestedSegments, matrix: Array, allowance: ErrorPatterns, bias: BiasProcess, disturbed: Sequence[int]
+) -> _TestedSegments:
     """Whiten like `_whiten_with_transfers`, with the transfers' variance inflated until their χ² equals their number.
 
     Their χ² is the difference of χ² with and without them. The factor is at most `MAX_RIPPLE_INFLATION`.
@@ -219,7 +219,7 @@ def _inflate_transfers(
     return with_transfers
 
 
-def _residual_chi_square(tested: _Tested) -> tuple[float, int]:
+def _residual_chi_square(tested: _TestedSegments) -> tuple[float, int]:
     """Return the residuals' χ² after a fit of the model and of all tested changes, and its degrees of freedom.
 
     If transfers are absent, some changes differ from the model's effects only by the rates' noise. These are dropped.
@@ -233,7 +233,7 @@ def _residual_chi_square(tested: _Tested) -> tuple[float, int]:
 
 def _whiten_with_transfers(
     matrix: Array, allowance: ErrorPatterns, bias: BiasProcess, disturbed: Sequence[int] = ()
-) -> _Tested:
+) -> _TestedSegments:
     """Return the segments with the transfers appended, their model rates, and their whitened model.
 
     Each `disturbed` transfer has a mean of its own.
@@ -243,11 +243,11 @@ def _whiten_with_transfers(
     model = whiten_segments(transfers, scatter, bias)
     offsets = [apply_whitener(model.whitener, sweep_columns(transfers, number)) for number in disturbed]
     model = replace(model, model=np.concatenate([model.model, *offsets], axis=1))
-    return _Tested(transfers, transfers.rates_rad_s @ matrix.T, model)
+    return _TestedSegments(transfers, transfers.rates_rad_s @ matrix.T, model)
 
 
 def _detection_limits(
-    segments_only: _Tested, with_transfers: _Tested, false_alarm_probability: float
+    segments_only: _TestedSegments, with_transfers: _TestedSegments, false_alarm_probability: float
 ) -> Iterator[tuple[str, float]]:
     """Yield every fault mode with the minimal detectable size of its check."""
     segments, chance = segments_only.segments, critical_value(false_alarm_probability)
@@ -256,7 +256,7 @@ def _detection_limits(
         changes(with_transfers.segments, with_transfers.axis_rates),
         differences(segments, segments_only.axis_rates, None),
     )
-    tests: dict[str, tuple[_Tested, list[Alternative]]] = {
+    tests: dict[str, tuple[_TestedSegments, list[Alternative]]] = {
         name: (tested, [(columns, chance)])
         for tested, columns_by_name in ((with_transfers, of_transfers), (segments_only, of_segments))
         for name, columns in columns_by_name.items()

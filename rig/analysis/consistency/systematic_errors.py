@@ -15,12 +15,12 @@ from rig.analysis.consistency.state_errors import build_reading_patterns, build_
 from rig.analysis.environment import MeasurementEnvironment
 from rig.analysis.gyroscope.segment_table import Segments
 from rig.analysis.gyroscope.vector_inputs import WAVE_RATIO, list_uncertainties
-from rig.config.judging.judging_keys import OfSensor
+from rig.config.judging.judging_keys import ExternalResult
 from rig.data.recording.settings import Uncertainty
 from rig.estimation.arrays import Array
 from rig.estimation.earth import EARTH_RATE_RAD_S
 from rig.estimation.gyroscope.nonlinearity import CUBE_DEVIATION, bending, curvature
-from rig.estimation.gyroscope.own_errors import KnownSensor, list_own_errors, rounding_errors
+from rig.estimation.gyroscope.own_errors import SensorProperties, list_own_errors, rounding_errors
 from rig.motion.geometry import AXIS_ERRORS, WAVES, WRIST_1, WRIST_2, WRIST_3
 from rig.observation.consistency.raw_readings import REST
 from rig.observation.consistency.segments import MotionInterval
@@ -38,7 +38,7 @@ FIRST_WAVE_INDEX = {WRIST_1: ANGLE_ERRORS.index("cos of wrist_1"), WRIST_2: ANGL
 # The joint of each zero, counted from the last.
 JOINT_OF_ZERO = {ANGLE_ERRORS.index("zero of wrist_2"): -2, ANGLE_ERRORS.index("zero of wrist_3"): -1}
 # The odd and the even part of the nonlinearity.
-NONLINEARITY_KEYS: tuple[OfSensor, OfSensor] = ("nonlinearity_percent", "asymmetry_percent")
+NONLINEARITY_KEYS: tuple[ExternalResult, ExternalResult] = ("nonlinearity_percent", "asymmetry_percent")
 TRANSFER_STEPS = 24  # directions count as constant within one
 
 
@@ -80,7 +80,7 @@ class KnownErrors:
     reading_rad: float
     earth_rad_s: Array
     curve: NonlinearityPrior
-    sensor: KnownSensor | None
+    sensor: SensorProperties | None
     temperature_times_s: Array
     stamp_s: float = 0.0
 
@@ -120,7 +120,7 @@ def build_known_errors(
     jitter_s: float,
     reading_rad: float,
     earth_rad_s: Array,
-    sensor: KnownSensor | None,
+    sensor: SensorProperties | None,
     temperature_times_s: Array,
     stamp_s: float = 0.0,
 ) -> KnownErrors:

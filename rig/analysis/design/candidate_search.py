@@ -102,7 +102,7 @@ class Candidate:
 
 
 @dataclass(frozen=True, slots=True)
-class Planned:
+class PlannedCandidate:
     """A candidate with its predicted budgets."""
 
     candidate: Candidate
@@ -115,17 +115,17 @@ class Planned:
 
 
 @dataclass(frozen=True, slots=True)
-class Searched:
+class SearchResult:
     """The result of a search: the shortest candidate that meets the target, the nearest one, all evaluated budgets."""
 
-    best: Planned | None = None
-    nearest: Planned | None = None
+    best: PlannedCandidate | None = None
+    nearest: PlannedCandidate | None = None
     evaluated: Sequence[Budgets] = ()
     candidates_count: int = 0
 
 
 @dataclass(frozen=True, slots=True)
-class Shortest:
+class ShortestRun:
     """The shortest run for a target.
 
     - `before`: the procedure in the file, None if its uncertainty cannot be predicted.
@@ -136,9 +136,9 @@ class Shortest:
     """
 
     wanted: TargetUncertainty
-    before: Planned | None
-    best: Planned | None
-    nearest: Planned | None
+    before: PlannedCandidate | None
+    best: PlannedCandidate | None
+    nearest: PlannedCandidate | None
     endless: Sequence[Budgets]
     unreachable: bool
     tried: int
@@ -157,7 +157,7 @@ class Shortest:
 
 def find_shortest(
     candidates: Sequence[Candidate], predict: Callable[[Candidate], Budgets | None], target: TargetUncertainty
-) -> Searched:
+) -> SearchResult:
     """Return the shortest candidate whose predicted U meets the target.
 
     If a candidate meets the target, longer ones are not tried; if it fails, those that it contains are not. `predict`
@@ -168,8 +168,8 @@ def find_shortest(
         key=lambda candidate: candidate.duration_s,
     )
     candidates_count, evaluated = len(remaining), list[Budgets]()
-    best: Planned | None = None
-    nearest: Planned | None = None
+    best: PlannedCandidate | None = None
+    nearest: PlannedCandidate | None = None
     while remaining:
         middle = len(remaining) // 2
         candidate = remaining[middle]
@@ -178,14 +178,14 @@ def find_shortest(
             del remaining[middle]
             continue
         evaluated.append(budgets)
-        planned = Planned(candidate, budgets)
+        planned = PlannedCandidate(candidate, budgets)
         if nearest is None or target.ratio_to_target(planned.reached) < target.ratio_to_target(nearest.reached):
             nearest = planned
         if target.is_met_by(planned.reached):
             best, remaining = planned, [other for other in remaining if other.duration_s < candidate.duration_s]
         else:
             remaining = [other for other in remaining if not other.is_contained_in(candidate)]
-    return Searched(best, nearest, evaluated, candidates_count)
+    return SearchResult(best, nearest, evaluated, candidates_count)
 
 
 def _worst_expanded(budgets: Mapping[str, Budget]) -> tuple[float, float]:

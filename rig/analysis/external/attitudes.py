@@ -11,7 +11,7 @@ from rig.analysis.estimator_names import choose_estimator
 from rig.analysis.external.attitude_budget import budget_by_causes, noise_dof
 from rig.analysis.external.attitude_equations import Equations
 from rig.analysis.external.changes import check_steady
-from rig.analysis.external.increment_calibration import InIncrements, solve_turning
+from rig.analysis.external.increment_calibration import IncrementCalibration, solve_turning
 from rig.analysis.installed_solvers import OfKind
 from rig.analysis.reference.triad import Triad, check_identifiable, check_mounted, field_reference, gravity_reference
 from rig.data.installed_kinds import installed_kinds
@@ -19,7 +19,7 @@ from rig.data.quantity import ACCELERATION, RATE, Quantity
 from rig.data.recording.settings import Elsewhere, Site
 from rig.errors import Fault, or_fault
 from rig.errors.attempts import Attempts, attempt_each
-from rig.estimation.external.placement import NOISE, LaidDown, laid_down
+from rig.estimation.external.placement import NOISE, PlacementSolution, laid_down
 from rig.estimation.external.placement_changes import find_placement_change
 from rig.estimation.external.sole_attitude import find_sole_attitude
 from rig.estimation.gyroscope.budget import Budget
@@ -43,7 +43,7 @@ ROUNDING_RATIO = 1e-9  # standard deviation over mean, below which all readings 
 
 
 @dataclass(frozen=True, slots=True)
-class InAttitudes:
+class AttitudeCalibration:
     """One quantity's calibration by the chosen method.
 
     - `triad`: scale and axes; `budget`: the contributors to the uncertainty.
@@ -60,13 +60,13 @@ class InAttitudes:
     budget: Budget
     measurements: Dwells
     reference_fault: Fault | None = None
-    laid: LaidDown | None = None
+    laid: PlacementSolution | None = None
     unplaced_rests: int = 0
     moving: int = 0
     dwells: tuple[StaticReading, ...] = ()
 
 
-Result = InAttitudes | InIncrements
+Result = AttitudeCalibration | IncrementCalibration
 
 
 def solve_placed(
@@ -131,14 +131,14 @@ def find_method(name: str | None) -> Chosen | None:
     return None if name is None else choose_estimator(CHOICES, name)
 
 
-def _solve_rows(equations: Equations, method: Method, *, any_mounting: bool) -> InAttitudes:
+def _solve_rows(equations: Equations, method: Method, *, any_mounting: bool) -> AttitudeCalibration:
     """Return a gyroscope's calibration from the mean rates in all attitudes, with the other methods' solutions."""
     solution = equations.solve(method)
     if not any_mounting:
         check_mounted(solution.matrix)
     budget = budget_by_causes(solution.matrix, {NOISE: solution.covariance}, float(equations.dof.min()))
     other_methods = equations.solve_others(method, *get_args(EqualWeights))
-    return InAttitudes(
+    return AttitudeCalibration(
         solution,
         Triad.from_solution(solution),
         other_methods,
@@ -150,7 +150,7 @@ def _solve_rows(equations: Equations, method: Method, *, any_mounting: bool) -> 
 
 def _solve_placements(
     placements: Placements, quantity: Quantity, equations: Equations, method: Method, *, any_mounting: bool
-) -> InAttitudes:
+) -> AttitudeCalibration:
     """Return the calibration from placements, with placement errors if the method models attitude errors.
 
     Raise Fault `bias_jumped` or `scale_changed` if the sensor changed abruptly by more than U covers, and as
@@ -173,7 +173,7 @@ def _solve_placements(
         check_mounted(solution.matrix)
     causes = {NOISE: solution.covariance} if laid is None else laid.causes
     budget = budget_by_causes(solution.matrix, causes, noise_dof(solution, equations))
-    return InAttitudes(
+    return AttitudeCalibration(
         solution,
         Triad.from_solution(solution),
         equations.solve_others(method, *METHODS),
@@ -220,7 +220,7 @@ def _solve(equations: Equations, method: Method, placements: Placements) -> Tria
         raise Fault(fault.name, what, fault.remedy) from None
 
 
-def _replace_parameters(solution: TriaxialSolution, laid: LaidDown) -> TriaxialSolution:
+def _replace_parameters(solution: TriaxialSolution, laid: PlacementSolution) -> TriaxialSolution:
     """Return the solution with the parameters, covariance and attitude error of the fit with placement errors."""
     theta = laid.theta
     return replace(

@@ -35,7 +35,7 @@ def estimate_changes(data: ExternalData, matrix: Array) -> Array:
     The covariance includes an abrupt change, and bias changes from rest to rest; it is zero if the rows show no change.
     """
     change = data.change
-    abrupt = change.find_covariance(matrix) if change is not None and _counts(change) else np.zeros((12, 12))
+    abrupt = change.find_covariance(matrix) if change is not None and _must_include(change) else np.zeros((12, 12))
     drift = np.diag([*np.zeros(9), *estimate_bias_drift(data.all_rests)])
     return abrupt + np.maximum(drift - np.diag(np.diag(abrupt)), 0.0)  # a step scatters the rests too
 
@@ -56,7 +56,7 @@ def widen_by_changes(solution: TurnedSolution, data: ExternalData) -> TurnedSolu
     )
 
 
-def _counts(change: AbruptChange) -> bool:
+def _must_include(change: AbruptChange) -> bool:
     """Return whether U must include a change: a likely one, or a possible large change of the bias."""
     is_large = change.what == "bias" and float(np.abs(change.sizes).max()) > RATE.steady
     return is_large or change.evidence >= MIN_EVIDENCE

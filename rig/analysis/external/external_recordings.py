@@ -9,9 +9,9 @@ import numpy as np
 from rig.analysis.by_hand.gyroscope import solve_hand_samples
 from rig.analysis.check import Check, fitness, list_unsolved
 from rig.analysis.estimator_names import ESTIMATORS, Estimator, choose_estimator
-from rig.analysis.external.attitudes import InAttitudes, Result, find_method, solve_placed
+from rig.analysis.external.attitudes import AttitudeCalibration, Result, find_method, solve_placed
 from rig.analysis.external.changes_of_sweeps import check_sweeps_steady, widen_by_changes
-from rig.analysis.external.increment_calibration import InIncrements
+from rig.analysis.external.increment_calibration import IncrementCalibration
 from rig.analysis.external.omissions import (
     list_omitted,
     notes_on_changes,
@@ -67,7 +67,7 @@ NO_SWEEPS = Fault("too_few_observations", "a file of attitudes contains no sweep
 
 
 @dataclass(frozen=True, slots=True)
-class OfSensor:
+class ExternalResult:
     """The solution of an external recording.
 
     - item: the sensor.
@@ -85,7 +85,7 @@ class OfSensor:
     item: Item
     gyroscope: SensorResult | None
     rates: Result | None
-    at_rest: Mapping[Quantity, InAttitudes]
+    at_rest: Mapping[Quantity, AttitudeCalibration]
     unsolved: Mapping[Quantity, Fault]
     turned: TurnedData | None = None
     installed_kinds: tuple[KindFound, ...] = ()
@@ -94,7 +94,7 @@ class OfSensor:
     notes: tuple[str, ...] = ()
 
 
-def solve_external(read: ExternalReadings, settings: RunSettings, estimator: str | None) -> OfSensor:
+def solve_external(read: ExternalReadings, settings: RunSettings, estimator: str | None) -> ExternalResult:
     """Return the solution of readings whose motion a file describes; `estimator` None chooses one.
 
     Raise Refused `unknown_estimator`, Fault as the observers do. If no quantity has a solution, raise the estimator's
@@ -113,7 +113,7 @@ def solve_external(read: ExternalReadings, settings: RunSettings, estimator: str
     return _add_notes(solved, read, samples)
 
 
-def _add_notes(sensor: OfSensor, read: ExternalReadings, samples: Samples) -> OfSensor:
+def _add_notes(sensor: ExternalResult, read: ExternalReadings, samples: Samples) -> ExternalResult:
     return replace(
         sensor,
         omitted=(*((None, part) for part in samples.omitted), *sensor.omitted),
@@ -121,7 +121,7 @@ def _add_notes(sensor: OfSensor, read: ExternalReadings, samples: Samples) -> Of
     )
 
 
-def check_external(name: str, sensor: OfSensor) -> Iterator[Check]:
+def check_external(name: str, sensor: ExternalResult) -> Iterator[Check]:
     """Yield checks in addition to the solvers' own: the condition of the equations, u of scale, the error of attitudes.
 
     Every quantity without a solution has a failing check. There is no configuration with limits for more checks.
@@ -140,13 +140,15 @@ def check_external(name: str, sensor: OfSensor) -> Iterator[Check]:
             yield fitness(name, quantity.name, "attitude_error", at_least, MAX_ATTITUDE_ERROR_RAD, unit="rad")
 
 
-def _solve_turns(read: ExternalReadings, samples: Samples, name: str | None) -> OfSensor:
+def _solve_turns(read: ExternalReadings, samples: Samples, name: str | None) -> ExternalResult:
     if name not in (None, "by_hand"):
         choose_estimator(("by_hand",), str(name))
-    return OfSensor(read.item, solve_hand_samples(read.item, samples, read.motion), None, {}, {})
+    return ExternalResult(read.item, solve_hand_samples(read.item, samples, read.motion), None, {}, {})
 
 
-def _solve_sweeps(read: ExternalReadings, samples: Samples, name: str | None, reference_c: float | None) -> OfSensor:
+def _solve_sweeps(
+    read: ExternalReadings, samples: Samples, name: str | None, reference_c: float | None
+) -> ExternalResult:
     """Solve a file's sweeps and rests, corrected to `reference_c` if given; estimator `name` (None: automatic)."""
     chosen = None if name is None else choose_estimator(SWEEP_ESTIMATORS, name)
     data, polynomials = average_sweeps(samples, read.motion), None
@@ -187,7 +189,9 @@ def _solve_sweeps(read: ExternalReadings, samples: Samples, name: str | None, re
     notes = (*notes_on_speeds(data), *notes_on_scale(solution.scale), *notes_on_changes(data))
     notes += tuple(notes_on_turns(data, solution)) if chosen in (None, "increments") else ()
     omitted = tuple((RATE, part) for part in data.omitted)
-    return OfSensor(read.item, gyroscope, None, {}, {}, by_turns, polynomials=polynomials, omitted=omitted, notes=notes)
+    return ExternalResult(
+        read.item, gyroscope, None, {}, {}, by_turns, polynomials=polynomials, omitted=omitted, notes=notes
+    )
 
 
 def solve_swept(data: ExternalData, estimator: BySweeps | None) -> Estimate:
@@ -244,26 +248,28 @@ def _vector(data: ExternalData) -> VectorSolution:
     return solve_vector(data.sweeps, data.rests)
 
 
-def _solve_attitudes(read: ExternalReadings, samples: Samples, settings: RunSettings, name: str | None) -> OfSensor:
+def _solve_attitudes(
+    read: ExternalReadings, samples: Samples, settings: RunSettings, name: str | None
+) -> ExternalResult:
     """Solve all quantities of readings in known attitudes by the method `name` (None: one for each quantity)."""
     method, site, options = find_method(name), settings.site, settings.elsewhere
     assert options is not None, "of readings of others"
     placed = average_placements(samples, read.motion, find_clock=options.find_clock)
     attempts = solve_placed(read.item.name, placed, site, options, method, second_order=settings.second_order)
     rates = attempts.results.get(RATE)
-    gyroscope = rates if isinstance(rates, InAttitudes | InIncrements) else None
-    return OfSensor(
+    gyroscope = rates if isinstance(rates, AttitudeCalibration | IncrementCalibration) else None
+    return ExternalResult(
         read.item,
         gyroscope=None if gyroscope is None else _gyroscope(read.item, gyroscope, placed.clock),
         rates=gyroscope,
         at_rest={
             quantity: result
             for quantity, result in attempts.results.items()
-            if quantity != RATE and isinstance(result, InAttitudes)
+            if quantity != RATE and isinstance(result, AttitudeCalibration)
         },
         unsolved=attempts.faults,
         omitted=tuple(list_omitted(placed, attempts.results)),
-        notes=tuple(gyroscope.notes) if isinstance(gyroscope, InIncrements) else (),
+        notes=tuple(gyroscope.notes) if isinstance(gyroscope, IncrementCalibration) else (),
         installed_kinds=tuple(
             KindFound(read.item.name, read.item, quantity, result)
             for quantity, result in attempts.results.items()
@@ -275,7 +281,7 @@ def _solve_attitudes(read: ExternalReadings, samples: Samples, settings: RunSett
 def _gyroscope(item: Item, result: Result, clock: TimeBase | None) -> SensorResult:
     """Return a gyroscope's `result` in attitudes in the form of a calibration from sweeps."""
     solution = _describe_as_swept(result)
-    if clock is not None and isinstance(result, InIncrements):
+    if clock is not None and isinstance(result, IncrementCalibration):
         clock = clock.correct(-result.solution.clock_s, result.solution.clock_std_s)
     return SensorResult(
         sensor=item,
@@ -295,7 +301,7 @@ def _describe_as_swept(result: Result) -> TurnedSolution:
     of_matrix = np.r_[F, OFFSET]
     sign = np.diag(RATE.parameter_signs)
     lines = tuple(replace(line, covariance=sign @ line.covariance @ sign) for line in result.budget.contributors)
-    if isinstance(result, InIncrements):
+    if isinstance(result, IncrementCalibration):
         observations, rank = len(result.solution.residuals_rad), 12
         warnings: tuple[str, ...] = ()
         residuals, estimator = np.zeros((0, 3)), "increments"

@@ -11,7 +11,7 @@ from rig.analysis.external.inverted import solve_unless_inverted
 from rig.analysis.external.rests_agree import check_rests_agree
 from rig.data.quantity import RATE
 from rig.estimation.arrays import Array, scale_of
-from rig.estimation.external.increment_solution import KnownIncrements, solve_known_increments
+from rig.estimation.external.increment_solution import IncrementSolution, solve_known_increments
 from rig.estimation.gyroscope.budget import Budget
 from rig.estimation.refusals import check_axes, check_unit
 from rig.observation.external.fixes import OmittedIncrements, gather
@@ -24,13 +24,13 @@ MAX_ITERATIONS = 3  # the clock of one determines the increments of the next
 
 
 @dataclass(frozen=True, slots=True)
-class InIncrements:
+class IncrementCalibration:
     """The solution, the duration over which each attitude is averaged, and the increments left out.
 
     `increments`: the number of all increments, including those left out.
     """
 
-    solution: KnownIncrements
+    solution: IncrementSolution
     window_s: float
     left_out: tuple[OmittedIncrements, ...]
     increments: int
@@ -69,7 +69,7 @@ def _spell_time(time_s: float) -> str:
     return f"at {time_s:.2f} s"
 
 
-def solve_turning(turning: Turning, window_s: float | None, *, any_mounting: bool) -> InIncrements:
+def solve_turning(turning: Turning, window_s: float | None, *, any_mounting: bool) -> IncrementCalibration:
     """Return the gyroscope's matrix and bias, with windows of a given or an automatically chosen length.
 
     Raise Fault `inverted_attitudes`, and as `gather`, `solve_known_increments`, `check_steady`, `check_rests_agree` and
@@ -86,7 +86,7 @@ def solve_turning(turning: Turning, window_s: float | None, *, any_mounting: boo
     return solved
 
 
-def _solve(turning: Turning, window_s: float | None) -> InIncrements:
+def _solve(turning: Turning, window_s: float | None) -> IncrementCalibration:
     """Return the solution, by iteration, because its clock offset determines which readings are missing."""
     start = find_start(select_covered(turning)).state
     check_unit(scale_of(start.matrix))
@@ -98,4 +98,4 @@ def _solve(turning: Turning, window_s: float | None) -> InIncrements:
             break
         gathered = regathered
     left_out, increments = gathered.left_out, gathered.increments
-    return InIncrements(solution, gathered.window_s, left_out, increments)  # pyrefly: ignore[unbound-name]  # MAX_ITERATIONS > 0
+    return IncrementCalibration(solution, gathered.window_s, left_out, increments)  # pyrefly: ignore[unbound-name]  # MAX_ITERATIONS > 0

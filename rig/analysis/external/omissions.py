@@ -4,8 +4,8 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from rig.analysis.external.attitudes import InAttitudes, Result
-from rig.analysis.external.increment_calibration import InIncrements
+from rig.analysis.external.attitudes import AttitudeCalibration, Result
+from rig.analysis.external.increment_calibration import IncrementCalibration
 from rig.analysis.installed_solvers import OfKind
 from rig.data.quantity import RATE, Quantity
 from rig.data.recording.motion_file import ExternalReadings
@@ -30,8 +30,10 @@ def list_omitted(
     """Yield the readings left out of a solution in attitudes, by the quantity concerned, None for all quantities."""
     yield from ((None, omitted) for omitted in placed.omitted)
     rates = results.get(RATE)
-    if isinstance(rates, InIncrements | InAttitudes):
-        yield from ((RATE, one) for one in (rates.omitted if isinstance(rates, InIncrements) else placed.incomplete))
+    if isinstance(rates, IncrementCalibration | AttitudeCalibration):
+        yield from (
+            (RATE, one) for one in (rates.omitted if isinstance(rates, IncrementCalibration) else placed.incomplete)
+        )
     solved = [quantity for quantity in results if quantity != RATE]
     if isinstance(placed.placements, Placements) and solved:
         yield from ((solved[0], omitted) for omitted in placed.placements.omitted)

@@ -11,7 +11,7 @@ from rig.data.quantity import RATE
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.earth import EARTH_RATE_RAD_S
-from rig.estimation.external.increment_solution import KnownIncrements
+from rig.estimation.external.increment_solution import IncrementSolution
 from rig.estimation.reference.reference_model import BIAS
 from rig.estimation.statistics.coverage import false_alarm_of_each
 from rig.observation.external.means_at_rest import means_at_rest
@@ -24,7 +24,7 @@ TAIL_FRACTION = 0.1  # of the readings at either end of their range, which may n
 MAX_HALF_RANGE_RAD_S = 2 * RATE.steady
 
 
-def check_rests_agree(turning: Turning, solution: KnownIncrements) -> None:
+def check_rests_agree(turning: Turning, solution: IncrementSolution) -> None:
     """Raise Fault `bias_contradicts_rests` if the bias differs from the readings at rest, `bias_jumped` if these jump.
 
     A rest is used only if both the readings and the rows' attitudes show it. Rests may differ by their scatter, by

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rig.analysis.check import Check, fitness
 from rig.data.quantity import RATE
-from rig.data.recording.recorded_events import BoardNotObserved, BoardObserved, BoardRecalled, BoardSolved, OfTheBoard
+from rig.data.recording.recorded_events import BoardEvent, BoardNotObserved, BoardObserved, BoardRecalled, BoardSolved
 from rig.data.recording.run_data import RunData
 from rig.errors import Fault
 from rig.estimation.arrays import Array
@@ -129,10 +129,10 @@ def _average_observation(run: RunData, event: BoardObserved) -> _BoardObservatio
     return _BoardObservation(gyroscope.convert(mean), event.speed_rad_s, averaged=True)
 
 
-def _events(run: RunData, sensor: str) -> Iterator[OfTheBoard]:
+def _events(run: RunData, sensor: str) -> Iterator[BoardEvent]:
     """Yield the events of the board's own calibration of a sensor, in order."""
     for recorded in run.events:
-        if isinstance(recorded.event, OfTheBoard) and recorded.event.sensor == sensor:
+        if isinstance(recorded.event, BoardEvent) and recorded.event.sensor == sensor:
             yield recorded.event
 
 

@@ -11,9 +11,9 @@ from rig.analysis.environment import MeasurementEnvironment
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.settings import Uncertainty
 from rig.estimation.arrays import Array
-from rig.estimation.gyroscope.budget import Unknown
+from rig.estimation.gyroscope.budget import UnobservedErrors
 from rig.estimation.gyroscope.earth_rate import EarthRate, EarthRatePrior
-from rig.estimation.gyroscope.own_errors import KnownSensor
+from rig.estimation.gyroscope.own_errors import SensorProperties
 from rig.estimation.gyroscope.vector_fit import VectorInputs
 from rig.motion.geometry import AXIS_ERRORS
 from rig.observation.average import Average
@@ -103,7 +103,7 @@ def _list_averages(parts: Sequence[RecordingPart]) -> tuple[list[Average], Array
 
 def _describe_recorded(
     environment: MeasurementEnvironment, name: str, sensor: RecordedSensor, averages: Sequence[Average]
-) -> KnownSensor:
+) -> SensorProperties:
     temperature_c = np.array([average.temperature_c for average in averages])
     stated = describe_sensor(environment.uncertainty, name, sensor.range_rad_s, temperature_c, sensor.unseen_change_k)
     return replace(stated, temperature_words=sensor.temperature_words)
@@ -111,9 +111,9 @@ def _describe_recorded(
 
 def describe_sensor(
     uncertainty: Uncertainty, name: str, full_scale_rad_s: float, temperature_c: Array, temperature_step_k: float
-) -> KnownSensor:
+) -> SensorProperties:
     """Return the stated properties of the sensor `name` with its range, and its temperature in each average (N,)."""
-    return KnownSensor(
+    return SensorProperties(
         nonlinearity=uncertainty.find_stated_size("nonlinearity_percent", name) / 100,
         full_scale_rad_s=full_scale_rad_s,
         bias_rad_s_per_k=float(np.radians(uncertainty.find_stated_size("bias_deg_s_k", name))),
@@ -208,13 +208,13 @@ def list_given(environment: MeasurementEnvironment, name: str) -> EarthRatePrior
 
 def list_uncertainties(
     environment: MeasurementEnvironment, name: str, earth_rate: EarthRate | None, stamp_std_s: float | None = None
-) -> Unknown:
+) -> UnobservedErrors:
     """Return the uncertainties that no recording of sensor `name` shows, and the uncertainty of the Earth's rate.
 
     `stamp_std_s` is as in `RecordedSensor`.
     """
     uncertainty, clock = environment.uncertainty, environment.clock
-    return Unknown(
+    return UnobservedErrors(
         clock_std=clock.std,
         clock_dof=clock.dof,
         clock_half_width=None if clock.comparisons else PPM * uncertainty.controller_clock_ppm,

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rig.analysis.reference.arm_patterns import Posture, list_arm_rotations
-from rig.config.judging.judging_keys import OfSensor
+from rig.config.judging.judging_keys import ExternalResult
 from rig.data.entries.budget import INCLUDED_IN_U
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.settings import RunSettings, Uncertainty
@@ -46,7 +46,7 @@ class Datasheet:
     """One accelerometer's data sheet: the half-widths of its errors, and the minimum of its Allan deviation.
 
     `nonlinearity_percent`: nonlinearity from −`over_g` to `over_g`, in % of `over_g`. `temperature_words`: see
-    `KnownSensor`.
+    `SensorProperties`.
     """
 
     nonlinearity_percent: float
@@ -70,7 +70,7 @@ class Datasheet:
 def read_datasheet(uncertainty: Uncertainty, name: str, range_m_s2: float) -> Datasheet:
     """Return the data of the accelerometer of the sensor `name`, from its data sheet or the configuration."""
 
-    def read_size(what: OfSensor) -> float:
+    def read_size(what: ExternalResult) -> float:
         return uncertainty.find_stated_size(what, name)
 
     return Datasheet(

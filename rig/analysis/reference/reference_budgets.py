@@ -17,7 +17,7 @@ from rig.estimation.reference.imu import ImuSolution
 from rig.estimation.reference.magnetometer import FieldDrift, Uniformity
 from rig.estimation.reference.reference_budget import (
     FitUncertainty,
-    KnownSize,
+    NormUncertainty,
     reference_budget,
     response_in_attitudes,
     scale_and_bias,
@@ -116,20 +116,20 @@ def _propagate(
     )
 
 
-def _gravity(site: Site) -> KnownSize:
+def _gravity(site: Site) -> NormUncertainty:
     size, source = site.gravity_m_s2, "site.gravity_uncertainty_m_s2"
     if site.gravity_expanded_m_s2 is not None:
-        return KnownSize("gravity", site.gravity_expanded_m_s2 / size, True, size, "m/s²", source)
+        return NormUncertainty("gravity", site.gravity_expanded_m_s2 / size, True, size, "m/s²", source)
     half_width = STANDARD_GRAVITY_ERROR_M_S2 if size == STANDARD_GRAVITY_M_S2 else LOCAL_GRAVITY_ERROR_M_S2
-    return KnownSize("gravity", half_width / size, False, size, "m/s²", f"{source} {NOT_GIVEN_SUFFIX}")
+    return NormUncertainty("gravity", half_width / size, False, size, "m/s²", f"{source} {NOT_GIVEN_SUFFIX}")
 
 
-def _field(site: Site, field_t: float) -> KnownSize:
+def _field(site: Site, field_t: float) -> NormUncertainty:
     size_ut, source = field_t / FIELD.bias.size, "site.magnetic_field_uncertainty_ut"
     if site.magnetic_field_expanded_t is not None:
         relative = site.magnetic_field_expanded_t / field_t
-        return KnownSize(SIZE_OF_FIELD, relative, True, size_ut, "µT", source)
-    return KnownSize(SIZE_OF_FIELD, UNSTATED_FIELD_ERROR, False, size_ut, "µT", f"{source} {NOT_GIVEN_SUFFIX}")
+        return NormUncertainty(SIZE_OF_FIELD, relative, True, size_ut, "µT", source)
+    return NormUncertainty(SIZE_OF_FIELD, UNSTATED_FIELD_ERROR, False, size_ut, "µT", f"{source} {NOT_GIVEN_SUFFIX}")
 
 
 def lag_pattern(movement: Movement, lag_s: float) -> Array:

@@ -43,14 +43,16 @@ Polynomials = Mapping[str, Mapping[Quantity, OverTemperature]]
 
 
 @dataclass(frozen=True, slots=True)
-class AtReference:
+class CorrectedRecordings:
     """Recordings corrected to the reference temperature, and the polynomials that corrected them."""
 
     recordings: tuple[ObservedRun, ...]
     polynomials: Polynomials
 
 
-def correct_recordings(recordings: Sequence[ObservedRun], settings: RunSettings, reference_c: float) -> AtReference:
+def correct_recordings(
+    recordings: Sequence[ObservedRun], settings: RunSettings, reference_c: float
+) -> CorrectedRecordings:
     """Return the recordings with rates and dwells' accelerations as at `reference_c`, for the sensors to calibrate.
 
     Raise Fault `temperature_not_recorded`, and as `fit_over_temperature` does.
@@ -65,7 +67,7 @@ def correct_recordings(recordings: Sequence[ObservedRun], settings: RunSettings,
             runs, polynomials[name][ACCELERATION] = _correct_accelerations(runs, name, environment, reference_c)
         if settings.planned_sweeps:  # last: it sets the sweeps' temperatures to the reference
             runs, polynomials[name][RATE] = _correct_rates(runs, name, environment, reference_c)
-    return AtReference(tuple(replace(recording, polynomials=polynomials) for recording in runs), polynomials)
+    return CorrectedRecordings(tuple(replace(recording, polynomials=polynomials) for recording in runs), polynomials)
 
 
 def correct_files(data: ExternalData, reference_c: float) -> tuple[ExternalData, OverTemperature]:

@@ -29,7 +29,7 @@ from rig.commands.laboratory.own_address import load_at_own_address
 from rig.commands.laboratory.simulated_operator import OperatorListener
 from rig.config.models import RigConfig
 from rig.config.sensors.sensor_sections import SensorSection
-from rig.data.recording.hand_events import OfTheHand
+from rig.data.recording.hand_events import HandEvent
 from rig.errors import Refused
 from rig.estimation.by_hand.solution import REAL_HAND_STD
 from rig.station.by_hand_words import hand_event_line
@@ -116,7 +116,7 @@ def _run_session(
     """Run a session on the board with the operator; yield the board, the sensor's name and the result."""
     from rig.runner.by_hand.on_board import calibrate_by_board
 
-    def tell(event: OfTheHand) -> None:
+    def tell(event: HandEvent) -> None:
         if (line := hand_event_line(event)) is not None:
             say(line, file=sys.stderr)
         if operator is not None:

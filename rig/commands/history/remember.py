@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from rig.config.judging.judging_sections import HistorySection
     from rig.config.load import Loaded
     from rig.history.entered.finished_run import FinishedRun
-    from rig.history.entered.issued_certificate import Issued
+    from rig.history.entered.issued_certificate import IssuedCertificate
     from rig.history.series import Change
     from rig.history.storage.address import HistoryAddress
     from rig.history.store import History, Past
@@ -74,7 +74,9 @@ def _is_usual(address: "HistoryAddress") -> bool:
         return False
 
 
-def remember_certificate(folder: Path, result: str, certificate: "Issued", history: str | None = None) -> str | None:
+def remember_certificate(
+    folder: Path, result: str, certificate: "IssuedCertificate", history: str | None = None
+) -> str | None:
     """Enter the certificate of the run in `folder` with result.json `result`; return why it is not entered, or None.
 
     The history is `history`, or if None the user's own, never one that the folder's configuration names, because the
@@ -157,7 +159,7 @@ def _enter(
         return tuple(past.id for past in history.select_run(run_id)), tuple(_compare_with_earlier(history, run_id))
 
 
-def _certify(address: "HistoryAddress", content_sha256: str, certificate: "Issued") -> bool:
+def _certify(address: "HistoryAddress", content_sha256: str, certificate: "IssuedCertificate") -> bool:
     from rig.history.storage.continuity import is_there
     from rig.history.store import open_history
 

@@ -12,7 +12,7 @@ from rig.errors import Refused
 from rig.station.plain_text import say
 
 if TYPE_CHECKING:
-    from rig.analysis.design.candidate_search import Planned, TargetUncertainty
+    from rig.analysis.design.candidate_search import PlannedCandidate, TargetUncertainty
 
 # The names on the command line, and those of `rig.analysis.design.candidate_search.TargetUncertainty`.
 TARGETS = {
@@ -88,7 +88,7 @@ def parse_target(options: Sequence[str], at_most_s: float | None) -> "TargetUnce
     return TargetUncertainty(**wanted, at_most_s=inf if at_most_s is None else at_most_s)
 
 
-def _write(options: Namespace, best: "Planned") -> None:
+def _write(options: Namespace, best: "PlannedCandidate") -> None:
     """Write a configuration for `rig run`: the file's values with the procedure of the plan."""
     from rig.commands.configured import load_configured
     from rig.config.files.safe_writing import write_new

@@ -33,7 +33,7 @@ from rig.report.certificate.content import certificate_of
 from rig.report.certificate.statements import configuration_statements
 from rig.report.document import document_of
 from rig.report.simulated_truth import truth_lines, truth_rows
-from rig.runner.early_connection import Ahead
+from rig.runner.early_connection import EarlyConnection
 from rig.runner.phases import Run
 from rig.station.events import Advice, BoardConnected, RunEvent, RunFolderWritten, SamplingStarted
 from rig.station.log import log
@@ -88,7 +88,7 @@ class RigBench:
     configured: Configured
     control: str | None
     station: BatchSettings
-    ahead: Ahead
+    ahead: EarlyConnection
     truth_file: Path
     begun: set[Path] = field(default_factory=set)
 
@@ -238,7 +238,7 @@ def open_bench(configured: Configured, folder: Path, station: BatchSettings) -> 
                 run_simulated_laboratory(configured.loaded.text, folder / LATENESS_FILE, folder / TRUTH_FILE)
             )
         connect = partial(kind_of(config.turner).connect, config.turner)
-        ahead = Ahead(connect, folder / ARM_LOG)
+        ahead = EarlyConnection(connect, folder / ARM_LOG)
         stack.callback(ahead.close)
         ahead.begin()
         yield RigBench(configured, control, station, ahead, folder / TRUTH_FILE)

@@ -16,7 +16,7 @@ Places = Mapping[Location, str]  # position of each key, in words: "line 3", "de
 
 
 @dataclass(frozen=True, slots=True)
-class Layered:
+class MergedLayers:
     """The merged layers: the `document`, the `places` of its keys in files, and the `problems` of merging.
 
     `written` is the text of every value that YAML reads as something other than text. `text` is the text of a single
@@ -40,12 +40,12 @@ class _Layer:
     problems: tuple[str, ...]
 
 
-def read_layers(path: Path, overrides: Sequence[str] = ()) -> Layered:
+def read_layers(path: Path, overrides: Sequence[str] = ()) -> MergedLayers:
     """Merge a file with the files that it is based on, and the overrides. Raise `Unreadable`."""
     return merge_layers(read_file(path), path, overrides)
 
 
-def merge_layers(text: str, path: Path | None, overrides: Sequence[str] = ()) -> Layered:
+def merge_layers(text: str, path: Path | None, overrides: Sequence[str] = ()) -> MergedLayers:
     """Merge a text with the files that it is based on, relative to its `path`, if any. Raise `Unreadable`."""
     layers = list(_layers(text, path))
     document: dict[str, Any] = {}
@@ -59,7 +59,7 @@ def merge_layers(text: str, path: Path | None, overrides: Sequence[str] = ()) ->
         problems += layer.problems
     for item in overrides:
         problems += _override(document, places, written, item)
-    return Layered(document, places, written, tuple(problems), None if overrides or len(layers) > 1 else text)
+    return MergedLayers(document, places, written, tuple(problems), None if overrides or len(layers) > 1 else text)
 
 
 def merge(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:

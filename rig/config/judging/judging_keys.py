@@ -12,7 +12,7 @@ from rig.config.section import Positive, Ratio, refuse_boolean_number
 JUDGING_MODEL = ConfigDict(frozen=True, allow_inf_nan=False, defer_build=True)
 NonNegative = Annotated[float, Field(ge=0)]
 DecisionRule = Literal["simple", "guard_band"]
-OfSensor = Literal[
+ExternalResult = Literal[
     "g_sensitivity_deg_s_g",
     "nonlinearity_percent",
     "asymmetry_percent",
@@ -26,7 +26,7 @@ OfSensor = Literal[
     "acceleration_scale_ppm_k",
     "acceleration_bias_instability_ug",
 ]
-SENSOR_KEYS: tuple[OfSensor, ...] = get_args(OfSensor)
+SENSOR_KEYS: tuple[ExternalResult, ...] = get_args(ExternalResult)
 # A size that a configuration states for all sensors, and a recording for each by its name.
 OfSensors = TypeVar("OfSensors")
 

@@ -10,7 +10,7 @@ RATE_TOLERANCE = 2e-4  # relative: 333.33 stands for 1000/3, and the closest two
 
 
 @dataclass(frozen=True, slots=True)
-class Delivered:
+class DeliveredErrors:
     """The errors of a part as it is delivered: half-widths, None if its data sheet has no figure.
 
     `rate_percent` is the error of the part's own data rate, over all temperatures.
@@ -67,7 +67,7 @@ class PartSpec:
     acceleration_scale_ppm_k: float
     acceleration_bias_instability_ug: float
     acceleration_nonlinear_over_g: float = 0.0
-    delivered: Delivered = Delivered()
+    delivered: DeliveredErrors = DeliveredErrors()
     own_port: bool = False
     any_rate: bool = False
 
@@ -165,7 +165,7 @@ PARTS: Mapping[str, PartSpec] = MappingProxyType(
             acceleration_bias_mg_k=1.5,
             acceleration_scale_ppm_k=260,
             acceleration_bias_instability_ug=30,
-            delivered=Delivered(bias_deg_s=30),  # at ±2000 °/s
+            delivered=DeliveredErrors(bias_deg_s=30),  # at ±2000 °/s
         ),
         "mpu9250": PartSpec(  # register map RM-MPU-9250A-00, registers 25 (SMPLRT_DIV) and 27 (GYRO_CONFIG)
             rates_hz=tuple(1000 / (1 + divider) for divider in range(250)),
@@ -188,7 +188,7 @@ PARTS: Mapping[str, PartSpec] = MappingProxyType(
             acceleration_bias_mg_k=1.5,
             acceleration_scale_ppm_k=260,
             acceleration_bias_instability_ug=30,  # not stated; assumed, as consumer parts have it
-            delivered=Delivered(bias_deg_s=5, scale_percent=3, rate_percent=1),  # PS-MPU-9250A-01, table 1
+            delivered=DeliveredErrors(bias_deg_s=5, scale_percent=3, rate_percent=1),  # PS-MPU-9250A-01, table 1
         ),
         "adis16465": PartSpec(  # datasheet, register DEC_RATE; the range is the model's: -1, -2 and -3 have one each
             rates_hz=tuple(2000 / (1 + divider) for divider in range(2000)),
@@ -237,7 +237,7 @@ PARTS: Mapping[str, PartSpec] = MappingProxyType(
             acceleration_bias_mg_k=0.15,
             acceleration_scale_ppm_k=50,
             acceleration_bias_instability_ug=30,  # not stated; assumed, as consumer parts have it
-            delivered=Delivered(
+            delivered=DeliveredErrors(
                 bias_deg_s=0.5,  # table 1
                 scale_percent=0.5,
                 acceleration_bias_mg=20,  # table 2
@@ -269,7 +269,7 @@ PARTS: Mapping[str, PartSpec] = MappingProxyType(
             acceleration_scale_ppm_k=100,  # table 3, ±0.01 %/°C
             acceleration_bias_instability_ug=30,  # not stated; assumed, as consumer parts have it
             # Table 3; the accelerometer's scale factor has no figure there
-            delivered=Delivered(bias_deg_s=1, scale_percent=0.3, acceleration_bias_mg=12, rate_percent=1),
+            delivered=DeliveredErrors(bias_deg_s=1, scale_percent=0.3, acceleration_bias_mg=12, rate_percent=1),
         ),
         "kvh1775": PartSpec(  # ICD 56-0298 Rev. B, command =DR; -01 and -25 have one range of acceleration each
             rates_hz=(1, 5, 10, 25, 50, 100, 250, 500, 750, 1000, 3600, 5000),

@@ -97,11 +97,9 @@ class CalibrationSection(Section):
     """Deviations of the arm from its nominal geometry, measured by its maker. The controller reports and uses them."""
 
     delta_theta_rad: Joints = Field(default=NO_ANGLES, description="added to the angle of each joint")
-    delta_a_mm: Lengths = Field(default=NO_LENGTHS, description="added to the length a of each link in the drawing")
-    delta_d_mm: Lengths = Field(default=NO_LENGTHS, description="added to the offset d of each link in the drawing")
-    delta_alpha_rad: Joints = Field(
-        default=NO_ANGLES, description="added to the twist alpha of each link in the drawing"
-    )
+    delta_a_mm: Lengths = Field(default=NO_LENGTHS, description="added to the nominal length a of each link")
+    delta_d_mm: Lengths = Field(default=NO_LENGTHS, description="added to the nominal offset d of each link")
+    delta_alpha_rad: Joints = Field(default=NO_ANGLES, description="added to the nominal twist alpha of each link")
 
 
 class ResidueSection(Section):

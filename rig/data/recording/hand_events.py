@@ -67,4 +67,4 @@ class HandBegunAnew:
     again: Reason
 
 
-OfTheHand = HandAsked | HandRested | HandMoveAccepted | HandMoveRefused | HandRestRefused | HandBegunAnew
+HandEvent = HandAsked | HandRested | HandMoveAccepted | HandMoveRefused | HandRestRefused | HandBegunAnew

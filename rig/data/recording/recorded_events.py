@@ -12,11 +12,11 @@ from firmware_host.answers import BoardObservation, BoardSolution
 from rig.data.recording.hand_events import (
     HandAsked,
     HandBegunAnew,
+    HandEvent,
     HandMoveAccepted,
     HandMoveRefused,
     HandRested,
     HandRestRefused,
-    OfTheHand,
 )
 from rig.data.recording.thermal_events import OfTheTemperature, SetMeasured, TemperatureWanted
 from rig.data.validation import Finite, parse_json, validate
@@ -100,9 +100,9 @@ class BoardSolved:
     solution: BoardSolution
 
 
-OfTheBoard = BoardObserved | BoardNotObserved | BoardRecalled | BoardSolved
+BoardEvent = BoardObserved | BoardNotObserved | BoardRecalled | BoardSolved
 OfTheArm = SweepStarted | SweepFinished | RestStarted | RestFinished | DwellStarted | DwellFinished
-Event = OfTheArm | OfTheBoard | OfTheHand | OfTheTemperature
+Event = OfTheArm | BoardEvent | HandEvent | OfTheTemperature
 
 _KINDS: dict[str, type[Event]] = {
     "sweep_started": SweepStarted,

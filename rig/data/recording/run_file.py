@@ -176,7 +176,7 @@ def read_run(path: Path, timeout_s: float | None = None, *, begun: ReadingTask |
     """
     contents = _contents(path, timeout_s, begun)
     try:
-        validate(_Named, {"sensors": [*contents.described]}, "samples")
+        validate(_SensorNames, {"sensors": [*contents.described]}, "samples")
         external = _read_external(contents) if contents.tables else None
         sensors = contents.sensors
         samples = {name: _whole_rows(rows) for name, rows in contents.samples.items()}
@@ -317,7 +317,7 @@ def _check_numbers(name: str, rows: NDArray[Any], most: float) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class _Named:
+class _SensorNames:
     """The sensors' names, validated as in a configuration, because files are named after them."""
 
     sensors: tuple[SensorName, ...]

@@ -16,9 +16,9 @@ from pydantic import Field, model_validator
 
 from rig.config.judging.judging_keys import (
     SENSOR_KEYS,
+    ExternalResult,
     NonNegative,
     ObservationKeys,
-    OfSensor,
     UncertaintyKeys,
     refuse_missing_keys,
 )
@@ -118,7 +118,7 @@ class Uncertainty(UncertaintyKeys[dict[str, NonNegative]]):
         """Return whether error sizes are stated for the sensor `name`."""
         return all(name in getattr(self, what) for what in SENSOR_KEYS)
 
-    def find_stated_size(self, what: OfSensor, name: str) -> float:
+    def find_stated_size(self, what: ExternalResult, name: str) -> float:
         """Return the stated size of the error `what` of the sensor `name`."""
         sizes: dict[str, float] = getattr(self, what)
         return sizes[name]

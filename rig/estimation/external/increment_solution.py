@@ -80,7 +80,7 @@ class EarthRateEstimate:
 
 
 @dataclass(frozen=True, slots=True)
-class KnownIncrements:
+class IncrementSolution:
     """A gyroscope's matrix and bias from its increments, with their covariance and variance components.
 
     - matrix (3, 3), bias (3,): F, the scale factors and axes; b, the reading at rest.
@@ -124,7 +124,7 @@ class KnownIncrements:
         return len(self.aside_s)
 
 
-def solve_known_increments(time_s: Array, readings: Array, fixes: Fixes, start: DriftState) -> KnownIncrements:
+def solve_known_increments(time_s: Array, readings: Array, fixes: Fixes, start: DriftState) -> IncrementSolution:
     """Estimate a gyroscope's matrix and bias from readings (n, 3) in rad/s at times (n,), with outlying fixes left out.
 
     `start` holds the initial values of F, b and τ. Raise Fault `rank_deficient`, `ill_conditioned`,
@@ -148,7 +148,7 @@ def solve_known_increments(time_s: Array, readings: Array, fixes: Fixes, start: 
 
 
 @dataclass(frozen=True, slots=True)
-class _Settled:
+class _ConvergedFit:
     """The converged fit, its model, and the maxima (n, k) of its variance components' posterior."""
 
     state: DriftState
@@ -167,7 +167,7 @@ class _Settled:
         return std
 
 
-def _settle(recorded: AttitudeSamples, state: DriftState) -> _Settled:
+def _settle(recorded: AttitudeSamples, state: DriftState) -> _ConvergedFit:
     """Solve by Gauss–Newton; the variances are re-estimated in the first iterations only."""
     maxima: Array | None = None
     for iteration in range(1, MAX_ITERATIONS + 1):
@@ -188,14 +188,14 @@ def _settle(recorded: AttitudeSamples, state: DriftState) -> _Settled:
         if not np.linalg.norm(solved.theta[MATRIX]) < MAX_MATRIX_STEP:
             raise refusals.untrustworthy_attitudes(refusals.NO_FIT)
         state = state.after_step(solved.theta)
-        settled = _Settled(state, recorded.fixes, averaged, causes, model, maxima, solved, iteration)
+        settled = _ConvergedFit(state, recorded.fixes, averaged, causes, model, maxima, solved, iteration)
         u = np.sqrt(np.diag(solved.covariance))[: CLOCK + 1]
         if iteration > 2 and (np.abs(solved.theta[: CLOCK + 1]) < CONVERGED_STEP_RATIO * u).all():
             break
     return settled  # pyrefly: ignore[unbound-name]  # MAX_ITERATIONS > 0
 
 
-def _find_outliers(settled: _Settled) -> NDArray[np.bool_]:
+def _find_outliers(settled: _ConvergedFit) -> NDArray[np.bool_]:
     """Return a mask (n,) of increments far beyond the ninth decile of errors, which a few outliers cannot inflate."""
     expected = np.sqrt(np.diag(settled.model.covariance(settled.std)).reshape(-1, 3).max(axis=1))
     errors = np.abs(settled.solved.residuals.reshape(-1, 3)).max(axis=1)
@@ -216,7 +216,7 @@ def _conditioning(mixed: Mixed) -> refusals.Conditioning:
     return refusals.condition_of(columns / np.repeat(sizes, [9, 3]), BIAS.stop)
 
 
-def _check(fixes: Fixes, remaining: Fixes, settled: _Settled) -> None:
+def _check(fixes: Fixes, remaining: Fixes, settled: _ConvergedFit) -> None:
     """Raise a Fault if residuals, clock, outliers, precision or axes of the solution are implausible.
 
     The Faults are `attitude_untrustworthy`, `clocks_apart`, `ill_conditioned`, `wrong_unit`, `mirrored_axis`.
@@ -267,7 +267,7 @@ def _times_s(fixes: Fixes, increments: NDArray[np.bool_]) -> Array:
     return np.asarray(fixes.at_s[first], dtype=np.float64)
 
 
-def _build_result(settled: _Settled, aside_s: Array) -> KnownIncrements:
+def _build_result(settled: _ConvergedFit, aside_s: Array) -> IncrementSolution:
     """Return the result of a converged fit; the bias is the mean over this recording's intervals."""
     solved, state = settled.solved, settled.state
     wanted = np.eye(len(solved.theta))[np.r_[MATRIX, EARTH, BIAS]]
@@ -280,7 +280,7 @@ def _build_result(settled: _Settled, aside_s: Array) -> KnownIncrements:
         of_sensor = np.ix_(*2 * [np.r_[0:9, 12:15]])  # F and b, without the Earth's rate
         causes[INTERVAL_DIFFERENCES][of_sensor] += change.find_covariance(state.matrix)
     sizes = partial(settled.causes.std_of, std=settled.std)
-    return KnownIncrements(
+    return IncrementSolution(
         matrix=state.matrix,
         bias=state.bias,
         covariance=np.sum(list(causes.values()), axis=0),
@@ -300,7 +300,7 @@ def _build_result(settled: _Settled, aside_s: Array) -> KnownIncrements:
     )
 
 
-def _widen_by_axes(settled: _Settled, wanted: Array, covariance: Array) -> Array:
+def _widen_by_axes(settled: _ConvergedFit, wanted: Array, covariance: Array) -> Array:
     """Return the covariance (q, q) that the reference's inclined axes add to combinations `wanted` (q, p) of θ."""
     inclinations = find_inclinations(settled.averaged, settled.fixes, settled.state.matrix)
     return inclinations.widen(settled.model, settled.std, settled.solved, wanted, np.diag(covariance))
@@ -314,7 +314,7 @@ CAUSES_OF_CONTRIBUTOR = {
 }
 
 
-def _causes(settled: _Settled) -> dict[str, Array]:
+def _causes(settled: _ConvergedFit) -> dict[str, Array]:
     """Return the parts of θ's covariance: one for each estimated error, and one for θ's priors."""
     covariance = settled.solved.covariance
     blind, *parts, _ = settled.model.causes(settled.std, settled.solved)

@@ -18,7 +18,7 @@ import numpy as np
 from rig.estimation.arrays import Array
 from rig.estimation.external.abrupt_change import AbruptChange
 from rig.estimation.external.placement_model import ERROR_MEDIAN_RATIO, MAX_CORRELATED, build_placement_model
-from rig.estimation.reference.attitude_error import AttitudeError, Placed, effects
+from rig.estimation.reference.attitude_error import AttitudeError, ReadingsInAttitudes, effects
 from rig.estimation.reference.reference_model import BIAS, REFERENCE, F, free_directions, jacobian, predicted
 from rig.estimation.statistics.coverage import COVERAGE_FACTOR
 
@@ -27,7 +27,7 @@ UNKNOWN_ATTITUDE_STD_RAD = 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class LaidDown:
+class PlacementSolution:
     """The parameters θ (p,) with placement errors: their covariance (p, p) is the sum of `causes`, by name.
 
     `placement_std` is ζ in the unit of the readings, `attitude_error` δ.
@@ -40,7 +40,7 @@ class LaidDown:
     placement_std: float
     placement_uncertainty: float
 
-    def add_change(self, change: AbruptChange) -> "LaidDown":
+    def add_change(self, change: AbruptChange) -> "PlacementSolution":
         """Return the solution with a covariance that contains the sensor before and after an abrupt change."""
         more, changed = np.zeros_like(self.covariance), np.r_[F, BIAS]
         more[np.ix_(changed, changed)] = change.find_covariance(self.theta[F].reshape(3, 3))
@@ -51,7 +51,7 @@ NOISE, ATTITUDES, PLACEMENTS, CHANGE = "noise", "attitudes", "placements", "abru
 
 
 @dataclass(frozen=True, slots=True)
-class _Linear:
+class _LinearisedPlacements:
     """The linearised readings of N placements.
 
     Residuals (N, 3), design (N, 3, q), variances of the noise (N, 3), the effects E of a rotation, and the stated
@@ -100,11 +100,13 @@ class _PlacementFits:
     likelihood: Array
 
 
-def laid_down(theta: Array, placed: Placed, unplaced: Array, unplaced_variances: Array) -> LaidDown:
+def laid_down(
+    theta: Array, placed: ReadingsInAttitudes, unplaced: Array, unplaced_variances: Array
+) -> PlacementSolution:
     """Re-estimate the solution `theta` (p,) with placement errors; `unplaced` (k, 3) are means in unknown attitudes."""
     all_rests = _add_unplaced(theta, placed, unplaced, unplaced_variances)
     free = free_directions(theta, norm_known=all_rests.norm_known)
-    linear = _Linear(
+    linear = _LinearisedPlacements(
         all_rests.readings - predicted(theta, all_rests.attitudes, all_rests.v_bar),
         jacobian(theta, all_rests.attitudes, all_rests.v_bar) @ free,
         all_rests.variances,
@@ -130,7 +132,7 @@ def laid_down(theta: Array, placed: Placed, unplaced: Array, unplaced_variances:
         averaged[REFERENCE] *= size / np.linalg.norm(averaged[REFERENCE])
     delta, zeta = weights @ grid
     stds = np.sqrt(weights @ (grid - weights @ grid) ** 2)
-    laid = LaidDown(
+    laid = PlacementSolution(
         theta=averaged,
         covariance=np.sum(list(causes.values()), axis=0),
         causes=causes,
@@ -141,7 +143,7 @@ def laid_down(theta: Array, placed: Placed, unplaced: Array, unplaced_variances:
     return laid if len(all_rests.readings) > MAX_CORRELATED else _relate_errors(laid, all_rests, len(placed.readings))
 
 
-def _relate_errors(laid: LaidDown, all_rests: Placed, stated: int) -> LaidDown:
+def _relate_errors(laid: PlacementSolution, all_rests: ReadingsInAttitudes, stated: int) -> PlacementSolution:
     """Return the solution if the errors of the first `stated` attitudes may be a smooth function of the attitude.
 
     The covariance at the most probable standard deviations is inflated to the 95 % intervals that integrate over them.
@@ -174,7 +176,7 @@ def _find_log_prior(grid: Array, size: float) -> Array:
     return log_prior
 
 
-def _add_unplaced(theta: Array, placed: Placed, unplaced: Array, variances: Array) -> Placed:
+def _add_unplaced(theta: Array, placed: ReadingsInAttitudes, unplaced: Array, variances: Array) -> ReadingsInAttitudes:
     """Return all rests; a rest without an attitude gets the attitude that fits its reading best."""
     if not len(unplaced) or not placed.norm_known:
         return placed

@@ -21,7 +21,7 @@ NEGLIGIBLE_FRACTION = 1e-3  # fraction of a mean's variance below which a common
 
 
 @dataclass(frozen=True, slots=True)
-class KnownSensor:
+class SensorProperties:
     """Half-widths of errors from the data sheet, and the temperature of N averages.
 
     - `nonlinearity`: largest distance from the best straight line by the odd or the even part, as a fraction of
@@ -57,7 +57,7 @@ class OwnError:
 
 
 def list_own_errors(
-    sensor: KnownSensor, matrix: Array, turns_rad_s: Array, windows_s: Array, speeds_rad_s: tuple[float, ...]
+    sensor: SensorProperties, matrix: Array, turns_rad_s: Array, windows_s: Array, speeds_rad_s: tuple[float, ...]
 ) -> Iterator[OwnError]:
     """Yield nonlinearity and temperature errors for F (3, 3), rates (N, 3), zero at rest, and windows (N, 2).
 
@@ -102,7 +102,7 @@ def rounding_errors(means_rad_s: Array, roundings_rad_s: Array | float, variance
         yield OwnError(ROUNDING, largest, "°/s", np.array(patterns), "the steps in which the readings come")
 
 
-def _temperature_deviations_k(sensor: KnownSensor, windows_s: Array, weights: Array) -> Array:
+def _temperature_deviations_k(sensor: SensorProperties, windows_s: Array, weights: Array) -> Array:
     """Return the deviations (2, N), K, from the weighted mean temperature: recorded, then hidden below a step."""
     recorded = subtract_mean(sensor.temperature_c, weights)
     return np.array([recorded, unseen_k(sensor.temperature_step_k, windows_s, weights)])

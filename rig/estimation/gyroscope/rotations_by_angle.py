@@ -100,7 +100,7 @@ class TurnedSolution:
 
 
 @dataclass(frozen=True, slots=True)
-class _NormalEquations:
+class _ObservationEquations:
     """The equations `observed` (r,) = `design` (r, 12) δθ + errors; `causes`: patterns (r, q) of one std, by name."""
 
     observed: Array
@@ -112,7 +112,7 @@ class _NormalEquations:
         total: Array = np.sum([cause @ cause.T for cause in self.causes.values()], axis=0)
         return total
 
-    def inflate(self, ratio: float) -> "_NormalEquations":
+    def inflate(self, ratio: float) -> "_ObservationEquations":
         """Return the equations with the rotations' errors multiplied by a ratio."""
         return replace(
             self, causes={name: ratio * cause if name in (ENDS, AXES) else cause for name, cause in self.causes.items()}
@@ -179,7 +179,7 @@ def solve_turned(
 
 def _equate(
     gyroscope: Gyroscope, turns: Sequence[Turn], means: Sequence[RateMean], state: _TurnsEstimate
-) -> list[_NormalEquations]:
+) -> list[_ObservationEquations]:
     """Return the equations of the means, then of the rotations as mean rates."""
     windows_s = np.array([(turn.start_s, turn.end_s) for turn in turns])
     turned = increments(gyroscope.time_s, gyroscope.readings, state.matrix, state.offset, windows_s)
@@ -192,16 +192,16 @@ def _equate(
     ]
 
 
-def _equate_mean(mean: RateMean, gyroscope: Gyroscope, state: _TurnsEstimate) -> _NormalEquations:
+def _equate_mean(mean: RateMean, gyroscope: Gyroscope, state: _TurnsEstimate) -> _ObservationEquations:
     causes = {NOISE: np.diag(np.sqrt(mean.variance)), BIAS: np.diag(gyroscope.bias_std_rad_s)}
-    return _NormalEquations(
+    return _ObservationEquations(
         mean.reading - state.matrix @ mean.rate - state.offset, _derive(mean.rate, np.eye(3)), causes
     )
 
 
 def _equate_rotation(
     turn: Turn, rotation: Array, jacobian: Array, gyroscope: Gyroscope, state: _TurnsEstimate
-) -> _NormalEquations:
+) -> _ObservationEquations:
     """Return three equations of the end attitude, and two of the mean reading at right angles to the axis."""
     from scipy.spatial.transform import Rotation
 
@@ -224,7 +224,7 @@ def _equate_rotation(
         AXES: turn.axis_std_rad
         * np.vstack([(stated - np.eye(3)) @ tilt_axes / lasting_s, across @ state.matrix @ tilted_rate]),
     }
-    return _NormalEquations(
+    return _ObservationEquations(
         np.concatenate([missed / lasting_s, across @ (reading - state.matrix @ rate - state.offset)]),
         np.vstack([jacobian / lasting_s, _derive(rate, across)]),
         causes,
@@ -241,7 +241,7 @@ def _perpendicular_axes(axis: Array) -> Array:
     return np.asarray(np.linalg.svd(axis[None])[2][1:].T, dtype=np.float64)
 
 
-def _solve(equations: Sequence[_NormalEquations]) -> tuple[Array, Array]:
+def _solve(equations: Sequence[_ObservationEquations]) -> tuple[Array, Array]:
     """Return the least-squares step δθ (12,) and its covariance."""
     information, gradient = np.zeros((12, 12)), np.zeros(12)
     for equation in equations:
@@ -252,7 +252,7 @@ def _solve(equations: Sequence[_NormalEquations]) -> tuple[Array, Array]:
     return covariance @ gradient, covariance
 
 
-def _conditioning(equations: Sequence[_NormalEquations]) -> refusals.Conditioning:
+def _conditioning(equations: Sequence[_ObservationEquations]) -> refusals.Conditioning:
     """Return the conditioning of the scaled design. Raise Fault `rank_deficient`, `ill_conditioned`."""
     design = np.vstack([equation.design for equation in equations])
     sizes = [np.linalg.norm(design[:, block]) for block in (slice(0, 9), slice(9, 12))]
@@ -261,7 +261,7 @@ def _conditioning(equations: Sequence[_NormalEquations]) -> refusals.Conditionin
     return conditioning
 
 
-def _find_birge_ratio(turns: Sequence[_NormalEquations], covariance: Array) -> tuple[float, float]:
+def _find_birge_ratio(turns: Sequence[_ObservationEquations], covariance: Array) -> tuple[float, float]:
     """Return the rotations' Birge ratio and its degrees of freedom; 1 and infinity if χ² is at most its expectation."""
     chi_square, dof = 0.0, 0.0
     for turn in turns:
@@ -273,7 +273,7 @@ def _find_birge_ratio(turns: Sequence[_NormalEquations], covariance: Array) -> t
     return float(np.sqrt(chi_square / dof)), dof
 
 
-def _check_closed(turns: Sequence[Turn], equations: Sequence[_NormalEquations], ratio: float) -> None:
+def _check_closed(turns: Sequence[Turn], equations: Sequence[_ObservationEquations], ratio: float) -> None:
     """Raise Fault `turn_not_closed` if rotations contradict their stated angles by more than `MAX_END_ERROR_RAD`."""
     miss_rad = ratio * float(np.median([turn.angle_std_rad for turn in turns]))
     if miss_rad <= MAX_END_ERROR_RAD:
@@ -291,7 +291,7 @@ def _check_closed(turns: Sequence[Turn], equations: Sequence[_NormalEquations], 
     )
 
 
-def _budget(equations: Sequence[_NormalEquations], gain: Array) -> Budget:
+def _budget(equations: Sequence[_ObservationEquations], gain: Array) -> Budget:
     """Return each cause's contribution; `gain` (6, 12) maps the least squares' gradient to scale and bias."""
     sources = {
         NOISE: "scatter of the readings",

@@ -17,7 +17,7 @@ from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.common_errors import CommonErrors, solve_with_common_errors
 from rig.estimation.gyroscope.nonlinearity import Nonlinearity, curvature, distinct_speeds, nonlinearity
-from rig.estimation.gyroscope.own_errors import KnownSensor, OwnError, list_own_errors, rounding_errors
+from rig.estimation.gyroscope.own_errors import OwnError, SensorProperties, list_own_errors, rounding_errors
 from rig.estimation.gyroscope.vector_model import VectorSolution, check_identifiable, design_matrix, propagate_speed_std
 from rig.estimation.statistics.bias_process import BiasProcess, bias_process
 
@@ -64,7 +64,7 @@ class VectorInputs:
     mount_turns_rad: Array | None = None
     arms_m: Array | None = None
     noise_dof: Array | float = np.inf
-    sensor: KnownSensor | None = None
+    sensor: SensorProperties | None = None
     encoder_errors_rad_s: Array | None = None
     ripples: Array | float = 0.0
     state_gains: Array | float = 1.0

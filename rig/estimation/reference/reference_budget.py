@@ -57,7 +57,7 @@ class FitUncertainty:
 
 
 @dataclass(frozen=True, slots=True)
-class KnownSize:
+class NormUncertainty:
     """The uncertainty of the reference's norm: expanded (k = 2) if `stated`, else a half-width.
 
     `relative` is the uncertainty divided by the norm; `relative` × `per_unit` is the uncertainty in `unit`.
@@ -107,7 +107,7 @@ def response_in_attitudes(solution: TriaxialSolution, dwells: Dwells) -> Array:
     return response
 
 
-def reference_budget(spread: FitUncertainty, size: KnownSize, others: Sequence[Contributor] = ()) -> Budget:
+def reference_budget(spread: FitUncertainty, size: NormUncertainty, others: Sequence[Contributor] = ()) -> Budget:
     """Return the budget of a fit's uncertainty `spread`, the norm's uncertainty `size`, and `others`."""
     noise = spread.response @ spread.noise @ spread.response.T
     contributors = [
@@ -135,7 +135,7 @@ def type_b(name: str, half_width: float, unit: str, source: str, covariance: Arr
     return Contributor(name, "B", "rectangular", half_width, unit, source, np.inf, covariance / 3)
 
 
-def _evaluate_norm(scale: Array, size: KnownSize) -> Contributor:
+def _evaluate_norm(scale: Array, size: NormUncertainty) -> Contributor:
     """Return the contributor of the reference's norm. It changes all scale factors in proportion and no bias."""
     derivative = np.concatenate([scale, np.zeros(3)])
     distribution: Literal["normal", "rectangular"] = "normal" if size.stated else "rectangular"

@@ -2,13 +2,13 @@
 
 from sqlalchemy import Connection, insert, select
 
-from rig.history.entered.issued_certificate import Issued
+from rig.history.entered.issued_certificate import IssuedCertificate
 from rig.history.storage import journal
 from rig.history.storage.row_numbers import next_number
 from rig.history.storage.schema import certificate, certificate_file, fill_row
 
 
-def enter(connection: Connection, run_id: int, issued: Issued, now_utc: str) -> None:
+def enter(connection: Connection, run_id: int, issued: IssuedCertificate, now_utc: str) -> None:
     """Add the certificate and its new files; change no existing rows."""
     number = connection.scalar(select(certificate.c.id).where(certificate.c.number == issued.number))
     if number is None:
@@ -26,11 +26,11 @@ def enter(connection: Connection, run_id: int, issued: Issued, now_utc: str) -> 
             journal.note(connection, certificate_file, number, name, sha256)
 
 
-def select_run(connection: Connection, run_id: int) -> tuple[Issued, ...]:
+def select_run(connection: Connection, run_id: int) -> tuple[IssuedCertificate, ...]:
     """Return the certificates of a run, each with its files, in the order of entry."""
     query = select(certificate).where(certificate.c.run_id == run_id).order_by(certificate.c.id)
     return tuple(
-        Issued(row.number, row.title, row.issued, row.replaces, row.marks, _files(connection, row.id))
+        IssuedCertificate(row.number, row.title, row.issued, row.replaces, row.marks, _files(connection, row.id))
         for row in connection.execute(query).all()
     )
 

@@ -12,7 +12,7 @@ from rig.config.files.regular_file import RECORDING_MAX_BYTES, UnfitFile, open_r
 from rig.data.run_folder import CONFIG, RESULT, SCRIPT, SCRIPT_IDENTITY, recordings
 from rig.data.validation import refuse_duplicate_keys
 from rig.errors import Refused
-from rig.history.entered.issued_certificate import Issued, issue_certificate
+from rig.history.entered.issued_certificate import IssuedCertificate, issue_certificate
 
 if TYPE_CHECKING:
     from rig.config.load import Loaded
@@ -61,7 +61,7 @@ class FinishedRun:
     recordings: tuple[EnteredRecording, ...]
     operator: str | None = None
     note: str | None = None
-    certificate: Issued | None = None
+    certificate: IssuedCertificate | None = None
     documents: tuple[tuple[str, str], ...] = ()
 
     @property
@@ -169,7 +169,7 @@ def read_configuration(folder: Path) -> "Loaded | None":
         return None
 
 
-def _certificate(folder: Path, document: "ResultDocument", stated: "StatedFacts") -> Issued | None:
+def _certificate(folder: Path, document: "ResultDocument", stated: "StatedFacts") -> IssuedCertificate | None:
     """Return the certificate in the folder if its content, not only its number, matches this result.
 
     An amended certificate is entered when it is made, not here.

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Issued:
+class IssuedCertificate:
     """An issued certificate.
 
     `issued` is a day; `replaces` the number of the certificate that it amends; `marks` the text across its pages, or
@@ -25,9 +25,9 @@ class Issued:
     files: tuple[tuple[str, str], ...] = ()
 
 
-def issue_certificate(certificate: "Certificate", files: Mapping[str, bytes]) -> Issued:
+def issue_certificate(certificate: "Certificate", files: Mapping[str, bytes]) -> IssuedCertificate:
     """Return the certificate for a history, with the checksums of its files."""
-    return Issued(
+    return IssuedCertificate(
         certificate.number,
         certificate.title,
         certificate.issued.isoformat(),

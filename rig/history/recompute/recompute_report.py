@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from rig.history.documents import cell
-from rig.history.entered.issued_certificate import Issued
+from rig.history.entered.issued_certificate import IssuedCertificate
 from rig.history.recompute.recompute_journal import RecomputeQuestion
 from rig.history.recompute.result_comparison import (
-    Compared,
+    ComparedResult,
     ParameterMove,
     RecomputedResult,
     RecomputeOutcome,
@@ -100,7 +100,7 @@ def _lines(outcome: RecomputeOutcome) -> Iterator[dict[str, str]]:
             yield _line(comparison, past)
 
 
-def _line(compared: Compared, past: Past | None) -> dict[str, str]:
+def _line(compared: ComparedResult, past: Past | None) -> dict[str, str]:
     """Return the cells of a calibration, or of a result without one."""
     move = _most_moved(compared, past)
     has_moved = past is not None and past.id in compared.moved
@@ -119,7 +119,7 @@ def _line(compared: Compared, past: Past | None) -> dict[str, str]:
     }  # fmt: skip
 
 
-def _verdict(compared: Compared) -> str:
+def _verdict(compared: ComparedResult) -> str:
     if not isinstance(compared.answer, RecomputedResult) or not compared.verdict_changed:
         return compared.stated.verdict
     by = f" ({', '.join(compared.answer.failed)})" if compared.answer.failed else ""
@@ -138,16 +138,16 @@ def _change(move: ParameterMove) -> str:
     return value_text(move.before) + ("" if move.now is None else f" → {value_text(move.now)}") + f" {move.before.unit}"
 
 
-def _numbers(certificates: tuple[Issued, ...]) -> str:
+def _numbers(certificates: tuple[IssuedCertificate, ...]) -> str:
     return ", ".join(certificate.number for certificate in certificates)
 
 
-def _most_moved(compared: Compared, past: Past | None) -> ParameterMove | None:
+def _most_moved(compared: ComparedResult, past: Past | None) -> ParameterMove | None:
     moves = () if past is None else compared.moves.get(past.id, ())
     return moves[0] if moves else None
 
 
-def _rows(compared: Compared) -> Iterator[dict[str, Any]]:
+def _rows(compared: ComparedResult) -> Iterator[dict[str, Any]]:
     """Yield a row for each calibration of the run, or one row if it has none."""
     answer = compared.answer
     columns: dict[str, Any] = {

@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import Literal
 
 from rig.history.entered.finished_run import EnteredRecording
-from rig.history.entered.issued_certificate import Issued
+from rig.history.entered.issued_certificate import IssuedCertificate
 from rig.history.store import Past
 from rig.report.findings.history_records import HistoryRecord, Parameter
 
@@ -37,7 +37,7 @@ class StatedResult:
     calibrations: tuple[Past, ...]
     recordings: tuple[EnteredRecording, ...]
     places: tuple[tuple[str, str], ...]
-    certificates: tuple[Issued, ...] = ()
+    certificates: tuple[IssuedCertificate, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +90,7 @@ class ParameterMove:
 
 
 @dataclass(frozen=True)
-class Compared:
+class ComparedResult:
     """A stated result, and the present `answer` from its recordings, or None; `of_u` as in `RecomputeOutcome`."""
 
     stated: StatedResult
@@ -121,13 +121,13 @@ class Compared:
         return isinstance(self.answer, RecomputedResult) and self.answer.verdict != self.stated.verdict
 
     @property
-    def withdrawn(self) -> tuple[Issued, ...]:
+    def withdrawn(self) -> tuple[IssuedCertificate, ...]:
         """The certificates that the recomputed results contradict (ISO/IEC 17025, 7.10.1, 7.8.8 and 8.7)."""
         refused = isinstance(self.answer, Unsolved) and self.answer.state == "refused"
         return self.stated.certificates if refused or self.verdict_changed or self.moved else ()
 
     @property
-    def unconfirmed(self) -> tuple[Issued, ...]:
+    def unconfirmed(self) -> tuple[IssuedCertificate, ...]:
         """The certificates that could not be checked, because their recordings were not solved."""
         unsolved = not isinstance(self.answer, RecomputedResult) and not self.withdrawn
         return self.stated.certificates if unsolved else ()
@@ -143,7 +143,7 @@ class RecomputeOutcome:
     """All comparisons in the order of time; values that moved by more than `of_u` of the stated U count as changed."""
 
     of_u: float
-    compared: tuple[Compared, ...]
+    compared: tuple[ComparedResult, ...]
 
     @property
     def solved(self) -> int:
@@ -173,12 +173,12 @@ class RecomputeOutcome:
         return sum(comparison.verdict_changed for comparison in self.compared)
 
     @property
-    def withdrawn(self) -> tuple[Issued, ...]:
+    def withdrawn(self) -> tuple[IssuedCertificate, ...]:
         """The certificates to withdraw, of all results."""
         return tuple(issued for comparison in self.compared for issued in comparison.withdrawn)
 
     @property
-    def unconfirmed(self) -> tuple[Issued, ...]:
+    def unconfirmed(self) -> tuple[IssuedCertificate, ...]:
         """The certificates, of any result, that could not be checked."""
         return tuple(issued for comparison in self.compared for issued in comparison.unconfirmed)
 
@@ -188,7 +188,7 @@ class RecomputeOutcome:
         return all(comparison.same for comparison in self.compared)
 
     @property
-    def notable(self) -> tuple[Compared, ...]:
+    def notable(self) -> tuple[ComparedResult, ...]:
         """The results that were not confirmed by recomputation."""
         return tuple(comparison for comparison in self.compared if not comparison.same)
 
@@ -198,7 +198,7 @@ def match_answers(
 ) -> RecomputeOutcome:
     """Return each result with the answer under the result's checksum, if any."""
     return RecomputeOutcome(
-        of_u, tuple(Compared(result, answers.get(result.content_sha256), of_u) for result in stated)
+        of_u, tuple(ComparedResult(result, answers.get(result.content_sha256), of_u) for result in stated)
     )
 
 

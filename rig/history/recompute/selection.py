@@ -8,7 +8,7 @@ from typing import TypeVar
 from sqlalchemy import Connection, select
 
 from rig.history.entered.finished_run import EnteredRecording
-from rig.history.entered.issued_certificate import Issued
+from rig.history.entered.issued_certificate import IssuedCertificate
 from rig.history.recompute.result_comparison import StatedResult
 from rig.history.storage import schema
 from rig.history.store import History, Past, Selection, chosen, replacement_condition
@@ -71,12 +71,12 @@ def _places(connection: Connection) -> Mapping[int, tuple[tuple[str, str], ...]]
     return _group_by_run((row.run_id, (row.computer, row.path)) for row in connection.execute(query))
 
 
-def _certificates(connection: Connection) -> Mapping[int, tuple[Issued, ...]]:
+def _certificates(connection: Connection) -> Mapping[int, tuple[IssuedCertificate, ...]]:
     """Return the certificates in force: those that are valid (without marks) and not replaced in this history."""
     rows = connection.execute(select(schema.certificate).order_by(schema.certificate.c.id)).all()
     replaced_numbers = {row.replaces for row in rows if not row.marks}  # an invalid one does not replace a valid one
     return _group_by_run(
-        (row.run_id, Issued(row.number, row.title, row.issued, row.replaces, row.marks))
+        (row.run_id, IssuedCertificate(row.number, row.title, row.issued, row.replaces, row.marks))
         for row in rows
         if row.number not in replaced_numbers and not row.marks
     )

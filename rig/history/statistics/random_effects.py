@@ -10,7 +10,7 @@ CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True, slots=True)
-class Fitted:
+class FittedModel:
     """The coefficients (p,), their covariance (p, p), and `between_std`, the scatter beyond the values' stated stds.
 
     `dof` is n − p.
@@ -46,7 +46,7 @@ class Fitted:
         return value, np.sqrt(variance)
 
 
-def fit(design: Array, values: Array, std: Array) -> Fitted:
+def fit(design: Array, values: Array, std: Array) -> FittedModel:
     """Return the weighted least-squares fit of values (n,) with stds (n,) to a design (n, p) of full rank, n > p.
 
     The variance between runs is DerSimonian and Laird's moment estimate (Control. Clin. Trials 7 (1986) 177), for any
@@ -68,7 +68,7 @@ def fit(design: Array, values: Array, std: Array) -> Fitted:
     residuals = values - design @ coefficients
     scatter = max(1.0, float(weights @ residuals**2) / (n - p))
     covariance = np.asarray(scatter * np.linalg.inv((design.T * weights) @ design), dtype=np.float64)
-    return Fitted(coefficients, covariance, float(np.sqrt(between_variance)), n - p)
+    return FittedModel(coefficients, covariance, float(np.sqrt(between_variance)), n - p)
 
 
 def _solve(design: Array, values: Array, weights: Array) -> Array:

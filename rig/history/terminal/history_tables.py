@@ -7,7 +7,7 @@ from rig.data.installed_kinds import quantities
 from rig.history.series import MIN_DRIFT_DAYS, YEAR_DAYS, Change, RigState, Subject, Trend
 from rig.history.statistics.charts import MIN_RESULTS, Chart
 from rig.history.statistics.rig_effects import RigEffect
-from rig.history.store import Kept, Past
+from rig.history.store import KeptRun, Past
 from rig.history.terminal.change_words import add_sign
 from rig.history.terminal.fitting_table import FittingTable, TableColumn, picture
 from rig.report.findings.history_records import BIASES, SCALES, Parameter, is_scale
@@ -107,7 +107,7 @@ def parameters_table(past: Past) -> FittingTable:
     return FittingTable(f"calibration {past.id}: {title_of(past.subject)}", columns)
 
 
-def run_lines(past: Past, kept: Kept) -> Iterator[str]:
+def run_lines(past: Past, kept: KeptRun) -> Iterator[str]:
     """Yield operator, board and note of a run, and its certificates with their replacements."""
     if past.board_unique_id != NO_BOARD:
         yield f"board: {past.board_unique_id}"

@@ -42,7 +42,7 @@ from rig.observation.external.placements import MIN_STILL_FRACTION, Placements, 
 from rig.observation.external.reference_clock import check_one_clock, find_reference_clock
 from rig.observation.external.reference_rows import Turning
 from rig.observation.external.table_motion import check_rates_agree
-from rig.observation.formats.column_selection import Mapped
+from rig.observation.formats.column_selection import MappedColumns
 from rig.observation.formats.csv_table import CsvTable, blank_cell, read_table
 from rig.observation.formats.sample_files import attitudes_in, rows_around
 from rig.observation.time_stamps.sampling import find_sampling
@@ -94,7 +94,7 @@ class PlacedReadings:
 
 
 def read_attitudes(
-    path: Path, mapped: Mapped | None = None, origin_s: int = 0, *, inverse: bool = False
+    path: Path, mapped: MappedColumns | None = None, origin_s: int = 0, *, inverse: bool = False
 ) -> dict[str, Array]:
     """Return the columns (N,) of a file of attitudes in any format; `mapped` if its columns have other names.
 

@@ -43,7 +43,7 @@ from rig.observation.external.csv_windows import (
 from rig.observation.external.omission import Omitted
 from rig.observation.external.turns import DeclaredTurns, TurnedData, find_turns
 from rig.observation.false_readings import check_frozen, check_unclipped
-from rig.observation.formats.column_selection import Mapped
+from rig.observation.formats.column_selection import MappedColumns
 from rig.observation.formats.csv_table import read_columns
 from rig.observation.observe import Observation, nearest_axis
 from rig.observation.stuck_check import check_reads
@@ -86,7 +86,7 @@ class ExternalData:
         return self.rests if self.turned is None else self.turned.rests
 
 
-def read_sweeps(path: Path, mapped: Mapped | None = None, origin_s: int = 0) -> dict[str, Array]:
+def read_sweeps(path: Path, mapped: MappedColumns | None = None, origin_s: int = 0) -> dict[str, Array]:
     """Return the columns (k,) of a file of sweeps, with times that count from `origin_s`.
 
     Raise Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`.

@@ -23,7 +23,7 @@ from rig.estimation.arrays import Array
 from rig.observation.external.csv_windows import check_times
 from rig.observation.external.omission import Omitted
 from rig.observation.false_readings import check_possible, check_temperatures, check_unwrapped
-from rig.observation.formats.column_selection import Mapped
+from rig.observation.formats.column_selection import MappedColumns
 from rig.observation.formats.csv_table import CsvTable, blank_cell, read_table
 from rig.observation.formats.sample_files import readings_in
 from rig.observation.statistics.spikes import bridge_spikes, find_spikes
@@ -65,14 +65,14 @@ class Samples:
     notes: tuple[str, ...] = ()
 
 
-def read_samples(path: Path, needed: Sequence[Quantity] = (), mapped: Mapped | None = None) -> Samples:
+def read_samples(path: Path, needed: Sequence[Quantity] = (), mapped: MappedColumns | None = None) -> Samples:
     """Return the readings of a file, as `samples_in` does. Raise Refused as `samples_in` and `read_sample_table` do."""
     only = [quantity.sensor for quantity in needed]
     return samples_in(read_sample_table(path, needed, mapped, only).columns, str(path))
 
 
 def read_sample_table(
-    path: Path, needed: Sequence[Quantity] = (), mapped: Mapped | None = None, only: Collection[str] = ()
+    path: Path, needed: Sequence[Quantity] = (), mapped: MappedColumns | None = None, only: Collection[str] = ()
 ) -> SampleTable:
     """Return the columns of a file in any format, which must hold the quantities `needed`.
 
@@ -99,7 +99,7 @@ def read_sample_table(
     return _drop_blanks(path, table, read, wanted)
 
 
-def _convert(path: Path, columns: Columns, mapped: Mapped | None) -> Columns:
+def _convert(path: Path, columns: Columns, mapped: MappedColumns | None) -> Columns:
     """Return columns renamed as in the rig's files, and multiplied by the factors of a map.
 
     The map can state a mirrored axis, or a topic in another unit. Raise Refused `wrong_columns`.

@@ -44,7 +44,7 @@ class OmittedIncrements:
 
 
 @dataclass(frozen=True, slots=True)
-class Gathered:
+class GatheredFixes:
     """Fixes, gathered over windows of `window_s`, and the omitted increments."""
 
     fixes: Fixes
@@ -57,7 +57,7 @@ class Gathered:
         return len(self.fixes.joined)
 
 
-def gather(turning: Turning, window_s: float | None = None, clock_s: float = 0.0) -> Gathered:
+def gather(turning: Turning, window_s: float | None = None, clock_s: float = 0.0) -> GatheredFixes:
     """Return the fixes of a reference's rows, in windows of a given or a suitable length.
 
     Time t of the reference is time t + `clock_s` of the readings. Raise Fault `too_few_observations` if the body moves

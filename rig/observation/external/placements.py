@@ -32,7 +32,7 @@ MIN_STILL_FRACTION = 0.5  # of a dwell in which the body lies still; otherwise t
 
 
 @dataclass(frozen=True, slots=True)
-class Rested:
+class RestMeans:
     """Averages in N rests: `means` (N, 3) of every quantity, their `variances` (N, 3), and the variances' `dof` (N, 3).
 
     `windows` reach from the first to the last of the `samples` (N,) of each rest.
@@ -59,10 +59,10 @@ class Placements:
     everything else that is left out.
     """
 
-    read: Rested
+    read: RestMeans
     attitudes: Array
     attitude_std_rad: Array | None
-    unplaced: Rested
+    unplaced: RestMeans
     left_out: int
     omitted: tuple[Omitted, ...] = ()
 
@@ -227,7 +227,7 @@ def _angle_between_rad(one: Array, other: Array) -> float:
 
 def _read(
     time_s: Array, readings: Mapping[Quantity, Array], cuts: Sequence[NDArray[np.intp]]
-) -> tuple[Rested, NDArray[np.intp]]:
+) -> tuple[RestMeans, NDArray[np.intp]]:
     """Return the means of the rests, and the samples of knocks. Rests with few samples get the others' noise."""
     means = {}
     variances = {}
@@ -246,7 +246,7 @@ def _read(
         fewest = len(values) - 1.0 if np.isnan(dofs).all() else np.nanmin(dofs)
         dof[quantity] = np.where(np.isnan(dofs), fewest, dofs)
     windows = tuple(Window(float(time_s[cut[0]]), float(time_s[cut[-1]])) for cut in cuts)
-    return Rested(means, variances, dof, windows, tuple(map(len, cuts))), knocked
+    return RestMeans(means, variances, dof, windows, tuple(map(len, cuts))), knocked
 
 
 def _fill_variances(variances: Array, counts: NDArray[np.intp], readings: Array, quantity: Quantity) -> Array:

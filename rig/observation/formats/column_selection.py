@@ -13,7 +13,7 @@ from rig.observation.formats.csv_cells import DAY_S, is_value
 
 
 @dataclass(frozen=True, slots=True)
-class Mapped:
+class MappedColumns:
     """The columns of another program's file.
 
     - columns: each column's name in the file, or its number from 1, and the factor to SI, by the rig's own name.
@@ -37,21 +37,21 @@ class Mapped:
         return bool(self.columns) and all(column.isdecimal() for column, _ in self.columns.values())
 
 
-def map_samples(columns: ColumnMap) -> Mapped | None:
+def map_samples(columns: ColumnMap) -> MappedColumns | None:
     """Return the column map of a file of readings, or None; without a map an unknown column is an error."""
     return _unless_empty(
         _build_map(columns.samples, columns.samples_skip_lines, columns.samples_rate_hz, columns.samples_missing)
     )
 
 
-def map_motion(columns: ColumnMap) -> Mapped | None:
+def map_motion(columns: ColumnMap) -> MappedColumns | None:
     """Return the column map of a file of sweeps or attitudes, or None, as `map_samples` does."""
     return _unless_empty(
         _build_map(columns.motion, columns.motion_skip_lines, columns.motion_rate_hz, columns.motion_missing)
     )
 
 
-def map_table_log(table: TableSection, columns: ColumnMap) -> Mapped:
+def map_table_log(table: TableSection, columns: ColumnMap) -> MappedColumns:
     """Return the column map of a rate table's log: `time_s`, and `angle_0`, `rate_0` … for its axes."""
     sections = {TIME: table.time}
     for index, axis in enumerate(table.axes):
@@ -61,15 +61,15 @@ def map_table_log(table: TableSection, columns: ColumnMap) -> Mapped:
     return _build_map(sections, columns.motion_skip_lines, None, columns.motion_missing)
 
 
-def _unless_empty(mapped: Mapped) -> Mapped | None:
+def _unless_empty(mapped: MappedColumns) -> MappedColumns | None:
     is_needed = mapped.columns or mapped.skip_lines or mapped.rate_hz is not None or mapped.missing
     return mapped if is_needed else None
 
 
 def _build_map(
     sections: Mapping[str, ColumnSection], skip_lines: int, rate_hz: float | None, missing: Sequence[str]
-) -> Mapped:
-    return Mapped(
+) -> MappedColumns:
+    return MappedColumns(
         {name: (section.column, section.to_si) for name, section in sections.items()},
         skip_lines,
         {name: section.wraps_at for name, section in sections.items() if section.wraps_at is not None},
@@ -78,7 +78,7 @@ def _build_map(
     )
 
 
-def unwrap_times(columns: Mapping[str, Array], mapped: Mapped | None, *, by_day: bool) -> dict[str, Array]:
+def unwrap_times(columns: Mapping[str, Array], mapped: MappedColumns | None, *, by_day: bool) -> dict[str, Array]:
     """Return the columns with continuous times, without the restarts of counters at 0.
 
     With `by_day`, times restart at midnight.
@@ -94,7 +94,7 @@ def unwrap_times(columns: Mapping[str, Array], mapped: Mapped | None, *, by_day:
 
 
 def select_columns(
-    path: Path, headings: Sequence[str], width: int, header: Header, mapped: Mapped | None
+    path: Path, headings: Sequence[str], width: int, header: Header, mapped: MappedColumns | None
 ) -> dict[int, str]:
     """Return the rig's name of each column to read, by the column's index in a table of `width` columns.
 
@@ -105,7 +105,9 @@ def select_columns(
     return selected
 
 
-def _select_mapped(path: Path, headings: Sequence[str], width: int, header: Header, mapped: Mapped) -> dict[int, str]:
+def _select_mapped(
+    path: Path, headings: Sequence[str], width: int, header: Header, mapped: MappedColumns
+) -> dict[int, str]:
     """Return the name of each column by its index, as the column map says."""
     indices = {name: _find_column(path, headings, width, name, column) for name, (column, _) in mapped.columns.items()}
     if len(set(indices.values())) < len(indices):

@@ -15,7 +15,7 @@ from rig.data.recording.motion_file import MAX_NUMBER, TIME, Header
 from rig.errors import Refused
 from rig.errors.quoting import quote
 from rig.estimation.arrays import Array
-from rig.observation.formats.column_selection import Mapped, check_headings, select_columns, unwrap_times
+from rig.observation.formats.column_selection import MappedColumns, check_headings, select_columns, unwrap_times
 from rig.observation.formats.csv_cells import (
     find_wrong_unit,
     is_number,
@@ -49,7 +49,7 @@ class CsvTable:
 
 
 def read_columns(
-    path: Path, header: Header, largest_mb: int, mapped: Mapped | None = None, origin_s: int = 0
+    path: Path, header: Header, largest_mb: int, mapped: MappedColumns | None = None, origin_s: int = 0
 ) -> dict[str, Array]:
     """Return the columns of a file as `read_table` does; no cell may be blank.
 
@@ -69,7 +69,7 @@ def blank_cell(path: Path, name: str, line: int) -> Refused:
 
 
 def read_table(
-    path: Path, header: Header, largest_mb: int, mapped: Mapped | None = None, origin_s: int | None = None
+    path: Path, header: Header, largest_mb: int, mapped: MappedColumns | None = None, origin_s: int | None = None
 ) -> CsvTable:
     """Return the columns of a file by the names in its header; each group of optional columns is complete or absent.
 
@@ -113,10 +113,12 @@ def csv_parts(
     The rows come in blocks, with the line number as an additional column. The last part states `origin_s`, and whether
     times are times of day.
     """
-    return _parts(path, Header(*names), largest_mb, None if mapped is None else Mapped(**mapped), origin_s)
+    return _parts(path, Header(*names), largest_mb, None if mapped is None else MappedColumns(**mapped), origin_s)
 
 
-def _parts(path: Path, header: Header, largest_mb: int, mapped: Mapped | None, origin_s: int | None) -> Iterator[Part]:
+def _parts(
+    path: Path, header: Header, largest_mb: int, mapped: MappedColumns | None, origin_s: int | None
+) -> Iterator[Part]:
     """Yield the table in blocks of rows, then the origin of its time."""
     skipped = 0 if mapped is None else mapped.skip_lines
     rows = read_mat_rows(path, header, mapped) if is_mat(path) else read_rows(path, largest_mb, skipped)
@@ -132,7 +134,7 @@ def _parts(path: Path, header: Header, largest_mb: int, mapped: Mapped | None, o
     width = max(len(headings), len(first)) if by_number else len(headings)
     selected = select_columns(path, headings, width, header, mapped)
     factors = {} if mapped is None else {name: factor for name, (_, factor) in mapped.columns.items()}
-    wanted = _Wanted(
+    wanted = _WantedColumns(
         path,
         width,
         selected,
@@ -168,7 +170,7 @@ def _parts(path: Path, header: Header, largest_mb: int, mapped: Mapped | None, o
 
 
 @dataclass(frozen=True, slots=True)
-class _Wanted:
+class _WantedColumns:
     """The columns to read from a file: their `names` by index, out of `width`, and their `factors` to SI.
 
     A cell with a text of `missing` is blank. `in_any_unit`: units that a row states are ignored.

@@ -16,7 +16,7 @@ from rig.data.recording.motion_file import Header
 from rig.errors import Refused
 from rig.errors.quoting import listing, quote, shorten
 from rig.estimation.arrays import Array
-from rig.observation.formats.column_selection import Mapped
+from rig.observation.formats.column_selection import MappedColumns
 
 SUFFIX = ".mat"
 HDF5_HEADER = b"MATLAB 7.3"
@@ -32,7 +32,7 @@ def is_mat(path: Path) -> bool:
     return path.suffix.lower() == SUFFIX
 
 
-def read_mat_rows(path: Path, header: Header, mapped: Mapped | None) -> Iterator[list[str]]:
+def read_mat_rows(path: Path, header: Header, mapped: MappedColumns | None) -> Iterator[list[str]]:
     """Yield the names of all columns of a file, then its rows, in which cells of unneeded columns are blank.
 
     The needed columns are those in the map or with the rig's names. NaN is spelt as the map does. Raise Refused

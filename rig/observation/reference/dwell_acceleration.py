@@ -22,7 +22,7 @@ from rig.observation.motion.arm_motion import ArmMotion
 from rig.observation.oscillation import MAX_TRAVEL_AT_REST_RAD
 from rig.observation.statistics.mean import Mean
 from rig.observation.statistics.vibration_noise import average_standstill
-from rig.observation.windows import Dwelt, Window, dwelt
+from rig.observation.windows import FinishedDwell, Window, dwelt
 
 LEAVING_S = 0.05  # before a dwell's end: the board's times include the gyroscope's delay, which is the longer one
 
@@ -104,7 +104,7 @@ def _is_noisy(stream: Stream) -> bool:
 
 
 def _dwell_reading(
-    run: RunData, stream: Stream, motion: ArmMotion, finished: Dwelt, settings: ObservationThresholds
+    run: RunData, stream: Stream, motion: ArmMotion, finished: FinishedDwell, settings: ObservationThresholds
 ) -> DwellReading:
     """Return a dwell's mean acceleration and attitude, with weights by which the arm's oscillation adds no noise."""
     dwell, window = finished.dwell, trim_dwell(run, finished).window
@@ -137,10 +137,10 @@ def gravity_difference(attitudes: Array, expected: Array, sensor: RecordedSensor
     return difference
 
 
-def trim_dwell(run: RunData, finished: Dwelt) -> Dwelt:
+def trim_dwell(run: RunData, finished: FinishedDwell) -> FinishedDwell:
     """Return the dwell without its last readings, which may include the start of the arm's next motion."""
     start_s, end_s = finished.window.start_s, finished.window.end_s
-    return Dwelt(finished.dwell, Window(start_s, max(end_s - LEAVING_S, start_s)))
+    return FinishedDwell(finished.dwell, Window(start_s, max(end_s - LEAVING_S, start_s)))
 
 
 def _check_standstill(motion: ArmMotion, window: Window, where: str) -> None:

@@ -4,9 +4,9 @@ from typing import Any
 
 import numpy as np
 
-from rig.analysis.external.attitudes import InAttitudes, Result
-from rig.analysis.external.external_recordings import OfSensor
-from rig.analysis.external.increment_calibration import InIncrements
+from rig.analysis.external.attitudes import AttitudeCalibration, Result
+from rig.analysis.external.external_recordings import ExternalResult
+from rig.analysis.external.increment_calibration import IncrementCalibration
 from rig.analysis.outcome import Outcome
 from rig.data.entries.accelerometer import AccelerometerEntry
 from rig.data.entries.external import (
@@ -70,7 +70,7 @@ def list_external_magnetometers(outcome: Outcome) -> dict[str, MagnetometerEntry
     }  # fmt: skip
 
 
-def rates_in_attitudes(sensor: OfSensor) -> AttitudesEntry | None:
+def rates_in_attitudes(sensor: ExternalResult) -> AttitudesEntry | None:
     """Return a gyroscope's results from attitudes, other than scale and bias; None if it was calibrated by sweeps."""
     if sensor.rates is None:
         return None
@@ -80,15 +80,17 @@ def rates_in_attitudes(sensor: OfSensor) -> AttitudesEntry | None:
             "earth_rate_rad_s": None if isinstance(earth, Fault) else earth.rate_rad_s.tolist(),
             "earth_rate_std_rad_s": None if isinstance(earth, Fault) else earth.std_rad_s.tolist(),
             "earth_rate_error": str(earth) if isinstance(earth, Fault) else None,
-            "by_increments": _increments_entry(sensor.rates) if isinstance(sensor.rates, InIncrements) else None,
+            "by_increments": _increments_entry(sensor.rates)
+            if isinstance(sensor.rates, IncrementCalibration)
+            else None,
             "covariance": sensor.rates.solution.covariance.tolist(),
             "covariance_order": ORDER[:15],
-            "other_methods": {} if isinstance(sensor.rates, InIncrements) else _other_rates(sensor.rates),
+            "other_methods": {} if isinstance(sensor.rates, IncrementCalibration) else _other_rates(sensor.rates),
         }
     )
 
 
-def angles_entry(sensor: OfSensor) -> AnglesEntry | None:
+def angles_entry(sensor: ExternalResult) -> AnglesEntry | None:
     """Return the stated accuracy of the turning angles; None for a gyroscope calibrated from mean rates."""
     if sensor.turned is None or sensor.gyroscope is None:
         return None
@@ -103,14 +105,14 @@ def angles_entry(sensor: OfSensor) -> AnglesEntry | None:
 
 def _earth_rate(result: Result) -> EarthRateEstimate | Fault:
     """Return the Earth's rate in the axes of the table, or the Fault that explains its absence."""
-    if isinstance(result, InIncrements):
+    if isinstance(result, IncrementCalibration):
         return result.solution.earth
     if result.reference_fault is not None:
         return result.reference_fault
     return EarthRateEstimate(result.solution.reference, result.solution.covariance[REFERENCE, REFERENCE])
 
 
-def _increments_entry(increments: InIncrements) -> IncrementsEntry:
+def _increments_entry(increments: IncrementCalibration) -> IncrementsEntry:
     residuals = increments.solution.residuals_rad
     return entry(
         IncrementsEntry, increments.solution, increments,
@@ -123,7 +125,7 @@ def _increments_entry(increments: InIncrements) -> IncrementsEntry:
     )  # fmt: skip
 
 
-def _other_rates(attitudes: InAttitudes) -> dict[str, RateSolutionEntry | ErrorEntry]:
+def _other_rates(attitudes: AttitudeCalibration) -> dict[str, RateSolutionEntry | ErrorEntry]:
     def solution_entry(other: TriaxialSolution) -> RateSolutionEntry:
         return entry(RateSolutionEntry, other, scale=scale_of(other.matrix), bias_rad_s=-other.bias)
 
@@ -133,7 +135,7 @@ def _other_rates(attitudes: InAttitudes) -> dict[str, RateSolutionEntry | ErrorE
     }
 
 
-def _attitude_results(outcome: Outcome, quantity: Quantity) -> list[tuple[str, Item, Site, InAttitudes]]:
+def _attitude_results(outcome: Outcome, quantity: Quantity) -> list[tuple[str, Item, Site, AttitudeCalibration]]:
     site = outcome.settings.site
     return [
         (name, sensor.item, site, sensor.at_rest[quantity])
@@ -142,7 +144,7 @@ def _attitude_results(outcome: Outcome, quantity: Quantity) -> list[tuple[str, I
     ]
 
 
-def _placement(attitudes: InAttitudes) -> PlacementEntry:
+def _placement(attitudes: AttitudeCalibration) -> PlacementEntry:
     solution, laid = attitudes.solution, attitudes.laid
     return PlacementEntry(
         placement_std=None if laid is None else laid.placement_std,

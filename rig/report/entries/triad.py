@@ -6,7 +6,7 @@ from typing import Any, Generic
 
 import numpy as np
 
-from rig.analysis.external.attitudes import InAttitudes
+from rig.analysis.external.attitudes import AttitudeCalibration
 from rig.analysis.reference.accelerometer import AccelerometerResult
 from rig.analysis.reference.magnetometer import MagnetometerResult
 from rig.data.entries.accelerometer import AccelerationSolutionEntry, AccelerometerEntry, DwellEntry
@@ -42,7 +42,7 @@ MAGNETOMETER_MODELS = Models(FIELD, MagnetometerEntry, FieldDwellEntry, FieldSol
 
 def triad_entry(
     models: Models[EntryT],
-    result: AccelerometerResult | MagnetometerResult | InAttitudes,
+    result: AccelerometerResult | MagnetometerResult | AttitudeCalibration,
     sensor: RecordedSensor | Item,
     residuals: tuple[Array, Array],
     **more: Any,
@@ -66,7 +66,7 @@ def triad_entry(
 
 
 def attitudes_entry(
-    models: Models[EntryT], result: MagnetometerResult | InAttitudes, sensor: RecordedSensor | Item, **more: Any
+    models: Models[EntryT], result: MagnetometerResult | AttitudeCalibration, sensor: RecordedSensor | Item, **more: Any
 ) -> EntryT:
     """Return the entry of a sensor that was calibrated in attitudes alone."""
     solution = result.solution

@@ -16,7 +16,7 @@ from rig.errors.quoting import printable
 from rig.estimation.arrays import Array
 from rig.report.exports.exported_corrections import ExportedCalibrations
 from rig.report.exports.over_temperature import ardupilot_parameters, px4_parameters
-from rig.report.findings.linear_corrections import Corrected
+from rig.report.findings.linear_corrections import SensorCorrection
 from rig.report.kinds.kind_registry import kinds
 
 GAUSS_T, MILLIGAUSS_T = 1e-4, 1e-7
@@ -36,7 +36,7 @@ ARDUPILOT_NOTES = (
 AXES = "XYZ"
 IMU = (RATE, ACCELERATION)
 # For each quantity the names of the parameters, and the values of the axes, or a single value.
-Autopilot = Mapping[Quantity, Mapping[str, Callable[[Corrected], Iterable[float]]]]
+Autopilot = Mapping[Quantity, Mapping[str, Callable[[SensorCorrection], Iterable[float]]]]
 
 
 def px4_files(calibrations: ExportedCalibrations) -> Mapping[str, str]:
@@ -106,18 +106,18 @@ def symmetric(matrix: Array) -> Array:
     return root
 
 
-def _find_diagonal(magnetometer: Corrected) -> Array:
+def _find_diagonal(magnetometer: SensorCorrection) -> Array:
     """Return the diagonal (3,) of a magnetometer's symmetric correction."""
     return np.diag(symmetric(np.asarray(np.linalg.inv(magnetometer.matrix), dtype=np.float64)))
 
 
-def _find_off_diagonal(magnetometer: Corrected) -> Array:
+def _find_off_diagonal(magnetometer: SensorCorrection) -> Array:
     """Return the off-diagonal elements (3,) xy, xz, yz of a magnetometer's symmetric correction."""
     matrix = symmetric(np.asarray(np.linalg.inv(magnetometer.matrix), dtype=np.float64))
     return matrix[[0, 0, 1], [1, 2, 2]]
 
 
-def _temperature_c(gyroscope: Corrected) -> Sequence[float]:
+def _temperature_c(gyroscope: SensorCorrection) -> Sequence[float]:
     return () if gyroscope.temperature_c is None else [gyroscope.temperature_c]
 
 
@@ -148,7 +148,7 @@ ARDUPILOT: Autopilot = {
 }
 
 
-def sensor_parameters(autopilot: Autopilot, index: int, sensor: Corrected) -> Iterator[tuple[str, float]]:
+def sensor_parameters(autopilot: Autopilot, index: int, sensor: SensorCorrection) -> Iterator[tuple[str, float]]:
     """Yield the parameters for the sensor number `index`, from 0; none for a quantity without parameters."""
     numbers = {"index": index, "number": index + 1, "later": index + 1 if index else ""}
     for name, values_of in autopilot.get(sensor.quantity, {}).items():

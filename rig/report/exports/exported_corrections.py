@@ -12,7 +12,7 @@ from rig.data.result_file import ResultDocument
 from rig.errors import Refused
 from rig.errors.quoting import printable
 from rig.estimation.arrays import Array
-from rig.report.findings.linear_corrections import Corrected
+from rig.report.findings.linear_corrections import SensorCorrection
 from rig.report.kinds.kind_registry import outlets, terms_of
 
 
@@ -20,8 +20,8 @@ from rig.report.kinds.kind_registry import outlets, terms_of
 class Imu:
     """A gyroscope with the accelerometer of the same sensor, if one was calibrated."""
 
-    gyroscope: Corrected
-    accelerometer: Corrected | None
+    gyroscope: SensorCorrection
+    accelerometer: SensorCorrection | None
 
     @property
     def name(self) -> str:
@@ -40,7 +40,7 @@ class ExportedCalibrations:
     """The `sensors` that a run calibrated, kind by kind, and polynomials of temperature by sensor and quantity."""
 
     result: ResultDocument
-    sensors: tuple[Corrected, ...]
+    sensors: tuple[SensorCorrection, ...]
     over_temperature: Mapping[str, Mapping[str, OverTemperatureEntry]]
 
     @cached_property
@@ -64,7 +64,7 @@ class ExportedCalibrations:
         terms = (term for term in terms_of(self.result, "exports") if not term.finding.is_reference)
         return tuple(printable(f"{term.whose}, {term.name}") for term in terms)
 
-    def origin(self, sensor: Corrected) -> Iterator[str]:
+    def origin(self, sensor: SensorCorrection) -> Iterator[str]:
         """Yield the sensor, the time and temperature of its calibration, and the program."""
         provenance = self.result.provenance
         temperature = "" if sensor.temperature_c is None else f" at {sensor.temperature_c:.1f} degC,"

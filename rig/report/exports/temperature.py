@@ -13,7 +13,7 @@ from rig.data.result_file import ResultDocument
 from rig.errors import Refused
 from rig.estimation.arrays import Array
 from rig.report.exports.exported_corrections import ExportedCalibrations
-from rig.report.findings.linear_corrections import Corrected
+from rig.report.findings.linear_corrections import SensorCorrection
 
 DRIFT_QUANTITIES = (RATE, ACCELERATION)  # a run of `bias_drift` measures their biases
 
@@ -36,7 +36,7 @@ def move_to_temperature(
     return replace(calibrations, sensors=sensors, over_temperature={})
 
 
-def _change(drift: ResultDocument, sensor: Corrected, to_c: float) -> Array:
+def _change(drift: ResultDocument, sensor: SensorCorrection, to_c: float) -> Array:
     """Return the bias' change (3,) up to `to_c`. Raise Refused `temperature_slope_unknown`, `temperature_outside`."""
     name, quantity, from_c = sensor.sensor, sensor.quantity.name, sensor.temperature_c
     if from_c is None:

@@ -9,7 +9,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from rig.analysis.rest_noise import AtRest, SensorAtRest
+from rig.analysis.rest_noise import QuantityNoise, SensorAtRest
 from rig.data.quantity import Quantity
 from rig.errors import Fault
 from rig.estimation.statistics.allan import FLICKER_RATIO, AllanReading
@@ -78,7 +78,7 @@ def _title(name: str, at_rest: SensorAtRest) -> str:
     return name if at_rest.sensor is None else f"{name}: {at_rest.sensor.part} {at_rest.sensor.serial_number}"
 
 
-def _table(title: str, quantity: Quantity, result: AtRest) -> Table:
+def _table(title: str, quantity: Quantity, result: QuantityNoise) -> Table:
     walk, bias = quantity.walk_unit, quantity.drift
     headings = ("axis", f"{quantity.walk} {walk.name}", "± U", f"bias instability {bias.name}", "± U", "at s")
     table = build_number_table(headings, title)
@@ -95,7 +95,7 @@ def _cells(figure: AllanReading | Fault, size: float) -> tuple[str, str]:
     return f"{figure.value / size:.4g}", f"{2 * figure.std / size:.1g}"
 
 
-def _lines(result: AtRest) -> Iterator[str]:
+def _lines(result: QuantityNoise) -> Iterator[str]:
     temperatures = "" if result.temperature_c is None else "; {:.1f} to {:.1f} °C".format(*result.temperature_c)
     durations = f"{result.total_s:.4g} s in all, the longest {result.longest_s:.4g} s"
     yield f"{result.intervals} intervals at rest, {durations}{temperatures}; U with k = 2"
@@ -105,7 +105,7 @@ def _lines(result: AtRest) -> Iterator[str]:
         yield from (f"{what.replace('_', ' ')}: {fault}" for _, fault in sorted(by_name.items()))
 
 
-def _entry(quantity: Quantity, result: AtRest) -> dict[str, Any]:
+def _entry(quantity: Quantity, result: QuantityNoise) -> dict[str, Any]:
     return {
         "stretches": result.intervals,
         "longest_s": result.longest_s,
@@ -127,7 +127,7 @@ def _read(figure: AllanReading | Fault) -> dict[str, Any]:
     return {"value": figure.value, "std": figure.std, "tau_s": figure.tau_s}
 
 
-def _draw(axes: "Axes", quantity: Quantity, result: AtRest) -> None:
+def _draw(axes: "Axes", quantity: Quantity, result: QuantityNoise) -> None:
     """Draw the curves with their bands, and mark the values read from them."""
     size = quantity.drift.size
     curve = result.curve

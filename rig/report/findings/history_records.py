@@ -76,7 +76,7 @@ class HistoryRecord:
     parameters: tuple[Parameter, ...] = ()
 
 
-class Calibrated(Protocol):
+class CalibratedEntry(Protocol):
     """Scale factors and biases of an entry of `result.json`, of any sensor."""
 
     @property
@@ -100,7 +100,7 @@ def is_scale(name: str) -> bool:
 
 
 def scale_and_bias(
-    sensor: str, quantity: "Quantity", entry: Calibrated, bias: Sequence[float], document: "ResultDocument"
+    sensor: str, quantity: "Quantity", entry: CalibratedEntry, bias: Sequence[float], document: "ResultDocument"
 ) -> Iterator[Parameter]:
     """Yield scale factor and bias of each axis, then the mean scale factor, with its covariance and largest k."""
     from rig.data.meaning import JUDGED_PARAMETERS, find_conformity_limit

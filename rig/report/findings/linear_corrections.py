@@ -19,7 +19,7 @@ from rig.data.quantity import Quantity
 from rig.estimation.arrays import Array
 
 
-class Averaged(Protocol):
+class AveragedInterval(Protocol):
     """The average of one interval of readings."""
 
     @property
@@ -37,7 +37,7 @@ class ReadingNoise:
 
 
 @dataclass(frozen=True, slots=True)
-class Corrected:
+class SensorCorrection:
     """The correction of one calibrated sensor: reading (3,) = `matrix` (3, 3) · true + `offset` (3,).
 
     - `full_scale` is None if it was not stated.
@@ -76,7 +76,7 @@ class Corrected:
         return axes
 
 
-def noise_of(means: Sequence[Averaged], at_rest: Sequence[tuple[Sequence[float], int]]) -> ReadingNoise:
+def noise_of(means: Sequence[AveragedInterval], at_rest: Sequence[tuple[Sequence[float], int]]) -> ReadingNoise:
     """Return the readings' noise, from each rest's standard deviation of one sample and number of samples.
 
     The density is σ over √rate of the noisiest axis, for noise that is white up to half the rate. Without a rest it is

@@ -17,7 +17,7 @@ from rig.estimation.arrays import Array
 from rig.report.findings.characteristic import Characteristic, Term
 from rig.report.findings.finding import EntryT, Finding
 from rig.report.findings.history_records import HistoryRecord
-from rig.report.findings.linear_corrections import Corrected
+from rig.report.findings.linear_corrections import SensorCorrection
 from rig.report.findings.unexplained import Unexplained
 
 ItemT = TypeVar("ItemT")
@@ -136,7 +136,7 @@ class ResultKind(Generic[EntryT]):
     block: str | NoOutlet
     measured: Callable[[Finding[EntryT], Mapping[str, ReversalEntry]], CertifiedItem | None] | NoOutlet
     standard: Standard | NoOutlet
-    corrected: Callable[[Finding[EntryT]], Corrected | None] | NoOutlet
+    corrected: Callable[[Finding[EntryT]], SensorCorrection | None] | NoOutlet
     unexplained: Callable[[Finding[EntryT]], Unexplained | None] | NoOutlet
     templates: Path = OWN_TEMPLATES
     unsolved: Callable[[ResultDocument], Iterable[str]] = lambda _: ()

@@ -19,7 +19,7 @@ from rig.report.entries.by_hand import hand_lines
 from rig.report.entries.earth_rate import earth_rate_lines
 from rig.report.findings.characteristics import GYROSCOPES, NON_ORTHOGONALITY
 from rig.report.findings.finding import Finding
-from rig.report.findings.linear_corrections import Corrected, noise_of
+from rig.report.findings.linear_corrections import SensorCorrection, noise_of
 from rig.report.findings.result_kind import CertifiedItem, DisplayRow, NoOutlet, ResultKind
 from rig.report.findings.unexplained import find_sweep_residuals
 from rig.report.kinds.triad import describe_unsolved, history_record, item_words, shown_of, tables
@@ -83,7 +83,7 @@ def _describe_item(finding: Finding[GyroscopeEntry], _: object) -> CertifiedItem
     return CertifiedItem("gyroscope", finding.sensor, sensor.part, sensor.serial_number, name, results, temperatures)
 
 
-def _build_correction(finding: Finding[GyroscopeEntry]) -> Corrected | None:
+def _build_correction(finding: Finding[GyroscopeEntry]) -> SensorCorrection | None:
     """Return the correction of readings to rates, in the frame nearest to the sensor's axes; None for a reference."""
     sensor = finding.entry
     if finding.is_reference:
@@ -94,7 +94,7 @@ def _build_correction(finding: Finding[GyroscopeEntry]) -> Corrected | None:
         matrix = np.array(vector.matrix) @ to_sensor.T
         if vector.g_sensitivity_rad_s_per_m_s2 is not None:  # gravity points down, force at rest up
             sensitivity = -np.array(vector.g_sensitivity_rad_s_per_m_s2) @ to_sensor.T
-    return Corrected(
+    return SensorCorrection(
         sensor=finding.sensor,
         quantity=RATE,
         part=sensor.part,

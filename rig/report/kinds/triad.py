@@ -19,8 +19,8 @@ from rig.estimation.arrays import Array
 from rig.report.findings.characteristic import Characteristic
 from rig.report.findings.characteristics import NON_ORTHOGONALITY
 from rig.report.findings.finding import Finding
-from rig.report.findings.history_records import Calibrated, HistoryRecord, scale_and_bias, select_uncertain
-from rig.report.findings.linear_corrections import Corrected, noise_of
+from rig.report.findings.history_records import CalibratedEntry, HistoryRecord, scale_and_bias, select_uncertain
+from rig.report.findings.linear_corrections import SensorCorrection, noise_of
 from rig.report.findings.result_kind import AxisValues, CertifiedItem, DisplayRow, ResultKind, Standard
 from rig.report.findings.unexplained import find_attitude_residuals
 from rig.report.tables.axis_tables import line_of, scale_and_bias_table, triple
@@ -71,7 +71,7 @@ def history_record(finding: Finding[Any], document: ResultDocument) -> HistoryRe
     return HistoryRecord(finding.sensor, quantity.name, *about, select_uncertain(parameters))
 
 
-def tables(title: str, quantity: Quantity, entry: Calibrated) -> Iterator[Table]:
+def tables(title: str, quantity: Quantity, entry: CalibratedEntry) -> Iterator[Table]:
     """Yield scale and bias of each axis ± U, and the uncertainty budget."""
     budget, expanded = entry.budget, expand_uncertainties(entry.budget, entry.covariance)
     yield scale_and_bias_table(
@@ -123,11 +123,11 @@ def describe_unsolved(document: ResultDocument, quantity: Quantity) -> Iterator[
             yield f"{name}, {quantity.sensor}, not calibrated: {fault.error}"
 
 
-def _build_correction(finding: Finding[Any]) -> Corrected:
+def _build_correction(finding: Finding[Any]) -> SensorCorrection:
     """Return the correction of readings, in the right-angled frame of the entry's matrix."""
     quantity, entry = finding.quantity, finding.entry
     noise = [(getattr(dwell, quantity.file_key("noise")), dwell.samples) for dwell in entry.dwells]
-    return Corrected(
+    return SensorCorrection(
         sensor=finding.sensor,
         quantity=quantity,
         part=entry.part,

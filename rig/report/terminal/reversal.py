@@ -6,7 +6,7 @@ import numpy as np
 from rich.console import Console
 
 from rig.analysis.effective_dof import reversal_dof
-from rig.analysis.reversal import AsMounted, MagnetometerReversal
+from rig.analysis.reversal import MagnetometerReversal, ReversalRun
 from rig.data.entries.magnetometer import AsMountedEntry, ReversalDocument, ReversalEntry
 from rig.data.quantity import FIELD
 from rig.report.entry import dof_or_none, entry
@@ -66,7 +66,7 @@ def _entry(reversal: MagnetometerReversal) -> ReversalEntry:
     )  # fmt: skip
 
 
-def _run_entry(run: AsMounted) -> AsMountedEntry:
+def _run_entry(run: ReversalRun) -> AsMountedEntry:
     solution = run.result.solution
     return entry(
         AsMountedEntry, run, run.result.sensor,

@@ -13,9 +13,9 @@ from rich.table import Table
 from rig.analysis.design.candidate_search import (
     TARGET_NAMES,
     Budgets,
-    Planned,
+    PlannedCandidate,
     ReachedUncertainty,
-    Shortest,
+    ShortestRun,
     TargetUncertainty,
 )
 from rig.config.models import ProcedureSection
@@ -58,7 +58,7 @@ def _values(section: ProcedureSection) -> dict[str, Any]:
     return values
 
 
-def print_shortest(shortest: Shortest, section: ProcedureSection, *, as_json: bool) -> None:
+def print_shortest(shortest: ShortestRun, section: ProcedureSection, *, as_json: bool) -> None:
     """Print the shortest run on stdout: tables for people, JSON in SI units for machines."""
     if as_json:
         print(json.dumps(shortest_document(shortest, section), indent=2, allow_nan=False))
@@ -75,7 +75,7 @@ def print_shortest(shortest: Shortest, section: ProcedureSection, *, as_json: bo
     console.print(plain(f"{shortest.tried} of {shortest.candidates_count} plans were compared. {ASSUMPTIONS}"))
 
 
-def shortest_document(shortest: Shortest, section: ProcedureSection) -> dict[str, Any]:
+def shortest_document(shortest: ShortestRun, section: ProcedureSection) -> dict[str, Any]:
     """Return the shortest run as JSON values; null for a missing plan or target."""
     shown = shortest.best or shortest.nearest
     return {
@@ -95,7 +95,7 @@ def shortest_document(shortest: Shortest, section: ProcedureSection) -> dict[str
     }
 
 
-def _plan_entry(planned: Planned, section: ProcedureSection) -> dict[str, Any]:
+def _plan_entry(planned: PlannedCandidate, section: ProcedureSection) -> dict[str, Any]:
     return {
         "duration_s": planned.candidate.duration_s,
         **_sizes_entry(planned.reached),
@@ -112,7 +112,7 @@ def _sizes_entry(reached: ReachedUncertainty) -> dict[str, float | None]:
     return {size: getattr(reached, size) or None for size in TARGET_NAMES}
 
 
-def _verdict(shortest: Shortest) -> str:
+def _verdict(shortest: ShortestRun) -> str:
     wish = wish_words(shortest.wanted)
     within = "" if shortest.wanted.at_most_s == inf else f" within {shortest.wanted.at_most_s:g} s"
     if shortest.best is not None:
@@ -130,7 +130,7 @@ def wish_words(wanted: TargetUncertainty) -> str:
     )
 
 
-def _tabulate_plans(shortest: Shortest, shown: Planned, section: ProcedureSection) -> Table:
+def _tabulate_plans(shortest: ShortestRun, shown: PlannedCandidate, section: ProcedureSection) -> Table:
     """Return a table that compares the shortest plan with the file's plan."""
     headings = ("", "as in the file", "shortest" if shortest.best else "nearest")
     table = build_number_table(headings, texts=("",), box=SIMPLE)
@@ -182,7 +182,7 @@ def _fraction(part: float, whole: float) -> float:
     return float((part / whole) ** 2) if whole > 0 else 0.0
 
 
-def _describe_floor(shortest: Shortest) -> str:
+def _describe_floor(shortest: ShortestRun) -> str:
     """Return a sentence on the smallest uncertainties that this kind of run can reach, with their contributors."""
     parts = []
     for index, (size, (unit, what)) in enumerate(TARGETS.items()):

@@ -10,7 +10,7 @@ WIDE_CONTEXT = Context(prec=1000)  # a value may be much larger than its uncerta
 
 
 @dataclass(frozen=True, slots=True)
-class Rounded:
+class RoundedValue:
     """A value and its expanded uncertainty U, both to the same decimal."""
 
     value: Decimal
@@ -26,7 +26,7 @@ class Rounded:
         return f"{self.uncertainty:f}"
 
 
-def round_to_u(value: float, uncertainty: float) -> Rounded:
+def round_to_u(value: float, uncertainty: float) -> RoundedValue:
     """Return U to two significant digits, and the value to the same decimal.
 
     Halves are rounded up, so U never decreases by more than 4.8 %; EA-4/02 requires rounding up only from 5 %. Raise
@@ -38,7 +38,7 @@ def round_to_u(value: float, uncertainty: float) -> Rounded:
     last = wide.adjusted() - (U_DIGITS - 1)
     if _quantize(wide, last).adjusted() > wide.adjusted():  # 0.0996 is 0.10
         last += 1
-    return Rounded(_quantize(exact, last), _quantize(wide, last))
+    return RoundedValue(_quantize(exact, last), _quantize(wide, last))
 
 
 def format_signed(value: float, decimals: int) -> str:

@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from rig.data.recording.hand_events import (
     HandAsked,
     HandBegunAnew,
+    HandEvent,
     HandMoveAccepted,
     HandMoveRefused,
     HandRested,
     HandRestRefused,
-    OfTheHand,
 )
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.run_data import RunData
@@ -65,7 +65,7 @@ class HandSession:
     """
 
     acquisition: Acquisition
-    note: Callable[[OfTheHand], None]
+    note: Callable[[HandEvent], None]
     tell: Callable[[RunEvent], None]
     settings: HandSettings
     name: str
@@ -217,7 +217,7 @@ class HandSession:
         if self._refused >= MAX_REFUSALS:
             what = f"{MAX_REFUSALS} moves in a row were refused; the last: {wrong.what}"
             raise Fault(wrong.name, what, wrong.remedy)
-        events: list[OfTheHand] = []
+        events: list[HandEvent] = []
         crept = wrong.name == "bias_jumped" and not self._bias_doubted
         no_rest = crept or wrong.name in UNFIT_RESTS
         if no_rest:

@@ -20,7 +20,7 @@ from rig.board.crystal import follows_crystal
 from rig.board.identify import changing, refusing
 from rig.config.models import RigConfig
 from rig.data.quantity import ACCELERATION, RATE
-from rig.data.recording.hand_events import HandAsked, HandMoveAccepted, HandMoveRefused, HandRested, OfTheHand
+from rig.data.recording.hand_events import HandAsked, HandEvent, HandMoveAccepted, HandMoveRefused, HandRested
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.errors import Fault, Refused
 from rig.motion.by_hand import Face, HandMove
@@ -57,7 +57,7 @@ class FollowedSession:
 
     sensor: RecordedSensor
     moves: int
-    tell: Callable[[OfTheHand], None]
+    tell: Callable[[HandEvent], None]
     reports: list[HandReport] = field(default_factory=list)
     _accepted: list[HandMove] = field(default_factory=list)
     _lay: list[Face] = field(default_factory=list)
@@ -118,7 +118,7 @@ class FollowedSession:
 
 @contextmanager
 def calibrate_by_board(
-    config: RigConfig, name: str, moves: int, scale_std: float, tell: Callable[[OfTheHand], None]
+    config: RigConfig, name: str, moves: int, scale_std: float, tell: Callable[[HandEvent], None]
 ) -> Iterator[tuple[Board, CalibratedByBoard]]:
     """Let the board calibrate one of its sensors; the board remains connected in the block.
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from rig.analysis.external.increment_calibration import InIncrements, solve_turning
+from rig.analysis.external.increment_calibration import IncrementCalibration, solve_turning
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.external.increment_solution import AXES
@@ -21,11 +21,11 @@ pytestmark = pytest.mark.slow
 CLEAR = ArmLog(stops=6, visits=2, error_rad=0.01, fastest_rad_s=2.5)
 
 
-def solved(recorded: Recorded) -> InIncrements:
+def solved(recorded: Recorded) -> IncrementCalibration:
     return solve_turning(turning(recorded), None, any_mounting=False)
 
 
-def errors(found: InIncrements, recorded: Recorded) -> tuple[Array, Array]:
+def errors(found: IncrementCalibration, recorded: Recorded) -> tuple[Array, Array]:
     """Errors of scale and bias (6,), and their standard uncertainties."""
     matrix = found.solution.matrix
     scale = 1 / np.linalg.norm(matrix, axis=1)

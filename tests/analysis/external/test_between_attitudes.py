@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from rig.analysis.external.increment_calibration import InIncrements, solve_turning
+from rig.analysis.external.increment_calibration import IncrementCalibration, solve_turning
 from rig.cli import main
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.estimation.external.increment_solution import KnownIncrements
+from rig.estimation.external.increment_solution import IncrementSolution
 from rig.estimation.reference.reference_budget import scale_and_bias_covariance
 from rig.observation.external.reference_rows import Turning
 from support.external.followed_body import EARTH_RAD_S, Followed, World, follow, turning, write
@@ -37,18 +37,18 @@ WORLDS = {
 }
 
 
-def solved(followed: Followed, window_s: float | None = None) -> InIncrements:
+def solved(followed: Followed, window_s: float | None = None) -> IncrementCalibration:
     return solve_turning(turning(followed), window_s, any_mounting=False)
 
 
-def in_unit(found: KnownIncrements) -> tuple[Array, Array]:
+def in_unit(found: IncrementSolution) -> tuple[Array, Array]:
     """Scale factors (3,), and the standard deviations of scale and bias (6,)."""
     matrix = found.matrix
     scale = 1 / np.linalg.norm(matrix, axis=1)
     return scale, np.sqrt(np.diag(scale_and_bias_covariance(matrix, scale, found.covariance)))
 
 
-def off(found: InIncrements, followed: Followed) -> Array:
+def off(found: IncrementCalibration, followed: Followed) -> Array:
     """(6,) errors of scale and bias in standard uncertainties."""
     scale, std = in_unit(found.solution)
     truth = 1 / np.linalg.norm(followed.matrix, axis=1)

@@ -9,7 +9,7 @@ import pytest
 
 from rig.analysis.external.attitudes import solve_placed
 from rig.analysis.external.external_recordings import budget_of, solve_swept
-from rig.analysis.external.increment_calibration import InIncrements
+from rig.analysis.external.increment_calibration import IncrementCalibration
 from rig.data.quantity import ACCELERATION, RATE, Quantity
 from rig.data.recording.settings import Elsewhere, Site
 from rig.errors import Fault, Refused
@@ -154,7 +154,7 @@ def test_poses_in_any_order_and_repeated_ones_are_placed_by_their_times(tmp_path
         np.savetxt(path, table, delimiter=",", header=",".join(["time_s", *names]), comments="", fmt="%.17g")
         placed = average_placements(samples, read_attitudes(path))
         result = solve_placed("imu", placed, SITE, ASKED, None, second_order=False).results[RATE]
-        assert isinstance(result, InIncrements)
+        assert isinstance(result, IncrementCalibration)
         matrices.append(result.solution.matrix)
     assert matrices[1] == pytest.approx(matrices[0], rel=1e-9)
     assert [str(entry) for entry in placed.omitted] == [

@@ -14,7 +14,7 @@ from rig.data.recording.run_data import RunData
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.budget import Budget
 from rig.estimation.gyroscope.nonlinearity import SQUARE_DEVIATION
-from rig.estimation.gyroscope.own_errors import KnownSensor, list_own_errors
+from rig.estimation.gyroscope.own_errors import SensorProperties, list_own_errors
 from support.recordings.synthetic_run import Setup, synthetic_run
 
 pytestmark = pytest.mark.slow
@@ -88,7 +88,7 @@ def test_a_bias_follows_a_temperature_of_few_steps_and_one_that_its_steps_hide(s
     """A pattern of each axis by what was recorded, and by half a step either way in the course of the run."""
     step_k, per_k, windows_s = 0.1, 6e-5, 10.0 * np.arange(8, dtype=np.float64)[:, None] + [0.0, 6.0]
     recorded_c = 22 + step_k * np.round(np.linspace(0, steps, 8))
-    known = KnownSensor(0.0, 1.0, per_k, 0.0, 0.0, recorded_c, step_k)
+    known = SensorProperties(0.0, 1.0, per_k, 0.0, 0.0, recorded_c, step_k)
     errors = list_own_errors(known, np.eye(3), np.ones((8, 3)), windows_s, ())
     (line,) = (error for error in errors if error.name == "bias over temperature")
     seen, hidden = line.patterns[:3], line.patterns[3:]

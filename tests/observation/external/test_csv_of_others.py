@@ -11,7 +11,7 @@ from rig.data.quantity import RATE
 from rig.data.recording.motion_file import Header
 from rig.errors import Refused
 from rig.observation.external.csv_samples import read_samples
-from rig.observation.formats.column_selection import Mapped
+from rig.observation.formats.column_selection import MappedColumns
 from rig.observation.formats.csv_table import read_columns
 
 HEAD = ["time_s", "x_rad_s", "y_rad_s", "z_rad_s"]
@@ -26,7 +26,7 @@ def written(folder: Path, content: bytes) -> Path:
     return path
 
 
-def read(path: Path, mapped: Mapped | None = None) -> np.ndarray:
+def read(path: Path, mapped: MappedColumns | None = None) -> np.ndarray:
     samples = read_samples(path, [RATE], mapped)
     return np.column_stack([samples.time_s, samples.readings[RATE]])
 
@@ -66,7 +66,7 @@ def test_headings_of_a_german_logger_are_found_in_any_encoding(tmp_path: Path, e
     headings = ["Zeit, ms", *(f"Drehrate {axis}, °/s" for axis in "xyz")]
     text = "\n".join(["Gerät; 7", "", ";".join(headings), *(row.replace(",", ";").replace(".", ",") for row in ROWS)])
     factors = (1e-3, 1.0, 1.0, 1.0)
-    mapped = Mapped({name: (there, by) for name, there, by in zip(HEAD, headings, factors, strict=True)}, 2)
+    mapped = MappedColumns({name: (there, by) for name, there, by in zip(HEAD, headings, factors, strict=True)}, 2)
     assert read(written(tmp_path, text.encode(encoding)), mapped) == pytest.approx(NUMBERS * factors)
 
 
@@ -114,7 +114,7 @@ def test_a_loggers_mark_of_a_missing_value_is_no_wrong_unit(tmp_path: Path, mark
         Refused, match=f"not_a_number: .* 1 samples that no gyroscope can read; .*sample {at + 1}, .*y_rad_s"
     ):
         read(written(tmp_path, content))
-    mapped = Mapped({"time_s": ("time_s", 1.0)}, missing=(mark,))
+    mapped = MappedColumns({"time_s": ("time_s", 1.0)}, missing=(mark,))
     with pytest.raises(Refused, match=f"line {at + 2}: y_rad_s is blank"):
         read(written(tmp_path, content), mapped)
 

@@ -5,7 +5,7 @@ import dataclasses
 import pytest
 
 from rig.analysis.by_hand.on_board import SCALE_LIMIT, compare_with_board
-from rig.data.recording.hand_events import HandAsked, HandMoveAccepted, OfTheHand
+from rig.data.recording.hand_events import HandAsked, HandEvent, HandMoveAccepted
 from rig.runner.by_hand.on_board import FollowedSession
 from support.board.hand_on_board import play
 from support.external.handled_body import TWELVE, handle
@@ -15,7 +15,7 @@ pytestmark = pytest.mark.slow
 
 
 def test_a_press_of_the_button_begins_anew_and_only_what_follows_is_held_against_double_precision() -> None:
-    told: list[OfTheHand] = []
+    told: list[HandEvent] = []
     session = FollowedSession(SENSOR, 12, told.append)
     played = play(handle(TWELVE, 3, rest_s=1.6))
     for report in played.reports[:5]:

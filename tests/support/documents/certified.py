@@ -21,7 +21,7 @@ from rig.data.entries.result_types import Matrix3, Vector3
 from rig.data.entries.temperature import OverTemperatureEntry
 from rig.data.result_file import ResultDocument, VectorEntry
 from rig.estimation.reference.attitude_error import AttitudeError
-from rig.estimation.reference.reference_budget import FitUncertainty, KnownSize, reference_budget
+from rig.estimation.reference.reference_budget import FitUncertainty, NormUncertainty, reference_budget
 from rig.motion.geometry import NOMINAL
 from rig.report.certificate.certificate_page import certificate_page
 from rig.report.certificate.content import Certificate, certificate_of
@@ -111,11 +111,11 @@ def accelerometer(
         "warnings": (),
     }
     return AccelerometerEntry.model_validate(
-        _add_budget(fields, KnownSize("gravity", 1e-4, True, 9.81, "m/s²", "site.gravity_uncertainty_m_s2"))
+        _add_budget(fields, NormUncertainty("gravity", 1e-4, True, 9.81, "m/s²", "site.gravity_uncertainty_m_s2"))
     )
 
 
-def _add_budget(fields: Mapping[str, Any], size: KnownSize) -> dict[str, Any]:
+def _add_budget(fields: Mapping[str, Any], size: NormUncertainty) -> dict[str, Any]:
     """Add a budget of noise and of the reference's uncertainty."""
     noise = np.linalg.cholesky(np.array(fields["covariance"]))
     exact = AttitudeError(0.0, 0.0)
@@ -184,7 +184,7 @@ def magnetometer() -> MagnetometerEntry:
         "warnings": (),
     }
     return MagnetometerEntry.model_validate(
-        _add_budget(fields, KnownSize("size of the field", 0.01, False, 48.0, "µT", "not given"))
+        _add_budget(fields, NormUncertainty("size of the field", 0.01, False, 48.0, "µT", "not given"))
     )
 
 

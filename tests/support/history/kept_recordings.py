@@ -9,7 +9,7 @@ from pathlib import Path
 
 from rig.data.result_file import ResultDocument
 from rig.history.entered.finished_run import FinishedRun, compact, read_finished_run
-from rig.history.entered.issued_certificate import Issued
+from rig.history.entered.issued_certificate import IssuedCertificate
 from rig.history.store import History
 from support.paths import RECORDINGS
 
@@ -30,7 +30,7 @@ def keep(history: History, folder: Path, source: Path = CALIBRATION, change: Cha
 
 def certify(history: History, run: FinishedRun, number: str, *, marks: str = "", replaces: str | None = None) -> None:
     """Enter a certificate of a run, by default without a mark, so that it can be relied on."""
-    issued = Issued(number, "Calibration certificate", "2026-01-02", replaces, marks)
+    issued = IssuedCertificate(number, "Calibration certificate", "2026-01-02", replaces, marks)
     assert history.certify(run.content_sha256, issued)
 
 

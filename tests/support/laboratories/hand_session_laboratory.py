@@ -11,10 +11,10 @@ from rig.data.recording.channel import triad_channel
 from rig.data.recording.hand_events import (
     HandAsked,
     HandBegunAnew,
+    HandEvent,
     HandMoveAccepted,
     HandMoveRefused,
     HandRestRefused,
-    OfTheHand,
 )
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.settings import HandSettings
@@ -51,7 +51,7 @@ class Table:
     settings: HandSettings = LIST
     hand: dict[str, Any] = field(default_factory=dict)
     creeps: int | None = None
-    events: list[OfTheHand] = field(default_factory=list)
+    events: list[HandEvent] = field(default_factory=list)
     time_s: float = 0.0
 
     def __post_init__(self) -> None:
@@ -104,7 +104,7 @@ class Table:
         """The accepted moves."""
         return [event for event in self.events if isinstance(event, HandMoveAccepted)]
 
-    def _note(self, event: OfTheHand) -> None:
+    def _note(self, event: HandEvent) -> None:
         self.events.append(event)
         if isinstance(event, HandAsked):
             instruction = event.instruction

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.config.load import load
-from rig.world.arm_motion_source import OnArm
+from rig.world.arm_motion_source import ArmMotionSource
 from rig.world.ur10e.interfaces.primary_server import PrimarySession
 from rig.world.ur10e.interfaces.rtde import OutputRecipe
 from rig.world.world_section import read_world_section
@@ -26,7 +26,7 @@ class LoggedArm:
 
     def __init__(self, overrides: Sequence[str] = ()) -> None:
         loaded = load(DEMO, list(overrides))
-        self.source = OnArm(loaded.config, read_world_section(loaded))
+        self.source = ArmMotionSource(loaded.config, read_world_section(loaded))
         self.robot = self.source.robot
         self._output = OutputRecipe(list(COLUMNS), 500.0, 1)
         self._rows: list[tuple[Any, ...]] = []

@@ -101,7 +101,7 @@ def has_robot_api(robot: Robot) -> bool:
 
 
 @dataclass(slots=True)
-class _Carrying:
+class _PendingOrder:
     """An order that is being carried out, and the tick at which the wait for its end is given up."""
 
     done: Done
@@ -117,7 +117,7 @@ class RobotApiSession:
         self._robot = robot
         self._programs = programs or StoredPrograms()
         self._buffer = bytearray()
-        self._order: _Carrying | None = None
+        self._order: _PendingOrder | None = None
         self.closing = False
 
     def greeting(self) -> bytes:
@@ -199,7 +199,7 @@ class RobotApiSession:
         act(self._robot)
         if done(self._robot):
             return _http(HTTPStatus.OK, {"message": "ok"})
-        self._order = _Carrying(done, self._robot.tick + PATIENCE_TICKS)
+        self._order = _PendingOrder(done, self._robot.tick + PATIENCE_TICKS)
         return b""
 
 
