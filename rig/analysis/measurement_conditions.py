@@ -16,7 +16,7 @@ from rig.observation.observed_run import ObservedRun
 
 
 @dataclass(frozen=True, slots=True)
-class ReadingConditions:
+class Conditions:
     """The first, mean and last time of readings (UTC), and their mean temperature with its range.
 
     Temperatures are None without a thermometer; the range is None if the temperature was stated.
@@ -33,8 +33,8 @@ class ReadingConditions:
 class GyroscopeConditions:
     """The conditions to which a gyroscope's scale factors and its bias refer."""
 
-    scale: ReadingConditions
-    bias: ReadingConditions
+    scale: Conditions
+    bias: Conditions
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +57,7 @@ def gyroscope_conditions(recordings: Sequence[ObservedRun], name: str) -> Gyrosc
     )
 
 
-def accelerometer_conditions(recordings: Sequence[ObservedRun], name: str, dwells: Iterable[int]) -> ReadingConditions:
+def accelerometer_conditions(recordings: Sequence[ObservedRun], name: str, dwells: Iterable[int]) -> Conditions:
     """Return the conditions of an accelerometer's readings: in the dwells with these indices, and in sweeps."""
     wanted = frozenset(dwells)
     read = []
@@ -77,7 +77,7 @@ def accelerometer_conditions(recordings: Sequence[ObservedRun], name: str, dwell
     return _average_conditions(recordings, name, read)
 
 
-def magnetometer_conditions(recordings: Sequence[ObservedRun], name: str, dwells: Iterable[int]) -> ReadingConditions:
+def magnetometer_conditions(recordings: Sequence[ObservedRun], name: str, dwells: Iterable[int]) -> Conditions:
     """Return the conditions of a magnetometer's readings, without temperature, in the dwells with these indices.
 
     If a dwell was repeated, only its last execution is used.
@@ -99,9 +99,7 @@ def _read_average(average: Average, offset_s: float) -> _WeightedReadings:
     )
 
 
-def _average_conditions(
-    recordings: Sequence[ObservedRun], name: str, read: Sequence[_WeightedReadings]
-) -> ReadingConditions:
+def _average_conditions(recordings: Sequence[ObservedRun], name: str, read: Sequence[_WeightedReadings]) -> Conditions:
     """Return the conditions of weighted windows; a recording's clock starts with its first state."""
     began = datetime.fromisoformat(recordings[0].run.provenance.started_utc)
     first_s, weights = float(recordings[0].motion.time_s[0]), [window.weight for window in read]
@@ -112,7 +110,7 @@ def _average_conditions(
     middles = [(window.start_s + window.end_s) / 2 for window in read]
     stated = recordings[0].run.sensors[name].temperature_stated
     warm = [window.temperature_c for window in read if np.isfinite(window.temperature_c)]
-    return ReadingConditions(
+    return Conditions(
         utc(min(window.start_s for window in read)),
         utc(max(window.end_s for window in read)),
         utc(float(np.average(middles, weights=weights))),

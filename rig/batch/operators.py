@@ -57,7 +57,7 @@ class Operator:
             return self._agrees("doubt", "Continue anyway? yes or no:", f"{doubt.why}.")
 
     def tries_again(self, part: BatchPart, error: RigError) -> bool:
-        """Ask whether to try a part again that was refused or ended in a fault; "no" puts it aside."""
+        """Ask whether to repeat a part that was refused or ended in a fault; "no" puts it aside."""
         return self._agrees("again", f"{part.serial}: again? yes, or no to put it aside:", f"{part.serial}: {error}")
 
     def agrees(self, announcement: Sequence[str], to_do: str) -> bool:

@@ -95,7 +95,7 @@ def _measure_to_forearm(
 ) -> tuple[str, float]:
     """Return the nearest part of the load to the forearm in the poses (N, 6), and its distance, m."""
     names, points = _list_load_points(carried)
-    offset_m, lengths = model.forearm.offset_m, arm or model.nominal_geometry
+    offset_m, lengths = model.forearm.offset_m, arm or model.nominal
     return _find_nearest(names, distance_to_forearm(q_rad, points, lengths, offset_m=offset_m))
 
 
@@ -104,7 +104,7 @@ def _measure_to_upper_arm(
 ) -> tuple[str, float]:
     """Return the nearest part of the load to the upper arm in the poses (N, 6), and its distance, m."""
     names, points = _list_load_points(carried)
-    offset_m, lengths = model.upper_arm.offset_m, arm or model.nominal_geometry
+    offset_m, lengths = model.upper_arm.offset_m, arm or model.nominal
     return _find_nearest(names, distance_to_upper_arm(q_rad, points, lengths, offset_m=offset_m))
 
 

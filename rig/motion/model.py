@@ -41,7 +41,7 @@ class TurnerModel:
     series: Series
     robot_type: int
     joints: tuple[str, ...]
-    nominal_geometry: DenavitHartenberg
+    nominal: DenavitHartenberg
     limits: JointLimits
     payload_kg: float
     forearm: Tube
@@ -69,7 +69,7 @@ def load_turner_model(key: ModelName) -> TurnerModel:
         series=row["series"],
         robot_type=row["robot_type"],
         joints=joints,
-        nominal_geometry=DenavitHartenberg(
+        nominal=DenavitHartenberg(
             theta_rad=(0.0,) * len(joints),
             a_m=tuple(row["a_m"]),
             d_m=tuple(row["d_m"]),

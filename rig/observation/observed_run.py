@@ -35,7 +35,7 @@ class Delay:
 
 @dataclass(frozen=True, slots=True)
 class ObservedRun:
-    """One recording, observed once; `sensors` by name.
+    """One recording with its observations; `sensors` by name.
 
     With `polynomials` its readings are corrected to one temperature. `clock_offset_s` converts its times to the clock
     of the first recording of its run.

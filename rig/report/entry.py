@@ -11,7 +11,7 @@ from rig.errors import Fault
 from rig.estimation.arrays import Array
 
 if TYPE_CHECKING:
-    from rig.analysis.measurement_conditions import ReadingConditions
+    from rig.analysis.measurement_conditions import Conditions
 
 EntryT = TypeVar("EntryT", bound=BaseModel)
 
@@ -36,7 +36,7 @@ def error_entry(fault: Fault) -> ErrorEntry:
     return ErrorEntry(error=str(fault))
 
 
-def when_entry(when: "ReadingConditions") -> ConditionsEntry:
+def when_entry(when: "Conditions") -> ConditionsEntry:
     """Return time and temperature of a value, times to the second."""
     times = {name: getattr(when, name).isoformat(timespec="seconds") for name in ("from_utc", "to_utc", "mean_utc")}
     return entry(ConditionsEntry, when, **times)

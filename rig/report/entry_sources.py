@@ -159,7 +159,7 @@ SOURCES: Final[Mapping[type[BaseModel], tuple[Row, ...]]] = {
     hand.MoveByHandEntry: (
         _row("MoveSummary", same="kind angle_rad turns normalised_residual", closure_error_rad="closure_rad"),
     ),
-    shared.ConditionsEntry: (_row("ReadingConditions", same="temperature_c temperature_range_c"),),
+    shared.ConditionsEntry: (_row("Conditions", same="temperature_c temperature_range_c"),),
     shared.DetectionLimitEntry: (
         _row("DetectionLimit", same="check unit", fault="what", error_over_expanded="off_by_expanded"),
     ),

@@ -14,7 +14,7 @@ import numpy as np
 
 from rig.estimation.arrays import Array
 from rig.estimation.earth import EARTH_RATE_RAD_S, STANDARD_GRAVITY_M_S2
-from rig.estimation.gyroscope.budget import UnobservedErrors, budget
+from rig.estimation.gyroscope.budget import UnknownErrors, budget
 from rig.estimation.gyroscope.nonlinearity import CUBE_DEVIATION, SQUARE_DEVIATION
 from rig.estimation.gyroscope.own_errors import SensorProperties
 from rig.estimation.gyroscope.six_observation import PARAMETERS
@@ -165,7 +165,7 @@ def _simulate_session(effects: Effects, rng: np.random.Generator) -> Array:
         ),
     )
     fit = explain(inputs, np.eye(3))
-    unknown = UnobservedErrors(
+    unknown = UnknownErrors(
         clock_std=effects.clock_known,
         clock_source="",
         state_jitter_s=effects.jitter_s,

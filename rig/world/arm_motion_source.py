@@ -47,14 +47,14 @@ class ArmMotionSource:
             vibration=_build_vibration(arm, world.seed),
             speed_limit_rad_s=model.speed_rad_s,
         )
-        self.arm = TrueArm(arm, build_site(world.site), motion, random, model.nominal_geometry)
+        self.arm = TrueArm(arm, build_site(world.site), motion, random, model.nominal)
         about_x, about_y, about_z = arm.tcp_rotation_deg
         self.robot = Robot(
             RobotIdentity(arm.serial_number, model.polyscope),
             motion,
             arm.remote_control,
             arm.speed_slider,
-            build_calibrated_links(arm.calibration, nominal_geometry=model.nominal_geometry),
+            build_calibrated_links(arm.calibration, nominal=model.nominal),
             model=model,
             tool_rotation_rad=(radians(about_x), radians(about_y), radians(about_z)),
         )

@@ -38,9 +38,9 @@ def problems(section: ArmSection, plan: Plan) -> list[str]:
 @pytest.mark.parametrize("name", NAMES)
 def test_two_tables_made_apart_say_the_same_of_an_arm(name: ModelName) -> None:
     ours, theirs = load_turner_model(name), MODELS[name]
-    a, d, quarters = np.array(theirs.nominal_geometry).T
-    np.testing.assert_array_equal([ours.nominal_geometry.a_m, ours.nominal_geometry.d_m], [a, d])
-    np.testing.assert_array_equal(ours.nominal_geometry.alpha_rad, quarters * math.pi / 2)
+    a, d, quarters = np.array(theirs.nominal).T
+    np.testing.assert_array_equal([ours.nominal.a_m, ours.nominal.d_m], [a, d])
+    np.testing.assert_array_equal(ours.nominal.alpha_rad, quarters * math.pi / 2)
     np.testing.assert_allclose(ours.limits.greatest_rad, theirs.limit_rad)
     np.testing.assert_allclose(ours.limits.least_rad, [-limit for limit in theirs.limit_rad])
     np.testing.assert_allclose(ours.limits.speed_rad_s, np.minimum(theirs.speed_rad_s, CLIENT_SPEED_RAD_S))
@@ -56,7 +56,7 @@ def test_every_row_says_where_its_figures_are_from(name: ModelName) -> None:
     row = load_turner_model(name)
     wanted = {"drawing", "limits", "acceleration", "payload", "room", "state_rate", "home"}
     assert row.sources.keys() == wanted and all(len(source) > 10 for source in row.sources.values())
-    height, upper_arm, forearm, *_ = lengths_m(row.nominal_geometry)
+    height, upper_arm, forearm, *_ = lengths_m(row.nominal)
     assert 0.1 < height < 0.3 and 0.2 < forearm < upper_arm < 0.9
     assert 0.03 <= row.forearm.radius_m <= row.upper_arm.radius_m <= 0.1
     assert 0 <= row.forearm.offset_m < row.upper_arm.offset_m and 0.045 <= row.sweep_room_m <= row.dwell_room_m
@@ -76,7 +76,7 @@ def test_a_configuration_ranges_as_far_as_any_of_them() -> None:
 
 
 def test_what_was_recorded_without_a_model_was_a_ur10e() -> None:
-    assert load_turner_model("ur10e").nominal_geometry == NOMINAL
+    assert load_turner_model("ur10e").nominal == NOMINAL
     assert arm("ur10e") == ArmSection(host="10.0.0.2", payload_kg=0.35)
 
 

@@ -12,7 +12,7 @@ from rig.analysis.gyroscope.vector_inputs import list_uncertainties
 from rig.data.quantity import RATE, Quantity
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.estimation.gyroscope.budget import UnobservedErrors, budget
+from rig.estimation.gyroscope.budget import UnknownErrors, budget
 from rig.estimation.gyroscope.vector_fit import Explained, explain
 from rig.observation.consistency.raw_readings import REST
 
@@ -72,9 +72,7 @@ def _means_of_solve(explained: Explained) -> Means:
     return Means(inputs_of_solve.rates_rad_s @ explained.solution.matrix.T, inputs_of_solve.windows_s, sweep)
 
 
-def _error_over_expanded(
-    patterns: Array, explained: Explained, mounting: Array, inputs: UnobservedErrors
-) -> float | None:
+def _error_over_expanded(patterns: Array, explained: Explained, mounting: Array, inputs: UnknownErrors) -> float | None:
     """Return the error of a result, divided by U, due to the worst of the fault's `patterns` (k, N, 3).
 
     Return None without a solution.

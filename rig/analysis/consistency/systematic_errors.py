@@ -289,7 +289,7 @@ def rate_errors(intervals: Sequence[MotionInterval], steps: int) -> Array:
 
 
 def _wave_indices(motion: ArmMotion) -> dict[int, int]:
-    """Return the first index in `ANGLE_ERRORS` of the waves of each of the last three joints: the wrists of an arm."""
+    """Return the first index in `ANGLE_ERRORS` of the angle's harmonics for each of the last three joints (wrists)."""
     beyond = motion.kinematics.joints - 1 - WRIST_3
     return {joint + beyond: first for joint, first in FIRST_WAVE_INDEX.items() if joint + beyond >= 0}
 

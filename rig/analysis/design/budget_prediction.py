@@ -14,7 +14,7 @@ from rig.analysis.clock_comparison import COMPUTER_CLOCK, CRYSTAL_CLOCK, PPM, Cl
 from rig.analysis.design.planned_motion import (
     END_REST_S,
     PlannedRun,
-    TimedStep,
+    Timed,
     measuring_steps,
     plan_run,
     predict_attitude,
@@ -148,7 +148,7 @@ def _plan_recording_part(
     return RecordingPart(turns, rests, run.clock_offset_s, run.settings.stage, np.array(run.settings.mount))
 
 
-def _average(timed: TimedStep[Step], run: PlannedRun, sensor: SensorSection) -> Average:
+def _average(timed: Timed[Step], run: PlannedRun, sensor: SensorSection) -> Average:
     """Return the planned average of a step: zero, with the variance due to the white noise of the data sheet."""
     start_s, end_s = timed.window_s
     lasting_s, walk_rad_sqrt_s = end_s - start_s, PARTS[sensor.part].angle_random_walk_rad_sqrt_s
@@ -166,7 +166,7 @@ def _average(timed: TimedStep[Step], run: PlannedRun, sensor: SensorSection) -> 
     )
 
 
-def _plan_observation(timed: TimedStep[Sweep], run: PlannedRun, sensor: SensorSection, speed_std: float) -> Observation:
+def _plan_observation(timed: Timed[Sweep], run: PlannedRun, sensor: SensorSection, speed_std: float) -> Observation:
     """Return the observation that a planned sweep would give, without noise; `speed_std` is relative."""
     sweep, turn = timed.step, predict_revolution(timed, run.arm, np.array(run.settings.mount))
     axis, sign = nearest_axis(mounting_matrix(sensor.mounting) @ turn.axis_flange)

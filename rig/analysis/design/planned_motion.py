@@ -48,7 +48,7 @@ def plan_run(config: RigConfig, plan: Plan, arm: DenavitHartenberg) -> PlannedRu
 
 
 @dataclass(frozen=True, slots=True)
-class TimedStep(Generic[StepT_co]):
+class Timed(Generic[StepT_co]):
     """A step with its start and end, and the joint angles at its start."""
 
     step: StepT_co
@@ -65,25 +65,25 @@ class TimedStep(Generic[StepT_co]):
         return middle - half, middle + half
 
 
-def time_steps(plan: Plan) -> Iterator[TimedStep[Step]]:
+def time_steps(plan: Plan) -> Iterator[Timed[Step]]:
     """Yield every step in order with its times, assuming that sensors settle at once before a dwell."""
     time_s, q_rad = END_REST_S, plan.start_q_rad
     for step in plan.steps:
-        yield TimedStep(step, time_s, time_s + step.duration_s, q_rad)
+        yield Timed(step, time_s, time_s + step.duration_s, q_rad)
         time_s += step.duration_s
         q_rad = step.target_q_rad if isinstance(step, (Sweep, Transfer)) else q_rad
 
 
-def time_steps_of(plan: Plan, kind: type[StepT]) -> list[TimedStep[StepT]]:
+def time_steps_of(plan: Plan, kind: type[StepT]) -> list[Timed[StepT]]:
     """Return the plan's steps of one kind, sweeps or dwells, with their times."""
     return [
-        TimedStep(time_step.step, time_step.start_s, time_step.end_s, time_step.q_rad)
+        Timed(time_step.step, time_step.start_s, time_step.end_s, time_step.q_rad)
         for time_step in time_steps(plan)
         if isinstance(time_step.step, kind)
     ]
 
 
-def measuring_steps(plan: Plan) -> Iterator[TimedStep[Step]]:
+def measuring_steps(plan: Plan) -> Iterator[Timed[Step]]:
     """Yield the plan's sweeps, rests and dwells with their times."""
     return (time_step for time_step in time_steps(plan) if isinstance(time_step.step, (Sweep, Rest, Dwell)))
 
@@ -94,7 +94,7 @@ def predict_state_jitter(plan: Plan) -> float:
     return float(np.sqrt(STATE_JITTER_S**2 + ENCODER_NOISE_RAD**2 * slow_s_rad)) * INTERPOLATION_JITTER_RATIO
 
 
-def predict_revolution(timed_step: TimedStep[Sweep], arm: DenavitHartenberg, mount: Array) -> Revolution:
+def predict_revolution(timed_step: Timed[Sweep], arm: DenavitHartenberg, mount: Array) -> Revolution:
     """Return a sweep's revolution, or arc, as `ArmMotion.turn` finds it in a recording, with a mount (3, 3)."""
     sweep, start_q_rad = timed_step.step, timed_step.step.first_q_rad
     return Revolution(
@@ -109,7 +109,7 @@ def predict_revolution(timed_step: TimedStep[Sweep], arm: DenavitHartenberg, mou
     )
 
 
-def predict_attitude(timed_step: TimedStep[Step], arm: DenavitHartenberg, mount: Array) -> Array:
+def predict_attitude(timed_step: Timed[Step], arm: DenavitHartenberg, mount: Array) -> Array:
     """Return the mean attitude (3, 3) of a revolution, rest or dwell, as `ArmMotion.attitude` finds it."""
     if not isinstance(timed_step.step, Sweep):
         return mount @ _attitude(timed_step.q_rad, arm)

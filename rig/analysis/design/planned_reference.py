@@ -5,13 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rig.analysis.consistency.reference_alternatives import ReferenceModel
-from rig.analysis.design.planned_motion import (
-    PlannedRun,
-    TimedStep,
-    predict_attitude,
-    predict_revolution,
-    time_steps_of,
-)
+from rig.analysis.design.planned_motion import PlannedRun, Timed, predict_attitude, predict_revolution, time_steps_of
 from rig.analysis.reference.accelerometer import select_validation, stack_sweeps
 from rig.analysis.reference.arm_patterns import Posture, StatedArm, arm_patterns, list_arm_rotations
 from rig.analysis.reference.datasheet_errors import Datasheet, ReferenceWindow, list_sensor_errors, read_datasheet
@@ -94,7 +88,7 @@ def predict_readings(accelerometer: PlannedAccelerometer) -> ReferenceModel:
     return ReferenceModel(theta, movement, np.concatenate([lag, arm_errors]), middles_s, second_order=second_order)
 
 
-def _segment(timed_step: TimedStep[Dwell] | TimedStep[Sweep]) -> ReferenceWindow:
+def _segment(timed_step: Timed[Dwell] | Timed[Sweep]) -> ReferenceWindow:
     """Return a dwell or a sweep at constant temperature."""
     step = timed_step.step
     wrist = step.joint - WRIST_1 if isinstance(step, Sweep) else None
@@ -102,7 +96,7 @@ def _segment(timed_step: TimedStep[Dwell] | TimedStep[Sweep]) -> ReferenceWindow
     return ReferenceWindow(step.index, timed_step.window_s, 1, 0.0, Posture(np.array(q_rad), wrist))
 
 
-def _predict_sweep(timed_step: TimedStep[Sweep], arm: DenavitHartenberg, walk_m_s_sqrt_s: float) -> SweptAcceleration:
+def _predict_sweep(timed_step: Timed[Sweep], arm: DenavitHartenberg, walk_m_s_sqrt_s: float) -> SweptAcceleration:
     """Return a sweep's first harmonic without signal, with the covariance of a velocity random walk, m/s/√s."""
     turn = predict_revolution(timed_step, arm, np.eye(3))
     waves = np.diag(np.repeat([1.0, 2.0, 2.0], 3))  # weights of the mean, the cosine and the sine over a revolution

@@ -11,7 +11,7 @@ from rig.errors import Fault
 from rig.errors.attempts import Attempts, attempt_each
 from rig.estimation.arrays import Array
 from rig.estimation.reference.accelerometer_model import Dwells
-from rig.estimation.reference.attitude_error import ReadingsInAttitudes
+from rig.estimation.reference.attitude_error import AttitudeReadings
 from rig.estimation.reference.reference_model import KnownNorm, KnownVector, ReferencePrior
 from rig.estimation.reference.triaxial import Method, TriaxialSolution, solve_triaxial
 from rig.observation.external.attitude_import import PlacedReadings, Rows
@@ -73,11 +73,11 @@ class Equations:
         return Dwells(self.means, self.variances, self.attitudes)
 
     @property
-    def placed(self) -> ReadingsInAttitudes:
+    def placed(self) -> AttitudeReadings:
         """The mean readings with their attitudes, in a constant reference of known norm."""
         std_rad = np.zeros(len(self.means)) if self.std_rad is None else self.std_rad
         nothing = np.zeros_like(self.means)
-        return ReadingsInAttitudes(self.means, self.variances, self.attitudes, nothing, std_rad, norm_known=True)
+        return AttitudeReadings(self.means, self.variances, self.attitudes, nothing, std_rad, norm_known=True)
 
     def solve(self, method: Method) -> TriaxialSolution:
         """Return the solution. Raise Fault `inverted_attitudes`, and as `solve_triaxial` does."""

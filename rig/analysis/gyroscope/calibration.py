@@ -18,7 +18,7 @@ from rig.errors import Fault, Refused
 from rig.errors.attempts import attempt
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.accumulator import Accumulator, SixObservationEstimator, Solution
-from rig.estimation.gyroscope.budget import Budget, UnobservedErrors, budget
+from rig.estimation.gyroscope.budget import Budget, UnknownErrors, budget
 from rig.estimation.gyroscope.earth_rate import EarthRate, find_earth_rate
 from rig.estimation.gyroscope.estimate import Estimate
 from rig.estimation.gyroscope.six_observation_budget import six_observation_budget
@@ -206,7 +206,7 @@ def _solve_sensor(
 
 
 def _budget_of(
-    solution: Estimate, explained: Explained, environment: MeasurementEnvironment, unknown: UnobservedErrors, name: str
+    solution: Estimate, explained: Explained, environment: MeasurementEnvironment, unknown: UnknownErrors, name: str
 ) -> Budget | None:
     """Return the budget of the chosen solution of the sensor `name`; None if its estimator has no budget."""
     if isinstance(solution, VectorSolution):

@@ -11,7 +11,7 @@ from rig.analysis.environment import MeasurementEnvironment
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.settings import Uncertainty
 from rig.estimation.arrays import Array
-from rig.estimation.gyroscope.budget import UnobservedErrors
+from rig.estimation.gyroscope.budget import UnknownErrors
 from rig.estimation.gyroscope.earth_rate import EarthRate, EarthRatePrior
 from rig.estimation.gyroscope.own_errors import SensorProperties
 from rig.estimation.gyroscope.vector_fit import VectorInputs
@@ -208,13 +208,13 @@ def list_given(environment: MeasurementEnvironment, name: str) -> EarthRatePrior
 
 def list_uncertainties(
     environment: MeasurementEnvironment, name: str, earth_rate: EarthRate | None, stamp_std_s: float | None = None
-) -> UnobservedErrors:
+) -> UnknownErrors:
     """Return the uncertainties that no recording of sensor `name` shows, and the uncertainty of the Earth's rate.
 
     `stamp_std_s` is as in `RecordedSensor`.
     """
     uncertainty, clock = environment.uncertainty, environment.clock
-    return UnobservedErrors(
+    return UnknownErrors(
         clock_std=clock.std,
         clock_dof=clock.dof,
         clock_half_width=None if clock.comparisons else PPM * uncertainty.controller_clock_ppm,

@@ -43,16 +43,14 @@ Polynomials = Mapping[str, Mapping[Quantity, OverTemperature]]
 
 
 @dataclass(frozen=True, slots=True)
-class CorrectedRecordings:
+class CorrectedRuns:
     """Recordings corrected to the reference temperature, and the polynomials that corrected them."""
 
     recordings: tuple[ObservedRun, ...]
     polynomials: Polynomials
 
 
-def correct_recordings(
-    recordings: Sequence[ObservedRun], settings: RunSettings, reference_c: float
-) -> CorrectedRecordings:
+def correct_recordings(recordings: Sequence[ObservedRun], settings: RunSettings, reference_c: float) -> CorrectedRuns:
     """Return the recordings with rates and dwells' accelerations as at `reference_c`, for the sensors to calibrate.
 
     Raise Fault `temperature_not_recorded`, and as `fit_over_temperature` does.
@@ -67,7 +65,7 @@ def correct_recordings(
             runs, polynomials[name][ACCELERATION] = _correct_accelerations(runs, name, environment, reference_c)
         if settings.planned_sweeps:  # last: it sets the sweeps' temperatures to the reference
             runs, polynomials[name][RATE] = _correct_rates(runs, name, environment, reference_c)
-    return CorrectedRecordings(tuple(replace(recording, polynomials=polynomials) for recording in runs), polynomials)
+    return CorrectedRuns(tuple(replace(recording, polynomials=polynomials) for recording in runs), polynomials)
 
 
 def correct_files(data: ExternalData, reference_c: float) -> tuple[ExternalData, OverTemperature]:

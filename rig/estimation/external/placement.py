@@ -18,7 +18,7 @@ import numpy as np
 from rig.estimation.arrays import Array
 from rig.estimation.external.abrupt_change import AbruptChange
 from rig.estimation.external.placement_model import ERROR_MEDIAN_RATIO, MAX_CORRELATED, build_placement_model
-from rig.estimation.reference.attitude_error import AttitudeError, ReadingsInAttitudes, effects
+from rig.estimation.reference.attitude_error import AttitudeError, AttitudeReadings, effects
 from rig.estimation.reference.reference_model import BIAS, REFERENCE, F, free_directions, jacobian, predicted
 from rig.estimation.statistics.coverage import COVERAGE_FACTOR
 
@@ -100,9 +100,7 @@ class _PlacementFits:
     likelihood: Array
 
 
-def laid_down(
-    theta: Array, placed: ReadingsInAttitudes, unplaced: Array, unplaced_variances: Array
-) -> PlacementSolution:
+def laid_down(theta: Array, placed: AttitudeReadings, unplaced: Array, unplaced_variances: Array) -> PlacementSolution:
     """Re-estimate the solution `theta` (p,) with placement errors; `unplaced` (k, 3) are means in unknown attitudes."""
     all_rests = _add_unplaced(theta, placed, unplaced, unplaced_variances)
     free = free_directions(theta, norm_known=all_rests.norm_known)
@@ -143,7 +141,7 @@ def laid_down(
     return laid if len(all_rests.readings) > MAX_CORRELATED else _relate_errors(laid, all_rests, len(placed.readings))
 
 
-def _relate_errors(laid: PlacementSolution, all_rests: ReadingsInAttitudes, stated: int) -> PlacementSolution:
+def _relate_errors(laid: PlacementSolution, all_rests: AttitudeReadings, stated: int) -> PlacementSolution:
     """Return the solution if the errors of the first `stated` attitudes may be a smooth function of the attitude.
 
     The covariance at the most probable standard deviations is inflated to the 95 % intervals that integrate over them.
@@ -176,7 +174,7 @@ def _find_log_prior(grid: Array, size: float) -> Array:
     return log_prior
 
 
-def _add_unplaced(theta: Array, placed: ReadingsInAttitudes, unplaced: Array, variances: Array) -> ReadingsInAttitudes:
+def _add_unplaced(theta: Array, placed: AttitudeReadings, unplaced: Array, variances: Array) -> AttitudeReadings:
     """Return all rests; a rest without an attitude gets the attitude that fits its reading best."""
     if not len(unplaced) or not placed.norm_known:
         return placed

@@ -10,7 +10,7 @@ import numpy as np
 from rig.estimation.arrays import Array
 from rig.estimation.external.abrupt_change import SCALE_STD, AbruptChange, PossibleChanges, find_change
 from rig.estimation.external.placement_model import MAX_CORRELATED, build_placement_model
-from rig.estimation.reference.attitude_error import ReadingsInAttitudes
+from rig.estimation.reference.attitude_error import AttitudeReadings
 from rig.estimation.reference.reference_model import BIAS, REFERENCE, predicted
 
 MIN_PLACEMENTS = 8  # fewer show no change, or take a wrong attitude for one
@@ -20,7 +20,7 @@ SMALL_ERROR_RATIO = 0.01  # scale of the errors tried in addition to the estimat
 MIN_EVIDENCE = 0.0  # ln of the Bayes factor of a change
 
 
-def find_placement_change(theta: Array, placed: ReadingsInAttitudes, starts_s: Array) -> AbruptChange | None:
+def find_placement_change(theta: Array, placed: AttitudeReadings, starts_s: Array) -> AbruptChange | None:
     """Return the abrupt change that N placements in the order of time show, None if they show none.
 
     `theta` (p,) is the solution without a change; the placements begin at `starts_s` (N,).

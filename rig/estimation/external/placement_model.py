@@ -12,7 +12,7 @@ import numpy as np
 
 from rig.estimation.arrays import Array
 from rig.estimation.external.attitude_drift import correlate_effects, matern
-from rig.estimation.reference.attitude_error import ReadingsInAttitudes, effects
+from rig.estimation.reference.attitude_error import AttitudeReadings, effects
 from rig.estimation.reference.reference_model import REFERENCE, free_directions, jacobian, predicted
 from rig.estimation.statistics.variance_components import Mixed, MixedModel
 
@@ -22,7 +22,7 @@ MAX_CORRELATED = 200  # more placements are taken for independent and not search
 ERROR_MEDIAN_RATIO = 1e-3  # of η to the reference (a milli-g)
 
 
-def build_placement_model(theta: Array, placed: ReadingsInAttitudes, stated: int) -> MixedModel:
+def build_placement_model(theta: Array, placed: AttitudeReadings, stated: int) -> MixedModel:
     """Return the model of N placements, linear in the free directions of `theta` (p,).
 
     Only the first `stated` placements have a measured attitude, and so an error γ. The components are ε, γ and η.

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.estimation.arrays import Array
-from rig.estimation.reference.attitude_error import ReadingsInAttitudes, effects, find_whiteners
+from rig.estimation.reference.attitude_error import AttitudeReadings, effects, find_whiteners
 from rig.estimation.reference.reference_model import REFERENCE, F, weighted_jacobian
 from rig.estimation.reference.reference_model import free_directions as directions
 
@@ -17,7 +17,7 @@ MAX_DETERMINED_STD = 0.1  # of a scale factor
 MIN_EIGENVALUE = 1e-9  # of the information: a smaller one counts as zero
 
 
-def find_sole_attitude(theta: Array, placed: ReadingsInAttitudes) -> tuple[int, int] | None:
+def find_sole_attitude(theta: Array, placed: AttitudeReadings) -> tuple[int, int] | None:
     """Return the axis whose scale factor depends on a single placement, and that placement; None if there is none.
 
     Without that placement, the scale factor's standard deviation exceeds `MAX_DETERMINED_STD`. None also if no attitude

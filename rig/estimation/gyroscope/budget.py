@@ -111,7 +111,7 @@ class Budget:
 
 
 @dataclass(frozen=True, slots=True)
-class UnobservedErrors:
+class UnknownErrors:
     """The standard uncertainties, or half-widths, of error sources that no recording determines.
 
     - clock_std: relative uncertainty of the clock.
@@ -150,12 +150,12 @@ class UnobservedErrors:
 Propagate = Callable[[Array], Array]  # patterns (k, N, 3) of readings to a covariance (6, 6)
 
 
-def budget(explained: Explained, unknown: UnobservedErrors) -> Budget:
+def budget(explained: Explained, unknown: UnknownErrors) -> Budget:
     """Return the budget of one sensor's vector solution."""
     return Budget(tuple(_contributors(explained, unknown)))
 
 
-def _contributors(explained: Explained, unknown: UnobservedErrors) -> Iterator[Contributor]:
+def _contributors(explained: Explained, unknown: UnknownErrors) -> Iterator[Contributor]:
     """Yield the contributors; the solution's response propagates a pattern of errors in the readings."""
     solution, inputs = explained.solution, explained.inputs
     matrix = solution.matrix
@@ -222,7 +222,7 @@ def _contributors(explained: Explained, unknown: UnobservedErrors) -> Iterator[C
     )
 
 
-def _evaluate_mounts(explained: Explained, unknown: UnobservedErrors, propagate: Propagate) -> Iterator[Contributor]:
+def _evaluate_mounts(explained: Explained, unknown: UnknownErrors, propagate: Propagate) -> Iterator[Contributor]:
     """Yield the contributors of the ends of arcs and of the mountings; `propagate` as in `_contributors`."""
     inputs, matrix = explained.inputs, explained.solution.matrix
     if inputs.encoder_errors_rad_s is not None:
@@ -236,7 +236,7 @@ def _evaluate_mounts(explained: Explained, unknown: UnobservedErrors, propagate:
 
 
 def _evaluate_times(
-    inputs: VectorInputs, unknown: UnobservedErrors, turned: Array, propagate: Propagate
+    inputs: VectorInputs, unknown: UnknownErrors, turned: Array, propagate: Propagate
 ) -> Iterator[Contributor]:
     """Yield the contributors of the times of the arm's states and of the sensor's samples."""
     per_s = np.sqrt(2) / np.diff(inputs.windows_s).T[0]

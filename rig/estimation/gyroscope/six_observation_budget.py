@@ -16,7 +16,7 @@ from rig.estimation.gyroscope.budget import (
     REPEATABILITY,
     Budget,
     Contributor,
-    UnobservedErrors,
+    UnknownErrors,
     budget,
     split_bias_covariance,
 )
@@ -26,7 +26,7 @@ from rig.estimation.gyroscope.vector_fit import Explained, VectorInputs
 AXIS_ANGLES = "angles between the axes"
 
 
-def six_observation_budget(explained: Explained, six: Solution, unknown: UnobservedErrors, axes_rad: float) -> Budget:
+def six_observation_budget(explained: Explained, six: Solution, unknown: UnknownErrors, axes_rad: float) -> Budget:
     """Return the budget of the solution `six`, which uses only the sweeps of `explained`, weighted by their noise.
 
     `axes_rad` is the half-width of the angles between the sensor's axes about 90°.

@@ -44,7 +44,7 @@ class AttitudeError:
 
 
 @dataclass(frozen=True, slots=True)
-class ReadingsInAttitudes:
+class AttitudeReadings:
     """Readings (N, 3) with the `variances` (N, 3) of their noise, in `attitudes` (N, 3, 3), body to table.
 
     `v_bar` (N, 3) is the table's own motion; `attitude_std_rad` (N,) the stated uncertainty of each attitude, zero if
@@ -58,10 +58,10 @@ class ReadingsInAttitudes:
     attitude_std_rad: Array
     norm_known: bool
 
-    def omit(self, attitude: int) -> "ReadingsInAttitudes":
+    def omit(self, attitude: int) -> "AttitudeReadings":
         """Return the readings without the attitude of index `attitude`."""
         remaining = np.arange(len(self.readings)) != attitude
-        return ReadingsInAttitudes(
+        return AttitudeReadings(
             self.readings[remaining],
             self.variances[remaining],
             self.attitudes[remaining],
@@ -82,7 +82,7 @@ class AttitudeWeighted:
     iterations: int
 
 
-def solve_attitude_weighted(start: Array, placed: ReadingsInAttitudes) -> AttitudeWeighted:
+def solve_attitude_weighted(start: Array, placed: AttitudeReadings) -> AttitudeWeighted:
     """Return the most likely θ and attitude error δ, from `start` (p,), by alternating steps until δ converges."""
     r, v_bar, norm_known = placed.attitudes, placed.v_bar, placed.norm_known
     theta, steps, delta, last = start, 0, 0.0, np.inf
@@ -105,7 +105,7 @@ def solve_attitude_weighted(start: Array, placed: ReadingsInAttitudes) -> Attitu
     )
 
 
-def find_worst_attitude(start: Array, placed: ReadingsInAttitudes, fit: AttitudeWeighted) -> tuple[int, float, float]:
+def find_worst_attitude(start: Array, placed: AttitudeReadings, fit: AttitudeWeighted) -> tuple[int, float, float]:
     """Return the index of the attitude that fits worst, its error relative to the others, and the expected error, rad.
 
     The expected error is determined without that attitude, which would inflate it.
@@ -140,7 +140,7 @@ def find_whiteners(variances: Array, rotations: Array, std_rad: Array) -> Array:
     return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)), dtype=np.float64)
 
 
-def _estimate_std(theta: Array, placed: ReadingsInAttitudes) -> float:
+def _estimate_std(theta: Array, placed: AttitudeReadings) -> float:
     """Return the restricted-maximum-likelihood estimate of δ."""
     r, v_bar = placed.attitudes, placed.v_bar
     rotations = effects(theta, r, v_bar)

@@ -25,8 +25,8 @@ from rig.estimation import refusals
 from rig.estimation.arrays import Array, scale_of
 from rig.estimation.reference.attitude_error import (
     AttitudeError,
+    AttitudeReadings,
     AttitudeWeighted,
-    ReadingsInAttitudes,
     find_worst_attitude,
     solve_attitude_weighted,
 )
@@ -144,7 +144,7 @@ def solve_triaxial(
             covariance = covariance_bound(theta, r, v_bar, whiteners, norm_known=norm_known)
         else:
             stated = np.zeros(len(m)) if attitude_std_rad is None else np.asarray(attitude_std_rad, dtype=np.float64)
-            placed = ReadingsInAttitudes(m, v, r, v_bar, stated, norm_known)
+            placed = AttitudeReadings(m, v, r, v_bar, stated, norm_known)
             weighted = solve_attitude_weighted(start, placed)
             _check_attitudes(start, placed, weighted)
             theta, covariance, iterations = weighted.theta, weighted.covariance, weighted.iterations
@@ -244,7 +244,7 @@ def _errors_in_x(m: Array, v: Array, method: Method) -> tuple[str, ...]:
     return ("noise in the readings biases the published estimate; maximum_likelihood does not suffer from it",)
 
 
-def _check_attitudes(start: Array, placed: ReadingsInAttitudes, fit: AttitudeWeighted) -> None:
+def _check_attitudes(start: Array, placed: AttitudeReadings, fit: AttitudeWeighted) -> None:
     """Raise Fault if all attitudes are wrong, or if one is and enough others remain to identify it."""
     enough = 3 * (len(placed.readings) - 1) > len(start) + 3
     check_trustworthy(fit.attitude_error.std_rad, lambda: find_worst_attitude(start, placed, fit), enough=enough)

@@ -118,7 +118,7 @@ class LinesSource:
 
 
 @dataclass(frozen=True, slots=True)
-class _PrintedColumns:
+class _Printed:
     """The columns of a channel in a line; a printed 1 is `size` in the channel's unit, a printed 0 `zero`."""
 
     columns: tuple[int, ...]
@@ -140,7 +140,7 @@ def describe(name: str, section: SensorSection) -> RecordedSensor:
 
 def _make_readers(
     name: str, section: SensorSection, first_lines: FirstLines
-) -> Iterator[tuple[str, tuple[RecordedSensor, tuple[_PrintedColumns, ...]]]]:
+) -> Iterator[tuple[str, tuple[RecordedSensor, tuple[_Printed, ...]]]]:
     """Yield name, description and printed channels of each sensor in the lines, the gyroscope first."""
     _, lines = _split_section(section)
     own_channels = [
@@ -150,9 +150,7 @@ def _make_readers(
     if section.acceleration is not None and lines.acceleration is not None:
         own_channels.append(_make_triad(lines, ACCELERATION, lines.acceleration, range_m_s2(section.acceleration)))
 
-    def make_sensor(
-        part: str, *channels: tuple[Channel, _PrintedColumns]
-    ) -> tuple[RecordedSensor, tuple[_PrintedColumns, ...]]:
+    def make_sensor(part: str, *channels: tuple[Channel, _Printed]) -> tuple[RecordedSensor, tuple[_Printed, ...]]:
         channels_only, printed = zip(*channels, strict=True)
         return build_sensor(section, *channels_only, part=part, clock=name), printed
 
@@ -165,7 +163,7 @@ def _make_readers(
     for scalar, scalar_section in lines.scalars.items():
         unit = UNITS[scalar_section.unit]
         channel = Channel(unit.quantity, unit.quantity, "<f8", 1.0)
-        printed_scalar = _PrintedColumns((lines.columns.index(scalar),), scalar_section.scale * unit.size, unit.zero)
+        printed_scalar = _Printed((lines.columns.index(scalar),), scalar_section.scale * unit.size, unit.zero)
         yield scalar_name(name, scalar), make_sensor(f"lines_{channel.measures.sensor}", (channel, printed_scalar))
 
 
@@ -236,25 +234,23 @@ def _mean(values: Array) -> Array:
 
 def _make_triad(
     lines: LinesSection, quantity: Quantity, section: _TriadSection, full_scale: float
-) -> tuple[Channel, _PrintedColumns]:
+) -> tuple[Channel, _Printed]:
     """Return a channel of three axes, with the step of the last digit or a coarser 32-bit step, and its columns."""
     unit = section.scale * UNITS[section.unit].size
     step = 0.0 if section.decimals is None else unit * 10.0**-section.decimals
     step = max(step, full_scale / FULL_SCALE_COUNTS)
     channel = triad_channel(quantity, step, max(int(SATURATION_FRACTION * full_scale / step), 1), full_scale)
-    return channel, _PrintedColumns(tuple(map(lines.columns.index, AXIS_NAMES[quantity])), unit)
+    return channel, _Printed(tuple(map(lines.columns.index, AXIS_NAMES[quantity])), unit)
 
 
-def _make_thermometer(lines: LinesSection, *, provides: bool) -> Iterator[tuple[Channel, _PrintedColumns]]:
+def _make_thermometer(lines: LinesSection, *, provides: bool) -> Iterator[tuple[Channel, _Printed]]:
     """Yield the channel of the printed temperature, else of the stated one; nothing if there is neither."""
-    printed, printed_channel = None, _PrintedColumns(())
+    printed, printed_channel = None, _Printed(())
     if provides and "temperature" in lines.columns:
         temperature = lines.temperature
         step = 0.0 if temperature.decimals is None else temperature.scale * 10.0**-temperature.decimals
         printed = thermometer_channel(max(step, DEGREES_PER_COUNT), 0.0)
-        printed_channel = _PrintedColumns(
-            (lines.columns.index("temperature"),), temperature.scale, temperature.offset_c
-        )
+        printed_channel = _Printed((lines.columns.index("temperature"),), temperature.scale, temperature.offset_c)
     yield from ((channel, printed_channel) for channel in thermometer_channels(printed, lines.temperature.stated))
 
 

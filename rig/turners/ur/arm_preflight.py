@@ -120,7 +120,7 @@ def kinematics_problems(arm: ArmSection, report: ArmReport) -> list[Problem]:
             )
         ]
     home, model = find_home(arm), model_of(arm)
-    actual, nominal = (flange_axes(home, chain)[:, WRISTS] for chain in (report.kinematics, model.nominal_geometry))
+    actual, nominal = (flange_axes(home, chain)[:, WRISTS] for chain in (report.kinematics, model.nominal))
     angles = np.arctan2(np.linalg.norm(np.cross(actual, nominal, axis=0), axis=0), np.sum(actual * nominal, axis=0))
     return [
         Problem(
@@ -142,8 +142,4 @@ def make_recorded(arm: ArmSection, report: ArmReport) -> TurnerIdentity:
 
 def _geometry(arm: ArmSection, report: ArmReport) -> DenavitHartenberg:
     """Return the geometry for all computations: the factory's measurement of this arm, or its model's nominal one."""
-    return (
-        model_of(arm).nominal_geometry
-        if arm.kinematics == "nominal" or report.kinematics is None
-        else report.kinematics
-    )
+    return model_of(arm).nominal if arm.kinematics == "nominal" or report.kinematics is None else report.kinematics

@@ -13,7 +13,7 @@ class ArmSetup:
     """The arm for which the controller is set up: the maker's type number, lengths, joint limits."""
 
     robot_type: int
-    nominal_geometry: DenavitHartenberg
+    nominal: DenavitHartenberg
     limits: JointLimits
 
 

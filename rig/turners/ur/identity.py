@@ -85,7 +85,7 @@ def identity_problems(arm: "ArmSection", report: ArmReport) -> list[Problem]:
     elif model.series == "CB3":
         return [_mismatch(arm, report, f"by its software, {version_text(report.version)}")]
     setup, kinematics = report.setup, report.kinematics
-    chains = [] if setup is None else [setup.nominal_geometry]
+    chains = [] if setup is None else [setup.nominal]
     if kinematics is not None and (setup is None or arm.kinematics == "controller"):
         chains.append(kinematics)
     if not chains and robot_type is None:
@@ -128,7 +128,7 @@ def _other_length(arm: DenavitHartenberg, model: TurnerModel) -> str | None:
 
     from rig.motion.geometry import LENGTHS, lengths_m
 
-    lengths, nominal = lengths_m(arm), lengths_m(model.nominal_geometry)
+    lengths, nominal = lengths_m(arm), lengths_m(model.nominal)
     worst = int(np.argmax(np.abs(lengths - nominal)))
     if abs(lengths[worst] - nominal[worst]) <= LENGTH_TOLERANCE_M:
         return None

@@ -50,7 +50,7 @@ def _problems(plans: Sequence[Plan], section: ArmSection, report: "ArmReport | N
 
 def _make_nominal(section: ArmSection) -> TurnerIdentity:
     model = model_of(section)
-    return TurnerIdentity(model.maker, model.name, model.nominal_geometry)
+    return TurnerIdentity(model.maker, model.name, model.nominal)
 
 
 def _make_recorded(section: ArmSection, report: "ArmReport") -> TurnerIdentity:

@@ -9,7 +9,7 @@ import pytest
 from rig.analysis.environment import find_environment
 from rig.analysis.gyroscope.calibration import SensorResult, solve_observed
 from rig.estimation.arrays import Array
-from rig.estimation.gyroscope.budget import UnobservedErrors, budget
+from rig.estimation.gyroscope.budget import UnknownErrors, budget
 from rig.observation.observed_run import observe_runs
 from support.recordings.synthetic_run import Setup, synthetic_run, truth
 
@@ -19,7 +19,7 @@ SENSITIVE = ((5.1e-3, -1.5e-3, 1.2e-3), (1.8e-3, -4.5e-3, 1.5e-3), (-0.9e-3, 2.1
 FAST = Setup(speed_deg_s=120, noise_rad_s=3e-4, g_sensitivity_rad_s_per_g=SENSITIVE)
 WITHOUT_RESTS = replace(FAST, rest_s=0)
 AT_THE_END_OF_300_MM = replace(FAST, offset_m=(0.0, 0.0, 0.3))
-KNOWN = UnobservedErrors(
+KNOWN = UnknownErrors(
     clock_std=1e-6,
     clock_source="",
     state_jitter_s=0.0,

@@ -6,11 +6,11 @@ import pytest
 from rig.analysis.gyroscope.vector_inputs import list_mount_rotations
 from rig.config.procedures.stage_section import rotation_by
 from rig.estimation.arrays import Array
-from rig.estimation.gyroscope.budget import REMOUNTING, Budget, UnobservedErrors, budget
+from rig.estimation.gyroscope.budget import REMOUNTING, Budget, UnknownErrors, budget
 from rig.estimation.gyroscope.vector_fit import VectorInputs, explain
 
 MOUNT_DEG, SPEED_RAD_S, NOISE_RAD_S = 1.0, 1.0, 1e-7
-UNKNOWN = UnobservedErrors(
+UNKNOWN = UnknownErrors(
     clock_std=0.0, clock_source="", state_jitter_s=0.0, axis_rad=0.0, sensor_offset_m=0.0,
     g_sensitivity_rad_s_per_g=0.0, earth_rate=False, mount_rad=float(np.radians(MOUNT_DEG)),
 )  # fmt: skip

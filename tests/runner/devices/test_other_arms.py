@@ -52,7 +52,7 @@ def _calibrates(model: ModelName, tmp_path: Path) -> None:
     measured = read_run(run / "run.h5")
     row = load_turner_model(model)
     assert measured.turner is not None
-    assert lengths_m(measured.turner.geometry) == pytest.approx(lengths_m(row.nominal_geometry), abs=5e-3)
+    assert lengths_m(measured.turner.geometry) == pytest.approx(lengths_m(row.nominal), abs=5e-3)
     rate_hz = 1 / np.median(np.diff(measured.states["time_s"]))
     assert rate_hz == pytest.approx(125, rel=1e-6)
     judged = solve(tmp_path / model)

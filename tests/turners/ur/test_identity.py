@@ -57,7 +57,7 @@ def test_a_ur10e_is_what_was_meant_and_says_what_it_can_do(seen: ArmReport) -> N
     limits = seen.setup.limits
     np.testing.assert_allclose(np.degrees(limits.speed_rad_s), [120, 120, 180, 180, 180, 180])
     np.testing.assert_allclose(np.degrees([limits.least_rad, limits.greatest_rad]).T, [[-360, 360]] * 6)
-    np.testing.assert_allclose(lengths_m(seen.setup.nominal_geometry), lengths_m(NOMINAL), atol=1e-12)
+    np.testing.assert_allclose(lengths_m(seen.setup.nominal), lengths_m(NOMINAL), atol=1e-12)
 
 
 @pytest.mark.one_in(2)
@@ -214,12 +214,12 @@ ALIKE = ({"ur5e", "ur7e"}, {"ur10e", "ur12e"})  # their controllers say the same
 def told_by(key: ModelName, told: ArmReport) -> ArmReport:
     """What the controller of that model says, by the table of the simulated laboratory."""
     world = MODELS[key]
-    a, d, quarters = zip(*world.nominal_geometry, strict=True)
-    nominal_geometry = DenavitHartenberg((0.0,) * 6, a, d, tuple(quarter * pi / 2 for quarter in quarters))
+    a, d, quarters = zip(*world.nominal, strict=True)
+    nominal = DenavitHartenberg((0.0,) * 6, a, d, tuple(quarter * pi / 2 for quarter in quarters))
     least = tuple(-limit for limit in world.limit_rad)
     limits = JointLimits(least, world.limit_rad, world.speed_rad_s, (40.0,) * 6)
-    setup = ArmSetup(world.robot_type, nominal_geometry, limits)
-    return replace(told, version=world.polyscope, called=world.name, setup=setup, kinematics=nominal_geometry)
+    setup = ArmSetup(world.robot_type, nominal, limits)
+    return replace(told, version=world.polyscope, called=world.name, setup=setup, kinematics=nominal)
 
 
 @pytest.mark.slow

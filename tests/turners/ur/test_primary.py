@@ -58,7 +58,7 @@ UR3E = ArmSetup(
 
 def configuration(setup: ArmSetup) -> bytes:
     """Configuration Data, as the maker describes it for PolyScope 5."""
-    limits, arm = setup.limits, setup.nominal_geometry
+    limits, arm = setup.limits, setup.nominal
     values = [value for pair in zip(limits.least_rad, limits.greatest_rad, strict=True) for value in pair]
     values += [value for pair in zip(limits.speed_rad_s, limits.acceleration_rad_s2, strict=True) for value in pair]
     values += [1.05, 1.4, 0.25, 1.2, 0.5, *arm.a_m, *arm.d_m, *arm.alpha_rad, *arm.theta_rad]

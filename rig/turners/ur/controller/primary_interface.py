@@ -93,12 +93,12 @@ def _setup(payload: bytes) -> ArmSetup | None:
     if len(payload) < CONFIGURATION.size:
         return None
     values = CONFIGURATION.unpack_from(payload)
-    limits, nominal_geometry, robot_type = values[:24], values[29:53], values[55]
-    if any(map(isnan, limits)) or not all(abs(length) <= MAX_VALUE for length in nominal_geometry):
+    limits, nominal, robot_type = values[:24], values[29:53], values[55]
+    if any(map(isnan, limits)) or not all(abs(length) <= MAX_VALUE for length in nominal):
         return None
     least, greatest = limits[0:12:2], limits[1:12:2]
     speed, acceleration = limits[12::2], limits[13::2]
-    a, d, alpha, theta = (nominal_geometry[first : first + 6] for first in (0, 6, 12, 18))
+    a, d, alpha, theta = (nominal[first : first + 6] for first in (0, 6, 12, 18))
     return ArmSetup(
         robot_type, DenavitHartenberg(theta, a, d, alpha), JointLimits(least, greatest, speed, acceleration)
     )

@@ -143,7 +143,7 @@ def _list_parameters(links: Links) -> list[float]:
 def _kinematics(robot: Robot) -> bytes:
     """Return the arm's own links, including the calibration, and whether they are calibrated."""
     angles = [link.theta_rad for link in robot.links]
-    status = CALIBRATED if robot.links != links(nominal_geometry=robot.model.nominal_geometry) else NOT_CALIBRATED
+    status = CALIBRATED if robot.links != links(nominal=robot.model.nominal) else NOT_CALIBRATED
     return struct.pack(">6I24dI", *[1] * 6, *angles, *_list_parameters(robot.links), status)
 
 
@@ -153,8 +153,8 @@ def _configuration(robot: Robot) -> bytes:
     positions = [value for limit in model.limit_rad for value in (-limit, limit)]
     speeds = [value for speed in model.speed_rad_s for value in (speed, ACCELERATION_LIMIT_RAD_S2)]
     defaults = [1.05, 1.4, 0.25, 1.2, 0.5]  # joint speed and acceleration, tool speed and acceleration, radius
-    nominal_geometry = _list_parameters(links(nominal_geometry=model.nominal_geometry))
-    numbers = [*positions, *speeds, *defaults, *nominal_geometry, *[0.0] * 6]
+    nominal = _list_parameters(links(nominal=model.nominal))
+    numbers = [*positions, *speeds, *defaults, *nominal, *[0.0] * 6]
     return struct.pack(f">{len(numbers)}d4i", *numbers, 0, 0, model.robot_type, 0)
 
 

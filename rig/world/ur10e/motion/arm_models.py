@@ -13,7 +13,7 @@ from types import MappingProxyType
 
 from rig.config.ranges import ModelName
 from rig.config.world.laboratory import SimulatedArmSection
-from rig.world.ur10e.motion.links import UR10E, NominalGeometry, build_nominal_geometry
+from rig.world.ur10e.motion.links import UR10E, LinkSizes, build_link_sizes
 from rig.world.ur10e.motion.moments import Bodies
 from rig.world.ur10e.motion.trajectory import Joints
 
@@ -33,7 +33,7 @@ class ArmModel:
 
     robot_type: int
     name: str
-    nominal_geometry: NominalGeometry
+    nominal: LinkSizes
     limit_rad: Joints
     speed_rad_s: Joints
     payload_kg: float
@@ -44,22 +44,10 @@ class ArmModel:
 
 
 def _model(
-    robot_type: int,
-    name: str,
-    nominal_geometry: NominalGeometry,
-    bodies: Bodies,
-    *,
-    payload_kg: float,
-    speed_deg_s: Joints,
+    robot_type: int, name: str, nominal: LinkSizes, bodies: Bodies, *, payload_kg: float, speed_deg_s: Joints
 ) -> ArmModel:
     return ArmModel(
-        robot_type,
-        name,
-        nominal_geometry,
-        (2 * pi,) * 6,
-        tuple(radians(speed) for speed in speed_deg_s),
-        payload_kg,
-        bodies,
+        robot_type, name, nominal, (2 * pi,) * 6, tuple(radians(speed) for speed in speed_deg_s), payload_kg, bodies
     )
 
 
@@ -98,31 +86,29 @@ _UR10 = _build_bodies(
 )  # fmt: skip
 _BASE_SLOWER = (120.0, 120.0, 180.0, 180.0, 180.0, 180.0)
 _HEAVY = (120.0, 120.0, 150.0, 210.0, 210.0, 210.0)
-_NOMINAL_3E = build_nominal_geometry((-0.24355, -0.2132), (0.15185, 0.13105, 0.08535, 0.0921))
-_NOMINAL_5E = build_nominal_geometry((-0.425, -0.3922), (0.1625, 0.1333, 0.0997, 0.0996))
-_NOMINAL_16E = build_nominal_geometry((-0.4784, -0.36), (0.1807, 0.17415, 0.11985, 0.11655))
-_NOMINAL_20 = build_nominal_geometry((-0.862, -0.7287), (0.2363, 0.201, 0.1593, 0.1543))
-_NOMINAL_30 = build_nominal_geometry((-0.637, -0.5037), (0.2363, 0.201, 0.1593, 0.1543))
-_NOMINAL_10 = build_nominal_geometry((-0.612, -0.5723), (0.1273, 0.163941, 0.1157, 0.0922))
+_SIZES_3E = build_link_sizes((-0.24355, -0.2132), (0.15185, 0.13105, 0.08535, 0.0921))
+_SIZES_5E = build_link_sizes((-0.425, -0.3922), (0.1625, 0.1333, 0.0997, 0.0996))
+_SIZES_16E = build_link_sizes((-0.4784, -0.36), (0.1807, 0.17415, 0.11985, 0.11655))
+_SIZES_20 = build_link_sizes((-0.862, -0.7287), (0.2363, 0.201, 0.1593, 0.1543))
+_SIZES_30 = build_link_sizes((-0.637, -0.5037), (0.2363, 0.201, 0.1593, 0.1543))
+_SIZES_10 = build_link_sizes((-0.612, -0.5723), (0.1273, 0.163941, 0.1157, 0.0922))
 
 MODELS: Mapping[ModelName, ArmModel] = MappingProxyType(
     {
         "ur3e": replace(
-            _model(
-                3, "UR3", _NOMINAL_3E, _UR3E, payload_kg=3.0, speed_deg_s=(180.0, 180.0, 180.0, 360.0, 360.0, 360.0)
-            ),
+            _model(3, "UR3", _SIZES_3E, _UR3E, payload_kg=3.0, speed_deg_s=(180.0, 180.0, 180.0, 360.0, 360.0, 360.0)),
             limit_rad=(*(2 * pi,) * 5, inf),
             home_deg=(0.0, -90.0, 90.0, -90.0, -60.0, 0.0),
         ),
-        "ur5e": _model(1, "UR5", _NOMINAL_5E, _UR5E, payload_kg=5.0, speed_deg_s=(180.0,) * 6),
-        "ur7e": _model(1, "UR5", _NOMINAL_5E, _UR5E, payload_kg=7.5, speed_deg_s=(180.0,) * 6),
+        "ur5e": _model(1, "UR5", _SIZES_5E, _UR5E, payload_kg=5.0, speed_deg_s=(180.0,) * 6),
+        "ur7e": _model(1, "UR5", _SIZES_5E, _UR5E, payload_kg=7.5, speed_deg_s=(180.0,) * 6),
         "ur10e": _model(2, "UR10", UR10E, _UR10E, payload_kg=12.5, speed_deg_s=_BASE_SLOWER),
         "ur12e": _model(2, "UR10", UR10E, _UR10E, payload_kg=12.5, speed_deg_s=_BASE_SLOWER),
-        "ur16e": _model(4, "UR16", _NOMINAL_16E, _UR16E, payload_kg=16.0, speed_deg_s=_BASE_SLOWER),
-        "ur20": _model(7, "UR20", _NOMINAL_20, _UR20, payload_kg=20.0, speed_deg_s=_HEAVY),
-        "ur30": _model(8, "UR30", _NOMINAL_30, _UR30, payload_kg=30.0, speed_deg_s=_HEAVY),
+        "ur16e": _model(4, "UR16", _SIZES_16E, _UR16E, payload_kg=16.0, speed_deg_s=_BASE_SLOWER),
+        "ur20": _model(7, "UR20", _SIZES_20, _UR20, payload_kg=20.0, speed_deg_s=_HEAVY),
+        "ur30": _model(8, "UR30", _SIZES_30, _UR30, payload_kg=30.0, speed_deg_s=_HEAVY),
         "ur10_cb3": replace(
-            _model(2, "UR10", _NOMINAL_10, _UR10, payload_kg=10.0, speed_deg_s=_BASE_SLOWER),
+            _model(2, "UR10", _SIZES_10, _UR10, payload_kg=10.0, speed_deg_s=_BASE_SLOWER),
             polyscope=CB3,
             encoder_step_rad=2 * pi / 2**19,
         ),

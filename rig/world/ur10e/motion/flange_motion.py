@@ -74,7 +74,7 @@ def propagate(
 
 
 def transfer_force(rate: Components, change: Components, force: Components, lever_arm_m: Sequence[float]) -> Components:
-    """Return the specific force at another point of the same body, `lever_arm_m` away, all in the body's axes."""
+    """Return the force `lever_arm_m` away on the same body, in its axes; `change` is the angular acceleration."""
     x, y, z = rate
     u, v, w = change
     a, b, c = lever_arm_m

@@ -24,18 +24,16 @@ class ArmLink:
 
 Links = tuple[ArmLink, ...]
 
-NominalGeometry = tuple[
-    tuple[float, float, int], ...
-]  # for each link: length a, offset d (m), twist alpha in quarter turns
+LinkSizes = tuple[tuple[float, float, int], ...]  # for each link: length a, offset d (m), twist alpha in quarter turns
 
 
-def build_nominal_geometry(a_m: tuple[float, float], d_m: tuple[float, float, float, float]) -> NominalGeometry:
+def build_link_sizes(a_m: tuple[float, float], d_m: tuple[float, float, float, float]) -> LinkSizes:
     """Return the nominal parameters of a UR arm's links from a2 a3 and d1 d4 d5 d6; all UR arms share the twists."""
     (a2, a3), (d1, d4, d5, d6) = a_m, d_m
     return ((0.0, d1, 1), (a2, 0.0, 0), (a3, 0.0, 0), (0.0, d4, 1), (0.0, d5, -1), (0.0, d6, 0))
 
 
-UR10E = build_nominal_geometry((-0.6127, -0.57155), (0.1807, 0.17415, 0.11985, 0.11655))  # maker's article 45257
+UR10E = build_link_sizes((-0.6127, -0.57155), (0.1807, 0.17415, 0.11985, 0.11655))  # maker's article 45257
 
 
 def links(
@@ -43,12 +41,12 @@ def links(
     a_m: Sequence[float] = ZERO6,
     d_m: Sequence[float] = ZERO6,
     alpha_rad: Sequence[float] = ZERO6,
-    nominal_geometry: NominalGeometry = UR10E,
+    nominal: LinkSizes = UR10E,
 ) -> Links:
     """Return links with the given deviations of each joint from the nominal ones; without any, twists are exact."""
     return tuple(
         _link(theta, a + da, d + dd, quarters, twist)
-        for (a, d, quarters), theta, da, dd, twist in zip(nominal_geometry, theta_rad, a_m, d_m, alpha_rad, strict=True)
+        for (a, d, quarters), theta, da, dd, twist in zip(nominal, theta_rad, a_m, d_m, alpha_rad, strict=True)
     )
 
 

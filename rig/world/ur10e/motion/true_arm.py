@@ -10,7 +10,7 @@ from rig.world.ur10e.motion.flange_motion import BodyMotion, find_base_motion, f
 from rig.world.ur10e.motion.forward_kinematics import Rotation, Vector, flange_rate, frames
 from rig.world.ur10e.motion.joint_errors import Errors, JointErrors
 from rig.world.ur10e.motion.joint_motion import JointMotion
-from rig.world.ur10e.motion.links import UR10E, ZERO6, Links, NominalGeometry, links
+from rig.world.ur10e.motion.links import UR10E, ZERO6, Links, LinkSizes, links
 from rig.world.ur10e.motion.trajectory import Joints
 
 NO_MOTION: Vector = (0.0, 0.0, 0.0)
@@ -18,7 +18,7 @@ WRIST = 3  # the first joint that vibrates: those before it are mostly at rest
 
 
 def build_calibrated_links(
-    calibration: CalibrationSection, twist_rad: tuple[float, ...] = ZERO6, nominal_geometry: NominalGeometry = UR10E
+    calibration: CalibrationSection, twist_rad: tuple[float, ...] = ZERO6, nominal: LinkSizes = UR10E
 ) -> Links:
     """Return the links as the maker calibrated them; with `twist_rad`, unknown to the maker, the true links."""
     return links(
@@ -26,7 +26,7 @@ def build_calibrated_links(
         [1e-3 * length for length in calibration.delta_a_mm],
         [1e-3 * length for length in calibration.delta_d_mm],
         [alpha + twist for alpha, twist in zip(calibration.delta_alpha_rad, twist_rad, strict=True)],
-        nominal_geometry,
+        nominal,
     )
 
 
@@ -37,16 +37,11 @@ class TrueArm:
     """
 
     def __init__(
-        self,
-        arm: SimulatedArmSection,
-        site: SiteTruth,
-        motion: JointMotion,
-        random: Random,
-        nominal_geometry: NominalGeometry = UR10E,
+        self, arm: SimulatedArmSection, site: SiteTruth, motion: JointMotion, random: Random, nominal: LinkSizes = UR10E
     ) -> None:
         self._motion, self._site = motion, site
         self._speed = 1.0 + 1e-6 * arm.clock_ppm
-        self._links = build_calibrated_links(arm.calibration, arm.unmodelled.twist_rad, nominal_geometry)
+        self._links = build_calibrated_links(arm.calibration, arm.unmodelled.twist_rad, nominal)
         errors = _errors(arm)
         self._errors = JointErrors(errors, random) if errors.any else None
         self._at_rest: BodyMotion | None = None
@@ -54,7 +49,7 @@ class TrueArm:
         self._forearm: tuple[tuple[Joints, ...], BodyMotion] = ((), find_base_motion(site))
         self.ideal = (
             self._speed == 1.0
-            and self._links == links(nominal_geometry=nominal_geometry)
+            and self._links == links(nominal=nominal)
             and self._errors is None
             and motion.vibration is None
             and not any(site.earth_rate_rad_s)
