@@ -85,7 +85,7 @@ def reversal_dof(reversal: "MagnetometerReversal") -> tuple[Array, Array]:
 
 
 def _axis_dof(result: "AccelerometerResult | MagnetometerResult", response: Array, noise: Array) -> Array:
-    """Return the degrees of freedom of the angles between the axes, from the `response` (p, n) of all parameters."""
+    """Return the dof of the angles between axes, from the `response` (p, n) of all parameters to `noise` (n, n)."""
     from rig.estimation.reference.reference_model import F
 
     derivative = _angle_derivatives(result.solution.matrix)[:3].reshape(3, 9) @ response[F]
@@ -101,9 +101,9 @@ def _attitude_dof(budget: Budget, response: Array, noise: Array, std: Array) -> 
 
 
 def _reading_parts(noise: Array, walk: Array, explained: Explained) -> dict[str, Array]:
-    """Return the parts of a gyroscope's variances that are estimated from readings, by their contributor.
+    """Return the parts of a gyroscope's variances due to readings, by contributor: `noise` and the bias's `walk`.
 
-    If the readings show no bias drift, its part is omitted: the data sheet's flicker has infinite dof.
+    Without drift in the readings `walk` is omitted: the data sheet's flicker has infinite dof.
     """
     return {NOISE: noise, **({BIAS_DRIFT: walk} if explained.bias.is_drifting else {})}
 

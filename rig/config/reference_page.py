@@ -120,7 +120,7 @@ that is there twice are refused.
 
 
 def reference() -> str:
-    """Return the page as Markdown."""
+    """Return the page of all configuration keys as Markdown."""
     return "\n".join([INTRODUCTION, *_keys(), *_parts(), *_world()]) + "\n"
 
 

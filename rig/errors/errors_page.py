@@ -6,7 +6,7 @@ STATUS = {"refused": "2", "fault": "3", "either": "2 or 3", "unprinted": "5"}
 
 
 def page() -> str:
-    """Return the table as Markdown."""
+    """Return the page of all errors as Markdown."""
     entries = catalogue()
     lines = [
         "# Errors",

@@ -71,7 +71,7 @@ def _list_voided(connection: Connection, run_id: int) -> list[str]:
 
 
 def _runs_of(connection: Connection, content: bytes) -> list[int]:
-    """Return the numbers of the runs entered with the same values of result.json, in the same order."""
+    """Return the numbers of the runs whose entered result.json equals `content`, apart from white space."""
     runs = schema.run.c
     try:
         text = content.decode()

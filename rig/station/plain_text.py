@@ -60,7 +60,7 @@ def _columns(file: TextIO) -> int:
 
 
 def plain(text: str, style: str = "") -> "Text":
-    """Return printable text for rich, which would otherwise interpret `[red]` and `:smileys:` in a string."""
+    """Return printable text for the library rich, which would interpret `[red]` and `:smileys:` in a string."""
     from rich.text import Text
 
     return Text(printable(text), style)

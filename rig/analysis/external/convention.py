@@ -67,7 +67,7 @@ def find_convention(samples: Samples, attitudes: Columns, *, is_order_named: boo
 
 
 def _fit(samples: Samples, time_s: Array, quaternions: Array, *, scalar_last: bool, inverse: bool) -> Convention:
-    """Return the convention with the lag at which its rates explain the readings best, and how well they do."""
+    """Return the convention with the lag at which rates of `quaternions` (N, 4) at times (N,) fit the readings best."""
     from scipy.spatial.transform import Rotation
 
     rotations = Rotation.from_quat(quaternions if scalar_last else np.roll(quaternions, -1, axis=1))

@@ -193,7 +193,7 @@ def sum_squares(rows: Sequence[Factor], covariance: Array) -> tuple[float, float
 
 
 def _stds_of_rows(rows: Sequence[Factor], step: Array, covariance: Array, now: HandStds) -> HandStds:
-    """Return the standard deviations at which the squared residuals after the step equal their expectation."""
+    """Return the stds at which squared residuals after `step` (p,) with `covariance` (p, p) equal their expectation."""
     stds: dict[str, float] = {}
     for name, (kind, cause) in CAUSE_OF_STD.items():
         stated = getattr(STATED, name)

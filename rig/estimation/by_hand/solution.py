@@ -263,7 +263,7 @@ def _find_first_face(session: HandRecording, conditions: SessionConditions, but:
 
 
 def _budget(fit: GraphFit, to_parameters: Array, clock: Array) -> Budget:
-    """Return the budget: each cause of the factors' errors, propagated by the gain of the least-squares solution."""
+    """Return the budget; `to_parameters` (6, 12): from F and b to scale and bias; `clock` (6, 6): the clock's part."""
     chosen = parameter_columns(fit)
     covariances = {name: np.zeros((6, 6)) for name in CONTRIBUTORS}
     line_of = {cause: name for name, (_, causes, _) in CONTRIBUTORS.items() for cause in causes}

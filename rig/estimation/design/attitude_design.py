@@ -63,7 +63,7 @@ class ExpectedStds:
 
 
 def assess_identifiability(attitudes: Array, up: Array, order: Order = 1) -> Identifiability:
-    """Return rank and condition of the attitudes, and the parameters that they leave undetermined."""
+    """Return rank, condition and undetermined parameters of attitudes (N, 3, 3) with the vertical `up` (3,)."""
     rows = _equations(attitudes, up, order)
     needed = PARAMETER_COUNT[order]
     conditioned = condition_of(rows, needed)

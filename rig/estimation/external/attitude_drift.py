@@ -286,7 +286,7 @@ def matern(distances: Array, reach: float) -> Array:
 def correlate_effects(effects: Array, correlation: Array) -> Array:
     """Return the covariance (3n, 3n) of n increments, from the effects (n, 3, p) of p unit causes on them.
 
-    `correlation` (n, n): of each cause between the increments; the causes are independent.
+    `correlation` (n, n): the correlation of one cause's size in two increments; the causes are independent.
     """
     flat = effects.reshape(-1, effects.shape[-1])
     return np.asarray((flat @ flat.T) * np.kron(correlation, np.ones((3, 3))), dtype=np.float64)

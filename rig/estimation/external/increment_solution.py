@@ -246,7 +246,7 @@ def _check(fixes: Fixes, remaining: Fixes, settled: _ConvergedFit) -> None:
 
 
 def _check_identified(matrix: Array, covariance: Array) -> None:
-    """Raise Fault `ill_conditioned` if the body hardly turned about an axis. The message names this axis."""
+    """Raise Fault `ill_conditioned`, naming an axis about which, by θ's `covariance`, the body hardly turned."""
     std = np.sqrt(np.diag(covariance)[MATRIX]).reshape(3, 3).max(axis=0)
     unknown = std > MAX_IDENTIFIABLE_STD
     if not unknown.any():

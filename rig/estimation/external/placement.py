@@ -175,7 +175,7 @@ def _find_log_prior(grid: Array, size: float) -> Array:
 
 
 def _add_unplaced(theta: Array, placed: AttitudeReadings, unplaced: Array, variances: Array) -> AttitudeReadings:
-    """Return all rests; a rest without an attitude gets the attitude that fits its reading best."""
+    """Return all rests; those without an attitude, `unplaced` (k, 3), get the attitude that fits best with `theta`."""
     if not len(unplaced) or not placed.norm_known:
         return placed
     forces = (unplaced - theta[BIAS]) @ np.linalg.inv(theta[F].reshape(3, 3)).T

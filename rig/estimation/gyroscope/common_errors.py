@@ -102,7 +102,7 @@ def solve_with_common_errors(
 
 
 def _gain(design: Array, effects: Array, noise: Array) -> tuple[Array, Array]:
-    """Return the gain (P, N, 3) from readings to the estimated errors, and their posterior covariance (P, P)."""
+    """Return the gain (P, N, 3) from readings with `noise` (3, N, N) to the errors, and their covariance (P, P)."""
     weights = np.linalg.inv(noise)
     weighted = weights @ design
     # The weights after removing what F, c and G explain (Frisch and Waugh, Econometrica 1 (1933) 387; Lovell 1963).

@@ -246,7 +246,7 @@ def _check_identifiable(inputs: VectorInputs, directions: Array, gravity: Array 
 
 
 def _condition(inputs: VectorInputs, directions: Array, gravity: Array | None) -> tuple[refusals.Conditioning, int]:
-    """Return the conditioning of the design (3 N, 3 p + d), blocks scaled to one size, and its number of columns."""
+    """Return the conditioning of the design (3 N, 3 p + d), in blocks of unit RMS, and its number of columns."""
     sweeps = inputs.turns_rad_s / (np.linalg.norm(inputs.turns_rad_s) / len(inputs.turns_rad_s) ** 0.5 or 1.0)
     scaled_gravity = None if gravity is None else gravity / (np.linalg.norm(gravity) / len(gravity) ** 0.5)
     sensor_columns = np.kron(design_matrix(sweeps, scaled_gravity), np.eye(3))
@@ -259,7 +259,7 @@ def _condition(inputs: VectorInputs, directions: Array, gravity: Array | None) -
 def check_earth_rate(
     free_rad_s: Array, covariance_rad2_s2: Array, expected_rad_s: float = EARTH_RATE_RAD_S, component: str = "it"
 ) -> None:
-    """Check that an estimate (3,) of the Earth's rate, or of one component, is significant and of the expected size.
+    """Check that the estimate `free_rad_s` (d,) of the Earth's rate is significant and has the expected size.
 
     Raise Fault `earth_rate_not_observable`.
     """

@@ -202,7 +202,7 @@ def _equate_mean(mean: RateMean, gyroscope: Gyroscope, state: _TurnsEstimate) ->
 def _equate_rotation(
     turn: Turn, rotation: Array, jacobian: Array, gyroscope: Gyroscope, state: _TurnsEstimate
 ) -> _ObservationEquations:
-    """Return three equations of the end attitude, and two of the mean reading at right angles to the axis."""
+    """Return a turn's equations: three of its integrated `rotation` (3, 3), two of the mean reading across the axis."""
     from scipy.spatial.transform import Rotation
 
     time_s = gyroscope.time_s

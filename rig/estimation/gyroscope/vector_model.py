@@ -201,7 +201,7 @@ def _check_identifiable(scaled: Array) -> Conditioning:
 
 
 def design_matrix(rates: Array, gravity: Array | None) -> Array:
-    """Return Z (…, N, 4 or 7) = [ω 1 (a)]."""
+    """Return the design Z (…, N, 4 or 7) = [ω 1 (a)] from rates ω and gravity a (…, N, 3), or None."""
     blocks = [rates, np.ones((*rates.shape[:-1], 1))]
     if gravity is not None:
         require_shape("gravity", gravity, rates.shape)
@@ -231,7 +231,7 @@ def regress(design: Array, means: Array, variances: Array, shared: Array | None 
 
 
 def propagate_speed_std(rates: Array, speed_std: Array, matrix: Array) -> Array:
-    """Return the effect (N, 3) of one standard deviation of the speed on the readings, F û σ."""
+    """Return the effect (N, 3) of one std σ (N,) of the speed on the readings, F û σ, û being the rates' directions."""
     speed = np.linalg.norm(rates, axis=1)
     axes = np.divide(rates, speed[:, None], out=np.zeros_like(rates), where=speed[:, None] > 0)
     noise: Array = speed_std[:, None] * (axes @ matrix.T)
@@ -262,7 +262,7 @@ def index_coefficients(columns: int) -> tuple[NDArray[np.intp], NDArray[np.intp]
 
 
 def _all_variances(variances: Array, speed_noise: Array, shared: Array | None) -> Array:
-    """Return the variances (N, 3) of the mean readings from all causes."""
+    """Return the variances (N, 3) of the means from noise, `speed_noise` (N, 3) and `shared` covariance (N, N)."""
     common = 0.0 if shared is None else np.diag(shared)[:, None]
     total: Array = variances + speed_noise**2 + common
     return total

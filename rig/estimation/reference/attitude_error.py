@@ -198,7 +198,7 @@ def maximise_likelihood(
 
 
 def _find_uncertainty(delta: float, fit: Array, rotations: Array) -> float:
-    """Return the uncertainty from the expected information on δ²: tr((P G)²)/2, G = E Eᵀ, P the residual maker."""
+    """Return δ's std from the expected information on δ²: tr((P G)²)/2, G = E Eᵀ, P the residual maker of `fit`."""
     orthogonal = np.linalg.qr(fit)[0].reshape(*rotations.shape[:2], -1)
     growth = rotations @ np.swapaxes(rotations, -1, -2)
     grown = growth @ orthogonal

@@ -49,14 +49,14 @@ def column_sizes(readings: Array, squares: Array | None) -> Array:
 
 
 def least_squares(x: Array, sizes: Array, v_bar: Array) -> Array:
-    """Return β (…, p) of Eq. (6) for v̄ (N, 3)."""
+    """Return β (…, p) of Eq. (6) for X (…, 3 N, p), column `sizes` (…, p) and v̄ (N, 3)."""
     scaled = x / sizes[..., None, :]
     beta: Array = (np.linalg.pinv(scaled) @ v_bar.reshape(-1)) / sizes
     return beta
 
 
 def null_vector(x: Array, sizes: Array, norm: float, side: Array) -> Array:
-    """Return β (…, p) of Eq. (5), scaled to ‖v_ref‖ = `norm`, with v_ref in the half-space of `side` (3,)."""
+    """Return β (…, p) of Eq. (5) for X (…, 3 N, p), with ‖v_ref‖ = `norm`, in the half-space of `side` (3,)."""
     _, _, directions = np.linalg.svd(x / sizes[..., None, :], full_matrices=False)
     beta = directions[..., -1, :] / sizes
     reference = beta[..., REFERENCE]

@@ -296,7 +296,7 @@ def _temper(weights: Array, fewest: float) -> Array:
 
 
 def find_half_width(offsets: Array, variances: Array, weights: Array) -> Array:
-    """Return h (q,): a mixture of normals (s, q) with `weights` (s,) is within ± h with 95.45 % probability."""
+    """Return h (q,): normals of mean `offsets` and variance (s, q), mixed by weights (s,), are 95.45 % within ± h."""
     from scipy.special import ndtr
 
     std = np.sqrt(variances)

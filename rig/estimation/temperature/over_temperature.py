@@ -424,8 +424,8 @@ class _ParameterFits:
 def _coefficients_from_changes(centre: Array, which: int) -> Array:
     """Return the matrix (12, 18) from the orders 1 to 3 of k and c to all four orders of k (`which` 0) or c (1).
 
-    The mean over the readings is fixed. So if an order is overestimated, the value at the reference is too small by its
-    mean power (`centre`): hence the minus.
+    The mean over the readings is fixed. So an overestimated order makes the value at the reference too small, by its
+    mean power: minus `centre` (2, 3, 3).
     """
     matrix = np.zeros((3 * (MAX_ORDER + 1), 6 * MAX_ORDER))
     first = 3 * MAX_ORDER * which

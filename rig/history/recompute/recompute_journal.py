@@ -1,6 +1,6 @@
 """The journal of a recomputation: a line for each solved recording, so that no recording is solved twice.
 
-The first line is the question; answers to other questions are not mixed in.
+The first line states program, settings and estimator; answers by others are not mixed in.
 """
 
 import json

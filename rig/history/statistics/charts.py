@@ -78,7 +78,7 @@ def step(average: Array, deviation: Array, before: int) -> tuple[Array, float]:
 
 
 def raise_alarms(deviation: Array, average: Array, limit: float | Array) -> Alarms:
-    """Return whether one of the two charts raises an alarm."""
+    """Return whether the deviation exceeds Shewhart's limit or the EWMA `average` its `limit` (…)."""
     return (np.abs(deviation) > SHEWHART_LIMIT) | (np.abs(average) > limit)
 
 

@@ -88,7 +88,7 @@ def _average_unknocked(blocks: Array, noise: Array) -> tuple[Array, Array]:
 
 
 def _find_steady_blocks(still: NDArray[np.bool_], pairs: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return a mask of the blocks (count,) that agree with a neighbouring block; all still blocks if none agrees."""
+    """Return a mask of the blocks (count,) that agree with a neighbour (`pairs`); all still blocks if none agrees."""
     steady = np.append(pairs, False) | np.append(False, pairs)
     return steady if steady.any() else still
 
@@ -105,7 +105,7 @@ def _mask_blocks(times: Array, windows: Sequence[Window]) -> NDArray[np.bool_]:
 def _find_unturned(
     means: Array, steady: NDArray[np.bool_], tolerance: Array, lying: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """Return a mask (count,) of blocks at rest: those with the most frequent reading, within declared rests if any."""
+    """Return a mask (count,) of blocks with the most frequent reading; `lying` marks blocks in declared rests."""
     declared = steady & lying
     pool = means[declared if declared.any() else steady]
     candidates = pool[:: -(-len(pool) // CANDIDATES)]

@@ -105,7 +105,7 @@ def check_readings(board_time_s: Array, readings: Array) -> None:
 
 
 def _find_first_clock(board_time_s: Array, readings: Array, motion: KnownMotion) -> tuple[TimeBase, int]:
-    """Return the coarse clock of the first samples that suffice to find one, and their number.
+    """Return the coarse clock by as few first samples as suffice to find one, and the number of these.
 
     A recording of ordinary length needs all samples. In a recording of hours a part suffices; the fine clock is then
     extended to twice its length, repeatedly.

@@ -76,7 +76,7 @@ class Rows:
 
 @dataclass(frozen=True, slots=True)
 class PlacedReadings:
-    """The contents of the two files, for the `quantities` that were recorded.
+    """The averages of a file of samples in a file's attitudes, for the `quantities` that were recorded.
 
     - `rows`: a gyroscope's averages; `turning`: its readings and all rows, for a solution by rotation angles.
     - `placements`: the placements of the other sensors, or the fault.

@@ -63,7 +63,7 @@ SWEEPS_MB = 1  # some ten thousand sweeps
 
 @dataclass(frozen=True, slots=True)
 class ExternalData:
-    """The contents of the two files: averaged sweeps and rests, in the order of the rows, and turns by angle.
+    """Averages of a file of samples in a file's sweeps and rests, in the order of the rows, and turns by angle.
 
     - `at_reference`: whether means are corrected to one temperature, by polynomials whose uncertainty includes the
       contradictions of repeats.

@@ -194,7 +194,7 @@ def _find_rest(time_s: Array, window: Window, rests: Sequence[_PlacedRest]) -> t
 
 
 def _mask_inner(rest: NDArray[np.intp], windows_s: Array, starts_s: Array, ends_s: Array) -> NDArray[np.bool_]:
-    """Return a mask (N,) of the rows at rest, without those near either end of their rest.
+    """Return a mask of rows (N,) at `rest` (number, or −1), without those near the start or end of their rest.
 
     A reference that lags still shows motion there. A rest keeps all its rows if all are near an end.
     """
@@ -207,7 +207,7 @@ def _mask_inner(rest: NDArray[np.intp], windows_s: Array, starts_s: Array, ends_
 
 
 def _group_by_placement(rest: NDArray[np.intp], attitudes: Array) -> list[NDArray[np.intp]]:
-    """Return the rows of each placement."""
+    """Return the rows of each placement: those of one `rest` (N,) with nearly equal attitudes."""
     groups: list[list[int]] = []
     last: dict[int, list[int]] = {}
     for row in np.flatnonzero(rest >= 0).tolist():

@@ -97,7 +97,7 @@ def _select_evenly(indices: NDArray[np.intp]) -> NDArray[np.intp]:
 
 
 def _fit(design: Array, turned: Array) -> tuple[float, Array]:
-    """Return the fraction of rotations (k, 3) that a fit does not explain, and the fit (4, 3): Fᵀ and b."""
+    """Fit Fᵀ and b (4, 3) to `turned` (k, 3) by the `design` (k, 4); return the unexplained fraction, and the fit."""
     aligned = np.concatenate([np.eye(3), np.zeros((1, 3))])
     weight = np.ones(len(design))
     solution = aligned

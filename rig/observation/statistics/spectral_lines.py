@@ -176,7 +176,7 @@ def _find_strongest(residuals: Array, previous: Array, fraction: Array, search: 
 
 
 def _choose_middle(peak: float, residuals: Array, previous: Array, fraction: Array, search: LineSearch) -> float:
-    """Return the frequency that explains most: the peak is the line's centre or a sideband.
+    """Return the line's frequency, in cycles, that explains most if the `peak` is its centre or a sideband.
 
     A sensor may sense a vibration of the room only across its axis, in the sidebands and not in the line itself.
     """

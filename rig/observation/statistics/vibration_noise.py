@@ -33,7 +33,7 @@ def average_rest(readings: Array, time_s: Array, window: Window, steps: Steps) -
 
 
 def average_standstill(readings: Array, time_s: Array, window: Window, steps: Steps) -> tuple[Mean, Window]:
-    """Return the mean of readings (n, 3) of an arm at rest, and the window that it represents."""
+    """Return the mean of readings (n, 3) at times (n,) of an arm at rest, and the window that it represents."""
     mean, averaged_window = mean_at_rest(readings, time_s, window, steps)
     if len(readings) >= MIN_READINGS and averaged_window != window:
         mean = average_rest(readings, time_s, window, steps)

@@ -110,7 +110,7 @@ def print_checks(result: ResultDocument, console: Console, sensor: str | None = 
 
 
 def print_verdict(result: ResultDocument, console: Console) -> None:
-    """Print the verdict, the last line."""
+    """Print the verdict as the last line of a result."""
     console.print(f"verdict: {result.verdict.upper()}", style="bold green" if result.verdict == "pass" else "bold red")
 
 

@@ -4,7 +4,7 @@ from rig.report.words.check_words import check_words
 
 
 def page_text() -> str:
-    """Return the table as Markdown."""
+    """Return the page of all checks as Markdown."""
     lines = [
         "# Checks of the verdict",
         "",

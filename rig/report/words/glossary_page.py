@@ -12,7 +12,7 @@ SECTIONS = {
 
 
 def page_text() -> str:
-    """Return the table as Markdown, in three sections."""
+    """Return the glossary as Markdown, in three sections."""
     lines = [
         "# Glossary",
         "",

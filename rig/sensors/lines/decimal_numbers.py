@@ -48,7 +48,7 @@ def parse_numbers(text: NDArray[np.uint8], starts: NDArray[np.intp], ends: NDArr
 def _sum_digits(
     text: NDArray[np.uint8], starts: NDArray[np.intp], ends: NDArray[np.intp]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the digits of each number as an integer, without the decimal point, and their count."""
+    """Return the digits of each number from `starts` to `ends` as an integer without the point, and their count."""
     lengths = ends - starts
     longest = min(int(lengths.max()), MAX_DIGITS + 2)
     values = text - np.uint8(_ZERO)  # other characters wrap around to more than nine

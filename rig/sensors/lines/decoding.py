@@ -207,7 +207,7 @@ class LineReader:
 def _have_valid_bytes(
     classes: NDArray[np.uint8], line_starts: NDArray[np.intp], line_ends: NDArray[np.intp]
 ) -> NDArray[np.bool_]:
-    """Return a mask of lines with only bytes that a sample may contain. Bytes between lines belong to no line."""
+    """Return a mask of lines whose bytes all have `classes` of a sample. Bytes between lines belong to no line."""
     good = np.ones(len(line_starts), np.bool_)
     others = np.flatnonzero(classes == _OTHER)
     if len(others):

@@ -71,7 +71,7 @@ def hold(lasting_s: float, habits: Habits, rng: np.random.Generator) -> tuple[Ar
 
 
 def build_course(start: Array, time_s: Array, rates: Array, habits: Habits, knock_m_s2: float = 0.0) -> HandCourse:
-    """Return the course that begins at attitude `start` (3, 3), with a knock at its end."""
+    """Return the course of body rates (n, 3) that begins at attitude `start` (3, 3), with a knock at its end."""
     attitudes = start @ integrate_rates(time_s, rates)
     lever_arm = np.asarray(habits.lever_arm_m)
     forces = np.swapaxes(attitudes, -1, -2) @ np.array([0.0, 0.0, habits.gravity_m_s2])

@@ -201,7 +201,7 @@ class Robot:
             self.stop_program("")
 
     def _settle(self) -> None:
-        """Complete the states that last until the joints have followed their targets."""
+        """Complete pausing and stopping once the joints are at rest; complete resuming at once."""
         if self.runtime_state == RuntimeState.PAUSING and (self.motion.standing or self.motion.fraction == 0.0):
             self.runtime_state = RuntimeState.PAUSED
         elif self.runtime_state == RuntimeState.RESUMING:

@@ -66,7 +66,7 @@ def flange_pose(q_rad: Sequence[float], links: Links = NOMINAL) -> tuple[float, 
 
 
 def rotate_pose(pose: Sequence[float], turn: Rotation) -> tuple[float, ...]:
-    """Return the pose of a frame with the same origin whose axes are those at `pose` rotated by `turn`."""
+    """Return `pose` with its axes rotated by the rotation vector `turn`, rad, about the same origin."""
     return (*pose[:3], *rotation_vector(_product(rotation_from_vector(pose[3:]), turn)))
 
 
