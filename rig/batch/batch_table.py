@@ -51,7 +51,7 @@ def summary(batch: Batch) -> str:
 
 
 def csv_of(batch: Batch) -> str:
-    """Return the table as CSV; a text that a spreadsheet would read as a formula gets an apostrophe."""
+    """Return a batch's table as CSV; a text that a spreadsheet would read as a formula gets an apostrophe."""
     file = StringIO(newline="")
     writer = csv.writer(file, lineterminator="\n")
     writer.writerow(COLUMNS)
@@ -61,7 +61,7 @@ def csv_of(batch: Batch) -> str:
 
 
 def page_of(batch: Batch, *, simulated: bool) -> str:
-    """Return the table as a self-contained page."""
+    """Return a batch's table as a self-contained page."""
     from jinja2 import Environment, StrictUndefined
 
     template = Environment(autoescape=True, undefined=StrictUndefined).from_string(_PAGE)

@@ -79,11 +79,11 @@ class Present:
     listeners: Sequence[Callable[[Now], None]] = field(default=())
 
     def event(self, event: RunEvent) -> None:
-        """Update the state after an event of a run."""
+        """Update the station's state after an event of a run."""
         self._becomes(after(self.now, event))
 
     def batch(self, batch: Batch) -> None:
-        """Update the state after a change of the batch."""
+        """Update the station's state after a change of its batch."""
         self._becomes(update_by_batch(self.now, batch))
 
     @contextmanager
@@ -101,7 +101,7 @@ class Present:
 
 
 def update_by_batch(now: Now, batch: Batch) -> Now:
-    """Return the state after a change of the batch."""
+    """Return a station's state after a change of its batch."""
     in_hand = batch.in_hand
     newest = batch.parts[-1] if batch.parts and not in_hand else None
     counts: dict[str, int] = {}
@@ -132,7 +132,7 @@ def last(now: Now) -> Now:
 
 
 def after(now: Now, event: RunEvent) -> Now:
-    """Return the state after an event of a run."""
+    """Return a station's state after an event of a run."""
     changed: dict[str, Any] | None = None
     match event:
         case ArmConnected(report):

@@ -75,7 +75,7 @@ class ColumnSection(Section):
 
 
 class AxisSection(Section):
-    """One axis of the table, with the log's columns of its angle and rate."""
+    """One axis of a rate table, with the log's columns of its angle and rate."""
 
     direction: AxisDirection = Field(
         alias="along",

@@ -44,7 +44,7 @@ def find_file_entries(history: History, name: str, content: bytes, anchor: tuple
 
 
 def _entries(connection: Connection, content: bytes) -> Iterator[tuple[Table, tuple[int | str, ...], str]]:
-    """Yield the rows of a file: table, key, and a description."""
+    """Yield the history's rows about a file: table, key, and a description."""
     sha256 = hashlib.sha256(content).hexdigest()
     files, issued, runs = schema.certificate_file, schema.certificate, schema.run
     query = select(files.c.name, issued).select_from(files.join(issued)).where(files.c.sha256 == sha256)

@@ -64,7 +64,7 @@ class StationState:
 
 
 def make_table(engine: Engine) -> None:
-    """Make the table if it does not exist. Raise SQLAlchemyError if the role may not make one."""
+    """Make the table of stations if it does not exist. Raise SQLAlchemyError if the role may not make one."""
     if inspect(engine).has_table(station.name):
         return
     try:

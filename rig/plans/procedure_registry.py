@@ -52,7 +52,7 @@ Analysis = Callable[[Sequence[RunData], Outcome | None, str], Outcome]
 
 
 def calibration(runs: Sequence[RunData], before: Outcome | None, estimator: str) -> Outcome:
-    """Return the usual analysis: scale and bias of every sensor from averaged revolutions, compared with the limits."""
+    """Return the usual outcome: scale and bias of every sensor from averaged revolutions, compared with the limits."""
     return calibrate(runs, estimator)
 
 

@@ -50,7 +50,7 @@ class Verbs(Protocol):
         ...
 
     def turn_by_hand(self) -> None:
-        """Let the operator lay the item on its faces and turn it, until the list is done or U is small enough."""
+        """Let the operator lay the item on its faces and turn it, until all moves are made or U is small enough."""
         ...
 
     def solve_on_board(self) -> None:

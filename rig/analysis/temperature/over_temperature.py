@@ -207,7 +207,7 @@ def _correct_turn(turn: Observation, mean_rad_s: Array, reference_c: float) -> O
 
 
 def _correct_wave(turn: Observation, polynomials: OverTemperature) -> Observation:
-    """Return a revolution with mean and first harmonic of its accelerometer at the reference temperature."""
+    """Correct the first harmonic of a revolution's accelerations, mean included, to the reference temperature."""
     if turn.acceleration is None:
         return turn
     wave = turn.acceleration.harmonic

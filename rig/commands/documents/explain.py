@@ -28,7 +28,7 @@ def add(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Print the meaning of the name and return 0. Raise Refused `nothing_known`."""
+    """Print the meaning of the option `name` and return 0. Raise Refused `nothing_known`."""
     name = " ".join(options.name).strip()
     lines = [*_explain_check(name), *_explain_limit(name), *_explain_error(name), *_explain_word(name)]
     if not lines:

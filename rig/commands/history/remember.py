@@ -32,14 +32,14 @@ class CalibrationComparison:
 
 
 def remember(folder: Path, section: "HistorySection") -> tuple[RunEvent | None, tuple[CalibrationComparison, ...]]:
-    """Enter the run in `folder`. Return the event to report, and the comparisons with earlier calibrations."""
+    """Enter the run of `folder` into the history. Return the event to report, and comparisons with the last results."""
     from rig.history.storage.address import choose_history_address
 
     return _enter_run(folder, lambda: choose_history_address(section))
 
 
 def remember_own(folder: Path, named: str | None) -> tuple[RunEvent | None, tuple[CalibrationComparison, ...]]:
-    """Enter the run in `folder` in the user's own history, or the `named` one. Return what `remember` returns."""
+    """Enter the run of `folder` into the user's own history, or the `named` one. Return as `remember` does."""
     from rig.history.storage.address import default_history_address
 
     return _enter_run(folder, lambda: default_history_address(named))
@@ -77,7 +77,7 @@ def _is_usual(address: "HistoryAddress") -> bool:
 def remember_certificate(
     folder: Path, result: str, certificate: "IssuedCertificate", history: str | None = None
 ) -> str | None:
-    """Enter the certificate of the run in `folder` with result.json `result`; return why it is not entered, or None.
+    """Enter the certificate of the run of `folder`, with result.json `result`; return why this failed, or None.
 
     The history is `history`, or if None the user's own, never one that the folder's configuration names, because the
     folder may come from anywhere.

@@ -198,10 +198,10 @@ class SixObservationSection(SixSweepsSection):
         return self.stages
 
     def problems(self, config: RigConfig) -> Iterator[str]:
-        """Yield the problems of sweeps, and what stages exclude: a target, a verification, magnetometers (as do arcs).
+        """Yield the problems of sweeps, and what stages exclude: a target, a verification and magnetometers.
 
-        With stages or arcs a magnetometer is recorded, but cannot be calibrated. Without this check only the end of the
-        run would show it.
+        With stages or arcs a magnetometer could be recorded, but not calibrated, which only the end of the run would
+        show.
         """
         yield from SixSweepsSection.problems(self, config)
         if self.stages and (self.target_scale_u or self.target_bias_u_rad_s):

@@ -38,7 +38,7 @@ Method = Literal["attitude_weighted", "maximum_likelihood", "as_published"]
 
 
 class Entry(BaseModel):
-    """A part of the document."""
+    """A part of `result.json`, or of another document."""
 
     # Keys that a later version adds are ignored on reading.
     model_config = ConfigDict(frozen=True, allow_inf_nan=False, defer_build=True)

@@ -110,9 +110,9 @@ class DriftState:
 
 @dataclass(frozen=True, slots=True)
 class FixedAttitudes:
-    """The integrated attitudes at N fixes, in the symbols of this module.
+    """The integrated attitudes at N fixes: E (N, 3, 3), with `sensitivities` S (N, 3, 12) and `turning` C ω (N, 3).
 
-    E (N, 3, 3), S (N, 3, 12), C ω (N, 3), middle times (N,), windows (N, 2). Of all samples: E (k, 3, 3), C ω (k, 3).
+    `middles_s` (N,) and `windows_s` (N, 2) are the fixes' times. Of all samples: E (k, 3, 3), and `rates` C ω (k, 3).
     """
 
     attitudes: Array

@@ -37,7 +37,8 @@ class IntegratedAttitudes:
     """A gyroscope's integrated attitudes at k instants, in increasing order.
 
     - `attitudes` (k, 3, 3): C, from body coordinates to those of the first reading.
-    - `sensitivities` (k, 3, 12): S, rotation of C with F (row by row) and b, in coordinates of the first reading.
+    - `sensitivities` (k, 3, 12): S, derivative of C's rotation by F (row by row) and b, in coordinates of the first
+      reading.
     - `rates_rad_s` (k, 3) in body coordinates.
     """
 

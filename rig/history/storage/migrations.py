@@ -20,7 +20,7 @@ MIGRATIONS: Mapping[int, Callable[[Connection], None]] = {}  # version 1 is the 
 
 
 def version_of(connection: Connection, label: str) -> int:
-    """Return the tables' version, 0 if none. Raise Refused `not_a_history`, `history_too_old`, `history_too_new`."""
+    """Return a history's version, 0 if empty. Raise Refused `not_a_history`, `history_too_old`, `history_too_new`."""
     tables = inspect(connection).get_table_names()
     if not tables:
         return 0
@@ -44,7 +44,7 @@ def version_of(connection: Connection, label: str) -> int:
 
 
 def bring_up_to_date(connection: Connection, label: str) -> None:
-    """Make or migrate the tables in the connection's transaction. Raise Refused as `version_of` does."""
+    """Make or migrate a history's tables in the connection's transaction. Raise Refused as `version_of` does."""
     journal.alone(connection)
     version = version_of(connection, label)
     if version == 0:

@@ -75,7 +75,7 @@ class _Match:
 def _coarse_offset(time_s: Array, readings: Array, arm_rate: Callable[[float], tuple[float, Array]]) -> _Match:
     """Return the best offset from `time_s` (n,) to the controller's clock, to within a step.
 
-    Every pair of axes is cross-correlated (magnitudes could hide a rotation in a bias); the vector fit judges the
+    Every pair of axes is cross-correlated, because the readings' norm would contain the bias; the vector fit judges the
     peaks. A step contains at least one sample.
     """
     step_s = max(COARSE_STEP_S, 1.1 * float(np.median(np.diff(time_s))))

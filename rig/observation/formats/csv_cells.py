@@ -72,7 +72,7 @@ def since(cell: str, factor: float, origin_s: int) -> float:
 
 
 def unit_of(cell: str) -> Unit | None:
-    """Return the unit that a cell names, with or without brackets; None for a unit that the table does not have."""
+    """Return the unit that a cell names, with or without brackets; None for a unit that is not in `UNITS`."""
     name = cell.strip().strip("[](){} ")
     if name in UNITS:
         return UNITS[name]

@@ -119,7 +119,7 @@ def csv_parts(
 def _parts(
     path: Path, header: Header, largest_mb: int, mapped: MappedColumns | None, origin_s: int | None
 ) -> Iterator[Part]:
-    """Yield the table in blocks of rows, then the origin of its time."""
+    """Yield a file's table in blocks of rows, then the origin of its times."""
     skipped = 0 if mapped is None else mapped.skip_lines
     rows = read_mat_rows(path, header, mapped) if is_mat(path) else read_rows(path, largest_mb, skipped)
     headings, first = [name.strip() for name in next(rows, list[str]())], next(rows, list[str]())

@@ -104,7 +104,7 @@ def angles_entry(sensor: ExternalResult) -> AnglesEntry | None:
 
 
 def _earth_rate(result: Result) -> EarthRateEstimate | Fault:
-    """Return the Earth's rate in the axes of the table, or the Fault that explains its absence."""
+    """Return the Earth's rate in the axes of the rate table, or the Fault that explains its absence."""
     if isinstance(result, IncrementCalibration):
         return result.solution.earth
     if result.reference_fault is not None:

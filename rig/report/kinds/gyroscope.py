@@ -117,7 +117,7 @@ def temperatures_c(sensor: GyroscopeEntry) -> dict[str, float | None]:
 
 
 def _lines(finding: Finding[GyroscopeEntry]) -> Iterator[str]:
-    """Yield the lines below the table: speeds, other estimators, and the axes by the vector model."""
+    """Yield the lines below a gyroscope's table: speeds, other estimators, and the axes by the vector model."""
     sensor = finding.entry
     yield from _speeds(sensor)
     if sensor.scale_conditions is not None and sensor.bias_conditions is not None:

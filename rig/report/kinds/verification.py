@@ -73,7 +73,7 @@ def verification_table(name: str, entry: VerificationEntry) -> Table:
 
 
 def verification_lines(entry: VerificationEntry) -> Iterator[str]:
-    """Yield the lines below the table, ± two standard uncertainties: mounting, the reference's error, turns, delays."""
+    """Yield the lines below `verification_table`, ± two standard uncertainties: mounting, reference, turns, delays."""
     rotation = entry.rotation
     angles = " ".join(f"{angle:+.3f}" for angle in np.degrees(rotation.from_nominal_rad))
     expanded_deg = 2 * np.degrees(max(rotation.std_rad))

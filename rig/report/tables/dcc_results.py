@@ -115,7 +115,7 @@ def bias_drift(entry: DriftEntry, quantity: Quantity) -> Iterator[Element]:
 
 
 def over_temperature(entry: OverTemperatureEntry, quantity: Quantity) -> Iterator[Element]:
-    """Yield scale and bias of each axis with U, at the table's temperatures."""
+    """Yield scale and bias of each axis with U, at the temperatures of the entry's table."""
     low, high = entry.range_c
     labels = [f"{row.temperature_c:.6g}_degC" for row in entry.table]
     statement = f"At temperatures of the item's own thermometer; valid from {low!r} to {high!r} °C only"

@@ -28,7 +28,7 @@ class CheckWords:
 
 @cache
 def check_words() -> Mapping[str, CheckWords]:
-    """Return the table's rows by check name. Raise ValueError for lines unlike `name | means | what to do`."""
+    """Return the rows of checks.txt by check name. Raise ValueError for lines unlike `name | means | what to do`."""
     return {cells[0]: CheckWords(*cells) for cells in read_rows(TABLE, "name | what it means | what to do")}
 
 

@@ -20,7 +20,7 @@ def shown_rows(entry: OverTemperatureEntry) -> Sequence[AtTemperatureEntry]:
 
 
 def coverage_at_rows(rows: Sequence[AtTemperatureEntry], entry: OverTemperatureEntry) -> Array:
-    """Return the coverage factors U/u (n, 6) of kx ky kz bx by bz in n rows of the table."""
+    """Return the coverage factors U/u (n, 6) of kx ky kz bx by bz in n rows of an entry's table."""
     expanded = np.array([[*row.expanded_scale, *row.expanded_bias] for row in rows])
     return divide_or_infinity(expanded, [entry.std_at(row.temperature_c) for row in rows])
 

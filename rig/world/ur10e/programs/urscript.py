@@ -135,7 +135,7 @@ def is_lone_move(body: Block) -> TypeGuard[tuple[Call]]:
 
 
 class ScriptProgram:
-    """A program of the statements below and endless loops: no variables, no conditions."""
+    """A program of the statements in `STATEMENTS` and endless loops: no variables, no conditions."""
 
     waiting = False  # unknown whether it waits
 
