@@ -10,7 +10,7 @@ import numpy as np
 
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.budget import BIAS_DRIFT, NOISE, Budget
-from rig.estimation.gyroscope.vector_fit import Explained
+from rig.estimation.gyroscope.vector_fit import VectorFit
 from rig.estimation.gyroscope.vector_model import design_matrix, regress
 from rig.estimation.sensor_axes import SensorAxes
 from rig.estimation.statistics.coverage import effective_dof
@@ -100,7 +100,7 @@ def _attitude_dof(budget: Budget, response: Array, noise: Array, std: Array) -> 
     return _split(std**2, {NOISE: by_noise, ATTITUDES: std**2 - by_noise}, budget)
 
 
-def _reading_parts(noise: Array, walk: Array, explained: Explained) -> dict[str, Array]:
+def _reading_parts(noise: Array, walk: Array, explained: VectorFit) -> dict[str, Array]:
     """Return the parts of a gyroscope's variances due to readings, by contributor: `noise` and the bias's `walk`.
 
     Without drift in the readings `walk` is omitted: the data sheet's flicker has infinite dof.
@@ -125,7 +125,7 @@ def _angle_derivatives(matrix: Array) -> Array:
     return SensorAxes.from_matrix(matrix).to_angles.reshape(6, 3, 3)
 
 
-def _drift_covariance(explained: Explained) -> Array:
+def _drift_covariance(explained: VectorFit) -> Array:
     """Return the bias drift's part (3, p, p) in the covariance of each axis' coefficients F, c (and G)."""
     inputs = explained.inputs
     gravity = None if explained.solution.g_sensitivity is None else inputs.apparent_gravity_m_s2

@@ -12,7 +12,7 @@ from rig.config.column_map import STANDARD_NAMES, TIMES, ColumnMap
 from rig.config.units import UNITS
 from rig.data.quantity import RATE, Quantity
 from rig.data.recording.motion_file import MOTIONS, TIME, Columns, Header, Item
-from rig.data.recording.settings import Elsewhere, Site
+from rig.data.recording.settings import Site, SolveOptions
 from rig.errors import Refused, RigError
 from rig.estimation.arrays import Array, axis_of
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
@@ -211,7 +211,7 @@ def try_turns(path: Path, column_map: ColumnMap) -> Trial:
     }
     motion = {name: np.array([value]) for name, value in options.items()}
     files = Files(path, motion, "turns", Item("imu"), None, column_map)
-    return Trial(obstacle=_find_obstacle(files, Elsewhere(), "+z"))
+    return Trial(obstacle=_find_obstacle(files, SolveOptions(), "+z"))
 
 
 def try_attitudes(
@@ -221,13 +221,14 @@ def try_attitudes(
     files = Files(path, reference, "attitudes", Item("imu"), None, column_map)
     trial = Trial()
     for only in ((), (RATE.sensor,)) if len(sensors) > 1 and RATE.sensor in sensors else ((),):
-        trial = Trial(only, _find_obstacle(files, Elsewhere(any_mounting=True, find_clock=find_clock, only=only), up))
+        options = SolveOptions(any_mounting=True, find_clock=find_clock, only=only)
+        trial = Trial(only, _find_obstacle(files, options, up))
         if trial.obstacle is None:
             return trial
     return trial
 
 
-def _find_obstacle(files: Files, request: Elsewhere, up: str) -> str | None:
+def _find_obstacle(files: Files, request: SolveOptions, up: str) -> str | None:
     """Return the reason why the files have no solution in this attitude, or which checks fail; None if all pass."""
     x, y, z = axis_of(up).tolist()
     site = Site(up=(x, y, z), gravity_m_s2=STANDARD_GRAVITY_M_S2, earth_rate_rad_s=None)

@@ -128,7 +128,7 @@ class ArmSection(TurnerSection):
 
     @property
     def simulated_at(self) -> str | None:
-        """The controller's name or address."""
+        """The host of the simulated controller."""
         return self.host
 
     def override_host(self, host: str) -> Mapping[str, str]:

@@ -24,7 +24,7 @@ class DisplayUnit:
 
 
 @dataclass(frozen=True, slots=True)
-class Mistaken:
+class MistakenUnit:
     """A `unit` in which readings are often given by mistake, the remedy, and an SI value that no part reaches."""
 
     unit: str
@@ -68,7 +68,7 @@ class Quantity:
     steady: float
     d_si: str
     towards: str = "the reference"
-    mistaken: Mistaken | None = None
+    mistaken: MistakenUnit | None = None
     offset: int = 1
     axes: str = "xyz"
 
@@ -156,7 +156,7 @@ RATE: Final = Quantity(
     walk_unit=DisplayUnit("°/√h", pi / 180 / ROOT_HOUR),
     steady=5e-3,
     d_si=r"\radian\second\tothe{-1}",
-    mistaken=Mistaken("°/s", "numpy.radians(readings)", 400.0),
+    mistaken=MistakenUnit("°/s", "numpy.radians(readings)", 400.0),
     offset=-1,
 )
 ACCELERATION: Final = Quantity(
@@ -175,7 +175,7 @@ ACCELERATION: Final = Quantity(
     steady=0.05,
     d_si=r"\metre\second\tothe{-2}",
     towards="up",
-    mistaken=Mistaken("g or mg", "9.80665 * readings for readings in g", 5000.0),
+    mistaken=MistakenUnit("g or mg", "9.80665 * readings for readings in g", 5000.0),
 )
 FIELD: Final = Quantity(
     name="field",
@@ -193,7 +193,7 @@ FIELD: Final = Quantity(
     steady=2e-6,
     d_si=r"\tesla",
     towards="the field",
-    mistaken=Mistaken("µT or gauss", "1e-6 * readings for readings in µT, 1e-4 for gauss", 0.1),
+    mistaken=MistakenUnit("µT or gauss", "1e-6 * readings for readings in µT, 1e-4 for gauss", 0.1),
 )
 RIG_QUANTITIES: Final = (RATE, ACCELERATION, FIELD)
 TEMPERATURE: Final = Scalar("temperature", "thermometer", "°C", "c", DisplayUnit("°C", 1.0))

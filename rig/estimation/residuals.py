@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rig.estimation.arrays import Array
-from rig.estimation.gyroscope.vector_fit import Explained
+from rig.estimation.gyroscope.vector_fit import VectorFit
 from rig.estimation.gyroscope.vector_model import design_matrix, propagate_speed_std, regress
 
 if TYPE_CHECKING:
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from rig.estimation.reference.triaxial import TriaxialSolution
 
 
-def residual_std_rad_s(explained: Explained) -> Array:
+def residual_std_rad_s(explained: VectorFit) -> Array:
     """Return the standard deviations (N, 3), rad/s, of the vector model's residuals.
 
     Their covariance is (1 − H) V (1 − H)ᵀ, with the hat matrix H and the covariance V of the mean readings.

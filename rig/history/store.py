@@ -81,7 +81,7 @@ class Past:
 
 
 @dataclass(frozen=True, slots=True)
-class Entered:
+class EnteredRun:
     """The number of a run; `new` is False if the history already had it."""
 
     run_id: int
@@ -138,7 +138,7 @@ class History:
     address: HistoryAddress
     engine: Engine
 
-    def enter(self, finished: FinishedRun) -> Entered:
+    def enter(self, finished: FinishedRun) -> EnteredRun:
         """Add a run; if the history already has it, add only a new location of its folder.
 
         Unlike `rig history import`, this does not compare the result with its recordings. Raise Refused
@@ -152,14 +152,14 @@ class History:
                 note_place(connection, run_id, finished)
                 if finished.certificate is not None:
                     certificates.enter(connection, run_id, finished.certificate, now_utc())
-            entered = Entered(run_id, existing is None)
+            entered = EnteredRun(run_id, existing is None)
         except IntegrityError:
             # Another process entered the same run first.
             with self.engine.connect() as connection:
                 existing = self._run_id(connection, content)
             if existing is None:
                 raise
-            entered = Entered(existing, False)
+            entered = EnteredRun(existing, False)
         if not entered.new:
             with connection_apart(self.engine) as connection:
                 read_back.refuse_missing(connection, self.address, schema.run, entered.run_id)

@@ -15,7 +15,7 @@ from rig.report.findings.result_kind import AxisValues
 from rig.report.kinds.kind_registry import shown
 from rig.report.simulated_truth import TruthRow
 from rig.report.words.printed_values import format_with_u
-from rig.station.events import Since
+from rig.station.events import LastCalibration
 
 Row = dict[str, Any]
 
@@ -47,7 +47,7 @@ def outcome_rows(result: ResultDocument, parts: Mapping[str, str], true_rows: Se
     return rows
 
 
-def since_rows(since: Iterable[Since]) -> dict[str, Row]:
+def since_rows(since: Iterable[LastCalibration]) -> dict[str, Row]:
     """Return the previous results, by the names of the displayed rows and in their units."""
     rows = {}
     for since_result in since:

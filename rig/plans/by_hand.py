@@ -47,8 +47,8 @@ class WantedMoves:
 
 
 @dataclass(frozen=True, slots=True)
-class Open:
-    """The wanted moves that remain in a session; `flips_done`: the number of flips that were made."""
+class RemainingMoves:
+    """The moves that a session still lacks; `flips_done`: the number of flips that were made."""
 
     pairs: tuple[Pair, ...]
     turns: tuple[tuple[str, int], ...]
@@ -62,7 +62,7 @@ class Open:
         return not self.turns and (not self.pairs or (self.flips == 0 and not self.faces))
 
 
-def still_open(wanted: WantedMoves, moves: Sequence[HandMove], faces_up: Sequence[Face]) -> Open:
+def still_open(wanted: WantedMoves, moves: Sequence[HandMove], faces_up: Sequence[Face]) -> RemainingMoves:
     """Return the `wanted` moves that remain after `moves`; `faces_up` are the faces that were up at rest."""
     pairs, turns, flips = list(wanted.pairs), list(wanted.about), wanted.flips
     for move in moves:
@@ -76,10 +76,10 @@ def still_open(wanted: WantedMoves, moves: Sequence[HandMove], faces_up: Sequenc
         if (turn := next((candidate for candidate in turns if candidate[0] == axis), None)) is not None:
             turns.remove(turn)
     faces = tuple(face for face in FACES if face not in faces_up)
-    return Open(tuple(pairs), tuple(turns), faces, max(flips, 0), wanted.flips - flips)
+    return RemainingMoves(tuple(pairs), tuple(turns), faces, max(flips, 0), wanted.flips - flips)
 
 
-def next_instruction(remaining: Open, face: Face | None) -> Instruction | None:
+def next_instruction(remaining: RemainingMoves, face: Face | None) -> Instruction | None:
     """Return the next request for an item with side `face` up (None if unknown), or None at the end."""
     if remaining.done or face is None:
         return None if remaining.done else Instruction("lay", FACE_ORDER[0])

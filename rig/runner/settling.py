@@ -25,7 +25,7 @@ MIN_SCATTER_COUNTS = 0.5  # a smaller scatter is rounding
 
 
 @dataclass(slots=True)
-class _Watched:
+class _RecentReadings:
     """The latest readings of one sensor, (3,) counts each."""
 
     name: str
@@ -66,14 +66,14 @@ class _Watched:
 class Settling:
     """The settling of all sensors, fed by the threads of the sources and read by the script's thread."""
 
-    _watched: dict[str, _Watched] = field(default_factory=dict)
+    _watched: dict[str, _RecentReadings] = field(default_factory=dict)
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
     def expect(self, name: str, sensor: RecordedSensor) -> None:
         """Watch a sensor: its accelerations if it sends them, otherwise its rates."""
         enough = max(2, round(SPAN_S * sensor.rate_hz))
         column = sensor.channel(ACCELERATION if sensor.measures(ACCELERATION) else RATE).column
-        self._watched[name] = _Watched(name, column, enough, deque(maxlen=2 * enough))
+        self._watched[name] = _RecentReadings(name, column, enough, deque(maxlen=2 * enough))
 
     def add(self, sensor: str, samples: NDArray[Any]) -> None:
         """Add the newest readings (n,) of a watched sensor."""

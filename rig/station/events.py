@@ -298,8 +298,8 @@ class RunFolderWritten:
 
 
 @dataclass(frozen=True, slots=True)
-class Since:
-    """The previous calibration of the `quantity` of a `sensor`: its number, its day, its values by parameter (`kx`).
+class LastCalibration:
+    """The last calibration of the `quantity` of a `sensor`: its number, its day, its values by parameter (`kx`).
 
     `before` has values with their U, in SI units; `normalised_error` is E_n of the changes since. `changed` are the
     significant changes among all values of the run.
@@ -323,7 +323,7 @@ class Remembered:
 
     history: str
     numbers: tuple[int, ...]
-    since: tuple[Since, ...] = ()
+    since: tuple[LastCalibration, ...] = ()
     usual: bool = True
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rig.estimation.gyroscope.vector_fit import Explained, VectorInputs, explain
+from rig.estimation.gyroscope.vector_fit import VectorFit, VectorInputs, explain
 from rig.estimation.residuals import dwell_residual_std_m_s2, residual_std_rad_s
 from support.recordings import drawn_accelerations
 
@@ -13,7 +13,7 @@ SPEED_RAD_S, NOISE_RAD_S, SPEED_STD_RAD_S = 1.0, 2e-4, 1.5e-4
 MATRIX = np.array([[1.1, 0.02, 0.0], [0.0, 0.9, 0.01], [0.01, 0.0, 1.05]])
 
 
-def session(rng: np.random.Generator, walk_rad_s_sqrt_s: float = 0.0) -> Explained:
+def session(rng: np.random.Generator, walk_rad_s_sqrt_s: float = 0.0) -> VectorFit:
     """Six sweeps, some noisier than others and of a speed that is not exact, and six rests; a bias that walks."""
     turns = SPEED_RAD_S * np.concatenate([np.eye(3), -np.eye(3), np.zeros((6, 3))])
     std = NOISE_RAD_S * np.linspace(0.5, 1.5, 12)[:, None] * np.ones((1, 3))

@@ -7,7 +7,7 @@ import pytest
 from rig.analysis.check import Check, fitness
 from rig.data.meaning import Meaning
 from rig.page.outcome_screen import after_fault, after_verdict, outcome_rows, since_rows
-from rig.station.events import Since
+from rig.station.events import LastCalibration
 from support.page.scripted_runs import ABOUT
 from support.page.scripted_six_sensors import PARTS, six_found
 
@@ -34,7 +34,9 @@ def test_each_thing_found_has_a_row_with_its_serial_number_and_its_limits() -> N
 def test_what_was_before_stands_beside_the_row_of_its_sensor_in_that_rows_unit() -> None:
     before = {"kx": (1.01, 1e-4), "ky": (0.99, 1e-4), "kz": (1.0, 1e-4), "bx": (2e-5, 1e-7), "by": (0.0, 1e-7)}
     errors = dict.fromkeys(before, 0.5) | {"ky": 1.5}
-    field = Since("mag", "field", 7, "2026-11-20", before | {"bz": (1e-6, 1e-7)}, errors | {"bz": 0.1}, ("ky",))
+    field = LastCalibration(
+        "mag", "field", 7, "2026-11-20", before | {"bz": (1e-6, 1e-7)}, errors | {"bz": 0.1}, ("ky",)
+    )
     rows = since_rows([field, replace(field, sensor="gyro", quantity="rate"), replace(field, quantity="a drift")])
     assert set(rows) == {"mag, magnetometer", "gyro"}
     assert rows["mag, magnetometer"]["bias"]["values"] == pytest.approx([20.0, 0.0, 1.0])  # µT

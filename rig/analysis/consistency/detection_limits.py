@@ -13,7 +13,7 @@ from rig.data.quantity import RATE, Quantity
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.budget import UnknownErrors, budget
-from rig.estimation.gyroscope.vector_fit import Explained, explain
+from rig.estimation.gyroscope.vector_fit import VectorFit, explain
 from rig.observation.consistency.raw_readings import REST
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ def find_reference_limits(sizes: Mapping[str, float], quantity: Quantity) -> tup
     )
 
 
-def _means_of_solve(explained: Explained) -> Means:
+def _means_of_solve(explained: VectorFit) -> Means:
     """Return the means of the solution: modelled rates along the sensor's axes, windows, and sweeps."""
     inputs_of_solve = explained.inputs
     turns = np.flatnonzero(inputs_of_solve.turns_rad_s.any(axis=1))
@@ -72,7 +72,7 @@ def _means_of_solve(explained: Explained) -> Means:
     return Means(inputs_of_solve.rates_rad_s @ explained.solution.matrix.T, inputs_of_solve.windows_s, sweep)
 
 
-def _error_over_expanded(patterns: Array, explained: Explained, mounting: Array, inputs: UnknownErrors) -> float | None:
+def _error_over_expanded(patterns: Array, explained: VectorFit, mounting: Array, inputs: UnknownErrors) -> float | None:
     """Return the error of a result, divided by U, due to the worst of the fault's `patterns` (k, N, 3).
 
     Return None without a solution.

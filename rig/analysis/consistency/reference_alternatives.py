@@ -96,7 +96,7 @@ def _axis_components(model: ReferenceModel) -> Array:
 
 
 def _bend_pattern(change: Callable[[Array], Array]) -> Callable[[ReferenceModel], Array]:
-    """Return a function for the patterns of a nonlinear `change` of the specific force relative to the reference."""
+    """Return a function of a model: the patterns of a nonlinear `change` of the force relative to the reference."""
 
     def patterns(model: ReferenceModel) -> Array:
         size = float(np.linalg.norm(model.theta[REFERENCE]))

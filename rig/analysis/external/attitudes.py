@@ -16,7 +16,7 @@ from rig.analysis.installed_solvers import OfKind
 from rig.analysis.reference.triad import Triad, check_identifiable, check_mounted, field_reference, gravity_reference
 from rig.data.installed_kinds import installed_kinds
 from rig.data.quantity import ACCELERATION, RATE, Quantity
-from rig.data.recording.settings import Elsewhere, Site
+from rig.data.recording.settings import Site, SolveOptions
 from rig.errors import Fault, or_fault
 from rig.errors.attempts import Attempts, attempt_each
 from rig.estimation.external.placement import NOISE, PlacementSolution, laid_down
@@ -70,7 +70,7 @@ Result = AttitudeCalibration | IncrementCalibration
 
 
 def solve_placed(
-    name: str, placed: PlacedReadings, site: Site, options: Elsewhere, method: Chosen | None, *, second_order: bool
+    name: str, placed: PlacedReadings, site: Site, options: SolveOptions, method: Chosen | None, *, second_order: bool
 ) -> Attempts[Quantity, Result | OfKind]:
     """Calibrate every recorded quantity of a sensor by `method`; None chooses one.
 

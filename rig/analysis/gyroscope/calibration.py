@@ -22,7 +22,7 @@ from rig.estimation.gyroscope.budget import Budget, UnknownErrors, budget
 from rig.estimation.gyroscope.earth_rate import EarthRate, find_earth_rate
 from rig.estimation.gyroscope.estimate import Estimate
 from rig.estimation.gyroscope.six_observation_budget import six_observation_budget
-from rig.estimation.gyroscope.vector_fit import Explained, VectorInputs, explain
+from rig.estimation.gyroscope.vector_fit import VectorFit, VectorInputs, explain
 from rig.estimation.gyroscope.vector_model import VectorSolution, solve_vector_model
 from rig.estimation.refusals import check_duplicates
 from rig.observation.average import Average
@@ -64,7 +64,7 @@ class SensorResult:
     vector_model: "VectorSolution | TurnedSolution | None"
     uncertainty: Budget | None
     corrected_by: Correction
-    explained: Explained | None = None
+    explained: VectorFit | None = None
     six_observation: Solution | None = None
     algorithm_1: Solution | None = None
     observations: tuple[Observation, ...] = ()
@@ -206,7 +206,7 @@ def _solve_sensor(
 
 
 def _budget_of(
-    solution: Estimate, explained: Explained, environment: MeasurementEnvironment, unknown: UnknownErrors, name: str
+    solution: Estimate, explained: VectorFit, environment: MeasurementEnvironment, unknown: UnknownErrors, name: str
 ) -> Budget | None:
     """Return the budget of the chosen solution of the sensor `name`; None if its estimator has no budget."""
     if isinstance(solution, VectorSolution):

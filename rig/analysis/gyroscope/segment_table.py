@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from rig.data.recording.settings import Site
 from rig.estimation.arrays import Array
-from rig.estimation.gyroscope.vector_fit import Explained
+from rig.estimation.gyroscope.vector_fit import VectorFit
 from rig.observation.consistency.raw_readings import REST, RawReadings
 from rig.observation.consistency.segments import MIN_REST_SAMPLES, MotionInterval, SegmentedAverage
 from rig.observation.consistency.transfers import WristTransfer
@@ -45,7 +45,7 @@ class Segments:
     unexplained_rad2_s2: Array | float = 0.0
 
 
-def stack_segments(windows: Sequence[SegmentedAverage], explained: Explained, site: Site) -> Segments:
+def stack_segments(windows: Sequence[SegmentedAverage], explained: VectorFit, site: Site) -> Segments:
     """Return the segments of a gyroscope's windows, in the order of the means of `explained`.
 
     The Earth's rate is that in `explained`, estimated or of the site.
@@ -82,7 +82,7 @@ def append_transfers(
     segments: Segments,
     transfers: Sequence[WristTransfer],
     windows: Sequence[SegmentedAverage],
-    explained: Explained,
+    explained: VectorFit,
 ) -> Segments:
     """Return the segments with the transfers appended, numbered downwards from `REST` − 1.
 
@@ -122,7 +122,7 @@ def append_transfers(
     )
 
 
-def _vibration_changes(windows: Sequence[SegmentedAverage], explained: Explained, times_s: Array) -> Array:
+def _vibration_changes(windows: Sequence[SegmentedAverage], explained: VectorFit, times_s: Array) -> Array:
     """Return the variances (M, 3), rad², of the vibration's change in M transfers, by the nearest rests.
 
     `times_s` (M, 2): start and end of the transfers on the clock of the first recording.

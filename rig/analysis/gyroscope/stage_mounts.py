@@ -18,7 +18,7 @@ from rig.data.recording.run_data import RunData
 from rig.data.recording.settings import RunSettings
 from rig.errors.attempts import attempt_each
 from rig.estimation.arrays import Array
-from rig.estimation.gyroscope.vector_fit import Explained, explain
+from rig.estimation.gyroscope.vector_fit import VectorFit, explain
 from rig.observation.observed_run import ObservedRun
 
 
@@ -76,7 +76,7 @@ def _estimate_mounts(recordings: Sequence[ObservedRun], settings: RunSettings) -
     )
 
 
-def _rotation_in_stage(fit: Explained, index: int) -> tuple[Array, Array]:
+def _rotation_in_stage(fit: VectorFit, index: int) -> tuple[Array, Array]:
     """Return the item's rotation (3,) in a stage relative to the first, and its standard deviations.
 
     Both are in units of the stated standard deviation. A rotation of the item rotates all sensed rates oppositely.

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from rig.commands.history.history_answer import ENTRY_MODULES, ask_history, explain_failure
 from rig.errors import RigError
-from rig.station.events import NotRemembered, Remembered, RunEvent, Since
+from rig.station.events import LastCalibration, NotRemembered, Remembered, RunEvent
 
 if TYPE_CHECKING:
     from rig.config.judging.judging_sections import HistorySection
@@ -181,8 +181,8 @@ def _read_journal_end(address: "HistoryAddress") -> tuple[int, str] | None:
     return (end.number, end.sha256) if end.number else None
 
 
-def _since_event(calibration: CalibrationComparison) -> Since:
-    return Since(
+def _since_event(calibration: CalibrationComparison) -> LastCalibration:
+    return LastCalibration(
         calibration.now.sensor,
         calibration.now.quantity,
         calibration.before.id,

@@ -160,7 +160,7 @@ def run(options: Namespace) -> int:
 def _build_recording(options: Namespace) -> "RunData":
     """Return the recording of the options' files. Raise Refused `bad_option` for an impossible value."""
     from rig.data.recording.motion_file import Item
-    from rig.data.recording.settings import Elsewhere, Site
+    from rig.data.recording.settings import Site, SolveOptions
     from rig.data.validation import validate
     from rig.estimation.arrays import axis_of
     from rig.observation.external.from_files import Files, build_recording
@@ -174,7 +174,7 @@ def _build_recording(options: Namespace) -> "RunData":
         raise Refused(
             "bad_option", "--reference-c is for sweeps that were repeated at several temperatures", "Give --sweeps"
         )
-    only = _read_only(options)
+    only = _sensors_to_calibrate(options)
     x, y, z = axis_of(options.up).tolist()
     named_values = {"name": options.name, "part": options.part, "serial_number": options.serial_number}
     given_item = {key: value for key, value in named_values.items() if value is not None}
@@ -201,7 +201,7 @@ def _build_recording(options: Namespace) -> "RunData":
             magnetic_field_t=options.field_t,
             magnetic_field_upwards=options.field_upwards,
         ),
-        Elsewhere(
+        SolveOptions(
             any_mounting=options.any_mounting,
             find_clock=options.estimate_clock_offset,
             exact_rates=options.exact_rates,
@@ -214,8 +214,8 @@ def _build_recording(options: Namespace) -> "RunData":
     )
 
 
-def _read_only(options: Namespace) -> tuple[str, ...]:
-    """Return the sensors to calibrate, empty for all. Raise Refused `bad_option`."""
+def _sensors_to_calibrate(options: Namespace) -> tuple[str, ...]:
+    """Return the sensors of the option `--only`, empty for all. Raise Refused `bad_option`."""
     from rig.data.installed_kinds import quantities
     from rig.data.quantity import RATE
 

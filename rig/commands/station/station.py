@@ -155,7 +155,7 @@ def resume_command(options: Namespace, folder: Path) -> str:
 
 
 def keep_to_one_arena() -> None:
-    """Make all threads of this process share freed memory, if the C library is glibc."""
+    """Make all threads allocate from one arena of glibc, so that they reuse freed memory."""
     if sys.platform == "linux":
         import ctypes
 

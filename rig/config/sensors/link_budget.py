@@ -49,7 +49,7 @@ def capacity_bytes_per_s(baud: int) -> float:
 
 
 def over_budget(streams: Mapping[str, LinkLoad], baud: int) -> str | None:
-    """Return the calculation, in words, if all `streams` (by sensor) together exceed the link's capacity, else None."""
+    """Return an error text with the sum of all `streams` (by sensor) if it exceeds the link's capacity, else None."""
     needed = sum(stream.bytes_per_s for stream in streams.values())
     if needed <= capacity_bytes_per_s(baud):
         return None
@@ -64,7 +64,7 @@ def over_budget(streams: Mapping[str, LinkLoad], baud: int) -> str | None:
 
 
 def sensor_line_over_budget(rate_hz: float, message_bytes: int, baud: int) -> str | None:
-    """Return the calculation, in words, if a sensor's own line lacks the capacity for its messages, else None."""
+    """Return an error text if a sensor's messages exceed the capacity of its own line, else None."""
     if rate_hz * message_bytes <= capacity_bytes_per_s(baud):
         return None
     return (

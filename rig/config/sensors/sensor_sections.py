@@ -196,7 +196,7 @@ class SensorSection(Section):
         return None if self.mavlink is None else ("mavlink.port", self.mavlink.port)
 
     def brings(self, name: str) -> set[str]:
-        """Return the names of the device's sensors other than `name`: a magnetometer, sensors of one number."""
+        """Return the names of the other sensors in the device `name`: a magnetometer, and sensors of scalars."""
         if self.lines is None:
             return {field_name(name)} if self.serial is not None and self.serial.message == "C" else set()
         field = {field_name(name)} if self.lines.field is not None else set()

@@ -8,7 +8,7 @@ from rig.config.section import Section
 
 Seconds = Annotated[float, Field(ge=0, le=60)]
 Probability = Annotated[float, Field(ge=0, le=1)]
-Mistaken = Literal[
+MistakenUnit = Literal[
     "short", "two_turns", "other_way", "wrong_face", "skipped", "crumb", "table_pushed", "held", "dropped", "left",
     "lifted", "too_fast",
 ]  # fmt: skip
@@ -36,9 +36,9 @@ class SimulatedHandSection(Section):
     reaction_time_s: tuple[Seconds, Seconds] = Field(
         default=(0.5, 2.0), description="shortest and longest time from an instruction to the first touch"
     )
-    mistakes: dict[Mistaken, Probability] = Field(
-        default=dict[Mistaken, Probability](),
+    mistakes: dict[MistakenUnit, Probability] = Field(
+        default=dict[MistakenUnit, Probability](),
         description="probability of this mistake in an action: "
-        + ", ".join(f"`{mistake}`" for mistake in get_args(Mistaken)),
+        + ", ".join(f"`{mistake}`" for mistake in get_args(MistakenUnit)),
         json_schema_extra={"unit": "1", "allowed": "mistakes with a number 0 to 1 each", "usual": "`{}`"},
     )

@@ -67,7 +67,7 @@ class RunRecorder:
         self.removed = False  # whether the file is no longer in its place
         self._controller_time_s: float | None = None
         self._lock = threading.Lock()
-        self._pending = _Pending({name: [] for name in sensors}, [], [])
+        self._pending = _PendingData({name: [] for name in sensors}, [], [])
         self._states_dtype = turner.dtype
         self._closing = threading.Event()
         try:
@@ -148,7 +148,7 @@ class RunRecorder:
         """Write the pending samples, states and events to the file."""
         with self._lock:
             pending = self._pending
-            self._pending = _Pending({name: [] for name in pending.samples}, [], [])
+            self._pending = _PendingData({name: [] for name in pending.samples}, [], [])
         for name, batches in pending.samples.items():
             if batches:
                 append(self._file["samples"][name], np.concatenate(batches))
@@ -324,7 +324,7 @@ class _SensorNames:
 
 
 @dataclass(slots=True)
-class _Pending:
+class _PendingData:
     """Data that wait for the writer thread."""
 
     samples: dict[str, list[NDArray[Any]]]

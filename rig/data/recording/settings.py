@@ -125,7 +125,7 @@ class Uncertainty(UncertaintyKeys[dict[str, NonNegative]]):
 
 
 @dataclass(frozen=True, slots=True)
-class Elsewhere:
+class SolveOptions:
     """The settings for solving external readings with their motion (`motion_file`).
 
     - `any_mounting`: whether the sensor may have any mounting on the body.
@@ -218,7 +218,7 @@ class RunSettings:
     second_order: bool = False
     finds_earth_rate: bool = False
     extension_m: Vector3 = (0.0, 0.0, 0.0)
-    elsewhere: Elsewhere | None = None
+    elsewhere: SolveOptions | None = None
     mounts: tuple[Mounting, ...] = ()
     stage: Annotated[int, Field(ge=0)] = 0
     by_hand: HandSettings | None = None
@@ -252,7 +252,7 @@ class RunSettings:
     def apply_overrides(self, overrides: Sequence[str]) -> "RunSettings":
         """Return the settings with other thresholds or limits.
 
-        An override is `limits.scale_std=0.001`, or if the run has arcs `uncertainty.angle_std_deg=0.02`. Raise Refused
+        An override is `limits.scale_std=0.001`, or if sweeps are arcs `uncertainty.angle_std_deg=0.02`. Raise Refused
         `unknown_setting` or `wrong_setting`, which list the possible settings.
         """
         changed = self
@@ -291,7 +291,7 @@ def settings_from_json(text: str) -> RunSettings:
 def settings_of(config: "RigConfig", plan: "Plan") -> RunSettings:
     """Return the settings of a new run; `plan` is the plan of the whole procedure.
 
-    Raise Refused `angle_std_not_stated` if the plan has arcs and the file does not state the encoders' error.
+    Raise Refused `angle_std_not_stated` if sweeps are arcs and the file does not state the encoders' error.
     """
     from rig.config.procedures.hand_sections import ByHandSection
 

@@ -14,7 +14,7 @@ import numpy as np
 from rig.estimation.arrays import Array, perpendicular_unit_vectors
 from rig.estimation.earth import EARTH_RATE_RAD_S, STANDARD_GRAVITY_M_S2
 from rig.estimation.gyroscope.mount_squares import propagate_mount_squares
-from rig.estimation.gyroscope.vector_fit import Explained, VectorInputs
+from rig.estimation.gyroscope.vector_fit import VectorFit, VectorInputs
 from rig.estimation.statistics.bias_process import BiasProcess
 from rig.estimation.statistics.coverage import coverage_factors, effective_dof
 
@@ -150,12 +150,12 @@ class UnknownErrors:
 Propagate = Callable[[Array], Array]  # patterns (k, N, 3) of readings to a covariance (6, 6)
 
 
-def budget(explained: Explained, unknown: UnknownErrors) -> Budget:
+def budget(explained: VectorFit, unknown: UnknownErrors) -> Budget:
     """Return the budget of one sensor's vector solution."""
     return Budget(tuple(_contributors(explained, unknown)))
 
 
-def _contributors(explained: Explained, unknown: UnknownErrors) -> Iterator[Contributor]:
+def _contributors(explained: VectorFit, unknown: UnknownErrors) -> Iterator[Contributor]:
     """Yield the contributors; the solution's response propagates a pattern of errors in the readings."""
     solution, inputs = explained.solution, explained.inputs
     matrix = solution.matrix
@@ -222,7 +222,7 @@ def _contributors(explained: Explained, unknown: UnknownErrors) -> Iterator[Cont
     )
 
 
-def _evaluate_mounts(explained: Explained, unknown: UnknownErrors, propagate: Propagate) -> Iterator[Contributor]:
+def _evaluate_mounts(explained: VectorFit, unknown: UnknownErrors, propagate: Propagate) -> Iterator[Contributor]:
     """Yield the contributors of the ends of arcs and of the mountings; `propagate` as in `_contributors`."""
     inputs, matrix = explained.inputs, explained.solution.matrix
     if inputs.encoder_errors_rad_s is not None:
@@ -251,7 +251,7 @@ def _evaluate_times(
         yield Contributor(SAMPLE_TIMES, "B", "rectangular", float(half_width), "ms", source, np.inf, propagate(moved))
 
 
-def _find_noise_dof(explained: Explained) -> float:
+def _find_noise_dof(explained: VectorFit) -> float:
     """Return the noise's smallest degrees of freedom in scale and bias (JCGM 100, G.4.1)."""
     variances = explained.solution.response**2 * explained.inputs.variances_rad2_s2
     dof = np.broadcast_to(explained.inputs.noise_dof, variances.shape)
@@ -264,7 +264,7 @@ def evaluate_a(name: str, source: str, covariance: Array, dof: float = np.inf) -
     return Contributor(name, "A", "normal", None, "", source, dof, covariance)
 
 
-def _evaluate_readings(explained: Explained) -> Iterator[Contributor]:
+def _evaluate_readings(explained: VectorFit) -> Iterator[Contributor]:
     """Yield the contributors of the readings: their noise, and the drift of the bias."""
     bias, response = explained.bias, explained.solution.response
     flicker, drift = split_bias_covariance(bias, response, explained.inputs.windows_s)

@@ -9,11 +9,11 @@ stages, which changes no scale, adds nothing.
 import numpy as np
 
 from rig.estimation.arrays import Array
-from rig.estimation.gyroscope.vector_fit import Explained
+from rig.estimation.gyroscope.vector_fit import VectorFit
 from rig.estimation.gyroscope.vector_model import design_matrix, propagate_speed_std, regress
 
 
-def propagate_mount_squares(explained: Explained) -> Array:
+def propagate_mount_squares(explained: VectorFit) -> Array:
     """Return the mean square (6, 6) of the mounts' second-order effect on kx ky kz bx by bz; zero if mounts are exact.
 
     For remaining errors ε ~ N(0, C) of the mounts, εᵀHε/2 has the mean tr(HC)/2 and the covariance tr(HCH'C)/2.
@@ -27,7 +27,7 @@ def propagate_mount_squares(explained: Explained) -> Array:
     return mean_square
 
 
-def _find_curvatures(explained: Explained, turns_rad: Array) -> Array:
+def _find_curvatures(explained: VectorFit, turns_rad: Array) -> Array:
     """Return the second derivatives (6, E, E) of scale and bias with respect to E mount errors, per prior std.
 
     Errors of the rates change the estimate of F to F + D + S, with D of first and S of second order; k = 1/‖row of F‖.
@@ -47,7 +47,7 @@ def _find_curvatures(explained: Explained, turns_rad: Array) -> Array:
     return np.concatenate([of_scale, -second_order[..., 3]])
 
 
-def _find_regression(explained: Explained) -> Array:
+def _find_regression(explained: VectorFit) -> Array:
     """Return the linear map (3, 4, N) from mean readings to each row of F and its offset, with the mounts fixed."""
     inputs, solution, bias = explained.inputs, explained.solution, explained.bias
     design = design_matrix(inputs.rates_rad_s, None if solution.g_sensitivity is None else inputs.apparent_gravity_m_s2)

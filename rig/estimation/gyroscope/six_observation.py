@@ -37,8 +37,8 @@ def design(means_rad_s: ArrayLike) -> Array:
 def closed_form(means_rad_s: Array, speed_rad_s: float) -> tuple[Array, Array]:
     """Return scale (3,) and bias (3,) from exactly six mean readings (6, 3) at one speed by one linear solve.
 
-    With the p, q and γ of this module, at one speed p = ω² q and = ω² Γ / (1 + Γ) with Γ = Σ q_l² / (4 q_s). The design
-    is not checked; `Accumulator.solve` does that. Raise Fault `rank_deficient`, `negative_square`.
+    In this module's notation, at one speed p = ω² q, and γ = ω² Γ / (1 + Γ) with Γ = Σ q_l² / (4 q_s). The design is
+    not checked; `Accumulator.solve` does that. Raise Fault `rank_deficient`, `negative_square`.
     """
     square = speed_rad_s * speed_rad_s
     q = solve_linear(design(means_rad_s), np.ones(6))

@@ -21,12 +21,12 @@ from rig.estimation.gyroscope.budget import (
     split_bias_covariance,
 )
 from rig.estimation.gyroscope.six_observation import design
-from rig.estimation.gyroscope.vector_fit import Explained, VectorInputs
+from rig.estimation.gyroscope.vector_fit import VectorFit, VectorInputs
 
 AXIS_ANGLES = "angles between the axes"
 
 
-def six_observation_budget(explained: Explained, six: Solution, unknown: UnknownErrors, axes_rad: float) -> Budget:
+def six_observation_budget(explained: VectorFit, six: Solution, unknown: UnknownErrors, axes_rad: float) -> Budget:
     """Return the budget of the solution `six`, which uses only the sweeps of `explained`, weighted by their noise.
 
     `axes_rad` is the half-width of the angles between the sensor's axes about 90°.

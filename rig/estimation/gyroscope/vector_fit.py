@@ -136,7 +136,7 @@ class VectorInputs:
 
 
 @dataclass(frozen=True, slots=True)
-class Explained:
+class VectorFit:
     """The solution of the vector model, the bias drift, and the inputs of both.
 
     `nonlinearity` is None if all sweeps had one speed. `mounts` (3 S,) are the errors of the mounts as in
@@ -167,7 +167,7 @@ def centripetal_m_s2(turns_rad_s: Array, lever_arm_m: Array) -> Array:
     return inwards
 
 
-def explain(inputs: VectorInputs, nominal_mounting: Array, process: BiasProcess | None = None) -> Explained:
+def explain(inputs: VectorInputs, nominal_mounting: Array, process: BiasProcess | None = None) -> VectorFit:
     """Estimate scale, bias and mounting, and the g-sensitivity if the attitudes determine it.
 
     The bias drift is estimated from the means unless a `process` is given. Raise Fault as the vector model does.
@@ -213,7 +213,7 @@ def solver(
 
 def _explain(
     inputs: VectorInputs, mounting: Array, gravity_m_s2: Array | None, process: BiasProcess | None
-) -> Explained:
+) -> VectorFit:
     """Solve with a steady bias, take `process` or estimate it from the residuals, and solve again if it drifts."""
     several = len(inputs.speeds_rad_s) > 1
     arm_errors = inputs.arm_errors_rad_s
@@ -244,4 +244,4 @@ def _explain(
     curve = nonlinearity(errors.sizes[curved], errors.covariance[curved, curved]) if several else None
     count = 0 if inputs.mount_turns_rad is None else len(inputs.mount_turns_rad)
     mounts = slice(len(arm_errors) - count, len(arm_errors))
-    return Explained(solution, bias, inputs, curve, errors.sizes[mounts], errors.covariance[mounts, mounts])
+    return VectorFit(solution, bias, inputs, curve, errors.sizes[mounts], errors.covariance[mounts, mounts])

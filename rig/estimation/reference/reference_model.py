@@ -26,7 +26,7 @@ STEP_TOLERANCE = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class KnownVector:
-    """The prior v̄ (N, 3), body coordinates: the table's own motion in each attitude, for a gyroscope its rate."""
+    """A prior v̄ (N, 3), body coordinates, due to the table's motion: for a gyroscope, its rate in each attitude."""
 
     added: ArrayLike
 

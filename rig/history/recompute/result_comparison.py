@@ -91,7 +91,7 @@ class ParameterMove:
 
 @dataclass(frozen=True)
 class ComparedResult:
-    """A stated result, and the present `answer` from its recordings, or None; `of_u` as in `RecomputeOutcome`."""
+    """A stated result, and the `answer` recomputed from its recordings, or None; changes above `of_u` U count."""
 
     stated: StatedResult
     answer: Answer | None

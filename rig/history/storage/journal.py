@@ -47,7 +47,7 @@ def alone(connection: Connection) -> None:
 
 
 def note(connection: Connection, table: Table, *key: int | str) -> None:
-    """Add a line for the row with this primary key, and for a run's parts. The caller must have called `alone`."""
+    """Enter the `table`'s row with this primary key, and a run's parts, in the journal, after a call of `alone`."""
     before = head(connection)
     line = {
         "number": before.number + 1,

@@ -22,14 +22,14 @@ WRITE_OPTION = "rig_writes"  # execution option of a connection that will write
 
 
 @dataclass(slots=True)
-class _Shared:
+class _SharedEngine:
     """An engine and the number of its users."""
 
     engine: Engine
     users: int = 0
 
 
-_engines: dict[Path, _Shared] = {}
+_engines: dict[Path, _SharedEngine] = {}
 _sharing = threading.Lock()
 
 
@@ -39,7 +39,7 @@ def share_engine(file: Path, label: str) -> Iterator[Engine]:
     key = file.parent.resolve() / file.name
     with _sharing:
         if key not in _engines:
-            _engines[key] = _Shared(sqlite_engine(file, label))
+            _engines[key] = _SharedEngine(sqlite_engine(file, label))
         shared = _engines[key]
         shared.users += 1
     try:

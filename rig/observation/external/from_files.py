@@ -13,7 +13,7 @@ from rig.data.quantity import ACCELERATION, RATE, TEMPERATURE
 from rig.data.recording.motion_file import TIME, Columns, ExternalReadings, Item, MotionKind
 from rig.data.recording.provenance import Provenance, provenance_of_files
 from rig.data.recording.run_data import RunData
-from rig.data.recording.settings import Elsewhere, ObservationThresholds, RunSettings, Site
+from rig.data.recording.settings import ObservationThresholds, RunSettings, Site, SolveOptions
 from rig.errors import Refused
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from rig.motion.state_rows import ARM_STATE_DTYPE
@@ -51,7 +51,7 @@ class Files:
 
 
 def build_recording(
-    files: Files, site: Site, request: Elsewhere, *, second_order: bool = False, reference_c: float | None = None
+    files: Files, site: Site, request: SolveOptions, *, second_order: bool = False, reference_c: float | None = None
 ) -> RunData:
     """Return the recording of a calibration, over temperature if there is a reference temperature.
 

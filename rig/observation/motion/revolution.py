@@ -63,12 +63,12 @@ class Revolution:
 
     @property
     def speed_rad_s(self) -> float:
-        """Mean speed Δθ/T, of a revolution 2π/T, which vibration does not change."""
+        """Mean speed Δθ/T, which vibration does not change; Δθ is 2π for a revolution."""
         return float(self.angle_rad / self.duration_s)
 
     @property
     def speed_std_rad_s(self) -> float:
-        """Standard deviation of the mean speed."""
+        """Standard deviation of the mean speed, from that of the duration."""
         return self.speed_rad_s * self.duration_std_s / self.duration_s
 
 

@@ -64,7 +64,7 @@ def turn_speed(time_s: NDArray[np.float64], q_rad: NDArray[np.float64]) -> TurnS
 
 
 def _std_of_mean(later_s: NDArray[np.float64], time_s: NDArray[np.float64], beyond_rad: NDArray[np.float64]) -> float:
-    """Return the std of the mean of `beyond_rad`: differences of readings at `later_s`, interpolated, and single ones.
+    """Return the std of the mean of `beyond_rad` (n,): the angle interpolated at `later_s` (n,) minus reading i.
 
     With white errors e of the readings, difference i has the error (1 − w) e_j + w e_{j+1} − e_i. The scatter of the
     differences gives the variance of a single reading. The variance of their mean then follows from the total weight of

@@ -77,7 +77,7 @@ class OrderedStamps:
 
 @dataclass(frozen=True, slots=True)
 class _UnorderedLog:
-    """The remaining rows (m,) of a log, with `stamps_s` (m,) and `readings` (m, c)."""
+    """The rows (m,) of a log that are not left out, with `stamps_s` (m,) and `readings` (m, c)."""
 
     rows: NDArray[np.intp]
     stamps_s: Array

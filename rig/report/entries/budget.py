@@ -5,7 +5,7 @@ import numpy as np
 from rig.analysis.clock_comparison import ClockCheck
 from rig.data.entries.budget import BiasProcessEntry, BudgetEntry, ClockComparisonEntry, ClockEntry, ContributorEntry
 from rig.estimation.gyroscope.budget import Budget
-from rig.estimation.gyroscope.vector_fit import Explained
+from rig.estimation.gyroscope.vector_fit import VectorFit
 from rig.estimation.statistics.coverage import coverage_probability
 from rig.report.entry import entry, finite_or_none, list_dof
 
@@ -29,7 +29,7 @@ def budget_entry(budget: Budget) -> BudgetEntry:
     )
 
 
-def bias_process_entry(fit: Explained) -> BiasProcessEntry:
+def bias_process_entry(fit: VectorFit) -> BiasProcessEntry:
     """Return the fitted bias process of the rests and the time over which the bias was averaged."""
     return entry(
         BiasProcessEntry,

@@ -10,7 +10,7 @@ from rig.analysis.outcome import Outcome
 from rig.data.result_file import ResultDocument
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.earth_rate import EarthRate
-from rig.estimation.gyroscope.vector_fit import Explained
+from rig.estimation.gyroscope.vector_fit import VectorFit
 from rig.motion.geometry import flange_attitude
 from rig.observation.observed_run import ObservedRun
 from rig.report.figures.verification import Picture, envelope, write_pictures
@@ -44,11 +44,11 @@ def write_earth_rate_figures(outcome: Outcome, document: ResultDocument, folder:
     )
 
 
-def _draw(figure: "Figure", recording: ObservedRun, sensor: str, fit: Explained, earth: EarthRate) -> None:
+def _draw(figure: "Figure", recording: ObservedRun, sensor: str, fit: VectorFit, earth: EarthRate) -> None:
     draw_errors(figure, *errors(recording, sensor, fit, earth))
 
 
-def errors(recording: ObservedRun, sensor: str, fit: Explained, earth: EarthRate) -> tuple[Array, Array, Array]:
+def errors(recording: ObservedRun, sensor: str, fit: VectorFit, earth: EarthRate) -> tuple[Array, Array, Array]:
     """Return times (n,), the flange's rates (n, 3), and corrected readings minus the rates of flange and Earth (n, 3).
 
     Rates are in rad/s, averaged over 1 / `RATE_HZ`, in the flange's frame, at times with states of the arm.

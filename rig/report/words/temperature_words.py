@@ -26,7 +26,7 @@ def coverage_at_rows(rows: Sequence[AtTemperatureEntry], entry: OverTemperatureE
 
 
 def coverage_words(entry: OverTemperatureEntry) -> str:
-    """Return the coverage factors of the shown rows as printed."""
+    """Return the coverage factors, in words, of the printed rows of an entry's table."""
     return spell_factors(coverage_at_rows(shown_rows(entry), entry).ravel().tolist())
 
 

@@ -40,7 +40,7 @@ from rig.observation.by_hand.rests_and_moves import (
     replay_runs,
     rotate_face,
 )
-from rig.plans.by_hand import Open, WantedMoves, next_instruction, still_open
+from rig.plans.by_hand import RemainingMoves, WantedMoves, next_instruction, still_open
 from rig.runner.acquisition import Acquisition
 from rig.station.events import HandSeen, RunEvent
 
@@ -120,7 +120,7 @@ class HandSession:
             self.tell(self._describe())
 
     @property
-    def _open(self) -> Open:
+    def _open(self) -> RemainingMoves:
         return still_open(WantedMoves(self.settings.flips, self.settings.turns), self._accepted, self._lay)
 
     def _feed(self, batches: Sequence[NDArray[Any]]) -> None:

@@ -11,7 +11,7 @@ from rig.analysis.external.attitudes import solve_placed
 from rig.analysis.external.external_recordings import budget_of, solve_swept
 from rig.analysis.external.increment_calibration import IncrementCalibration
 from rig.data.quantity import ACCELERATION, RATE, Quantity
-from rig.data.recording.settings import Elsewhere, Site
+from rig.data.recording.settings import Site, SolveOptions
 from rig.errors import Fault, Refused
 from rig.observation.external.attitude_import import average_placements, read_attitudes
 from rig.observation.external.csv_import import ExternalData, average, average_sweeps, read_sweeps
@@ -23,7 +23,7 @@ from support.paths import DOCS
 EXAMPLES = DOCS / "examples"
 SCALE = np.array([1.1771, 1.1554, 1.1440])  # what the example was made with
 SITE = Site(up=(0, 0, -1.0), gravity_m_s2=9.80061, earth_rate_rad_s=None)
-ASKED = Elsewhere(any_mounting=False, find_clock=False, exact_rates=False)
+ASKED = SolveOptions(any_mounting=False, find_clock=False, exact_rates=False)
 
 
 def swept(row: int, factor: float) -> ExternalData:

@@ -11,7 +11,7 @@ import pytest
 from rig.analysis.analyses import calibrate
 from rig.data.quantity import ACCELERATION, RATE
 from rig.data.recording.motion_file import TIME, Item, samples_header
-from rig.data.recording.settings import Elsewhere, Site
+from rig.data.recording.settings import Site, SolveOptions
 from rig.errors import Refused
 from rig.observation.external.attitude_import import read_attitudes
 from rig.observation.external.csv_samples import read_sample_table, read_samples
@@ -73,7 +73,7 @@ def write_bag(path: Path, table: dict[str, Any], poses: dict[str, Any] | None = 
 def solved(samples: Path, sweeps: Path) -> np.ndarray:
     """Scale, bias and their covariance, as a gyroscope's readings and their sweeps give them."""
     item = Item("imu", "any", "1")
-    found = calibrate([build_recording(Files(samples, sweeps, "sweeps", item), STANDARD, Elsewhere())])
+    found = calibrate([build_recording(Files(samples, sweeps, "sweeps", item), STANDARD, SolveOptions())])
     (entry,) = document_of(found).gyroscopes.values()
     return np.concatenate([entry.scale, entry.bias_rad_s, np.ravel(entry.covariance)])
 

@@ -8,7 +8,15 @@ from rig.analysis.check import Check
 from rig.data.result_file import ResultDocument, read_result, write_result
 from rig.data.run_folder import RESULT
 from rig.page.replay import end_events
-from rig.station.events import Checked, DocumentWritten, Remembered, RunEvent, SamplesTaken, Since, VerdictReached
+from rig.station.events import (
+    Checked,
+    DocumentWritten,
+    LastCalibration,
+    Remembered,
+    RunEvent,
+    SamplesTaken,
+    VerdictReached,
+)
 from support.page.scripted_runs import ABOUT, moving, plan_demo
 from support.paths import RECORDINGS
 
@@ -69,7 +77,7 @@ def six_judged(folder: Path, *, passed: bool = True, broken: Collection[str] = (
     yield Remembered("the history", (12, 13), tuple(_since(document)))
 
 
-def _since(document: ResultDocument) -> Iterator[Since]:
+def _since(document: ResultDocument) -> Iterator[LastCalibration]:
     scale, bias = (
         document.gyroscopes["gyro" if "gyro" in document.gyroscopes else "lsm9ds1"].scale,
         (0.00766, -0.00977, -0.00452),
@@ -78,5 +86,5 @@ def _since(document: ResultDocument) -> Iterator[Since]:
     values = [*scale[:2], scale[2] - 0.004, *bias]
     before = {name: (value, 0.0012 if name[0] == "k" else 0.0005) for name, value in zip(names, values, strict=True)}
     errors = {name: 2.4 if name == "kz" else 0.3 for name in names}
-    yield Since("lsm9ds1", "rate", 8, "2026-11-20", before, errors, ("kz",))
-    yield Since("mpu9250", "rate", 9, "2026-11-20", before, {**errors, "kz": 0.4})
+    yield LastCalibration("lsm9ds1", "rate", 8, "2026-11-20", before, errors, ("kz",))
+    yield LastCalibration("mpu9250", "rate", 9, "2026-11-20", before, {**errors, "kz": 0.4})

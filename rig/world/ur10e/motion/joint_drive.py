@@ -49,7 +49,7 @@ class JointDrive:
     crosstalk: float = 0.0
 
     def shake(self, joint: int, u: float, v: float, a: float) -> list[Shaken]:
-        """Return the ripple of a joint at the angle `u`, rad, without ripple, with rate `v` and acceleration `a`.
+        """Return the ripple of a joint whose motion without ripple has angle `u`, rate `v`, acceleration `a` (rad, s).
 
         With crosstalk, also return the fraction of it that reaches each neighbour with a parallel axis.
         """

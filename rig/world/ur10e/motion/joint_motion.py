@@ -31,7 +31,7 @@ class Instant:
 
 
 class _Tick(NamedTuple):
-    """The execution of a tick: its start, the trajectory's time then, and the time scaling then with its derivative."""
+    """A tick's start, and at that moment the trajectory's time and the time scaling with its derivative."""
 
     start_s: float
     trajectory_s: float

@@ -250,7 +250,7 @@ def _tcp(robot: Robot, value: Arguments) -> None:
 
 
 def _digital_out(first: int) -> Callable[[Robot, Arguments], None]:
-    """Return the statement that sets an output, the outputs being numbered from bit `first`."""
+    """Return the statement that sets one of eight digital outputs, whose bits begin at bit `first`."""
 
     def put(robot: Robot, value: Arguments) -> None:
         number = int(value("0", "n"))
