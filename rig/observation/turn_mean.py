@@ -65,10 +65,10 @@ class SampledTurn:
 
 @dataclass(frozen=True, slots=True)
 class Lines:
-    """Spectral lines to remove: their `cycles` (k,) in the turn; the encoders do not show the last `not_encoded`.
+    """Spectral lines, by their `cycles` (k,) in the turn; the encoders do not measure the last `not_encoded` of them.
 
-    - `encoded` (n, m): columns of a slow ripple that the encoders measure, its changes, and the remainder of their
-      rate, mostly noise.
+    - `encoded` (n, m): columns to remove: a slow ripple that the encoders measure, its changes, and the remainder of
+      their rate, mostly noise.
     - `rate` (n, 0 to 2): further columns to remove. If few samples or a gap do not sample a ripple evenly, the rate
       itself; otherwise the changes of the slow ripple in a whole turn, which a lagging sensor reads too.
     """

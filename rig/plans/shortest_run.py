@@ -49,8 +49,8 @@ SectionT = TypeVar("SectionT", bound=Section)
 REPEATS = (1, 2, 3, 4, 6, 8, 12, 16)
 MAX_SIZE = 100  # sweeps or dwells of one plan
 RESTS_S = (1.0, 2.0, 3.0, 5.0, 10.0, 20.0)  # durations of a rest, and of a dwell, that are tried
-# The endless run is predicted from a plan of two repeats, because in a single one noise is too large relative to the
-# errors that repeats share. Other rests and more repeats reduce its U further, but by no more than this factor.
+# A run without end is predicted from a plan of two repeats, because in a single one noise is too large relative to the
+# errors that repeats share. Other rests and more repeats reduce U further, but by no more than this factor.
 PREDICTED_REPEATS, MAX_U_REDUCTION = 2, 2.0
 REPEAT_CAUSES = NOISE, BIAS_DRIFT, FLICKER, STATE_TIMES  # the budget lines that repeats reduce, also for accelerometers
 FLIP_COUNTS, TURN_COUNTS = (8, 10, 12, 16, 24, 36, 48), (0, 3, 6)

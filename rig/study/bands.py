@@ -25,7 +25,7 @@ PUBLISHED = {
     "extreme": {0.035: (3.0e-3, 3.0e-3), 0.2: (1.8e-2, 1.8e-2)},
 }
 SPEEDS = {"3 rad/s": sim.FAST_SPEED_RAD_S, "60°/s": sim.ARM_SPEED_RAD_S}
-WHISKER = 1.5  # length of a box plot's whiskers, in boxes
+WHISKER = 1.5  # length of a box plot's whiskers, in interquartile ranges
 
 
 @dataclass(frozen=True, slots=True)

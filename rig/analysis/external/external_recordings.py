@@ -221,7 +221,7 @@ def solve_swept(data: ExternalData, estimator: BySweeps | None) -> Estimate:
 
 
 def budget_of(solution: Estimate, data: ExternalData) -> Budget:
-    """Return the budget of a sensor's covariance: the scatter of means, and the errors of the stated motion."""
+    """Return the budget of a `solution`, whose contributors are the means' scatter and errors of the stated motion."""
     if data.turned is None or not isinstance(solution, TurnedSolution):
         vector = solution if isinstance(solution, VectorSolution) else _vector(data)
         errors, covariance = sweep_errors(vector, data), solution.covariance

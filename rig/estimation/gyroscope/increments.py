@@ -150,7 +150,7 @@ def _find_slopes(time_s: Array, rates: Array) -> _Interval:
 
 
 def _integrate_block(interval: _Interval, at_s: Array, inverse: Array) -> tuple[Array, Array, Array]:
-    """Return attitudes C and sensitivities S relative to the block's start, at its k instants and end, and k rates."""
+    """Return C (k + 1, 3, 3) and S (k + 1, 3, 12) from the block's start to `at_s` (k,) and its end; rates (k, 3)."""
     before = np.clip(np.searchsorted(interval.time_s, at_s, side="right") - 1, 0, len(interval.time_s) - 2)
     whole = _whole_steps(interval)
     attitudes = _running_product(whole.vectors)

@@ -37,7 +37,7 @@ class Chart:
 
     @property
     def out_of_control(self) -> Alarms:
-        """Whether the newest result raised an alarm (…)."""
+        """Whether the newest result of each chart raised an alarm."""
         newest: Alarms = self.alarm[..., -1]
         return newest
 
@@ -78,12 +78,12 @@ def step(average: Array, deviation: Array, before: int) -> tuple[Array, float]:
 
 
 def raise_alarms(deviation: Array, average: Array, limit: float | Array) -> Alarms:
-    """Return whether the deviation exceeds Shewhart's limit or the EWMA `average` its `limit` (…)."""
+    """Return whether each deviation exceeds Shewhart's limit or its EWMA `average` the `limit`."""
     return (np.abs(deviation) > SHEWHART_LIMIT) | (np.abs(average) > limit)
 
 
 def _deviation(values: Array, std: Array, counted: Alarms) -> Array:
-    """Return the last result's deviation (…) from the earlier ones (…, i) as a standard normal deviate.
+    """Return the deviation (…) of the last of results (…, i + 1) from the others, as a standard normal deviate.
 
     With equal stds, of any size, it is Student's (x − x̄)/(s √(1 + 1/n)) converted to a normal deviate; otherwise
     weights include the variance between runs (as in `random_effects.fit`).

@@ -152,7 +152,7 @@ def _has_late(time_s: Array, single: _PeriodCandidate) -> bool:
 
 
 def _list_wider(time_s: Array) -> list[_PeriodCandidate]:
-    """Return the candidates that span several readings, narrowest first, without those with a beat."""
+    """Return the candidates that span several readings, narrowest first, without those that `_lost_regularly`."""
     widths = takewhile(lambda width: 4 * width <= len(time_s), WIDTHS[1:])
     wider = (_count_missing(time_s, width, quantile) for width in widths for quantile in (MEDIAN, LOW_QUANTILE))
     return [candidate for candidate in wider if not _lost_regularly(candidate.missing)]
@@ -204,7 +204,7 @@ def _count_missing(time_s: Array, width: int, quantile: float) -> _PeriodCandida
 
 
 def _lost_regularly(missing: NDArray[np.intp]) -> bool:
-    """Return whether readings (n − 1,) are missing more regularly than by chance: a beat of two clocks, not losses.
+    """Return whether `missing` readings (n − 1,) recur more regularly than by chance: a beat of two clocks, not losses.
 
     It occurs if the stamps of a polled port are multiples of a time shorter than the interval. A logger that loses
     every n-th reading looks alike, but hardly loses as many.
