@@ -6,7 +6,7 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 
 from rig.batch.batch_state import BatchPart, Doubt
-from rig.batch.part_list import following
+from rig.batch.part_list import next_serial_number
 from rig.errors import Refused, RigError
 from rig.station.plain_text import say
 from rig.station.questions import COMMAND_WORDS, Kind, Question, Voice, is_agreed, question_before
@@ -38,7 +38,7 @@ class Operator:
     def next_part(self, done: Sequence[BatchPart], why: str = "") -> str | None:
         """Return the next serial number, from the list or typed; `why`: the reason if the last one was refused."""
         if self.numbers is not None:
-            return following(self.numbers, [part.serial for part in done])
+            return next_serial_number(self.numbers, [part.serial for part in done])
         text = f"part {len(done) + 1}, serial number (Enter alone ends):"
         question = Question("number", text, (f"{why}.",) if why else ())
         while (answer := self._answer(question)) is not None and answer.lower() in COMMAND_WORDS:

@@ -11,7 +11,7 @@ from starlette.responses import PlainTextResponse, Response
 from starlette.routing import Route
 
 from rig.batch.status import Now, Present, last
-from rig.page.server.application import acting, body_of
+from rig.page.server.application import body_of, require_token
 from rig.page.server.control import Control
 from rig.page.server.guard import Door
 from rig.page.server.sections import Sections
@@ -81,8 +81,8 @@ class PageOperator:
             return Response(status_code=202)
 
         return [
-            Route("/say", acting(door, say), methods=["POST"]),
-            Route("/stop", acting(door, stop), methods=["POST"]),
+            Route("/say", require_token(door, say), methods=["POST"]),
+            Route("/stop", require_token(door, stop), methods=["POST"]),
         ]
 
 

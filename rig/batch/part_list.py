@@ -35,7 +35,7 @@ def _unfit(path: Path, why: str) -> Refused:
     )
 
 
-def following(numbers: Sequence[str], done: Sequence[str]) -> str | None:
+def next_serial_number(numbers: Sequence[str], done: Sequence[str]) -> str | None:
     """Return the first serial number that is not done yet; None if all are done. Raise Refused `another_series`."""
     if tuple(done) != tuple(numbers[: len(done)]):
         raise Refused(

@@ -5,7 +5,7 @@ from typing import Any
 
 from firmware_host.problem import printable
 
-__all__ = ["listing", "printable", "printable_lines", "quote", "shorten"]
+__all__ = ["list_first", "printable", "printable_lines", "quote", "shorten"]
 MAX_CHARACTERS = 60
 MAX_NAMES = 12
 
@@ -26,7 +26,7 @@ def quote(value: Any) -> str:
     return shorten(repr(value))
 
 
-def listing(names: Iterable[str]) -> str:
+def list_first(names: Iterable[str]) -> str:
     """Return the first of many names, which are already shortened, and the number of the others."""
     every = list(names)
     more = len(every) - MAX_NAMES

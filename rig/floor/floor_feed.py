@@ -22,7 +22,7 @@ POLL_S = 0.5  # a dead rig (3.5 s) must be shown as such within 5 s
 
 
 @contextmanager
-def looking(address: HistoryAddress) -> Iterator[Sections]:
+def polled_feed(address: HistoryAddress) -> Iterator[Sections]:
     """Keep a feed up to date during the block, from a history that is only read."""
     feed, over = Sections(), threading.Event()
     feed.put(history={"label": address.label, "silent": None})

@@ -256,7 +256,7 @@ class History:
     def _writing(self) -> Iterator[Connection]:
         """Begin a transaction that enters rows, and read the rows back after it."""
         with self.engine.connect().execution_options(**{WRITE_OPTION: True}) as connection, connection.begin():
-            journal.alone(connection)
+            journal.lock_out_writers(connection)
             before = journal.head(connection)
             yield connection
             after = journal.head(connection)

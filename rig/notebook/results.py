@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from rig.data.latest_run import meant_run
-from rig.data.recording.settings import setting
+from rig.data.recording.settings import setting_path
 from rig.data.result_file import CheckEntry, ResultDocument, read_result
 from rig.notebook.calibrations import HEADINGS, U_TEXT, Calibration, CharacteristicValue, rows
 from rig.notebook.frames import frame
@@ -135,7 +135,7 @@ def solve(run: Run | str | Path, estimator: str | None = None, **changes: float)
     possible changes.
     """
     run = run if isinstance(run, Run) else load(run)
-    overrides = [f"{setting(key)}={value!r}" for key, value in changes.items()]
+    overrides = [f"{setting_path(key)}={value!r}" for key, value in changes.items()]
     return Result(document_of(judge_phases(run.recorded.override_settings(overrides), estimator)))
 
 

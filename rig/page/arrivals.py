@@ -37,7 +37,7 @@ class Arrivals:
         return {name: round(now_s - arrived_s, 1) for name, arrived_s in self._arrived_s.items()}
 
     def _take_state(self, q_rad: tuple[float, ...], time_s: float, now_s: float) -> bool:
-        """Note a state's arrival; a state without joints is ignored."""
+        """Return whether a state with joints is new, and note its arrival."""
         if not q_rad or time_s == self._state_s:
             return False
         self._state_s = time_s

@@ -33,7 +33,7 @@ from rig.batch.batch_state import (
 from rig.batch.batch_table import csv_of, page_of, summary
 from rig.batch.label import Label, files_of, zpl
 from rig.batch.operators import Operator
-from rig.batch.part_list import following, numbers_in
+from rig.batch.part_list import next_serial_number, numbers_in
 from rig.batch.part_sequence import Bench, Desk, Work
 from rig.commands.station import station
 from rig.config.judging.station_section import StationSection
@@ -302,7 +302,7 @@ def test_a_list_of_parts_is_a_column_or_a_line_each(tmp_path: Path) -> None:
 
 
 def test_another_list_than_the_batch_was_begun_with_is_refused() -> None:
-    assert following(["a", "b"], ["a"]) == "b"
-    assert following(["a", "b"], ["a", "b"]) is None
+    assert next_serial_number(["a", "b"], ["a"]) == "b"
+    assert next_serial_number(["a", "b"], ["a", "b"]) is None
     with pytest.raises(Refused, match="another_series"):
-        following(["a", "b"], ["b"])
+        next_serial_number(["a", "b"], ["b"])

@@ -6,7 +6,7 @@ import pytest
 
 from rig.config.judging.verdict_limits import LIMITS, Limits, Need
 from rig.config.load import ConfigurationRefused, load, parse
-from rig.data.recording.settings import setting, settings_from_json, settings_of
+from rig.data.recording.settings import setting_path, settings_from_json, settings_of
 from rig.plans.phase import first_phase
 from rig.plans.procedure_registry import load_procedures
 from support.paths import CONFIGS
@@ -21,7 +21,7 @@ def test_every_limit_is_configured_recorded_and_changed_under_one_key() -> None:
     recorded = json.loads(made.to_json())["limits"]
     assert recorded == limits
     assert settings_from_json(made.to_json()).limits == Limits(**limits)
-    changed = made.apply_overrides([f"{setting(key)}={2 * limit}" for key, limit in limits.items()])
+    changed = made.apply_overrides([f"{setting_path(key)}={2 * limit}" for key, limit in limits.items()])
     assert changed.limits == Limits(**{key: 2 * limit for key, limit in limits.items()})
 
 

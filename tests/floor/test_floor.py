@@ -16,7 +16,7 @@ from rig.batch.batch_state import Begun, PartBegun, PartEnded, state_of
 from rig.batch.status import Now, Present, after, last, update_by_batch
 from rig.errors import Fault, Refused
 from rig.floor import floor_content
-from rig.floor.floor_feed import looking
+from rig.floor.floor_feed import polled_feed
 from rig.floor.heartbeat import heartbeat
 from rig.history import stations
 from rig.history.stations import StationState
@@ -132,7 +132,7 @@ def states_become(feed: Sections, wanted: dict[str, str]) -> None:
 @pytest.mark.slow
 def test_what_stations_tell_a_history_is_on_the_floor(tmp_path: Path) -> None:
     where = resolve_address(str(tmp_path / "history.sqlite"))
-    with open_history(where), looking(where) as feed:
+    with open_history(where), polled_feed(where) as feed:
         with heartbeat("bench 1", where, Now("running")), heartbeat("bench 2", where, Now("waiting")) as second:
             states_become(feed, {"bench 1": "running", "bench 2": "waiting"})
             second.hear(Now("fault", doing="board_link_lost: the cable was pulled out"))

@@ -9,7 +9,7 @@ from selenium.webdriver import Chrome
 from selenium.webdriver.common.by import By
 
 from rig.batch.status import Now
-from rig.floor.floor_feed import looking
+from rig.floor.floor_feed import polled_feed
 from rig.history import stations
 from rig.history.storage.address import resolve_address
 from rig.history.store import open_history
@@ -44,7 +44,7 @@ def feed(tmp_path: Path) -> Iterator[Sections]:
             history.enter(finish_run(days - ago, serial_number="CHECK", rig="bench 1", check_standard=True))
         for rig, now in SAID.items():
             stations.tell(history.engine, rig, "lab-1", now.json())
-        with looking(where) as found:
+        with polled_feed(where) as found:
             yield found
 
 

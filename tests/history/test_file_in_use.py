@@ -17,7 +17,7 @@ from rig.commands.history.run_serials import recall_sensors
 from rig.config.files.regular_file import UnfitFile, read_regular_file
 from rig.config.load import load
 from rig.errors import Refused
-from rig.floor.floor_feed import looking
+from rig.floor.floor_feed import polled_feed
 from rig.history.store import open_history
 from rig.notebook.notebook_history import calibrations
 from rig.station.events import NotRemembered, Remembered
@@ -202,7 +202,7 @@ def test_the_floor_says_that_its_history_is_gone_and_begins_none(file: Path) -> 
     with open_history(str(file)) as history:
         history.enter(finish_run(0))
         place = history.address
-    with looking(place) as feed:
+    with polled_feed(place) as feed:
         wait_for(lambda: b'"today"' in feed.whole(), "what the history has")
         remove(file)
         wait_for(lambda: b"existed before and is gone" in feed.whole(), "that it is gone")

@@ -118,7 +118,7 @@ def judge_readings(
 
 
 def _count_constant_bits(counts: NDArray[np.int64]) -> int:
-    """Count the bits, over the axes, that never change although the readings' range contains both values."""
+    """Count the bits of all axes that never change, although the readings' range contains numbers with either value."""
     constant = 0
     for axis in counts.T:
         if len(np.unique(axis)) < MIN_DISTINCT_VALUES:
@@ -129,7 +129,7 @@ def _count_constant_bits(counts: NDArray[np.int64]) -> int:
 
 
 def _count_uneven_bits(windows: Sequence[RawReadings], noise: Array, critical_value: float) -> int:
-    """Count the bits, well below the noise, that are not set in half of the readings."""
+    """Count the bits of all axes, well below the noise, that are not set in half of the readings."""
     uneven = 0
     counts = np.concatenate([window.counts for window in windows])
     for axis in range(3):

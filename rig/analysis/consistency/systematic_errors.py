@@ -19,7 +19,7 @@ from rig.config.judging.judging_keys import ExternalResult
 from rig.data.recording.settings import Uncertainty
 from rig.estimation.arrays import Array
 from rig.estimation.earth import EARTH_RATE_RAD_S
-from rig.estimation.gyroscope.nonlinearity import CUBE_DEVIATION, bending, curvature
+from rig.estimation.gyroscope.nonlinearity import CUBE_DEVIATION, curvature, nonlinear_effects
 from rig.estimation.gyroscope.own_errors import SensorProperties, list_own_errors, rounding_errors
 from rig.motion.geometry import AXIS_ERRORS, WAVES, WRIST_1, WRIST_2, WRIST_3
 from rig.observation.consistency.raw_readings import REST
@@ -333,7 +333,7 @@ def _nonlinearity_patterns(intervals: Sequence[MotionInterval], matrix: Array, c
     for interval in intervals:
         edges = np.linspace(interval.start_s, interval.end_s, TRANSFER_STEPS + 1)
         rates = interval.motion.rate((edges[1:] + edges[:-1]) / 2)
-        bent = curvature(matrix, rates) if curve.free else bending(matrix, rates, curve.full_scale_rad_s)
+        bent = curvature(matrix, rates) if curve.free else nonlinear_effects(matrix, rates, curve.full_scale_rad_s)
         by_interval.append(bent.mean(axis=1))
     sizes = np.ones(6) if curve.free else np.repeat([curve.cube, curve.square], 3)
     return np.asarray(sizes[:, None, None] * np.stack(by_interval, axis=1), dtype=np.float64)

@@ -13,7 +13,7 @@ from rig.estimation.reference.accelerometer_model import (
     SHARED_ERRORS,
     SIZE_RATIO,
     Movement,
-    turned,
+    arm_effects,
 )
 from rig.motion.chain import DenavitHartenberg
 from rig.motion.geometry import WRIST_1, angle_waves, flange_attitude, flange_errors
@@ -44,7 +44,7 @@ class StatedArm:
 
 def arm_patterns(theta: Array, movement: Movement, postures: Sequence[Posture], stated: StatedArm) -> Array:
     """Return the changes (18, 3 K) of the readings that one standard uncertainty of each wrist error causes."""
-    by_turns = turned(theta, replace(movement, sweeps=movement.sweeps.alone()))
+    by_turns = arm_effects(theta, replace(movement, sweeps=movement.sweeps.alone()))
     stated_rad = np.radians(stated.axis_deg) / np.sqrt(3) * _error_fractions()
     std_rad = np.maximum(stated_rad, stated.estimated_rad)
     patterns: Array = std_rad[:, None] * (_stack_rotations(postures, stated.arm, stated.mounting) @ by_turns.T)

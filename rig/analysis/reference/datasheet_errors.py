@@ -24,10 +24,10 @@ from rig.estimation.gyroscope.own_errors import (
 from rig.estimation.reference.accelerometer_errors import AccelerometerErrors
 from rig.estimation.reference.accelerometer_model import Movement
 from rig.estimation.reference.reading_errors import (
-    bending,
+    bias_flicker,
     bias_warming,
     find_drift_covariance,
-    flickering,
+    nonlinearity_patterns,
     scale_warming,
 )
 from rig.estimation.reference.reference_budget import FitUncertainty
@@ -167,14 +167,14 @@ def separate_sensor_errors(
     """
     drift, flicker = (
         spread.response @ shared @ spread.response.T
-        for shared in (find_drift_covariance(movement), flickering(movement))
+        for shared in (find_drift_covariance(movement), bias_flicker(movement))
     )
     warm = "; ".join(filter(None, (PART_SOURCE, datasheet.temperature_words)))
     of_range = f"% of {datasheet.over_g:.3g} g"
     by_sheet = {
         BIAS_OVER_TEMPERATURE: (datasheet.bias_mg_k, "mg/K", warm, bias_warming(movement)),
         SCALE_OVER_TEMPERATURE: (datasheet.scale_ppm_k, "ppm/K", warm, scale_warming(theta, movement)),
-        NONLINEARITY: (datasheet.nonlinearity_percent, of_range, PART_SOURCE, bending(theta, movement)),
+        NONLINEARITY: (datasheet.nonlinearity_percent, of_range, PART_SOURCE, nonlinearity_patterns(theta, movement)),
     }
     stability = f"least Allan deviation: {datasheet.bias_instability_ug:.3g} µg"
     lines = [

@@ -280,13 +280,13 @@ def _recompute_finished(folder: Path, history: History, *, solve: bool) -> Finis
                 f"{folder} has a {RESULT} but no recording from which it can be computed",
                 "Import the folder with its recordings",
             )
-    from rig.history.entered.recomputed_result import not_given
+    from rig.history.entered.recomputed_result import differing_parts
     from rig.history.integrity import MAX_SHOWN
     from rig.plans.recorded_run import judge_phases, open_run
     from rig.report.document import document_of
 
     document = document_of(judge_phases(open_run(folder)))
-    differing = list[str]() if claimed is None else not_given(claimed.document, document)
+    differing = list[str]() if claimed is None else differing_parts(claimed.document, document)
     if claimed is not None and not differing:
         return claimed
     if not solve:

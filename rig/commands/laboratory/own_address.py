@@ -55,7 +55,7 @@ def _candidate_addresses() -> Iterator[str]:
 
 
 def _take_if_free(host: str, stack: ExitStack) -> bool:
-    """Claim an address if it is free: no other rig or laboratory uses it, and no program listens there."""
+    """Claim an address, and return True, if no other rig or laboratory uses it and no program listens there."""
     with ExitStack() as claims, socket.socket() as probe:
         try:
             claims.enter_context(claim_laboratory(host))

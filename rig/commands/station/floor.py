@@ -20,7 +20,7 @@ def run(options: Namespace) -> int:
 
     Return 0. Raise Refused `page_address`, `no_history`, and as `open_history` does.
     """
-    from rig.floor.floor_feed import looking
+    from rig.floor.floor_feed import polled_feed
     from rig.history.storage.address import default_history_address
     from rig.history.storage.continuity import is_there
     from rig.history.store import open_history
@@ -35,7 +35,7 @@ def run(options: Namespace) -> int:
         pass  # an unreadable history is refused before there is a page
     address = PageWish(options.page_address, read_page_token(options)).address()
     with (
-        looking(shared) as feed,
+        polled_feed(shared) as feed,
         serving(feed, Control(may_answer=False), None, address, Page("floor.html")) as url,
     ):
         say(f"page: {url}", sys.stderr)

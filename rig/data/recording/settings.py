@@ -446,7 +446,7 @@ def _override(settings: RunSettings, item: str) -> RunSettings:
         raise Refused("wrong_setting", str(error), f"Give a number, for example {path}=0.001") from None
 
 
-def setting(key: str) -> str:
+def setting_path(key: str) -> str:
     """Return the full path of a threshold or limit: `observation.max_lost_fraction` for `max_lost_fraction`."""
     return next((path for path in _settable() if path.rpartition(".")[2] == key), key)
 

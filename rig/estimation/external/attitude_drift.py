@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from rig.estimation.arrays import Array, rotation_vectors
 from rig.estimation.earth import EARTH_RATE_RAD_S
-from rig.estimation.gyroscope.increments import course
+from rig.estimation.gyroscope.increments import integrate_attitudes
 from rig.estimation.statistics.bias_process import walk_covariance
 from rig.estimation.statistics.variance_components import Mixed
 
@@ -128,7 +128,7 @@ def average_fixes(recorded: AttitudeSamples, state: DriftState) -> FixedAttitude
     """Return the mean attitude of each fix, minus the motion that the gyroscope measures with a state's parameters."""
     fixes, time_s = recorded.fixes, recorded.time_s
     at_s = np.clip(fixes.at_s + state.clock_s, time_s[0], time_s[-1])
-    integrated = course(time_s, recorded.readings, state.matrix, state.bias, at_s)
+    integrated = integrate_attitudes(time_s, recorded.readings, state.matrix, state.bias, at_s)
     samples = fixes.attitudes @ np.swapaxes(integrated.attitudes, -1, -2)
     turning = (integrated.attitudes @ integrated.rates_rad_s[..., None])[..., 0]
     count = len(fixes.placement)

@@ -72,7 +72,7 @@ class Increments:
     jacobian: Array
 
 
-def course(time_s: Array, readings: Array, matrix: Array, bias: Array, at_s: Array) -> IntegratedAttitudes:
+def integrate_attitudes(time_s: Array, readings: Array, matrix: Array, bias: Array, at_s: Array) -> IntegratedAttitudes:
     """Integrate rates to attitudes at the instants `at_s` (k,).
 
     Readings (n, 3) in rad/s at times (n,) are corrected by F (3, 3) and b (3,). Raise ValueError unless times increase
@@ -99,7 +99,7 @@ def course(time_s: Array, readings: Array, matrix: Array, bias: Array, at_s: Arr
 
 
 def track(time_s: Array, readings: Array, matrix: Array) -> Track:
-    """Integrate readings without bias, at their own times. Other arguments: see `course`."""
+    """Integrate readings without bias, at their own times. Other arguments: see `integrate_attitudes`."""
     inverse = np.asarray(np.linalg.inv(matrix), dtype=np.float64)
     interval = _find_slopes(time_s, readings @ inverse.T)
     steps = _whole_steps(interval)
@@ -111,9 +111,9 @@ def track(time_s: Array, readings: Array, matrix: Array) -> Track:
 
 
 def increments(time_s: Array, readings: Array, matrix: Array, bias: Array, windows_s: Array) -> Increments:
-    """Return the rotations over windows (w, 2) [start, end], which may overlap. Other arguments: see `course`."""
+    """Return the rotations over windows (w, 2) [start, end], which may overlap. See also `integrate_attitudes`."""
     at_s, index = np.unique(windows_s, return_inverse=True)
-    path = course(time_s, readings, matrix, bias, at_s)
+    path = integrate_attitudes(time_s, readings, matrix, bias, at_s)
     start, end = index.reshape(-1, 2).T
     inverse = np.swapaxes(path.attitudes[start], -1, -2)
     return Increments(inverse @ path.attitudes[end], inverse @ (path.sensitivities[end] - path.sensitivities[start]))

@@ -44,7 +44,7 @@ def curvature(matrix: Array, rates_rad_s: Array) -> Array:
     return PRIOR_STD_PER_RAD_S * np.array([gain * axis for gain in gains for axis in np.eye(3)])
 
 
-def bending(matrix: Array, rates_rad_s: Array, full_scale_rad_s: float, true_at_rad_s: float = 0.0) -> Array:
+def nonlinear_effects(matrix: Array, rates_rad_s: Array, full_scale_rad_s: float, true_at_rad_s: float = 0.0) -> Array:
     """Return the effects (6, N, 3) of cubes along x, y, z, then of squares, each of unit size at full scale.
 
     Arguments as in `curvature`; F is exact at the speed `true_at_rad_s`.

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig.estimation.arrays import Array
-from rig.estimation.gyroscope.nonlinearity import CUBE_DEVIATION, SQUARE_DEVIATION, bending
+from rig.estimation.gyroscope.nonlinearity import CUBE_DEVIATION, SQUARE_DEVIATION, nonlinear_effects
 
 NONLINEARITY = "nonlinearity"
 BIAS_OVER_TEMPERATURE, SCALE_OVER_TEMPERATURE = "bias over temperature", "scale over temperature"
@@ -65,7 +65,7 @@ def list_own_errors(
     along the axis, so its scale may differ. With several speeds the model contains the nonlinearity.
     """
     if len(speeds_rad_s) == 1:
-        unit_curves = bending(matrix, turns_rad_s, sensor.full_scale_rad_s, speeds_rad_s[0])
+        unit_curves = nonlinear_effects(matrix, turns_rad_s, sensor.full_scale_rad_s, speeds_rad_s[0])
         coefficients = sensor.nonlinearity / np.repeat([CUBE_DEVIATION, SQUARE_DEVIATION], 3)[:, None, None]
         yield OwnError(NONLINEARITY, 100 * sensor.nonlinearity, "% of full scale", coefficients * unit_curves)
     duration_s = np.diff(windows_s)[:, 0]

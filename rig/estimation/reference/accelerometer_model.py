@@ -259,10 +259,10 @@ def effects(theta: Array, movement: Movement) -> Array:
 
 def split_effects(theta: Array, movement: Movement) -> tuple[Array, Array | None]:
     """Return the columns of `effects` in two parts: independent errors, and the wrists' constant ones if known."""
-    independent = turned(theta, movement)
+    independent = arm_effects(theta, movement)
     if movement.arm_turns is None:
         return independent, None
-    return independent, turned(theta, replace(movement, sweeps=movement.sweeps.alone())) @ movement.arm_turns.T
+    return independent, arm_effects(theta, replace(movement, sweeps=movement.sweeps.alone())) @ movement.arm_turns.T
 
 
 def combine_effects(independent: Array, constant: Array | None, fraction: float) -> Array:
@@ -272,7 +272,7 @@ def combine_effects(independent: Array, constant: Array | None, fraction: float)
     return np.concatenate([np.sqrt(fraction) * independent, np.sqrt(1 - fraction) * constant], axis=1)
 
 
-def turned(theta: Array, movement: Movement) -> Array:
+def arm_effects(theta: Array, movement: Movement) -> Array:
     """Return the effect (3 K, P) of the arm's errors on the readings; `effects` names the columns."""
     count, sweeps = len(movement.dwells.readings_m_s2), movement.sweeps
     gravity, s = project_reference(theta[DELAY], movement), find_force(theta, movement)

@@ -26,10 +26,10 @@ from rig.estimation.reference.accelerometer_model import (
     Dwells,
     Movement,
     Sweeps,
+    arm_effects,
     effects,
     jacobian,
     predicted,
-    turned,
 )
 from rig.estimation.reference.attitude_error import AttitudeError
 from rig.estimation.reference.imu_fit import (
@@ -182,7 +182,7 @@ def _find_worst_dwell(start: Array, movement: Movement, fixed: list[int], fit: F
     worst = int(np.argmax(misfit))
     rest = most_likely(start, movement.omit(worst), fixed, None)
     missed = (movement.readings() - predicted(rest.theta, movement))[worst]
-    rotation = turned(rest.theta, movement)[3 * worst : 3 * worst + 3, 3 * worst : 3 * worst + 3]
+    rotation = arm_effects(rest.theta, movement)[3 * worst : 3 * worst + 3, 3 * worst : 3 * worst + 3]
     error_rad = np.linalg.lstsq(rotation, missed, rcond=1e-6)[0]  # rotations about the reference are not identifiable
     return worst, float(np.linalg.norm(error_rad)), rest.std_rad
 

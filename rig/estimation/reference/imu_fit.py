@@ -21,7 +21,7 @@ from rig.estimation.reference.accelerometer_model import (
     split_effects,
 )
 from rig.estimation.reference.attitude_error import CONVERGED_CHANGE_RATIO, MAX_ITERATIONS
-from rig.estimation.reference.reading_errors import noise, select_sweeps, walking
+from rig.estimation.reference.reading_errors import noise, select_sweeps, unit_walk
 from rig.estimation.reference.reference_model import REFERENCE, STEP_LIMIT, STEP_TOLERANCE, free_directions
 from rig.estimation.reference.shared_errors import Decorrelation, decorrelate, estimate_common_error
 from rig.estimation.statistics.expected_variances import ResidualInputs, estimate_disturbances, estimate_variances
@@ -122,7 +122,7 @@ def refit_with_components(
     residuals = (movement.readings() - predicted(fit.theta, movement)).ravel()
     modelled, variances = noise(fit.theta, movement), np.diag(movement.noise())
     of_arm = partial(combine_effects, *split_effects(fit.theta, movement))
-    scattered = ResidualInputs(residuals, fit.jacobian, modelled, of_arm, walking(sensor, movement), variances)
+    scattered = ResidualInputs(residuals, fit.jacobian, modelled, of_arm, unit_walk(sensor, movement), variances)
     components = estimate_variances(scattered, independent_fractions)
     unit = float(np.sqrt(np.median(variances)))
     separate = [np.diag(np.sqrt(variances))[:, segment] for segment in movement.segments()]

@@ -17,8 +17,8 @@ from rig.estimation.reference.accelerometer_model import (
     SHARED_ERRORS,
     SIZE_RATIO,
     Movement,
+    arm_effects,
     find_force,
-    turned,
 )
 from rig.estimation.reference.reference_model import matrix
 from rig.estimation.statistics.bias_process import flicker_covariance, flicker_harmonic_covariance, walk_covariance
@@ -29,14 +29,14 @@ ANGLES_PER_REVOLUTION = 72  # at which nonlinear functions of the acceleration a
 def noise(theta: Array, movement: Movement) -> Array:
     """Return the covariance (3 K, 3 K) of the readings from all errors except the arm's attitude errors."""
     covariance = (
-        movement.noise() + _not_repeated(theta, movement) + flickering(movement) + find_drift_covariance(movement)
+        movement.noise() + _repeatability(theta, movement) + bias_flicker(movement) + find_drift_covariance(movement)
     )
-    for patterns in (bending(theta, movement), bias_warming(movement), scale_warming(theta, movement)):
+    for patterns in (nonlinearity_patterns(theta, movement), bias_warming(movement), scale_warming(theta, movement)):
         covariance += patterns.T @ patterns
     return np.asarray(covariance, dtype=np.float64)
 
 
-def bending(theta: Array, movement: Movement) -> Array:
+def nonlinearity_patterns(theta: Array, movement: Movement) -> Array:
     """Return the patterns (P, 3 K) of one standard uncertainty of φ and χ, the nonlinearity, of each axis."""
     sensor = movement.sensor_errors
     if sensor is None:
@@ -80,7 +80,7 @@ def _warmer_k(sensor: AccelerometerErrors, movement: Movement) -> tuple[Array, A
     return repeat_by_segment(sensor.warmer_k, movement), repeat_by_segment(sensor.unseen_k, movement)
 
 
-def flickering(movement: Movement) -> Array:
+def bias_flicker(movement: Movement) -> Array:
     """Return the covariance (3 K, 3 K) of the bias's stated flicker."""
     sensor = movement.sensor_errors
     if sensor is None or not sensor.instability_m_s2:
@@ -95,7 +95,7 @@ def find_drift_covariance(movement: Movement) -> Array:
     """Return the covariance (3 K, 3 K) of the estimated bias drift: random walk and segments' disturbances."""
     sensor, covariance = movement.sensor_errors, np.zeros((movement.readings().size,) * 2)
     if sensor is not None and sensor.walk_m_s2_sqrt_s:
-        covariance += sensor.walk_m_s2_sqrt_s**2 * walking(sensor, movement)
+        covariance += sensor.walk_m_s2_sqrt_s**2 * unit_walk(sensor, movement)
     if sensor is not None and sensor.louder is not None:
         covariance += np.diag(np.repeat(repeat_by_segment(sensor.louder, movement), 3) * np.diag(movement.noise()))
         turning = sensor.turning_m_s2 * select_sweeps(movement)
@@ -103,7 +103,7 @@ def find_drift_covariance(movement: Movement) -> Array:
     return covariance
 
 
-def walking(sensor: AccelerometerErrors, movement: Movement) -> Array:
+def unit_walk(sensor: AccelerometerErrors, movement: Movement) -> Array:
     """Return the covariance (3 K, 3 K) of a random walk of each axis, 1 m/s² (std) after one second."""
     return _expand_bias(walk_covariance(sensor.windows_s), movement)
 
@@ -145,12 +145,12 @@ def project_errors(theta: Array, movement: Movement, change: Callable[[Array], A
     return per_axis(np.concatenate([change(felt_along[:dwells]), np.stack(waves, axis=1).reshape(-1, 3)]))
 
 
-def _not_repeated(theta: Array, movement: Movement) -> Array:
+def _repeatability(theta: Array, movement: Movement) -> Array:
     """Return the covariance (3 K, 3 K) due to small rotations of sweeps, independent for each sweep."""
     sweeps = movement.sweeps
     if movement.repeatability_rad == 0.0:
         return np.zeros((movement.readings().size,) * 2)
-    rotations = turned(theta, replace(movement, sweeps=sweeps.alone()))[
+    rotations = arm_effects(theta, replace(movement, sweeps=sweeps.alone()))[
         :, OWN_ERRORS * len(movement.dwells.readings_m_s2) :
     ]
     turns = rotations[:, np.arange(rotations.shape[1]) % SHARED_ERRORS < ROTATIONS] * (

@@ -15,7 +15,7 @@ ROUNDING_ERROR = 1e-15  # values that are zero except for rounding: no quantity 
 UNCOMPARED_FIELDS = ("iterations", "solved_utc")  # the same result may take other iterations, and has another time
 
 
-def not_given(claimed: ResultDocument, recomputed: ResultDocument) -> list[str]:
+def differing_parts(claimed: ResultDocument, recomputed: ResultDocument) -> list[str]:
     """Return the parts of a `claimed` result that differ from the recomputed one beyond a processor's rounding.
 
     `recomputed` is solved from the recordings. Calibrations agree within 1e-6 of their standard uncertainty, other

@@ -40,14 +40,14 @@ class Head:
     sha256: str
 
 
-def alone(connection: Connection) -> None:
+def lock_out_writers(connection: Connection) -> None:
     """Lock out other writers until the transaction ends; on SQLite, a writing transaction is exclusive anyway."""
     if connection.dialect.name == "postgresql":
         connection.execute(text("SELECT pg_advisory_xact_lock(:lock)"), {"lock": LOCK_NUMBER})
 
 
 def note(connection: Connection, table: Table, *key: int | str) -> None:
-    """Enter the `table`'s row with this primary key, and a run's parts, in the journal, after a call of `alone`."""
+    """Enter the `table`'s row with this key, and a run's parts, in the journal. Call `lock_out_writers` before."""
     before = head(connection)
     line = {
         "number": before.number + 1,

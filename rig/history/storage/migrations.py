@@ -45,7 +45,7 @@ def version_of(connection: Connection, label: str) -> int:
 
 def bring_up_to_date(connection: Connection, label: str) -> None:
     """Make or migrate a history's tables in the connection's transaction. Raise Refused as `version_of` does."""
-    journal.alone(connection)
+    journal.lock_out_writers(connection)
     version = version_of(connection, label)
     if version == 0:
         _make(connection)

@@ -16,7 +16,7 @@ from rig.data.quantity import ACCELERATION, FIELD, RATE
 from rig.data.recording.motion_file import QUATERNION, TIME
 from rig.errors import Refused
 from rig.errors.extras import missing_extra
-from rig.errors.quoting import listing, quote, shorten
+from rig.errors.quoting import list_first, quote, shorten
 from rig.observation.formats.table_parts import LEFT_OUT, NOTE, read_blocks
 
 IMU, MAGNETIC = "sensor_msgs/msg/Imu", "sensor_msgs/msg/MagneticField"
@@ -144,7 +144,7 @@ def _select_topic(reader: Any, types: Sequence[str], topic: str | None, what: st
         connections = [connection for connection in connections if connection.topic == topic]
     names = {connection.topic for connection in connections}
     if len(names) != 1:
-        topics = listing(f"{shorten(topic)} ({shorten(kind)})" for topic, kind in _list_topics(reader, types))
+        topics = list_first(f"{shorten(topic)} ({shorten(kind)})" for topic, kind in _list_topics(reader, types))
         name = "" if topic is None else f" called {quote(topic)}"
         raise Refused(
             "bag_topic",
@@ -205,7 +205,7 @@ def _check_layout(store: Any, connections: Any) -> None:
         if other := sorted(
             name for name in fields if name in store.fielddefs and fields[name] != store.fielddefs[name]
         ):
-            raise ValueError(f"its {listing(map(shorten, other))} differs from that of ROS")
+            raise ValueError(f"its {list_first(map(shorten, other))} differs from that of ROS")
 
 
 def _orientation(message: Any) -> Any:

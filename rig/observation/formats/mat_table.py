@@ -14,7 +14,7 @@ import numpy as np
 
 from rig.data.recording.motion_file import Header
 from rig.errors import Refused
-from rig.errors.quoting import listing, quote, shorten
+from rig.errors.quoting import list_first, quote, shorten
 from rig.estimation.arrays import Array
 from rig.observation.formats.column_selection import MappedColumns
 
@@ -85,7 +85,7 @@ def read_mat_columns(path: Path) -> dict[str, Array]:
                 raise ValueError(f"it holds more than {MAX_COLUMNS} columns")
     if not columns:
         what = (
-            f"holds numbers only in objects, which only MATLAB can read: {listing(map(shorten, objects))}"
+            f"holds numbers only in objects, which only MATLAB can read: {list_first(map(shorten, objects))}"
             if objects
             else "holds no numbers"
         )

@@ -19,7 +19,7 @@ from rig.data.quantity import ACCELERATION, RATE, Quantity
 from rig.data.recording.motion_file import TIME
 from rig.errors import Refused
 from rig.errors.extras import missing_extra
-from rig.errors.quoting import listing, shorten
+from rig.errors.quoting import list_first, shorten
 from rig.estimation.arrays import Array
 from rig.observation.formats.table_parts import NOTE
 
@@ -77,7 +77,7 @@ def _is_combined(path: Path, topics: Mapping[tuple[str, int], Any], inside: str 
         wanted = COMBINED_TOPIC if inside == COMBINED_TOPIC else f"sensor_gyro {shorten(number)}"
         raise Refused(
             "ulog_topic",
-            f"{path} holds no {wanted}; of sensor_gyro, sensor_accel and sensor_combined it holds {listing(logged)}",
+            f"{path} holds no {wanted}; of sensor_gyro, sensor_accel and sensor_combined it holds {list_first(logged)}",
             "Let SDLOG_PROFILE log the sensors at full rate, or name another instance after the file: LOG.ulg::1",
         )
     return False

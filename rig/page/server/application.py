@@ -22,7 +22,7 @@ MAX_CERTIFICATE_BYTES = 8_000_000
 Handler = Callable[[Request], Awaitable[Response]]
 
 
-def looking(broadcast: Broadcast, door: Door, home: str) -> list[Route]:
+def read_only_routes(broadcast: Broadcast, door: Door, home: str) -> list[Route]:
     """Return the read-only routes: page, static files, stream of events."""
 
     async def stream(request: Request) -> Response:
@@ -45,7 +45,7 @@ def looking(broadcast: Broadcast, door: Door, home: str) -> list[Route]:
     return [*files, Route("/events", stream)]
 
 
-def acting(door: Door, handler: Handler) -> Handler:
+def require_token(door: Door, handler: Handler) -> Handler:
     """Return a handler that requires the token."""
 
     async def allowed(request: Request) -> Response:
@@ -97,8 +97,8 @@ def run_routes(broadcast: Broadcast, control: Control, door: Door, folder: Path)
 
     return [
         Route(f"/{CERTIFICATE}", certificate),
-        Route("/stop", acting(door, stop), methods=["POST"]),
-        Route("/answer", acting(door, answer), methods=["POST"]),
+        Route("/stop", require_token(door, stop), methods=["POST"]),
+        Route("/answer", require_token(door, answer), methods=["POST"]),
     ]
 
 

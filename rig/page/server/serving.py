@@ -125,10 +125,10 @@ def _server(broadcast: Broadcast, control: Control, door: Door, folder: Path | N
     import uvicorn
     from starlette.applications import Starlette
 
-    from rig.page.server.application import looking, run_routes
+    from rig.page.server.application import read_only_routes, run_routes
 
     connections = Connections()
-    served = [*looking(broadcast, door, shown.home), *shown.routes(door)]
+    served = [*read_only_routes(broadcast, door, shown.home), *shown.routes(door)]
     if folder is not None:
         served = [*served, *run_routes(broadcast, control, door, folder)]
     config = uvicorn.Config(

@@ -14,7 +14,7 @@ from rig.data.quantity import ACCELERATION
 from rig.data.recording.settings import Site
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.budget import Budget
-from rig.estimation.reference.accelerometer_model import OWN_ERRORS, Dwells, Movement, turned
+from rig.estimation.reference.accelerometer_model import OWN_ERRORS, Dwells, Movement, arm_effects
 from rig.estimation.reference.imu import solve_imu
 from rig.estimation.reference.magnetometer import field_drift, uniformity
 from rig.estimation.reference.reference_budget import scale_and_bias_covariance
@@ -160,7 +160,7 @@ def test_the_readings_tell_how_much_of_what_an_arm_is_off_by_is_new_in_each_dwel
     off = []
     for seed in range(6):
         session = drawn_accelerations.drawn("adis16465", seed, arm_rad=3e-4)
-        turns = turned(session.truth.theta(), session.movement)[:, : OWN_ERRORS * len(JOINTS)]
+        turns = arm_effects(session.truth.theta(), session.movement)[:, : OWN_ERRORS * len(JOINTS)]
         elsewhere = new_rad * np.random.default_rng([9, seed]).standard_normal(turns.shape[1])
         solution, budget, error = drawn_accelerations.solve_session(session.reading(turns @ elsewhere))
         shares.append(solution.independent_fraction)

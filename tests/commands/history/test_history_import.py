@@ -11,7 +11,7 @@ import pytest
 
 from rig.analysis.estimator_names import DEFAULT_ESTIMATOR
 from rig.data.result_file import ResultDocument, read_result
-from rig.history.entered.recomputed_result import not_given
+from rig.history.entered.recomputed_result import differing_parts
 from rig.history.store import open_history
 from rig.plans.recorded_run import judge_phases, open_run
 from rig.report.document import document_of
@@ -88,9 +88,9 @@ def board(result: Document) -> None:
 def test_a_result_that_its_recording_does_not_give_is_known_by_what_differs(
     change: Callable[[Document], None], named: str, folder: Path, given: ResultDocument
 ) -> None:
-    assert not_given(read_result(folder), given) == []
+    assert differing_parts(read_result(folder), given) == []
     claims(folder, change)
-    assert named in "; ".join(not_given(read_result(folder), given))
+    assert named in "; ".join(differing_parts(read_result(folder), given))
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope import increments as module
-from rig.estimation.gyroscope.increments import course, increments
+from rig.estimation.gyroscope.increments import increments, integrate_attitudes
 
 MATRIX = np.array([[1.02, 0.01, -0.03], [0.004, 0.97, 0.02], [-0.01, 0.03, 1.01]])
 BIAS = np.array([0.02, -0.01, 0.03])
@@ -38,7 +38,7 @@ def test_a_body_tumbled_by_hand_comes_out_where_it_is() -> None:
     """Within 10 µrad at 200 Hz; a straight line from reading to reading would be 0.7 mrad off."""
     time_s = np.arange(4001) / 200
     at_s = np.sort(np.random.default_rng(1).uniform(0, 20, 200))
-    found = course(time_s, tumbling(time_s)[1] @ MATRIX.T + BIAS, MATRIX, BIAS, at_s)
+    found = integrate_attitudes(time_s, tumbling(time_s)[1] @ MATRIX.T + BIAS, MATRIX, BIAS, at_s)
     truth, rates = tumbling(at_s)
     off = angle(np.swapaxes(tumbling(np.zeros(1))[0], -1, -2) @ truth, found.attitudes)
     assert np.abs(off).max() < 1e-5
@@ -82,9 +82,9 @@ def test_the_jacobian_equals_finite_differences(parameter: int) -> None:
 def test_blocks_of_a_long_recording_join(monkeypatch: pytest.MonkeyPatch) -> None:
     time_s = np.arange(1001) / 200
     readings, at_s = tumbling(time_s)[1], np.linspace(0, 5, 77)
-    whole = course(time_s, readings, MATRIX, BIAS, at_s)
+    whole = integrate_attitudes(time_s, readings, MATRIX, BIAS, at_s)
     monkeypatch.setattr(module, "BLOCK_READINGS", 64)
-    parts = course(time_s, readings, MATRIX, BIAS, at_s)
+    parts = integrate_attitudes(time_s, readings, MATRIX, BIAS, at_s)
     assert parts.attitudes == pytest.approx(whole.attitudes, abs=1e-12)
     assert parts.sensitivities == pytest.approx(whole.sensitivities, abs=1e-11)
 
@@ -105,4 +105,4 @@ def test_noise_and_a_bias_random_walk_scatter_as_predicted() -> None:
 def test_instants_outside_the_recording_are_the_callers_mistake(at_s: list[float]) -> None:
     time_s = np.arange(201) / 200
     with pytest.raises(ValueError, match="instants"):
-        course(time_s, np.zeros((201, 3)), *STILL, np.array(at_s))
+        integrate_attitudes(time_s, np.zeros((201, 3)), *STILL, np.array(at_s))

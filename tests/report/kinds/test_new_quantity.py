@@ -17,7 +17,7 @@ from rig.data.entries.result_types import Freedom3, Vector3
 from rig.data.quantity import Quantity
 from rig.data.result_file import GyroscopeEntry, ResultDocument
 from rig.history.entered.finished_run import FinishedRun, compact
-from rig.history.entered.recomputed_result import not_given
+from rig.history.entered.recomputed_result import differing_parts
 from rig.history.series import subjects, trends
 from rig.history.series_plots import draw_trends
 from rig.history.store import Selection, open_history
@@ -168,10 +168,10 @@ def test_a_history_follows_it(document: ResultDocument, tmp_path: Path, capsys: 
 
 
 def test_a_result_of_before_that_does_not_state_it_is_still_what_its_recordings_give(document: ResultDocument) -> None:
-    assert not_given(plain(), document) == []
+    assert differing_parts(plain(), document) == []
     other = document.gyroscopes["gyro"].model_copy(update={"noise_density_rad_sqrt_s": (1.1e-4, 2e-4, 3e-4)})
     changed = document.model_copy(update={"gyroscopes": {"gyro": other}})
-    assert any("bow_x" in each for each in not_given(changed, document))
+    assert any("bow_x" in each for each in differing_parts(changed, document))
 
 
 @pytest.mark.parametrize("name", CALIBRATION_FORMATS)

@@ -202,7 +202,7 @@ class _Child:
                 self.send(Braked(self._brake(request.deceleration_rad_s2)))
 
     def _take_control(self, request: TakeControl) -> Message:
-        """Upload the control script, set the payload and wait until the states show it."""
+        """Upload the control script, set the payload, wait until the states show it, and return the answer."""
         from rtde_control import RTDEControlInterface
 
         flags = RTDEControlInterface.FLAG_UPLOAD_SCRIPT.value | RTDEControlInterface.FLAG_NO_EXT_FT.value

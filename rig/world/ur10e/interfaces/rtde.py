@@ -205,13 +205,13 @@ class RtdeSession:
         return b""
 
     def _message(self, payload: bytes) -> bytes:
-        """Log a text message from a client."""
+        """Log a text message from a client, without an answer."""
         length = payload[0] if payload else 0
         self._robot.messages.say(payload[1 : 1 + length].decode(errors="replace"))
         return b""
 
     def _say(self, text: str) -> bytes:
-        """Send the client a message in the form of its protocol version."""
+        """Return the package of a message to the client, in the form of its protocol version."""
         words, error = text.encode(), 1
         if self._version == 1:
             return build_package("M", bytes([error]) + words)
