@@ -14,8 +14,7 @@ In a notebook:
     rig.calibrations("LSM9DS1-001").to_frame()                    # a sensor's, from the history
 
 docs/how-to/with-code/notebook.md goes through it. These names are public; the modules that define them may change.
-Importing them loads no arm driver. A refusal raises `Refused`, a failure `Fault`: docs/errors.md lists each by
-`error.name`.
+Importing them loads no arm driver. A refusal raises `Refused`, a failure `Fault`: docs/errors.md lists their names.
 """
 
 from typing import TYPE_CHECKING, Any

@@ -114,8 +114,7 @@ def judge(
 def verification_checks(sensor: str, verification: "Verification | None", limits: Limits | None) -> tuple[Check, ...]:
     """Return the checks of calibrated readings: the worst axis, and the worst mean over a revolution.
 
-    The same limit applies to the reference's error against the arm, which may be the cause. `verification` is None if
-    it did not take place.
+    The same limit applies to the reference's error against the arm, which may be the cause. `verification` may be None.
     """
     rms = mean = verified = None
     if verification is not None:

@@ -154,7 +154,7 @@ class Acquisition:
         """Return the samples (n,) of one sensor and the states of the arm in memory, and the number of new states.
 
         States since the latest `keep` are new. Older states go back at most `CLOCK_DATA_S` before it, however long the
-        run has waited.
+        wait.
         """
         with self._lock:
             batches = [batch for part in self._kept for batch in part.batches[sensor]]

@@ -83,8 +83,8 @@ def refuse_turning_otherwise(
 ) -> None:
     """Raise Fault `mounted_otherwise` if a gyroscope contradicts a small rotation (3,), rad, in the flange's frame.
 
-    `resting_rad_s` (3,) is this gyroscope's mean reading at rest. The readings cover the whole rotation, which an error
-    message calls `what`.
+    `resting_rad_s` (3,) is this gyroscope's mean reading at rest. The readings cover the whole rotation, called `what`
+    in an error.
     """
     turned = (readings.rates_rad_s - resting_rad_s).sum(axis=0) / readings.sensor.rate_hz
     stated = np.array(stage.mount) @ turn_flange_rad

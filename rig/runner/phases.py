@@ -1,7 +1,6 @@
 """One run in its folder: records and judges a phase; if it passed, stores the results and continues with the next.
 
-Each phase has its own recordings. The run's log states the reason of an early end and, if data were kept, how to
-continue.
+Each phase has its own recordings. The run's log states why a run ended early and, if data were kept, how to continue.
 """
 
 import traceback

@@ -1,7 +1,7 @@
 """Possible faults of a gyroscope during a recording: the tested alternatives, and fault modes of a given size.
 
-A check tests how much of the residuals its columns explain. A fault mode is a realistic fault, similar but not equal to
-the columns of its check.
+A check tests how much of the residuals its columns explain. A fault mode is a realistic fault, similar to its check's
+columns.
 """
 
 from dataclasses import dataclass

@@ -136,7 +136,7 @@ def check_references(
     """Return the checks for contradictions within the readings of each accelerometer and magnetometer.
 
     Dwells and sweeps are named as for gyroscopes: `gyro.acceleration_disturbed_dwell.13`. If `drifting`, the bias may
-    change steadily.
+    drift.
     """
     from rig.analysis.consistency.reference_contradictions import (
         ReferenceReadings,

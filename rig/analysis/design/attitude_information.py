@@ -50,8 +50,7 @@ class AttitudeAccount:
 def attitude_account(config: RigConfig, plan: Plan) -> AttitudeAccount | None:
     """Return the expected accuracy of a plan's attitudes, for nominal arm and noise; None for other procedures.
 
-    A repeated attitude repeats the arm's error, so only noise is averaged. Raise Refused `rank_deficient`,
-    `ill_conditioned`.
+    Repeats of an attitude average only noise, not the arm's error. Raise Refused `rank_deficient`, `ill_conditioned`.
     """
     order = config.procedure.accelerometer_order
     if order == 0:

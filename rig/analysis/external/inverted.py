@@ -1,8 +1,8 @@
 """The detection of attitudes in another convention, by solving with their inverses.
 
 Quaternions that were written as x y z w but are read as w x y z look like inverse rotations too, because that
-permutation is improper. The axes of body and room then seem to be others. The sensor's axes show which of the two
-mistakes was made.
+permutation is improper. The axes of body and room then seem to be others. The sensor's axes show which mistake was
+made.
 """
 
 from collections.abc import Callable, Collection

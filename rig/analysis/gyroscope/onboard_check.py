@@ -144,8 +144,7 @@ def _count_missing(sequence: NDArray[np.uint32]) -> int:
 def _solve(observations: Sequence[_BoardObservation]) -> tuple[Array, Array] | None:
     """Return scale and bias by the board's method, with equal weights.
 
-    Return None if there are too few observations, if the samples are not those that the board reports, or if no mean
-    could be checked.
+    Return None for too few observations, samples other than those that the board reports, or no checked mean.
     """
     accumulated = Accumulator.empty()
     if not any(observation.averaged for observation in observations):

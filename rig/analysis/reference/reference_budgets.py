@@ -106,8 +106,7 @@ def _propagate(
 ) -> FitUncertainty:
     """Return the uncertainty of scale and bias, from the `response` (p, n) of all parameters to the readings.
 
-    `noise` (n, n): the readings' covariance; `error`: that of attitudes; `chi_square`: χ² of the residuals, and its
-    dof.
+    `noise` (n, n): the readings' covariance; `error`: that of attitudes; `chi_square`: of the residuals, and its dof.
     """
     scale = scale_of(solution.matrix)
     rows = scale_and_bias(solution.matrix, scale, len(solution.covariance))
@@ -143,8 +142,7 @@ def lag_pattern(movement: Movement, lag_s: float) -> Array:
 def drift_patterns(matrix: Array, attitudes: Array, drift: FieldDrift | None) -> tuple[Array, float]:
     """Return the patterns (3, 3 N) of a field that changes linearly over the attitudes, and its change in T.
 
-    Each axis of the base has one pattern: one standard uncertainty if the `drift` was tested, else half of the largest
-    possible drift.
+    Each axis of the base has one pattern: one standard uncertainty if the `drift` was tested, else half of the largest.
     """
     change_t = UNTESTED_DRIFT_T
     if drift is not None:

@@ -200,8 +200,7 @@ class SixObservationSection(SixSweepsSection):
     def problems(self, config: RigConfig) -> Iterator[str]:
         """Yield the problems of sweeps, and what stages exclude: a target, a verification and magnetometers.
 
-        With stages or arcs a magnetometer could be recorded, but not calibrated, which only the end of the run would
-        show.
+        With stages or arcs a magnetometer could be recorded, not calibrated, which only the run's end would show.
         """
         yield from SixSweepsSection.problems(self, config)
         if self.stages and (self.target_scale_u or self.target_bias_u_rad_s):

@@ -173,8 +173,7 @@ class Graph:
     def stamp_std_s(self) -> float:
         """The standard deviation of time stamps, from their second differences.
 
-        The largest differences are omitted, because gaps cause them. Irregular sampling is included, because it looks
-        like wrong stamps.
+        The largest differences, due to gaps, are omitted. Irregular sampling looks like wrong stamps and is included.
         """
         differences = np.sort(np.abs(np.diff(self.session.time_s, 2)))
         return float(np.sqrt(np.mean(np.square(differences[: round(GAPLESS_FRACTION * len(differences))])) / 6))

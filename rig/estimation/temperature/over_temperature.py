@@ -155,9 +155,8 @@ def powers_at(difference_k: float) -> Array:
 def fit_over_temperature(readings: RepeatedMeans, reference_c: float, gradient_k: float) -> OverTemperature:
     """Fit the polynomials, with k at the reference by plain least squares (`combine_with_reference` improves it).
 
-    `gradient_k`: half-width of the interval in which the temperature difference between thermometer and sensor may
-    change in use. Raise Fault `too_few_observations`, `temperature_range_too_small`, `temperature_outside`,
-    `not_finite`.
+    `gradient_k`: half-width of the change, in use, of the temperature difference between thermometer and sensor. Raise
+    Fault `too_few_observations`, `temperature_range_too_small`, `temperature_outside`, `not_finite`.
     """
     check_finite(means=readings.means, temperature_c=readings.temperature_c)
     range_c = (float(readings.temperature_c.min()), float(readings.temperature_c.max()))
@@ -458,8 +457,7 @@ def _gradient(polynomials: OverTemperature, half_width_k: float) -> TemperatureL
     """Return the contributor of the temperature difference between sensor and thermometer.
 
     A difference changes each value by the slope of its polynomial. One part is the same over the range; an independent
-    part has opposite signs at the ends of the range, because a heater's power and the loss to the air grow with
-    temperature.
+    part has opposite signs at its ends, because a heater's power and the loss to the air grow with temperature.
     """
     both = np.array([polynomials.scale, polynomials.bias])
     steep = np.arange(1, MAX_ORDER + 1)[:, None] * both[:, 1:]

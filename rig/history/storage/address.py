@@ -45,7 +45,7 @@ def choose_history_address(
 def default_history_address(address: str | None) -> HistoryAddress | None:
     """Return the user's history; None if it is switched off.
 
-    The history is at the command's `address`, else at `RIG_HISTORY`, else in the user's own file. Raise Refused
+    The history is at the command's `address`, else at `RIG_HISTORY`, else the user's own. Raise Refused
     `history_address`.
     """
     address = address or os.environ.get(ENVIRONMENT)

@@ -100,8 +100,7 @@ def _connect_to_write(file: Path, *, new: bool) -> sqlite3.Connection:
 def _connect_to_read(file: Path) -> sqlite3.Connection:
     """Open a file for reading only, in a folder in which the user cannot create files.
 
-    A writer would keep a log in that folder. Without a log the file does not change while it is read, so it needs no
-    lock.
+    A writer would keep a log in that folder. Without a log the file does not change during reading, and needs no lock.
     """
     log = file.with_name(f"{file.name}-wal")
     return _connect(file, "mode=ro" if log.exists() else "mode=ro&immutable=1")

@@ -24,8 +24,8 @@ TIME_ROUNDING_S = 1e-7  # at most
 def compare_board_means(sensor: str, recordings: Sequence[ObservedRun]) -> dict[int, float]:
     """Return the deviation of the board's average from the computer's mean, by the index of the sweep.
 
-    The deviation is the worst axis', in standard deviations of the computer's mean. Sweeps that the board did not
-    average are absent.
+    The deviation is the worst axis', in standard deviations of the computer's mean. Sweeps not averaged by the board
+    are absent.
     """
     deviations = dict[int, float]()
     for recording in recordings:

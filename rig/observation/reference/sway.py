@@ -31,8 +31,8 @@ def sway_acceleration(
     - time_s (n,): in the turn, which begins and ends at `window_s`.
     - extension_m (3,): the point in the flange's frame.
 
-    The position's deviation is fitted by waves, whose second derivative is the acceleration. It is zero if the encoders
-    show noise only.
+    The position's deviation is fitted by waves, whose second derivative is the acceleration. It is zero if encoders
+    show only noise.
     """
     margin_s = MARGIN_FRACTION * (window_s[1] - window_s[0])
     start_s, end_s = window_s[0] - margin_s, window_s[1] + margin_s

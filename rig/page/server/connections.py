@@ -1,8 +1,7 @@
 """Connections to the page: their number, their time-outs, and the one to close if there are too many.
 
 A connection takes a descriptor of the process that moves the arm, and anyone on this computer can open one. Connections
-without the token are strangers: if there are too many, the oldest stranger of the address with the most strangers is
-closed.
+without the token are strangers: if there are too many, the oldest of the address with the most is closed.
 """
 
 import asyncio

@@ -39,8 +39,8 @@ def sensor_entry(
 ) -> GyroscopeEntry:
     """Return scale, bias and covariance by the chosen estimator, and the other estimators' solutions or errors.
 
-    `board` is the comparison with the board's own solution, `more` are further fields of the entry. Fields without a
-    value are left out.
+    `board` is the comparison with the board's own solution, `more` are further fields. Fields without a value are left
+    out.
     """
     solution, turns = result.solution, result.observations
     return entry(

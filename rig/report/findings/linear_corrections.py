@@ -1,7 +1,6 @@
 """Corrections of a sensor's readings in the form of other programs: matrix, offset, noise. Pure.
 
-All are in SI units, in the right-angled frame nearest to a gyroscope's axes, whose rotation is the vector model's
-`mounting`:
+In SI units, in the right-angled frame nearest to a gyroscope's axes, whose rotation is the vector model's `mounting`:
 
     gyroscope        m = F ω + G a + c,    c = −b, a the specific force, which at rest points upwards
     any other triad  m = F s + c

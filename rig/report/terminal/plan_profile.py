@@ -25,8 +25,7 @@ class ProfilePoint:
 def profile(plan: Plan) -> list[ProfilePoint]:
     """Return the corners of each axis's rate over time, axis after axis, from 0 s and 0°; rests follow sweeps.
 
-    Motions between sweeps are left out, because a rate table makes its own. Angles grow by the right-hand rule about
-    the named axis.
+    Motions between sweeps are left out, because a rate table makes its own. Angles are right-handed about the axis.
     """
     by_axis: dict[str, list[tuple[Sweep, float]]] = {}
     for index, step in enumerate(plan.steps):

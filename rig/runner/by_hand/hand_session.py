@@ -1,7 +1,6 @@
 """A session by hand in progress: requests a move, waits for the rest after it, and accepts or refuses the move.
 
-The first sensor to calibrate decides; others are only recorded. All are solved from the recording afterwards, without
-the refused moves.
+The first sensor to calibrate decides; others are only recorded. All are solved afterwards, without the refused moves.
 """
 
 import time

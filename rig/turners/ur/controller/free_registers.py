@@ -27,8 +27,7 @@ OWNERS = (
 def find_free_half(host: str, version: tuple[int, ...], timeout_s: float) -> int | None:
     """Return the half of the registers, `LOWER_FIRST` or `UPPER_FIRST`, that is free at the controller `host`, or None.
 
-    `version`: the controller's software. Nothing remains reserved. Raise `OSError` without an answer within
-    `timeout_s`.
+    `version`: the controller's software. Nothing remains reserved. Raise `OSError` without an answer in `timeout_s`.
     """
     with socket.create_connection((host, PORT), timeout_s) as connection:
         deadline_s, received = time.monotonic() + timeout_s, bytearray()

@@ -1,8 +1,7 @@
 """The primary and secondary interfaces, ports 30001 and 30002: the robot's state ten times a second, and its messages.
 
 Source: the maker's client interface description for PolyScope 5. A package is a big-endian size (i32), a type (u8) and
-a payload. A robot state (16) contains sub-packages of the same form; a robot message (20) contains time stamp, source
-and kind.
+a payload. A robot state (16) contains sub-packages of this form; a robot message (20) time stamp, source and kind.
 """
 
 import struct
