@@ -1,7 +1,6 @@
 """The search for the shortest run of a configuration that reaches a target uncertainty. Pure.
 
-The file's order, directions, stages, several speeds and six axes are kept, and the attitudes if there are
-magnetometers.
+The file's order, directions, stages, several speeds and six axes are kept; with magnetometers, also attitudes.
 """
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence

@@ -144,7 +144,7 @@ def laid_down(theta: Array, placed: AttitudeReadings, unplaced: Array, unplaced_
 def _relate_errors(laid: PlacementSolution, all_rests: AttitudeReadings, stated: int) -> PlacementSolution:
     """Return the solution if the errors of the first `stated` attitudes may be a smooth function of the attitude.
 
-    The covariance at the most probable standard deviations is inflated to the 95 % intervals that integrate over them.
+    The covariance at the most probable standard deviations is inflated to 95 % intervals that integrate over these.
     """
     model, theta = build_placement_model(laid.theta, all_rests, stated), laid.theta.copy()
     maxima = model.find_maxima()

@@ -39,8 +39,8 @@ def find_rests(
 ) -> tuple[Window, ...]:
     """Return the rests of at least two blocks, from readings (n, 3) of one or several quantities at rising times (n,).
 
-    `still_at_first`: whether the first second scatters like a rest. `lying`: declared rests; the body lies still for at
-    least a part of each.
+    `still_at_first`: whether the first second scatters like a rest. `lying`: declared rests, in a part of which the
+    body lies still.
     """
     quantity = next(quantity for quantity in quantities().values() if quantity in readings)
     if len(time_s) < 2 * MIN_BLOCK_SAMPLES:
