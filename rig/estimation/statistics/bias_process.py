@@ -133,7 +133,7 @@ def _flicker(instability_rad_s: float, windows_s: ArrayLike) -> Array:
 
 
 def average_posterior(sizes: Array, likelihood: Array) -> Array:
-    """Return the root-mean-square (2,) over the posterior of `sizes` (K, 2), pairs (q, s).
+    """Return the root-mean-square (2,) of random walk q and scatter s over the posterior of their `sizes` (K, 2).
 
     The prior is spike-and-slab, log-uniform in the slab. The maximum of the likelihood, and with it every uncertainty,
     would by chance be far too small or too large (Mitchell and Beauchamp, J. Am. Stat. Assoc. 83 (1988) 1023).
@@ -142,7 +142,7 @@ def average_posterior(sizes: Array, likelihood: Array) -> Array:
 
 
 def average_walks(sizes: Array, likelihood: Array) -> Array:
-    """Return the root-mean-square (2,) over the posterior of `sizes` (K, 2), pairs (q, s), with a uniform prior of q.
+    """Return the root-mean-square (2,) of q and s over the posterior of `sizes` (K, 2), with a uniform prior of q.
 
     The scatter has the prior of `average_posterior`. This is for parameters over a long time, such as slopes over
     temperature: their uncertainty may come mostly from a walk that the averages hardly show. So a walk is assumed to
@@ -154,13 +154,13 @@ def average_walks(sizes: Array, likelihood: Array) -> Array:
 
 
 def _root_mean_square(sizes: Array, log_posterior: Array, prior: Array | float = 1.0) -> Array:
-    """Return the root-mean-square (2,) of pairs (q, s) (K, 2), with weights exp(`log_posterior`) times `prior` (K,)."""
+    """Return the root-mean-square (2,) of q and s (K, 2), with weights exp(`log_posterior`) times `prior` (K,)."""
     weights = prior * np.exp(log_posterior - log_posterior.max())
     return np.asarray(np.sqrt(weights @ sizes**2 / weights.sum()), dtype=np.float64)
 
 
 def select_by_akaike(sizes: Array, likelihood: Array) -> Array:
-    """Return the likeliest pair (q, s) of `sizes` (K, 2), zero unless it reduces Akaike's information criterion.
+    """Return the likeliest random walk and scatter (2,) of `sizes` (K, 2); zero unless Akaike's criterion decreases.
 
     There is no random walk if noise alone explains the averages.
     """

@@ -61,8 +61,8 @@ def gather(turning: Turning, window_s: float | None = None, clock_s: float = 0.0
     """Return the fixes of a reference's rows, in windows of a given or a suitable length.
 
     Time t of the reference is time t + `clock_s` of the readings. Raise Fault `too_few_observations` if the body moves
-    in too few of the remaining increments; `lost_samples`, `saturation` or `turned_too_fast` if this is the cause, or
-    leaves out more increments than remain.
+    in too few of the remaining increments; `lost_samples`, `saturation` or `turned_too_fast` if that is the cause, or
+    if more increments are left out for it than remain.
     """
     turning = select_covered(turning, clock_s)
     if len(turning.rows_s) < 2:
