@@ -111,7 +111,7 @@ def _read_numbers(path: Path, layout: TableLayout) -> tuple[Array, Array | None]
     columns = {f"column_{index}": (names[index], 1.0) for index in layout.numbers if index != layout.time}
     if layout.time is not None:
         columns[TIME] = (names[layout.time], unit_s)
-    mapped = Mapped(columns, layout.skip_lines, missing=layout.missing, in_any_unit=True)
+    mapped = MappedColumns(columns, layout.skip_lines, missing=layout.missing, in_any_unit=True)
     table = read_table(path, Header(tuple(columns)), SAMPLES_MB, mapped, None if layout.time_unit is None else 0)
     values = np.full((len(table.lines), len(layout.headings)), np.nan)
     for index in layout.numbers:

@@ -102,7 +102,7 @@ def test_stamps_too_uneven_to_count_losses_say_so() -> None:
     rng = np.random.default_rng(51)
     arrived_s = np.maximum.accumulate(taken(100) + rng.exponential(0.015, size=COUNT)) + 1e-6 * np.arange(COUNT)
     lost = rng.choice(COUNT, size=COUNT // 60, replace=False)[:, None] + np.arange(3)
-    stamps_s = np.delete(arrived_s, np.minimum(lost, COUNT - 1).ravel())
+    stamps_s = np.asarray(np.delete(arrived_s, np.minimum(lost, COUNT - 1).ravel()), dtype=np.float64)
     readings = rng.normal(size=(3, len(stamps_s)))
     samples = samples_in({"time_s": stamps_s, **dict(zip(RATE.columns, readings, strict=True))}, "log.csv")
     assert samples.sampling is not None and samples.sampling.hides_losses

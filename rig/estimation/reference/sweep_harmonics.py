@@ -187,7 +187,7 @@ def _fourier_columns(angle_rad: Array, count: int) -> Array:
 
 
 @dataclass(frozen=True, slots=True)
-class _Uneven:
+class _Unevenness:
     """The unevenness of a joint's motion: `rate` (n,) minus its mean, and `jerk` (n,), SI units.
 
     `fast` (4, n): the rate and its first three derivatives, without the lowest four harmonics of a revolution.
@@ -198,7 +198,7 @@ class _Uneven:
     fast: Array
 
 
-def _smooth(time_s: Array, angle_rad: Array, mean_speed_rad_s: float) -> _Uneven:
+def _smooth(time_s: Array, angle_rad: Array, mean_speed_rad_s: float) -> _Unevenness:
     """Return the deviations of the joint from constant speed.
 
     Its angle is smoothed by harmonics of the revolution and then differentiated, which leaves slow deviations nearly
@@ -216,10 +216,10 @@ def _smooth(time_s: Array, angle_rad: Array, mean_speed_rad_s: float) -> _Uneven
     for _ in range(3):
         derivatives.append(mean_speed_rad_s * _differentiate(derivatives[-1]))
     jerk = mean_speed_rad_s**2 * _differentiate(_differentiate(excess))
-    return _Uneven(waves @ excess, waves @ jerk, np.array(derivatives) @ waves.T)
+    return _Unevenness(waves @ excess, waves @ jerk, np.array(derivatives) @ waves.T)
 
 
-def _motion_terms(uneven: _Uneven, turn: JointTurn, mean_speed_rad_s: float) -> Array:
+def _motion_terms(uneven: _Unevenness, turn: JointTurn, mean_speed_rad_s: float) -> Array:
     """Return the terms (6, n) of the joint's motion in the specific force; see `FirstHarmonic.turning_rad2_s2`.
 
     Harmonics of the revolution have equal speeds at both ends. A vibration without a whole number of periods does not,
@@ -238,7 +238,7 @@ def _motion_terms(uneven: _Uneven, turn: JointTurn, mean_speed_rad_s: float) -> 
     )
 
 
-def _list_vibration(uneven: _Uneven, angle_rad: Array, mean_speed_rad_s: float) -> Array:
+def _list_vibration(uneven: _Unevenness, angle_rad: Array, mean_speed_rad_s: float) -> Array:
     """Return the specific force (n, 6) of the joint's vibration, with derivatives of α for the filter's lag.
 
     For the centripetal acceleration its linear part stands, 2 ω₀ (ω − ω₀). The square of the vibration has a mean: of a

@@ -77,7 +77,7 @@ def gather(turning: Turning, window_s: float | None = None, clock_s: float = 0.0
         raise _all_lost(moving_count, int(moving.sum()), left_out)
     walk = _measure_walk(turning, rows.rows_s[still] + clock_s)
     fixes = replace(fixes, joined=joined, blind_rad=blind_rad, walk=walk, hides_losses=turning.hides_losses)
-    return Gathered(fixes, length_s, left_out)
+    return GatheredFixes(fixes, length_s, left_out)
 
 
 def _suitable_s(span_s: float) -> float:

@@ -5,6 +5,7 @@ SciPy reads versions 4 to 7, h5py version 7.3. They run in a separate process, a
 function, no link to another file.
 """
 
+import math
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
@@ -65,7 +66,7 @@ def read_mat_rows(path: Path, header: Header, mapped: MappedColumns | None) -> I
 
 def spell_numbers(numbers: Array, nan: str = NAN) -> list[str]:
     """Return the cells of a column of numbers, with `nan` for NaN."""
-    return [repr(number) if number == number else nan for number in numbers.tolist()]  # noqa: PLR0124
+    return [nan if math.isnan(number) else repr(number) for number in numbers.tolist()]
 
 
 def _is_number_of(column: str, names: list[str]) -> bool:
