@@ -47,7 +47,7 @@ class FirstHarmonic:
 
     - `harmonic_m_s2` (3, 3): mean, cosine, sine (rows) of the axes x y z; `covariance_m2_s4` (9, 9), row by row.
     - `swayed_m_s2` (3, 3): those of the force due to the sway of other joints, in the sensor's nominal axes.
-    - `speed_rad_s`: that of `JointTurn`.
+    - `speed_rad_s`: the joint's mean speed, negative if its angle falls.
     - `noise_m_s2` (3,): std of one sample, with `dof` degrees of freedom; `residuals_m_s2` (n, 3).
     - `vibration_m_s2` (3,): RMS of the removed vibration of servo and arm.
     - `turning_rad2_s2` (6, 3): mean, cosine and sine, by the same weights, of ω² and α. For the filter's lag the
