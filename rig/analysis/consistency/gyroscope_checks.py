@@ -179,8 +179,8 @@ def _free_disturbed_transfers(
     """Return the result of `_inflate_transfers` with a separate mean for each outlying transfer, and the axis test.
 
     The axis test is for a scale factor of one axis that changes. A ripple at the data rate shifts the mean of one
-    transfer. A change of a scale factor shifts all later transfers, so a transfer is an outlier only if its own mean
-    explains clearly more of the residuals than any such change.
+    transfer. A change of scale factors or of the mounting shifts all later transfers, so a transfer is an outlier only
+    if its own mean explains clearly more of the residuals than any such change.
     """
     disturbed: list[int] = []
     while True:
@@ -194,7 +194,8 @@ def _free_disturbed_transfers(
         worst, (explained, limit) = find_outliers(
             model, transfers, partial(sweep_columns, segments), false_alarm_probability
         )[0]
-        if explained <= max(limit, axis_changed[0] + CHI_SQUARE_MARGIN):
+        by_change = model.chi_square_of(list(changes(segments, with_transfers.axis_rates).values()), ())
+        if explained <= max(limit, max(axis_changed[0], *by_change) + CHI_SQUARE_MARGIN):
             return with_transfers, axis_changed
         disturbed.append(worst)
 
