@@ -81,7 +81,7 @@ FAULT_MODES: tuple[FaultMode[Means], ...] = (  # (k, N, 3) each
 )  # fmt: skip
 
 
-def changes(segments: Segments, axis_rates: Array) -> Alternatives:
+def changes(segments: Segments, axis_rates: Array) -> dict[str, Array]:
     """Return the effects (3, N, k) of a scale factor or a mounting that changes with time, by the name of the check."""
     time = normalise_time(segments)
     for sweep in np.unique(segments.sweep):  # a change within a sweep is tested for that sweep

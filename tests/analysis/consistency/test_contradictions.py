@@ -177,7 +177,7 @@ def test_what_is_damaged_is_named_or_does_not_matter(name: str, thorough: bool) 
 
 @pytest.mark.slow
 def test_a_change_of_all_scale_factors_is_no_transfer_that_is_disturbed() -> None:
-    """Between the two sweeps about one axis: they contradict, but repeated they would not, and the change would remain."""
+    """Between two sweeps about one axis: they contradict; repeated, they would agree, and the change would remain."""
     checks, _, _ = judged(scale(1.005, later)(readings_of(Setup(seed=1, noise_rad_s=NOISE[1]))).recording())
     assert {"scale_changed", "disturbed_sweep"} <= failed(checks)
 
