@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.analysis.consistency.residual_tests import Alternatives, FaultMode
+from rig.analysis.consistency.residual_tests import FaultMode
 from rig.analysis.gyroscope.segment_table import Segments
 from rig.estimation.arrays import Array
 from rig.observation.consistency.raw_readings import REST
