@@ -226,7 +226,7 @@ def _residual_chi_square(tested: _TestedSegments) -> tuple[float, int]:
     If transfers are absent, some changes differ from the model's effects only by the rates' noise. These are dropped.
     """
     changed = [*changes(tested.segments, tested.axis_rates).values(), quarter_columns(tested.means)]
-    columns = [apply_whitener(tested.model.whitener, change) for change in changed if change is not None]
+    columns = [apply_whitener(tested.model.whitener, change) for change in changed]
     basis = orthonormal_basis(tested.model.model)
     possible = remaining_directions(basis, np.concatenate(columns, axis=1))
     return chi_square_of(tested.model.readings, np.concatenate([basis, possible], axis=1), None)

@@ -119,7 +119,7 @@ def first_harmonic(
         dof=count - int(rank),
         residuals_m_s2=residuals,
         vibration_m_s2=np.sqrt(np.mean(vibration**2, axis=0)),
-        turning_rad2_s2=_motion_terms(uneven, turn, mean_speed) @ gain.T,
+        turning_rad2_s2=_motion_terms(uneven, turn) @ gain.T,
     )
 
 
@@ -219,21 +219,22 @@ def _smooth(time_s: Array, angle_rad: Array, mean_speed_rad_s: float) -> _Uneven
     return _Unevenness(waves @ excess, waves @ jerk, np.array(derivatives) @ waves.T)
 
 
-def _motion_terms(uneven: _Unevenness, turn: JointTurn, mean_speed_rad_s: float) -> Array:
+def _motion_terms(uneven: _Unevenness, turn: JointTurn) -> Array:
     """Return the terms (6, n) of the joint's motion in the specific force; see `FirstHarmonic.turning_rad2_s2`.
 
     Harmonics of the revolution have equal speeds at both ends. A vibration without a whole number of periods does not,
     so α has a mean, and `uneven` has no acceleration.
     """
-    rate, acceleration = mean_speed_rad_s + uneven.rate, turn.acceleration_rad_s2
+    mean_rate, acceleration = turn.speed_rad_s, turn.acceleration_rad_s2
+    rate = mean_rate + uneven.rate
     return np.stack(
         [
             rate**2,
             acceleration,
-            2 * rate * acceleration / mean_speed_rad_s,
-            uneven.jerk / mean_speed_rad_s,
-            mean_speed_rad_s * uneven.rate * np.cos(turn.angle_rad),
-            mean_speed_rad_s * uneven.rate * np.sin(turn.angle_rad),
+            2 * rate * acceleration / mean_rate,
+            uneven.jerk / mean_rate,
+            mean_rate * uneven.rate * np.cos(turn.angle_rad),
+            mean_rate * uneven.rate * np.sin(turn.angle_rad),
         ]
     )
 

@@ -50,13 +50,13 @@ def swept_acceleration(
     time_s = stream.time_s[inside]
     covered = motion.covered(time_s)
     time_s = time_s[covered]
-    angle_rad = motion.angle(sweep, time_s) - motion.angle(sweep, turn.start_s)
     pose_rad = motion.angles(time_s).mean(axis=0)
     axis = motion.axes(pose_rad)[:, sweep.joint]
-    attitudes, rotations = motion.attitudes(time_s), _rotations(-axis, angle_rad)
-    start_rad = np.where(np.arange(len(pose_rad)) == sweep.joint, motion.angles(turn.start_s), pose_rad)
-    began = motion.mount @ flange_attitude(start_rad, motion.kinematics)
-    steady = rotations @ began
+    turns = np.arange(len(pose_rad)) == sweep.joint
+    steady_rad = np.where(turns, motion.angles(np.append(turn.start_s, time_s)), pose_rad)
+    began, steady = np.split(motion.mount @ flange_attitude(steady_rad, motion.kinematics), [1])
+    angle_rad = steady_rad[1:, sweep.joint] - steady_rad[0, sweep.joint]
+    attitudes = motion.attitudes(time_s)
     by_gravity = gravity_difference(attitudes, steady, stream.sensor, settings.site)
     window_s, extension_m = (turn.start_s, turn.end_s), np.array(settings.extension_m)
     swayed = sway_acceleration(motion, sweep.joint, pose_rad, time_s, window_s=window_s, extension_m=extension_m)
@@ -72,16 +72,8 @@ def swept_acceleration(
         coloured=fit_inflation,
         swings=line_columns,
     )
-    in_pose = replace(turn, attitude=began, axis_flange=sweep.growing * axis, arm_m=arm_m)
+    in_pose = replace(turn, attitude=began[0], axis_flange=sweep.growing * axis, arm_m=arm_m)
     return turn_harmonic(sweep, in_pose, harmonic)
-
-
-def _rotations(axis: Array, angle_rad: Array) -> Array:
-    """Return the rotations (n, 3, 3) by angles (n,) about a unit vector (3,): Rodrigues' formula."""
-    across = np.cross(np.eye(3), axis)
-    sine, versine = np.sin(angle_rad)[:, None, None], (1 - np.cos(angle_rad))[:, None, None]
-    rotations: Array = np.eye(3) + sine * across + versine * (across @ across)
-    return rotations
 
 
 def turn_harmonic(sweep: Sweep, turn: Revolution, harmonic: FirstHarmonic) -> SweptAcceleration:
