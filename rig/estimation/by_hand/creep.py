@@ -1,7 +1,7 @@
 """Rests in which the body crept, that is, turned slowly while it lay on a face.
 
-The reading of such a rest differs from its neighbours'. In the graph this looks like a bias that jumps and returns,
-which inflates the bias' random walk; no move contains the rotation within the rest.
+The mean reading of such a rest differs from that of the rests before and after. The graph has no rotation within a
+rest, so the fit explains the difference by a bias that jumps and returns, and overestimates the bias' random walk.
 """
 
 from collections.abc import Sequence
@@ -18,9 +18,9 @@ MAX_CREEPING_FRACTION = 0.125  # of the rests: if more stand out, the bias itsel
 
 
 def find_creeping_rests(fit: GraphFit) -> tuple[int, ...]:
-    """Return the smallest set of rests without which the bias' random walk is much smaller; empty if the set is large.
+    """Return the few rests without which the bias' random walk is much smaller; empty if a few do not suffice.
 
-    A creeping rest needs a used rest on either side: otherwise it looks like a jump of the bias.
+    Only a rest between two used rests can be identified, because elsewhere a creep looks like a jump of the bias.
     """
     if fit.stds.walk_rad_s_sqrt_s <= MAX_WALK_RATIO * STATED.walk_rad_s_sqrt_s:
         return ()

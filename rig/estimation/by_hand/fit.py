@@ -46,7 +46,9 @@ UNREDUCED_STDS = ("of_angle", "walk_rad_s_sqrt_s")  # these errors exist even if
 
 @dataclass(frozen=True, slots=True)
 class GraphFit:
-    """The converged graph; `covariance` (p, p), `chi_square` of all factors except the priors, with `dof`."""
+    """The converged graph, with the `covariance` (p, p) of its p unknowns.
+
+    `chi_square` and its degrees of freedom `dof` are of all factors except the priors."""
 
     session: HandRecording
     conditions: SessionConditions
@@ -164,7 +166,8 @@ def _leverages(design: Array, covariance: Array) -> Array:
 def estimate_stds(rows: Sequence[Factor], now: HandStds, trusted: int | None = None) -> tuple[list[Factor], HandStds]:
     """Return the rows with re-estimated standard deviations, and these standard deviations.
 
-    They are from the residuals of the first `trusted` rests, by default of all; `now` contains the previous values.
+    They are estimated from the residuals of the first `trusted` rests, by default of all rests. `now` contains the
+    previous standard deviations.
     """
     rows = list(rows)
     for _ in range(VARIANCE_ITERATIONS):

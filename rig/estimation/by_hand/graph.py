@@ -4,11 +4,14 @@ Unknowns: F, G, the gyroscope's nonlinearity, the accelerometer's F_a and b_a, t
 for each rest the attitude Q (body to table) and the gyroscope's bias. A factor has rows of equations, with the standard
 deviation of each cause of their errors (Dellaert and Kaess, Factor Graphs for Robot Perception, 2017).
 
+R is the body's rotation in a move by the gyroscope, from rest i to rest j; m̄ and ā are the mean readings of gyroscope
+and accelerometer in a rest, b is the bias and f the upward vertical in the body.
+
 - move: Log(R (Qᵢᵀ Qⱼ)ᵀ), with the gyroscope's noise and an error in proportion to the angle
 - rest: m̄ − b − G f; walk: the change of the bias from rest to rest, minus the change of a parabolic drift
 - flat: the table's normal in the body equals the face's normal; box: the face's normal equals the nominal one
 - closure: the heading after a whole turn; lean: the mean axis of a turn is the face's normal
-- acceleration: ā − F_a Qᵀ g − b_a, used as a level, so the component along the vertical has little weight
+- acceleration: ā − F_a Qᵀ g − b_a. It serves as a level, so the component along the vertical has little weight
 """
 
 from collections.abc import Iterator
@@ -220,7 +223,10 @@ def reading_noise(session: HandRecording) -> float:
 
 
 def _hand_held_std(scatter: Array, quiet: float, lasting_s: float) -> float:
-    """Return the standard deviation of the mean of a rest held in the hand, from the readings' low frequencies."""
+    """Return the standard deviation of the mean of a rest held in the hand.
+
+    The `scatter` beyond that of a `quiet` rest is tremor, whose bandwidth limits how many values of it are independent.
+    """
     beyond = float(np.mean(scatter**2)) - (QUIET_SCATTER_RATIO * quiet) ** 2
     return float(np.sqrt(max(beyond, 0.0) / max(TREMOR_BANDWIDTH_HZ * lasting_s, 1.0)))
 
@@ -231,7 +237,7 @@ def _rest_columns(row: int) -> tuple[slice, slice]:
 
 
 def _move(graph: Graph, row: int) -> Factor:
-    """Return the factor of a move: its integrated rates must rotate the attitude before it to the attitude after it."""
+    """Return the factor of a move: the integrated rates must rotate the attitude at its start to that at its end."""
     integrals, stds = graph.integrals, graph.stds
     design = np.zeros((3, graph.width))
     (first, first_bias), (second, second_bias) = _rest_columns(row), _rest_columns(row + 1)
@@ -250,7 +256,10 @@ def _move(graph: Graph, row: int) -> Factor:
 
 
 def _tilt_factor(graph: Graph, row: int) -> Factor:
-    """Return the equations ∫(m − b) dt/α = F n of turns by α about a face's normal n, in two directions across F n."""
+    """Return the factor of a turn by the angle α about a face's normal n, whose mean rate gives F n.
+
+    ∫(m − b) dt/α = F n, with readings m and bias b; the two equations are those in the directions across F n.
+    """
     normal, matrix = graph.faces.up[row], graph.state.matrix
     integral_rad, duration_s = graph.integrals.swept_rad[row], graph.integrals.durations_s[row]
     angle_rad = float(normal @ integral_rad)
@@ -265,7 +274,7 @@ def _tilt_factor(graph: Graph, row: int) -> Factor:
 
 
 def _closure(graph: Graph, row: int) -> Factor:
-    """Return the factor of a whole turn: about the vertical, the body returns to its heading."""
+    """Return the factor of a whole turn, after which the body has the same heading about the vertical again."""
     up = graph.faces.up[row]
     design = np.zeros((1, graph.width))
     design[0, _rest_columns(row)[0]], design[0, _rest_columns(row + 1)[0]] = -up, up @ graph.between[row]

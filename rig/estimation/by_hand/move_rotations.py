@@ -2,8 +2,9 @@
 
     m = r + even r² + odd r |r| + b + G f,   r = F ω
 
-f is the specific force in units of gravity: at a hand's speeds the vertical in body axes. It is tracked during the
-move, because with its values at the ends alone the scale errs by 1.7 standard uncertainties.
+m is the reading, ω the rate, b the bias, and f the specific force in units of gravity: at a hand's speeds this is the
+vertical in body axes. f is tracked during the move: from f at the ends alone the scale would err by 1.7 standard
+uncertainties.
 """
 
 from collections.abc import Sequence
@@ -20,12 +21,13 @@ from rig.estimation.gyroscope.increments import track
 class MoveIntegrals:
     """The rotations of the body in k moves.
 
-    - `rotations` (k, 3, 3): R from body coordinates at the end to those at the start; exp(J δθ) R with the derivatives
-      `by_matrix` (k, 3, 9), `by_bias` (k, 3, 3), `by_gravity` (k, 3, 9), `by_nonlinearity` (k, 3, 6).
+    - `rotations` (k, 3, 3): R from body coordinates at the end to those at the start. A change δ of the parameters
+      makes it exp(J δ) R, with J `by_matrix` (k, 3, 9), `by_bias` (k, 3, 3), `by_gravity` (k, 3, 9) or
+      `by_nonlinearity` (k, 3, 6).
     - `swept_rad` (k, 3): the integral of the reading minus offset, g-sensitivity and nonlinearity.
-    - `durations_s` (k,), `paths_rad` (k,): the total angle, there and back.
-    - `changes_rad_s` (k,): the root sum of squares of the rate's changes from sample to sample. Multiplied by the
-      standard deviation of the time stamps, it gives the standard deviation of the rotation due to them.
+    - `durations_s` (k,) of the moves; `paths_rad` (k,): the total angle turned, in whichever direction.
+    - `changes_rad_s` (k,): the root sum of squares of the rate's changes from sample to sample. The time stamps'
+      standard deviation times this is their contribution to the standard deviation of the rotation.
     """
 
     rotations: Array

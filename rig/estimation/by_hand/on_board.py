@@ -28,7 +28,7 @@ CURVATURE_FRACTION = 0.02
 
 @dataclass(frozen=True, slots=True)
 class BoardRest:
-    """A rest of `samples` readings on a `face`, 0 to 5 of +x -x +y -y +z -z upwards, and its mean reading (3,)."""
+    """A rest of `samples` readings with their mean (3,); `face` 0 to 5: which of +x -x +y -y +z -z points upwards."""
 
     face: int
     mean_rad_s: Array
@@ -110,7 +110,7 @@ def _vertical_on_face(centre: Array, face: int) -> tuple[Array, Array]:
 
 
 def _rest_equations(centre: Array, rest: BoardRest, noise_rad_s: float) -> Iterator[Equation]:
-    """Yield the equations of a rest, linear in a step from `centre` (33,): readings are bias plus gravity's effect."""
+    """Yield the equations of a rest, linear in a step from `centre` (33,): a reading is bias plus gravity's effect."""
     up, _ = _vertical_on_face(centre, rest.face)
     sensitivity = centre[GRAVITY].reshape(3, 3)
     for axis in range(3):

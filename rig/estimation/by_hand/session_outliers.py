@@ -1,10 +1,11 @@
 """The search for the rest or move that contradicts the others: outlier tests of a session by hand.
 
 A fault hypothesis is that some factors are wrong: each of their equations gets its own column (Baarda's mean-shift
-model, 1968), and the decreases of χ² are compared. The largest decrease is reported.
+model, 1968). The hypothesis with the largest decrease of χ² is reported.
 
-A single large outlier inflates the hand's standard deviations, which then mask it: the result holds, with a larger U.
-`find_masked_fault` finds it by standard deviations without it. Biases are excluded, because real biases jump.
+A single large outlier inflates the hand's standard deviations, which then mask the outlier: the result is right, but
+has a larger U. `find_masked_fault` re-estimates the standard deviations without each candidate. It does not test
+biases, because real biases jump.
 """
 
 from collections.abc import Iterator, Sequence
@@ -38,7 +39,7 @@ LIVE_DROP_LIMIT = 8.0  # during the session, in which a move can be repeated: 1 
 
 @dataclass(frozen=True, slots=True)
 class FaultHypothesis:
-    """A fault of the rest or move `index`, and the drop of χ² without its equations."""
+    """A possible fault of the rest or move `index`, and the drop of χ² if its equations need not hold."""
 
     name: str
     index: int
@@ -54,7 +55,7 @@ def find_contradiction(fit: GraphFit, since: int | None = None) -> Fault | None:
 
 
 def find_masked_fault(fit: GraphFit) -> Fault | None:
-    """Return the fault of the one rest or turn that inflates the stds of the hand's moves, or None."""
+    """Return the fault of the one rest or turn that inflates the stds of the hand's moves; None without one."""
     if not _much_larger(fit.stds, STATED):
         return None
     hypotheses = sorted(_test_hypotheses(fit, None), key=lambda hypothesis: hypothesis.chi_square_drop)
@@ -239,7 +240,7 @@ def _find_excessive_std(fit: GraphFit) -> Fault | None:
 
 
 def _find_unlikely_box(fit: GraphFit) -> Fault | None:
-    """Return the fault of faces further out of square than stated, by χ² of their normals, or None.
+    """Return a fault if the faces are further out of square than stated, by χ² of their normals, else None.
 
     A scale factor that changes in mid-session looks like a skewed box, because the faces follow the moves' angles.
     """

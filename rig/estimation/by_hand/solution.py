@@ -46,7 +46,7 @@ CONTRIBUTORS: dict[str, tuple[Literal["A", "B"], tuple[str, ...], str]] = {
 
 @dataclass(frozen=True, slots=True)
 class RestSummary:
-    """A rest on a `face`, or on none; `normalised_residual`: its largest residual over the standard deviation."""
+    """A rest on a `face`, None if unknown; `normalised_residual`: the largest residual in units of its own std."""
 
     face: str | None
     normalised_residual: float
@@ -238,13 +238,16 @@ def _check_precision(fit: GraphFit) -> Fault | None:
 
 
 def _looseness(fit: GraphFit) -> float:
-    """Return the larger ratio of estimated to stated standard deviation: of faces, or of moves."""
+    """Return the ratio of estimated to stated std of the faces, or of the moves if theirs is larger."""
     stds = fit.stds
     return max(stds.repeat_rad / STATED.repeat_rad, stds.of_angle / STATED.of_angle)
 
 
 def _find_first_face(session: HandRecording, conditions: SessionConditions, but: GraphFit | None) -> Fault | None:
-    """Return the Fault of a wrong first face if another first face gives a consistent session, else None."""
+    """Return the Fault of a wrong first face if another one gives a session that is consistent, else None.
+
+    `but` is the fit with the stated first face: the other face must fit much better.
+    """
     if session.acceleration is not None or conditions.first_face is None:
         return None
     for face in (face for face in FACES if face != conditions.first_face):
@@ -263,7 +266,7 @@ def _find_first_face(session: HandRecording, conditions: SessionConditions, but:
 
 
 def _budget(fit: GraphFit, to_parameters: Array, clock: Array) -> Budget:
-    """Return the budget; `to_parameters` (6, 12): from F and b to scale and bias; `clock` (6, 6): the clock's part."""
+    """Return the budget; `to_parameters` (6, 12) maps F and b to scale and bias, `clock` (6, 6) is due to the clock."""
     chosen = parameter_columns(fit)
     covariances = {name: np.zeros((6, 6)) for name in CONTRIBUTORS}
     line_of = {cause: name for name, (_, causes, _) in CONTRIBUTORS.items() for cause in causes}
@@ -297,7 +300,7 @@ def _largest_of_factor(fit: GraphFit, row: Factor) -> float:
 
 
 def _summarise_move(fit: GraphFit, row: int) -> MoveSummary:
-    """Return the rotation of a move, and its fit with the others."""
+    """Return the kind and angle of a move, and its residuals against the rest of the session."""
     move, turns = fit.session.moves[row], fit.faces.turns[row]
     closure = next((factor for factor in fit.factors if factor.kind == CLOSURE and factor.index == row), None)
     return MoveSummary(
