@@ -1,11 +1,11 @@
-"""The information of a planned set of attitudes on an accelerometer at rest in them.
+"""The information that a planned set of attitudes gives about an accelerometer at rest in them.
 
-The model is that of `rig.estimation.reference.reference_model` with v̄ = 0 and ‖v_ref‖ known, TRIAX, Eqs. (10), (11),
-about an ideal sensor: F = 1, b = 0, φ = 0. With an attitude error δ the readings' covariance is V = σ² 1 + δ² E Eᵀ
-(`rig.estimation.reference.attitude_error`).
+The model is that of `rig.estimation.reference.reference_model` for a reference v_ref of known norm, linearised about an
+ideal sensor: F = 1, b = 0, φ = 0 (Eqs. (10) and (11) of the paper TRIAX). Noise of the standard deviation σ and an
+attitude error δ give the readings the covariance σ² 1 + δ² E Eᵀ (`rig.estimation.reference.attitude_error`).
 
-Attitudes R (N, 3, 3) take body to table coordinates, `up` (3,) is a unit vector of the table. `order` 1 is the model
-with 14 free numbers, F, b and the direction of v_ref; order 2 has φ as well, 17.
+Attitudes R (N, 3, 3) take body to table coordinates, `up` (3,) is a unit vector of the table. The model of `order` 1
+has 14 free numbers, namely F, b and the direction of v_ref; that of order 2 has 17, because it has φ (3,) as well.
 """
 
 from dataclasses import dataclass
@@ -109,7 +109,7 @@ def g_efficiency(attitudes: Array, up: Array, order: Order = 1) -> float:
 def predict_stds(
     attitudes: Array, reference_m_s2: Array, noise_m_s2: Array, attitude_std_rad: float, order: Order = 1
 ) -> ExpectedStds:
-    """Return the Cramér–Rao bound of mean readings with white noise `noise_m_s2` (N,) and attitude errors δ.
+    """Return the Cramér–Rao bound for mean readings with noise of std `noise_m_s2` (N,) and errors of the attitudes.
 
     `reference_m_s2` (3,): the specific force at rest, in table coordinates. The attitudes must determine all
     parameters, see `assess_identifiability`.
@@ -136,7 +136,7 @@ def _rms(variances: Array) -> float:
 
 
 def _ideal(reference: Array, order: Order) -> Array:
-    """Return the parameters θ (p,) of an ideal sensor."""
+    """Return the parameters θ (p,) of an ideal sensor: F = 1, no bias, no nonlinearity."""
     theta = np.zeros(18 if order == 2 else 15)
     theta[[0, 4, 8]] = 1.0
     theta[REFERENCE] = reference

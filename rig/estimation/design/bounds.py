@@ -14,7 +14,9 @@ from rig.estimation.sensor_axes import parameter_jacobian
 
 
 def six_observation_bound(scale: ArrayLike, rates_rad_s: ArrayLike, variances_rad2_s2: ArrayLike) -> Array:
-    """Return the Cramér–Rao bound (6, 6) for kx ky kz bx by bz if only ‖g‖ of each sweep is given: SIX (1)–(4).
+    """Return the Cramér–Rao bound (6, 6) for kx ky kz bx by bz if only ‖g‖ of each sweep is given.
+
+    The model is Eqs. (1) to (4) of the paper SIX: g = K (m + b), m being the mean reading.
 
     `scale` (3,); `rates_rad_s` (N, 3): true g in the sensor frame; `variances_rad2_s2` (N, 3) of the mean readings. The
     two unknown components of a sweep's direction take two of its three readings; the third determines ‖g‖², with the
@@ -57,8 +59,8 @@ def triaxial_bound(
 ) -> Array:
     """Return the Cramér–Rao bound (15, 15) of F by rows, v_ref and b; (18, 18) if `second_order` φ (3,) is given.
 
-    TRIAX (3), (10). The arguments are true values, in the shapes of `solve_triaxial`. `known_references` (N, 3) are v̄;
-    without them the norm of `reference` is given.
+    The model is Eqs. (3) and (10) of the paper TRIAX. The arguments are true values, in the shapes of `solve_triaxial`.
+    `known_references` (N, 3) are v̄, the table's own motion; without them the norm of `reference` counts as known.
     """
     parts = [np.ravel(matrix), np.asarray(reference), np.asarray(bias)]
     if second_order is not None:

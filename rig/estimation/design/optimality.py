@@ -1,11 +1,12 @@
-"""Optimality of a set of sweep directions: G-optimality, SIX section II-B, and c-optimality.
+"""Optimality of a set of sweep directions: G-optimality, as in section II-B of the paper SIX, and c-optimality.
 
 The variance of the fitted model's prediction at a point x is N f(x)ᵀ (XᵀX)⁻¹ f(x), in units of one observation's
 variance. Its mean over the design's own points is exactly p, the number of parameters, so its largest value is at least
 p. A design whose largest value on the sphere is p is G-optimal, and then also D-optimal (Kiefer and Wolfowitz).
 
-Two models: "squared" is Eq. (4), f = [x² y² z² x y z], p = 6, with β0 given by the others; "vector" is f = [x y z 1], p
-= 4, for each axis. Directions are unit vectors; a zero row is a rest, which only the vector model can use.
+There are two models. "squared" is the paper's Eq. (4), with f = [x² y² z² x y z] and p = 6; its constant β0 follows
+from the six. "vector" has f = [x y z 1] and p = 4 for each axis. Directions are unit vectors; a zero vector is a rest,
+which only the vector model can use.
 """
 
 from collections.abc import Mapping
@@ -72,7 +73,7 @@ def c_efficiency(directions: ArrayLike, what: Literal["scale", "bias"] = "scale"
 
 
 def list_designs() -> dict[str, Array]:
-    """Return sets of sweep directions (N, 3) to compare with the six of SIX, section II-B."""
+    """Return sets of sweep directions (N, 3), by name: the paper's "six", and others to compare with it."""
     axes = np.eye(3)
     six = np.concatenate([axes, -axes])
     corners = np.array(list(product((1.0, -1.0), repeat=3))) / np.sqrt(3)
