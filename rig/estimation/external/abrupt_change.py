@@ -3,8 +3,8 @@
 A change happens before one of the rows, or increments, of a mixed model: the sensor's bias or the scale factors of its
 axes change by δ ~ N(0, size² 1), or the coordinates of a reference's attitudes turn by δ. The ratio of the likelihoods
 with and without such a term is the Bayes factor (Kass and Raftery, J. Am. Stat. Assoc. 90 (1995) 773). It is first
-computed for every row, with the other errors' standard deviations fixed. For the most probable row these are then
-estimated together with the change; otherwise they would include it.
+computed for every row, with the other errors' standard deviations fixed. For the most probable row these standard
+deviations are then estimated again, together with the change; otherwise they would include the change.
 """
 
 from collections.abc import Sequence
@@ -37,9 +37,10 @@ class AbruptChange:
     evidence: float
 
     def find_covariance(self, matrix: Array) -> Array:
-        """Return the covariance (12, 12) of F (3, 3), row by row, and bias whose U covers both states of the sensor.
+        """Return the covariance (12, 12) of F `matrix` (3, 3), row by row, and bias that is due to the change.
 
-        A solution lies between both states. Half of the change is the standard uncertainty, so U is the whole change.
+        A solution lies between the sensor's states before and after. Half of the change is the standard uncertainty,
+        so that U, the whole change, covers both states.
         """
         half = np.zeros((12, 3))
         if self.what == "bias":
@@ -53,7 +54,7 @@ class AbruptChange:
 class PossibleChanges:
     """Possible changes of `what`, of prior standard deviation `size`; `of_axes` (n, 3, 3) are their effects on n rows.
 
-    `possible` (n, 3): whether the axis may have changed just before the row. `lasts`: whether it affects later rows.
+    `possible` (n, 3): whether the axis may have changed just before the row. `lasts`: whether later rows change too.
     """
 
     what: Changing
@@ -68,8 +69,9 @@ def find_change(
 ) -> AbruptChange | None:
     """Return the most probable change before a row, or None if its evidence is at most `least_evidence`.
 
-    The rows are in the order of time and begin at `begins_s` (n,). `starts` (s, k) are sets of standard deviations of
-    the model's errors. The search for the row is made with each: the first is the most probable one without a change.
+    The rows are in the order of time and begin at `begins_s` (n,). `starts` (s, k) are standard deviations of the
+    model's k errors, with each of which the row is searched for; the first are the most probable ones if nothing
+    changed.
     """
     count = sum(int(effect.possible.any(axis=1).sum()) for effect in effects)
     log_without, change = model.evaluate_posterior(starts[0]) + float(np.log(max(count, 1))), None

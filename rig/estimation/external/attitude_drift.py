@@ -232,8 +232,8 @@ def drift_model(averaged: FixedAttitudes, fixes: Fixes) -> DriftModel:
 def _list_errors(averaged: FixedAttitudes, fixes: Fixes, correlation: Array, step: Array) -> dict[str, Array]:
     """Return the covariance (3n, 3n) of the increments, by cause, due to unit errors of the reference or the times.
 
-    Errors of the reference vary with attitude, or are new in each visit, rest, or fix in motion. Times err by jitter of
-    the stamps, and by a drift of the sampling interval.
+    The reference's errors vary with attitude, or are new in each visit to an attitude, each rest, or each fix in
+    motion. The errors of the times are jitter of the stamps and, if these hide lost readings, of the times in between.
     """
     count = len(fixes.placement)
     first = np.searchsorted(fixes.fix, np.arange(count))
@@ -317,8 +317,8 @@ def _weigh_bias(averaged: FixedAttitudes, fixes: Fixes) -> Array:
 def _find_bias_changes(sensitivities: Array, nearby: Array, middles_s: Array, weights: Array) -> Array:
     """Return the covariance (3n, 3n) of the increments due to unit changes of the bias b with attitude and time.
 
-    `sensitivities` (n, 3, 12) are those to F and b, `nearby` (n, n) the correlation by attitude, `middles_s` (n,) the
-    middle times. Changes are relative to the mean bias with `weights` (n,).
+    `sensitivities` (n, 3, 12) are the increments' derivatives by F and b, `nearby` (n, n) the correlation by attitude,
+    `middles_s` (n,) the middle times. Changes are relative to the mean bias with `weights` (n,).
     """
     apart = np.abs(middles_s[:, None] - middles_s) / (np.ptp(middles_s) / BIAS_INTERVALS + 1e-9)
     from_mean = np.eye(len(weights)) - weights

@@ -26,8 +26,8 @@ MIN_ROTATION_RAD2 = 1e-14  # sum of a fix's squared rotations: less is rounding
 class Inclinations:
     """Inclinations of a reference's axes of motion.
 
-    - `response` (m, r): of the m components of all increments to r independent inclinations of 1 rad.
-    - `prior_median_rad`: the prior median of their standard deviation.
+    - `response` (m, r): the change of the m components of all increments by r independent inclinations of 1 rad.
+    - `prior_median_rad`: the prior median of the inclinations' standard deviation.
     """
 
     response: Array
@@ -36,9 +36,9 @@ class Inclinations:
     def widen(self, model: MixedModel, std: Array, fit: MixedFit, wanted: Array, variances: Array) -> Array:
         """Return the covariance (q, q) that inclinations add to `wanted` (q, p) combinations of the parameters.
 
-        Only inclinations that the residuals do not show are added. `variances` (q,) are due to the model's other
-        errors, with standard deviations `std` (k,), which contain the visible inclinations. With both covariances
-        added, 2 u is the half-width of the 95.45 % interval.
+        Only inclinations that the residuals do not show are added. The model's other errors, with the standard
+        deviations `std` (k,), cause the `variances` (q,) and include the inclinations that the residuals do show.
+        From the sum of both variances, 2 u is the half-width of the 95.45 % interval.
         """
         from scipy.linalg import cho_factor, cho_solve
 
@@ -62,10 +62,10 @@ class Inclinations:
 
 
 def _weigh_sizes(sizes_rad: Array, values: Array, scores: Array) -> Array:
-    """Return the probabilities (j,) of the inclinations' standard deviations: prior times restricted likelihood.
+    """Return the probabilities (j,) of `sizes_rad`, standard deviations of the inclinations: prior times likelihood.
 
-    The information about the inclinations is Hᵀ P H. In its eigenvectors the likelihood is a product with one factor
-    for each of the eigenvalues `values` (r,) and their `scores` (r,). All other errors keep their sizes.
+    The restricted likelihood is a product with one factor for each eigenvector of the information about the
+    inclinations, with its eigenvalue of `values` (r,) and its `scores` (r,). All other errors keep their sizes.
     """
     variances = np.square(sizes_rad)[:, None]
     ratio = 1 + variances * values

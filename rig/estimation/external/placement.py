@@ -28,9 +28,9 @@ UNKNOWN_ATTITUDE_STD_RAD = 1.0
 
 @dataclass(frozen=True, slots=True)
 class PlacementSolution:
-    """The parameters θ (p,) with placement errors: their covariance (p, p) is the sum of `causes`, by name.
+    """The parameters θ (p,), estimated with placement errors; θ's covariance (p, p) is the sum of its named `causes`.
 
-    `placement_std` is ζ in the unit of the readings, `attitude_error` δ.
+    `placement_std` is ζ in the unit of the readings, with its `placement_uncertainty`; `attitude_error` is δ.
     """
 
     theta: Array
@@ -54,8 +54,8 @@ NOISE, ATTITUDES, PLACEMENTS, CHANGE = "noise", "attitudes", "placements", "abru
 class _LinearisedPlacements:
     """The linearised readings of N placements.
 
-    Residuals (N, 3), design (N, 3, q), variances of the noise (N, 3), the effects E of a rotation, and the stated
-    standard deviations (N,).
+    - residuals (N, 3): readings minus model; design (N, 3, q) by θ's free directions; variances (N, 3) of the noise.
+    - turned (N, 3, 3): E, the effects of a small rotation; std_rad (N,): the attitudes' stated standard deviations.
     """
 
     residuals: Array
@@ -101,7 +101,10 @@ class _PlacementFits:
 
 
 def laid_down(theta: Array, placed: AttitudeReadings, unplaced: Array, unplaced_variances: Array) -> PlacementSolution:
-    """Re-estimate the solution `theta` (p,) with placement errors; `unplaced` (k, 3) are means in unknown attitudes."""
+    """Return the solution `theta` (p,) re-estimated by a model that has placement errors.
+
+    `unplaced` (k, 3) are mean readings in unknown attitudes, with `unplaced_variances` (k, 3).
+    """
     all_rests = _add_unplaced(theta, placed, unplaced, unplaced_variances)
     free = free_directions(theta, norm_known=all_rests.norm_known)
     linear = _LinearisedPlacements(
@@ -144,7 +147,8 @@ def laid_down(theta: Array, placed: AttitudeReadings, unplaced: Array, unplaced_
 def _relate_errors(laid: PlacementSolution, all_rests: AttitudeReadings, stated: int) -> PlacementSolution:
     """Return the solution if the errors of the first `stated` attitudes may be a smooth function of the attitude.
 
-    The covariance at the most probable standard deviations is inflated to 95 % intervals that integrate over these.
+    The covariance is that at the most probable standard deviations of the errors, enlarged so that its 95 % intervals
+    are those averaged over all standard deviations.
     """
     model, theta = build_placement_model(laid.theta, all_rests, stated), laid.theta.copy()
     maxima = model.find_maxima()

@@ -20,8 +20,8 @@ MIN_EIGENVALUE = 1e-9  # of the information: a smaller one counts as zero
 def find_sole_attitude(theta: Array, placed: AttitudeReadings) -> tuple[int, int] | None:
     """Return the axis whose scale factor depends on a single placement, and that placement; None if there is none.
 
-    Without that placement, the scale factor's standard deviation exceeds `MAX_DETERMINED_STD`. None also if no attitude
-    was repeated. `theta` (p,) is the solution: SI units, scale factors about 1.
+    Without that placement, the scale factor's standard deviation exceeds `MAX_DETERMINED_STD`. Return None also if no
+    attitude was repeated. `theta` (p,) is the solution in SI units, with scale factors about 1.
     """
     size = np.linalg.norm(theta[REFERENCE])
     verticals = np.einsum("nji,j->ni", placed.attitudes, theta[REFERENCE] / size)
