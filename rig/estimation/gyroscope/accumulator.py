@@ -104,9 +104,9 @@ class Accumulator:
     def solve(self, estimator: SixObservationEstimator = "newton") -> Solution:
         """Return scale factors and biases with their covariance.
 
-        `newton` centres the readings on their mean, about −b: uncentred, the design of Eq. (7) is singular if ‖K b‖ =
-        ω. `algorithm_1` uses them uncentred, as published. Raise Fault `too_few_observations`, `rank_deficient`,
-        `negative_square`, `algorithm_1_diverged`, `wrong_unit`.
+        `newton` centres the readings on their mean, which is about −b, because uncentred the design of the paper's Eq.
+        (7) is singular if ‖K b‖ = ω. `algorithm_1` uses uncentred readings, as published. Raise Fault
+        `too_few_observations`, `rank_deficient`, `negative_square`, `algorithm_1_diverged`, `wrong_unit`.
         """
         check_count(self.count, 6, 6)
         centre = self.geometry[6, 3:6] / self.count

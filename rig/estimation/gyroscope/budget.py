@@ -161,7 +161,7 @@ def _contributors(explained: VectorFit, unknown: UnknownErrors) -> Iterator[Cont
     matrix = solution.matrix
 
     def propagate(patterns: Array) -> Array:
-        """Return the covariance (6, 6) of scale and bias due to independent patterns (k, N, 3), rad/s, of one std."""
+        """Return the covariance (6, 6) of scale and bias due to independent patterns (k, N, 3) of one std, rad/s."""
         effects = np.einsum("qni,kni->kq", solution.response, patterns)
         covariance: Array = effects.T @ effects
         return covariance
@@ -279,7 +279,7 @@ def _evaluate_readings(explained: VectorFit) -> Iterator[Contributor]:
 
 
 def split_bias_covariance(bias: BiasProcess, response: Array, windows_s: Array) -> tuple[Array, Array]:
-    """Return the covariances (6, 6) due to the bias' flicker, and due to the rest of its drift.
+    """Return the covariances (6, 6) of scale and bias due to the bias' flicker, and to the rest of its drift.
 
     `response` (6, N, 3) is the derivative of scale and bias with respect to the readings' means over windows (N, 2).
     """

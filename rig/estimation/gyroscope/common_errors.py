@@ -5,8 +5,9 @@ fast sweep. Each such error e (zero on average, of standard deviation 1 in its o
 
     m = F ω + c (+ G a) + B e,   e ~ N(0, I)
 
-F, c, G and e are estimated together (the mixed model of Henderson, Biometrics 31 (1975) 423). The result is corrected
-for the part of e that sweeps and rests determine; the other part is predicted as zero.
+F, c, e and, with the apparent gravity a, the g-sensitivity G are estimated together (the mixed model of Henderson,
+Biometrics 31 (1975) 423). The result is corrected for the part of e that sweeps and rests determine; the other part is
+predicted as zero.
 """
 
 from collections.abc import Callable

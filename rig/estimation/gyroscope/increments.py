@@ -1,8 +1,9 @@
-"""A gyroscope's increments: its rotation between two instants, and the sensitivity of that to matrix and bias.
+"""A gyroscope's increments, that is, its rotations between two instants, and their sensitivity to matrix and bias.
 
     m = F ω + b,   Ċ = C [ω]×,   C(t₁)ᵀ C(t₂) = exp(φ₁) exp(φ₂) … exp(φₙ)
 
-C maps body coordinates at t to those of the first reading; ω is the inertial rate in body coordinates. Between readings
+C maps body coordinates at t to those of the first reading; ω is the inertial rate in body coordinates and m its reading
+by a gyroscope with the matrix F and the bias b. Between readings
 at ω₀ and ω₁ the rate follows a cubic whose slopes, per step, are those of five readings,
 ω̇ₖ = (8 (ωₖ₊₁ − ωₖ₋₁) − ωₖ₊₂ + ωₖ₋₂)/12, so that the rotation vector of a step h is, to fourth order (Magnus, Comm.
 Pure Appl. Math. 7 (1954) 649),
@@ -17,7 +18,8 @@ A small error of the parameters δθ = (δF row by row, δb) adds δω = −F⁻
 
     exp(S(t) δθ) C(t),   S(t) = −∫ C F⁻¹ [ω ⊗ 1, 1] dt        in coordinates of the first reading
 
-so one pass gives C and S at all requested instants, and an increment between any two is a difference.
+so one pass gives C and S at all requested instants. The increment from t₁ to t₂ is then the rotation C(t₁)ᵀ C(t₂), with
+the sensitivity C(t₁)ᵀ (S(t₂) − S(t₁)) in body coordinates at t₁.
 """
 
 from collections.abc import Iterator
@@ -63,9 +65,9 @@ class Track:
 class Increments:
     """The body's rotation between w pairs of instants.
 
-    - `rotations` (w, 3, 3): body coordinates at the end to those at the start.
-    - `jacobian` (w, 3, 12): J, by which a change δθ of F (row by row) and b makes the rotation exp(J δθ) × rotation, in
-      body coordinates at the start.
+    - `rotations` (w, 3, 3): each maps body coordinates at the end to those at the start.
+    - `jacobian` (w, 3, 12): J. A change δθ of F (row by row) and b makes a rotation exp(J δθ) × rotation, in body
+      coordinates at the start.
     """
 
     rotations: Array
@@ -99,7 +101,7 @@ def integrate_attitudes(time_s: Array, readings: Array, matrix: Array, bias: Arr
 
 
 def track(time_s: Array, readings: Array, matrix: Array) -> Track:
-    """Integrate readings without bias, at their own times. Other arguments: see `integrate_attitudes`."""
+    """Integrate readings that have no bias, and return the attitudes at their own times; see `integrate_attitudes`."""
     inverse = np.asarray(np.linalg.inv(matrix), dtype=np.float64)
     interval = _find_slopes(time_s, readings @ inverse.T)
     steps = _whole_steps(interval)
@@ -150,7 +152,10 @@ def _find_slopes(time_s: Array, rates: Array) -> _Interval:
 
 
 def _integrate_block(interval: _Interval, at_s: Array, inverse: Array) -> tuple[Array, Array, Array]:
-    """Return C (k + 1, 3, 3) and S (k + 1, 3, 12) from the block's start to `at_s` (k,) and its end; rates (k, 3)."""
+    """Return C (k + 1, 3, 3), S (k + 1, 3, 12) and rates (k, 3) at the times `at_s` (k,), C and S also at the end.
+
+    C and S are relative to the block's start.
+    """
     before = np.clip(np.searchsorted(interval.time_s, at_s, side="right") - 1, 0, len(interval.time_s) - 2)
     whole = _whole_steps(interval)
     attitudes = _running_product(whole.vectors)

@@ -16,7 +16,8 @@ from rig.estimation.gyroscope.vector_model import design_matrix, propagate_speed
 def propagate_mount_squares(explained: VectorFit) -> Array:
     """Return the mean square (6, 6) of the mounts' second-order effect on kx ky kz bx by bz; zero if mounts are exact.
 
-    For remaining errors ε ~ N(0, C) of the mounts, εᵀHε/2 has the mean tr(HC)/2 and the covariance tr(HCH'C)/2.
+    Let ε ~ N(0, C) be the remaining errors of the mounts, and H and H' the second derivatives of two of the parameters.
+    The second-order effect εᵀHε/2 has the mean tr(HC)/2, and the covariance tr(HCH'C)/2 with the other parameter's.
     """
     covariance = explained.mounts_covariance
     if explained.inputs.mount_turns_rad is None:
@@ -28,9 +29,10 @@ def propagate_mount_squares(explained: VectorFit) -> Array:
 
 
 def _find_curvatures(explained: VectorFit, turns_rad: Array) -> Array:
-    """Return the second derivatives (6, E, E) of scale and bias with respect to E mount errors, per prior std.
+    """Return the second derivatives (6, E, E) of scale and bias by E mount errors, in units of their prior stds.
 
-    Errors of the rates change the estimate of F to F + D + S, with D of first and S of second order; k = 1/‖row of F‖.
+    The mount errors change the estimate of F to F + D + S, with D of first and S of second order. The second derivative
+    of k = 1/‖row of F‖ has a part linear in S and a part quadratic in D.
     """
     inputs, matrix = explained.inputs, explained.solution.matrix
     inverse = _find_regression(explained)  # (3, 4, N)

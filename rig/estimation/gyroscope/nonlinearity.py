@@ -36,7 +36,8 @@ def distinct_speeds(speeds_rad_s: Array) -> tuple[float, ...]:
 def curvature(matrix: Array, rates_rad_s: Array) -> Array:
     """Return the effects (6, N, 3) on readings of the odd parts of x, y, z, then of the even parts.
 
-    Each part has the size `PRIOR_STD_PER_RAD_S`. `rates_rad_s` (N, 3) are mean rates in the flange's frame; F (3, 3).
+    Each part has the size `PRIOR_STD_PER_RAD_S`. `rates_rad_s` (N, 3) are mean rates in the flange's frame, which the
+    gyroscope's `matrix` F (3, 3) maps to its readings.
     """
     readings = rates_rad_s @ matrix.T
     projected = readings / np.linalg.norm(matrix, axis=1)

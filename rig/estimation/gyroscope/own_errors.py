@@ -24,8 +24,8 @@ NEGLIGIBLE_FRACTION = 1e-3  # fraction of a mean's variance below which a common
 class SensorProperties:
     """Half-widths of errors from the data sheet, and the temperature of N averages.
 
-    - `nonlinearity`: largest distance from the best straight line by the odd or the even part, as a fraction of
-      `full_scale_rad_s`.
+    - `nonlinearity`: largest distance from the best straight line that the odd or the even part alone may cause, as a
+      fraction of `full_scale_rad_s`.
     - `bias_rad_s_per_k`, `scale_per_k`: changes with temperature.
     - `temperature_c` (N,): recorded in steps of `temperature_step_k`, NaN if not recorded.
     - `temperature_words`: source of the temperature, if it is not a thermometer.
@@ -59,10 +59,14 @@ class OwnError:
 def list_own_errors(
     sensor: SensorProperties, matrix: Array, turns_rad_s: Array, windows_s: Array, speeds_rad_s: tuple[float, ...]
 ) -> Iterator[OwnError]:
-    """Yield nonlinearity and temperature errors for F (3, 3), rates (N, 3), zero at rest, and windows (N, 2).
+    """Yield the errors due to nonlinearity and temperature in the means of N windows (N, 2) of sweeps and rests.
 
-    If all sweeps have one speed, the scale refers to this speed along an axis: an oblique rotation has a lower rate
-    along the axis, so its scale may differ. With several speeds the model contains the nonlinearity.
+    `matrix` (3, 3) is F, `turns_rad_s` (N, 3) are the rates, zero in a rest. If all sweeps have one speed, the scale
+    refers to this speed along an axis: an oblique rotation has a lower rate along the axis, so its scale may differ.
+    With several speeds the vector model estimates the nonlinearity, so it is not yielded.
+
+    The temperature's patterns (6, N, 3) are due to the recorded temperature, for x, y, z, then to changes that the
+    thermometer hides. Only sweeps determine the scale, so its temperature is relative to their mean temperature.
     """
     if len(speeds_rad_s) == 1:
         unit_curves = nonlinear_effects(matrix, turns_rad_s, sensor.full_scale_rad_s, speeds_rad_s[0])
@@ -103,7 +107,7 @@ def rounding_errors(means_rad_s: Array, roundings_rad_s: Array | float, variance
 
 
 def _temperature_deviations_k(sensor: SensorProperties, windows_s: Array, weights: Array) -> Array:
-    """Return the deviations (2, N), K, from the weighted mean temperature: recorded, then hidden below a step."""
+    """Return the deviations (2, N), K, from the weighted mean temperature: the recorded ones, then the hidden ones."""
     recorded = subtract_mean(sensor.temperature_c, weights)
     return np.array([recorded, unseen_k(sensor.temperature_step_k, windows_s, weights)])
 

@@ -38,7 +38,7 @@ NOISE, BIAS, ENDS, AXES = "noise", "bias from rest to rest", "ends of the turns"
 class Turn:
     """A rotation from rest to rest: from `start_s` to `end_s` about the unit `axis` (3,) of the body by `angle_rad`.
 
-    `angle_std_rad`: standard uncertainty of the end attitude about any axis; `axis_std_rad`: of the axis in the body.
+    `angle_std_rad` is the standard uncertainty of the end attitude about any axis, `axis_std_rad` that of the `axis`.
     """
 
     start_s: float
@@ -101,7 +101,7 @@ class TurnedSolution:
 
 @dataclass(frozen=True, slots=True)
 class _ObservationEquations:
-    """The equations `observed` (r,) = `design` (r, 12) δθ + errors; `causes`: patterns (r, q) of one std, by name."""
+    """The equations `observed` (r,) = `design` (r, 12) δθ + errors, the latter by cause: patterns (r, q) of one std."""
 
     observed: Array
     design: Array
@@ -202,7 +202,10 @@ def _equate_mean(mean: RateMean, gyroscope: Gyroscope, state: _TurnsEstimate) ->
 def _equate_rotation(
     turn: Turn, rotation: Array, jacobian: Array, gyroscope: Gyroscope, state: _TurnsEstimate
 ) -> _ObservationEquations:
-    """Return a turn's equations: three of its integrated `rotation` (3, 3), two of the mean reading across the axis."""
+    """Return a turn's five equations: three for its integrated `rotation` (3, 3), two for its mean reading.
+
+    The two are for the components across F n, as in this module's docstring. `jacobian` (3, 12) is J.
+    """
     from scipy.spatial.transform import Rotation
 
     time_s = gyroscope.time_s

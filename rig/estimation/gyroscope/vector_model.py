@@ -201,7 +201,7 @@ def _check_identifiable(scaled: Array) -> Conditioning:
 
 
 def design_matrix(rates: Array, gravity: Array | None) -> Array:
-    """Return the design Z (…, N, 4 or 7) = [ω 1 (a)] from rates ω and gravity a (…, N, 3), or None."""
+    """Return the design Z (…, N, 4 or 7) = [ω 1 (a)] from the rates ω (…, N, 3) and, unless None, the gravity a."""
     blocks = [rates, np.ones((*rates.shape[:-1], 1))]
     if gravity is not None:
         require_shape("gravity", gravity, rates.shape)
@@ -217,7 +217,10 @@ def _unit(design: Array) -> Array:
 
 
 def regress(design: Array, means: Array, variances: Array, shared: Array | None = None) -> tuple[Array, Array]:
-    """Return coefficients (…, p, 3) and the map (…, 3, p, N) to them, axis by axis; `shared` (N, N) adds covariance."""
+    """Return coefficients (…, p, 3) and the map (…, 3, p, N) from means to them, for each axis.
+
+    `shared` (N, N) is a covariance of the means in addition to their `variances`.
+    """
     transposed = np.swapaxes(design, -1, -2)[..., None, :, :]
     if shared is None:
         weights = 1 / np.swapaxes(variances, -1, -2)  # (…, 3, N)
@@ -231,7 +234,7 @@ def regress(design: Array, means: Array, variances: Array, shared: Array | None 
 
 
 def propagate_speed_std(rates: Array, speed_std: Array, matrix: Array) -> Array:
-    """Return the effect (N, 3) of one std σ (N,) of the speed on the readings, F û σ, û being the rates' directions."""
+    """Return the effect (N, 3) on readings of one std `speed_std` (N,) of the speed, along the rates' directions."""
     speed = np.linalg.norm(rates, axis=1)
     axes = np.divide(rates, speed[:, None], out=np.zeros_like(rates), where=speed[:, None] > 0)
     noise: Array = speed_std[:, None] * (axes @ matrix.T)
@@ -271,7 +274,7 @@ def _all_variances(variances: Array, speed_noise: Array, shared: Array | None) -
 def _response(to_parameters: Array, inverse: Array) -> Array:
     """Return the derivative (6, N, 3) of k and b with respect to the mean readings, by the chain rule.
 
-    `to_parameters` (6, 12): derivative with respect to the coefficients; `inverse` (3, p, N): readings to coefficients.
+    `to_parameters` (6, 12) is their derivative by the coefficients; `inverse` (3, p, N) maps readings to coefficients.
     """
     by_axis = np.concatenate([to_parameters[:, :9].reshape(6, 3, 3), to_parameters[:, 9:, None]], axis=2)
     response: Array = np.matmul(np.swapaxes(by_axis, 0, 1), inverse[:, :4]).transpose(1, 2, 0)
