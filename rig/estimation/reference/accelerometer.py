@@ -15,7 +15,10 @@ MODEL = "a_m = F (s + φ s²) + b, s = −Rᵀ g"
 
 
 def specific_force(readings_m_s2: ArrayLike, matrix: Array, bias_m_s2: Array, second_order_s2_m: Array | None) -> Array:
-    """Return the specific force s (…, 3) in m/s²: the smaller root of φ s² + s = F⁻¹ (a_m − b); φ (3,) or None."""
+    """Return the specific force s (…, 3) in m/s² from readings a_m: the smaller root of φ s² + s = F⁻¹ (a_m − b).
+
+    φ is `second_order_s2_m` (3,), zero if None.
+    """
     linear = (np.asarray(readings_m_s2, dtype=np.float64) - bias_m_s2) @ np.linalg.inv(matrix).T
     if second_order_s2_m is None:
         return np.asarray(linear, dtype=np.float64)

@@ -61,7 +61,7 @@ class Sweeps:
     - axes_flange (M, 3): unit vector of a growing angle; speeds_rad_s (M,): negative if the angle falls.
     - attitudes (M, 3, 3): flange to base at the angle zero.
     - arms_m (M, 3): p, from the axis to the flange's origin, in flange coordinates.
-    - stations (M,): a number for each joint and pose; sweeps of one station, in either direction, share errors.
+    - stations (M,): the number of each sweep's joint and pose; sweeps of one station share errors in both directions.
     - turning_rad2_s2 (M, 6, 3): mean, cosine and sine of the joint's motion, as in `FirstHarmonic`.
     """
 
@@ -181,7 +181,7 @@ def project_reference(delay_s: float, movement: Movement) -> Array:
 
 
 def _differentiate_lag(waves: Array, sweeps: Sweeps) -> Array:
-    """Return the derivative of harmonics (M, 3, …) with respect to the angle's lag, without the mean rate's effect."""
+    """Return the derivative of harmonics `waves` (M, 3, …) by the filter's lag, due to uneven rotation alone."""
     by_wave = (len(waves), 3, *(1,) * (waves.ndim - 2))
     cosine, sine = (sweeps.turning_rad2_s2[:, row] / sweeps.speeds_rad_s[:, None] for row in (4, 5))
     changed: Array = sine.reshape(by_wave) * waves[:, 1:2] - cosine.reshape(by_wave) * waves[:, 2:]
@@ -319,7 +319,11 @@ def _read(changes: Array, s: Array, theta: Array, movement: Movement) -> Array:
 
 
 def _product(one: Array, other: Array, movement: Movement) -> Array:
-    """Return the elementwise product (K, 3, …); in sweeps, the product of two harmonics up to the first order."""
+    """Return the elementwise product (K, 3, …) of two quantities in dwells and sweeps.
+
+    In sweeps, given as mean, cosine and sine over the angle, two Fourier series are multiplied; the product's second
+    harmonic is dropped.
+    """
     count = len(movement.dwells.readings_m_s2)
     mean, cos, sin = np.moveaxis(_harmonics_of_sweeps(one, movement), 1, 0)
     others = np.moveaxis(_harmonics_of_sweeps(other, movement), 1, 0)

@@ -4,9 +4,10 @@ A small rotation ε of the body, (3,) rad, turns the reference in the body's fra
 
     v_m = F (s + φ s²) + b + E ε,   s = Rᵀ v_ref + v̄,   E = F diag(1 + 2 φ s) [Rᵀ v_ref]×
 
-With ε ~ N(0, δ² 1) in every attitude a reading's covariance is V = diag(σ²) + δ² E Eᵀ, which along the reference does
-not depend on δ. For δ → 0 this is the fit to the reference as a vector, for δ → ∞ the fit to its size alone. δ is the
-restricted maximum likelihood estimate (Patterson and Thompson, Biometrika 58 (1971) 545).
+With ε ~ N(0, δ² 1) in every attitude a reading of noise σ (3,) has the covariance V = diag(σ²) + δ² E Eᵀ, which along
+the reference does not depend on δ. The fit with these covariances is the fit to the reference as a vector for δ → 0,
+and the fit to its size alone for δ → ∞. δ is the restricted maximum likelihood estimate (Patterson and Thompson,
+Biometrika 58 (1971) 545).
 """
 
 from dataclasses import dataclass
@@ -134,7 +135,10 @@ def effects(theta: Array, attitudes: Array, v_bar: Array) -> Array:
 
 
 def find_whiteners(variances: Array, rotations: Array, std_rad: Array) -> Array:
-    """Return whiteners (N, 3, 3) for noise `variances` (N, 3) and attitude errors `std_rad` (N,) with effects E."""
+    """Return whiteners (N, 3, 3) for noise `variances` (N, 3) and attitude errors `std_rad` (N,).
+
+    `rotations` (N, 3, 3) are E, the effects of small rotations on the readings.
+    """
     scaled = rotations * std_rad[:, None, None]
     covariance = np.eye(3) * variances[:, :, None] + scaled @ np.swapaxes(scaled, -1, -2)
     return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)), dtype=np.float64)
@@ -159,8 +163,8 @@ def maximise_likelihood(
     """Return the restricted-maximum-likelihood estimate of δ, rad, and the negative log-likelihood up to a constant.
 
     Residuals (n,) are independent with variances 1 + δ² γ, `growth` (n,) being γ; `slopes` (n, q) are the model's
-    columns, `nuisance` (n, k) further explanatory ones. The constant depends on the slopes alone. The search takes the
-    best δ of a grid and refines it between its neighbours.
+    columns, `nuisance` (n, k) further explanatory columns. The constant depends on the slopes alone. The search takes
+    the best δ of a grid and refines it between the grid's neighbouring values.
     """
     from scipy.optimize import minimize_scalar
 
@@ -198,7 +202,10 @@ def maximise_likelihood(
 
 
 def _find_uncertainty(delta: float, fit: Array, rotations: Array) -> float:
-    """Return δ's std from the expected information on δ²: tr((P G)²)/2, G = E Eᵀ, P the residual maker of `fit`."""
+    """Return δ's std from the expected information on δ², which is tr((P G)²)/2.
+
+    G is E Eᵀ, with E `rotations`, and P the residual maker of `fit`, the whitened derivatives.
+    """
     orthogonal = np.linalg.qr(fit)[0].reshape(*rotations.shape[:2], -1)
     growth = rotations @ np.swapaxes(rotations, -1, -2)
     grown = growth @ orthogonal

@@ -52,7 +52,7 @@ MODEL = "m = F (s + φ s²) + b, s = Rᵀ v_ref + ω × (ω × (p + r)) + α × 
 class ImuSolution:
     """An accelerometer's calibration from dwells and sweeps.
 
-    - matrix (3, 3), bias_m_s2 (3,): F, the scale factors and axes; b, part of the reading.
+    - matrix (3, 3): F, the scale factors and axes; bias_m_s2 (3,): b, the reading at zero specific force.
     - reference_m_s2 (3,): v_ref, the specific force at rest, in base coordinates.
     - lever_arm_m (3,), delay_s: r in the flange's frame, and the filter's lag τ; None without sweeps.
     - second_order_s2_m (3,): quadratic terms φ, or None.
@@ -113,9 +113,9 @@ def solve_imu(
 ) -> ImuSolution:
     """Calibrate from dwells, sweeps or both.
 
-    `gravity_m_s2` is the length of v_ref, which points into the half-space of the base frame around `up` (3,).
-    `repeatability_rad`, `sensor_errors`, `arm_turns`: see `Movement`. `independent_fractions`: possible values of its
-    `independent_fraction`, of which the readings show the most likely one.
+    `gravity_m_s2` is the length of the specific force at rest, v_ref, whose product with `up` (3,) is positive, both in
+    the base frame. `repeatability_rad`, `sensor_errors`, `arm_turns`: see `Movement`. `independent_fractions` are the
+    possible values of `Movement.independent_fraction`, from which the readings determine it.
 
     Raise Fault `too_few_observations`, `not_finite`, `bad_variance`, `bad_speed`, `zero_reading`,
     `duplicated_observation`, `bad_attitude`, `rank_deficient`, `ill_conditioned`, `sign_unknown`, `wrong_unit`,

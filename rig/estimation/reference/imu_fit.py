@@ -31,7 +31,10 @@ DISTURBANCE_ODDS = 1 / 19  # prior: one dwell or sweep is disturbed, or all swee
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """Parameters θ (22,), the attitude error δ `std_rad`, and the Jacobian (3 K, q) of `free` directions (22, q)."""
+    """A fit: parameters θ (22,), attitude error δ `std_rad`, and Jacobian (3 K, q) in the `free` directions (22, q).
+
+    `readings` decorrelates the K readings; `iterations` counts Gauss–Newton steps.
+    """
 
     theta: Array
     readings: Decorrelation
@@ -99,7 +102,7 @@ def most_likely(start: Array, movement: Movement, fixed: list[int], attitude_std
 
 
 def _least_squares(theta: Array, movement: Movement, fixed: list[int], whitener: Array) -> tuple[Array, int]:
-    """Return θ by Gauss–Newton steps, and their number."""
+    """Return the least-squares θ by Gauss–Newton steps, and the number of steps."""
     readings, norm = movement.readings(), np.linalg.norm(theta[REFERENCE])
     rounding = 1e-13 * float(np.linalg.norm(whitener @ readings.ravel()))
     steps, moved = 0, np.inf
@@ -118,7 +121,7 @@ def _least_squares(theta: Array, movement: Movement, fixed: list[int], whitener:
 def refit_with_components(
     fit: Fit, movement: Movement, sensor: AccelerometerErrors, fixed: list[int], independent_fractions: Sequence[float]
 ) -> tuple[Movement, Fit]:
-    """Return the movement with variance components estimated from the residuals of `fit`, and its new fit."""
+    """Return the movement with variance components estimated from the residuals of `fit`, and the fit with these."""
     residuals = (movement.readings() - predicted(fit.theta, movement)).ravel()
     modelled, variances = noise(fit.theta, movement), np.diag(movement.noise())
     of_arm = partial(combine_effects, *split_effects(fit.theta, movement))

@@ -27,7 +27,9 @@ REMEDY = "Take attitudes turned about at least two axes, or sweep about more axe
 
 
 def linear_start(movement: Movement, norm: float, up: Array) -> Array:
-    """Return the initial parameters θ (22,): v_ref has the length `norm` and is on the side of `up` (3,).
+    """Return the initial parameters θ (22,): F, the specific force at rest v_ref, b and the lever arm; the rest is 0.
+
+    v_ref has the length `norm` and a positive product with `up` (3,), which determines its sign.
 
     Raise Fault `rank_deficient`, `ill_conditioned`, `sign_unknown`.
     """

@@ -25,7 +25,7 @@ FALSE_ALARM_PROBABILITY = 1e-3  # of one of the two tests, for a steady, uniform
 
 
 def hard_iron(solution: TriaxialSolution) -> Array:
-    """Return F⁻¹ b (3,): the field that would read as b."""
+    """Return F⁻¹ b (3,), the field that an ideal sensor would read as the `solution`'s bias b."""
     return np.asarray(np.linalg.solve(solution.matrix, solution.bias), dtype=np.float64)
 
 
@@ -55,7 +55,7 @@ def uniformity(
     variances_t2: ArrayLike,
     attitude_error_rad: float,
 ) -> Uniformity:
-    """Return the test of a uniform field: a fit of the readings with the given error of the attitudes.
+    """Test that the field is uniform, by the residuals of a fit of the readings with the given error of the attitudes.
 
     `solution` fits the `readings_t` with `variances_t2` (N, 3) in `attitudes` (N, 3, 3). Raise Fault
     `attitude_untrustworthy` if no fit exists.

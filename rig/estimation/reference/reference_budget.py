@@ -31,7 +31,7 @@ class FitUncertainty:
       readings.
     - `noise` (n, n): covariance of the readings' own noise.
     - `attitude_error`: the error of the attitudes.
-    - `chi_square` of the residuals, and its `dof`.
+    - `chi_square`, `dof`: χ² of the residuals, and its degrees of freedom.
     - `noise_dof` (n,): degrees of freedom of the readings' variances.
     """
 
@@ -74,7 +74,7 @@ class NormUncertainty:
 def scale_and_bias(matrix: Array, scale: Array, parameters: int) -> Array:
     """Return the derivative (6, p) of scale and bias with respect to θ (p,), which begins with F, the reference and b.
 
-    The bias changes sign: θ has it as a part of the reading, a gyroscope's result adds it to the reading.
+    The bias changes its sign: in θ it is a part of the reading, in a gyroscope's result it is added to the reading.
     """
     derivative = np.zeros((6, parameters))
     derivative[:, np.r_[F, BIAS]] = parameter_jacobian(matrix, scale) * np.repeat([1.0, -1.0], 3)[:, None]
@@ -89,9 +89,9 @@ def scale_and_bias_covariance(matrix: Array, scale: Array, covariance: Array) ->
 
 
 def fewest_dof(response: Array, variances: Array, dof: Array) -> float:
-    """Return the smallest degrees of freedom of the noise in scale and bias, whose response to readings is (6, n).
+    """Return the smallest degrees of freedom of the noise in scale and bias.
 
-    The readings' `variances` (n,) have `dof` (n,) degrees of freedom.
+    `response` (6, n) is their derivative by the readings, whose `variances` (n,) have `dof` (n,) degrees of freedom.
     """
     return float(effective_dof((response**2 * variances).T, dof[:, None]).min())
 
@@ -146,7 +146,7 @@ def _evaluate_norm(scale: Array, size: NormUncertainty) -> Contributor:
 
 
 def find_uncertainty_dof(error: AttitudeError) -> float:
-    """Return the degrees of freedom of an attitude error with an uncertainty of its own (JCGM 100, G.4.2)."""
+    """Return the degrees of freedom of an estimated attitude error, by its uncertainty (JCGM 100, G.4.2)."""
     if error.uncertainty_rad == 0.0:
         return np.inf
     return max(1.0, 0.5 * (error.std_rad / error.uncertainty_rad) ** 2)

@@ -1,4 +1,4 @@
-"""The forward model of a sensor's readings in known attitudes, TRIAX, Eqs. (3), (9), (10), and its best fit.
+"""The forward model of a sensor's readings in known attitudes, Eqs. (3), (9), (10) of the paper TRIAX, and its fit.
 
     v_m = F (s + φ s²) + b,   s = Rᵀ v_ref + v̄
 
@@ -26,7 +26,7 @@ STEP_TOLERANCE = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class KnownVector:
-    """A prior v̄ (N, 3), body coordinates, due to the table's motion: for a gyroscope, its rate in each attitude."""
+    """The given v̄ (N, 3), in body coordinates, due to the table's motion: for a gyroscope, the table's own rate."""
 
     added: ArrayLike
 
@@ -37,7 +37,7 @@ class KnownVector:
 
 @dataclass(frozen=True, slots=True)
 class KnownNorm:
-    """The prior v̄ = 0 and ‖v_ref‖ = `norm`, with a table vector `side` (3,) whose dot product with v_ref is > 0."""
+    """The given norm of v_ref, with v̄ = 0; `side` (3,), table coordinates, has a positive dot product with v_ref."""
 
     norm: float
     side: ArrayLike
@@ -110,13 +110,13 @@ def whitening(variances: Array) -> Array:
 
 
 def whitened(whiteners: Array, residuals: Array) -> Array:
-    """Return W r (…, N, 3) of residuals (…, N, 3): independent, each with the standard deviation 1."""
+    """Return residuals (…, N, 3) multiplied by whiteners W: independent ones, each of the standard deviation 1."""
     independent: Array = (whiteners @ residuals[..., None])[..., 0]
     return independent
 
 
 def weighted_jacobian(theta: Array, attitudes: Array, v_bar: Array, whiteners: Array, *, norm_known: bool) -> Array:
-    """Return W J (…, 3 N, q) in the free directions: (W J)ᵀ W J is the Fisher information."""
+    """Return W J (…, 3 N, q), the whitened Jacobian in θ's free directions; (W J)ᵀ W J is the Fisher information."""
     return _reduce_jacobian(theta, attitudes, v_bar, whiteners, free_directions(theta, norm_known=norm_known))
 
 

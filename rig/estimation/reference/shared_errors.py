@@ -2,8 +2,9 @@
 
     y = J x + E e + n,   n ~ N(0, V),   e ~ N(0, δ² 1)
 
-In coordinates in which V is 1 and E Eᵀ is diagonal (γ, `growth`), the readings are independent with variance 1 + δ² γ
-for any δ. δ is estimated by restricted maximum likelihood (Patterson and Thompson, Biometrika 58 (1971) 545).
+J is the Jacobian of the readings y, the effects E map unit errors to readings. In coordinates in which V is 1 and E Eᵀ
+is diagonal, with the elements γ (`growth`), the readings are independent with variances 1 + δ² γ for any δ. δ is
+estimated by restricted maximum likelihood (Patterson and Thompson, Biometrika 58 (1971) 545).
 """
 
 from dataclasses import dataclass
@@ -16,18 +17,24 @@ from rig.estimation.reference.attitude_error import AttitudeError, maximise_like
 
 @dataclass(frozen=True, slots=True)
 class Decorrelation:
-    """The map `transform` (n, n) from readings to independent ones, of variance 1 + δ² γ; `growth` (n,) is γ."""
+    """The map `transform` (n, n) from readings to independent ones.
+
+    If the shared errors have the standard deviation δ, their variances are 1 + δ² `growth` (n,).
+    """
 
     transform: Array
     growth: Array
 
     def whitener(self, std_rad: float) -> Array:
-        """Return the matrix (n, n) that whitens readings whose errors have the standard deviation δ."""
+        """Return the matrix (n, n) that whitens readings whose shared errors have the standard deviation `std_rad`."""
         return np.asarray(self.transform / np.sqrt(1 + std_rad**2 * self.growth)[:, None], dtype=np.float64)
 
 
 def decorrelate(noise: Array, effects: Array) -> Decorrelation:
-    """Return decorrelated readings of noise V (n, n) and errors E (n, P). Raise LinAlgError for an invalid V."""
+    """Return the decorrelation of readings with the noise V (n, n) and shared errors of the `effects` E (n, P).
+
+    Raise LinAlgError for an invalid V.
+    """
     whitener = np.asarray(np.linalg.inv(np.linalg.cholesky(noise)), dtype=np.float64)
     scaled = whitener @ effects
     growth, directions = np.linalg.eigh(scaled @ scaled.T)
@@ -48,7 +55,10 @@ def add_uncertainty(readings: Decorrelation, std_rad: float, jacobian: Array) ->
 
 
 def information(growth: Array, std_rad: float, slopes: Array) -> float:
-    """Return the information on δ²: tr((P G)²)/2, G = E Eᵀ and P the residual maker of slopes (n, q), whitened."""
+    """Return the information on δ², which is tr((P G)²)/2 at δ = `std_rad`.
+
+    G = E Eᵀ, and P is the residual maker of whitened `slopes` (n, q), the derivatives of decorrelated readings.
+    """
     variance = 1 + std_rad**2 * growth
     growth = growth / variance
     orthogonal = np.linalg.qr(slopes / np.sqrt(variance)[:, None])[0]

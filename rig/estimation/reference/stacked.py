@@ -99,7 +99,7 @@ def estimate_as_published(
 
 
 def _solve(x: Array, sizes: Array, prior: ReferencePrior) -> Array:
-    """Return β (…, p) for X and its columns' norms: by Eq. (5) if the norm of v_ref is given, else by Eq. (6)."""
+    """Return β (…, p) for X with columns of `sizes`: by Eq. (5) if the norm of v_ref is given, else by Eq. (6)."""
     if isinstance(prior, KnownNorm):
         return null_vector(x, sizes, prior.norm, np.asarray(prior.side, dtype=np.float64))
     return least_squares(x, sizes, prior.v_bar(x.shape[-2] // 3))
@@ -110,8 +110,8 @@ def compute_published_covariance(
 ) -> Array:
     """Return the covariance (p, p) of θ by the published method, to first order in errors of `variances` (N, 3).
 
-    An error e of a reading also changes the matrix X of the equations, so it enters equation k as F⁻¹ e_k: δβ = −X⁺ F⁻¹
-    e, projected to the normalisation. With second-order terms s² changes with v_ref. F and b follow from β.
+    An error e of a reading also changes the matrix X of the equations, so the error enters equation k as F⁻¹ e_k: δβ =
+    −X⁺ F⁻¹ e, projected to the normalisation. With second-order terms s² changes with v_ref. F and b follow from β.
     """
     second_order = len(theta) > 15
     norm_known = isinstance(prior, KnownNorm)

@@ -1,12 +1,12 @@
 """The first harmonic of one revolution: mean, cosine and sine of accelerometer readings over the joint's angle.
 
-For an accelerometer it replaces the mean of a gyroscope's revolution. The effects of the servo's vibration follow from
-the joint's own speed: centripetal acceleration by the change of ω², Euler acceleration by the angular acceleration α,
-and gravity by the joint's extra rotation during the filter's lag. One regression removes them all, so
-they neither bias the result nor count as noise. It also removes the second and the third harmonic, due to angle errors
-and a nonlinear sensor. Changes of the speed with one to four periods per revolution cannot be separated from gravity;
-their effect remains. An oscillation of the arm that its encoders do not measure is a spectral line of the residuals. It
-is removed as well, because a revolution is not a whole number of its periods.
+It is for an accelerometer what the mean of a revolution is for a gyroscope. The effects of the servo's vibration follow
+from the joint's own speed: centripetal acceleration by the change of ω², Euler acceleration by the angular acceleration
+α, and gravity by the joint's extra rotation during the filter's lag. One regression removes all these effects, so they
+neither bias the result nor count as noise. It also removes the second and the third harmonic, due to angle errors and a
+nonlinear sensor. Changes of the speed with one to four periods per revolution cannot be separated from gravity, so
+their effect remains. An oscillation of the arm that its encoders do not measure is a peak in the spectrum of the
+residuals. It is removed as well, because a revolution is not a whole number of the oscillation's periods.
 """
 
 from collections.abc import Callable
@@ -46,13 +46,13 @@ class FirstHarmonic:
     """The first harmonic of n samples, its uncertainty, and the joint's motion.
 
     - `harmonic_m_s2` (3, 3): mean, cosine, sine (rows) of the axes x y z; `covariance_m2_s4` (9, 9), row by row.
-    - `swayed_m_s2` (3, 3): those of the force due to the sway of other joints, in the sensor's nominal axes.
+    - `swayed_m_s2` (3, 3): the same of the force due to the sway of other joints, in the sensor's nominal axes.
     - `speed_rad_s`: the joint's mean speed, negative if its angle falls.
     - `noise_m_s2` (3,): std of one sample, with `dof` degrees of freedom; `residuals_m_s2` (n, 3).
     - `vibration_m_s2` (3,): RMS of the removed vibration of servo and arm.
-    - `turning_rad2_s2` (6, 3): mean, cosine and sine, by the same weights, of ω² and α. For the filter's lag the
-      further rows are those of their derivatives per radian of the mean rotation, and of ω₀ (ω − ω₀) cos θ and sin θ,
-      with the mean rate ω₀.
+    - `turning_rad2_s2` (6, 3): mean, cosine and sine, by the same weights, of six terms of the joint's motion: ω², α,
+      and for the filter's lag their derivatives per radian of the mean rotation, then ω₀ (ω − ω₀) cos θ and
+      ω₀ (ω − ω₀) sin θ. ω is the joint's rate, ω₀ its mean, α its angular acceleration, θ its angle.
     """
 
     harmonic_m_s2: Array
@@ -82,7 +82,7 @@ def first_harmonic(
     - turn: the joint's motion at these times.
     - swayed_m_s2 (n, 3): the specific force due to the sway of other joints, in the sensor's nominal axes.
     - coloured: takes residuals (n,); returns the variance of their mean, relative to that of white noise.
-    - swings: takes residuals (n, 3); returns the columns (n, k) of their spectral lines.
+    - swings: takes residuals (n, 3); returns columns (n, k), the oscillations at the peaks of their spectrum.
 
     Raise Fault `not_finite`, `incomplete_revolution`; ValueError for a wrong shape.
     """
@@ -127,7 +127,7 @@ def estimate_acceleration(angle_rad: Callable[[Array], Array], time_s: Array, sp
     """Return a joint's angular acceleration (n,), rad/s², as differences of its mean speeds between even samples.
 
     - angle_rad: returns the joint's angles (n,) at times (n,), also shortly before and after the samples.
-    - time_s (n,): of the samples. speed_rad_s: of the joint, without its sign.
+    - time_s (n,): the samples' times; speed_rad_s: the joint's speed, without its sign.
 
     Each speed is a mean over `SPEED_MEAN_RAD`. The sum of the accelerations depends only on the speeds at both ends of
     the revolution, so the encoders' noise stays small.
@@ -148,7 +148,7 @@ def evenly_turning(speed_rad_s: float) -> Array:
 
 
 def _regression(columns: Array, readings: Array) -> tuple[Array, Array]:
-    """Return the map (p, n) from readings (n, 3) to the coefficients of `columns` (n, p), and the residuals (n, 3)."""
+    """Return the least-squares map (p, n) from readings to coefficients of `columns` (n, p), and residuals (n, 3)."""
     size = np.linalg.norm(columns, axis=0)
     size = np.where(size > 0, size, 1.0)
     inverse = np.linalg.pinv(columns / size, rcond=EMPTY_COLUMN_RATIO) / size[:, None]
@@ -158,8 +158,8 @@ def _regression(columns: Array, readings: Array) -> tuple[Array, Array]:
 def _find_long_run_covariance(residuals: Array, scatter: Array, coloured: Callable[[Array], float]) -> Array:
     """Return the long-run covariance (3, 3) of residuals (n, 3), by their autocorrelation along principal axes.
 
-    A vibration is along one of these axes and averages out almost entirely, unlike the noise along the others. Along x,
-    y, z the noise would seem to have the vibration's correlation.
+    A vibration is along one principal axis and averages out almost entirely, unlike the noise along the other two.
+    Along x, y, z the noise would seem to have the vibration's correlation.
     """
     variances, directions = np.linalg.eigh(scatter)
     projected = residuals @ directions
@@ -242,9 +242,9 @@ def _motion_terms(uneven: _Unevenness, turn: JointTurn) -> Array:
 def _list_vibration(uneven: _Unevenness, angle_rad: Array, mean_speed_rad_s: float) -> Array:
     """Return the specific force (n, 6) of the joint's vibration, with derivatives of α for the filter's lag.
 
-    For the centripetal acceleration its linear part stands, 2 ω₀ (ω − ω₀). The square of the vibration has a mean: of a
-    vibration at one frequency the columns could form it alone, and the regression would take it from the mean of the
-    readings. It is left to the model, by `FirstHarmonic.turning_rad2_s2`.
+    The centripetal acceleration is represented by its linear part, 2 ω₀ (ω − ω₀), without (ω − ω₀)². This square has a
+    mean, which the columns of a vibration at one frequency could imitate, so that the regression would remove it from
+    the mean of the readings. The model accounts for the square instead, by `FirstHarmonic.turning_rad2_s2`.
     """
     rate, *derivatives = uneven.fast
     return np.column_stack([rate, *derivatives, rate * np.cos(angle_rad), rate * np.sin(angle_rad)])

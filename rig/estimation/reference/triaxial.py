@@ -63,7 +63,7 @@ class TriaxialSolution:
     """A tri-axial sensor's calibration, in the unit of the readings.
 
     - method: the method's name.
-    - matrix (3, 3), bias (3,): F, the scale factors and axes; b, part of the reading.
+    - matrix (3, 3): F, the scale factors and axes; bias (3,): b, the reading at zero input.
     - reference (3,): the reference v_ref in table coordinates.
     - second_order (3,): quadratic terms φ, the diagonal of F̄ in 1/unit, or None.
     - covariance (15, 15) or (18, 18): of the rows of F, v_ref, b, φ.
@@ -113,9 +113,10 @@ def solve_triaxial(
 ) -> TriaxialSolution:
     """Solve for F, v_ref and b, and φ with `second_order`.
 
-    `readings`, `variances` (N, 3): mean readings and the variances of these means; `attitudes` (N, 3, 3): R, body to
-    table; `prior`: v̄ as a `KnownVector`, or the norm of v_ref if v̄ = 0 as a `KnownNorm`; `attitude_std_rad` (N,): the
-    stated uncertainty of each attitude, for the method "attitude_weighted".
+    - `readings`, `variances` (N, 3): mean readings and the variances of these means.
+    - `attitudes` (N, 3, 3): R, body to table.
+    - `prior`: the table's motion v̄ as a `KnownVector`, or, if it is at rest, the norm of v_ref as a `KnownNorm`.
+    - `attitude_std_rad` (N,): the stated uncertainty of each attitude, for the method "attitude_weighted".
 
     Raise Fault `too_few_observations`, `not_finite`, `bad_variance`, `zero_reading`, `duplicated_observation`,
     `bad_attitude`, `rank_deficient`, `ill_conditioned`, `sign_unknown`, `wrong_unit`, `mirrored_axis`,
@@ -232,7 +233,7 @@ def _check_scale(scale: Array, m: Array, prior: ReferencePrior) -> None:
 
 
 def _conditioning(scaled: Array, m: Array, v: Array, needed: int) -> refusals.Conditioning:
-    """Return the conditioning of the scaled design. Directions that noise dominates do not count towards the rank."""
+    """Return the conditioning of the scaled design; directions dominated by noise do not count towards the rank."""
     noise = np.sqrt(v.max() / np.mean(m**2)) * (np.sqrt(len(m)) + np.sqrt(3))
     return refusals.condition_of(scaled, needed, float(noise))
 
