@@ -6,9 +6,9 @@ over all overlapping pairs of adjacent means ȳ of m readings (NIST SP 1065, sec
 frequencies). A pair lies within one interval of readings, because the sensor may have turned between two.
 
 The equivalent degrees of freedom of σ² (Howe, Allan and Barnes 1981; NIST SP 1065, table 5) are those of the noise that
-dominates about τ, by the slope of the curve. σ² times these degrees of freedom over its true value is χ². White noise
-has the slope −1/2 and σ = N/√τ, N being the random walk; the least σ, at the flat part of the curve, is 0.664 times the
-bias instability B (IEEE Std 952-1997, C.1.1 and C.1.3).
+dominates about τ, by the slope of the curve. σ² times these degrees of freedom, divided by its true value, is
+distributed as χ². White noise has the slope −1/2 and σ = N/√τ, N being the random walk; the least σ, at the flat part
+of the curve, is 0.664 times the bias instability B (IEEE Std 952-1997, C.1.1 and C.1.3).
 """
 
 from collections.abc import Sequence
@@ -59,7 +59,7 @@ class AllanCurve:
 
 @dataclass(frozen=True, slots=True)
 class AllanReading:
-    """A value read off the curve of one axis, its standard deviation, and its τ."""
+    """A value read off the curve of one axis, its standard deviation, and the τ of the point on the curve."""
 
     value: float
     std: float
@@ -68,9 +68,9 @@ class AllanReading:
 
 @dataclass(frozen=True, slots=True)
 class AllanAxis:
-    """The noise of one axis: random walk N in the readings' unit times √s, and bias instability B in that unit.
+    """The noise of one axis: random walk N in the readings' unit times √s, and bias instability B in their unit.
 
-    Each may be the Fault that prevents it.
+    Instead of either, there may be the Fault that prevents its determination.
     """
 
     random_walk: AllanReading | Fault
@@ -80,7 +80,8 @@ class AllanAxis:
 def allan_curve(series: Sequence[Array], interval_s: float) -> AllanCurve:
     """Return the overlapping Allan deviation of series (nᵢ, 3) of readings that are `interval_s` apart.
 
-    τ: near powers of two, and 1 s. Raise Fault `not_finite`, and `recording_too_short` if no series has three readings.
+    The times τ are about powers of two of the interval, and 1 s. Raise Fault `not_finite`, and `recording_too_short`
+    if no series has three readings.
     """
     used = [np.asarray(readings, dtype=np.float64) for readings in series if len(readings) >= MIN_READINGS]
     if not used:
@@ -111,7 +112,7 @@ def read_axis(curve: AllanCurve, axis: int) -> AllanAxis:
 
 
 def too_short(what: str, enough_s: float = MIN_DURATION_S) -> Fault:
-    """Return the error for a recording too short for a value; about `enough_s` would suffice."""
+    """Return the error for a recording that is too short for the value `what`; about `enough_s` would suffice."""
     return Fault("recording_too_short", what, f"Record at rest for {enough_s:.0f} s or more without interruption")
 
 

@@ -48,7 +48,10 @@ class BiasProcess:
         return not self.is_drifting and self.instability_rad_s == 0.0
 
     def covariance(self, windows_s: ArrayLike) -> Array:
-        """Return the drift's covariance (N, N) in means over windows (N, 2), about the mean over their whole span."""
+        """Return the covariance (N, N) of the drift's means over windows (N, 2).
+
+        The drift is counted from its mean over the whole time from the first start to the last end.
+        """
         walk = self.walk_rad_s_sqrt_s**2 * walk_covariance(windows_s)
         drift: Array = walk + self.scatter_rad_s**2 * np.eye(len(walk))
         return drift if self.instability_rad_s == 0.0 else drift + _flicker(self.instability_rad_s, windows_s)
@@ -135,8 +138,8 @@ def _flicker(instability_rad_s: float, windows_s: ArrayLike) -> Array:
 def average_posterior(sizes: Array, likelihood: Array) -> Array:
     """Return the root-mean-square (2,) of random walk q and scatter s over the posterior of their `sizes` (K, 2).
 
-    The prior is spike-and-slab, log-uniform in the slab. The maximum of the likelihood, and with it every uncertainty,
-    would by chance be far too small or too large (Mitchell and Beauchamp, J. Am. Stat. Assoc. 83 (1988) 1023).
+    The most likely sizes, and with them every uncertainty, would by chance be far too small or too large. The prior is
+    spike-and-slab, log-uniform in the slab (Mitchell and Beauchamp, J. Am. Stat. Assoc. 83 (1988) 1023).
     """
     return _root_mean_square(sizes, likelihood - np.log(GRID_POINTS) * np.count_nonzero(sizes, axis=1))
 
@@ -144,10 +147,10 @@ def average_posterior(sizes: Array, likelihood: Array) -> Array:
 def average_walks(sizes: Array, likelihood: Array) -> Array:
     """Return the root-mean-square (2,) of q and s over the posterior of `sizes` (K, 2), with a uniform prior of q.
 
-    The scatter has the prior of `average_posterior`. This is for parameters over a long time, such as slopes over
-    temperature: their uncertainty may come mostly from a walk that the averages hardly show. So a walk is assumed to
-    exist, with a uniform prior (Gelman, Bayesian Analysis 1 (2006) 515), and the covariance is the posterior mean.
-    Sizes are on a geometric grid, so a size's prior is proportional to the step to the next.
+    The scatter has the prior of `average_posterior`. These averages are for parameters over a long time, such as slopes
+    over temperature: their uncertainty may come mostly from a walk that the readings hardly show. So a walk is assumed
+    to exist, with a uniform prior (Gelman, Bayesian Analysis 1 (2006) 515). Sizes are on a geometric grid, so a size's
+    prior is proportional to the step to the next, that is, to the size itself.
     """
     log_posterior = likelihood - np.log(GRID_POINTS) * np.count_nonzero(sizes[:, 1:], axis=1)
     return _root_mean_square(sizes, log_posterior, prior=sizes[:, 0])
@@ -162,7 +165,7 @@ def _root_mean_square(sizes: Array, log_posterior: Array, prior: Array | float =
 def select_by_akaike(sizes: Array, likelihood: Array) -> Array:
     """Return the likeliest random walk and scatter (2,) of `sizes` (K, 2); zero unless Akaike's criterion decreases.
 
-    There is no random walk if noise alone explains the averages.
+    So there is no random walk if noise alone explains the averages.
     """
     return np.asarray(sizes[np.argmax(likelihood - PARAMETER_COST * np.count_nonzero(sizes, axis=1))], dtype=np.float64)
 
@@ -206,9 +209,9 @@ def bias_process(
 
 
 def _likelihood(contrasts: Array, noise: Array, scatters: Array) -> Array:
-    """Return log-likelihoods (K, L), up to a constant, for K noise covariances (n, n) and L values of s² with each.
+    """Return log-likelihoods (K, L) of contrasts (n,), up to a constant, for K noise covariances and L scatters s².
 
-    A scatter adds to every eigenvalue, so each covariance is decomposed only once.
+    `noise` is (K, n, n). A scatter adds s² to every eigenvalue, so each covariance is decomposed only once.
     """
     values, vectors = np.linalg.eigh(noise)
     squares = np.square(contrasts @ vectors)[:, None]

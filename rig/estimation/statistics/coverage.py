@@ -1,4 +1,4 @@
-"""Coverage: the factor k of a standard uncertainty u, so that value ± k u contains the true value 95.45 times in 100.
+"""Coverage: the factor k of a standard uncertainty u for which value ± k u contains the true value 95.45 times in 100.
 
 If u is itself determined by few readings, k exceeds two: U = k u with k by Student's t for the effective degrees of
 freedom ν (JCGM 100, G.3 and G.6.4; EA-4/02 M:2022, annex E). 95.45 % is the probability within two standard deviations
@@ -31,7 +31,7 @@ def coverage_factors(dof: ArrayLike) -> Array:
 
 
 def coverage_probability(factors: ArrayLike, dof: ArrayLike) -> Array:
-    """Return the probability that value ± k u contains the true value, for k and ν of one shape."""
+    """Return the probability that value ± `factors` × u contains the true value; `dof` has the shape of `factors`."""
     return 1 - 2 * tail_probability(factors, dof)
 
 
@@ -56,10 +56,10 @@ def false_alarm_of_each(of_all: float, tests: int) -> float:
 
 
 def joint_factors(values: int, dof: ArrayLike, probability: float) -> Array:
-    """Return the simultaneous coverage factor: k so that all of `values` intervals ± k u contain their true values.
+    """Return the simultaneous coverage factor k, by which all of `values` intervals ± k u contain their true values.
 
-    They do so with at least that `probability`, by Bonferroni's inequality. `dof`: degrees of freedom of any shape. For
-    one value and `PROBABILITY` the factor is that of `coverage_factors`.
+    The intervals do so with at least the given `probability`, by Bonferroni's inequality. `dof`: degrees of freedom of
+    any shape. For one value and `PROBABILITY` the factor is that of `coverage_factors`.
     """
     whole_dof, tail = _round_down(dof), false_alarm_of_each(1 - probability, values) / 2
     factors = np.full(np.shape(dof), -NormalDist().inv_cdf(tail))
@@ -97,7 +97,10 @@ def find_dof_by_factor(factor: float) -> float:
 
 
 def effective_dof(variances: ArrayLike, dof: ArrayLike) -> Array:
-    """Return ν (…) of sums of independent `variances` (n, …) with `dof` (n, …): Welch–Satterthwaite (JCGM 100, G.4)."""
+    """Return the dof (…) of the sums of independent `variances` (n, …) with `dof` (n, …), by Welch–Satterthwaite.
+
+    See JCGM 100, G.4.
+    """
     parts, degrees = np.asarray(variances, dtype=np.float64), np.asarray(dof, dtype=np.float64)
     with np.errstate(divide="ignore", invalid="ignore"):
         effective = parts.sum(axis=0) ** 2 / np.sum(parts**2 / degrees, axis=0)

@@ -54,10 +54,10 @@ class ErrorSizes:
 
 
 def estimate_variances(fit: ResidualInputs, fractions: Sequence[float]) -> ErrorSizes:
-    """Return the posterior mean squares of the variance components.
+    """Return the root-mean-squares of random walk and attitude error δ over their posterior, and the mean fraction.
 
-    The prior of the random walk is spike-and-slab, with a log-uniform slab; that of δ is log-uniform. The `fractions`,
-    possible fractions of δ² that are independent in each dwell, are equally probable.
+    The prior of the random walk is spike-and-slab, with a log-uniform slab; that of δ is log-uniform. The `fractions`
+    are possible fractions of δ² that are independent in each dwell; all are equally probable.
     """
     constant = np.diag(fit.walk) > 0
     typical = np.sqrt(np.median(fit.noise[constant]) / np.median(np.diag(fit.walk)[constant]))
@@ -82,9 +82,9 @@ def estimate_variances(fit: ResidualInputs, fractions: Sequence[float]) -> Error
 def estimate_disturbances(
     fit: ResidualInputs, sizes: ErrorSizes, causes: Sequence[Array], odds: Sequence[float]
 ) -> Array:
-    """Return the expected variance (k,) of each of `causes`: the effects (n, …) of one std on the readings.
+    """Return the expected variance (k,) of each of `causes`, given as its effects (n, …) of one std on the readings.
 
-    The priors are log-uniform, with `odds` (k,) that the cause exists.
+    The priors are log-uniform, with `odds` (k,) that the cause exists. At most one cause is assumed to exist at a time.
     """
     effects = sizes.std_rad * fit.effects(sizes.independent_fraction)
     whitener = np.linalg.inv(np.linalg.cholesky(fit.covariance + sizes.walk**2 * fit.walk + effects @ effects.T))

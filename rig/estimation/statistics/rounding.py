@@ -88,8 +88,8 @@ def cut_steps(readings: Array, unit: float) -> Steps:
 def find_steps(readings: Array) -> Array:
     """Return the steps (3,) of readings (n, 3), zero for an axis without visible steps.
 
-    If noise is much larger than a step, hardly any number repeats: steps cannot be found and do not matter. A nearly
-    constant axis shows too few numbers, and gets the steps of the others.
+    If noise is much larger than a step, hardly any number repeats, so steps cannot be found, and they do not matter. A
+    nearly constant axis has too few different numbers, so it gets the largest step of the other axes.
     """
     stride = max(len(readings) // MAX_READINGS, 1)
     units = np.array([_find_unit(axis) for axis in readings[::stride].T])
@@ -149,7 +149,7 @@ def _bound_zero_error(steps: Steps, axis: int, readings: Array) -> float:
 
     A truncated reading of zero is anywhere within a unit of zero. Let s be the slope of the logarithm of the density of
     readings, taken between zero's neighbours, which are three units apart. Then the mean of the readings that are cut
-    to zero is s · 2²/12. If no neighbour shows s, the mean may be anywhere in between.
+    to zero is s · 2²/12. If all readings are zero, no neighbour shows s, and the mean may be anywhere within a unit.
     """
     zeros = steps.reads_zero(axis, readings)
     if zeros.all():

@@ -87,7 +87,8 @@ class MixedModel:
     def evaluate_posterior(self, std: Array) -> float:
         """Return the log-posterior density of ln σ (k,).
 
-        Its constant is the same for a model of the same y with further columns, if their precision is 1.
+        The density lacks a constant, which is the same for a model of the same observations with further columns whose
+        prior precision is 1. So the posteriors of these models may be compared.
         """
         return self._whiten(std)[-1] + self._log_prior(np.log(std))
 
@@ -97,7 +98,7 @@ class MixedModel:
         return self._project(lower, information)
 
     def find_maxima(self, start: Array | None = None) -> Array:
-        """Return the standard deviations (n, k) at the maxima of the posterior, the most probable first.
+        """Return standard deviations (n, k) of the k causes at the n maxima of their posterior, most probable first.
 
         With few residuals there may be several maxima, at which different causes explain the largest residuals. Without
         a `start` the search begins at the priors' medians and at points where one cause exceeds all others. Maxima less
@@ -120,10 +121,11 @@ class MixedModel:
         return np.exp(distinct)
 
     def _climb(self, logarithms: Array, most_steps: int = MAX_NEWTON_STEPS) -> "OptimizeResult":
-        """Return the maximum of the posterior of ln σ (k,) near a point.
+        """Return the maximum of the posterior of the standard deviations' `logarithms` (k,) near a point.
 
-        Newton's method in a trust region, whose curvature is the average information (Gilmour, Thompson and Cullis,
-        Biometrics 51 (1995) 1440): a step to ratios that rounding dominates is undone and shortened.
+        The method is Newton's in a trust region, and the curvature is the average information (Gilmour, Thompson and
+        Cullis, Biometrics 51 (1995) 1440). The trust region undoes and shortens a step to ratios of standard deviations
+        so large that rounding dominates.
         """
         from scipy.optimize import minimize
 
@@ -149,14 +151,15 @@ class MixedModel:
     def expand(self, maxima: Array, wanted: Array) -> Array:
         """Return the half-widths (q,) of the 95.45 % intervals of q combinations of θ, the rows of `wanted` (q, p).
 
-        The intervals are about the estimates at the first of `maxima` (n, k), and integrate over all σ.
+        The intervals are about the estimates at the first of `maxima` (n, k), and integrate over all standard
+        deviations.
         """
         top = wanted @ self.solve(maxima[0]).theta
         offsets = []
         variances = []
 
         def evaluate(logarithms: Array) -> float:
-            """Return the log-posterior of standard deviations; keep the estimates there and their variances."""
+            """Return the log-posterior of standard deviations, and keep the estimates and variances that they give."""
             try:
                 fit = self.solve(np.exp(logarithms))
             except np.linalg.LinAlgError:
@@ -172,7 +175,7 @@ class MixedModel:
         return find_half_width(np.array(offsets), np.array(variances), weights)
 
     def _whiten(self, std: Array) -> tuple[Array, Array, Array, Array, float]:
-        """Return L of the covariance L Lᵀ, whitened design, whitened observations, information and log-likelihood."""
+        """Return L of the errors' covariance L Lᵀ, whitened design and observations, information and log-likelihood."""
         from scipy.linalg.lapack import dpotrf, dtrtrs  # without the checks of `solve_triangular`, which take longer
 
         mixed = self.mixed
@@ -296,7 +299,10 @@ def _temper(weights: Array, fewest: float) -> Array:
 
 
 def find_half_width(offsets: Array, variances: Array, weights: Array) -> Array:
-    """Return h (q,): normals of mean `offsets` and variance (s, q), mixed by weights (s,), are 95.45 % within ± h."""
+    """Return the half-widths h (q,) within which, from −h to h, 95.45 % of a mixture of normal distributions are.
+
+    The mixture has the means `offsets` and the `variances` (s, q), with the weights (s,).
+    """
     from scipy.special import ndtr
 
     std = np.sqrt(variances)
