@@ -73,8 +73,8 @@ def bias_by_repeat(readings: Array, variances: Array, modelled: Array, bias: Arr
     """Return the bias of R ≥ 2 repeats of N attitudes.
 
     `readings` (R, N, 3) are mean readings, `variances` their variances, `modelled` the model's readings without a bias.
-    `bias` (3,) is the bias of the first repeat if a fit has estimated it, and the others are relative to it. Raise
-    Fault `too_few_observations`, `not_finite`, `bad_variance`; ValueError for a wrong shape.
+    `bias` (3,) is the bias of the first repeat if a fit has estimated it, and the other biases are relative to it.
+    Raise Fault `too_few_observations`, `not_finite`, `bad_variance`; ValueError for a wrong shape.
     """
     repeats, attitudes = readings.shape[:2]
     require_shape("readings", readings, (repeats, attitudes, 3))

@@ -22,8 +22,8 @@ MIN_REPEATS = 4  # for three parameters
 class BiasOverTemperature:
     """The `slope` (3,) per °C, its standard deviation (3,), and the range of temperatures in which it is valid.
 
-    `dof` (3,): degrees of freedom of the deviations, finite if they come from residuals. `correlation` is the
-    correlation of temperature and time, whose slopes are estimated together.
+    `dof` (3,): degrees of freedom of the standard deviations, finite if the residuals determine them. `correlation` is
+    that of temperature and time, whose slopes are estimated together.
     """
 
     slope: Array
@@ -36,7 +36,7 @@ class BiasOverTemperature:
 def bias_over_temperature(bias: Array, std: Array, temperature_c: Array, time_s: Array) -> BiasOverTemperature:
     """Fit the slope of biases (R, 3) of uncertainty `std` (R, 3) at mean temperatures (R,) and times (R,).
 
-    Larger residuals increase the deviations (Birge ratio). Raise Fault `too_few_observations`,
+    Larger residuals increase the standard deviations (Birge ratio). Raise Fault `too_few_observations`,
     `temperature_not_recorded`, `temperature_range_too_small`, `temperature_and_time_confounded`.
     """
     check_count(len(bias), MIN_REPEATS, 3)

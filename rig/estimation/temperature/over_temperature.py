@@ -130,7 +130,7 @@ class OverTemperature:
         return moved
 
     def changes(self, temperature_c: Array) -> tuple[Array, Array]:
-        """Return k divided by its value at the reference temperature, and c minus its value there, (N, 3) each."""
+        """Return k divided by its value at the reference temperature, and c minus the value there, (N, 3) each."""
         rows = np.vander(temperature_c - self.reference_c, MAX_ORDER + 1, increasing=True)
         return rows @ (self.scale / self.scale[0]), rows[:, 1:] @ self.bias[1:]
 
@@ -153,10 +153,11 @@ def powers_at(difference_k: float) -> Array:
 
 
 def fit_over_temperature(readings: RepeatedMeans, reference_c: float, gradient_k: float) -> OverTemperature:
-    """Fit the polynomials, with k at the reference by plain least squares (`combine_with_reference` improves it).
+    """Fit scale and bias as polynomials of T − `reference_c` to the readings.
 
-    `gradient_k`: half-width of the change, in use, of the temperature difference between thermometer and sensor. Raise
-    Fault `too_few_observations`, `temperature_range_too_small`, `temperature_outside`, `not_finite`.
+    Plain least squares determine the scale factors at the reference; `combine_with_reference` replaces them by better
+    ones. `gradient_k` is the half-width of the change, in use, of the temperature difference between thermometer and
+    sensor. Raise Fault `too_few_observations`, `temperature_range_too_small`, `temperature_outside`, `not_finite`.
     """
     check_finite(means=readings.means, temperature_c=readings.temperature_c)
     range_c = (float(readings.temperature_c.min()), float(readings.temperature_c.max()))
@@ -209,8 +210,8 @@ def combine_with_reference(
 ) -> OverTemperature:
     """Return the polynomials with k and c (6,) at the reference temperature replaced by `values`.
 
-    `values` are another solution, at that temperature; `lines`: contributors to `values`, with the covariance (6, 6) of
-    their means over all temperatures.
+    `values` are another solution, which holds at that temperature. `lines` are the contributors to `values`, with the
+    covariance (6, 6) of their means over all temperatures.
     """
     scale, bias = polynomials.scale * values[:3] / polynomials.scale[0], polynomials.bias.copy()
     bias[0] = values[3:]
@@ -244,9 +245,9 @@ def heating_rate(windows_s: Array, temperature_c: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, slots=True)
 class _TemperatureFit:
-    """One fit: the coefficients (3 orders, 3) of k, relative, and of c, in powers of T − reference.
+    """One fit: the coefficients (3 orders, 3) of relative changes of k, and of c, in powers of T − reference.
 
-    `covariance` (18, 18) includes the effect of the fitted lag, `without_lag` does not.
+    `covariance` (18, 18) includes the effect of the fitted lag, `without_lag` (18, 18) does not.
     """
 
     relative: Array
@@ -357,7 +358,13 @@ class _ParameterFits:
         return self._fit(orders, values, covariance, fixed, aicc)
 
     def _rows(self, axis: int, orders: tuple[int, int], values: Array) -> tuple[Array, Array]:
-        """Return the whitened design matrix of an axis (last column: the time lag) and its whitened residuals."""
+        """Return an axis's whitened design, with columns for k, c, hysteresis and lag, and its whitened residuals.
+
+            m = offset + x (1/r − 1) + c + hysteresis + lag · dT/dt · ∂m/∂T,   r = 1 + q(T)
+
+        x are the inputs along the axis in the readings' unit; `values` contain the coefficients of the polynomials q
+        and c, the size of the hysteresis, and the lag.
+        """
         of_scale, of_bias = orders
         per_axis = (len(values) - 1) // 3
         by_axis, lag_s = values[axis * per_axis : (axis + 1) * per_axis], values[-1]
@@ -446,7 +453,10 @@ def _centre_coefficients(fit: _TemperatureFit, centre: Array) -> Array:
 
 
 def _loop_covariance(size: Array, std: Array) -> Array:
-    """Return the coefficients' covariance (24, 24) due to hysteresis `size` (6,), less that due to its `std` (6,)."""
+    """Return the coefficients' covariance (24, 24) due to the hysteresis, a half-width `size` (6,).
+
+    The square of its `std` (6,) is subtracted, because noise enlarges the square of an estimated size.
+    """
     variances = np.zeros(COEFFICIENT_COUNT)
     half = np.maximum(size**2 - std**2, 0.0) / 3
     variances[:3], variances[COEFFICIENT_COUNT // 2 : COEFFICIENT_COUNT // 2 + 3] = half[:3], half[3:]
@@ -456,8 +466,9 @@ def _loop_covariance(size: Array, std: Array) -> Array:
 def _gradient(polynomials: OverTemperature, half_width_k: float) -> TemperatureLine:
     """Return the contributor of the temperature difference between sensor and thermometer.
 
-    A difference changes each value by the slope of its polynomial. One part is the same over the range; an independent
-    part has opposite signs at its ends, because a heater's power and the loss to the air grow with temperature.
+    A difference changes each value in proportion to its polynomial's slope. One part of the difference is the same over
+    the range; an independent part has opposite signs at the range's ends, because a heater's power and the loss to the
+    air grow with temperature.
     """
     both = np.array([polynomials.scale, polynomials.bias])
     steep = np.arange(1, MAX_ORDER + 1)[:, None] * both[:, 1:]
