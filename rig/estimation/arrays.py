@@ -12,7 +12,7 @@ BISECTION_STEPS = 30
 
 
 def scale_of(matrix: Array) -> Array:
-    """Return the scale factors k (3,) of a sensor that reads F g + o: the inverse length of each row of F (3, 3)."""
+    """Return the scale factors (3,) of a sensor that reads `matrix` × input + offset: 1 over the length of each row."""
     scale: Array = 1 / np.linalg.norm(matrix, axis=1)
     return scale
 

@@ -77,18 +77,18 @@ def _slopes(step: Array, secants: Array) -> Array:
 
 
 def _end_condition(step: float, following: float, secant: Array, next_secant: Array) -> Array:
-    """Return r (k,) of the not-a-knot end condition `following` s₀ + (step + following) s₁ = r."""
+    """Return r (k,) of the not-a-knot condition on the end's slopes, `following` s₀ + (step + following) s₁ = r."""
     both = step + following
     end: Array = ((step + 2 * both) * following * secant + step**2 * next_secant) / both
     return end
 
 
 def _solve_tridiagonal(lower: Array, upper: Array, right: Array) -> Array:
-    """Solve lower s₋ + s + upper s₊ = right for s (n, k); s₋, s₊ are the rows before and after; lower, upper (n, 1).
+    """Solve lower s₋ + s + upper s₊ = right for s (n, k), s₋ and s₊ being its rows before and after.
 
-    Parallel cyclic reduction (R. W. Hockney 1965): each pass eliminates the neighbours of a row, which then depends on
-    rows twice as far away, with squared coefficients. The rows of a spline are diagonally dominant, so six passes
-    suffice for any n.
+    `lower` and `upper` are (n, 1). Parallel cyclic reduction (R. W. Hockney 1965): each pass eliminates the neighbours
+    of a row, which then depends on rows twice as far away, with squared coefficients. The rows of a spline are
+    diagonally dominant, so six passes suffice for any n.
     """
     apart = 1
     while apart < len(right) and max(np.abs(lower).max(), np.abs(upper).max()) > NEGLIGIBLE_WEIGHT:

@@ -1,4 +1,4 @@
-"""The expected standard deviations of a solution's residuals: all modelled errors minus what the fit absorbs."""
+"""The expected standard deviations of a solution's residuals: of the modelled errors, without what the fit absorbs."""
 
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -61,7 +61,10 @@ def attitude_residual_std(solution: "TriaxialSolution", inputs: "Dwells") -> Arr
 
 
 def _residual_std(fit_matrix: Array, covariance: Array) -> Array:
-    """Return the standard deviations (K, 3) of the residuals of a fit (3 K, 3 K) to readings with `covariance`."""
+    """Return the standard deviations (K, 3) of the residuals of K readings with `covariance` (3 K, 3 K).
+
+    `fit_matrix` (3 K, 3 K) maps readings to fitted readings.
+    """
     residual_maker = np.eye(len(fit_matrix)) - fit_matrix
     std: Array = np.sqrt(np.diag(residual_maker @ covariance @ residual_maker.T).clip(min=0.0)).reshape(-1, 3)
     return std

@@ -19,7 +19,10 @@ AXIS_ORDER = np.roll(np.eye(3), -1, axis=1) - np.roll(np.eye(3), 1, axis=1)
 
 @dataclass(frozen=True, slots=True)
 class SensorAxes:
-    """The axes of F: `scale` factors (3,), unit vectors (3, 3) as rows, and the rotation (3, 3) nearest to these."""
+    """The axes of F: `scale` factors (3,), and `axes` (3, 3), whose rows are unit vectors.
+
+    `mounting` (3, 3) is the rotation nearest to `axes`.
+    """
 
     scale: Array
     axes: Array
@@ -39,7 +42,7 @@ class SensorAxes:
 
     @property
     def to_angles(self) -> Array:
-        """The derivative (6, 9) of angles and mounting with respect to F, row by row."""
+        """The derivative (6, 9) of non-orthogonality and mounting with respect to F, row by row."""
         return angle_jacobian(self.axes, self.scale, self.mounting)
 
     @property
@@ -74,7 +77,10 @@ def nearest_rotation(axes: Array) -> Array:
 
 
 def parameter_jacobian(matrix: Array, scale: Array) -> Array:
-    """Return the derivative (6, 12) of k and b with respect to F, row by row, and c: δk = −k³ F_i·δF_i, δb = −δc."""
+    """Return the derivative (6, 12) of k and b of m = F ω + c with respect to F, row by row, and c.
+
+    Axis i has the scale factor k = 1/‖F_i‖, so δk = −k³ F_i·δF_i, and the bias b = −c, so δb = −δc.
+    """
     jacobian = np.zeros((6, 12))
     jacobian[:3, :9].reshape(3, 3, 3)[PAIR_INDICES, PAIR_INDICES] = -(scale**3)[:, None] * matrix
     jacobian[3:, 9:] = -np.eye(3)
@@ -84,8 +90,8 @@ def parameter_jacobian(matrix: Array, scale: Array) -> Array:
 def angle_jacobian(axes: Array, scale: Array, rotation: Array) -> Array:
     """Return the derivative (6, 9) of non-orthogonality and mounting `rotation` with respect to F, row by row.
 
-    δa_i = P_i δF_i with P_i = k_i (1 − a_i a_iᵀ). With A = S R and δR = [δθ]× R: (tr S − S) δθ = the axial vector of M
-    − Mᵀ, M = δA Rᵀ.
+    A row a_i of the axes A changes by δa_i = k_i (1 − a_i a_iᵀ) δF_i. The mounting R of A = S R changes by
+    δR = [δθ]× R, in which (tr S − S) δθ is the axial vector of M − Mᵀ with M = δA Rᵀ.
     """
     project = scale[:, None, None] * (np.eye(3) - axes[:, :, None] * axes[:, None, :])
     stretch = axes @ rotation.T

@@ -35,7 +35,7 @@ def align_triads(
 ) -> Alignment:
     """Return the alignment of two triads from F (3, 3) of both and the covariances (9, 9) of their rows.
 
-    The two are treated as independent, so shared errors of the arm count twice. Raise Fault `not_finite`,
+    The triads' errors are treated as independent, so shared errors of the arm count twice. Raise Fault `not_finite`,
     `mirrored_axis`; ValueError for a wrong shape.
     """
     gyroscope_frame, gyroscope_turns = _frame(gyroscope, gyroscope_covariance)
