@@ -56,7 +56,7 @@ def _find_gaps(time_s: Array, rates: Array) -> NDArray[np.bool_]:
 
 
 def _began_still(time_s: Array, rates: Array) -> bool:
-    """Return whether the body hardly moved in the first second; otherwise a hand held it at first, perhaps longer."""
+    """Return whether the body hardly moved in the first second; otherwise a hand held the body at first."""
     first = rates[time_s < time_s[0] + BEGINNING_S]
     return bool(len(first) > 1 and first.std(axis=0).max() < MAX_STILL_SCATTER_RAD_S)
 
@@ -98,7 +98,7 @@ def _find_clipped(rates: Array, range_rad_s: float | None) -> NDArray[np.bool_]:
 
 
 def _find_held_intervals(time_s: Array, rates: Array, rests: tuple[HandRest, ...]) -> tuple[tuple[float, float], ...]:
-    """Return the intervals in which a hand held the body: it turned more slowly than in a move, faster than at rest."""
+    """Return the intervals in which a hand held the body, which turned more slowly than in a move, but did not rest."""
     if not rests:
         return ()
     width = max(2, int(np.ceil(BLOCK_S / find_sampling(time_s).interval_s - ROUNDING_TOLERANCE)))
@@ -122,7 +122,7 @@ State = Literal["starting", "resting", "moving", "held"]
 
 @dataclass(frozen=True, slots=True)
 class Live:
-    """The body's state at `time_s` and since when; rotation (3,), rad, and peak rate, rad/s, of the present move."""
+    """The body's `state` at `time_s`, the time since which it lasts, and the present move's rotation and peak rate."""
 
     time_s: float
     state: State

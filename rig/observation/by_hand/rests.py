@@ -1,12 +1,13 @@
 """The rests of a body, from its sensors' readings alone.
 
 A recording is divided into blocks of a quarter of a second. A block is at rest if its readings scatter at most a few
-times as much as in the quietest tenth of all blocks, and if a gyroscope reads its bias: the most frequent reading of
-quiet blocks. A steady turn is as quiet as a rest, so of several nearly equally frequent readings the smallest is taken
-as the bias. Adjacent blocks with equal readings form one rest, which a few missing readings do not end.
+times as much as in the quietest tenth of all blocks, and if a gyroscope reads its bias, that is, the most frequent
+reading of quiet blocks. A steady turn is as quiet as a rest, so of several nearly equally frequent readings the
+smallest is taken as the bias. Adjacent blocks with equal readings form one rest, which a few missing readings do not
+end.
 
-A gyroscope decides alone: it measures every turn, and hardly a knock against the table. Without a gyroscope, a few
-readings due to a knock do not count.
+If there is a gyroscope, it alone decides, because it measures every turn, and hardly a knock against the table. Other
+sensors do measure knocks, so the few readings of a knock are left out.
 """
 
 from collections.abc import Mapping, Sequence
@@ -76,7 +77,8 @@ def find_rests(
 def _average_unknocked(blocks: Array, noise: Array) -> tuple[Array, Array]:
     """Return means and scatter (count, 3) of blocks (count, width, 3), each without the few readings of a knock.
 
-    A knock is a disturbance with equal readings before and after. Not for a gyroscope: a knock may turn the body.
+    A knock is a disturbance with equal readings before and after. This is not for a gyroscope's readings, because a
+    knock may turn the body.
     """
     before, after = np.concatenate([blocks[:1, 0], blocks[:-1, -1]]), np.concatenate([blocks[1:, 0], blocks[-1:, -1]])
     extended = np.concatenate([before[:, None], blocks, after[:, None]], axis=1)
@@ -105,7 +107,12 @@ def _mask_blocks(times: Array, windows: Sequence[Window]) -> NDArray[np.bool_]:
 def _find_unturned(
     means: Array, steady: NDArray[np.bool_], tolerance: Array, lying: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """Return a mask (count,) of blocks with the most frequent reading; `lying` marks blocks in declared rests."""
+    """Return a mask (count,) of the blocks with a gyroscope's bias, that is, the most frequent reading at rest.
+
+    A steady turn may last nearly as long as the rests, so of nearly equally frequent readings the smallest is the bias.
+    `lying` marks the blocks in declared rests, in which the body mostly lies still: if there are any, the most frequent
+    reading in these is the bias.
+    """
     declared = steady & lying
     pool = means[declared if declared.any() else steady]
     candidates = pool[:: -(-len(pool) // CANDIDATES)]

@@ -42,7 +42,7 @@ def microsecond_of(sensor: RecordedSensor) -> float:
 
 
 def readings_of(sensor: RecordedSensor, samples: NDArray[np.void], from_s: float = 0.0) -> Readings:
-    """Return samples (n,) in SI units; their times, by the clock that stamps them, are shifted by `from_s`."""
+    """Return samples (n,) in SI units, at times that are those of their stamps plus `from_s`."""
     time_s = from_s + microsecond_of(sensor) * samples["board_time_us"].astype(np.float64)
     force = sensor.channel(ACCELERATION).values(samples) if sensor.measures(ACCELERATION) else None
     return time_s, sensor.channel(RATE).values(samples), force
@@ -58,8 +58,8 @@ def range_of(sensor: RecordedSensor) -> float | None:
 class NotCounted:
     """The parts of a session that are left out, in the session's seconds.
 
-    `moves` and `rests`: their intervals; `seams`: the middles of the gaps between recordings; `from_s`: the time before
-    which everything is left out. Events have times in microseconds of `microsecond_s`.
+    `moves` and `rests`: the intervals of refused moves and rests; `seams`: the middles of the gaps between recordings;
+    `from_s`: the time before which everything is left out. Events have times in microseconds of `microsecond_s`.
     """
 
     moves: list[tuple[float, float]] = field(default_factory=list)
@@ -69,7 +69,7 @@ class NotCounted:
     microsecond_s: float = MICROSECOND_S
 
     def take(self, event: Event, shift_s: float) -> None:
-        """Add an event of a recording whose clock is `shift_s` behind the session's."""
+        """Leave out what an `event` refuses, in a recording whose clock is `shift_s` behind the session's."""
         match event:
             case HandMoveRefused(begin_us, end_us):
                 self.moves.append(self._span_s(begin_us, end_us, shift_s))
