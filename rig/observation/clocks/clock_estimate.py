@@ -105,10 +105,10 @@ def check_readings(board_time_s: Array, readings: Array) -> None:
 
 
 def _find_first_clock(board_time_s: Array, readings: Array, motion: KnownMotion) -> tuple[TimeBase, int]:
-    """Return the coarse clock by as few first samples as suffice to find one, and the number of these.
+    """Return the coarse clock by as few first samples as suffice to find one, and the number of these samples.
 
-    A recording of ordinary length needs all samples. In a recording of hours a part suffices; the fine clock is then
-    extended to twice its length, repeatedly.
+    A recording of ordinary length needs all samples. In a recording of hours a part suffices; the caller then extends
+    the fine clock repeatedly, each time to twice as many samples.
     """
     span_s = LONG_RUN_S
     while True:

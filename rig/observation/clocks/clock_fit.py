@@ -49,11 +49,11 @@ def _average_samples(time_s: Array, readings: Array, count: int) -> tuple[Array,
 
 
 def fit_clock(clock: TimeBase, board_time_s: Array, readings: Array, motion: KnownMotion) -> TimeBase:
-    """Return the clock with the best fit of readings and motion, first by their slow parts.
+    """Return the clock with the best fit of readings and motion, first by the slow parts of both.
 
     A ripple looks the same after one period, and a fast ripple differs between readings and states because of their
-    filters. If the finest fit has no optimum for this reason, the clock of the slow parts remains, with its own
-    uncertainty. Raise Fault `time_base_not_found`.
+    filters. If the finest fit has no optimum for this reason, return the clock of the slow parts, with its uncertainty.
+    Raise Fault `time_base_not_found`.
     """
     first, *finer = _list_stages(clock, board_time_s, readings, motion)
     clock = _iterate_clock(clock, *first)
@@ -69,8 +69,9 @@ def fit_clock(clock: TimeBase, board_time_s: Array, readings: Array, motion: Kno
 def _is_contradiction(clock: TimeBase, refined: TimeBase) -> bool:
     """Return whether a finer fit has a less certain drift than the fit before it, and contradicts that fit.
 
-    It has then found another optimum: readings without a filter show fast ripples at other frequencies (aliasing). The
-    offsets may differ, as filters delay slow and fast parts differently.
+    The finer fit has then found another optimum, because readings without a filter show fast ripples at other
+    frequencies (aliasing). Only the drifts are compared: filters delay slow and fast parts differently, so the offsets
+    may differ.
     """
     difference, std = abs(refined.drift - clock.drift), float(np.hypot(refined.drift_std, clock.drift_std))
     return refined.drift_std > clock.drift_std and difference > MAX_DRIFT_DIFFERENCE * std

@@ -75,8 +75,9 @@ class _Match:
 def _coarse_offset(time_s: Array, readings: Array, arm_rate: Callable[[float], tuple[float, Array]]) -> _Match:
     """Return the best offset from `time_s` (n,) to the controller's clock, to within a step.
 
-    Every pair of axes is cross-correlated, because the readings' norm would contain the bias; the vector fit judges the
-    peaks. A step contains at least one sample.
+    Readings are averaged in steps, each of which contains at least one sample. Every axis of the board is
+    cross-correlated with every axis of the arm, because the readings' norm would contain the bias. Of the offsets at
+    the highest peaks, that with the best linear fit of the vectors is returned.
     """
     step_s = max(COARSE_STEP_S, 1.1 * float(np.median(np.diff(time_s))))
     bins = ((time_s - time_s[0]) / step_s).astype(np.intp)

@@ -41,7 +41,7 @@ class TimeBase:
         return board_time_s + self.offset_s + self.drift * (board_time_s - self.reference_s)
 
     def correct(self, by_s: float, std_s: float) -> "TimeBase":
-        """Return the time base with `by_s` added to its offset, whose standard deviation is then `std_s`."""
+        """Return the time base with `by_s` added to the offset, and `std_s` as the offset's standard deviation."""
         covariance = np.diag([std_s**2, self.covariance[1, 1]])
         return replace(self, offset_s=self.offset_s + by_s, covariance=covariance)
 
