@@ -1,4 +1,4 @@
-"""The arm's states: their clock's rate against the computer's, the jitter of their times, the noise of their angles."""
+"""The quality of the arm's states: the rate of their clock, the jitter of their times, the noise of their angles."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -36,7 +36,7 @@ class ClockRate:
 
 
 def compare_with_computer(motion: ArmMotion) -> ClockRate:
-    """Return the rate of the controller's clock relative to the computer's, by a line through arrival times.
+    """Return the rate of the controller's clock relative to the computer's, by a straight line through arrival times.
 
     States arrive in bursts after delays, so only some of them count as independent.
     """
@@ -53,8 +53,8 @@ def state_jitter(recordings: Sequence[ObservedRun]) -> Jitter:
     """Return the jitter of the times of the arm's states, from the scatter of the joint angles in all sweeps of a run.
 
     Differences of the sixth order remove the servo's motion, which is slow compared with the states, and keep the
-    errors of the times and the noise and steps of the encoder. Neighbouring differences share states: n of them have n
-    / Σ ρ² degrees of freedom, with Σ ρ² = C(24, 12) / C(12, 6)² over all lags.
+    errors of the times and the noise and steps of the encoder. Neighbouring differences share states and so are
+    correlated, by ρ at each lag: n differences have n / Σ ρ² degrees of freedom, with Σ ρ² = C(24, 12) / C(12, 6)².
     """
     count = 0
     scatter = []
@@ -71,8 +71,8 @@ def state_jitter(recordings: Sequence[ObservedRun]) -> Jitter:
 def find_encoder_noise_rad(recordings: Sequence[ObservedRun]) -> float:
     """Return the noise of one reading of a joint's angle, rad, from the joints that are at rest during a sweep.
 
-    It is the scatter of sixth differences, as in `state_jitter`, and includes the encoders' steps. Zero with a single
-    shaft, or if single angles are inaccurate.
+    The noise is the scatter of sixth differences, as in `state_jitter`, and includes the encoders' steps. It is zero
+    for a turner with a single shaft, or if single angles are inaccurate.
     """
     squares = [
         np.mean(np.delete(steps_rad, sweep.joint, axis=1) ** 2)

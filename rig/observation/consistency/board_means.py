@@ -1,9 +1,9 @@
 """The board's own average of each sweep, compared with the computer's mean of the same turn. Pure.
 
-Both average the same samples, with different weights. The board's weights are equal over whole blocks of readings, so
-its window begins and ends a little before or after the turn; the computer's weights cancel the spectral lines that it
-found. The arm's rotation and the spectral lines, averaged with the board's weights, are subtracted from the board's
-average. The rest must agree with the computer's mean.
+Board and computer average the same samples, with different weights. The board's weights are equal over whole blocks of
+readings, so its window begins and ends a little before or after the turn; the computer's weights cancel the spectral
+lines that the computer found. The arm's rotation and the spectral lines, averaged with the board's weights, are
+subtracted from the board's average. The remainder must agree with the computer's mean.
 """
 
 from collections.abc import Sequence
@@ -68,8 +68,8 @@ def _deviation(recording: ObservedRun, stream: Stream, turn: Observation, observ
 def _nuisance_columns(time_s: Array, turn: Observation, rates_rad_s: Array) -> Array:
     """Return the nuisance columns (n, k) of the computer's mean, at times (n,) with rates (n,) about the axis.
 
-    The weights of that mean cancel them: the turn's first two harmonics, spectral lines, and the effect of a slow
-    ripple on a lagging sensor.
+    The weights of that mean cancel these columns: the turn's first two harmonics, spectral lines, and the effect of a
+    slow ripple on a lagging sensor.
     """
     average = turn.average
     fraction = (time_s - average.start_s) / average.duration_s

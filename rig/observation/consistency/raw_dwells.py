@@ -79,7 +79,7 @@ def raw_field_dwells(name: str, recording: ObservedRun) -> list[RawDwell]:
 
 
 def rests_of_dwells(dwells: Sequence[RawDwell]) -> list[RawReadings]:
-    """Return the dwells as rests: their raw readings with the residuals from the dwell's mean."""
+    """Return the dwells as rests, each with its raw readings and their residuals from the dwell's mean."""
     residuals = [dwell.still_counts - dwell.still_counts.mean(axis=0) for dwell in dwells]
     return [RawReadings(REST, dwell.counts, rest, np.zeros(3)) for dwell, rest in zip(dwells, residuals, strict=True)]
 

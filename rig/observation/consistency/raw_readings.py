@@ -24,7 +24,7 @@ class RawReadings:
     - counts (n, 3): the readings as recorded.
     - residual_counts (m, 3): readings minus their segment's mean and the vibration, for samples with recorded motion.
     - vibration_counts (3,): RMS of the arm's vibration.
-    - vibration_rad2 (3,): mean square difference of the vibration's angle between two times in a rest.
+    - vibration_rad2 (3,): mean square of the angle by which the vibration turns the body between two times in a rest.
     """
 
     sweep: int

@@ -208,7 +208,7 @@ def _slow_line_variance(slow: Array, weights: Array, residuals: Array) -> Array:
     """Return the variance (3,) that slow spectral lines, columns (n, k) fitted to residuals (n, 3), add to means.
 
     The means have weights (p, n). The frequencies of slow lines are uncertain, so the variance is at least the means'
-    scatter around a linear drift in time; the drift itself would be a fault, not a vibration.
+    scatter around a linear drift in time. The drift is excluded, because it would be a fault, not a vibration.
     """
     fitted = np.mean((weights @ slow @ fit_columns(slow, residuals)) ** 2, axis=0)
     if len(weights) <= MIN_SCATTER_SEGMENTS:
@@ -254,7 +254,8 @@ def _segment_rest(stream: Stream, motion: ArmMotion, average: Average, count: in
 def _noise_at_rest(residuals: Array, segments: int, columns: int, steps: Steps) -> MeanNoise:
     """Return the noise of readings, from the residuals (n, 3) of a fit of segment means and spectral lines.
 
-    With spectral lines, a vibration may remain in the scatter; then the noise of a long mean is that at zero frequency.
+    If there are spectral lines, a part of a vibration may remain in the scatter; then the noise of a long mean is that
+    at zero frequency.
     """
     dof = max(len(residuals) - segments - columns, 1)
     scatter = np.maximum(np.sum(residuals**2, axis=0) / dof, steps.variance)

@@ -1,10 +1,11 @@
-"""Transfers between sweeps and rests, each averaged as a whole: rotations about other axes than the sweeps around them.
+"""Transfers of the arm between sweeps and rests: rotations about other axes than the sweeps before and after.
 
-The sweeps about an axis follow each other, so they do not show a change of its scale factor at another time. In a
-transfer two wrists turn by half a revolution, from rest to rest, and the arm states the mean rate as in a sweep.
+The sweeps about an axis follow each other, so they do not show a change of that axis's scale factor at another time.
+In a transfer two wrists turn by half a revolution, from rest to rest, and the arm states the mean rate as in a sweep.
+Each transfer is averaged as a whole.
 
-No spectral lines are sought in a transfer: it is short, and the frequency of the servo's vibration rises and falls. A
-vibration at the data rate aliases to zero, an error of the mean that the scatter does not show: see
+No spectral lines are sought in a transfer, because it is short, and the frequency of the servo's vibration rises and
+falls. A vibration at the data rate aliases to zero, an error of the mean that the scatter does not show: see
 `rig.analysis.consistency.gyroscope_checks`.
 """
 
@@ -50,12 +51,12 @@ LOW_FRACTION = 0.0  # of the data rate: as few low frequencies as possible, beca
 class WristTransfer:
     """A transfer in which only the wrists turned, averaged; times are on the clock of its recording.
 
-    - clock_offset_s: converts its times to the clock of the first recording.
-    - mean_rad_s (3,): mean of the readings; scatter_rad2_s2, rounding_rad2_s2 (3,): its variances due to the residuals
-      of a fit of the arm's rate and gravity, and due to rounding.
+    - clock_offset_s: converts the transfer's times to the clock of the first recording.
+    - mean_rad_s (3,): mean of the readings; scatter_rad2_s2, rounding_rad2_s2 (3,): the mean's variances due to noise,
+      by the residuals of a fit of the arm's rate and gravity, and due to rounding.
     - rate_rad_s (3,): the flange's mean rate relative to the base, in the flange's frame.
     - gravity_m_s2 (3,): gravity minus the acceleration at the sensors' position, in the same frame.
-    - attitude (3, 3): from the base into that frame.
+    - attitude (3, 3): rotation from the base into the flange's frame.
     """
 
     clock_offset_s: float
