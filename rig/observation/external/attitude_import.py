@@ -1,12 +1,13 @@
 """External data in known attitudes: a CSV file of samples and one of attitudes, in TRIAX's format.
 
-samples: see `rig.observation.external.csv_samples`.
+The file of samples is that of `rig.observation.external.csv_samples`.
 
-attitudes: `start_s`, `end_s` on the same clock, or `time_s` alone, and `qw qx qy qz`, the unit quaternion that takes
-body to table coordinates; while the table turns `rate_x_rad_s rate_y_rad_s rate_z_rad_s`, its rate in body coordinates;
-and optionally `attitude_std_rad` about each axis. While the table turns, a row refers to its middle and should be
-short. A row may be a single sample, whose noise is then estimated from the scatter of all rows about the model.
-Accelerometers and magnetometers use only the rows in which the body is at rest (`rig.observation.external.placements`).
+The file of attitudes has `start_s`, `end_s` on the same clock, or `time_s` alone, and `qw qx qy qz`, the unit
+quaternion that takes body to table coordinates. If the table turns, it also has the table's rate in body coordinates,
+`rate_x_rad_s rate_y_rad_s rate_z_rad_s`; optionally it has `attitude_std_rad` about each axis. While the table turns, a
+row refers to its middle and should be short. A row may contain a single sample; the noise is then estimated from the
+scatter of all rows about the model. Accelerometers and magnetometers use only the rows in which the body is at rest
+(`rig.observation.external.placements`).
 
 Columns may have any order; the first row holds their names.
 
@@ -235,7 +236,7 @@ def _list_omitted(rows: _ReferenceRows, kept: _ReferenceRows, reason: str) -> It
 
 
 def _rows(time_s: Array, rate: Array, fixes: _ReferenceRows) -> Rows:
-    """Average the samples in each row's window; without noise if a row has too few samples for an estimate."""
+    """Average the samples in each row's window, without variances if a row has too few samples to estimate noise."""
     cuts = [rate[inside(time_s, window)] for window in fixes.windows]
     counts = np.array([len(cut) for cut in cuts])
     noise = np.array([scatter_of(cut)[:2] for cut in cuts]) if counts.min() >= MIN_SAMPLES else None
@@ -253,8 +254,8 @@ def _rows(time_s: Array, rate: Array, fixes: _ReferenceRows) -> Rows:
 def _find_complete(rows: _ReferenceRows, counts: NDArray[np.intp], expected: Array) -> NDArray[np.intp]:
     """Return the rows whose samples are complete.
 
-    Raise Fault `lost_samples` if no row is complete, or if most long rows lack samples. Short rows are not considered,
-    because any gap may cover one.
+    Raise Fault `lost_samples` if no row is complete, or if most long rows lack samples. Short rows are not counted,
+    because any gap may cover a whole short row.
     """
     whole = np.array([is_complete(*pair, least=1) for pair in zip(counts.tolist(), expected.tolist(), strict=True)])
     long = expected >= MIN_SAMPLES

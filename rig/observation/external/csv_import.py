@@ -1,12 +1,12 @@
 """External data: a CSV file of samples and one of sweeps, solved like the rig's own recordings.
 
-samples: a gyroscope's, see `rig.observation.external.csv_samples`; other sensors' samples are not used.
+The file of samples is that of `rig.observation.external.csv_samples`; only a gyroscope's samples are used.
 
-sweeps: `start_s`, `end_s` on the same clock, `axis_x`, `axis_y`, `axis_z` (unit vector of the turn in a frame fixed to
-the sensor's carrier, right-handed), and either `speed_rad_s` (mean speed) or `angle_rad` (angle turned from start to
-end). A row of speed or angle 0 is a rest, without an axis. If the table or servo vibrates, a sweep should be a whole
-turn, whose mean speed is 2π/T in any case. Standard deviations may be given: `angle_std_rad` of the angle reached, and
-`axis_std_rad` of the direction of the axis.
+The file of sweeps has `start_s`, `end_s` on the same clock, `axis_x`, `axis_y`, `axis_z` (unit vector of the turn in a
+frame fixed to the sensor's carrier, right-handed), and either `speed_rad_s` (mean speed) or `angle_rad` (angle turned
+from start to end). A row of speed or angle 0 is a rest, without an axis. If the table or servo vibrates, a sweep should
+be a whole turn, whose mean speed is 2π/T in any case. Standard deviations may be given: `angle_std_rad` of the angle
+reached, and `axis_std_rad` of the direction of the axis.
 
 A row with an angle whose body is at rest at both ends is solved by the angle that the gyroscope measured
 (`rig.estimation.gyroscope.rotations_by_angle`).
@@ -63,10 +63,10 @@ SWEEPS_MB = 1  # some ten thousand sweeps
 
 @dataclass(frozen=True, slots=True)
 class ExternalData:
-    """Averages of a file of samples in a file's sweeps and rests, in the order of the rows, and turns by angle.
+    """Averages of samples over the sweeps and rests of a file, in the order of its rows, and turns with a stated angle.
 
     - `at_reference`: whether means are corrected to one temperature, by polynomials whose uncertainty includes the
-      contradictions of repeats.
+      contradictions between repeated measurements.
     - `by_mean`: numbers of rows that state an angle but are solved by mean speed, as the body moved before or after.
     - `omitted`: rows left out for missing readings, and the readings missing in the others.
     - `change`: an abrupt change of the gyroscope that the rows show.
@@ -139,7 +139,7 @@ def _find_change(data: ExternalData) -> AbruptChange | None:
 
 
 def stack_rows(sweeps: Sequence[Observation], rests: Sequence[Average]) -> tuple[list[Average], Array]:
-    """Return the averages of N sweeps, then rests, and the stated rotation rates (N, 3) in rad/s, zero at rest."""
+    """Return N averages, of the sweeps and then of the rests, and their stated rates (N, 3) in rad/s, zero at rest."""
     rates_rad_s = [sweep.speed_rad_s * sweep.axis_flange for sweep in sweeps]
     return [*(sweep.average for sweep in sweeps), *rests], np.array([*rates_rad_s, *np.zeros((len(rests), 3))])
 
@@ -270,7 +270,7 @@ def _observation(row: int, mean: Average, speed_rad_s: float, axis: Array) -> Ob
 
 
 def _check_noisy(mean: Average, row: int) -> None:
-    """Raise Fault `stuck_sensor` if an axis has one value throughout a row, so that its mean is uncertain by a step."""
+    """Raise Fault `stuck_sensor` if an axis has one value throughout a row, so that the mean is uncertain by a step."""
     quiet = np.flatnonzero(mean.noise_rad_s <= ROUNDING_RATIO * np.abs(mean.mean_rad_s))
     if len(quiet):
         axis = int(quiet[0])

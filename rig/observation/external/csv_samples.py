@@ -53,7 +53,7 @@ class Samples:
 
     - `time_s` (n,): smoothed if the time stamps are too inexact; `sampling` describes the stamps.
     - `readings` (n, 3) by quantity; `temperature_c` (n,), None without such a column.
-    - `omitted`: rows that are left out, such as repetitions, and spikes, which are interpolated.
+    - `omitted`: rows that are left out, such as repetitions; also spikes, although these are interpolated.
     - `notes`: how stamps were interpreted, in words.
     """
 
@@ -119,7 +119,7 @@ def _convert(path: Path, columns: Columns, mapped: MappedColumns | None) -> Colu
 
 
 def _read(path: Path, table: CsvTable, quantity: Quantity) -> NDArray[np.bool_]:
-    """Return a mask (n,) of the rows with a quantity. Raise Refused `not_a_number` if only some axes are blank."""
+    """Return a mask (n,) of the rows that have a quantity. Raise Refused `not_a_number` if only some axes are blank."""
     blank = np.isnan([table.columns[name] for name in quantity.columns])
     if len(partly := np.flatnonzero(blank.any(axis=0) & ~blank.all(axis=0))):
         row = int(partly[0])
@@ -132,7 +132,7 @@ def _read(path: Path, table: CsvTable, quantity: Quantity) -> NDArray[np.bool_]:
 def _drop_blanks(
     path: Path, table: CsvTable, read: Mapping[Quantity, NDArray[np.bool_]], wanted: Sequence[Quantity]
 ) -> SampleTable:
-    """Return the rows that hold every wanted quantity. Raise Refused `blank_cells` if these are in different rows."""
+    """Return the rows that hold the wanted quantities. Raise Refused `blank_cells` if some rows hold a part of them."""
     columns, time_s = dict(table.columns), table.columns[TIME]
     if not wanted or all(read[quantity].all() for quantity in read):
         kept = np.ones(len(time_s), dtype=np.bool_)

@@ -92,10 +92,10 @@ def average_bridged(readings: Array, numbers: NDArray[np.intp], window: Window, 
 
 @dataclass(frozen=True, slots=True)
 class RowGaps:
-    """The readings of a row: the numbers present (`count`), `expected` and `missing`, and the number of `gaps`.
+    """The readings of a row: how many are present (`count`), `expected` and `missing`, and the number of `gaps`.
 
-    `hidden_rad`: standard deviation of the rotation that the gaps hide; `first_s`: time before the first of them;
-    `is_inside`: whether the recording covers the row.
+    `hidden_rad`: standard deviation of the rotation that the gaps hide; `first_s`: time of the reading before the first
+    gap; `is_inside`: whether the recording covers the row.
     """
 
     count: int

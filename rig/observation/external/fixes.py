@@ -61,8 +61,8 @@ def gather(turning: Turning, window_s: float | None = None, clock_s: float = 0.0
     """Return the fixes of a reference's rows, in windows of a given or a suitable length.
 
     Time t of the reference is time t + `clock_s` of the readings. Raise Fault `too_few_observations` if the body moves
-    in too few of the remaining increments; `lost_samples`, `saturation` or `turned_too_fast` if that is the cause, or
-    if more increments are left out for it than remain.
+    in too few of the remaining increments. Raise instead `lost_samples`, `saturation` or `turned_too_fast` if that is
+    why they are too few, or why more of them are left out than remain.
     """
     turning = select_covered(turning, clock_s)
     if len(turning.rows_s) < 2:
@@ -85,9 +85,10 @@ def _suitable_s(span_s: float) -> float:
 
 
 def _fixes(turning: Turning, still: NDArray[np.bool_], window_s: float) -> Fixes:
-    """Group the reference's attitudes into fixes: start and end of each row at rest, and one per window between rests.
+    """Group the reference's attitudes into fixes, without regard to the gyroscope's gaps.
 
-    `placement` is equal at both ends of a rest. The gyroscope's gaps are ignored.
+    Rows of the reference that are `still` are rests: each gives a fix at its start and one at its end, which have the
+    same `placement`. The other rows give one fix for each window of `window_s` between two rests.
     """
     rows_s = turning.rows_s
     passed = np.cumsum(still)
@@ -108,9 +109,10 @@ def _fixes(turning: Turning, still: NDArray[np.bool_], window_s: float) -> Fixes
 
 
 def _measure_walk(turning: Turning, rests_s: Array) -> tuple[float, float]:
-    """Return the angle random walk in rests (k, 2) from means over `BATCH_MEAN_S`: sum of squares, rad²/s, and its dof.
+    """Return the sum of squares, rad²/s, of a gyroscope's angle random walk in k rests, and its degrees of freedom.
 
-    Batch means are used because the readings' noise may be coloured over a few samples.
+    `rests_s` (k, 2) are the rests' ends. The readings are first averaged over `BATCH_MEAN_S`, because their noise may
+    be coloured over a few samples.
     """
     squares, dof = 0.0, 0.0
     for start_s, end_s in rests_s.tolist():
@@ -126,7 +128,7 @@ def _measure_walk(turning: Turning, rests_s: Array) -> tuple[float, float]:
 
 
 def _drop_thin(fixes: Fixes) -> Fixes:
-    """Return the fixes, except for moving ones made of far fewer rows than usual."""
+    """Return the fixes, except for fixes in motion made of far fewer rows than usual."""
     counts = np.bincount(fixes.fix)
     moving = fixes.placement >= 0
     kept = ~moving | (counts >= MIN_ROW_RATIO * np.median(counts[moving] if moving.any() else counts))
@@ -145,9 +147,10 @@ def _drop_thin(fixes: Fixes) -> Fixes:
 def _find_joined(
     turning: Turning, fixes: Fixes, clock_s: float
 ) -> tuple[NDArray[np.bool_], Array, tuple[OmittedIncrements, ...]]:
-    """Return which fixes are joined to the next, the std of the rotation hidden in between, and what is left out.
+    """Return which fixes are joined to the next fix, the std of the hidden rotation, and the omitted increments.
 
-    The mask and the stds, rad, have shape (N − 1,). A fix is not joined over a step that may hide too much rotation.
+    The mask and the stds, rad, have shape (N − 1,). Two fixes are not joined over a step that may hide too much
+    rotation.
     """
     count = len(fixes.placement)
     first_s = clock_s + fixes.at_s[np.searchsorted(fixes.fix, np.arange(count))]
@@ -170,9 +173,9 @@ def _find_joined(
 
 
 def _find_unknown_steps(turning: Turning) -> Iterator[tuple[str, NDArray[np.intp], Array]]:
-    """Yield, by error name, the steps (k,) with unknown motion and the stds (k,) of the rotation in them, rad.
+    """Yield an error's name, the steps (k,) with motion unknown for this reason, and the stds (k,) of their rotation.
 
-    A step has the index of the reading before it.
+    A step has the index of the reading before it. The stds are in rad.
     """
     steps_s = np.diff(turning.time_s)
     readings = turning.readings_rad_s

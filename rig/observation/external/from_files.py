@@ -37,9 +37,9 @@ THRESHOLDS = ObservationThresholds(max_lost_fraction=0.01, max_speed_deviation=0
 class Files:
     """The files of `readings` and of their motion, and their item.
 
-    `recorded` is the time of recording, None for the time at which the readings' file was last written. `columns` map
-    columns with other names than the rig's. `tells` is the kind of motion; for "turns", which have no file, `motion`
-    holds the user's declarations, by column.
+    `recorded` is the time of recording, None for the time at which the readings' file was last written. `columns` maps
+    columns with other names than the rig's. `tells` is the kind of motion. "turns" have no file; their `motion` holds
+    the user's declarations, by column.
     """
 
     readings: Path

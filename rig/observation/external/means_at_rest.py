@@ -94,8 +94,8 @@ def _split_single(windows: Sequence[Window]) -> Sequence[Window]:
 def _rate_rad_s(times_s: Array, attitudes: Array) -> Array:
     """Return the body's rate (3,) from its attitudes at increasing times; zero for a single attitude.
 
-    The rate is the median over pairs of rows that are half of all rows apart (Theil's incomplete method, 1950). So a
-    few rows at either end, in which the body already moves, have no effect. A single row states a body at rest.
+    The rate is the median over pairs of rows that are half of all rows apart (Theil's incomplete method, 1950), so that
+    a few rows at either end, in which the body already moves, have no effect. A single row means that the body rests.
     """
     half = len(times_s) // 2
     if not half:

@@ -1,4 +1,4 @@
-"""The rows of a reference, and the readings in them, that are not a placement: count, reason, first row and time."""
+"""The rows of a reference that are no placement, and the readings left out of the others, with their reasons."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from rig.observation.windows import Window, inside
 class AttitudeRows:
     """Rows (N,) of a reference: their `windows`, `attitudes` (N, 3, 3), body to table, and `numbers` (N,) in its file.
 
-    `std_rad` (N,) of the attitudes as stated, or None.
+    `std_rad` (N,): the attitudes' stated standard deviations, or None.
     """
 
     windows: Sequence[Window]
@@ -44,7 +44,7 @@ class Account:
     def check_mostly_at_rest(self) -> None:
         """Raise Fault `not_at_rest` if the body moves in all rows, or in more than half of the dwells.
 
-        Raise `lost_samples` if most of these lack the readings that would show a rest.
+        Raise `lost_samples` instead if most of these lack the readings that would show a rest.
         """
         left_out, windows = int((self.rest[self.dwells] < 0).sum()), self.rows.windows
         if (self.rest >= 0).any() and 2 * left_out <= int(self.dwells.sum()):
@@ -127,7 +127,7 @@ class Account:
             yield Omitted("rows", len(moving), total, "not_at_rest: the body moves in them", where)
 
     def _find_gaps_s(self, rows: NDArray[np.bool_]) -> Array:
-        """Return the longest gap (N,), s, in each of `rows` that has no rest; 0 if below a block, and in other rows."""
+        """Return the longest gap (N,), s, in each of `rows` without a rest; 0 for gaps below a block and other rows."""
         gaps_s = np.zeros(len(rows))
         for row in np.flatnonzero((self.rest < 0) & rows).tolist():
             longest_s = float(np.diff(self.time_s[self._inside(row)]).max(initial=0.0))

@@ -3,7 +3,8 @@
 A placement is a rest of the recording (`rig.observation.by_hand.rests`) with the rows of a reference in it. Consecutive
 rows without a movement in between are one placement. Rests without a row still show the quantity's norm.
 
-Only the readings during a knock or a gap are lost: if those before and after are equal, the body lay still.
+A knock or a gap does not end a placement if the readings before and after are equal: the body then lay still, and only
+the readings in between are left out.
 """
 
 from collections.abc import Mapping, Sequence
@@ -140,7 +141,7 @@ def _join_rests(time_s: Array, readings: Mapping[Quantity, Array], rests: Sequen
 def _same_rest(time_s: Array, readings: Mapping[Quantity, Array], before: Window, after: Window) -> bool:
     """Return whether the body lay still between two rests.
 
-    In a gap of a gyroscope's readings the body may have turned; then the other quantities must show that it has not.
+    In a gap of a gyroscope's readings the body may have turned, so the other quantities must show that it has not.
     """
     between = _closed_slice(time_s, Window(before.end_s, after.start_s))
     gap_s = float(np.diff(time_s[between]).max())
@@ -171,8 +172,8 @@ def _reads_alike(read: Array, quantity: Quantity, before: NDArray[np.intp], afte
 def _find_rest(time_s: Array, window: Window, rests: Sequence[_PlacedRest]) -> tuple[int, NDArray[np.intp]]:
     """Return the number of the rest that contains a row, −1 if none does, and the row's samples at rest.
 
-    A rest contains a row if neither end of the row exceeds it by more than a block. If no rest contains a dwell, one
-    that contains most of it suffices.
+    A rest contains a row if neither end of the row is more than a block outside the rest. For a dwell that no rest
+    contains, a rest with most of the dwell suffices.
     """
     row, nothing = inside(time_s, window), np.zeros(0, dtype=np.intp)
     met: list[tuple[int, float, NDArray[np.intp]]] = []
@@ -194,9 +195,10 @@ def _find_rest(time_s: Array, window: Window, rests: Sequence[_PlacedRest]) -> t
 
 
 def _mask_inner(rest: NDArray[np.intp], windows_s: Array, starts_s: Array, ends_s: Array) -> NDArray[np.bool_]:
-    """Return a mask of rows (N,) at `rest` (number, or −1), without those near the start or end of their rest.
+    """Return a mask of the rows (N,) in a rest, except those near its start or end.
 
-    A reference that lags still shows motion there. A rest keeps all its rows if all are near an end.
+    A reference that lags shows motion there. A rest keeps all its rows if all are near an end. `rest` (N,) are the
+    numbers of the rows' rests, −1 without one.
     """
     at_rest = np.flatnonzero(rest >= 0)
     middles_s, number = windows_s[at_rest].mean(axis=1), rest[at_rest]
@@ -207,7 +209,7 @@ def _mask_inner(rest: NDArray[np.intp], windows_s: Array, starts_s: Array, ends_
 
 
 def _group_by_placement(rest: NDArray[np.intp], attitudes: Array) -> list[NDArray[np.intp]]:
-    """Return the rows of each placement: those of one `rest` (N,) with nearly equal attitudes."""
+    """Return the rows of each placement: rows of the same `rest` (N,) with nearly equal attitudes."""
     groups: list[list[int]] = []
     last: dict[int, list[int]] = {}
     for row in np.flatnonzero(rest >= 0).tolist():
@@ -228,7 +230,7 @@ def _angle_between_rad(one: Array, other: Array) -> float:
 def _read(
     time_s: Array, readings: Mapping[Quantity, Array], cuts: Sequence[NDArray[np.intp]]
 ) -> tuple[RestMeans, NDArray[np.intp]]:
-    """Return the means of the rests, and the samples of knocks. Rests with few samples get the others' noise."""
+    """Return the means of the rests, and the samples of knocks; rests with few samples get the other rests' noise."""
     means = {}
     variances = {}
     dof = {}
@@ -250,7 +252,7 @@ def _read(
 
 
 def _fill_variances(variances: Array, counts: NDArray[np.intp], readings: Array, quantity: Quantity) -> Array:
-    """Return variances (N, 3); missing ones come from other rests, or successive differences of readings (n, 3)."""
+    """Return variances (N, 3), the missing ones from other rests, or from differences of successive readings (n, 3)."""
     unknown = np.isnan(variances[:, 0])
     if not unknown.any():
         return variances

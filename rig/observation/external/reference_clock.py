@@ -93,7 +93,7 @@ def _find_steady_clock(turning: Turning, motion: TableMotion) -> tuple[TimeBase,
 
 
 def _check_not_inverted(turning: Turning, unexplained: float) -> None:
-    """Raise Fault `inverted_attitudes` if the inverse rotations leave only half as much unexplained."""
+    """Raise Fault `inverted_attitudes` if the inverse rotations leave less than half of `unexplained` unexplained."""
     inverse = replace(turning, attitudes=np.swapaxes(turning.attitudes, -1, -2))
     motion = TableMotion(inverse.rows_s.mean(axis=1), inverse.attitudes, None)
     if _find_steady_clock(inverse, motion)[1] < unexplained / 2:

@@ -1,7 +1,7 @@
 """A gyroscope's readings with the rows of a reference, and the rests among the rows.
 
-While the body lies still, rows that follow each other densely are combined in one long row for the whole rest. Both the
-readings and the rows must show the rest.
+While the body lies still, rows that follow each other densely are combined in one long row for the whole rest, if both
+the readings and the rows show the rest.
 """
 
 from dataclasses import dataclass, replace
@@ -37,7 +37,7 @@ class Turning:
     hides_losses: bool = False
 
     def select(self, rows: NDArray[np.intp]) -> "Turning":
-        """Return the readings with only the `rows` of these indices."""
+        """Return all readings with only some of the reference's rows, those with the indices `rows`."""
         std_rad = None if self.std_rad is None else self.std_rad[rows]
         return replace(self, rows_s=self.rows_s[rows], attitudes=self.attitudes[rows], std_rad=std_rad)
 

@@ -1,7 +1,8 @@
 """Robust initial values of a gyroscope's F, bias and clock, from a reference's rotations from row to row.
 
-    ∫ m dt = F φ + b Δt        from t₁ + τ to t₂ + τ, φ the rotation vector from the row at t₁ to the row at t₂
+    ∫ m dt = F φ + b Δt        from t₁ + τ to t₂ + τ
 
+with the readings m, the offset τ of the clock, and φ the rotation vector from the row at t₁ to the row at t₂. This
 holds to second order for any φ below π, however far apart the rows are. The fit minimises the sum of the residuals'
 lengths (least absolute deviations by reweighting), over a grid of τ. Only pairs between which the body moves determine
 F and τ, so neither a few bad rows nor long rests have an effect.
@@ -45,7 +46,7 @@ class _Pairs:
 
 
 def find_start(turning: Turning) -> RobustStart:
-    """Return initial values of F, b and τ; without suitable rows, of an aligned sensor on the same clock."""
+    """Return initial values of F, b and τ; without suitable rows, those of an aligned sensor on the same clock."""
     aligned = RobustStart(DriftState(np.eye(3), np.zeros(3), 0.0), 1.0)
     pairs = _find_pairs(turning)
     if len(pairs.begin_s) < MIN_PAIRS:

@@ -52,7 +52,7 @@ class TurnedData:
 
 @dataclass(frozen=True, slots=True)
 class DeclaredTurns:
-    """The table's rows (k,): `angle_rad`, and standard deviations of angle and axis, or None."""
+    """The stated angles (k,) of the table's rows, and the standard deviations (k,) of angle and axis, if given."""
 
     angle_rad: Array
     angle_std_rad: Array | None
@@ -62,7 +62,7 @@ class DeclaredTurns:
 def find_turns(
     time_s: Array, readings: Array, declared: DeclaredTurns, sweeps: Sequence[Observation], rests: Sequence[Average]
 ) -> TurnedData | None:
-    """Return the turns, if any, that start and end at rest. `readings` (n, 3) in rad/s at `time_s`."""
+    """Return the turns that start and end at rest, by readings (n, 3) in rad/s at `time_s` (n,); None without any."""
     pauses = _find_pauses(time_s, sweeps)
     lying = find_rests(time_s, {RATE: readings}, lying=pauses)
     if not lying:
@@ -115,7 +115,7 @@ def find_turns(
 def _find_other_bias(
     time_s: Array, rates: Array, pauses: Sequence[Window], lying: Sequence[Window]
 ) -> Iterator[Window]:
-    """Yield the pauses with a quiet reading that may be another bias, by rates (n, 3) minus the usual bias."""
+    """Yield the pauses in which a quiet reading may be another bias; `rates` (n, 3) are minus the usual bias."""
     middles = [
         Window(pause.start_s + (pause.end_s - pause.start_s) / 4, pause.end_s - (pause.end_s - pause.start_s) / 4)
         for pause in pauses
