@@ -54,8 +54,8 @@ def bag_readings(path: Path, inside: str | None) -> Iterator[Part]:
     """Yield, in blocks, the readings of the topic `inside` a bag, or of its only topic of type Imu.
 
     The columns are as in a CSV file, times are measured from the beginning of the bag, and rows have the order of the
-    bag. Messages without a rate are left out and counted. If another lacks an acceleration, all accelerations are left
-    out. Raise Refused `missing_extra` or `bag_topic`, and any error of the parser for a damaged bag.
+    bag. Messages without a rate are left out and counted. If any other message lacks an acceleration, all accelerations
+    are left out. Raise Refused `missing_extra` or `bag_topic`, and any error of the parser for a damaged bag.
     """
     with _open_bag(path) as reader:
         chosen = _select_topic(reader, (IMU,) if inside is None else (IMU, MAGNETIC), inside, "readings")
@@ -163,7 +163,8 @@ def _list_topics(reader: Any, types: Sequence[str]) -> list[tuple[str, str]]:
 def _read_messages(reader: Any, connections: Any) -> Iterator[tuple[float, Any]]:
     """Yield each message with the time in its header, in seconds from the beginning of the bag.
 
-    All topics share one beginning. A float of seconds since 1970 would lose microseconds. Raise Refused `bag_topic`.
+    All topics have the same beginning. Times count from it because a float of seconds since 1970 would lose
+    microseconds. Raise Refused `bag_topic`.
     """
     from rosbags.typesys import Stores, get_typestore
 
@@ -186,7 +187,7 @@ def _read_messages(reader: Any, connections: Any) -> Iterator[tuple[float, Any]]
 def _check_layout(store: Any, connections: Any) -> None:
     """Raise ValueError if the messages' own definition differs from ROS's.
 
-    The definition is only compared, because rosbags would generate code from it and execute it.
+    The definition is only compared and not used, because rosbags would generate code from it and execute this code.
     """
     from rosbags.interfaces import MessageDefinitionFormat
     from rosbags.typesys import get_types_from_idl, get_types_from_msg

@@ -40,7 +40,7 @@ LINE = "line"  # an additional column: the number of each row's line
 class CsvTable:
     """A file's `columns` (n,) by name, NaN for a blank cell, and the `lines` (n,) of its rows.
 
-    Times are relative to `origin_s`, in whole seconds. It is 0, except for a clock that began in 1970 or so.
+    Times are relative to `origin_s`, a whole number of seconds: 0, unless the clock began in 1970 or so.
     """
 
     columns: dict[str, Array]
@@ -73,9 +73,10 @@ def read_table(
 ) -> CsvTable:
     """Return the columns of a file by the names in its header; each group of optional columns is complete or absent.
 
-    The first row holds the names. All rows have its separators: commas, tabs, or semicolons as in spreadsheets with a
-    decimal comma. Empty rows, rows of units below the heading, and repetitions of the heading are skipped. If the file
-    is `mapped`, only columns in the map, or with the rig's names, are returned. A file packed by gzip is unpacked.
+    The first row holds the names. All rows have this row's separators: commas, tabs, or semicolons as in spreadsheets
+    with a decimal comma. Empty rows, rows of units below the heading, and repetitions of the heading are skipped. If
+    the file is `mapped`, only columns in the map, or with the rig's names, are returned. A file packed by gzip is
+    unpacked.
     Times count from `origin_s`, by default determined by the first time. A packed or long file is read in a process of
     its own, because it might exhaust the memory. Raise Refused `no_file`, `file_too_costly`, `temporary_folder_full`,
     `wrong_columns`, `wrong_unit`, `not_a_number`.

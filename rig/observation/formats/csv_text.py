@@ -89,7 +89,7 @@ def _read_beginning(file: BinaryIO | GzipFile) -> bytes:
 
 
 def _lines(text: TextIOWrapper, most: int) -> Iterator[str]:
-    """Yield the lines, of limited length and sum: a packed file may hold a thousand times its size."""
+    """Yield the lines, at most `most` characters in all, because a packed file may hold a thousand times its size."""
     while line := text.readline(MAX_LINE):
         most -= len(line)
         if len(line) == MAX_LINE:

@@ -36,8 +36,8 @@ def is_mat(path: Path) -> bool:
 def read_mat_rows(path: Path, header: Header, mapped: MappedColumns | None) -> Iterator[list[str]]:
     """Yield the names of all columns of a file, then its rows, in which cells of unneeded columns are blank.
 
-    The needed columns are those in the map or with the rig's names. NaN is spelt as the map does. Raise Refused
-    `wrong_columns` if they differ in length, and any error of the parser for a damaged file.
+    The needed columns are those in the map or with the rig's names. NaN is written as the map spells missing values.
+    Raise Refused `wrong_columns` if the columns differ in length, and any error of the parser for a damaged file.
     """
     columns = read_mat_columns(path)
     names = [*columns]

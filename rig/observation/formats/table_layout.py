@@ -121,7 +121,7 @@ def layout_parts(path: Path, largest_mb: int) -> Iterator[Part]:
 
 
 def _find_table_rows(columns: Mapping[str, Array]) -> int:
-    """Return the number of rows of the table among the variables of a workspace: the one with the most columns."""
+    """Return the number of rows of a workspace's table: the most common length of its columns, short ones excluded."""
     lengths = Counter(map(len, columns.values()))
     longest = max(lengths)
     return max(lengths, key=lambda length: (length >= min(longest, FEWEST_ROWS), lengths[length], length))
@@ -204,7 +204,7 @@ def _largest_number(column: Sequence[str]) -> float:
 def _find_time(
     headings: Sequence[str], units: Sequence[str], columns: Sequence[Sequence[str]], times: Sequence[int]
 ) -> int | None:
-    """Return the index of the time column: by its name or unit, or else the first column that increases, or None.
+    """Return the index of the time column by its name or unit, or else of the first column that increases, or None.
 
     A column with a time's name is accepted only if its values rise.
     """
@@ -236,7 +236,7 @@ def _increases_by_one(column: Sequence[str]) -> bool:
 def _time_unit(heading: str, unit: str, column: Sequence[str]) -> str:
     """Return the time unit that the heading states, or else the unit in which the numbers are plausible.
 
-    They are plausible as dates, or if they give a likely sample rate.
+    Numbers are plausible if they are dates of recent years, or if they give a likely sample rate.
     """
     if unit in ALLOWED_UNITS and UNITS[unit].quantity == TIME:
         return unit

@@ -1,11 +1,11 @@
 """Readings from PX4's log (`.ulg`), by `pyulog`: the sensors' readings before the autopilot corrects them.
 
-They come from one instance of `sensor_gyro` and one of `sensor_accel`, in rad/s and m/s²; `timestamp_sample` is the
-autopilot's time of the sample in µs. An accelerometer with other sample times is interpolated to the gyroscope's times;
-in one part their times are equal.
+The readings are those of one instance of `sensor_gyro` and one of `sensor_accel`, in rad/s and m/s²; `timestamp_sample`
+is the autopilot's time of the sample in µs. If gyroscope and accelerometer are separate parts, the accelerometer's
+readings are interpolated to the gyroscope's times; in one part the times of both are equal.
 
-PX4's default profile logs these once a second or not at all. Then `sensor_combined`, at about 200 Hz, is read, with a
-note about what it lacks. The reader runs in a process of its own (`rig.observation.formats.sample_files`).
+PX4's default profile logs these topics once a second or not at all. Then `sensor_combined`, at about 200 Hz, is read,
+with a note on its shortcomings. The reader runs in a process of its own (`rig.observation.formats.sample_files`).
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -61,7 +61,7 @@ def ulog_readings(path: Path, inside: str | None = None) -> Iterator[Part]:
 
 
 def _is_combined(path: Path, topics: Mapping[tuple[str, int], Any], inside: str | None) -> bool:
-    """Return whether to read `sensor_combined`, that is if it is named, or the raw topic is rare or missing.
+    """Return whether to read `sensor_combined`, because it is named, or because the raw topic is rare or missing.
 
     Raise Refused `ulog_topic` if the log does not hold the named topic.
     """
