@@ -38,8 +38,8 @@ class ArmMotion:
     Rates come from the recorded joint angles, because the controller filters its velocity signal. `states` (m,) are
     rows of `state_dtype`; `kinematics` and `names` describe the joints. `mount` (3, 3) transforms all vectors in the
     flange's frame to the item's: the identity unless a stage mounts the item differently. If single readings of an
-    angle scatter (`reading_std_rad`), angles and rates are fitted over a window, and a turn ends where the reading
-    recurs. Raise Fault `no_motion`, `not_finite`, `impossible_times`, `arm_clock_stepped`.
+    angle scatter (`reading_std_rad`), angles and rates are fitted over a window, and a turn ends at the time at which
+    its first reading recurs. Raise Fault `no_motion`, `not_finite`, `impossible_times`, `arm_clock_stepped`.
     """
 
     def __init__(
@@ -154,9 +154,9 @@ class ArmMotion:
     def rates_at_samples(self, time_s: Array) -> Array:
         """Return the flange's rate (n, 3), rad/s, around consecutive evenly spaced samples at rising times (n,).
 
-        It is the mean rate from half-way after the previous sample to half-way before the next; if samples are far
-        apart, the mean over `RATE_STEP_S`. Joints that stand still between the first and the last sample get the rate
-        zero, so that their encoders' noise is not added to the motion.
+        A sample's rate is the mean from half-way after the previous sample to half-way before the next one, or over
+        `RATE_STEP_S` if samples are far apart. Joints that stand still between the first and the last sample get the
+        rate zero, so that their encoders' noise is not added to the motion.
         """
         standing_rad = self._standing_rad(float(time_s[0]), float(time_s[-1]))
         return self._mean_rates(time_s, _averaging_time(time_s), standing_rad)
@@ -164,7 +164,7 @@ class ArmMotion:
     def state_gain(self, time_s: Array, weights: Array) -> float:
         """Return the ratio of the states' noise in a weighted mean of `rates_at_samples` to their noise in Δθ/T.
 
-        `weights` (n,) belong to the mean. Angles between states are interpolated, here linearly.
+        `weights` (n,) are those of the mean. For this ratio, angles between states are interpolated linearly.
         """
         lasting_s = _averaging_time(time_s)
         # A rate at a sample is the difference of two interpolated angles; `by_state` is the weight of each state.
