@@ -31,8 +31,8 @@ LEAVING_S = 0.05  # before a dwell's end: the board's times include the gyroscop
 class DwellReading:
     """A dwell of the procedure, by its `index`: the mean reading in m/s².
 
-    `attitude` (3, 3): mean rotation from the arm's base frame into the flange's, weighted like the readings; `window`:
-    in controller times.
+    `attitude` (3, 3) is the mean rotation from the arm's base frame into the flange's, weighted like the readings. The
+    `window` is in controller times.
     """
 
     index: int

@@ -1,6 +1,7 @@
 """The acceleration of the sensors while one joint turns and the others sway, from the encoders of all joints.
 
-A sway of about one period per turn is no spectral line: it cannot be separated from gravity, which has one period.
+A sway of about one period per turn must be computed from the encoders, because it cannot be separated from gravity in
+the readings, as a faster one can by its spectral line.
 """
 
 import numpy as np
@@ -27,12 +28,12 @@ def sway_acceleration(
 ) -> Array:
     """Return the acceleration (n, 3), m/s², in the flange's frame, of a point moved by all joints but `joint`.
 
-    - pose_rad (j,): the joints' angles from which they sway; that of `joint` does not matter.
-    - time_s (n,): in the turn, which begins and ends at `window_s`.
+    - pose_rad (j,): the angles about which the joints sway; that of `joint` does not matter.
+    - time_s (n,): times in the turn, which begins and ends at `window_s`.
     - extension_m (3,): the point in the flange's frame.
 
-    The position's deviation is fitted by waves, whose second derivative is the acceleration. It is zero if encoders
-    show only noise.
+    The point's deviation from its position is fitted by waves, whose second derivative is the acceleration. The
+    acceleration is zero if encoders show only noise.
     """
     margin_s = MARGIN_FRACTION * (window_s[1] - window_s[0])
     start_s, end_s = window_s[0] - margin_s, window_s[1] + margin_s

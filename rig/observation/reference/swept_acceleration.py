@@ -41,9 +41,9 @@ def swept_acceleration(
 ) -> SweptAcceleration:
     """Fit the first harmonic of one sweep's revolution, together with its vibrations.
 
-    In the model only the sweep's joint moves, and the others stand at their mean angles. Their sway about these, by the
-    encoders, changes gravity and accelerates: a further specific force, which the model adds. Raise Fault `saturation`,
-    `stuck_sensor`, `incomplete_revolution` or `not_finite`.
+    In the model only the sweep's joint moves, and the other joints stand at their mean angles. Their sway about these
+    angles, by the encoders, tilts and accelerates the sensor, which adds a further specific force to the model. Raise
+    Fault `saturation`, `stuck_sensor`, `incomplete_revolution` or `not_finite`.
     """
     inside = slice_time(stream, turn.start_s, turn.end_s)
     check_acceleration(stream, inside, describe(sweep), turning=True)
