@@ -1,4 +1,4 @@
-"""Variance inflation of a mean with coloured residuals: similar neighbours average out worse, vibration better."""
+"""Variance inflation of a mean with coloured residuals: like neighbours raise the variance, a vibration lowers it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -35,7 +35,8 @@ def fit_noise_factor(residuals: Array) -> float:
     """Return the factor on a mean's variance from an autoregressive model, below 1 if residuals are mostly vibration.
 
     Over many periods a vibration averages out, regardless of the sum of its correlations. A long mean's variance is the
-    spectrum at zero: with coefficients a and innovations e, var(e) / (1 − Σ a)². Akaike's criterion sets the order.
+    spectrum at zero frequency, which is var(e) / (1 − Σ a)² with the model's coefficients a and innovations e.
+    Akaike's criterion selects the order.
     """
     return fit_autoregression(residuals).factor
 

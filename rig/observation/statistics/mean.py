@@ -92,7 +92,7 @@ def dof_by_axis(dofs: Iterable[Array | float]) -> Array:
 def compute_weighted_means(
     readings: Array, groups: Array, weights: Array, *, smooth: Array, noise: MeanNoise, steps: Steps
 ) -> tuple[Mean, ...]:
-    """Return the weighted means of p groups of readings: one for a whole window, several for its segments.
+    """Return the weighted means of p groups of readings, such as the segments of a window, or one for the whole window.
 
     - readings (n, 3): in any unit, recorded in `steps`.
     - groups (n, p): above zero if a reading belongs to a group.
@@ -151,9 +151,9 @@ def even_mean(readings: Array, steps: Steps) -> Mean:
 def mean_at_rest(readings: Array, time_s: Array, window: Window, steps: Steps) -> tuple[Mean, Window]:
     """Return the mean of readings (n, 3) with resolution `steps`, at times (n,), and the window that it represents.
 
-    If the arm vibrates, weights are tapered (`average_tapered`): 2 mg at 14 Hz leave 10 µg in an unweighted mean of
-    three seconds. The window reaches from half-way up the first flank to half-way down the last: for a random walk of
-    the bias, unweighted means of these windows differ like the tapered means, within a thousandth.
+    If the arm vibrates, weights are tapered (`average_tapered`), because 2 mg at 14 Hz leave 10 µg in an unweighted
+    mean of three seconds. The window then reaches from half-way up the first flank to half-way down the last: a random
+    walk of the bias changes unweighted means over such windows as it changes the tapered means, within a thousandth.
     """
     if vibrates(readings):
         half_s = flank_s(window.end_s - window.start_s) / 2

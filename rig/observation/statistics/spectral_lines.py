@@ -31,9 +31,9 @@ EMPTY: Array = np.zeros(0)
 class LineSearch:
     """The criteria of a spectral line.
 
-    - `stands_out`: its power exceeds this multiple of the median power around it, and of `floor`.
+    - `stands_out`: the line's power exceeds this multiple of the median power around it, and of `floor`.
     - `floor`: the median power of the readings in the same window, if the line is sought in data with less noise.
-    - `slowest`: its least number of cycles in all readings; `sidebands`: its number of sidebands (`waves`).
+    - `slowest`: the least number of cycles in all readings; `sidebands`: the number of a line's sidebands (`waves`).
     - `most`: the largest number of lines, previous ones included.
     """
 
@@ -47,8 +47,9 @@ class LineSearch:
 def find_lines(residuals: Array, search: LineSearch, previous: Array = EMPTY, fraction: Array | None = None) -> Array:
     """Return the numbers of cycles (k,) of the spectral lines in the residuals (n, axes); k may be zero.
 
-    `fraction` (n,): elapsed fraction of the time at each reading, by default even. Lines are at least `MIN_DISTANCE`
-    from each other; a line that merges with another is dropped. `previous` lines are returned unchanged.
+    `fraction` (n,): elapsed fraction of the time at each reading, by default at even intervals. Lines are at least
+    `MIN_DISTANCE` from each other; a line that merges with another is dropped. The `previous` lines, given as numbers
+    of cycles, are returned first, unchanged.
     """
     count, merged, fixed = len(residuals), EMPTY, len(previous)
     cycles = previous
@@ -69,10 +70,11 @@ def find_lines(residuals: Array, search: LineSearch, previous: Array = EMPTY, fr
 
 
 def _are_too_near(cycles: Array, search: LineSearch) -> bool:
-    """Return whether two spectral lines cannot be separated, or the slowest cannot from the turn's own waves.
+    """Return whether two spectral lines cannot be separated, or the slowest line cannot from the turn's own waves.
 
-    A refined line below the search's lowest frequency is valid only if its sidebands are apart from all others'.
-    Otherwise two lines, a vibration and a ripple less than a cycle apart, would explain a part of the mean.
+    A line that is refined to below the search's lowest frequency is valid only if its sidebands do not overlap those of
+    another line. Otherwise two lines, of a vibration and a ripple less than a cycle apart, would explain a part of the
+    mean.
     """
     ordered = np.sort(cycles)
     gaps = np.diff(ordered)
@@ -122,7 +124,8 @@ def unit_columns(columns: Array) -> Array:
 def fit_columns(columns: Array, values: Array) -> Array:
     """Return the least-squares coefficients (k, m) of values (n, m) by columns (n, k), which may be nearly collinear.
 
-    Normal equations take a third of a decomposition's time, and suffice for columns that `TOLERANCE` separates.
+    Normal equations take a third of the time of a singular value decomposition, and are accurate enough, because
+    directions below `TOLERANCE` are left out.
     """
     return np.asarray(np.linalg.lstsq(columns.T @ columns, columns.T @ values, rcond=TOLERANCE**2)[0], dtype=np.float64)
 
@@ -176,9 +179,10 @@ def _find_strongest(residuals: Array, previous: Array, fraction: Array, search: 
 
 
 def _choose_middle(peak: float, residuals: Array, previous: Array, fraction: Array, search: LineSearch) -> float:
-    """Return the line's frequency, in cycles, that explains most if the `peak` is its centre or a sideband.
+    """Return the frequency, in cycles, of the line of which the `peak` is either the centre or a sideband.
 
-    A sensor may sense a vibration of the room only across its axis, in the sidebands and not in the line itself.
+    Of these, the line that explains most is chosen. A rotating sensor may sense a vibration of the room only across the
+    axis of rotation, that is, in the sidebands and not in the line itself.
     """
     whitened = residuals / (residuals.std(axis=0) + np.finfo(np.float64).tiny)
     sidebands = [peak + shift for shift in (-1.0, 1.0) if search.slowest <= peak + shift]
@@ -194,8 +198,8 @@ def _choose_middle(peak: float, residuals: Array, previous: Array, fraction: Arr
 def _refine(cycles: Array, residuals: Array, fixed: int, fraction: Array, sidebands: int) -> Array:
     """Return the frequencies of spectral lines, in cycles, refined from their phase drift.
 
-    The drift is the part of the amplitude that grows in quadrature. The first `fixed` lines, and lines with sidebands
-    only, which have no phase, are unchanged.
+    The phase drift of a line shows in the part of its amplitude that grows in quadrature. The first `fixed` lines, and
+    lines that consist of sidebands only and so have no phase, are unchanged.
     """
     for _ in range(PASSES):
         fitted = fit_columns(waves(cycles, fraction, sidebands), residuals)

@@ -1,7 +1,7 @@
 """Single readings of a gyroscope far from those before and after: bit errors, dropped digits, markers of a logger.
 
 A body needs several readings to turn there and back, so a single deviating reading is not a motion, however large it
-is. A vibration, or a knock that rings, moves its neighbours too, and is kept.
+is. A vibration, or a knock that rings, also moves the neighbouring readings, and is kept.
 
 A reading is compared with the cubic through two readings on either side. A spike of size 1 leaves deviations of 1/6,
 −2/3, 1, −2/3, 1/6, while a step leaves −1/6, 1/2, −1/2, 1/6. Remainders of a motion or a vibration also show in the

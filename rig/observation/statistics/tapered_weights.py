@@ -2,9 +2,9 @@
 
 In a plain mean over the time T, a vibration leaves a remainder: the change of its angle from start to end, divided by
 T. 2 mrad/s at 14 Hz leave 0.7 deg/h RMS in ten seconds, three times the noise of a KVH 1775. Weights with raised-cosine
-flanks of length L (Tukey's window) reduce it by the factor 4 (f L)² − 1: 200 for half a second. White noise averages
-out a little worse. Its variance grows by the factor n Σ w², where Σ w = 1: by 4 % in ten seconds, by 10 % in the
-shortest rests.
+flanks of length L (Tukey's window) reduce the remainder of a vibration of frequency f by the factor 4 (f L)² − 1: 200
+for half a second. White noise averages out a little worse: for weights w of n readings that add up to 1, its variance
+grows by the factor n Σ w², which is 4 % in ten seconds and 10 % in the shortest rests.
 """
 
 from functools import lru_cache
@@ -47,8 +47,9 @@ def weights(time_s: Array, start_s: float, end_s: float) -> Array:
 def noise_at_zero(readings: Array, low: float = LOW_FRACTION) -> Array:
     """Return the variance (3,) per reading for a long mean: the spectrum near zero without its lines.
 
-    The median over low frequencies, which lines do not shift, is divided by the median of χ² with two degrees of
-    freedom. Low frequencies reach up to the fraction `low` of the data rate, in at least `MIN_BINS` bins.
+    The median power over low frequencies, which spectral lines hardly change, is divided by the median of χ² with two
+    degrees of freedom, relative to its mean. Low frequencies reach up to the fraction `low` of the data rate, in at
+    least `MIN_BINS` bins.
     """
     powers = np.abs(np.fft.rfft(apply_window(readings), axis=0)[MAIN_LOBE : _count_low_bins(len(readings), low)]) ** 2
     medians: Array = np.median(powers, axis=0) / np.log(2)
@@ -73,7 +74,8 @@ def _window(count: int) -> Array:
 def dof_at_zero(count: int) -> float:
     """Return the degrees of freedom of `noise_at_zero`, a median of m independent powers, from `count` readings.
 
-    The median's relative variance is 1 / (m ln² 2), and ν is 2 divided by this (JCGM 100, G.4.2).
+    The median's relative variance is 1 / (m ln² 2), and the degrees of freedom are 2 divided by this variance (JCGM
+    100, G.4.2).
     """
     return float(2 * np.log(2) ** 2 * (_count_low_bins(count) - MAIN_LOBE) / NOISE_BINS)
 

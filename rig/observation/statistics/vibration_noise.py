@@ -1,7 +1,7 @@
-"""The noise of readings that vibrate: the residuals of a model of the vibration by spectral lines.
+"""The noise of readings that vibrate, from the residuals of a model of the vibration by spectral lines.
 
-A vibration's scatter is not noise, and one turn has too few low frequencies to show the noise itself. Without the lines
-the noise is usually white, and all residuals determine it; otherwise their correlations do.
+A vibration's scatter is not noise, and one turn has too few low frequencies to show the noise itself. The residuals are
+usually white, so that their scatter determines the noise of a mean; otherwise their correlations do.
 """
 
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ SHORT_ORDERS = (1, 2)  # orders of autoregression that fit coloured noise, but n
 
 
 def average_rest(readings: Array, time_s: Array, window: Window, steps: Steps) -> Mean:
-    """Average readings at rest with weights that cancel a vibration (`average_tapered`), so it is not noise."""
+    """Average readings at rest with tapered weights, which cancel a vibration, and without its part of the noise."""
     residuals = readings - readings.mean(axis=0)
     shaking = _columns(residuals, LineSearch(sidebands=0))
     columns = np.column_stack([np.ones(len(residuals)), shaking])
@@ -55,7 +55,10 @@ def _columns(residuals: Array, search: LineSearch) -> Array:
 
 
 def estimate_noise(residuals: Array, parameters: int, steps: Steps, memories: Sequence[int]) -> MeanNoise:
-    """Return the noise from residuals (n, 3) of a fit of `parameters` columns; `memories`: orders to try."""
+    """Return the noise of readings, from the residuals (n, 3) of a fit of `parameters` columns.
+
+    `memories` are the orders of the autoregressive models to try.
+    """
     scatter = np.maximum(np.sum(residuals**2, axis=0) / (len(residuals) - parameters), steps.variance)
     inflations = [fit_autoregression(axis, memories) for axis in residuals.T]
     return MeanNoise(
