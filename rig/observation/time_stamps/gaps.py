@@ -1,9 +1,9 @@
 """The rotation that a gap between readings can hide: the error of bridging it, from the readings on either side.
 
-A gap of a rate is bridged by the trapezoidal rule. If a body is at rest or turns evenly, a gap hides nothing; if it
-starts or oscillates, a short gap hides much. So gaps of the same length are cut into the readings on either side and
-bridged, and the result is compared with their integral. If the rate changes over the gap by more than on either side,
-the change may lie anywhere in the gap. All functions are pure.
+A gap between rates is bridged by the trapezoidal rule. If the body is at rest or turns evenly, a gap hides nothing; if
+the body starts or oscillates, a short gap hides much. So artificial gaps of the same length are made among the readings
+on either side and bridged, and the result is compared with the integral of those readings. If the rate changes over the
+gap by more than on either side, the change may lie anywhere in the gap. All functions are pure.
 """
 
 import numpy as np

@@ -6,7 +6,7 @@ from rig.estimation.arrays import Array
 
 
 def find_least_around(values: Array, width: int) -> Array:
-    """Return the larger of two minima (n,) for each value: of the values ahead, and of the values behind.
+    """Return, for each value, the minimum of `width` values ahead or of as many behind, whichever is larger (n,).
 
     At the ends, where one of the minima is missing, the other is returned.
     """

@@ -147,7 +147,7 @@ def _is_misleading(time_s: Array, interval_s: float, resolution_s: float) -> boo
 
 
 def _has_late(time_s: Array, single: _PeriodCandidate) -> bool:
-    """Return whether readings were late rather than lost: the step after a late one is short."""
+    """Return whether readings were late rather than lost, that is, whether the step after each of them is short."""
     return bool(np.count_nonzero(np.diff(time_s) < SHORT_STEP * single.interval_s) > MAX_SHORT_RATIO * single.gap_count)
 
 
@@ -204,10 +204,10 @@ def _count_missing(time_s: Array, width: int, quantile: float) -> _PeriodCandida
 
 
 def _lost_regularly(missing: NDArray[np.intp]) -> bool:
-    """Return whether `missing` readings (n − 1,) recur more regularly than by chance: a beat of two clocks, not losses.
+    """Return whether `missing` readings (n − 1,) recur so regularly that they are a beat of two clocks, not losses.
 
-    It occurs if the stamps of a polled port are multiples of a time shorter than the interval. A logger that loses
-    every n-th reading looks alike, but hardly loses as many.
+    Such a beat occurs if the stamps of a polled port are multiples of a time shorter than the interval. The stamps of a
+    logger that loses every n-th reading look the same, but such a logger hardly loses as many.
     """
     missing = np.minimum(missing, 1)  # a gap counts once
     lost = int(missing.sum())
@@ -237,9 +237,9 @@ def _interval_s(time_s: Array, missing: NDArray[np.intp], width: int) -> float:
 def _estimate_unlocated_losses(time_s: Array) -> Sampling:
     """Return the sampling for losses that cannot be located: the stamps are bad, or the losses too many.
 
-    If a fraction p of all readings is lost at random, the variance of the lateness over m readings is p m T². From m to
-    4 m it grows fourfold. The variance of errors that do not accumulate is constant, that of a clock's random walk
-    grows much more.
+    If a fraction p of all readings is lost at random, the variance of the lateness gained over m readings is p m T²,
+    with the interval T, so that from m to 4 m readings it grows fourfold. By this growth losses are recognised: the
+    variance of errors that do not accumulate is constant, and that of a clock's random walk grows much more.
     """
     mean_s = float(time_s[-1] - time_s[0]) / (len(time_s) - 1)
     apart = min(len(time_s) // MIN_SEGMENTS, MAX_SEGMENT)
@@ -269,7 +269,7 @@ def _walk_variance(walk: Array, apart: int) -> float:
 
 
 def _merge_at_longest(missing: NDArray[np.intp], steps_s: Array) -> NDArray[np.intp]:
-    """Return the missing readings (n − 1,) so that a loss counts once: at the longest of the steps that it affects."""
+    """Return the missing readings (n − 1,) with each loss counted once, at the longest of the steps that it affects."""
     merged = np.zeros_like(missing)
     steps = np.flatnonzero(missing)
     if not len(steps):

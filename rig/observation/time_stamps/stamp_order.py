@@ -2,8 +2,9 @@
 
 Loggers write rows that are not readings (NaN, zeros before the first conversion), the same row twice, rows in another
 order, counters that wrap, and readings that waited in a buffer. At the start of a recording, old readings come faster
-than they were taken; after a stall of the link, those taken during the stall do. A stall loses no readings. So a long
-step between two stamps is compared with the number of readings that follow until a reading is on time again.
+than they were taken; after a stall of the link, the readings taken during the stall come faster too. A stall loses no
+readings. To recognise one, a long step between two stamps is compared with the number of readings that follow until a
+reading is on time again.
 
 Each kind is counted, with its first row and time. The remaining readings have the times of
 `rig.observation.time_stamps.sampling`. All functions are pure.
@@ -194,7 +195,7 @@ def _sort(log: _UnorderedLog) -> _UnorderedLog:
 
 
 def _check_rising(log: _UnorderedLog, where: str) -> None:
-    """Raise Refused `time_not_increasing` if the clock of an ordered log was set back."""
+    """Raise Refused `time_not_increasing` if the log could not be sorted, because its clock was set back."""
     backward_steps = np.flatnonzero(np.diff(log.stamps_s) < 0)
     if not len(backward_steps):
         return
@@ -229,7 +230,7 @@ def _drop_stale(log: _UnorderedLog) -> _UnorderedLog:
 def _spread_stalled(log: _UnorderedLog) -> _UnorderedLog:
     """Return the log with the times at which waiting readings were taken during a stall of the link.
 
-    If some of them were lost, it is unknown which, so all are left out.
+    If some of the readings of a stall were lost, it is unknown which, so all of them are left out.
     """
     stamps_s, interval_s = log.stamps_s.copy(), find_typical_interval_s(log.stamps_s)
     steps_s = np.diff(stamps_s)
@@ -259,8 +260,8 @@ def _spread_stalled(log: _UnorderedLog) -> _UnorderedLog:
 def _separate_equal(log: _UnorderedLog) -> _UnorderedLog:
     """Return the log without the second of two readings with equal stamps, unless an adjacent interval is free.
 
-    If an interval is missing before or after the two, one of them is moved there. A log with coarse stamps or arrival
-    times, in which equal stamps are usual, is unchanged.
+    If no reading is in the interval before or after the two, one of them is moved there. A log with coarse stamps or
+    arrival times, in which equal stamps are usual, is unchanged.
     """
     steps_s = np.diff(log.stamps_s)
     equal = np.flatnonzero(steps_s == 0)
@@ -285,5 +286,8 @@ def _separate_equal(log: _UnorderedLog) -> _UnorderedLog:
 
 
 def _estimate_usual_delay_s(late_s: Array, interval_s: float) -> float:
-    """Return the largest usual delay, s, behind the least late following reading; only buffered readings exceed it."""
+    """Return the largest usual delay, s, of a reading against the most punctual of the readings that follow it.
+
+    Only readings that waited in a buffer have longer delays.
+    """
     return DELAY_RATIO * float(np.median(late_s - find_least_ahead(late_s, LONG_WIDTHS[-1]))) + MAX_DELAY * interval_s
