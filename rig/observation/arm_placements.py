@@ -1,4 +1,4 @@
-"""Placements from an arm's dwells, for kinds of sensors that packages add. Pure."""
+"""Placements from an arm's dwells, for the kinds of sensors that installed packages add. Pure."""
 
 from collections.abc import Sequence
 

@@ -58,7 +58,7 @@ def add_attitude(average: Average, motion: ArmMotion) -> Average:
 def estimate_bias_drift(rests: Sequence[Average]) -> Array:
     """Return the variance (3,) of the bias between rests, (rad/s)², in excess of the noise of a rest.
 
-    The variance is zero unless χ² over all axes is significant at 0.999, so noise inflates no steady sensor's variance.
+    The variance is zero unless χ² over all axes is significant at 0.999, so that noise does not count as drift.
     """
     from scipy.special import chdtri
 

@@ -35,9 +35,10 @@ def find_dwelling_companion(run: RunData, name: str, sensors: Iterable[str]) -> 
 
 
 def field_readings(recording: ObservedRun, name: str, thresholds: ObservationThresholds) -> tuple[StaticReading, ...]:
-    """Average a magnetometer's readings in the dwells in which an accelerometer on its clock was read.
+    """Average a magnetometer's readings in the dwells in which an accelerometer with the same clock was read.
 
-    The gyroscope's time base serves both: a delay changes no mean at rest. Raise Fault `lost_samples`, `saturation`.
+    The time base found for the accelerometer's sensor also serves the magnetometer: their delays may differ, but a
+    delay changes no mean at rest. Raise Fault `lost_samples`, `saturation`.
     """
     other = find_companion(recording, name)
     if other is None:

@@ -19,7 +19,7 @@ MIN_AXIS_FRACTION = 0.9  # of a turn's angle about one axis
 
 @dataclass(frozen=True, slots=True)
 class SurveyedTurn:
-    """A turn from rest to rest, as the readings show it: `window`; `axis` ("+x"; "other" without one); `angle_rad`."""
+    """A turn from rest to rest by `angle_rad`; its `axis` is "+x", for example, or "other" if it is oblique."""
 
     window: Window
     axis: str

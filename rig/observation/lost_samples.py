@@ -1,4 +1,4 @@
-"""The error for missing samples, with remedies by the samples' path to the recording."""
+"""The error for missing samples, with remedies that depend on the samples' way from the sensor to the recording."""
 
 from collections.abc import Mapping
 from types import MappingProxyType

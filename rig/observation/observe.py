@@ -45,7 +45,7 @@ MISREADING_FAULTS = {"wrong_axis", "wrong_sign", "wrong_unit"}  # a stuck sensor
 class Observation:
     """One revolution, or one arc of a joint, averaged.
 
-    - sweep: index of the sweep in the plan. joint_name, direction: of the turn; None in external data.
+    - sweep: index of the sweep in the plan; joint_name, direction: of the joint's turn, None in external data.
     - axis ("x", "y", "z"), sign: the sensor axis that is nominally along the turn.
     - axis_flange (3,), speed_rad_s: unit vector, in the flange's frame, and size (nominally 2π/T; Δθ/T for an arc) of
       the arm's mean rate, with the weights of the mean reading.

@@ -55,8 +55,9 @@ class ObservedRun:
     def time_s(self, sensor: str, gyroscope: str | None = None) -> Array:
         """Return the times (n,) of all samples of a sensor on the arm's clock.
 
-        They use the time base of `gyroscope`, by default the sensor's own, or else the first gyroscope's on the same
-        clock. Without any time base, arrival times at the computer relate samples to arm states, to milliseconds.
+        The times are by the time base of `gyroscope`; by default, by the sensor's own time base, or else by that of the
+        first gyroscope on the same clock. Without any time base, arrival times at the computer relate samples to arm
+        states, to within milliseconds.
         """
         bases = {name: observations.time_base for name, observations in self.sensors.items()}
         return times_s(self.run, sensor, bases, gyroscope)
@@ -131,8 +132,8 @@ def observe_runs(runs: Sequence[RunData], corrections: Mapping[int, Array] = NO_
 def _clock_offsets_s(recordings: Sequence[ObservedRun]) -> list[float]:
     """Return the offset of each recording's clock to the first one's; the controller may restart in between.
 
-    A recording begins after the previous one has ended, even if the computer's clock disagrees, because that may have
-    been set. Time in an accelerated laboratory passes faster.
+    A recording begins after the previous one has ended, even if the computer's clock disagrees, because that clock may
+    have been set. In an accelerated laboratory, more time passes than by the computer's clock.
     """
     offsets_s = [0.0] * bool(recordings)
     for last, recording in pairwise(recordings):

@@ -30,9 +30,9 @@ def revolution_on_the_board(
 ) -> tuple[int, int, float]:
     """Return a revolution's start and end on the board's clock, µs, and its speed by the arm's joints, rad/s.
 
-    The sweep began after the state `first`. `samples` (n,) SAMPLE_DTYPE and the turner's `states` (m,) should include
-    the motion to the sweep's start: a slow sweep may not determine the time base. Raise Fault as `estimate_time_base`
-    and `ArmMotion.turn` do.
+    The sweep began after the state `first`. `samples` (n,) of SAMPLE_DTYPE and the turner's `states` (m,) should
+    include the arm's motion to the sweep's start, because a slow sweep alone may not determine the time base. Raise
+    Fault as `estimate_time_base` and `ArmMotion.turn` do.
     """
     names = [f"joint {number}" for number in range(kinematics.joints)]
     motion = ArmMotion(states, kinematics, names, reading_std_rad=reading_std_rad)

@@ -21,7 +21,7 @@ REMEDY = "Check the sensor's supply and its bus wiring, then repeat the run"
 
 
 def check_rests(rests: Sequence[Average], slowest_rad_s: float) -> None:
-    """Raise Fault `stuck_sensor` if rests differ as rotations do; `stuck_axis` if the differing axis has no noise."""
+    """Raise Fault `stuck_sensor` if means at rest differ as in rotations, `stuck_axis` if that axis has no noise."""
     if len(rests) < 2:
         return
     apart = np.ptp([rest.mean_rad_s for rest in rests], axis=0)

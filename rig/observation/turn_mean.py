@@ -4,7 +4,7 @@ In an unweighted mean a vibration leaves a remainder that depends on its phase a
 µrad/s in six seconds, more than the noise of a good gyroscope. A vibration that the encoders measure affects both means
 alike. Any other vibration shows in the readings as spectral lines, which the weights cancel (`mean_weights`).
 
-The readings' residual after lines and rate is the noise, usually white.
+The residuals of the readings, without lines and rate, are the noise, which is usually white.
 """
 
 from dataclasses import dataclass, replace
@@ -43,13 +43,13 @@ ENCODER_SEARCH = LineSearch(slowest=2.5, sidebands=0, most=5)
 class SampledTurn:
     """A turn or an arc at a sensor's n samples.
 
-    - `fraction` (n,): elapsed fraction of its time.
+    - `fraction` (n,): elapsed fraction of the turn's time.
     - `rates_rad_s` (n, 3): the flange's mean rate around each sample, from the encoders.
     - `uneven_rad_s` (n,): that rate along the axis minus the turn's mean rate, which the angles at its ends determine.
-    - `regressors` (n, k): columns of the turn's harmonics; for an arc minus their means.
+    - `regressors` (n, k): columns of the turn's harmonics; for an arc, their means are subtracted.
     - `sidebands`: number of sidebands of spectral lines, see `Revolution`.
     - `encoders_true`: whether the encoders are right within a turn, not only over whole turns.
-    - `closed`: whether it consists of whole turns.
+    - `closed`: whether the turn is a whole number of turns, not an arc.
     - `complete`: whether samples follow each other closely, and no long gap is among them.
     """
 
@@ -67,10 +67,10 @@ class SampledTurn:
 class Lines:
     """Spectral lines, by their `cycles` (k,) in the turn; the encoders do not measure the last `not_encoded` of them.
 
-    - `encoded` (n, m): columns to remove: a slow ripple that the encoders measure, its changes, and the remainder of
-      their rate, mostly noise.
-    - `rate` (n, 0 to 2): further columns to remove. If few samples or a gap do not sample a ripple evenly, the rate
-      itself; otherwise the changes of the slow ripple in a whole turn, which a lagging sensor reads too.
+    - `encoded` (n, m): columns to remove from the residuals: a slow ripple that the encoders measure, its changes, and
+      the remainder of the encoders' rate, mostly noise.
+    - `rate` (n, 0 to 2): columns that the weights cancel too. They are the rate itself if few samples or a gap do not
+      sample a ripple evenly; otherwise the changes of the slow ripple in a whole turn, which a lagging sensor reads.
     """
 
     cycles: Array
@@ -80,7 +80,7 @@ class Lines:
 
 
 def turn_mean(readings: Array, steps: Steps, turn: SampledTurn) -> tuple[Mean, Array]:
-    """Return the mean of readings (n, 3) with resolution `steps`, and the weights (n,), also of the arm's mean rate."""
+    """Return the mean of readings (n, 3) with resolution `steps`, and the weights (n,) for it and the arm's mean rate."""
     ones = whole(readings)
     steady = np.column_stack([ones, turn.regressors])
     lines = _find_turn_lines(readings, steady, turn)
@@ -111,9 +111,10 @@ def _gain(weights: Array) -> float:
 def _slow_line_variance(readings: Array, turn: SampledTurn, slow: Array, change: Array, explained: Array) -> Array:
     """Return the variance (3,) of the mean due to slow spectral lines, with columns `slow` (n, k).
 
-    The readings determine these lines poorly. Weights that do not remove them give another mean; the used weights minus
-    those are `change` (n,). The variance is the larger of two: the square of the means' difference, and its variance
-    for the lines' fitted amplitudes at random phases. `explained` (n, m): columns of everything else.
+    The readings determine these lines poorly. `change` (n,) are weights that cancel the lines minus weights that do
+    not, so `change` gives the difference between two means. The variance is the square of this difference, or its
+    variance for the lines' fitted amplitudes at random phases if that is larger. `explained` (n, m) are the columns of
+    everything else.
     """
     without_ripple = fit_residuals(np.column_stack([whole(readings), turn.uneven_rad_s]), readings)
     residuals = fit_residuals(explained, readings)
@@ -123,7 +124,7 @@ def _slow_line_variance(readings: Array, turn: SampledTurn, slow: Array, change:
 def _line_variance(slow: Array, weights: Array, residuals: Array) -> Array:
     """Return the variance (3,) of a mean with weights (n,) due to slow columns (n, k) fitted to residuals (n, 3).
 
-    Only their amplitude is used, because with some phases even a large line hardly changes the mean.
+    Only the lines' amplitude is used, because with some phases even a large line hardly changes the mean.
     """
     powers = (fit_columns(slow, residuals) ** 2).reshape(-1, 2, 3).sum(axis=1)
     kept = ((weights @ slow) ** 2).reshape(-1, 2).sum(axis=1)
@@ -132,9 +133,10 @@ def _line_variance(slow: Array, weights: Array, residuals: Array) -> Array:
 
 
 def _find_turn_lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines:
-    """Find the vibrations in readings (n, 3), beyond the steady columns (n, k) and the rates that encoders measure.
+    """Find the vibrations in readings (n, 3) that the `steady` columns (n, k) do not explain.
 
-    Fast spectral lines of the arm's rate appear in the readings at their frequency. The residuals show the others.
+    The encoders' rate is searched for spectral lines first, because its fast lines appear in the readings at the same
+    frequency. The readings' residuals without these show the other lines.
     """
     uneven = turn.uneven_rad_s[:, None]
     none = uneven[:, :0]
@@ -183,7 +185,8 @@ def _changes(slow: Array) -> Array:
 def _find_slow_ripple(rate: Array, fraction: Array) -> Array:
     """Return the part (n, 1) of a rate (n, 1) with less than `SLOW_CYCLES` per turn, or no column if it is noise.
 
-    `fraction` (n,) is elapsed time. The encoders' noise is white in the angle, the sum of the rate.
+    `fraction` (n,) is the elapsed fraction of the time. The angle, the sum of the rate, is tested, because the
+    encoders' noise is white in it.
     """
     powers = np.abs(np.fft.rfft(apply_window(np.cumsum(rate, axis=0))[:, 0])) ** 2
     slow_bins = int(SLOW_CYCLES) + MAIN_LOBE
@@ -192,9 +195,9 @@ def _find_slow_ripple(rate: Array, fraction: Array) -> Array:
 
 
 def _fit_slow_part(rate: Array, fraction: Array) -> Array:
-    """Return the part of a rate (n, 1) with less than `SLOW_CYCLES` cycles per turn, by waves of half a turn.
+    """Return the part of a rate (n, 1) with less than `SLOW_CYCLES` cycles per turn.
 
-    A vibration is not periodic in the turn.
+    The part is fitted by harmonics of two turns, because a vibration is not periodic in the turn.
     """
     halves = harmonics(np.pi * fraction, int(2 * SLOW_CYCLES))
     slow: Array = halves @ fit_columns(halves, rate)
