@@ -96,8 +96,8 @@ def changes(segments: Segments, axis_rates: Array) -> dict[str, Array]:
 def differences(segments: Segments, axis_rates: Array, whole: Array | None) -> dict[str, Array | None]:
     """Return the effects (3, N, k) of a difference between directions, sweeps or rests, by the name of the check.
 
-    The check `residuals` has the columns `whole` (3, N, k), which give each sweep its own mean. If `whole` is None, it
-    uses all residuals, including the scatter within sweeps.
+    The check `residuals` has the columns `whole` (3, N, k), which give each sweep its own mean. If `whole` is None, the
+    check uses all residuals, including the scatter within sweeps.
     """
     columns_by_name: dict[str, Array | None] = {
         "cw_against_ccw": split_per_axis(np.abs(axis_rates)),

@@ -110,11 +110,11 @@ def contradictions(
 
 
 def _non_orthogonality_deg(solution: VectorSolution, stated_deg: float, false_alarm_probability: float) -> Statistic:
-    """Return the largest non-orthogonality relative to the stated one, and its limit, in degrees.
+    """Return the non-orthogonality that most exceeds the stated one, and its limit, both in degrees.
 
-    `stated_deg` is a half-width. The limit includes the angle's uncertainty at this false-alarm probability. Sweeps
-    about three axes cannot separate a wrist's zero error from a tilted sensor axis: no residual shows the error, and
-    scale factors of an askew sensor are wrong.
+    `stated_deg` is a half-width. The limit includes the angle's uncertainty at this false-alarm probability. This check
+    is needed because sweeps about three axes cannot separate a wrist's zero error from a tilted sensor axis: no
+    residual shows the zero error, and the scale factors of an askew sensor are wrong.
     """
     from scipy.special import ndtri
 
@@ -135,8 +135,8 @@ def check_references(
 ) -> ConsistencyChecks:
     """Return the checks for contradictions within the readings of each accelerometer and magnetometer.
 
-    Dwells and sweeps are named as for gyroscopes: `gyro.acceleration_disturbed_dwell.13`. If `drifting`, the bias may
-    drift.
+    A check of a disturbed dwell or sweep is named like `gyro.acceleration_disturbed_dwell.13`, as for gyroscopes. If
+    `drifting`, the bias may drift.
     """
     from rig.analysis.consistency.reference_contradictions import (
         ReferenceReadings,
@@ -174,7 +174,7 @@ def _false_alarm_probability(run: RunData, sensors: Sequence[str], settings: Run
 
 
 def contradicting_sweeps(runs: Sequence[RunData]) -> frozenset[int]:
-    """Return the sweeps of an unfinished run that, judged as in the verdict, contradict the others for any sensor.
+    """Return the sweeps of an unfinished run that contradict the other sweeps for any sensor, judged as in the verdict.
 
     A sensor without a solution so far contributes no sweep.
     """

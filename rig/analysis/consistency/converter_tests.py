@@ -1,8 +1,9 @@
 """Tests of readings as the output of a converter with a noisy input: their bits, range and repetitions. Pure.
 
-If the noise exceeds one step, every low bit is set in half of the readings, and there is no gap, no pile-up at an end
-of the range, no run of equal readings and no repeated sequence. With less noise nothing can be said. A step is the
-resolution of the source: one count of a converter, one unit of an integer message, the last digit of a printed line.
+If the noise exceeds one step, a healthy converter sets every low bit in half of its readings, and there is no gap, no
+pile-up at an end of the range, no run of equal readings and no repeated sequence. With less noise there may be. A step
+is the resolution of the source: one count of a converter, one unit of an integer message, the last digit of a printed
+number.
 """
 
 from collections.abc import Sequence
@@ -81,8 +82,9 @@ def judge_readings(
 ) -> Statistics:
     """Return statistic and limit by the check's name, from all readings (n, 3) and the windows of each recording.
 
-    Each statistic has at most the given false-alarm probability. The noise is the median of all windows, so it is not
-    zero if an axis is stuck in some. `frozen`: the longest run of equal readings of an axis during motion.
+    Each statistic has at most the given false-alarm probability. The noise is the median over the windows at rest, so
+    that it is not zero if an axis is stuck in some of them. `frozen`: the longest run of equal readings of an axis
+    during motion.
     """
     from scipy.special import ndtri
 
@@ -118,7 +120,7 @@ def judge_readings(
 
 
 def _count_constant_bits(counts: NDArray[np.int64]) -> int:
-    """Count the bits of all axes that never change, although the readings' range contains numbers with either value."""
+    """Count the bits of all axes that never change, although the range of the readings is wide enough for a change."""
     constant = 0
     for axis in counts.T:
         if len(np.unique(axis)) < MIN_DISTINCT_VALUES:
@@ -129,7 +131,10 @@ def _count_constant_bits(counts: NDArray[np.int64]) -> int:
 
 
 def _count_uneven_bits(windows: Sequence[RawReadings], noise: Array, critical_value: float) -> int:
-    """Count the bits of all axes, well below the noise, that are not set in half of the readings."""
+    """Count the bits of all axes that are well below the noise, but not set in half of the readings.
+
+    The lowest bits of a large number in single precision are rounded, so they are not tested.
+    """
     uneven = 0
     counts = np.concatenate([window.counts for window in windows])
     for axis in range(3):
@@ -143,7 +148,7 @@ def _count_uneven_bits(windows: Sequence[RawReadings], noise: Array, critical_va
 
 
 def _find_spikes(windows: Sequence[RawReadings], step_counts: Array) -> tuple[float, int]:
-    """Return the largest deviation relative to noise, and the number of axes whose spikes all equal one power of two.
+    """Return the largest deviation relative to noise, and the number of axes whose spikes are mostly one power of two.
 
     Such spikes come from a faulty bit. The noise includes vibration and is at least half a step. The first readings are
     omitted, because the filter of a quiet sensor has not settled.
@@ -184,7 +189,7 @@ def _find_scatter_around(deviations: Array) -> Array:
 
 
 def _is_one_bit(powers: Array) -> bool:
-    """Return whether most spikes equal the same power of two; `powers` contains −1 for spikes of other sizes."""
+    """Return whether most spikes have the same size 2ᵖ; `powers` (n,) are p, or −1 for spikes of other sizes."""
     if len(powers) < MIN_SPIKES:
         return False
     which, often = np.unique(powers, return_counts=True)
@@ -193,7 +198,7 @@ def _is_one_bit(powers: Array) -> bool:
 
 
 def _skewness(windows: Sequence[RawReadings], axes: NDArray[np.bool_], critical_value: float) -> tuple[float, float]:
-    """Return the largest skewness of the noise (3,) at rest, which bit errors cause, and its limit.
+    """Return the largest skewness of the noise of any axis at rest, which bit errors cause, and its limit.
 
     Readings in motion are not used, because the arm's vibration may be skewed.
     """

@@ -22,9 +22,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class DetectionLimit:
-    """The `size` of a fault, in `unit`, that its check detects in 95 of 100 recordings, or infinity.
+    """The `size` of a fault, in `unit`, that its check detects in 95 of 100 recordings; infinity if none is.
 
-    `off_by_expanded`: the largest error of scale factor or bias by a fault just below `size`, in units of the stated U.
+    `off_by_expanded`: the largest error of scale factor or bias that a fault just below `size` causes, divided by the
+    stated U.
     """
 
     what: str

@@ -1,13 +1,14 @@
 """The checks of a gyroscope's recording against itself: segments of sweeps and rests against one model.
 
-One calibration must explain all segments: m = F ω + c + G a + d t, the vector model with gravity and a steady bias
-drift, within noise, bias random walk and the known errors of arm and sensor. Each check tests the columns of one fault,
-whose χ² without the fault has as many degrees of freedom as columns. The bias process is estimated from residuals
-within sweeps and between rests, so that a disturbed sweep does not mask itself.
+One calibration must explain all segments within noise, bias random walk and the known errors of arm and sensor: m =
+F ω + c + G a + d t, the vector model with gravity a and a steady bias drift d. Each check tests the columns of one
+fault, whose χ² without the fault has as many degrees of freedom as there are columns. The bias process is estimated
+from residuals within sweeps and between rests, so that a disturbed sweep does not mask itself.
 
 A ripple faster than readings and states affects the transfers' mean readings but no rates, and looks like noise unless
 it is synchronous with the samples. So the unexplained variance of transfers is inflated by their Birge ratio, after a
-fit of all changes from quarter to quarter. A transfer that remains an outlier tells nothing about the others.
+fit of all changes from quarter to quarter. A transfer that still is an outlier gets a mean of its own, so that it does
+not affect the tests.
 """
 
 from collections.abc import Iterator, Sequence
@@ -70,9 +71,9 @@ MAX_RIPPLE_INFLATION, INFLATION_STEPS = 16.0, 7  # of the variance by a synchron
 
 @dataclass(frozen=True, slots=True)
 class ErrorPatterns:
-    """The known errors of segments, one pattern of one standard deviation each: `patterns_rad_s` (P, N, 3).
+    """The known errors of N segments, each as the pattern that one standard deviation of it adds to the readings.
 
-    - `encoders_rad_s` (E, N, 3): the patterns among `patterns_rad_s` that the encoders cause in arcs.
+    - `patterns_rad_s` (P, N, 3): all patterns; `encoders_rad_s` (E, N, 3): those among them due to encoders in arcs.
     - `transfers`: N segments and M − N transfers; `transfer_patterns_rad_s` (Q, M, 3): the error patterns of all M.
     - `instability_rad_s`: the sensor's bias instability.
     """
@@ -103,8 +104,8 @@ def check_gyroscope(
 ) -> TestResults:
     """Test the model of a gyroscope against each alternative, find outlier sweeps, and compute detection limits.
 
-    Faults that persist (`changes`) are tested with the transfers between segments, `differences` without. Each test has
-    the given false-alarm probability; `matrix` (3, 3) is F.
+    Faults that persist (`changes`) are tested on the segments and the transfers between them, `differences` on the
+    segments alone. Each test has the given false-alarm probability; `matrix` (3, 3) is F.
     """
     segments = _steady_rates(segments, matrix)
     allowance = replace(allowance, transfers=_steady_rates(allowance.transfers, matrix))
@@ -148,7 +149,8 @@ def check_gyroscope(
 def _steady_rates(segments: Segments, matrix: Array) -> Segments:
     """Return the segments with the mean rate of each sweep, and with the deviations from it removed from the readings.
 
-    Otherwise noisy columns would explain the encoder noise, which rates and residuals share.
+    The tested columns contain the rates. With the rates of single segments, they would contain encoder noise, which the
+    residuals have too, and would explain it.
     """
     rates = segments.rates_rad_s.copy()
     for sweep in np.unique(segments.sweep[segments.sweep > REST]):
@@ -178,7 +180,7 @@ def _free_disturbed_transfers(
 ) -> tuple[_TestedSegments, Statistic | None]:
     """Return the result of `_inflate_transfers` with a separate mean for each outlying transfer, and the axis test.
 
-    The axis test is for a scale factor of one axis that changes. A ripple at the data rate shifts the mean of one
+    The axis test is that of a change of one axis's scale factor. A ripple at the data rate shifts the mean of one
     transfer. A change of scale factors or of the mounting shifts all later transfers, so a transfer is an outlier only
     if its own mean explains clearly more of the residuals than any such change.
     """
@@ -203,9 +205,10 @@ def _free_disturbed_transfers(
 def _inflate_transfers(
     segments_only: _TestedSegments, matrix: Array, allowance: ErrorPatterns, bias: BiasProcess, disturbed: Sequence[int]
 ) -> _TestedSegments:
-    """Whiten like `_whiten_with_transfers`, with the transfers' variance inflated until their χ² equals their number.
+    """Whiten like `_whiten_with_transfers`, with the transfers' variance inflated until their χ² is at most its dof.
 
-    Their χ² is the difference of χ² with and without them. The factor is at most `MAX_RIPPLE_INFLATION`.
+    The transfers' χ² and dof are the differences of those with and without transfers. The factor on their unexplained
+    variance is at most `MAX_RIPPLE_INFLATION`.
     """
     transfers, (segments_chi_square, segments_dof) = allowance.transfers, _residual_chi_square(segments_only)
     with_transfers = _whiten_with_transfers(matrix, allowance, bias, disturbed)
@@ -223,7 +226,8 @@ def _inflate_transfers(
 def _residual_chi_square(tested: _TestedSegments) -> tuple[float, int]:
     """Return the residuals' χ² after a fit of the model and of all tested changes, and its degrees of freedom.
 
-    If transfers are absent, some changes differ from the model's effects only by the rates' noise. These are dropped.
+    If transfers are absent, some changes differ from the model's effects only by the rates' noise; such changes are
+    dropped.
     """
     changed = [*changes(tested.segments, tested.axis_rates).values(), quarter_columns(tested.means)]
     columns = [apply_whitener(tested.model.whitener, change) for change in changed]
@@ -294,9 +298,9 @@ def _test_bias_jump(
 ) -> Statistic | None:
     """Return the χ² of the largest bias jump between two rests, beyond drift; None with fewer than three rests.
 
-    The drift is re-estimated with the best jump in the model; otherwise it would contain the jump. Few rests determine
-    the drift poorly. So the critical value is from F with one degree of freedom per possible jump; simulated random
-    walks exceed it about as often.
+    The drift is re-estimated with the best jump in the model, because it would contain the jump otherwise. Few rests
+    determine the drift poorly, so the critical value is from F with one degree of freedom per possible jump. Simulated
+    random walks exceed this value about as often as the false-alarm probability states.
     """
     steady_columns, steps = _steady_columns(segments), step_columns(segments)
     if len(steps) < 2:

@@ -19,9 +19,10 @@ def compare_dwell_halves(
     """Return the largest difference between a dwell's halves, as χ² of three axes, and its limit; skip short dwells.
 
     The limit is a quantile of the F distribution, because the noise is estimated from the dwells' readings. Flicker
-    with the Allan deviation `flicker_counts` makes the halves differ by √2 times as much. A slow oscillation that no
-    encoder measures affects every dwell, a knock only one. So the other dwells' differences are added to the variance,
-    with degrees of freedom by Welch–Satterthwaite. `steps`: the steps of the counts.
+    with the Allan deviation `flicker_counts` makes the halves differ by √2 times this deviation. A slow oscillation
+    that no encoder measures affects every dwell, a knock only one dwell, so the mean square of the other dwells'
+    differences is added to the variance, with degrees of freedom by Welch–Satterthwaite. `steps`: the steps of the
+    counts.
     """
     from scipy.special import fdtri
 

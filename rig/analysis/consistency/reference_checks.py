@@ -1,8 +1,8 @@
 """The checks of readings in a constant reference against themselves: dwells and sweeps against one model.
 
 The calibration (`rig.estimation.reference.accelerometer_model`) must explain the readings within their noise, the arm's
-attitude error δ and stated errors. A magnetometer has dwells only. Every alternative is a likelihood-ratio test, in
-which δ is re-estimated, so that a fault does not mask itself.
+attitude error δ and stated errors. A magnetometer has dwells only. Every alternative is tested by a likelihood ratio,
+in which δ is re-estimated, so that a fault does not mask itself.
 """
 
 from collections.abc import Sequence
@@ -38,7 +38,7 @@ from rig.estimation.reference.shared_errors import decorrelate, information
 class WhitenedReference:
     """Residuals (n,) and model columns (n, q) with unit noise, in coordinates in which all errors are independent.
 
-    `growth` (n,) is the increase of their variance with δ²: see `rig.estimation.reference.shared_errors`.
+    `growth` (n,) is the increase of the residuals' variance with δ²: see `rig.estimation.reference.shared_errors`.
     """
 
     residuals: Array
@@ -62,9 +62,10 @@ class WhitenedReference:
     ) -> Statistic | None:
         """Return the likelihood-ratio statistic of the columns, and the critical value.
 
-        The statistic is twice the logarithm of the ratio, χ² if δ is given. Both likelihoods have their own restricted
-        maximum-likelihood δ (Welham and Thompson, J. R. Stat. Soc. B 59 (1997) 701). If δ is estimated, the limit
-        approaches the quantile of F with δ's part of the variance. Columns None stand for the χ² of all residuals.
+        The statistic is twice the logarithm of the ratio, which would be χ² for a given δ. The likelihoods with and
+        without the columns each have their own restricted maximum-likelihood δ (Welham and Thompson, J. R. Stat. Soc. B
+        59 (1997) 701). The larger δ's part of the variance, the closer is the critical value to a quantile of F instead
+        of χ². Columns None stand for the χ² of all residuals.
         """
         from scipy.special import chdtri
 
@@ -83,7 +84,10 @@ class WhitenedReference:
     def minimal_detectable_size(
         self, fault_patterns: Array, alternatives: Sequence[Array], false_alarm_probability: float
     ) -> float:
-        """Return the minimal detectable size of a fault, `fault_patterns` (n, k) per unit, tested by `alternatives`."""
+        """Return the minimal detectable size of a fault that adds `fault_patterns` (n, k) per unit to the readings.
+
+        `alternatives` are the columns of the tests that may detect the fault.
+        """
         model = self._extend_model(())
         delta_rad = self._estimate_delta(model)
         size = np.sqrt(1 + delta_rad**2 * self.growth)[:, None]

@@ -39,7 +39,10 @@ DISTURBED_DWELL = "disturbed_dwell"
 
 @dataclass(frozen=True, slots=True)
 class SegmentName:
-    """A sweep or dwell that contradicts the others, by its index in the plan; if all agree, the worst, unnumbered."""
+    """A sweep or dwell that contradicts the others, by its index in the plan.
+
+    If all agree, the name stands for the worst of them, and both indices are None.
+    """
 
     what: str
     sweep: int | None = None
@@ -73,8 +76,8 @@ class ReferenceReadings:
 class ReferenceStatistics:
     """The statistics of a sensor with their critical values, and the detection limits by fault mode.
 
-    `segments`: the dwells and sweeps that contradict the others, or the worst one; `statistics`: of all segments
-    together, by the check's name.
+    `segments`: the dwells and sweeps that contradict the others, or the worst one if all agree; `statistics`: the other
+    statistics, by the check's name.
     """
 
     segments: list[tuple[SegmentName, Statistic]]

@@ -1,8 +1,8 @@
 """Tests of residuals against alternative hypotheses: the common form of all checks of consistency.
 
-An alternative is a set of columns: the effect of one possible fault on the readings. The part of the residuals that the
-columns explain is χ² without the fault, with as many degrees of freedom as columns that the model does not span
-(Teunissen, Testing Theory, 2000).
+An alternative is a matrix of columns, the effects of one possible fault on the readings. The sum of squares of the
+residuals that the columns explain is distributed as χ² if there is no such fault, with as many degrees of freedom as
+there are columns outside the span of the model (Teunissen, Testing Theory, 2000).
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -29,7 +29,7 @@ class FaultMode(Generic[Subject]):
     """A possible fault, the `check` that detects it, and the `unit` of its size: None for the readings' unit.
 
     `patterns` returns the changes of the readings by one unit of the fault, a column for each form that it may have. A
-    change half-way through the recording has zero mean, because the calibration absorbs any mean.
+    change half-way through the recording is given a zero mean, because the calibration would absorb any mean.
     """
 
     what: str
@@ -43,7 +43,7 @@ class TestResults:
     """The statistics of one sensor by the name of their check, each with its critical value.
 
     - `worst`: the statistic of the segment that differs most from the others; `disturbed`: the statistics of all
-      outliers, by index.
+      outlying segments, by index.
     - `detection_limits`: the minimal detectable size of fault modes, by name, if known.
     """
 
@@ -79,9 +79,10 @@ def test_alternatives(
 def find_outliers(
     model: WhitenedModel, segments: Iterable[int], columns: Callable[[int], Array], false_alarm_probability: float
 ) -> list[tuple[int, Statistic]]:
-    """Return the outlier segments, removed one by one until the others agree or half are removed.
+    """Return the outlying segments with their statistics, or the worst segment alone if all segments agree.
 
-    If only two segments determine a parameter, either may be the outlier, and both are returned.
+    Outliers are removed one by one until the remaining segments agree or half of all are removed. If only two segments
+    determine a parameter, either may be the outlier, so both are returned.
     """
     remaining, nuisance = list(segments), list[Array]()
     outliers = list[tuple[int, Statistic]]()
@@ -134,10 +135,10 @@ def chi_square_of(readings: Array, base: Array, columns: Array | None) -> tuple[
 def minimal_detectable_size(model_basis: Array, patterns: Array, alternatives: Iterable[Alternative]) -> float:
     """Return the smallest fault that at least one test detects in 95 of 100 recordings; inf if none does.
 
-    Minimal detectable bias (Baarda 1968): under the fault a test's statistic is non-central χ². All arguments are
-    whitened. `model_basis` (n, p): orthonormal columns of the model. `patterns` (n, k): readings per unit fault, one
-    column for each form in which it may occur; the worst one is decisive. `alternatives`: the columns of each test, and
-    its critical value as a function of their number.
+    This is Baarda's minimal detectable bias (1968): under the fault a test's statistic is non-central χ². All arguments
+    are whitened. `model_basis` (n, p): orthonormal columns of the model. `patterns` (n, k): readings per unit fault,
+    one column for each form that the fault may have; the form that is detected worst decides. `alternatives`: the
+    columns of each test, and the test's critical value as a function of their number.
     """
     from scipy.special import chndtrinc
 

@@ -54,7 +54,7 @@ def build_reading_patterns(segments: Segments, noise_rad: float) -> Array:
 
 
 def _edges(segments: Segments, sweep: int) -> Iterator[NDArray[np.float64]]:
-    """Yield (N,) for each edge of a sweep's segments: 1 for the segment that ends there, −1 for the one that begins."""
+    """Yield an array (N,) for each edge of a sweep's segments: 1 for the segment that ends there, −1 for the next."""
     inside = segments.sweep == sweep
     times_s = np.sort(segments.times_s[inside].ravel())
     for time_s in times_s[np.append(True, np.diff(times_s) > TIME_TOLERANCE_S)]:

@@ -226,7 +226,7 @@ def _angle_patterns(segments: Segments, known_errors: KnownErrors) -> Array:
 def _encoder_patterns(segments: Segments, encoder_rad: float) -> Array:
     """Return the patterns of encoder errors at each angle where arcs begin or end.
 
-    Angles closer than a quarter of an arc are one encoder mark, because a sweep back passes the same marks.
+    Angles closer than a quarter of an arc have one error in common, because a sweep back passes the same encoder marks.
     """
     marks: list[tuple[int, float]] = []
     patterns_by_mark: list[Array] = []
@@ -248,7 +248,7 @@ def _encoder_patterns(segments: Segments, encoder_rad: float) -> Array:
 
 
 def _sweeps_between_moves(segments: Segments, joint: int) -> list[list[int]]:
-    """Return lists of the sweeps and transfers between moves of a joint; a transfer that moves it begins a list.
+    """Return lists of the sweeps and transfers between moves of a joint; a transfer that moves the joint begins a list.
 
     `joint` counts from the end of the chain, from −1. If a transfer is missing, a changed angle or another recording
     shows that the joint moved.

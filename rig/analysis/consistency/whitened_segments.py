@@ -122,8 +122,9 @@ def build_whitener(segments: Segments, scatter: Scatter, bias: BiasProcess) -> A
     """Return the whitener W (3 N, 3 N), which makes the means' errors independent with variance 1.
 
     Noise and bias drift of each axis are whitened first, then the shared errors. Shared errors may be 10⁵ times the
-    noise (a free nonlinearity), so one decomposition of both would lose the noise to rounding. No variance of the first
-    part is below the smallest noise: after a clock was set back, windows overlap, and the matrix is no covariance.
+    noise (a free nonlinearity), so one decomposition of both would lose the noise to rounding. In the first part, no
+    variance may be below the smallest noise: if a clock was set back, windows overlap, and the drift's matrix is no
+    covariance.
     """
     count, bias_covariance = len(segments.sweep), bias.covariance(segments.times_s)
     noise_whitener, least = np.zeros((3, count, 3, count)), segments.variances_rad2_s2.min()
