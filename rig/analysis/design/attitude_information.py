@@ -28,9 +28,9 @@ MAX_CONDITION = 100.0  # the worst of a thousand random sets of ten has 19; beyo
 
 @dataclass(frozen=True, slots=True)
 class AttitudeAccount:
-    """The identifiability of a model of this `order` in `count` attitudes, and each sensor's expected uncertainty.
+    """The identifiability of a model of chosen `order` in `count` attitudes, and each sensor's expected uncertainty.
 
-    `first` and `second` are the identifiability of the two models; the efficiency belongs to the chosen model.
+    `first` and `second` are the identifiability of the models of both orders; `g_efficiency` is that of the chosen one.
     """
 
     count: int

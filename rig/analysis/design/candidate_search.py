@@ -95,7 +95,7 @@ class Candidate:
     rests_s: tuple[float, ...] = ()
 
     def is_contained_in(self, other: "Candidate") -> bool:
-        """Return whether another candidate contains this one, whose U is then no smaller than the other's."""
+        """Return whether another candidate contains this one, so that this one's U is at least the other's."""
         return (self.family, self.rests_s) == (other.family, other.rests_s) and all(
             size <= other_size for size, other_size in zip(self.sizes, other.sizes, strict=True)
         )
@@ -160,8 +160,8 @@ def find_shortest(
 ) -> SearchResult:
     """Return the shortest candidate whose predicted U meets the target.
 
-    If a candidate meets the target, longer ones are not tried; if it fails, those that it contains are not. `predict`
-    returns None for a candidate that cannot be run.
+    If a candidate meets the target, longer candidates are not tried; if it does not, the candidates that it contains
+    are not tried. `predict` returns None for a candidate that cannot be run.
     """
     remaining = sorted(
         (candidate for candidate in candidates if candidate.duration_s <= target.at_most_s),

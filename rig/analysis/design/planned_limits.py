@@ -34,8 +34,8 @@ class DetectionLimits:
 def predict_limits(config: RigConfig, plan: Plan, turner: DenavitHartenberg) -> DetectionLimits:
     """Predict the detection limits of the gyroscopes to calibrate and, on an arm, of the accelerometers.
 
-    The `turner` is nominal, the noise that of the data sheet, and flicker the only bias drift. Only one set of sweeps
-    of a plan over temperature is used.
+    The `turner` is nominal, the noise is that of the data sheet, and flicker is the only bias drift. Of a plan over
+    temperature, only the sweeps before the wait for its second temperature are used.
     """
     if turner.joints == 0:
         return DetectionLimits({}, {})

@@ -31,7 +31,7 @@ StepT_co = TypeVar("StepT_co", bound=Step, covariant=True)
 class PlannedRun:
     """A planned recording of a chain of joints (`arm`), and the stated errors.
 
-    Its clock begins `clock_offset_s` after that of the run's first recording.
+    The recording's clock begins `clock_offset_s` after that of the run's first recording.
     """
 
     plan: Plan

@@ -97,7 +97,7 @@ def _segment(timed_step: Timed[Dwell] | Timed[Sweep]) -> ReferenceWindow:
 
 
 def _predict_sweep(timed_step: Timed[Sweep], arm: DenavitHartenberg, walk_m_s_sqrt_s: float) -> SweptAcceleration:
-    """Return a sweep's first harmonic without signal, with the covariance of a velocity random walk, m/s/√s."""
+    """Return a sweep's first harmonic without signal, but with the covariance due to a velocity random walk, m/s/√s."""
     turn = predict_revolution(timed_step, arm, np.eye(3))
     waves = np.diag(np.repeat([1.0, 2.0, 2.0], 3))  # weights of the mean, the cosine and the sine over a revolution
     harmonic = FirstHarmonic(
