@@ -38,11 +38,12 @@ def noise_dof(solution: TriaxialSolution, equations: Equations) -> float:
 
 
 def budget_by_causes(matrix: Array, causes: Mapping[str, Array], noise_dof: float | None = None) -> Budget:
-    """Return the budget by the contribution of each cause to a reference model's covariance (p, p), F (3, 3) first.
+    """Return the budget of scale and bias, with a contributor for each of `causes`.
 
-    All degrees of freedom are infinite, except those of the noise if `noise_dof` is given. The u of a solution that
-    integrates over the likelihood of its variance components, or inflates by Student's t, includes the components'
-    uncertainty (JCGM 101, 6.4.9).
+    The causes are parts (p, p) of the covariance of a reference model's parameters, of which the `matrix` F (3, 3), row
+    by row, is the first. All degrees of freedom are infinite, except those of the noise if `noise_dof` is given: the
+    standard uncertainty of a solution that integrates over the likelihood of its variance components, or inflates by
+    Student's t, already includes the components' uncertainty (JCGM 101, 6.4.9).
     """
     scale = scale_of(matrix)
     lines = []

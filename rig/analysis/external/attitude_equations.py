@@ -1,4 +1,4 @@
-"""The readings of a sensor in known attitudes: the equations of every method of TRIAX."""
+"""The readings of a sensor in known attitudes: the equations that all methods of `triaxial` solve."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -23,7 +23,8 @@ class Equations:
     """The readings of a sensor and the attitudes in which they were taken.
 
     - `means`, `variances` (N, 3), with `dof` (N, 3) degrees of freedom of the variances.
-    - `attitudes` (N, 3, 3); `std_rad` (N,): their stated standard deviation; `reference`: its norm, or its vectors.
+    - `attitudes` (N, 3, 3); `std_rad` (N,): their stated standard deviation.
+    - `reference`: the norm of the measured reference, or the vectors that the table's motion adds to it.
     """
 
     means: Array
@@ -95,15 +96,15 @@ class Equations:
         )
 
     def solve_others(self, method: Method, *others: Method) -> Attempts[Method, TriaxialSolution]:
-        """Return the solutions by all other methods, or the Fault of a method that has none."""
+        """Return the solutions by the `others` except `method`, or the Fault of a method that has none."""
         return attempt_each({other: partial(self.solve, other) for other in others if other != method})
 
 
 def _estimate_variances(rows: Rows, reference: KnownVector) -> tuple[Array, Array]:
     """Return the variances (N, 3) of the means and their dof, from one variance for all samples.
 
-    The residuals determine that variance. Rows are weighted equally, because a model with attitude errors would mistake
-    noise for such errors. Raise Fault `too_few_observations` without redundant rows.
+    The residuals of a fit with equal weights determine that variance: a model with attitude errors would mistake noise
+    for such errors. Raise Fault `too_few_observations` without redundant rows.
     """
     counts = rows.samples[:, None]
     quiet = np.full_like(rows.means, (1e-9 * np.abs(rows.means).max()) ** 2) / counts

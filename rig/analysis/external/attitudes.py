@@ -72,9 +72,9 @@ Result = AttitudeCalibration | IncrementCalibration
 def solve_placed(
     name: str, placed: PlacedReadings, site: Site, options: SolveOptions, method: Chosen | None, *, second_order: bool
 ) -> Attempts[Quantity, Result | OfKind]:
-    """Calibrate every recorded quantity of a sensor by `method`; None chooses one.
+    """Calibrate every recorded quantity of a sensor by `method`; None chooses a method.
 
-    The choice is "attitude_weighted"; for a gyroscope "increments" (over windows of `window_s`), or
+    The chosen method is "attitude_weighted". For a gyroscope it is "increments" (over windows of `window_s`), or
     "maximum_likelihood" with `exact_rates`.
     """
     any_mounting, exact_rates = options.any_mounting, options.exact_rates

@@ -66,7 +66,8 @@ def _is_certain(data: ExternalData, change: AbruptChange) -> bool:
     """Return whether a step of the bias is certain, not an error of the stated motion.
 
     If there are rests before and after the step, they must show at least half of it; otherwise the step must exceed the
-    effect of plausible errors of all stated rates. Single first or last rows are never certain: they may be wrong.
+    effect of plausible errors of all stated rates. A step after the first row or before the last one is never certain,
+    because that single row may be wrong.
     """
     axis = int(np.argmax(np.abs(change.sizes)))
     size_rad_s = float(change.sizes[axis])

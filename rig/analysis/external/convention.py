@@ -2,8 +2,8 @@
 
 A quaternion may transform body to room coordinates, or room to body. Under the right convention the body's rates are a
 linear function of the gyroscope's readings. The position of the scalar part, first or last, only rotates the frames of
-body and room, so the gyroscope does not show it. So the accelerometer chooses the position: that with a vertical z
-axis. The other position leads to the same calibration, in other axes of the body.
+body and room, so the gyroscope does not show this position. The accelerometer does, because under the right one the
+room's z axis is vertical. The other position leads to the same calibration, in other axes of the body.
 """
 
 from dataclasses import dataclass

@@ -72,7 +72,7 @@ class ExternalResult:
 
     - item: the sensor.
     - gyroscope: its calibration, None without one.
-    - rates: the gyroscope's solution in attitudes, None by another method.
+    - rates: the gyroscope's solution in attitudes, None if it was solved from sweeps.
     - at_rest: the solutions of the other quantities, from rests.
     - unsolved: the faults of recorded quantities without a solution.
     - turned: the turns from rest to rest that the solution uses, if any.
@@ -124,7 +124,8 @@ def _add_notes(sensor: ExternalResult, read: ExternalReadings, samples: Samples)
 def check_external(name: str, sensor: ExternalResult) -> Iterator[Check]:
     """Yield checks in addition to the solvers' own: the condition of the equations, u of scale, the error of attitudes.
 
-    Every quantity without a solution has a failing check. There is no configuration with limits for more checks.
+    Every quantity without a solution has a failing check. There are no further checks, because files come without a
+    configuration that states limits.
     """
     yield from list_unsolved((name, quantity.name, fault) for quantity, fault in sensor.unsolved.items())
     if (gyroscope := sensor.gyroscope) is not None:

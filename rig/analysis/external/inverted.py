@@ -1,8 +1,8 @@
 """The detection of attitudes in another convention, by solving with their inverses.
 
 Quaternions that were written as x y z w but are read as w x y z look like inverse rotations too, because that
-permutation is improper. The axes of body and room then seem to be others. The sensor's axes show which mistake was
-made.
+permutation is improper. In addition they exchange the axes of body and room, so the sensor's axes show which mistake
+was made.
 """
 
 from collections.abc import Callable, Collection
@@ -30,8 +30,9 @@ Solved = TypeVar("Solved", bound=HasMatrix)
 def solve_unless_inverted(attitudes: Array, solve: Callable[[Array], Solved], contradicting: Collection[str]) -> Solved:
     """Return the result of `solve` with attitudes (N, 3, 3).
 
-    Raise its Faults. A Fault among `contradicting` is replaced by `inverted_attitudes` if the inverse attitudes agree
-    with the readings. Its message names the cause: an inversion, or the order of the quaternions' numbers.
+    Raise the Faults of `solve`. A Fault among `contradicting` is replaced by `inverted_attitudes` if the inverse
+    attitudes agree with the readings; the message then names the cause, which is an inversion, or the order of the
+    quaternions' numbers.
     """
     try:
         return solve(attitudes)
@@ -46,7 +47,10 @@ def solve_unless_inverted(attitudes: Array, solve: Callable[[Array], Solved], co
 
 
 def _find_order(attitudes: Array, solve: Callable[[Array], Solved], inverted: Solved) -> Fault:
-    """Return the error for inverse attitudes, or for their order if the sensor's axes are then nearer to the body's."""
+    """Return the error of wrongly ordered or of inverse quaternions, whichever brings the sensor's axes to the body's.
+
+    `inverted` is the solution with the inverse attitudes.
+    """
     try:
         reordered = solve(_read_scalar_last(attitudes))
     except Fault:

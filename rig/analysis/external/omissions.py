@@ -51,7 +51,7 @@ def notes_on_reading(read: ExternalReadings, samples: Samples) -> Iterator[str]:
 
 
 def notes_on_speeds(data: ExternalData) -> Iterator[str]:
-    """Yield a note if speeds look like °/s; a wrong unit that both files share falsifies only the bias."""
+    """Yield a note if speeds look like °/s, because a wrong unit that both files share shows in the bias alone."""
     fastest = max((sweep.speed_rad_s for sweep in data.sweeps), default=0.0)
     remedy = "if both files are in °/s, state that unit with --columns, because the bias depends on it"
     if RATE.mistaken is not None and fastest > RATE.mistaken.unusual:

@@ -1,8 +1,8 @@
 """The check that a gyroscope's bias from increments between attitudes agrees with its readings at rest.
 
-A gyroscope at rest reads its bias, and motion that the reference does not show. The uncertainty of this motion follows
-from the scatter of the reference's rates in the rests. The reference's errors in motion are not used, because time
-stamps may cause them.
+A gyroscope at rest reads its bias, plus any motion that the reference does not show. The uncertainty of such motion
+follows from the scatter of the reference's rates in the rests. The reference's errors while the body moves are not
+used, because time stamps may cause them.
 """
 
 import numpy as np

@@ -76,7 +76,8 @@ class SweepErrors:
 def sweep_errors(solution: VectorSolution, data: ExternalData) -> SweepErrors | None:
     """Return the effect of the stated motion's errors, and of the sensor's changes, on the vector model's `solution`.
 
-    Return None for means corrected to one temperature: their polynomials already include the contradictions of repeats.
+    Return None for means corrected to one temperature, because the polynomials' uncertainty already includes the
+    contradictions between repeats.
     """
     if data.at_reference:
         return None
@@ -95,8 +96,8 @@ def sweep_errors(solution: VectorSolution, data: ExternalData) -> SweepErrors | 
     def inflate(to_values: Array, dof: float, noise_dof: float) -> Array:
         """Return the covariance (q, q), without noise, of values with derivatives `to_values` (q, 12) to F and c.
 
-        The covariance is for errors of the median size. Each value's part is scaled so that, together with the noise,
-        twice its standard uncertainty is the U over the posterior distribution of the sizes.
+        The covariance is for errors of the median size, but scaled value by value, so that the expanded uncertainty
+        together with the noise is U over the posterior distribution of the sizes.
         """
         by_noise, of_rate, of_axis, by_wrong = (
             to_values @ effects @ effects.T @ to_values.T for effects in (noise, by_rate, by_axis, wrong)
@@ -159,7 +160,8 @@ def _derivatives(design: Array, means: Array, variances: Array) -> Array:
 def _contradictions(stated: StatedMotion, sizes: MotionErrors, design: Array) -> Array:
     """Return the contradiction (N, 3) of each sweep with the others, beyond errors of the given sizes.
 
-    One wrong row among many hardly increases the sizes. With only two sweeps about an axis, only the sizes show it.
+    One wrong row among many hardly increases the sizes, so its contradiction counts in addition. With only two sweeps
+    about an axis it has no contradiction, but increases the sizes.
     """
     rate_variance, axis_variance = sizes.median_variances
     spread = rate_variance * stated.rate_patterns**2 + axis_variance * np.sum(stated.axis_patterns**2, axis=0)
