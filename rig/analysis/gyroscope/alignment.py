@@ -68,9 +68,10 @@ def collect_mean_rates(observations: Sequence[Observation], calibration: LinearC
 def fit_rotation(sensor: MeanRates, reference: MeanRates, nominal: Array) -> RelativeRotation:
     """Return the rotation R that minimises Σ ‖sensor − R reference‖²; `nominal` (3, 3) is R by the nominal mountings.
 
-    This is Wahba's problem, solved by SciPy (Kabsch 1976). To first order the sensor reads R r + δθ × R r, so δθ is a
-    linear least-squares estimate with the noise of both sensors. Errors of scale are parallel to the axes of rotation,
-    and biases cancel between both directions. Raise Fault `rank_deficient`.
+    This is Wahba's problem, solved by SciPy (Kabsch 1976). For an error δθ of R and a rate r of the reference, the
+    sensor reads R r + δθ × R r to first order, so the standard deviation of δθ is that of a linear least-squares
+    estimate with the noise of both sensors. R is independent of errors of scale, which are parallel to the axes of
+    rotation, and of biases, which cancel between both directions. Raise Fault `rank_deficient`.
     """
     from scipy.spatial.transform import Rotation
 

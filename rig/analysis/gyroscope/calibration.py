@@ -49,14 +49,14 @@ class SensorResult:
     - uncertainty: the budget; None for other estimators than "vector" and "newton".
     - corrected_by: the correction for the board and calibration.h.
     - explained: the vector model with gravity and bias drift, None without a solution.
-    - six_observation: the exact solution of SIX.
-    - algorithm_1: the iterative solution of SIX.
+    - six_observation: the exact solution of the six-observation model (the paper SIX).
+    - algorithm_1: the solution of the same model by the paper's Algorithm 1.
     - observations: the averages of the sweeps.
     - rests: the averages of the rests.
     - time_bases: one for each recording.
     - earth: the Earth's rate, None if it was not estimated.
     - by_hand: the solution if a hand turned the sensor.
-    - faults: the reasons of missing parts, by the estimator's name or EARTH_RATE.
+    - faults: the reasons why parts are missing, by the estimator's name or EARTH_RATE.
     """
 
     sensor: RecordedSensor | Item

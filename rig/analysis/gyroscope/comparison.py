@@ -88,8 +88,8 @@ class Comparison:
     - `noise_rad_s` (3,): standard deviation of the difference at rest, from both sensors' noise: the RMS of a perfect
       calibration; None without rests.
     - `revolutions`: the errors of each.
-    - `delay_s`, `delay_std_s`: delay of the sensor's filter relative to the reference's, one for each recording; empty
-      if no common clock stamps the samples.
+    - `delay_s`, `delay_std_s`: for each recording, the delay of the sensor's filter relative to the reference's, and
+      its standard deviation; empty if no common clock stamps the samples.
     """
 
     time_s: Array

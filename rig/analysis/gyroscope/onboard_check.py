@@ -89,7 +89,7 @@ def _list_unobserved(run: RunData, sensor: str) -> tuple[str, ...]:
 
 @dataclass(frozen=True, slots=True)
 class _BoardObservation:
-    """An observation of the board: mean reading (3,), rad/s, and speed; whether the host `averaged` it too."""
+    """An observation of the board: mean reading (3,), rad/s, and speed; `averaged`: whether the mean is the host's."""
 
     mean_rad_s: Array
     speed_rad_s: float
@@ -144,7 +144,8 @@ def _count_missing(sequence: NDArray[np.uint32]) -> int:
 def _solve(observations: Sequence[_BoardObservation]) -> tuple[Array, Array] | None:
     """Return scale and bias by the board's method, with equal weights.
 
-    Return None for too few observations, samples other than those that the board reports, or no checked mean.
+    Return None if observations are too few, if samples are other than those that the board reports, or if the host has
+    averaged no observation.
     """
     accumulated = Accumulator.empty()
     if not any(observation.averaged for observation in observations):

@@ -156,7 +156,8 @@ def _return_errors(turns: Sequence[Observation], rests: int, uncertainty: Uncert
 def _encoder_errors(turns: Sequence[Observation], rests: int, uncertainty: Uncertainty) -> Array | None:
     """Return the errors (P, N, 3), as in `VectorInputs`, of a joint's encoder at each angle where arcs begin or end.
 
-    Sweeps in both directions share these angles, so repeats do not average the errors. None if all are whole turns.
+    Sweeps in both directions share these angles, so repeats do not average the errors. Return None if all sweeps are
+    whole turns.
     """
     arcs = [None if turn.arc_rad is None else (turn.joint_name, *turn.arc_rad) for turn in turns]
     marks = list(dict.fromkeys((arc[0], end) for arc in arcs if arc is not None for end in arc[1:]))

@@ -1,4 +1,4 @@
-"""The verification of calibrated readings by a reference sensor: SIX, Section IV-B, Tables IV and V.
+"""The verification of calibrated readings by a reference sensor, as in the paper SIX, Section IV-B, Tables IV and V.
 
 Only the rotation between the two sensors is removed, as determined in the calibration's revolutions. The
 non-orthogonality that the board's correction leaves, and the cross-axis errors of both sensors, remain.
@@ -45,8 +45,8 @@ def verify(
 ) -> Verification:
     """Compare the readings that the board has calibrated (`after`) with those of the reference.
 
-    - `before`: the recordings of raw readings of the `calibration`, which determine the rotation between the sensors;
-      without them, `after` does.
+    - `before`: the recordings of raw readings from which the `calibration` was estimated. They determine the rotation
+      between the sensors; without them, `after` does.
     - `gravity_rad_s`: gravity's effects (N, 3) on the corrected readings of sensor and of reference in the revolutions
       of `after`, if estimated.
 
