@@ -1,4 +1,4 @@
-"""The calibration of accelerometers from dwells in known attitudes and from sweeps: TRIAX, section III-B, on an arm."""
+"""The calibration of accelerometers on an arm, from dwells in known attitudes (the paper TRIAX, III-B) and sweeps."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -214,7 +214,10 @@ def _select_planned(dwells: Sequence[DwellReading], settings: RunSettings) -> tu
 def _split_dwells(
     dwells: Sequence[DwellReading], planned: Sequence[PlannedDwell]
 ) -> tuple[tuple[DwellReading, ...], tuple[DwellReading, ...]]:
-    """Return the dwells to use, and the dwells of the last of several repeats. Raise Fault `not_all_attitudes`."""
+    """Return the dwells to use in the solution, and those of the last repeat, which are left out to validate it.
+
+    If each attitude is visited once, nothing is left out. Raise Fault `not_all_attitudes`.
+    """
     if missing := {dwell.index for dwell in planned} - {dwell.index for dwell in dwells}:
         raise Fault(
             "not_all_attitudes",

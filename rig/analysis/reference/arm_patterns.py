@@ -67,7 +67,10 @@ def _stack_rotations(postures: Sequence[Posture], arm: DenavitHartenberg, mounti
 
 
 def _rotations(posture: Posture, arm: DenavitHartenberg, mounting: Array) -> Array:
-    """Return a dwell's or sweep's errors (18, 3 or 10), in the order of `effects`, per radian of each wrist error."""
+    """Return a dwell's 3 or a sweep's 10 errors (18, 3 or 10) per radian of each of 18 wrist errors.
+
+    The 3 or 10 are in the order of `rig.estimation.reference.accelerometer_model.effects`.
+    """
     in_base = flange_errors(posture.q_rad, arm)
     in_flange = in_base @ (mounting @ flange_attitude(posture.q_rad, arm)).T
     if posture.wrist is None:
@@ -88,7 +91,7 @@ def _rotations(posture: Posture, arm: DenavitHartenberg, mounting: Array) -> Arr
 
 
 def _shift_harmonics(angle_rad: float) -> Array:
-    """Return the matrix (4, 4) that refers the first two harmonics to θ itself, not to θ minus `angle_rad`."""
+    """Return the matrix (4, 4) from the first two harmonics of θ minus `angle_rad` to those of θ."""
     cos, sin, cos_2, sin_2 = angle_waves(angle_rad)
     waves: Array = np.zeros((4, 4))
     waves[:2, :2] = [[cos, -sin], [sin, cos]]

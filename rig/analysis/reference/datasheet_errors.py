@@ -58,12 +58,12 @@ class Datasheet:
 
     @property
     def even_s2_m(self) -> float:
-        """The half-width of φ if there is no odd part: up to |v| = V, the best line deviates from φ v² by φ V²/2."""
+        """The half-width of φ if there is no odd part: up to |v| = V, φ v² deviates from its best line by φ V²/2."""
         return 0.02 * self.nonlinearity_percent / (self.over_g * STANDARD_GRAVITY_M_S2)
 
     @property
     def odd_s4_m2(self) -> float:
-        """The half-width of χ if there is no even part: up to |v| = V, the best line deviates from χ v³ by χ V³/4."""
+        """The half-width of χ if there is no even part: up to |v| = V, χ v³ deviates from its best line by χ V³/4."""
         return 0.04 * self.nonlinearity_percent / (self.over_g * STANDARD_GRAVITY_M_S2) ** 2
 
 
@@ -163,7 +163,7 @@ def separate_sensor_errors(
 ) -> tuple[FitUncertainty, list[Contributor]]:
     """Return the uncertainty due to noise and arm, and the contributors of the sensor's own errors in this `movement`.
 
-    `spread` is the uncertainty of a fit that includes φ, so the noise has a larger effect.
+    `spread` is the uncertainty of a fit that includes φ, so the noise has a larger effect than in a fit without φ.
     """
     drift, flicker = (
         spread.response @ shared @ spread.response.T

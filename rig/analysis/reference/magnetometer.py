@@ -1,7 +1,7 @@
-"""The calibration of magnetometers from dwells in known attitudes: TRIAX, Eq. (7), on an arm.
+"""The calibration of magnetometers on an arm, from dwells in known attitudes: Eq. (7) of the paper TRIAX.
 
-The solution contains the effect of iron and currents that turn with the magnetometer, also in the arm, which no
-residual shows. Runs with the sensor turned over separate it: `rig.analysis.reversal`.
+The bias contains the field of iron and currents that turn with the magnetometer, also in the arm, which no residual
+shows. Runs with the sensor turned over separate this field: `rig.analysis.reversal`.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -141,7 +141,10 @@ def _drift(name: str, recordings: Sequence[ObservedRun], settings: RunSettings) 
 
 
 def _solve(solve: Callable[..., TriaxialSolution]) -> TriaxialSolution:
-    """Return the solution. For large residuals raise Fault `field_not_uniform`: attitudes cannot be their cause."""
+    """Return the solution. Raise Fault `field_not_uniform` for large residuals.
+
+    Wrong attitudes cannot be their cause, because the accelerometer agrees with the attitudes.
+    """
     try:
         return solve(method=ESTIMATOR)
     except Fault as fault:

@@ -45,8 +45,9 @@ def accelerometer_budget(
 ) -> Budget:
     """Return the budget of the solution of the `movement`.
 
-    `lag_s` is the half-width of the sensor's filter lag. `noise_dof` (3 N + 9 M,) is as in `FitUncertainty`: of the
-    dwells' readings, then of the sweeps' harmonics. With a `datasheet` the sensor's own errors are contributors.
+    `lag_s` is the half-width of the sensor's filter lag. `noise_dof` (3 N + 9 M,) are the degrees of freedom of the
+    variances of the dwells' readings, then of the sweeps' harmonics. With a `datasheet` the sensor's own errors are
+    contributors.
     """
     spread = _propagate(
         solution,
@@ -106,7 +107,8 @@ def _propagate(
 ) -> FitUncertainty:
     """Return the uncertainty of scale and bias, from the `response` (p, n) of all parameters to the readings.
 
-    `noise` (n, n): the readings' covariance; `error`: that of attitudes; `chi_square`: of the residuals, and its dof.
+    `noise` (n, n): the readings' covariance; `error`: the attitude error; `chi_square`: χ² of the residuals, and its
+    dof.
     """
     scale = scale_of(solution.matrix)
     rows = scale_and_bias(solution.matrix, scale, len(solution.covariance))

@@ -1,4 +1,4 @@
-"""Three axes in known attitudes to gravity or a field of known norm, for accelerometers and magnetometers."""
+"""The three axes of an accelerometer or magnetometer calibrated in known attitudes to gravity or a field."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
