@@ -1,4 +1,4 @@
-"""Biases by repeat, in a run that visits attitudes several times: TRIAX, III-A and III-B, Figs. 4 and 6. Pure."""
+"""Biases by repeat, in a run that visits attitudes several times (the paper TRIAX, III-A, III-B, Figs. 4, 6). Pure."""
 
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
@@ -30,7 +30,7 @@ SLOPE = "over_temperature"
 
 @dataclass(frozen=True, slots=True)
 class ScaleFreeBias:
-    """The bias (3,) of one repeat with all parameters estimated from it, and its standard deviation (3,)."""
+    """The bias (3,) of one repeat, with all parameters estimated from this repeat, and the bias' std (3,)."""
 
     bias: Array
     std: Array
@@ -40,10 +40,11 @@ class ScaleFreeBias:
 class BiasDrift:
     """The bias of one quantity of a sensor by repeat, rad/s or m/s².
 
-    A gyroscope's bias includes the Earth's rate times the scale error, or all of the Earth's rate if none is stated
-    (`earth_rate_known`); both are the same in every repeat.
+    A gyroscope's bias includes the Earth's rate times the scale error, or the whole Earth's rate if the site states
+    none (`earth_rate_known`); either part is the same in every repeat.
 
-    - `scale_fixed`: biases with scale, axes and reference of the first repeat (accelerometer) or nominal (gyroscope).
+    - `scale_fixed`: biases with scale, axes and reference as in the first repeat (accelerometer), or with nominal ones
+      (gyroscope).
     - `common_std` (3,): a further standard deviation common to all biases.
     - `scale_free`: the bias by a separate solution of every repeat, by the repeat's index.
     - `time_s`, `temperature_c` (R,): means over every repeat, times since the first repeat.
