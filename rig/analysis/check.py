@@ -84,6 +84,6 @@ def list_unsolved(faults: Iterable[tuple[str, str, Fault]]) -> Iterator[Check]:
 
 
 def name_check(sensor: str, quantity: str, what: str) -> str:
-    """Return the name of a check of a sensor; it contains the quantity, unless that is a gyroscope's rate."""
+    """Return the name of a check of a sensor, which contains the `quantity` unless that is a gyroscope's rate."""
     described = quantities().get(quantity)
     return f"{sensor}.{f'{quantity}_' if described is None else described.prefix}{what}"

@@ -72,7 +72,7 @@ class ClockCheck:
     half_width: float
 
     def differences(self) -> Iterator[ClockDifference]:
-        """Yield the difference of each pair of clocks, and its limit: the sum of both half-widths, and noise."""
+        """Yield the difference of each pair of clocks, with its limit from both half-widths and the noise."""
         clocks = [("controller", 0.0, self.half_width, 0.0)]
         clocks += [
             (CLOCK_NAMES[comparison.by], comparison.error, comparison.half_width, comparison.noise_std)

@@ -1,7 +1,7 @@
 """The degrees of freedom of estimates without a budget of their own: angles, sensitivity to gravity.
 
-Their variance is divided among the budget's contributors of type A, each with its degrees of freedom (Welch and
-Satterthwaite, JCGM 100, G.4); the remainder, due to arm errors of a stated size, has infinite degrees of freedom.
+The estimates' variance is divided among the budget's contributors of type A, each with its degrees of freedom (Welch
+and Satterthwaite, JCGM 100, G.4); the remainder, due to arm errors of a stated size, has infinite degrees of freedom.
 """
 
 from typing import TYPE_CHECKING
@@ -74,7 +74,7 @@ def field_angle_dof(result: "MagnetometerResult") -> Array:
 def reversal_dof(reversal: "MagnetometerReversal") -> tuple[Array, Array]:
     """Return the degrees of freedom of the mean scale factors (3,), and of bias and arm's field (6,).
 
-    For bias and field they are the lowest of any run's bias, a lower bound for a sum of independent parts.
+    Those of bias and field are the lowest of any run's bias, which is a lower bound for a sum of independent parts.
     """
     budgets = [run.result.budget for run in reversal.runs]
     # Welch–Satterthwaite: u⁴ / ν = Σ u_i⁴ / ν_i. Errors common to the runs have infinite ν and add nothing.

@@ -19,7 +19,7 @@ class MeasurementEnvironment:
     """The site, the stated uncertainty, the controller's clock, and its states' jitter in s.
 
     - `clock`: the comparison that corrects the speeds; `clocks`: the comparisons of all recordings, for the checks.
-    - `extension_m` (3,): the sensors' position from the flange, in its frame.
+    - `extension_m` (3,): the sensors' position relative to the flange, in the flange's frame.
     - `reading_noise_rad`: noise of a joint's angle at any time, from the noise of its encoder.
     - `finds_earth_rate`: whether the Earth's rate is estimated, not taken from the site.
     """

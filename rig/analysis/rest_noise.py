@@ -53,7 +53,9 @@ class SensorAtRest:
 
 
 def rest_noises(runs: Sequence[RunData]) -> dict[str, SensorAtRest]:
-    """Return every sensor with rates, by name, over all recordings of a run, without readings corrected by the board.
+    """Return the noise of every sensor with rates, by name, over all recordings of a run.
+
+    Readings corrected by the board are left out.
 
     Raise Fault as `motion_of` and `synchronize_stream` do.
     """

@@ -40,8 +40,8 @@ class MagnetometerReversal:
 def reversals(runs: Sequence[tuple[str, Outcome]]) -> dict[str, MagnetometerReversal]:
     """Separate bias and field of every magnetometer of the first run, from at least two named runs.
 
-    Raise Refused `too_few_runs`, `no_magnetometer` if a run did not record or calibrate it, `runs_do_not_match` with
-    the difference, and as `separate` does.
+    Raise Refused `too_few_runs`, `no_magnetometer` if a run did not record or calibrate a magnetometer of the first
+    run, `runs_do_not_match` with the difference, and as `separate` does.
     """
     if len(runs) < 2:
         raise Refused("too_few_runs", "one run cannot separate the bias from the arm's field", REMEDY)

@@ -42,7 +42,7 @@ def build_hand_result(sensor: RecordedSensor | Item, solution: HandSolution, cor
 
 
 def read_conditions(columns: Columns) -> SessionConditions:
-    """Return the conditions in the only row of a table "turns" (`rig.data.recording.motion_file`)."""
+    """Return the conditions of the session from its table of motion "turns", which has a single row."""
     first = columns.get("first_face")
     return SessionConditions(
         clock_ppm=float(columns["clock_ppm"][0]),
