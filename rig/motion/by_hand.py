@@ -13,10 +13,10 @@ Say = Literal["lay", "turn"]
 
 @dataclass(frozen=True, slots=True)
 class Instruction:
-    """One action, for the line of text, the drawing and the simulated operator.
+    """One action of the operator.
 
     "lay": put the item down with the side `face` up. "turn": with the side `face` up, turn the item by whole `turns`
-    about the vertical, counterclockwise from above if positive, and release it where it was.
+    about the vertical, counterclockwise from above if positive, and release it in its first position.
     """
 
     say: Say
@@ -35,7 +35,7 @@ class Instruction:
 
 @dataclass(frozen=True, slots=True)
 class HandMove:
-    """A recorded move: a flip from one face to another, or whole turns on one."""
+    """A recorded move: a flip from one face to another, or whole turns on one face."""
 
     kind: Literal["flip", "turn"]
     from_face: Face

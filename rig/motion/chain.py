@@ -11,7 +11,7 @@ Pose = tuple[float, ...]  # a controller's pose, (6,): m, rotation vector in rad
 class DenavitHartenberg:
     """A chain's geometry: zero θ, length a, offset d and twist α of n joints, the first at the ground, rad and m.
 
-    Raise ValueError unless all have the same number of values, at most `MAX_JOINTS`, all of them finite.
+    Raise ValueError unless all four have the same number of values, at most `MAX_JOINTS`, and all values are finite.
     """
 
     theta_rad: tuple[float, ...]

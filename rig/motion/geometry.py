@@ -211,7 +211,7 @@ def _dot(one: Array, other: Array) -> Array:
 def flange_axes(q_rad: ArrayLike, arm: DenavitHartenberg = NOMINAL) -> Array:
     """Return unit axes (…, 3, n) of the n joints (columns) in the flange frame, for joint angles `q_rad` (…, n).
 
-    A joint's own angle does not move its column, so a sweep of one wrist keeps its axis.
+    A joint's axis does not depend on the joint's own angle, so it is constant in a sweep of this joint.
     """
     *before, flange = _frames(q_rad, arm)
     axes_in_base = np.stack([frame[..., :3, 2] for frame in before], axis=-1)
@@ -221,7 +221,8 @@ def flange_axes(q_rad: ArrayLike, arm: DenavitHartenberg = NOMINAL) -> Array:
 def flange_arm(q_rad: ArrayLike, joint: int, arm: DenavitHartenberg = NOMINAL) -> Array:
     """Return the lever arm (…, 3), m, from a joint's axis to the flange's origin, in the flange's frame.
 
-    The joint angles are `q_rad` (…, n). It begins at the joint's origin; its part along the axis is arbitrary.
+    The joint angles are `q_rad` (…, n). The lever arm begins at the origin of the joint's frame, so its part along the
+    axis is arbitrary.
     """
     frames = _frames(q_rad, arm)
     to_flange = np.swapaxes(frames[-1][..., :3, :3], -1, -2)

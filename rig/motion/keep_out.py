@@ -42,8 +42,8 @@ def find_clearance_problems(
 ) -> list[Problem]:
     """Return the problems of steps that bring flange, payload's centre or extension too near to forearm or upper arm.
 
-    Lengths are those of `arm` if given, otherwise nominal. A motion from or to an attitude must keep `dwell_room_m`
-    from the forearm, all others `sweep_room_m`.
+    Lengths are those of `arm` if given, otherwise nominal. A dwell, or a motion from or to its attitude, must keep
+    `dwell_room_m` from the forearm, all other motions `sweep_room_m`.
     """
     problems = []
     for path in _list_paths(plan, model):

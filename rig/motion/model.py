@@ -30,7 +30,7 @@ class Tube:
 class TurnerModel:
     """A model of arm: geometry, joint limits, payload, thickness. SI units.
 
-    - `robot_type`: the number that the controller reports; identical models share one.
+    - `robot_type`: the number that the controller reports, which several models may have in common.
     - `sweep_room_m`, `dwell_room_m`: clearances between a link's surface and the middle of the load.
     - `home_rad`: the default home pose; `sources`: the sources of the figures.
     """

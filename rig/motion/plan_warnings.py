@@ -1,4 +1,4 @@
-"""Plans that are possible but probably unintended: shown before the operator agrees, never refused. Pure."""
+"""Warnings of plans that are possible but probably unintended, shown before the operator agrees. Pure."""
 
 import math
 

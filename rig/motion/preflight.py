@@ -8,7 +8,7 @@ from rig.motion.turner_state import Joints
 
 
 def find_step_problems(plan: Plan) -> list[Problem]:
-    """Return the problems of steps: one without duration, or a motion without joints or speed."""
+    """Return the problems of a plan's steps: a step without duration, or a motion without joints or speed."""
     problems = [
         Problem(
             "no_duration",

@@ -85,8 +85,8 @@ class Sweep:
 class Transfer:
     """A motion between sweeps or attitudes, without measurement.
 
-    A transfer that `tries` the mounting is a small turn of one joint. The sensors must sense it about the axis, and
-    with the sign, of the stage's mounting, or the run ends.
+    A transfer that `tries` the mounting is a small turn of one joint. If the sensors do not sense it about the axis and
+    with the sign that follow from the stage's mounting, the run ends.
     """
 
     name: str
@@ -114,8 +114,8 @@ class Rest:
 class Dwell:
     """A measured rest in the attitude `q_rad` for `duration_s` in the controller's time.
 
-    It begins when the sensors have settled, at most `settle_s` after the arm's arrival, which `duration_s` does not
-    include. `index` is the number among the procedure's sweeps and dwells, from 0.
+    The dwell begins when the sensors have settled, at most `settle_s` after the arm's arrival; `duration_s` does not
+    include this time. `index` is the number among the procedure's sweeps and dwells, from 0.
     """
 
     index: int
@@ -187,7 +187,7 @@ class Plan:
 
 
 def closes(angle_rad: float) -> bool:
-    """Return whether an angle is a whole number of turns, which the closure of the circle makes exact."""
+    """Return whether an angle is a whole number of turns, which is exact because the circle closes."""
     turns = round(angle_rad / TURN_RAD)
     return turns > 0 and abs(angle_rad - turns * TURN_RAD) < CLOSURE_TOLERANCE_RAD
 

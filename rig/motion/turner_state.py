@@ -99,7 +99,7 @@ class ArmState:
     """One packet of the controller: a `State` with six joints, base to wrist 3.
 
     - target_speed_fraction: the speed slider (1 = 100 %); speed_scaling: the actual scaling.
-    - robot_mode, safety_mode, runtime_state: the controller's numbers, as in `RobotMode` and its neighbours.
+    - robot_mode, safety_mode, runtime_state: the controller's numbers: `RobotMode`, `SafetyMode`, `RuntimeState`.
 
     The field names are those of `ARM_STATE_DTYPE`.
     """

@@ -1,4 +1,4 @@
-"""The winding of the flange's cable by a plan: each joint's travel to both sides of its present angle. Pure."""
+"""The winding of the flange's cable by a plan, from each joint's travel to both sides of its present angle. Pure."""
 
 from collections.abc import Sequence
 from math import ceil, degrees, pi
