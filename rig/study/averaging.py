@@ -1,8 +1,8 @@
-"""SIX, Eq. (8): squaring every sample before averaging, against averaging the revolution before squaring.
+"""Eq. (8) of the paper SIX: squaring every sample before averaging, against averaging the revolution before squaring.
 
-Taken literally, Eq. (8) averages m². The mean of squares contains the variance of the noise on all three axes, and of
-the vibration along the turn (a fraction ε = 0.05 of the speed). The estimated scale factors therefore shrink by about 3
-k² σ² / (2 ω²) + ε²/2.
+Taken literally, Eq. (8) averages the squares of the readings. The mean of squares contains the variance σ² of the noise
+on all three axes, and that of the vibration along the turn (a fraction ε = 0.05 of the speed ω). The estimated scale
+factors k therefore shrink by about 3 k² σ² / (2 ω²) + ε²/2.
 """
 
 from functools import partial

@@ -1,4 +1,4 @@
-"""SIX, Figs. 2 and 5: error bands of 30 gyroscopes × 500 runs under normal and extreme conditions."""
+"""Figs. 2 and 5 of the paper SIX: error bands of 30 gyroscopes × 500 runs under normal and extreme conditions."""
 
 from dataclasses import dataclass
 from functools import partial

@@ -1,9 +1,9 @@
 """Coverage of the stated uncertainty: sessions with all effects in the budget, drawn from their distributions.
 
-JCGM 101: a draw is a session with its own gyroscope, arm and controller. Its mean readings are computed from the true
-motion; the solver gets the controller's values. The interval ± 2 u of the budget must then cover the truth in 95 of 100
-draws. For comparison the solver also runs without this rig's remedies: no gravity columns, no bias random walk, no
-correction of the clock, and an uncertainty from noise alone.
+As in JCGM 101, a draw is a session with its own gyroscope, arm and controller. The session's mean readings are computed
+from the true motion, whereas the solver gets the controller's values. The interval ± 2 u of the budget must then cover
+the truth in 95 of 100 draws. For comparison the solver also runs without this rig's remedies: no gravity columns, no
+bias random walk, no correction of the clock, and an uncertainty from noise alone.
 """
 
 from dataclasses import dataclass
@@ -40,7 +40,7 @@ WARM_UP_S, STEP_K = 300.0, 1 / 16  # duration of warm-up; resolution of an LSM9D
 
 @dataclass(frozen=True, slots=True)
 class Effects:
-    """Magnitudes of the effects: standard deviations; for clock, offset, nonlinearity and warming half-widths.
+    """Magnitudes of the effects: half-widths of clock, offset, nonlinearity and warming, standard deviations of others.
 
     - `g_sensitivity_rad_s_g`: every element of the g-sensitivity; `axis_rad`: twist of each wrist's axis; `jitter_s`:
       jitter of the states' times.
@@ -48,7 +48,8 @@ class Effects:
     - `walk_rad_s_sqrt_s`: bias random walk; `offset_m`: the sensor's offset from the flange's centre, by axis.
     - `nonlinearity`: as a fraction of full scale; `warming_k`: change of temperature, which affects bias and scale.
 
-    The noise is an LSM9DS1's from its data sheet, 0.01 °/s/√Hz, the nonlinearity an MPU-9250's (PS-MPU-9250A-01).
+    The default noise is that of an LSM9DS1 by its data sheet, 0.01 °/s/√Hz, the nonlinearity that of an MPU-9250
+    (PS-MPU-9250A-01).
     """
 
     speed_rad_s: float = np.pi / 3
@@ -97,7 +98,7 @@ def study(settings: Settings) -> StudyReport:
 
 
 def errors(effects: Effects, settings: Settings) -> Array:
-    """Return errors of scale and bias over their standard uncertainty, with and without remedies, (draws, 2, 6)."""
+    """Return errors of scale and bias divided by their std uncertainty, with and without remedies, (draws, 2, 6)."""
     draws = settings.runs or DRAWS
     counts = [draws // BATCHES + (batch < draws % BATCHES) for batch in range(BATCHES)]
     return np.concatenate(run_parallel(partial(_simulate_batch, effects), [n for n in counts if n], settings))
@@ -108,7 +109,14 @@ def _simulate_batch(effects: Effects, rng: np.random.Generator, draws: int) -> A
 
 
 def _simulate_session(effects: Effects, rng: np.random.Generator) -> Array:
-    """Return the errors over their standard uncertainty (2, 6) in a session of sweeps and rests, random `effects`."""
+    """Simulate a session with randomly drawn effects, and return the errors over their standard uncertainty (2, 6).
+
+        m = K⁻¹ A ω − b + G f + drift + noise
+
+    are the mean readings, with the scale factors K, the sensor's axes A, the true rates ω, the bias b, the
+    g-sensitivity G and the specific force f; nonlinearity and temperature also change A ω and the drift. The solver
+    gets the nominal motion, with rates by the controller's wrong clock.
+    """
     scale, bias = rng.uniform(0.9, 1.1, 3), rng.uniform(-0.02, 0.02, 3)
     true = _build_session(rng.normal(0, effects.axis_rad, (3, 2)), effects.speed_rad_s)
     nominal = _build_session(np.zeros((3, 2)), effects.speed_rad_s)
@@ -189,7 +197,7 @@ def _apply_nonlinearity(along_rad_s: Array, effects: Effects, rng: np.random.Gen
 
 
 def _draw_warming(rng: np.random.Generator, effects: Effects, session: Session) -> tuple[Array, Array]:
-    """Draw the mean temperature, K (N,), of each average above the start: true, and as recorded in steps."""
+    """Draw the temperature of each average above that at the start, K (N,); return the true and the rounded one."""
     middle_s = session.windows_s.mean(axis=1)
     warmth = effects.warming_k * rng.uniform(-1, 1) * (1 - np.exp(-middle_s / WARM_UP_S))
     return warmth, STEP_K * np.round(warmth / STEP_K)

@@ -1,9 +1,10 @@
-"""SIX, Table I: passes of Algorithm 1, and the bias at which it stops converging.
+"""Table I of the paper SIX: passes of Algorithm 1, and the bias at which the algorithm stops converging.
 
-Without noise the first pass omits β0: k₁² = k² / (1 − β0/ω²), and b₁ = b already. So the first line of each example in
-Table I determines the speed, which SIX does not state. Each further pass shrinks the error by Γ = β0 / (ω² − β0),
-alternating: k_n ≈ k (1 ± Γⁿ/2). So Algorithm 1 needs β0 < ω²/2 (at 1 rad/s this is SIX's "β0 < 0.5"). Table I counts
-passes until its four decimals stop changing, long before Σ|Δβ| ≤ 1e-6.
+β0 = Σ k² b² is the constant of the paper's Eq. (4) for scale factors k and biases b, ω the speed. The first pass omits
+β0; without noise it gives k₁² = k² / (1 − β0/ω²), and already the right biases. So the first line of each example in
+Table I determines the speed, which the paper does not state. Each further pass multiplies the error by −Γ, with
+Γ = β0 / (ω² − β0): k_n ≈ k (1 ± Γⁿ/2). So Algorithm 1 needs β0 < ω²/2 (at 1 rad/s this is the paper's "β0 < 0.5").
+Table I counts passes until its four decimals stop changing, long before Σ|Δβ| ≤ 1e-6.
 """
 
 from dataclasses import dataclass
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class _Example:
-    """An example of SIX, Table I: the true parameters, those after the last and first pass, the number of passes."""
+    """An example of the paper's Table I: true parameters, those after the last and first pass, number of passes."""
 
     scale: tuple[float, float, float]
     bias_rad_s: tuple[float, float, float]
@@ -104,7 +105,7 @@ def _build_rows(example: str, scale: Array, bias_rad_s: Array, speed_rad_s: floa
 
 
 def _count_passes(scale: float, ratio: float) -> int | None:
-    """Return the number of passes until four decimals of k (1 ± Γⁿ/2) stay the same, or None if they never do."""
+    """Return the number n of passes until four decimals of `scale` (1 ± `ratio`ⁿ/2) stay the same; None if never."""
     factor = ratio / (1 - ratio) if ratio < 0.5 else 1.0
     return None if factor == 1 else int(np.ceil(np.log(2 * FOUR_DECIMALS / scale) / np.log(factor)))
 

@@ -1,7 +1,8 @@
 """The mean squared error of every estimator over its own Cramér–Rao bound.
 
-The gyroscope's estimators use the same runs. The six-observation estimators and the vector model have different bounds:
-the latter knows the directions of the turns and uses the rests too. The tri-axial estimators use the rate table's data.
+The gyroscope's estimators use the same runs. The six-observation estimators and the vector model have different bounds,
+because the vector model knows the directions of the turns and uses the rests too. The tri-axial estimators use the rate
+table's data.
 """
 
 from collections.abc import Iterator

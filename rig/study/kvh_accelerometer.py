@@ -1,4 +1,4 @@
-"""TRIAX, section III-B: an accelerometer in attitudes at rest, with second-order terms, and its bias by repeat."""
+"""Section III-B of the paper TRIAX: an accelerometer at rest in attitudes, with second-order terms; bias by repeat."""
 
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -63,8 +63,8 @@ def study(settings: Settings) -> StudyReport:
 def _calibrate(rng: np.random.Generator, _: int) -> tuple[Array, Array, Array]:
     """Return the parameters θ (18,), their standard deviations (18,), and three numbers in m/s².
 
-    These are the largest standard deviation of corrected samples, and the largest residual of an attitude's mean: with
-    second-order terms, then without.
+    The three are the largest standard deviation of corrected samples, and the largest residual of an attitude's mean,
+    with second-order terms and without.
     """
     attitudes = rt.draw_attitudes(REST_ATTITUDES)
     force = rt.project(attitudes, rt.ACCELEROMETER_REFERENCE_M_S2)

@@ -1,8 +1,8 @@
-"""TRIAX, section III-A: a fiber-optic gyroscope on an oscillating rate table, the Earth's rate, and the bias by repeat.
+"""Section III-A of the paper TRIAX: a fiber-optic gyroscope on an oscillating rate table; Earth's rate; bias by repeat.
 
-TRIAX reports residuals of up to 0.0475 °/s and considers them consistent with the angle random walk of 0.012 °/√h; at
-25 Hz that random walk gives 0.001 °/s. The remainder must be the table's vibration, as TRIAX suspects for its x axis.
-Both levels are simulated, as white noise: `random_walk` and `residual`.
+The paper reports residuals of up to 0.0475 °/s and considers them consistent with the angle random walk of 0.012 °/√h,
+but at 25 Hz that random walk gives 0.001 °/s. The remainder must be the table's vibration, as the paper suspects for
+the x axis. Both levels are simulated, as white noise: `random_walk` and `residual`.
 """
 
 from functools import partial
@@ -79,7 +79,7 @@ def _calibrate(noise_rad_s: float, rng: np.random.Generator, _: int) -> tuple[Ar
 
 
 def _simulate_drift(seed: int) -> list[dict[str, Any]]:
-    """Return repeats as in TRIAX, Fig. 4, where the bias is below 1 deg/h; here it steps by 0.1 deg/h every hour."""
+    """Return repeats as in the paper's Fig. 4, with a bias below 1 deg/h, which steps by 0.1 deg/h every hour."""
     sensor = rt.DriftingSensor(
         rt.GYRO_MATRIX,
         rt.GYRO_REFERENCE_RAD_S * (rt.EARTH_RATE_RAD_S / np.linalg.norm(rt.GYRO_REFERENCE_RAD_S)),

@@ -2,7 +2,8 @@
 
 Six averaged sweeps determine only ‖K (m + b)‖, so the sensor's mounting does not matter, but its axes must be
 orthogonal: their non-orthogonality changes the scale factors. The change is of second order if the sensor is mounted
-straight, otherwise the product with the mounting error. The vector model estimates both angles.
+straight, otherwise it is of the order of the non-orthogonality times the mounting error. The vector model estimates
+both angles.
 """
 
 from functools import partial

@@ -1,4 +1,4 @@
-"""A simulated three-axis rate table with a KVH 1775 on it: the numbers of TRIAX, and its motions."""
+"""A simulated three-axis rate table with a KVH 1775 on it: the numbers of the paper TRIAX, and the table's motions."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -48,7 +48,7 @@ def draw_attitudes(count: int) -> Array:
 def simulate_oscillation(duration_s: float) -> tuple[Array, Array]:
     """Return attitudes (N, 3, 3) and body rates (N, 3), rad/s, of oscillations by ±60° about all three axes.
 
-    TRIAX shows its motion only in a figure; what matters is that every axis turns and tilts.
+    The paper shows its motion only in a figure, but any motion will do in which every axis turns and tilts.
     """
     from scipy.spatial.transform import Rotation
 
@@ -70,7 +70,7 @@ def simulate_oscillation(duration_s: float) -> tuple[Array, Array]:
 
 
 def project(attitudes: Array, reference: Array) -> Array:
-    """Return Rᵀ v_ref (N, 3) for attitudes (N, 3, 3), body to table."""
+    """Return a `reference` (3,) of the table in body coordinates (N, 3), in N attitudes (N, 3, 3), body to table."""
     return np.asarray(reference @ attitudes, dtype=np.float64)
 
 
@@ -78,8 +78,8 @@ def project(attitudes: Array, reference: Array) -> Array:
 class DriftingSensor:
     """A sensor whose bias changes from one repeat to the next.
 
-    F (3, 3), reference (3,), second-order terms (3,), the first bias (3,), the standard deviations of its steps before
-    each repeat, and the random walk that limits an average; all in the unit of the readings.
+    `matrix` is F (3, 3), `bias` (3,) the first bias, and `bias_steps` the standard deviations of the bias' steps before
+    each repeat; `random_walk` limits an average. All are in the unit of the readings.
     """
 
     matrix: Array
@@ -90,7 +90,7 @@ class DriftingSensor:
     random_walk: float
 
     def simulate_repeats(self, rng: np.random.Generator, unit: float, unit_name: str) -> list[dict[str, Any]]:
-        """Return one row per repeat, with the bias in `unit`, as in TRIAX, Figs. 4 and 6.
+        """Return one row per repeat, with the bias in `unit`, as in the paper's Figs. 4 and 6.
 
         Columns `held_…` have the bias estimated with the matrix F and the reference of an earlier calibration. For
         columns `free_…`, all parameters are estimated from the ten attitudes, with the reference's norm given.
@@ -158,7 +158,10 @@ def find_drift_errors(rows: list[dict[str, Any]], column_unit: str, unit: str) -
 def build_parameter_rows(
     kind: str, names: Mapping[str, tuple[str, float]], truth: Array, estimates: Array, stated: Array
 ) -> list[dict[str, Any]]:
-    """Return one row per parameter. `names`: its unit and the unit's size; `estimates` (runs, p); `stated` (p,) σ."""
+    """Return one row per parameter, from `estimates` (runs, p) and their `stated` standard deviations (p,).
+
+    `names`: each parameter's unit and the unit's size, by the parameter's name.
+    """
     return [
         {
             "noise": kind,

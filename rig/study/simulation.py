@@ -1,16 +1,16 @@
-"""Simulated gyroscopes and their averaged sweeps, vectorised over runs: SIX, section III.
+"""Simulated gyroscopes and their averaged sweeps, vectorised over runs, as in section III of the paper SIX.
 
 A sweep's mean reading is drawn directly. The mean of N samples with white noise σ is Gaussian with σ/√N, so samples are
 not needed; if a study squares the samples first, the mean of the squares is drawn from its exact distribution, too.
 
-Two models of the servo's vibration, which SIX describes as "rotation noise" of 5 % of the speed:
+There are two models of the servo's vibration, which the paper describes as "rotation noise" of 5 % of the speed:
 
 `whole_turns`
     Vibration oscillates about the even turn, and integrates to the joint's whole turn. Its mean over the turn is zero
     by geometry, as with a servo that has a position loop.
 `white`
     The speed of each sample is drawn independently. The mean speed of the sweep is then off by 5 % / √N: the joint
-    misses its own end stop. SIX's wording suggests this model; its figures do not.
+    misses its own end stop. The paper's wording suggests this model, but its figures do not.
 """
 
 from dataclasses import dataclass
@@ -80,7 +80,7 @@ def build_whole_turn(speed_rad_s: float, noise_rad_s: float, vibration: Vibratio
 def draw_mountings(rng: np.random.Generator, runs: int, largest: float = MAX_MISALIGNMENT) -> Array:
     """Draw rotations (runs, 3, 3) from flange to sensor axes, about random axes, sine of the angle from U(0, largest).
 
-    SIX states only "misalignment U(0 %, 10 %)", taken here as the fraction of a rate that other axes sense.
+    The paper states only "misalignment U(0 %, 10 %)", taken here as the fraction of a rate that other axes sense.
     """
     from scipy.spatial.transform import Rotation
 
@@ -106,9 +106,10 @@ def draw_means_and_squares(
 ) -> tuple[Array, Array]:
     """Draw averages of readings and of their squares, both (…, 6, 3), of the same samples, exactly.
 
-    Let d = n + c v be the deviation of a sample from the mean, with noise n and the vibration v common to the axes. v
-    enters through Σ(v − v̄)² ~ χ²(N − 1), the noise along v through one Gaussian z, and the rest of the noise through
-    χ²(N − 2), so that Σ(d − d̄)² = (σ z + c √Σ(v − v̄)²)² + σ² χ²(N − 2).
+    Let d = n + c v be the deviation of one of N samples from the mean, with noise n of standard deviation σ, and the
+    vibration v common to the axes, which an axis reads as c v. v enters through Σ(v − v̄)² ~ χ²(N − 1), the noise along
+    v through one Gaussian z, and the remaining noise through χ²(N − 2), so that Σ(d − d̄)² = (σ z + c √Σ(v − v̄)²)² + σ²
+    χ²(N − 2).
     """
     mean, per_vibration = _draw_means(rng, F, bias_rad_s, sweep)
     shape, count = mean.shape, sweep.samples

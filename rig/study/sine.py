@@ -1,4 +1,4 @@
-"""SIX, Fig. 3: readings of a gyroscope in oscillation, before and after calibration."""
+"""Fig. 3 of the paper SIX: readings of a gyroscope in oscillation, before and after calibration."""
 
 from functools import partial
 from typing import TYPE_CHECKING
@@ -24,8 +24,8 @@ PUBLISHED_ESTIMATE = (0.9070, 1.0502, 0.8735, 0.0529, 0.0802, -0.0994)
 def study(settings: Settings) -> StudyReport:
     """Simulate a calibration at 3 rad/s, then a sine of 1 rad/s and 0.75 Hz about an axis equally far from x, y and z.
 
-    SIX corrects "using Eq. (1)". With g = K m + b, as printed there, its own estimates would leave errors of (1 − k) b.
-    The correction here is g = K (m + b).
+    The paper corrects "using Eq. (1)", printed as g = K m + b. With the paper's own estimates that equation would leave
+    errors of (1 − k) b, so the correction here is g = K (m + b).
     """
     rng = np.random.default_rng(settings.seed)
     sweep = sim.build_whole_turn(sim.FAST_SPEED_RAD_S, NOISE_RAD_S)

@@ -1,8 +1,8 @@
-"""SIX, Fig. 4: mean squared error of the parameters against the speed of the sweeps.
+"""Fig. 4 of the paper SIX: mean squared error of the parameters against the speed of the sweeps.
 
-In SIX the biases' error is the same at every speed. This needs the same number of samples in every sweep, whereas a
-slower revolution has more. Both are shown: `whole_turn` samples one revolution at 200 Hz, `fixed_samples` takes as many
-samples as a revolution at 3 rad/s has.
+In the paper the biases' error is the same at every speed. This needs the same number of samples in every sweep, whereas
+a slower revolution has more samples. Both cases are shown: `whole_turn` samples one revolution at 200 Hz,
+`fixed_samples` takes as many samples as a revolution at 3 rad/s has.
 """
 
 from collections.abc import Callable
@@ -62,7 +62,7 @@ def _simulate_gyroscope(runs: int, rng: np.random.Generator, _: int) -> Array:
 
 
 def _findings(rows: list[dict[str, Any]]) -> tuple[StudyFinding, ...]:
-    """Return the slopes of the doubly logarithmic plot, because errors are powers of the speed; SIX: exponential."""
+    """Return the slopes of the doubly logarithmic plot: errors are powers of the speed, not exponentials as in SIX."""
     findings = []
     for duration in DURATIONS:
         chosen = [row for row in rows if row["samples"] == duration and row["noise_rad_s"] == sim.NOISE_LEVELS_RAD_S[0]]

@@ -13,7 +13,7 @@ Columns = Mapping[str, Sequence[Any] | NDArray[Any]]
 
 
 class StudyProgress(Protocol):
-    """A function that passes on the results of a study's tasks, and may show the progress out of `total`."""
+    """A function that passes on the results of a study's `total` tasks, and may show the progress."""
 
     def __call__(self, results: Iterable[Any], total: int) -> Iterable[Any]: ...
 
