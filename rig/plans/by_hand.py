@@ -58,7 +58,7 @@ class RemainingMoves:
 
     @property
     def done(self) -> bool:
-        """Whether the session is complete: all turns, and all listed flips or as many others over all six faces."""
+        """Whether the session has all turns, and all wanted flips or as many other flips over all six faces."""
         return not self.turns and (not self.pairs or (self.flips == 0 and not self.faces))
 
 

@@ -23,7 +23,7 @@ class Phase:
     """One movement of a run.
 
     `procedure` determines readings, steps and verdict; `plan` makes the steps. `agreed`: whether the operator agreed to
-    it with the previous phase; `follows`: the next phase, if this one passes.
+    this phase together with the previous one; `follows`: the next phase, if this one passes.
     """
 
     procedure: AnyProcedure
@@ -35,9 +35,9 @@ class Phase:
 def first_phase(procedure: AnyProcedure, config: RigConfig, procedures: Procedures) -> Phase:
     """Return the phase with which a run of `procedure` begins; the next phase repeats its movement.
 
-    Raise Refused `no_such_procedure`. The phase's `plan` raises Refused as the procedure's does, and `script_failed`.
-    It raises `rank_deficient`, `ill_conditioned` if the whole plan's attitudes do not determine the requested
-    parameters, and `other_turner` if the procedure needs another kind of turner.
+    Raise Refused `no_such_procedure`. The phase's `plan` raises Refused as the procedure's does, and `script_failed`;
+    also `rank_deficient` or `ill_conditioned` if the whole plan's attitudes do not determine the requested parameters,
+    and `other_turner` if the procedure needs another kind of turner.
     """
 
     def plan(start_q_rad: Joints | None = None, done: Collection[int] = ()) -> Plan:

@@ -60,9 +60,10 @@ def calibration(runs: Sequence[RunData], before: Outcome | None, estimator: str)
 class Procedure(Generic[SectionT]):
     """A procedure: its name, its section in the configuration, its planner, its script and its analysis.
 
-    - readings: of the sensors to calibrate: raw counts, which the board also averages, or corrected by the board.
+    - readings: the readings of the sensors to calibrate, either "raw", which the board also averages, or "calibrated",
+      which the board corrects.
     - then: the procedure that follows with the same movement if the section has `then_verify`.
-    - turner: the section type of the turner that it needs.
+    - turner: the section type of the turner that the procedure needs.
     - estimator: the estimator of the result, unless another is requested.
     """
 

@@ -1,6 +1,7 @@
 """The search for the shortest run of a configuration that reaches a target uncertainty. Pure.
 
-The file's order, directions, stages, several speeds and six axes are kept; with magnetometers, also attitudes.
+The order, directions, stages, several speeds and six axes that the file states are kept, and with magnetometers also
+the attitudes.
 """
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -60,7 +61,7 @@ class RunSearch(Protocol):
     """The candidate runs of a procedure, with their predictions.
 
     - `predict`: returns the budgets, None for a run that is not possible.
-    - `per_repeat`: the contributors with a new error in each repeat; endless repetition averages them out.
+    - `per_repeat`: the contributors whose error is new in each repeat, so that endless repetition averages them out.
     - `ending`: the keys that end a run before its last repeat, when the target is reached.
     """
 
@@ -78,8 +79,8 @@ def shortest_run(config: RigConfig, wanted: TargetUncertainty) -> ShortestRun:
     """Return the shortest run of this configuration whose predicted uncertainty meets the target.
 
     A family of candidates is skipped if even its run of unlimited length misses the target by more than the factor
-    `MAX_U_REDUCTION`. If all are, only the longest run of the best family is evaluated. Raise Refused `not_predictable`
-    if the uncertainty of the procedure or of the target's quantity is not predicted.
+    `MAX_U_REDUCTION`. If all families are skipped, only the longest run of the best one is evaluated. Raise Refused
+    `not_predictable` if the uncertainty of the procedure or of the target's quantity cannot be predicted.
     """
     what = find_search(config)
     _refuse_others(wanted, config)
@@ -183,7 +184,7 @@ def _longest(candidates: Sequence[Candidate], family: tuple[object, ...], at_mos
 class _TurnerSearch:
     """The search among runs of a turner with joints, by sweeps or attitudes.
 
-    - `motions`: yields the family and the angle of each motion, and the keys of the procedure that state it.
+    - `motions`: yields the family and the angle of each motion, and the procedure's keys that state this motion.
     - `waits`: the keys of the times at standstill, after a sweep or in an attitude.
     """
 
@@ -216,7 +217,11 @@ class _TurnerSearch:
         return candidates
 
     def select_endless(self, candidates: Sequence[Candidate]) -> Sequence[Candidate]:
-        """Return each family's candidates with the largest angle and dwell, extreme rests, and up to two repeats."""
+        """Return each family's candidates whose predictions without `per_repeat` are those of unlimited length.
+
+        These have the largest angle and dwell, and as many repeats as are predicted. Rests are the shortest or the
+        longest ones, because either may be better if the bias drifts.
+        """
         selected = {
             (candidate.family, candidate.rests_s): candidate
             for candidate in sorted(candidates, key=lambda candidate: candidate.sizes)
@@ -227,7 +232,7 @@ class _TurnerSearch:
     def finer(self, best: Candidate) -> Sequence[Candidate]:
         """Return the candidates with slightly shorter waits, down to the next coarse value.
 
-        For such small steps a longer wait is assumed to give a smaller uncertainty.
+        Because the steps are small, a longer wait is assumed to give a smaller uncertainty.
         """
         waits_s = {key: float(getattr(best.procedure, key)) for key in self.waits}
         counts = self._counts(plan_of(self.config, best.procedure))  # waits of all repeats
@@ -287,7 +292,7 @@ class _HandSearch:
         return [self._candidate(*numbers) for numbers in product(FLIP_COUNTS, TURN_COUNTS, RESTS_S[:4])]
 
     def select_endless(self, candidates: Sequence[Candidate]) -> Sequence[Candidate]:
-        """Return the candidate with the most flips, fewest turns and shortest rests, which is best without noise."""
+        """Return the candidate with the most flips, fewest turns and shortest rests, the best one without noise."""
         return [max(candidates, key=lambda candidate: (candidate.sizes[0], -candidate.sizes[1], -candidate.sizes[2]))]
 
     def finer(self, best: Candidate) -> Sequence[Candidate]:

@@ -10,8 +10,9 @@ MIN_GAIN_S = 1e-9  # a smaller gain is rounding, and might repeat forever
 def shortest_way(between_s: Array) -> tuple[int, ...]:
     """Return the points 1 to n − 1 in the order of the shortest round trip from point 0.
 
-    `between_s` (n, n), symmetric. Each nearest-neighbour tour is improved by reversing parts as long as that shortens
-    it (2-opt: Croes, Operations Research 6 (1958) 791), and the best tour is chosen, which is not always the optimum.
+    `between_s` (n, n) are the times between points, a symmetric matrix. Each nearest-neighbour tour is improved by
+    reversing parts as long as that shortens the tour (2-opt: Croes, Operations Research 6 (1958) 791). The best of
+    these tours is returned, which is not always the optimum.
     """
     rounds = [_improve(_nearest_neighbours(between_s, first), between_s) for first in range(1, len(between_s))]
     best = min(rounds, key=lambda order: round(_length(order, between_s), 9))
@@ -32,7 +33,7 @@ def _nearest_neighbours(between_s: Array, first: int) -> list[int]:
 
 
 def _improve(order: list[int], between_s: Array) -> list[int]:
-    """Improve a tour by 2-opt: reverse the part between two edges that shortens it most, until none does."""
+    """Improve a tour by 2-opt: reverse the part that shortens the tour most, until no reversal shortens it."""
     while True:
         starts, ends = np.array(order), np.roll(order, -1)
         durations_s = between_s[starts, ends]

@@ -1,4 +1,4 @@
-"""The sweeps of SIX, Section III, around the home pose, with the transfers between them and the rests after them."""
+"""The sweeps of the paper SIX, Section III, around the home pose, with transfers between them and rests after them."""
 
 import math
 from collections.abc import Collection, Iterable, Iterator, Sequence
@@ -36,9 +36,9 @@ WRIST_1, WRIST_2, WRIST_3 = (JOINT_NAMES.index(name) for name in ("wrist_1", "wr
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """A sweep order: the stations in turn, each in the `directions`.
+    """An order of sweeps: the poses `stations` in turn, and in each the sweeps in all `directions` of a repeat.
 
-    `alternates`: whether every second station has them reversed.
+    `alternates`: whether every second station has the directions in reverse.
     """
 
     stations: tuple[SweepPose, ...]
@@ -49,14 +49,15 @@ class Order:
 def plan_six_observation(
     arm: ArmSection, procedure: SixSweepsSection, start_q_rad: Joints | None = None, done: Collection[int] = ()
 ) -> Plan:
-    """Plan the movement of SIX, Section III: each wrist in turn rotates in one direction, rests, rotates back, rests.
+    """Plan the paper's movement (SIX, Section III): each wrist in turn rotates, rests, rotates back, rests.
 
     With `axes: 6` wrist 1 turns about three more axes, with wrists 2 and 3 turned. With several speeds, all sweeps are
     made at each speed. A sweep turns by `arc_deg` about the home pose, one revolution by default. An order and
     directions that the file leaves open are chosen for the least effect of a steady drift of the bias (`drift_effect`).
-    The whole series repeats `procedure.repeats` times, in each stage with its wrists. `start_q_rad` is the arm's pose
-    (home if None); from there the plan first goes home slowly, and it ends at home. `done`: the indices of finished
-    sweeps, which are left out. The turner's `problems` checks limits. Raise Refused `axes_do_not_span`.
+    The whole series repeats `procedure.repeats` times, and does so in each stage, with the wrists of that stage.
+    `start_q_rad` is the arm's pose (home if None); from there the plan first goes home slowly, and it ends at home.
+    `done`: the indices of finished sweeps, which are left out. The turner's `problems` checks limits. Raise Refused
+    `axes_do_not_span`.
     """
     home = find_home(arm)
     swept = _order_sweeps(arm, procedure)
@@ -93,7 +94,7 @@ def _axes_of_items(mounted: Iterable[Mounted]) -> Iterator[Array]:
 
 
 def _trials(sweeps: Sequence[Sweep], home: Joints) -> Iterator[Step]:
-    """Yield a small turn of each swept joint, and its reverse; they show the item's mounting."""
+    """Yield a small turn of each swept joint and back, by which the sensors show how the item is mounted."""
     for joint, name in dict.fromkeys((sweep.joint, sweep.joint_name) for sweep in sweeps):
         station = SweepPose(joint, name, home)
         yield from trial(f"trial of {name}", f"back from the trial of {name}", station, TRIAL_RAD, TRIAL_PACE)
@@ -101,7 +102,7 @@ def _trials(sweeps: Sequence[Sweep], home: Joints) -> Iterator[Step]:
 
 @lru_cache(maxsize=16)
 def _order_sweeps(arm: ArmSection, procedure: SixSweepsSection) -> tuple[Sweep, ...]:
-    """Return all sweeps in the file's order or, if it states none, in the best order: by direction, then by wrist."""
+    """Return all sweeps in the order that the file states, or else in the order with the least effect of a drift."""
     home = find_home(arm)
 
     def harm(order: Order) -> float:
@@ -129,7 +130,8 @@ def _order_sweeps(arm: ArmSection, procedure: SixSweepsSection) -> tuple[Sweep, 
 def _stations(home: Joints, procedure: SixSweepsSection, order: Sequence[str]) -> tuple[SweepPose, ...]:
     """Return the sweep poses in the order of the wrists.
 
-    Wrist 1 has further poses with the other wrists turned: wrist 2 by 45°, to move the flange away from the forearm.
+    Wrist 1 has further poses, in which the other wrists are turned. Wrist 2 is then turned by 45°, to move the flange
+    away from the forearm.
     """
     tilt_rad = math.radians(-45 if math.sin(home[WRIST_2]) > 0 else 45)
     offsets = ((tilt_rad, 0.0), (tilt_rad, math.pi / 2), (0.0, math.pi / 4)) if procedure.axes == 6 else ()

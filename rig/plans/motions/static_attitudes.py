@@ -1,4 +1,4 @@
-"""Attitudes in which the arm rests, one after the other, for TRIAX's calibration of an accelerometer."""
+"""Attitudes in which the arm rests, one after the other, to calibrate an accelerometer as in the paper TRIAX."""
 
 from collections.abc import Collection, Iterator
 from functools import lru_cache

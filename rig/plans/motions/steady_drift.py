@@ -16,7 +16,7 @@ NEGLIGIBLE_RATIO = 1e-6  # to the largest singular value: directions that attitu
 
 @dataclass(frozen=True, slots=True)
 class PlannedAverage:
-    """A planned average: the flange's rate, the arm's pose (for a sweep, at its start), its middle and duration.
+    """A planned average: the flange's rate, the arm's pose (of a sweep, at the start), and the middle and duration.
 
     `on_the_way`: poses evenly along an arc; empty for whole turns.
     """
@@ -32,8 +32,8 @@ def drift_effect(steps: Sequence[Step]) -> float:
     """Return the change of the calibration, rad/s, for a bias that rises by 1 rad/s from first sweep to last step.
 
     The vector model m = F ω + c (+ G a if there are rests; `rig.estimation.gyroscope.vector_model`) is fitted to this
-    ramp, which is zero in its middle. The changes of scale, at the mean speed of the sweeps, and of bias are added in
-    quadrature. The base is upright; weights are for white noise.
+    ramp of the bias, with zero mean. The result is the root of the sum of squares of the changes of scale, at the mean
+    speed of the sweeps, and of bias. The base is upright; weights are for white noise.
     """
     looks = list(_list_averages(steps))
     rates = np.array([look.rate_rad_s for look in looks])

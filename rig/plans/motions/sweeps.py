@@ -60,7 +60,10 @@ def sweep_about(index: int, station: SweepPose, direction: Direction, axis_flang
 def connect_sweeps(
     sweeps: Sequence[Sweep], home: Joints, pace: Pace, rest_s: float, is_clear: Callable[[Joints, Joints], bool]
 ) -> Iterator[Step]:
-    """Yield sweeps, rests after them and transfers between (through home if not clear), from home and back."""
+    """Yield sweeps with the rests after them and the transfers between them, from home and back.
+
+    A transfer leads through home if the direct way is not clear.
+    """
     pose = home
     for sweep in sweeps:
         if not is_clear(pose, sweep.start_q_rad):
@@ -75,7 +78,7 @@ def connect_sweeps(
 
 
 def trial(name: str, return_name: str, station: SweepPose, by_rad: float, pace: Pace) -> Iterator[Transfer]:
-    """Yield a small turn and its reverse, under these names; they show the item's mounting."""
+    """Yield a small turn and its reverse, with these names, by which the sensors show how the item is mounted."""
     home, tried = station.pose_q_rad, station.rotate_joint(by_rad)
     for step in transfer(name, home, tried, pace):
         yield replace(step, tries=True)
@@ -88,7 +91,7 @@ def build_stages(
     steps_of: Callable[[Sequence[Sweep]], Iterable[Step]],
     done: Collection[int],
 ) -> Plan:
-    """Return the approach, then every stage: its remaining sweeps, from home and back.
+    """Return the plan of the approach, then of every stage's remaining sweeps, from home and back.
 
     Sweeps are numbered through all stages; those in `done` are left out. A stage without remaining sweeps has no steps.
     """

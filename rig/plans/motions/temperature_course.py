@@ -1,8 +1,8 @@
 """The temperatures that a calibration over temperature still lacks. Pure.
 
-The sensors go from one end of the range to the other, and back if both directions are wanted. The temperature of a set
-of sweeps is the mean of its temperatures. Neighbouring sets may be at most `max_step_k` apart, and the outermost ones
-at most a quarter of that from the ends of the range.
+The sensors go from one end of the range to the other, and back if both directions are wanted. At intervals the arm
+makes a set of sweeps, whose temperature is the mean over the set. Sets with neighbouring temperatures may be at most
+`max_step_k` apart, and the coldest and the warmest set at most a quarter of that from the ends of the range.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -20,9 +20,9 @@ INTEGRAL_TIME_S = 30.0  # of the controller
 
 @dataclass(slots=True)
 class TemperatureCourse:
-    """The course through a range of temperatures with gaps of at most `max_step_k`.
+    """The course through a range of temperatures, in which sets of sweeps are at most `max_step_k` apart.
 
-    `sets`: the measured sets. `warming`: the present direction, None before a temperature is known.
+    `sets`: the measured sets of sweeps. `warming`: the present direction, None before a temperature is known.
     """
 
     from_c: float
@@ -33,7 +33,7 @@ class TemperatureCourse:
     warming: bool | None = None
 
     def begin(self, temperature_c: float) -> None:
-        """Choose the direction: the interrupted run's, or away from the nearer end of the range."""
+        """Choose the direction: that of an interrupted run, or else away from the nearer end of the range."""
         self.warming = temperature_c <= (self.from_c + self.to_c) / 2
         if self.sets:
             self.warming = self.sets[-1].warming
@@ -51,7 +51,7 @@ class TemperatureCourse:
             self.warming = True
 
     def is_due(self, now_c: Mapping[str, float]) -> bool:
-        """Return whether the sensors have changed enough for the next set, or the course has ended."""
+        """Return whether the sensors' temperatures have changed enough for the next set, or have reached the end."""
         if not self.sets:
             return True
         if min(now_c.values()) >= self.to_c if self.warming else max(now_c.values()) <= self.from_c:
@@ -85,7 +85,7 @@ class TemperatureCourse:
                     yield f"{name} was never between {gap[0]:.1f} and {gap[1]:.1f} °C {words}".strip()
 
     def _sets_in(self, direction: bool | None) -> list[SetMeasured]:
-        """Return the sets in a direction, or all; a set at a reversal belongs to both directions."""
+        """Return the sets in a `direction`, or all if None; a set at a reversal belongs to both directions."""
         pairs = zip_longest(self.sets, self.sets[1:])
         return [
             step
@@ -94,7 +94,7 @@ class TemperatureCourse:
         ]
 
     def _gap(self, temperatures_c: Sequence[float]) -> tuple[float, float] | None:
-        """Return the first gap between sets, counted from the cold end, or None."""
+        """Return the coldest interval without a set that is too wide, from rising temperatures of the sets, or None."""
         end_k = END_FRACTION * self.max_step_k
         if temperatures_c[0] > self.from_c + end_k:
             return self.from_c, temperatures_c[0]
@@ -106,9 +106,9 @@ class TemperatureCourse:
 
 @dataclass(slots=True)
 class Ramp:
-    """The setpoint that a heater follows, and the power for it: 0 to `most_power`.
+    """The setpoint that a heater follows, and the power that this needs, from 0 to `most_power`.
 
-    The setpoint changes at `rate_k_s`, and waits for a sensor that cannot follow.
+    The setpoint `wanted_c` changes at `rate_k_s`, but waits for a sensor that cannot follow.
     """
 
     rate_k_s: float

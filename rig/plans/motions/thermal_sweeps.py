@@ -21,7 +21,7 @@ def plan_thermal(
     start_q_rad: Joints | None = None,
     done: Collection[int] = (),
 ) -> Plan:
-    """Plan the sets in sequence, at most `procedure.repeats` of them, each from home and back.
+    """Plan sets of sweeps and attitudes one after the other, at most `procedure.repeats` sets, each from home and back.
 
     Before each set the arm rests at home until the temperature is right. A set that is incomplete in `done` is
     repeated, because its sweeps belong to one temperature. Raise Refused `axes_do_not_span`.
@@ -35,7 +35,7 @@ def plan_thermal(
 
 
 def _sets(arm: ArmSection, procedure: ThermalSection) -> Iterator[list[Step]]:
-    """Yield the steps of each set: one repeat of the sweeps, then the attitudes, numbered on from set to set."""
+    """Yield the steps of each set: one series of the sweeps, then the attitudes; numbers continue from set to set."""
     sweeps = len(plan_six_observation(arm, procedure).sweeps)
     in_each, attitudes = sweeps // procedure.repeats, len(procedure.attitudes) if procedure.with_attitudes else 0
     for number in range(procedure.repeats):
