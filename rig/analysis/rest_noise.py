@@ -55,9 +55,7 @@ class SensorAtRest:
 def rest_noises(runs: Sequence[RunData]) -> dict[str, SensorAtRest]:
     """Return the noise of every sensor with rates, by name, over all recordings of a run.
 
-    Readings corrected by the board are left out.
-
-    Raise Fault as `motion_of` and `synchronize_stream` do.
+    Readings corrected by the board are left out. Raise Fault as `motion_of` and `synchronize_stream` do.
     """
     motions = [motion_of(run) for run in runs]
     results = {}

@@ -19,10 +19,7 @@ AXIS_ORDER = np.roll(np.eye(3), -1, axis=1) - np.roll(np.eye(3), 1, axis=1)
 
 @dataclass(frozen=True, slots=True)
 class SensorAxes:
-    """The axes of F: `scale` factors (3,), and `axes` (3, 3), whose rows are unit vectors.
-
-    `mounting` (3, 3) is the rotation nearest to `axes`.
-    """
+    """The axes of F: `scale` (3,), `axes` (3, 3) with unit vectors as rows, and their nearest rotation `mounting`."""
 
     scale: Array
     axes: Array
@@ -77,9 +74,9 @@ def nearest_rotation(axes: Array) -> Array:
 
 
 def parameter_jacobian(matrix: Array, scale: Array) -> Array:
-    """Return the derivative (6, 12) of k and b of m = F ω + c with respect to F, row by row, and c.
+    """Return the derivative (6, 12) of scale k and bias b = −c with respect to F, row by row, and c.
 
-    Axis i has the scale factor k = 1/‖F_i‖, so δk = −k³ F_i·δF_i, and the bias b = −c, so δb = −δc.
+    k = 1/‖F_i‖ of axis i changes by δk = −k³ F_i·δF_i.
     """
     jacobian = np.zeros((6, 12))
     jacobian[:3, :9].reshape(3, 3, 3)[PAIR_INDICES, PAIR_INDICES] = -(scale**3)[:, None] * matrix

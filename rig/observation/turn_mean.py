@@ -80,10 +80,7 @@ class Lines:
 
 
 def turn_mean(readings: Array, steps: Steps, turn: SampledTurn) -> tuple[Mean, Array]:
-    """Return the mean of readings (n, 3) with resolution `steps`, and the weights (n,), also of the arm's mean rate.
-
-    The arm's rates need the same weights, because a vibration then has the same effect on both means.
-    """
+    """Return the mean of readings (n, 3) with resolution `steps`, and the weights (n,), also for the arm's rates."""
     ones = whole(readings)
     steady = np.column_stack([ones, turn.regressors])
     lines = _find_turn_lines(readings, steady, turn)

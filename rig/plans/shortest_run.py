@@ -217,11 +217,7 @@ class _TurnerSearch:
         return candidates
 
     def select_endless(self, candidates: Sequence[Candidate]) -> Sequence[Candidate]:
-        """Return each family's candidates whose predictions without `per_repeat` are those of unlimited length.
-
-        These have the largest angle and dwell, and as many repeats as are predicted. Rests are the shortest or the
-        longest ones, because either may be better if the bias drifts.
-        """
+        """Return each family's largest candidates, with up to two repeats, and the shortest or the longest rests."""
         selected = {
             (candidate.family, candidate.rests_s): candidate
             for candidate in sorted(candidates, key=lambda candidate: candidate.sizes)

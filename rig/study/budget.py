@@ -113,9 +113,8 @@ def _simulate_session(effects: Effects, rng: np.random.Generator) -> Array:
 
         m = K⁻¹ A ω − b + G f + drift + noise
 
-    are the mean readings, with the scale factors K, the sensor's axes A, the true rates ω, the bias b, the
-    g-sensitivity G and the specific force f; nonlinearity and temperature also change A ω and the drift. The solver
-    gets the nominal motion, with rates by the controller's wrong clock.
+    are the mean readings (K scale factors, A axes, ω true rates, b bias, G f effect of gravity); the solver gets the
+    nominal motion, with rates by the controller's wrong clock.
     """
     scale, bias = rng.uniform(0.9, 1.1, 3), rng.uniform(-0.02, 0.02, 3)
     true = _build_session(rng.normal(0, effects.axis_rad, (3, 2)), effects.speed_rad_s)

@@ -90,7 +90,7 @@ def _solve(means: Array, attitudes: Array, *, second_order: bool) -> TriaxialSol
 
 
 def _simulate_drift(seed: int) -> list[dict[str, Any]]:
-    """Return repeats as in TRIAX, Fig. 6: a jump after the first repeat, then almost no change."""
+    """Return repeats as in the paper's Fig. 6: a jump after the first repeat, then almost no change."""
     sensor = rt.DriftingSensor(
         rt.ACCELEROMETER_MATRIX,
         rt.ACCELEROMETER_REFERENCE_M_S2,

@@ -158,10 +158,7 @@ def find_drift_errors(rows: list[dict[str, Any]], column_unit: str, unit: str) -
 def build_parameter_rows(
     kind: str, names: Mapping[str, tuple[str, float]], truth: Array, estimates: Array, stated: Array
 ) -> list[dict[str, Any]]:
-    """Return one row per parameter, from `estimates` (runs, p) and their `stated` standard deviations (p,).
-
-    `names`: each parameter's unit and the unit's size, by the parameter's name.
-    """
+    """Return one row per parameter from `estimates` (runs, p) and `stated` stds (p,); `names`: unit and unit's size."""
     return [
         {
             "noise": kind,

@@ -62,7 +62,7 @@ def _simulate_gyroscope(runs: int, rng: np.random.Generator, _: int) -> Array:
 
 
 def _findings(rows: list[dict[str, Any]]) -> tuple[StudyFinding, ...]:
-    """Return the slopes of the doubly logarithmic plot: errors are powers of the speed, not exponentials as in SIX."""
+    """Return the slopes of the doubly logarithmic plot: errors are powers of the speed; the paper says exponentials."""
     findings = []
     for duration in DURATIONS:
         chosen = [row for row in rows if row["samples"] == duration and row["noise_rad_s"] == sim.NOISE_LEVELS_RAD_S[0]]

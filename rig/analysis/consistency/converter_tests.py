@@ -131,10 +131,7 @@ def _count_constant_bits(counts: NDArray[np.int64]) -> int:
 
 
 def _count_uneven_bits(windows: Sequence[RawReadings], noise: Array, critical_value: float) -> int:
-    """Count the bits of all axes that are well below the noise, but not set in half of the readings.
-
-    The lowest bits of a large number in single precision are rounded, so they are not tested.
-    """
+    """Count the bits of all axes that are well below the noise, but not set in half of the readings."""
     uneven = 0
     counts = np.concatenate([window.counts for window in windows])
     for axis in range(3):

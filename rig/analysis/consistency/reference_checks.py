@@ -84,10 +84,7 @@ class WhitenedReference:
     def minimal_detectable_size(
         self, fault_patterns: Array, alternatives: Sequence[Array], false_alarm_probability: float
     ) -> float:
-        """Return the minimal detectable size of a fault that adds `fault_patterns` (n, k) per unit to the readings.
-
-        `alternatives` are the columns of the tests that may detect the fault.
-        """
+        """Return the minimal size of a fault, with `fault_patterns` (n, k) per unit, that `alternatives` detect."""
         model = self._extend_model(())
         delta_rad = self._estimate_delta(model)
         size = np.sqrt(1 + delta_rad**2 * self.growth)[:, None]

@@ -1,4 +1,4 @@
-"""The calibration of gyroscope, accelerometer and magnetometer from readings in known attitudes (TRIAX)."""
+"""The calibration of gyroscope, accelerometer and magnetometer in known attitudes, as in the paper TRIAX."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace

@@ -47,10 +47,7 @@ def solve_unless_inverted(attitudes: Array, solve: Callable[[Array], Solved], co
 
 
 def _find_order(attitudes: Array, solve: Callable[[Array], Solved], inverted: Solved) -> Fault:
-    """Return the error of wrongly ordered or of inverse quaternions, whichever brings the sensor's axes to the body's.
-
-    `inverted` is the solution with the inverse attitudes.
-    """
+    """Return the error for reordered or for inverse quaternions, whichever brings the sensor's axes near the body's."""
     try:
         reordered = solve(_read_scalar_last(attitudes))
     except Fault:

@@ -67,10 +67,7 @@ def _stack_rotations(postures: Sequence[Posture], arm: DenavitHartenberg, mounti
 
 
 def _rotations(posture: Posture, arm: DenavitHartenberg, mounting: Array) -> Array:
-    """Return a dwell's 3 or a sweep's 10 errors (18, 3 or 10) per radian of each of 18 wrist errors.
-
-    The 3 or 10 are in the order of `rig.estimation.reference.accelerometer_model.effects`.
-    """
+    """Return the errors (18, 3 or 10) of a dwell or a sweep, as in `Movement.arm_turns`, per radian of wrist error."""
     in_base = flange_errors(posture.q_rad, arm)
     in_flange = in_base @ (mounting @ flange_attitude(posture.q_rad, arm)).T
     if posture.wrist is None:

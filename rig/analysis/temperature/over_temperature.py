@@ -108,10 +108,7 @@ def add_acceleration_polynomials(
 def _combine(
     quantity: Quantity, polynomials: OverTemperature, parameters: Array, budget: Budget
 ) -> tuple[Budget, OverTemperature]:
-    """Return the budget with the polynomials' fit as a contributor, and the polynomials with the budget's contributors.
-
-    `parameters` (6,) are scale and bias of the solution at the reference temperature.
-    """
+    """Return the budget with the polynomials' fit as a contributor, and the polynomials with the budget's as theirs."""
     sign = np.diag(quantity.parameter_signs)
     values = sign @ parameters
     lines = tuple(

@@ -46,9 +46,7 @@ UNREDUCED_STDS = ("of_angle", "walk_rad_s_sqrt_s")  # these errors exist even if
 
 @dataclass(frozen=True, slots=True)
 class GraphFit:
-    """The converged graph, with the `covariance` (p, p) of its p unknowns.
-
-    `chi_square` and its degrees of freedom `dof` are of all factors except the priors."""
+    """The converged graph, the unknowns' `covariance` (p, p), and `chi_square` with `dof`, both without the priors."""
 
     session: HandRecording
     conditions: SessionConditions

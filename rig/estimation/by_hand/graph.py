@@ -223,10 +223,7 @@ def reading_noise(session: HandRecording) -> float:
 
 
 def _hand_held_std(scatter: Array, quiet: float, lasting_s: float) -> float:
-    """Return the standard deviation of the mean of a rest held in the hand.
-
-    The `scatter` beyond that of a `quiet` rest is tremor, whose bandwidth limits how many values of it are independent.
-    """
+    """Return the std of the mean of a rest held in the hand, due to tremor: the `scatter` beyond a `quiet` rest's."""
     beyond = float(np.mean(scatter**2)) - (QUIET_SCATTER_RATIO * quiet) ** 2
     return float(np.sqrt(max(beyond, 0.0) / max(TREMOR_BANDWIDTH_HZ * lasting_s, 1.0)))
 
@@ -256,10 +253,7 @@ def _move(graph: Graph, row: int) -> Factor:
 
 
 def _tilt_factor(graph: Graph, row: int) -> Factor:
-    """Return the factor of a turn by the angle α about a face's normal n, whose mean rate gives F n.
-
-    ∫(m − b) dt/α = F n, with readings m and bias b; the two equations are those in the directions across F n.
-    """
+    """Return the factor of a turn by α about a face's normal n: ∫(m − b) dt/α = F n, in both directions across F n."""
     normal, matrix = graph.faces.up[row], graph.state.matrix
     integral_rad, duration_s = graph.integrals.swept_rad[row], graph.integrals.durations_s[row]
     angle_rad = float(normal @ integral_rad)

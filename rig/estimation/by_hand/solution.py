@@ -244,10 +244,7 @@ def _looseness(fit: GraphFit) -> float:
 
 
 def _find_first_face(session: HandRecording, conditions: SessionConditions, but: GraphFit | None) -> Fault | None:
-    """Return the Fault of a wrong first face if another one gives a session that is consistent, else None.
-
-    `but` is the fit with the stated first face: the other face must fit much better.
-    """
+    """Return the Fault of a wrong first face if another face fits consistently, and better than in `but`, else None."""
     if session.acceleration is not None or conditions.first_face is None:
         return None
     for face in (face for face in FACES if face != conditions.first_face):

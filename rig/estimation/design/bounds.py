@@ -14,9 +14,7 @@ from rig.estimation.sensor_axes import parameter_jacobian
 
 
 def six_observation_bound(scale: ArrayLike, rates_rad_s: ArrayLike, variances_rad2_s2: ArrayLike) -> Array:
-    """Return the Cramér–Rao bound (6, 6) for kx ky kz bx by bz if only ‖g‖ of each sweep is given.
-
-    The model is Eqs. (1) to (4) of the paper SIX: g = K (m + b), m being the mean reading.
+    """Return the Cramér–Rao bound (6, 6) for kx ky kz bx by bz by the paper SIX, Eqs. (1)–(4): only ‖g‖ is given.
 
     `scale` (3,); `rates_rad_s` (N, 3): true g in the sensor frame; `variances_rad2_s2` (N, 3) of the mean readings. The
     two unknown components of a sweep's direction take two of its three readings; the third determines ‖g‖², with the

@@ -101,10 +101,7 @@ class _PlacementFits:
 
 
 def laid_down(theta: Array, placed: AttitudeReadings, unplaced: Array, unplaced_variances: Array) -> PlacementSolution:
-    """Return the solution `theta` (p,) re-estimated by a model that has placement errors.
-
-    `unplaced` (k, 3) are mean readings in unknown attitudes, with `unplaced_variances` (k, 3).
-    """
+    """Re-estimate the solution `theta` (p,) by a model with placement errors; `unplaced` (k, 3) have no attitudes."""
     all_rests = _add_unplaced(theta, placed, unplaced, unplaced_variances)
     free = free_directions(theta, norm_known=all_rests.norm_known)
     linear = _LinearisedPlacements(

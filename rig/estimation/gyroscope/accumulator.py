@@ -80,7 +80,7 @@ class Accumulator:
 
         `mean_rad_s` (3,) is the revolution's mean reading, with the variance `variance_rad2_s2` (3,); `speed_rad_s` is
         its mean speed 2π/T, with the standard deviation `speed_std_rad_s`. The default weight is the inverse variance
-        of ω² − ‖m + b‖² at k = 1 with equal noise on all axes; SIX uses 1. Raise Fault `not_finite`, `bad_speed`,
+        of ω² − ‖m + b‖² at k = 1 with equal noise on all axes; the paper uses 1. Raise Fault `not_finite`, `bad_speed`,
         `zero_reading`, `bad_variance`.
         """
         mean = np.asarray(mean_rad_s, dtype=np.float64)

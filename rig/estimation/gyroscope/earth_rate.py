@@ -1,4 +1,4 @@
-"""The Earth's rate from sweeps and rests of a sufficiently stable gyroscope: TRIAX, section III-A, on an arm.
+"""The Earth's rate from sweeps and rests of a stable gyroscope on an arm, as in section III-A of the paper TRIAX.
 
     m = F (ω + R ω_E) + c (+ G a) + B e
 

@@ -152,10 +152,7 @@ def _find_slopes(time_s: Array, rates: Array) -> _Interval:
 
 
 def _integrate_block(interval: _Interval, at_s: Array, inverse: Array) -> tuple[Array, Array, Array]:
-    """Return C (k + 1, 3, 3), S (k + 1, 3, 12) and rates (k, 3) at the times `at_s` (k,), C and S also at the end.
-
-    C and S are relative to the block's start.
-    """
+    """Return C (k + 1, 3, 3) and S (k + 1, 3, 12) since the block's start at `at_s` (k,) and its end, and k rates."""
     before = np.clip(np.searchsorted(interval.time_s, at_s, side="right") - 1, 0, len(interval.time_s) - 2)
     whole = _whole_steps(interval)
     attitudes = _running_product(whole.vectors)

@@ -1,4 +1,4 @@
-"""The six-observation model solved by Levenberg–Marquardt, with which SIX compares Algorithm 1 (Figs. 2 and 5).
+"""The six-observation model solved by Levenberg–Marquardt, with which the paper SIX compares its Algorithm 1.
 
 The residuals are ω² − ‖K (m + b)‖², Eqs. (2)–(4), weighted if weights are given, in the six parameters themselves, so
 that β0 is not an unknown. With six sweeps the solution equals that of `closed_form`, except for rounding.
@@ -49,7 +49,7 @@ def solve_levenberg_marquardt(
     """Solve by `scipy.optimize.least_squares(method="lm")` with the exact Jacobian, from k = 1, b = −(mean m).
 
     `means_rad_s`, `variances_rad2_s2` (N, 3): mean readings of N ≥ 6 sweeps and the variances of these means;
-    `speeds_rad_s`, `speed_std_rad_s` (N,). Weights are the inverse variances of ω² at k = 1; SIX uses equal weights.
+    `speeds_rad_s`, `speed_std_rad_s` (N,). Weights are the inverse variances of ω² at k = 1; the paper has equal ones.
 
     Raise Fault `too_few_observations`, `not_finite`, `bad_variance`, `bad_speed`, `zero_reading`,
     `duplicated_observation`, `lm_did_not_converge`, `rank_deficient`, `ill_conditioned`, `wrong_unit`,
@@ -114,7 +114,7 @@ def _conditioning(unit_means: Array, noise: float) -> refusals.Conditioning:
 
 
 def compute_squared_rate(theta: Array, means: Array) -> Array:
-    """Return ‖K (m + b)‖² (N,) of mean readings (N, 3) for θ = [k b] (6,): SIX, Eqs. (1), (2)."""
+    """Return ‖K (m + b)‖² (N,) of mean readings (N, 3) for θ = [k b] (6,), the paper's Eqs. (1), (2)."""
     return np.asarray(np.sum((theta[:3] * (means + theta[3:])) ** 2, axis=-1), dtype=np.float64)
 
 

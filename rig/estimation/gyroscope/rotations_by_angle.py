@@ -202,10 +202,7 @@ def _equate_mean(mean: RateMean, gyroscope: Gyroscope, state: _TurnsEstimate) ->
 def _equate_rotation(
     turn: Turn, rotation: Array, jacobian: Array, gyroscope: Gyroscope, state: _TurnsEstimate
 ) -> _ObservationEquations:
-    """Return a turn's five equations: three for its integrated `rotation` (3, 3), two for its mean reading.
-
-    The two are for the components across F n, as in this module's docstring. `jacobian` (3, 12) is J.
-    """
+    """Return a turn's five equations: three for the integrated `rotation`, two for the mean reading across F n."""
     from scipy.spatial.transform import Rotation
 
     time_s = gyroscope.time_s

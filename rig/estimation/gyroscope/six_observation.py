@@ -29,7 +29,7 @@ NEWTON_LIMIT = 20
 
 
 def design(means_rad_s: ArrayLike) -> Array:
-    """Return X (…, 6) = [mx² my² mz² mx my mz] of mean readings (…, 3) in rad/s: SIX, Eq. (7), squares first."""
+    """Return X (…, 6) = [mx² my² mz² mx my mz] of mean readings (…, 3) in rad/s: the paper's Eq. (7), squares first."""
     means = np.asarray(means_rad_s, dtype=np.float64)
     return np.concatenate([means * means, means], axis=-1)
 
@@ -71,7 +71,7 @@ def solve_by_newton(p: Array, q: Array, square_rad2_s2: float) -> tuple[Array, i
 
 
 def solve_by_algorithm_1(p: Array, q: Array) -> tuple[Array, int]:
-    """Return β (6,) and the number of passes by SIX, Algorithm 1, as published.
+    """Return β (6,) and the number of passes by the paper's Algorithm 1, as published.
 
     β ← (XᵀX)⁻¹Xᵀ(ω² − γ) = p − γ q and γ ← Γ(β), beginning with γ = 0, until Σ|Δβ| ≤ 10⁻⁶; the first β is pass 1. Each
     pass shrinks the step by β0 / (ω² − β0), so it converges only for β0 < ω²/2 (at 1 rad/s this is the paper's "β0 <

@@ -52,7 +52,7 @@ def newton_batch(means_rad_s: ArrayLike, speeds_rad_s: ArrayLike) -> BatchSoluti
 
 
 def algorithm_1_batch(means_rad_s: ArrayLike, speeds_rad_s: ArrayLike) -> BatchSolution:
-    """Solve every run by SIX, Algorithm 1, as published; `iterations` counts as `solve_by_algorithm_1` does.
+    """Solve every run by the paper's Algorithm 1, as published; `iterations` counts as `solve_by_algorithm_1` does.
 
     `means_rad_s` (R, N, 3); `speeds_rad_s` (N,) or (R, N).
     """

@@ -3,10 +3,10 @@
     m = F ω + c (+ G a),   F_i = a_i / k_i,   c = −b
 
 m is the mean reading (rad/s), ω the mean angular rate in the flange frame (unit axis × speed, zero for a rest), a_i the
-unit vector of sensor axis i in the flange frame. It is g = K (m + b), as in SIX, with a known direction of g: k_i = 1 /
-‖row i of F‖ and b = −c, so every sweep and every rest determines all three biases. The mounting rotation and the
-non-orthogonality of the axes are estimated, not assumed. With gravity in the flange frame (m/s²) given, G (3×3, rad/s
-per m/s²) is the g-sensitivity.
+unit vector of sensor axis i in the flange frame. It is the model g = K (m + b) of the paper SIX with a known direction
+of g: k_i = 1 / ‖row i of F‖ and b = −c, so every sweep and every rest determines all three biases. The mounting
+rotation and the non-orthogonality of the axes are estimated, not assumed. If the apparent gravity a in the flange
+frame (m/s²) is given, G (3×3, rad/s per m/s²) is the g-sensitivity.
 
 The equations are linear in F, c and G, one weighted regression for each axis (Aitken's generalised least squares):
 efficient if the noise is Gaussian.
@@ -217,10 +217,7 @@ def _unit(design: Array) -> Array:
 
 
 def regress(design: Array, means: Array, variances: Array, shared: Array | None = None) -> tuple[Array, Array]:
-    """Return coefficients (…, p, 3) and the map (…, 3, p, N) from means to them, for each axis.
-
-    `shared` (N, N) is a covariance of the means in addition to their `variances`.
-    """
+    """Return coefficients (…, p, 3) and each axis's map (…, 3, p, N) to them; `shared` (N, N) adds to the variances."""
     transposed = np.swapaxes(design, -1, -2)[..., None, :, :]
     if shared is None:
         weights = 1 / np.swapaxes(variances, -1, -2)  # (…, 3, N)

@@ -319,11 +319,7 @@ def _read(changes: Array, s: Array, theta: Array, movement: Movement) -> Array:
 
 
 def _product(one: Array, other: Array, movement: Movement) -> Array:
-    """Return the elementwise product (K, 3, …) of two quantities in dwells and sweeps.
-
-    In sweeps, given as mean, cosine and sine over the angle, two Fourier series are multiplied; the product's second
-    harmonic is dropped.
-    """
+    """Return the elementwise product (K, 3, …); in sweeps that of two Fourier series, without its second harmonic."""
     count = len(movement.dwells.readings_m_s2)
     mean, cos, sin = np.moveaxis(_harmonics_of_sweeps(one, movement), 1, 0)
     others = np.moveaxis(_harmonics_of_sweeps(other, movement), 1, 0)

@@ -135,10 +135,7 @@ def effects(theta: Array, attitudes: Array, v_bar: Array) -> Array:
 
 
 def find_whiteners(variances: Array, rotations: Array, std_rad: Array) -> Array:
-    """Return whiteners (N, 3, 3) for noise `variances` (N, 3) and attitude errors `std_rad` (N,).
-
-    `rotations` (N, 3, 3) are E, the effects of small rotations on the readings.
-    """
+    """Return whiteners (N, 3, 3) for noise `variances` (N, 3) and attitude errors `std_rad` (N,); `rotations` are E."""
     scaled = rotations * std_rad[:, None, None]
     covariance = np.eye(3) * variances[:, :, None] + scaled @ np.swapaxes(scaled, -1, -2)
     return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)), dtype=np.float64)
@@ -202,10 +199,7 @@ def maximise_likelihood(
 
 
 def _find_uncertainty(delta: float, fit: Array, rotations: Array) -> float:
-    """Return δ's std from the expected information on δ², which is tr((P G)²)/2.
-
-    G is E Eᵀ, with E `rotations`, and P the residual maker of `fit`, the whitened derivatives.
-    """
+    """Return δ's std from the expected information on δ²: tr((P G)²)/2 with G = E Eᵀ, P being the residual maker."""
     orthogonal = np.linalg.qr(fit)[0].reshape(*rotations.shape[:2], -1)
     growth = rotations @ np.swapaxes(rotations, -1, -2)
     grown = growth @ orthogonal

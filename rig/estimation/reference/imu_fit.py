@@ -31,10 +31,7 @@ DISTURBANCE_ODDS = 1 / 19  # prior: one dwell or sweep is disturbed, or all swee
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """A fit: parameters θ (22,), attitude error δ `std_rad`, and Jacobian (3 K, q) in the `free` directions (22, q).
-
-    `readings` decorrelates the K readings; `iterations` counts Gauss–Newton steps.
-    """
+    """A fit: parameters θ (22,), attitude error δ `std_rad`, and Jacobian (3 K, q) in the `free` directions (22, q)."""
 
     theta: Array
     readings: Decorrelation

@@ -1,4 +1,4 @@
-"""The initial values of the fit of sweeps and attitudes: TRIAX, Eqs. (4) and (5), with the lever arm; linear.
+"""The linear initial values of the fit of sweeps and attitudes: Eqs. (4), (5) of the paper TRIAX, with a lever arm.
 
     F⁻¹ m − A v_ref − L (p + r) − b* = 0,   b* = F⁻¹ b
 
@@ -27,9 +27,7 @@ REMEDY = "Take attitudes turned about at least two axes, or sweep about more axe
 
 
 def linear_start(movement: Movement, norm: float, up: Array) -> Array:
-    """Return the initial parameters θ (22,): F, the specific force at rest v_ref, b and the lever arm; the rest is 0.
-
-    v_ref has the length `norm` and a positive product with `up` (3,), which determines its sign.
+    """Return the initial θ (22,); the reference v_ref in it has the length `norm` and a positive product with `up`.
 
     Raise Fault `rank_deficient`, `ill_conditioned`, `sign_unknown`.
     """

@@ -1,9 +1,9 @@
-"""A magnetometer turned in a constant field, with the iron fixed to it: TRIAX, Eq. (7).
+"""A magnetometer turned in a constant field, with iron fixed to the magnetometer: Eq. (7) of the paper TRIAX.
 
     m_m = F Rᵀ m + b,   F = M C_NO C_SI,   b = M C_NO b_HI + b_O
 
 C_SI and b_HI are the soft and hard iron, C_NO the non-orthogonality, M the scale factors, b_O the sensor's own offset.
-(Below Eq. (7) TRIAX writes S for M.) Only the products F and b are identifiable: the correction m = F⁻¹ (m_m − b)
+(Below Eq. (7) the paper writes S for M.) Only the products F and b are identifiable: the correction m = F⁻¹ (m_m − b)
 removes the effects of iron and sensor together.
 """
 

@@ -17,10 +17,7 @@ from rig.estimation.reference.attitude_error import AttitudeError, maximise_like
 
 @dataclass(frozen=True, slots=True)
 class Decorrelation:
-    """The map `transform` (n, n) from readings to independent ones.
-
-    If the shared errors have the standard deviation δ, their variances are 1 + δ² `growth` (n,).
-    """
+    """The map `transform` (n, n) from readings to independent readings of variances 1 + δ² γ; `growth` (n,) is γ."""
 
     transform: Array
     growth: Array
@@ -31,10 +28,7 @@ class Decorrelation:
 
 
 def decorrelate(noise: Array, effects: Array) -> Decorrelation:
-    """Return the decorrelation of readings with the noise V (n, n) and shared errors of the `effects` E (n, P).
-
-    Raise LinAlgError for an invalid V.
-    """
+    """Return the decorrelation of readings for V `noise` (n, n) and E `effects`. Raise LinAlgError for an invalid V."""
     whitener = np.asarray(np.linalg.inv(np.linalg.cholesky(noise)), dtype=np.float64)
     scaled = whitener @ effects
     growth, directions = np.linalg.eigh(scaled @ scaled.T)
@@ -55,10 +49,7 @@ def add_uncertainty(readings: Decorrelation, std_rad: float, jacobian: Array) ->
 
 
 def information(growth: Array, std_rad: float, slopes: Array) -> float:
-    """Return the information on δ², which is tr((P G)²)/2 at δ = `std_rad`.
-
-    G = E Eᵀ, and P is the residual maker of whitened `slopes` (n, q), the derivatives of decorrelated readings.
-    """
+    """Return the information on δ²: tr((P G)²)/2 with G = E Eᵀ, P being the residual maker of the slopes (n, q)."""
     variance = 1 + std_rad**2 * growth
     growth = growth / variance
     orthogonal = np.linalg.qr(slopes / np.sqrt(variance)[:, None])[0]

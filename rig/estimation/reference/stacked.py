@@ -1,12 +1,12 @@
-"""The stacked linear problem of TRIAX, Eqs. (4)–(6), with or without the second-order columns of Eq. (11).
+"""The stacked linear problem of the paper TRIAX, Eqs. (4)–(6), with or without second-order columns, Eq. (11).
 
 F⁻¹ v_m − Rᵀ v_ref − b* − φ s² = v̄ with b* = F⁻¹ b is linear in β = [rows of F⁻¹, v_ref, b*, φ]:
 
     X β = V̄,   X = [D(v_m)  −Rᵀ  −I  −diag(s²)]
 
-v̄ ≠ 0: linear least squares, Eq. (6). v̄ = 0: the last right singular vector, Eq. (5), scaled to the given ‖v_ref‖ and
-sign. This vector depends on the units of the columns, which TRIAX does not state; here every block of columns is scaled
-to unit RMS first.
+For v̄ ≠ 0 the solution is by linear least squares, Eq. (6). For v̄ = 0 it is the last right singular vector, Eq. (5),
+scaled to the given ‖v_ref‖ and sign. This vector depends on the units of the columns, which the paper does not state;
+here every block of columns is scaled to unit RMS first.
 
 All functions broadcast over runs: readings (…, N, 3). θ is as in `reference_model`: F itself and b, not their inverses.
 """
@@ -77,7 +77,7 @@ def to_theta(beta: Array) -> Array:
 def estimate_as_published(
     readings: Array, attitudes: Array, prior: ReferencePrior, *, second_order: bool
 ) -> tuple[Array, int]:
-    """Return the parameters θ (…, 15 or 18) by the method as published in TRIAX, and the number of linear solutions.
+    """Return the parameters θ (…, 15 or 18) by the paper's method as published, and the number of linear solutions.
 
     With second-order terms the linear solution is repeated until it converges, with s² computed from the last v_ref.
     """

@@ -48,10 +48,7 @@ class BiasProcess:
         return not self.is_drifting and self.instability_rad_s == 0.0
 
     def covariance(self, windows_s: ArrayLike) -> Array:
-        """Return the covariance (N, N) of the drift's means over windows (N, 2).
-
-        The drift is counted from its mean over the whole time from the first start to the last end.
-        """
+        """Return the covariance (N, N) of the drift's means over windows (N, 2), relative to its mean over all time."""
         walk = self.walk_rad_s_sqrt_s**2 * walk_covariance(windows_s)
         drift: Array = walk + self.scatter_rad_s**2 * np.eye(len(walk))
         return drift if self.instability_rad_s == 0.0 else drift + _flicker(self.instability_rad_s, windows_s)

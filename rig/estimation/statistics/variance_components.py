@@ -299,9 +299,9 @@ def _temper(weights: Array, fewest: float) -> Array:
 
 
 def find_half_width(offsets: Array, variances: Array, weights: Array) -> Array:
-    """Return the half-widths h (q,) within which, from −h to h, 95.45 % of a mixture of normal distributions are.
+    """Return h (q,): 95.45 % of a mixture of normal distributions lie from −h to h.
 
-    The mixture has the means `offsets` and the `variances` (s, q), with the weights (s,).
+    The s distributions of each of q values have means `offsets` and `variances` (s, q), with weights (s,).
     """
     from scipy.special import ndtr
 

@@ -1,4 +1,4 @@
-"""The bias of every repeat of the same attitudes, and the repeats at which it stepped: TRIAX, Figs. 4 and 6.
+"""The bias in every repeat of the same attitudes, and its steps between repeats: Figs. 4 and 6 of the paper TRIAX.
 
 Scale, axes and reference are fixed: their errors, and those of the arm's attitudes, are the same in every repeat of an
 attitude and cancel in the differences between repeats.

@@ -1,4 +1,4 @@
-"""External data in known attitudes: a CSV file of samples and one of attitudes, in TRIAX's format.
+"""External data in known attitudes: a CSV file of samples and one of attitudes.
 
 The file of samples is that of `rig.observation.external.csv_samples`.
 

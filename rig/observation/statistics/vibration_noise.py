@@ -55,10 +55,7 @@ def _columns(residuals: Array, search: LineSearch) -> Array:
 
 
 def estimate_noise(residuals: Array, parameters: int, steps: Steps, memories: Sequence[int]) -> MeanNoise:
-    """Return the noise of readings, from the residuals (n, 3) of a fit of `parameters` columns.
-
-    `memories` are the orders of the autoregressive models to try.
-    """
+    """Return the noise from residuals (n, 3) of a fit of `parameters` columns, by autoregressions of `memories`."""
     scatter = np.maximum(np.sum(residuals**2, axis=0) / (len(residuals) - parameters), steps.variance)
     inflations = [fit_autoregression(axis, memories) for axis in residuals.T]
     return MeanNoise(

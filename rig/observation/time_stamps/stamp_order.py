@@ -286,8 +286,5 @@ def _separate_equal(log: _UnorderedLog) -> _UnorderedLog:
 
 
 def _estimate_usual_delay_s(late_s: Array, interval_s: float) -> float:
-    """Return the largest usual delay, s, of a reading against the most punctual of the readings that follow it.
-
-    Only readings that waited in a buffer have longer delays.
-    """
+    """Return the largest delay, s, of a reading against the most punctual ones after it if no reading was buffered."""
     return DELAY_RATIO * float(np.median(late_s - find_least_ahead(late_s, LONG_WIDTHS[-1]))) + MAX_DELAY * interval_s

@@ -60,10 +60,7 @@ def sweep_about(index: int, station: SweepPose, direction: Direction, axis_flang
 def connect_sweeps(
     sweeps: Sequence[Sweep], home: Joints, pace: Pace, rest_s: float, is_clear: Callable[[Joints, Joints], bool]
 ) -> Iterator[Step]:
-    """Yield sweeps with the rests after them and the transfers between them, from home and back.
-
-    A transfer leads through home if the direct way is not clear.
-    """
+    """Yield sweeps, each with a transfer to it (through home if the direct way is not clear) and a rest, then home."""
     pose = home
     for sweep in sweeps:
         if not is_clear(pose, sweep.start_q_rad):
