@@ -257,7 +257,7 @@ def _gravity_effects(
 ) -> tuple[Array, Array] | None:
     """Return gravity's effects (N, 3) that the corrected readings of sensor and of reference contain.
 
-    The centripetal acceleration acts like gravity. None if the calibration has no g-sensitivity.
+    The centripetal acceleration acts like gravity. Return None if the calibration has no g-sensitivity.
     """
     from rig.analysis.gyroscope.comparison import list_revolutions
 

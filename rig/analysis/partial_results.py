@@ -1,6 +1,6 @@
 """The partial results of a run in progress: observations, refusals, and parameters once they are identifiable.
 
-They are for display: the final result may differ, and the uncertainty includes only the noise.
+Partial results are for display only: the final result may differ, and the uncertainty includes only the noise.
 """
 
 from collections.abc import Mapping, Sequence

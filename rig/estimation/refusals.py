@@ -254,7 +254,7 @@ def untrustworthy_attitudes(what: str, remedy: str = "") -> Fault:
 
 
 def report_inverted() -> Fault:
-    """Return the error for attitudes that are inverted: the readings agree with their inverses."""
+    """Return the error for inverted attitudes, that is, attitudes whose inverses agree with the readings."""
     return Fault(
         "inverted_attitudes",
         "the readings contradict the attitudes and agree with their inverses",

@@ -98,9 +98,9 @@ def _twists(arm: DenavitHartenberg) -> tuple[Array, Array]:
 
 @lru_cache
 def _link_coefficients(arm: DenavitHartenberg) -> Array:
-    """Return coefficients (n, 3, 4, 4): a link's transform is their sum, weighted by cos θ, sin θ, 1 of its joint.
+    """Return three matrices of each link (n, 3, 4, 4), which add up to its transform with weights cos θ, sin θ and 1.
 
-    A link's transform is a rotation about z, translations along z and x, and a rotation about x.
+    The transform is a rotation about z by the joint's angle θ, translations along z and x, and a rotation about x.
     """
     (cos, sin), terms = _twists(arm), np.zeros((arm.joints, 3, 4, 4))
     terms[:, 0, 0, 0], terms[:, 0, 1, 1], terms[:, 0, 1, 2], terms[:, 0, 0, 3] = 1.0, cos, -sin, arm.a_m

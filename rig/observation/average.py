@@ -129,7 +129,7 @@ def convert_stream(raw: NDArray[Any], sensor: RecordedSensor, clock: TimeBase) -
 
 
 def steps_of(raw: NDArray[Any], sensor: RecordedSensor, quantity: Quantity) -> Steps:
-    """Return the resolution steps of a quantity in a sensor's samples (n,): on a board, the converter's."""
+    """Return the resolution steps of a quantity in a sensor's samples (n,); a board's are those of the converter."""
     channel = sensor.channel(quantity)
     return channel.steps(channel.values(raw), trusts_counts=sensor.on_board)
 

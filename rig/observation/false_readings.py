@@ -35,7 +35,7 @@ def check_possible(readings: Array, rows: NDArray[np.intp], quantity: Quantity, 
     """Raise Refused `not_a_number` if a few readings (n, 3) far exceed all others, and the range of most sensors.
 
     `rows` (n,) are the readings' numbers in the file, from 0; messages call the file `where`. Many such readings raise
-    nothing here: they are due to a wrong unit.
+    nothing here, because they are due to a wrong unit.
     """
     if quantity.mistaken is None or not len(readings):
         return

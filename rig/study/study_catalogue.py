@@ -1,4 +1,4 @@
-"""The studies by name. Each is a module with `study(settings) -> Report`, imported only if it is requested."""
+"""The studies by name. Each has a function `study(settings) -> StudyReport` in a module imported only on request."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,6 +1,6 @@
 """Possible faults of readings of a constant reference: the tested alternatives, and fault modes of a given size.
 
-They are the counterpart of `rig.analysis.consistency.alternatives` for accelerometers and magnetometers.
+This is the counterpart of `rig.analysis.consistency.alternatives` for accelerometers and magnetometers.
 """
 
 from collections.abc import Callable

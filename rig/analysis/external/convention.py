@@ -27,7 +27,7 @@ MIN_VERTICAL_GRAVITY = 0.97  # component along the vertical axis of the room
 
 @dataclass(frozen=True, slots=True)
 class Convention:
-    """The convention that fits the gyroscope: delayed by `lag_s`, it explains the fraction `explained` of the rates.
+    """The convention by which the gyroscope explains most of the rates: the fraction `explained`, `lag_s` later.
 
     `scalar_last`: the columns read as qw qx qy qz contain qx qy qz qw. `inverse`: quaternions take room to body
     coordinates. `up`: the room's axis that points upwards, as for `--up`; "" if no accelerometer shows it.

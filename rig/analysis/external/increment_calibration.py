@@ -87,7 +87,7 @@ def solve_turning(turning: Turning, window_s: float | None, *, any_mounting: boo
 
 
 def _solve(turning: Turning, window_s: float | None) -> IncrementCalibration:
-    """Return the solution, by iteration, because its clock offset determines which readings are missing."""
+    """Return the solution by iteration, because the estimated clock offset determines which readings are missing."""
     start = find_start(select_covered(turning)).state
     check_unit(scale_of(start.matrix))
     gathered = gather(turning, window_s, start.clock_s)

@@ -1,6 +1,6 @@
 """The check that the board's average of each sweep agrees with the computer's. Pure.
 
-It detects a mean reading that is paired with a wrong mean rate, which no residual shows.
+The check detects a mean reading that is paired with a wrong mean rate, which no residual shows.
 """
 
 from collections.abc import Sequence

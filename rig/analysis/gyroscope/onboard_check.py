@@ -1,8 +1,9 @@
 """The comparison of the board's own solution with one in double precision from the same observations. Pure.
 
-Both average the same samples (the board reports which) and use the same speeds, so only the board's arithmetic differs.
-If a sample was lost on its way to the host, the board's own mean replaces the host's. The run's calibration differs
-from both: it has weights, removes vibration and uses rests (`rig.analysis.gyroscope.calibration`).
+Board and host average the same samples (the board reports which) and use the same speeds, so that only the arithmetic
+differs. If a sample was lost on its way to the host, the board's own mean replaces the host's. The run's calibration
+differs from both solutions, because it has weights, removes vibration and uses rests
+(`rig.analysis.gyroscope.calibration`).
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence

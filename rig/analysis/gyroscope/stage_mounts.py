@@ -26,8 +26,8 @@ from rig.observation.observed_run import ObservedRun
 class EstimatedMount:
     """The mount of the item in a `stage`, counted from 0, relative to its nominal mount.
 
-    `rotation_rad` (3,): rotation vector from the nominal mount, in the item's axes; `std_rad` (3,): its standard
-    deviations, the stated ones if sweeps do not determine it.
+    `rotation_rad` (3,): rotation vector from the nominal mount, in the item's axes; `std_rad` (3,): the rotation's
+    standard deviations, which are the stated ones if sweeps do not determine the rotation.
     """
 
     stage: int
@@ -79,7 +79,7 @@ def _estimate_mounts(recordings: Sequence[ObservedRun], settings: RunSettings) -
 def _rotation_in_stage(fit: VectorFit, index: int) -> tuple[Array, Array]:
     """Return the item's rotation (3,) in a stage relative to the first, and its standard deviations.
 
-    Both are in units of the stated standard deviation. A rotation of the item rotates all sensed rates oppositely.
+    All are in units of the stated standard deviation. A rotation of the item rotates all sensed rates oppositely.
     """
     size = len(fit.mounts)
     pick = np.zeros((3, size))

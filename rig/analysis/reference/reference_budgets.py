@@ -144,7 +144,8 @@ def lag_pattern(movement: Movement, lag_s: float) -> Array:
 def drift_patterns(matrix: Array, attitudes: Array, drift: FieldDrift | None) -> tuple[Array, float]:
     """Return the patterns (3, 3 N) of a field that changes linearly over the attitudes, and its change in T.
 
-    Each axis of the base has one pattern: one standard uncertainty if the `drift` was tested, else half of the largest.
+    Each axis of the base has one pattern. The change is a standard uncertainty if the `drift` was tested, else an
+    assumed half-width.
     """
     change_t = UNTESTED_DRIFT_T
     if drift is not None:

@@ -217,7 +217,7 @@ def perpendicular_axes(axis: Array) -> Array:
 
 
 def reading_noise(session: HandRecording) -> float:
-    """Return the standard deviation of a reading at rest, rad/s: of all axes, over the quieter half of the rests."""
+    """Return the standard deviation of a reading at rest, rad/s, over all axes and the quieter half of the rests."""
     scatter = sorted(float(np.mean(rest.noise_rad_s**2)) for rest in session.rests)
     return float(np.sqrt(np.mean(scatter[: (len(scatter) + 1) // 2])))
 
@@ -234,7 +234,7 @@ def _rest_columns(row: int) -> tuple[slice, slice]:
 
 
 def _move(graph: Graph, row: int) -> Factor:
-    """Return the factor of a move: the integrated rates must rotate the attitude at its start to that at its end."""
+    """Return the factor of a move, whose integrated rates must rotate the attitude at its start to that at its end."""
     integrals, stds = graph.integrals, graph.stds
     design = np.zeros((3, graph.width))
     (first, first_bias), (second, second_bias) = _rest_columns(row), _rest_columns(row + 1)
@@ -291,7 +291,7 @@ def _bias_walk(graph: Graph, row: int) -> Factor:
 
 
 def _rest(graph: Graph, row: int) -> Factor:
-    """Return the factor of a rest: the gyroscope reads its bias, and its sensitivity times the upward vertical."""
+    """Return the factor of a rest, in which the gyroscope reads its bias plus its sensitivity times the vertical."""
     session, state = graph.session, graph.state
     rest, up = session.rests[row], state.attitudes[row][2]
     design = np.zeros((3, graph.width))
@@ -305,7 +305,7 @@ def _rest(graph: Graph, row: int) -> Factor:
 
 
 def _flat(graph: Graph, row: int, face: int) -> Factor:
-    """Return the factor of a rest on a face: the vertical in the body is the normal of that face."""
+    """Return the factor of a rest on a face, in which the vertical in the body is the normal of that face."""
     state = graph.state
     axis, up = axis_of(FACES[face]), state.attitudes[row][2]
     perpendicular = perpendicular_axes(axis)

@@ -1,4 +1,4 @@
-"""The board's own algorithm for calibration by hand, in double precision: it processes each move once, in order.
+"""The board's own algorithm for calibration by hand, in double precision, which processes each move once, in order.
 
 The equations are those of `firmware_host/firmware/core/by_hand/hand_solver.c`; only the arithmetic differs. The board
 reports the rests and moves, and their faces.
@@ -110,7 +110,7 @@ def _vertical_on_face(centre: Array, face: int) -> tuple[Array, Array]:
 
 
 def _rest_equations(centre: Array, rest: BoardRest, noise_rad_s: float) -> Iterator[Equation]:
-    """Yield the equations of a rest, linear in a step from `centre` (33,): a reading is bias plus gravity's effect."""
+    """Yield the equations of a rest, whose reading is bias plus gravity's effect, for a step from `centre` (33,)."""
     up, _ = _vertical_on_face(centre, rest.face)
     sensitivity = centre[GRAVITY].reshape(3, 3)
     for axis in range(3):
@@ -122,7 +122,7 @@ def _rest_equations(centre: Array, rest: BoardRest, noise_rad_s: float) -> Itera
 
 
 def _move_equations(centre: Array, move: BoardMove) -> Iterator[Equation]:
-    """Yield the equations of a move: its integrated rotation must turn one rest's vertical to the next rest's."""
+    """Yield the equations of a move, whose integrated rotation must turn one rest's vertical to the next rest's."""
     matrix, sensitivity = centre[MATRIX].reshape(3, 3), centre[GRAVITY].reshape(3, 3)
     (up, up_axes), (after, after_axes) = (
         _vertical_on_face(centre, move.before.face),
@@ -161,7 +161,7 @@ def _move_equations(centre: Array, move: BoardMove) -> Iterator[Equation]:
 
 
 def _attitudes(steps: Array) -> tuple[Array, Array]:
-    """Return the attitude (3, 3) after rotation vectors (n, 3), and the attitudes (n, 3, 3) in the middle of each."""
+    """Return the attitude (3, 3) after n rotations by vectors (n, 3), and those (n, 3, 3) in the middle of each."""
     from scipy.spatial.transform import Rotation
 
     halves = np.asarray(Rotation.from_rotvec(steps / 2).as_matrix(), dtype=np.float64)

@@ -197,7 +197,7 @@ def parameter_columns(fit: GraphFit) -> NDArray[np.intp]:
 
 
 def insufficient_session(session: HandRecording, expanded: Array | None) -> Fault:
-    """Return the Fault that explains why a session has no result: unusable moves, or too few."""
+    """Return the Fault of a session that has no result because its moves are unusable or too few."""
     clipped = sum(move.clipped for move in session.moves)
     lost = sum(move.lost for move in session.moves)
     if clipped:

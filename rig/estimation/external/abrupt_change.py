@@ -2,8 +2,8 @@
 
 A change happens before one of the rows, or increments, of a mixed model: the sensor's bias or the scale factors of its
 axes change by δ ~ N(0, size² 1), or the coordinates of a reference's attitudes turn by δ. The ratio of the likelihoods
-with and without such a term is the Bayes factor (Kass and Raftery, J. Am. Stat. Assoc. 90 (1995) 773). It is first
-computed for every row, with the other errors' standard deviations fixed. For the most probable row these standard
+with and without such a term is the Bayes factor (Kass and Raftery, J. Am. Stat. Assoc. 90 (1995) 773). The factor is
+first computed for every row, with the other errors' standard deviations fixed. For the most probable row these standard
 deviations are then estimated again, together with the change; otherwise they would include the change.
 """
 

@@ -2,7 +2,7 @@
 
     E(t) = R(t + τ) C(t)ᵀ          R: body → table by the reference, C: body → first reading by the gyroscope
 
-is constant if both are exact: it maps the first reading's coordinates to the table's. It changes by
+is constant if R and C are exact, and maps the first reading's coordinates to the table's. Otherwise E changes by
 
     E(t₁)ᵀ E(t₂) = exp(ΔS δθ + Δ(C ω) τ − Eᵀ ω_E Δt + e)
 

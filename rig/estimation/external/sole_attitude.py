@@ -1,6 +1,6 @@
-"""The attitude on which a scale factor depends: no other attitude determines it, so none contradicts its error.
+"""The only attitude that determines a scale factor, so that no other attitude contradicts an error of it.
 
-Repeated rests in one attitude agree even if the attitude is wrong: they show that placements repeat, no more.
+Repeated rests in one attitude agree even if the attitude is wrong, so they only show that placements repeat.
 """
 
 import numpy as np

@@ -34,8 +34,8 @@ MAX_ITERATIONS = 2  # B depends on F, and the first F is already within one perc
 class CommonErrors:
     """The best linear unbiased prediction of the errors.
 
-    `sizes` (P,) in prior standard deviations, their posterior `covariance` (P, P); `readings_rad_s` (N, 3): their
-    effect on the mean readings.
+    `sizes` (P,) are in prior standard deviations, with the posterior `covariance` (P, P); `readings_rad_s` (N, 3) are
+    the effects of the errors on the mean readings.
     """
 
     sizes: Array

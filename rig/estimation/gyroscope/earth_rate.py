@@ -93,7 +93,7 @@ class EarthRate:
 
     @property
     def latitude_std_rad(self) -> float:
-        """The standard deviation of the latitude, for an exact `up`: a tilted base appears as another latitude."""
+        """The standard deviation of the latitude if `up` is exact; a tilted base would look like another latitude."""
         latitude = self.latitude_rad
         slope = self.up - np.sin(latitude) * self.rate_rad_s / self.norm_rad_s
         return self._std(slope / (self.norm_rad_s * np.cos(latitude)))

@@ -1,9 +1,9 @@
-"""The second-order effect of mounting errors on scale and bias: a tilt reduces a rate by its cosine.
+"""The second-order effect of mounting errors on scale and bias, because a tilt reduces a rate by the tilt's cosine.
 
-If sweeps do not determine an item's mounting, only the size of the rates' angular errors is known. Their first order is
-a pattern of error like any other. The mean and the covariance of their second order, 150 ppm for 1°, follow from the
-covariance of the angles (JCGM 100, 5.1.2, note). Every stage has angles of its own, so that a rotation common to all
-stages, which changes no scale, adds nothing.
+If sweeps do not determine an item's mounting, only the size of the rates' angular errors is known. The first order of
+these errors is a pattern like that of any other error. The mean and the covariance of the second order, 150 ppm for 1°,
+follow from the covariance of the angles (JCGM 100, 5.1.2, note). Every stage has angles of its own, so that a rotation
+common to all stages, which changes no scale, adds nothing.
 """
 
 import numpy as np

@@ -114,7 +114,7 @@ def _temperature_deviations_k(sensor: SensorProperties, windows_s: Array, weight
 def unseen_k(step_k: float, windows_s: Array, weights: Array) -> Array:
     """Return the temperature changes (N,), K, of a linear drift by `step_k` in all, which the thermometer hides.
 
-    They are relative to the mean over the windows (N, 2) with weights (N,).
+    The changes are relative to the mean over the windows (N, 2) with weights (N,).
     """
     middle = windows_s.mean(axis=1)
     return np.asarray(step_k * subtract_mean(middle, weights) / np.ptp(middle), dtype=np.float64)

@@ -1,6 +1,6 @@
 """Calibration by rotations of known angle from rest to rest.
 
-The rate during a rotation does not matter, so a hand may turn the gyroscope. Its integral
+The rate during a rotation does not matter, so a hand may turn the gyroscope. The integral of the rate
 (`rig.estimation.gyroscope.increments`) is compared with the angle:
 
     Log(exp(n α) R(F, c)ᵀ) = J δθ + e

@@ -1,7 +1,7 @@
 """The uncertainty budget of the six-observation solution, from its response to the mean readings.
 
-That model uses speeds alone, so errors of directions do not matter. It assumes orthogonal sensor axes, which adds a
-contributor.
+The six-observation model uses speeds alone, so errors of directions do not matter. But it assumes orthogonal sensor
+axes, which adds a contributor.
 """
 
 from dataclasses import replace

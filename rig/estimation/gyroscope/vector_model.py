@@ -113,7 +113,7 @@ def solve_vector_model(
     - `gravity_m_s2` (N, 3): the mean apparent gravity, in the flange frame.
     - `nominal_mounting` (3, 3): flange to sensor, with which the solution is compared.
     - `shared_covariance_rad2_s2` (N, N): covariance of the means beyond their own variances, for example due to bias
-      drift. It is equal for the three axes, which are independent.
+      drift. The covariance is equal for the three axes, which are independent.
 
     Raise Fault `too_few_observations`, `not_finite`, `bad_variance`, `zero_reading`, `duplicated_observation`,
     `rank_deficient`, `ill_conditioned`, `wrong_unit`, `mirrored_axis`, `swapped_axes`, `wrong_mounting`.
@@ -176,7 +176,7 @@ def solve_vector_model(
 
 
 def solve_vector_batch(means_rad_s: ArrayLike, rates_rad_s: ArrayLike, variances_rad2_s2: ArrayLike) -> VectorBatch:
-    """Solve the vector model of many runs at once, without checks: for studies of a design known to be identifiable.
+    """Solve the vector model of many runs at once, without checks, for studies of a design known to be identifiable.
 
     `means_rad_s` (R, N, 3); `rates_rad_s` (N, 3) or (R, N, 3); `variances_rad2_s2` (N, 3), the same for all runs.
     """

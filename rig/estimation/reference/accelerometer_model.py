@@ -56,8 +56,8 @@ class Sweeps:
     """Whole revolutions at nearly constant speed.
 
     - harmonics_m_s2 (M, 3, 3): mean, cosine and sine over the joint's angle (rows) of the axes x y z.
-    - swayed_m_s2 (M, 3, 3): those of the specific force due to the sway of other joints, by the encoders.
-    - covariances_m2_s4 (M, 9, 9): their covariances, row by row, from `rig.estimation.reference.sweep_harmonics`.
+    - swayed_m_s2 (M, 3, 3): the same of the specific force due to the sway of other joints, by the encoders.
+    - covariances_m2_s4 (M, 9, 9): the harmonics' covariances, row by row (`rig.estimation.reference.sweep_harmonics`).
     - axes_flange (M, 3): unit vector of a growing angle; speeds_rad_s (M,): negative if the angle falls.
     - attitudes (M, 3, 3): flange to base at the angle zero.
     - arms_m (M, 3): p, from the axis to the flange's origin, in flange coordinates.

@@ -62,7 +62,7 @@ def covariance_bound(
 ) -> tuple[Array, Array]:
     """Return the Cramér–Rao bound (22, 22) at the true θ (22,) and attitude error δ, and ∂θ/∂readings (22, 3 K).
 
-    Both depend on movement and noise, not on the readings.
+    The bound and the derivative depend on movement and noise, not on the readings.
     """
     free = find_free_directions(theta, list_fixed(movement, second_order=second_order))
     readings = decorrelate(noise(theta, movement), effects(theta, movement))
@@ -145,7 +145,7 @@ def list_fixed(movement: Movement, *, second_order: bool) -> list[int]:
 
 
 def find_free_directions(theta: Array, fixed: list[int]) -> Array:
-    """Return the free directions (22, q) of θ: v_ref keeps its norm, the elements `fixed` their values."""
+    """Return the free directions (22, q) of θ, in which v_ref keeps its norm and the elements `fixed` their values."""
     directions = free_directions(theta, norm_known=True)
     free: Array = np.delete(directions, [index - 1 for index in fixed], axis=1)  # v_ref has one column fewer
     return free

@@ -1,7 +1,7 @@
 """Separation of a magnetometer's own bias and the field of its carrier by turning the sensor over on its holder.
 
-In run k the sensor is mounted by the rotation M_k from the holder's axes to its own. Its bias b rotates with it; the
-field a of its carrier (the part of the arm's iron that rotates with the flange) is fixed to the holder:
+In run k the sensor is mounted by the rotation M_k from the holder's axes to the sensor's. The sensor's bias b rotates
+with it; the field a of its carrier (the part of the arm's iron that rotates with the flange) is fixed to the holder:
 
     b_k = b + F_k M_k a
 

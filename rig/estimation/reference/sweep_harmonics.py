@@ -201,8 +201,8 @@ class _Unevenness:
 def _smooth(time_s: Array, angle_rad: Array, mean_speed_rad_s: float) -> _Unevenness:
     """Return the deviations of the joint from constant speed.
 
-    Its angle is smoothed by harmonics of the revolution and then differentiated, which leaves slow deviations nearly
-    without the encoders' noise.
+    The joint's angle is smoothed by harmonics of the revolution and then differentiated, which leaves slow deviations
+    nearly without the encoders' noise.
     """
     passed_s = time_s - time_s[0]
     waves = _fourier_columns(mean_speed_rad_s * passed_s, min(VIBRATION_HARMONICS, len(time_s) // 4))

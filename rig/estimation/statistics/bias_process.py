@@ -94,8 +94,8 @@ def flicker_covariance(windows_s: ArrayLike) -> Array:
 def flicker_harmonic_covariance() -> Array:
     """Return the covariance (3, 3) of mean, cosine and sine of a revolution for flicker noise of Allan deviation 1.
 
-    It does not depend on the revolution's duration, except for the mean's variance, which is 0 here: see
-    `flicker_covariance`.
+    The covariance does not depend on the revolution's duration, except for the mean's variance, which is 0 here because
+    `flicker_covariance` contains it.
     """
     ends = np.linspace(0, 1, REVOLUTION_PARTS + 1)
     angle_rad = np.pi * (ends[:-1] + ends[1:])

@@ -97,7 +97,7 @@ def find_dof_by_factor(factor: float) -> float:
 
 
 def effective_dof(variances: ArrayLike, dof: ArrayLike) -> Array:
-    """Return the dof (…) of sums of independent `variances` (n, …): by Welch–Satterthwaite (JCGM 100, G.4)."""
+    """Return the dof (…) of sums of independent `variances` (n, …), by Welch–Satterthwaite (JCGM 100, G.4)."""
     parts, degrees = np.asarray(variances, dtype=np.float64), np.asarray(dof, dtype=np.float64)
     with np.errstate(divide="ignore", invalid="ignore"):
         effective = parts.sum(axis=0) ** 2 / np.sum(parts**2 / degrees, axis=0)

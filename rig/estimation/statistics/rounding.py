@@ -2,8 +2,8 @@
 
 The mean of x + noise, rounded to multiples of q, has the error Σ (−1)ⁿ q/(πn) exp(−2(πnσ/q)²) sin(2πnx/q): the sawtooth
 of the rounding error, each harmonic damped by the characteristic function of the noise that carries the reading across
-steps (Widrow and Kollár, Quantization Noise, 2008). Its mean square over x is Σ q²/(2π²n²) exp(−(2πnσ/q)²), which the
-first exponential bounds: Σ q²/(2π²n²) = q²/12.
+steps (Widrow and Kollár, Quantization Noise, 2008). The error's mean square over x, Σ q²/(2π²n²) exp(−(2πnσ/q)²), is at
+most q²/12 times the first exponential, because Σ q²/(2π²n²) = q²/12.
 """
 
 from dataclasses import dataclass

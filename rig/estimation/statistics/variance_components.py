@@ -242,9 +242,9 @@ class MixedModel:
 def sample_adaptively(log_density: Callable[[Array], float], begins: Sequence[tuple[Array, Array]]) -> Array:
     """Draw s samples of k variables, call the log-density at each, and return their weights (s,) in the same order.
 
-    Adaptive multiple importance sampling (Cornuet et al., Scand. J. Stat. 39 (2012) 798). It begins at each maximum
-    (k,) of `begins` with the curvature (k, k) there; each further round draws from Student's t with the mean and
-    covariance of the samples around the maximum. The weights are normalised over all samples.
+    Adaptive multiple importance sampling (Cornuet et al., Scand. J. Stat. 39 (2012) 798) begins at each maximum (k,) of
+    `begins` with the curvature (k, k) there; each further round draws from Student's t with the mean and covariance of
+    the samples around the maximum. The weights are normalised over all samples.
     """
     rng = np.random.default_rng(0)
     size = len(begins[0][0])

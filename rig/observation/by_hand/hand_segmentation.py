@@ -32,7 +32,7 @@ MIN_HELD_S, MAX_HELD_RATE_RAD_S, BLOCK_S = 0.75, 0.15, 0.25
 def segment_session(
     time_s: Array, rates: Array, acceleration: Array | None = None, *, range_rad_s: float | None = None
 ) -> HandRecording:
-    """Return the session of readings (n, 3), rad/s and m/s², at rising times (n,); `range_rad_s` None: unknown."""
+    """Return the session of readings (n, 3), rad/s and m/s², at rising times (n,); an unknown range is None."""
     windows = find_rests(time_s, {RATE: rates}, still_at_first=_began_still(time_s, rates)) if len(time_s) > 1 else ()
     rests = tuple(_rest(time_s, rates, acceleration, window) for window in windows)
     top = _find_clipped(rates, range_rad_s)

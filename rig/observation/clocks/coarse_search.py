@@ -1,4 +1,4 @@
-"""The first estimate of a board's clock: turn rate and joint rate are correlated over all data.
+"""The first estimate of a board's clock, by correlation of turn rate and joint rate over all data.
 
 The board may have been switched on at any time, and its oscillator may be some per cent off.
 """

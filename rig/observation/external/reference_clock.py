@@ -2,8 +2,8 @@
 
 The rates of densely written, evenly stamped rows determine offset and drift to a fraction of a millisecond
 (`rig.observation.clocks`). Rows that come slowly, or are stamped on arrival, have no such rates, and a fitted drift
-would be a time-stamp error. Their offset, without drift, minimises the absolute deviations between the rotations from
-row to row (`robust_start`).
+would be a time-stamp error. The offset of such rows, without drift, minimises the absolute deviations between the
+rotations from row to row (`robust_start`).
 """
 
 from dataclasses import replace

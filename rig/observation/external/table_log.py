@@ -1,4 +1,4 @@
-"""The log of a rate table as attitudes: each record's axis angles become one row."""
+"""The log of a rate table as attitudes, in which each record's axis angles become one row."""
 
 from pathlib import Path
 

@@ -82,7 +82,7 @@ def unit_of(cell: str) -> Unit | None:
 
 
 def strip_blank_end(headings: Sequence[str]) -> list[str]:
-    """Return headings without blank ones at the end: some loggers end every line by a separator."""
+    """Return headings without blank ones at the end, because some loggers end every line by a separator."""
     count = max((index for index, name in enumerate(headings, start=1) if name), default=0)
     return [*headings[:count]]
 

@@ -29,9 +29,9 @@ class Format:
     """A kind of file: its `name` in messages, and its readers, which run in a process of their own.
 
     `readings` and `attitudes` are readers ("module:function", as in `rig.data.processes.reading_process`), None if a
-    file cannot hold them. Their arguments are the path that `reads` returns for the user's path, and the part `inside`.
-    They yield columns by `rig.observation.formats.table_parts.read_blocks`, named as in a CSV file; attitudes are times
-    and quaternions. `remedy` is for a file that cannot be read.
+    file cannot hold them. A reader's arguments are the path that `reads` returns for the user's path, and the part
+    `inside`. A reader yields columns by `rig.observation.formats.table_parts.read_blocks`, named as in a CSV file;
+    attitudes are times and quaternions. `remedy` is for a file that cannot be read.
     """
 
     name: str

@@ -26,7 +26,7 @@ GUARD_RAD = float(np.radians(1.5))  # angle left out next to the ramps: the shaf
 
 
 def well_timed(states: NDArray[Any]) -> NDArray[Any]:
-    """Return the states whose requests were fast: in a slow one the servo measures at an unknown moment."""
+    """Return the states whose requests were fast; in a slow request the servo measures at an unknown moment."""
     if "took_s" not in (states.dtype.names or ()) or not len(states):
         return states
     in_time: NDArray[Any] = states[states["took_s"] <= DELAY_RATIO * np.quantile(states["took_s"], USUAL_QUANTILE)]

@@ -85,7 +85,7 @@ class Ends:
 def find_revolution(states: NDArray[Any], sweep: Sweep, settings: ObservationThresholds) -> Ends:
     """Return the revolution of one sweep from the turner's `states` (n,), in the order of their times.
 
-    Its ends are the times at which the recorded joint angle crosses the ends of `revolution_rad`. Raise Fault
+    The revolution's ends are the times at which the joint angle crosses the ends of `revolution_rad`. Raise Fault
     `incomplete_revolution`, `arm_states_lost`, `speed_slider`, `speed_limited`, `speed_not_constant`,
     `other_joint_moved`.
     """

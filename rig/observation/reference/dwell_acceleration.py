@@ -60,7 +60,7 @@ def read_each_dwell(
 ) -> Attempts[int, DwellReading]:
     """Return the averages of finished dwells, and the faults of others, both by the dwell's index.
 
-    A fault of one dwell does not affect the others. Both are empty for a sensor without accelerations.
+    A fault of one dwell does not affect the others. There are no averages and no faults without accelerations.
     """
     if not stream.sensor.measures(ACCELERATION):
         return Attempts()

@@ -10,8 +10,8 @@ A reading is never stamped before it is taken. So the least lateness among `widt
 least among those before it, is the time of the readings missing in between. The width is the smallest for which these
 differences are whole multiples of the interval: 1 if stamps are good to a quarter of an interval.
 
-Random losses of readings with worse stamps cannot be counted one by one. They make the lateness a random walk, whose
-Allan variance (IEEE 952, annex C) gives the number of missing readings.
+If stamps are worse, random losses of readings cannot be counted one by one. But the losses make the lateness a random
+walk, whose Allan variance (IEEE 952, annex C) gives the number of missing readings.
 """
 
 from collections.abc import Sequence
@@ -72,7 +72,7 @@ class Sampling:
 
     @property
     def hides_losses(self) -> bool:
-        """Whether the stamps do not show single lost readings: they are smoothed arrival times, or too bad."""
+        """Whether the stamps, as smoothed arrival times or because they are bad, do not show single lost readings."""
         return self.on_arrival or self.late is not None
 
     def gaps(self, time_s: Array, fewest: int = 1) -> NDArray[np.bool_]:
@@ -235,7 +235,7 @@ def _interval_s(time_s: Array, missing: NDArray[np.intp], width: int) -> float:
 
 
 def _estimate_unlocated_losses(time_s: Array) -> Sampling:
-    """Return the sampling for losses that cannot be located: the stamps are bad, or the losses too many.
+    """Return the sampling for losses that cannot be located, because stamps are bad or losses too many.
 
     If a fraction p of all readings is lost at random, the variance of the lateness gained over m readings is p m T²,
     with the interval T, so that from m to 4 m readings it grows fourfold. By this growth losses are recognised: the

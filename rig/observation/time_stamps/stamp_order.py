@@ -6,7 +6,7 @@ than they were taken; after a stall of the link, the readings taken during the s
 readings. To recognise one, a long step between two stamps is compared with the number of readings that follow until a
 reading is on time again.
 
-Each kind is counted, with its first row and time. The remaining readings have the times of
+Each kind of row is counted, with the first row and its time. The remaining readings have the times of
 `rig.observation.time_stamps.sampling`. All functions are pure.
 """
 
