@@ -67,15 +67,15 @@ def integrate_moves(session: HandRecording, gyroscope: GyroscopeModel, up: Array
         times_s = session.time_s[inside]
         corrected = session.rates[inside] - np.column_stack([np.interp(times_s, middles, axis) for axis in biases.T])
         path = track(times_s, corrected, matrix)
-        squares = np.stack([corrected**2, corrected * np.abs(corrected)], axis=1)
-        if sensitivity.any() or factors.any():
+        squares = np.stack([corrected**2, corrected * np.abs(corrected)], axis=1)  # even and odd nonlinearity
+        if sensitivity.any() or factors.any():  # the first path shows the vertical during the move
             bent = (squares * factors.reshape(2, 3)).sum(axis=1)
             corrected = corrected - up[row] @ path.attitudes @ sensitivity.T - bent
             path = track(times_s, corrected, matrix)
         rotations.append(path.attitudes[-1])
         by_theta.append(path.sensitivity)
         lasting_s = _durations(times_s)
-        turned = path.attitudes @ inverse * -lasting_s[:, None, None]
+        turned = path.attitudes @ inverse * -lasting_s[:, None, None]  # rotation per error of each reading
         by_gravity.append(np.tensordot(turned, up[row] @ path.attitudes, (0, 0)).reshape(3, 9))
         by_nonlinearity.append(np.einsum("kij,kbj->ibj", turned, squares).reshape(3, 6))
         swept.append(lasting_s @ corrected)

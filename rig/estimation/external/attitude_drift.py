@@ -195,13 +195,13 @@ def drift_model(averaged: FixedAttitudes, fixes: Fixes) -> DriftModel:
     observed = rotation_vectors(inverse @ averaged.attitudes[joined + 1])
     sensitivities, turning = (np.tensordot(step, values, 1) for values in (averaged.sensitivities, averaged.turning))
     earth = -inverse * (step @ averaged.middles_s)[:, None, None]
-    design = np.concatenate([sensitivities, turning[..., None], earth], axis=2)
+    design = np.concatenate([sensitivities, turning[..., None], earth], axis=2)  # by δθ, τ and ω_E
     precision = np.zeros(COMMON_PARAMETERS)
     precision[MATRIX] = MATRIX_PRECISION
     precision[CLOCK] = CLOCK_STD_S**-2.0
     precision[EARTH] = EARTH_PRECISION
     correlation = _correlate(fixes)
-    between = np.abs(step) / 2
+    between = np.abs(step) / 2  # the mean of the fixes at both ends
     nearby = between @ correlation @ between.T
     errors = {
         **_list_errors(averaged, fixes, correlation, step),

@@ -119,7 +119,7 @@ def laid_down(theta: Array, placed: AttitudeReadings, unplaced: Array, unplaced_
     weights = np.exp(likelihood - likelihood.max())
     weights /= weights.sum()
     steps = np.concatenate([fit.steps for fit in fits])
-    step = weights @ steps
+    step = weights @ steps  # the posterior mean; the scatter of the steps is part of the placements' covariance
     causes = {
         name: free @ np.tensordot(weights, np.concatenate([fit.causes[name] for fit in fits]), 1) @ free.T
         for name in (NOISE, ATTITUDES, PLACEMENTS)

@@ -43,9 +43,9 @@ def build_placement_model(theta: Array, placed: AttitudeReadings, stated: int) -
             + correlate_effects(tilts * placed.attitude_std_rad[:, None, None], alone),
             components=np.array(
                 [
-                    correlate_effects(measured, alone),
-                    correlate_effects(measured @ np.swapaxes(attitudes, -1, -2), alike),
-                    np.eye(3 * count),
+                    correlate_effects(measured, alone),  # ε
+                    correlate_effects(measured @ np.swapaxes(attitudes, -1, -2), alike),  # γ, in table coordinates
+                    np.eye(3 * count),  # η
                 ]
             ),
             precision=np.zeros(free.shape[1]),

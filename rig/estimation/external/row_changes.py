@@ -39,13 +39,13 @@ def find_row_change(
     if not MIN_ROWS <= count <= MAX_ROWS or np.linalg.matrix_rank(design) < 4:
         return None
     speeds = np.linalg.norm(rates_rad_s, axis=1)
-    usual = np.sqrt(variances.mean(axis=1) + (ERROR_MEDIAN * speeds) ** 2)[:, None]
+    usual = np.sqrt(variances.mean(axis=1) + (ERROR_MEDIAN * speeds) ** 2)[:, None]  # std of each row
     fitted = np.linalg.lstsq(design / usual, means / usual, rcond=None)[0]
-    read = rates_rad_s @ fitted[:3]
+    read = rates_rad_s @ fitted[:3]  # readings without bias, which change in proportion to a rate or scale error
     across, alone = np.zeros((2, count, 3)), np.eye(count)
     for row in np.flatnonzero(speeds):
         across[:, row] = speeds[row] * perpendicular_unit_vectors(rates_rad_s[row] / speeds[row])
-    across = across @ fitted[:3]
+    across = across @ fitted[:3]  # changes of the readings by an axis tilted by 1 rad in two directions
     mixed = Mixed(
         observed=(means - design @ fitted).ravel(),
         design=np.asarray(np.kron(design, np.eye(3)), dtype=np.float64),
@@ -62,7 +62,7 @@ def find_row_change(
     either_side = MIN_EITHER_SIDE if (speeds == 0).any() or count < MIN_ROWS_FOR_ONE else 1
     rows_before = np.arange(count)
     inner = np.minimum(rows_before, count - rows_before) >= either_side
-    large = np.abs(read) > MIN_LARGE_RATIO * np.abs(read).max(axis=0)
+    large = np.abs(read) > MIN_LARGE_RATIO * np.abs(read).max(axis=0)  # rows that show an axis's scale factor
     before = np.cumsum(large, axis=0) - large
     both_sides = np.minimum(before, large.sum(axis=0) - before) >= MIN_EITHER_SIDE
     std = model.find_maxima()[0]

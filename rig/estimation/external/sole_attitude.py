@@ -36,7 +36,7 @@ def find_sole_attitude(theta: Array, placed: AttitudeReadings) -> tuple[int, int
     matrix = theta[F].reshape(3, 3)
     slopes = np.zeros((3, len(theta)))
     for axis in range(3):
-        slopes[axis, 3 * axis : 3 * axis + 3] = matrix[axis] / np.linalg.norm(matrix[axis]) ** 2
+        slopes[axis, 3 * axis : 3 * axis + 3] = matrix[axis] / np.linalg.norm(matrix[axis]) ** 2  # of −ln k
     wanted = slopes @ free
     usual = _find_std(rows, wanted)
     for number in np.flatnonzero(np.bincount(group) == 1).tolist():

@@ -123,7 +123,7 @@ def compute_published_covariance(
     p = len(theta)
     left_vectors, singular, right_vectors = np.linalg.svd(x / sizes, full_matrices=False)
     rank = p - norm_known
-    pseudo = ((right_vectors[:rank].T / singular[:rank]) @ left_vectors[:, :rank].T) / sizes[:, None]
+    pseudo = ((right_vectors[:rank].T / singular[:rank]) @ left_vectors[:, :rank].T) / sizes[:, None]  # X⁺
     project = np.eye(p)
     if norm_known:
         beta = theta.copy()
@@ -131,13 +131,13 @@ def compute_published_covariance(
         reference = theta[REFERENCE]
         project[:, REFERENCE] -= np.outer(beta, reference) / (reference @ reference)
     gain = -project @ pseudo
-    if second_order:
+    if second_order:  # δβ changes s² and with it the equations, so that δβ = gain (F⁻¹ e + feedback δβ)
         feedback = np.zeros((len(s), 3, p))
         feedback[..., REFERENCE] = -(2 * theta[SECOND] * s)[..., None] * np.swapaxes(attitudes, -1, -2)
         gain = np.linalg.solve(np.eye(p) - gain @ feedback.reshape(-1, p), gain)
     to_errors = np.einsum("pni,ij->pnj", gain.reshape(p, -1, 3), inverse)
     of_beta = np.einsum("pnj,nj,qnj->pq", to_errors, variances, to_errors)
-    change = np.eye(p)
+    change = np.eye(p)  # derivative of θ by β
     change[F, F] = -np.kron(f, f.T)
     change[BIAS, F] = -np.kron(f, theta[BIAS])
     change[BIAS, BIAS] = f

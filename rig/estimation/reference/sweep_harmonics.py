@@ -107,7 +107,7 @@ def first_harmonic(
     size = np.linalg.norm(columns, axis=0)
     rank = np.linalg.matrix_rank(columns / np.where(size > 0, size, 1.0), rtol=EMPTY_COLUMN_RATIO)
     scatter = residuals.T @ residuals / (count - rank)
-    gain: Array = inverse[:3]
+    gain: Array = inverse[:3]  # from readings to mean, cosine and sine
     vibration = columns[:, 1 + 2 * HARMONICS :] @ (inverse[1 + 2 * HARMONICS :] @ m)
     long_run = _find_long_run_covariance(residuals, scatter, coloured)
     return FirstHarmonic(

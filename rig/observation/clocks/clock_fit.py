@@ -130,7 +130,7 @@ def _refine_clock(
     residual = readings - columns @ fitted
     by_offset = motion.rate(t, 1) @ fitted[:3]
     by_clock = np.hstack([by_offset, by_offset * since[:, None]])
-    by_clock -= columns @ (inverse @ by_clock)
+    by_clock -= columns @ (inverse @ by_clock)  # without the part that A and c explain
     if inflation is None:
         inflation = np.array([correlation_inflation(noise) for noise in residual.T])
     weights = 1 / (np.einsum("na,na->a", residual, residual) / len(t) * inflation + np.finfo(np.float64).tiny)

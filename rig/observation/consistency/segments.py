@@ -172,13 +172,13 @@ def _segment_revolution(
     rates = motion.rates_at_samples(times_s)[division.used]
     fraction = (division.time_s - average.start_s) / average.duration_s
     lines = waves(average.lines_hz * average.duration_s, fraction, turn.sidebands)
-    vibration = np.column_stack([rates @ axis, motion.rate(division.time_s, 1) @ axis])
+    vibration = np.column_stack([rates @ axis, motion.rate(division.time_s, 1) @ axis])  # and the effect of a lag
     encoded = np.column_stack([np.ones(len(rates)), vibration])
     residual, vibration = (
         division.subtract_means(values, division.averages) for values in (division.readings_rad_s, vibration)
     )
     vibrating = vibration @ np.linalg.lstsq(vibration, residual, rcond=None)[0]
-    noise_alone = residual - vibrating
+    noise_alone = residual - vibrating  # without the vibration that the encoders measure
     noise = MeanNoise(average.noise_rad_s**2, average.noise_rad2_s2 * average.samples, average.dof)
     is_slow = np.repeat(average.lines_hz * average.duration_s < SLOW_CYCLES, column_count(turn.sidebands))
     weights = mean_weights(division.groups, lines[:, ~is_slow])

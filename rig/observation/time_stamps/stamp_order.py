@@ -237,11 +237,11 @@ def _spread_stalled(log: _UnorderedLog) -> _UnorderedLog:
     usual_s = _estimate_usual_delay_s(stamps_s - interval_s * np.arange(len(stamps_s)), interval_s)
     waited, lost = np.zeros(len(stamps_s), dtype=np.bool_), np.zeros(len(stamps_s), dtype=np.bool_)
     for last in np.flatnonzero(steps_s > LONG_STEP_INTERVALS * interval_s + usual_s).tolist():
-        reach = int(CATCH_UP_STEPS * steps_s[last] / interval_s)
+        reach = int(CATCH_UP_STEPS * steps_s[last] / interval_s)  # readings among which one must be on time again
         ahead_s = log.stamps_s[last + 1 : last + 1 + reach] - log.stamps_s[last]
         late_s = ahead_s - interval_s * np.arange(1, len(ahead_s) + 1)
         caught_up = int(np.argmax(late_s <= late_s.min() + MAX_DELAY * interval_s))
-        missing = max(round(float(late_s[caught_up]) / interval_s), 0)
+        missing = max(round(float(late_s[caught_up]) / interval_s), 0)  # readings that never came
         if not caught_up or missing > (1 - MIN_DELAYED_FRACTION) * steps_s[last] / interval_s or waited[last]:
             continue
         late = slice(last + 1, last + 1 + caught_up)
