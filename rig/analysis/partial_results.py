@@ -33,8 +33,8 @@ NO_SWEEP_YET = Fault("too_few_observations", "no sweep is averaged yet", "Wait f
 class PartialGyroscope:
     """A gyroscope's partial result: its finished sweeps by index, observed or refused.
 
-    The `solution` of the vector model is None while it lacks data, by the fault `missing`. `bias_rad_s`: the bias (3,)
-    from the rests alone, and its standard deviation (3,); None without rests.
+    The `solution` of the vector model is None while data are insufficient, as the fault `missing` explains.
+    `bias_rad_s`: the bias (3,) from the rests alone, and its standard deviation (3,); None without rests.
     """
 
     sweeps: Attempts[int, Observation]

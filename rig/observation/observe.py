@@ -294,7 +294,7 @@ def _check_stuck(stream: Stream, inside: slice, where: str) -> None:
 def _check_frozen(readings: Array, rate_read: Array, expected_rad_s: Array, where: str) -> None:
     """Raise Fault `stuck_axis` if all readings of an axis are equal and differ from its expected rate.
 
-    Coarse resolution alone does not raise it.
+    Equal readings due to coarse resolution alone do not raise the Fault, because they are close to the expected rate.
     """
     still = np.ptp(readings, axis=0) == 0
     misread = np.abs(rate_read - expected_rad_s) > MAX_ERROR_RATIO * np.linalg.norm(expected_rad_s)

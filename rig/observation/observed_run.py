@@ -65,7 +65,7 @@ class ObservedRun:
     def delay(self, sensor: str, behind: str) -> Delay | None:
         """Return the delay of `sensor` against the sensor `behind`; None unless one clock stamps the samples of both.
 
-        Then their time bases differ only by the delays of their filters.
+        With one clock, the time bases of both differ only by the delays of their filters.
         """
         if not all(self.run.sensors[name].on_board for name in (sensor, behind)):
             return None

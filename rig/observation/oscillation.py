@@ -14,8 +14,8 @@ MIN_OSCILLATION_ANGLES = 8  # fewest angles; the oscillation itself takes three 
 def remove_oscillation(q_rad: Array) -> Array:
     """Return angles (n, k) of joints, evenly spaced, without the dominant sine about a mean.
 
-    All joints oscillate at one frequency, each with its own amplitude and phase: least squares over a grid of
-    frequencies (Lomb's periodogram with a floating mean). Steps and creep are preserved.
+    All joints oscillate at one frequency, each with its own amplitude and phase. Least squares over a grid of
+    frequencies determine these (Lomb's periodogram with a floating mean). Steps and creep are preserved.
     """
     time = np.arange(len(q_rad)) / len(q_rad)
     fastest = min(MAX_CYCLES, len(q_rad) / 4)

@@ -24,7 +24,7 @@ ORDERS = ("mean_then_square", "square_then_mean")
 
 
 def study(settings: Settings) -> StudyReport:
-    """Simulate 30 gyroscopes × 500 runs at each noise level, 60°/s, 200 Hz."""
+    """Simulate 30 gyroscopes × 500 runs at each noise level, with sweeps at 60°/s that are sampled at 200 Hz."""
     task = partial(_simulate_gyroscope, settings.runs or sim.RUNS)
     errors = np.concatenate(run_parallel(task, range(sim.SETS), settings), axis=2)  # (noises, orders, all runs, 6)
     rows: list[dict[str, Any]] = [

@@ -76,9 +76,8 @@ def _means_of_solve(explained: VectorFit) -> Means:
 def _error_over_expanded(patterns: Array, explained: VectorFit, mounting: Array, inputs: UnknownErrors) -> float | None:
     """Return the error of a result, divided by U, due to the worst of the fault's `patterns` (k, N, 3).
 
-    Return None without a solution.
-
-    The means are solved again with the fault, which may also look like bias drift and increase U.
+    The means are solved again with the fault, which may also look like bias drift and increase U. Return None if there
+    is no solution with the fault.
     """
     solution, inputs_of_solve = explained.solution, explained.inputs
     response = np.einsum("qni,kni->kq", solution.response, patterns) / np.sqrt(np.diag(solution.covariance))

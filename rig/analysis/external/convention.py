@@ -2,7 +2,7 @@
 
 A quaternion may transform body to room coordinates, or room to body. Under the right convention the body's rates are a
 linear function of the gyroscope's readings. The position of the scalar part, first or last, only rotates the frames of
-body and room, so the gyroscope does not show this position. The accelerometer does, because under the right one the
+body and room, so the gyroscope does not show this position. The accelerometer does, because with the right position the
 room's z axis is vertical. The other position leads to the same calibration, in other axes of the body.
 """
 
@@ -27,10 +27,11 @@ MIN_VERTICAL_GRAVITY = 0.97  # component along the vertical axis of the room
 
 @dataclass(frozen=True, slots=True)
 class Convention:
-    """The convention by which the gyroscope explains most of the rates: the fraction `explained`, `lag_s` later.
+    """The convention by which the gyroscope explains most of the attitudes' rates, the fraction `explained`.
 
     `scalar_last`: the columns read as qw qx qy qz contain qx qy qz qw. `inverse`: quaternions take room to body
-    coordinates. `up`: the room's axis that points upwards, as for `--up`; "" if no accelerometer shows it.
+    coordinates. `lag_s`: the time by which the readings are later than the attitudes. `up`: the room's axis that points
+    upwards, as for `--up`; "" if no accelerometer shows it.
     """
 
     scalar_last: bool

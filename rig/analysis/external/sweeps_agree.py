@@ -161,7 +161,7 @@ def _contradictions(stated: StatedMotion, sizes: MotionErrors, design: Array) ->
     """Return the contradiction (N, 3) of each sweep with the others, beyond errors of the given sizes.
 
     One wrong row among many hardly increases the sizes, so its contradiction counts in addition. With only two sweeps
-    about an axis it has no contradiction, but increases the sizes.
+    about an axis, a wrong row has no contradiction, but increases the sizes.
     """
     rate_variance, axis_variance = sizes.median_variances
     spread = rate_variance * stated.rate_patterns**2 + axis_variance * np.sum(stated.axis_patterns**2, axis=0)

@@ -221,7 +221,7 @@ def _estimate_noise(rests: Sequence[Array]) -> Array | None:
 def _compare_revolutions(
     recordings: Sequence[ObservedRun], sensor: str, reference: Reference, rotation: Array, gravity_rad_s: Array | None
 ) -> tuple[RevolutionError, ...]:
-    """Return the tested sensor's mean rate minus the reference's, rotated into its axes, in each sweep."""
+    """Return the sensor's mean rate minus the reference's, which is rotated into the sensor's axes, in each sweep."""
     turns = list_revolutions(sensor, recordings)
     tested = collect_mean_rates(turns)
     expected = collect_mean_rates(list_revolutions(reference.name, recordings), reference).rotate(rotation)

@@ -61,7 +61,7 @@ class GraphState:
     - matrix (3, 3): F, the scale factors and axes.
     - sensitivity (3, 3): G, the g-sensitivity in rad/s per g.
     - nonlinearities: the even and the odd nonlinearity (6,), s/rad.
-    - drift_rad_s: the bias' drift from the first rest to the last, and its deviation in the middle of it (2, 3).
+    - drift_rad_s (2, 3): the bias' drift from the first rest to the last, and the deviation from a steady drift midway.
     - level: F_a (3, 3) of the accelerometer.
     - offset: b_a (3,) of the accelerometer, m/s².
     - table: the table's tilt (2,), rad.

@@ -3,8 +3,8 @@
     m = r + even r² + odd r |r| + b + G f,   r = F ω
 
 m is the reading, ω the rate, b the bias, and f the specific force in units of gravity: at a hand's speeds this is the
-vertical in body axes. f is tracked during the move: from f at the ends alone the scale would err by 1.7 standard
-uncertainties.
+vertical in body axes. f is tracked during the move, because with f at the ends alone the scale would err by 1.7
+standard uncertainties.
 """
 
 from collections.abc import Sequence

@@ -69,9 +69,8 @@ def find_change(
 ) -> AbruptChange | None:
     """Return the most probable change before a row, or None if its evidence is at most `least_evidence`.
 
-    The rows are in the order of time and begin at `begins_s` (n,). `starts` (s, k) are standard deviations of the
-    model's k errors, with each of which the row is searched for; the first are the most probable ones if nothing
-    changed.
+    The rows are in the order of time and begin at `begins_s` (n,). The row is searched for with each of s choices
+    `starts` (s, k) of the standard deviations of the model's k errors; the first are most probable without a change.
     """
     count = sum(int(effect.possible.any(axis=1).sum()) for effect in effects)
     log_without, change = model.evaluate_posterior(starts[0]) + float(np.log(max(count, 1))), None

@@ -2,11 +2,11 @@
 
     v_m = F (s + φ s²) + b + E ε + η,   ε ~ N(0, δ² 1),   η ~ N(0, ζ² 1)
 
-ε rotates the body (`rig.estimation.reference.attitude_error`) and does not change the norm of the reference. η does
-change it: a bias changed by stress or temperature, a local disturbance. Longer dwells reduce neither. A solution from
-six faces has hardly any redundancy to separate ζ from δ. So θ and its covariance are averaged over both, weighted by
-the restricted likelihood, a uniform prior of δ and a half-Cauchy prior of ζ with a scale of a milli-g (Gelman, Bayesian
-Analysis 1 (2006) 515).
+ε rotates the body (`rig.estimation.reference.attitude_error`) and does not change the norm of the reference. η changes
+the norm, for example by a bias that depends on stress or temperature, or by a local disturbance. Longer dwells reduce
+neither ε nor η. A solution from six faces has hardly any redundancy to separate ζ from δ. So θ and its covariance are
+averaged over ζ and δ, weighted by the restricted likelihood, a uniform prior of δ and a half-Cauchy prior of ζ with a
+scale of a milli-g (Gelman, Bayesian Analysis 1 (2006) 515).
 
 Rests in an unknown attitude determine ζ as well, because the reference's norm is the same in every attitude.
 """

@@ -28,11 +28,11 @@ def find_row_change(
 ) -> AbruptChange | None:
     """Return the abrupt change that rows in the order of time show, None if they show none.
 
-    `means` (N, 3) of the readings, their `variances` (N, 3), the stated rates (N, 3), zero at rest, and the rows'
+    The rows have mean readings `means` (N, 3) with `variances` (N, 3), stated rates (N, 3), zero at rest, and begin at
     `starts_s` (N,). `bias_sizes` are prior standard deviations of a change of the bias.
 
     At least two rows precede and follow a change of the bias, because a single wrong row at either end looks the same.
-    One is enough if no row is a rest and there are `MIN_ROWS_FOR_ONE` rows.
+    A single row is enough if no row is a rest and there are `MIN_ROWS_FOR_ONE` rows.
     """
     count = len(means)
     design = np.column_stack([rates_rad_s, np.ones(count)])

@@ -8,7 +8,7 @@ So does a sweep: in the mean of a revolution only the Earth's rate along its axi
 estimated: F, c and ω_E.
 
 e contains the arm's errors: its angles, as in `explain`, and its repeatability, which tilts the axis of each sweep
-independently. A tilt of a hundred microradians at 1 rad/s is 20 °/h across the axis, where a sweep determines only its
+independently. A tilt of a hundred microradians at 1 rad/s is 20 °/h across the axis, where a sweep determines only the
 bias, so the attitudes determine the Earth's rate. An error in a revolution's end time is a wrong speed, along the axis.
 
 Gravity and the Earth's axis are both fixed in the room. A g-sensitivity G = λ F has the same effect as an Earth's rate

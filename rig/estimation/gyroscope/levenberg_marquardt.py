@@ -1,7 +1,7 @@
 """The six-observation model solved by Levenberg–Marquardt, with which the paper SIX compares its Algorithm 1.
 
-The residuals are ω² − ‖K (m + b)‖², Eqs. (2)–(4), weighted if weights are given, in the six parameters themselves, so
-that β0 is not an unknown. With six sweeps the solution equals that of `closed_form`, except for rounding.
+The residuals are ω² − ‖K (m + b)‖², Eqs. (2)–(4), weighted if weights are given. The unknowns are the six parameters
+themselves, without β0. With six sweeps the solution equals that of `closed_form`, except for rounding.
 """
 
 from dataclasses import dataclass

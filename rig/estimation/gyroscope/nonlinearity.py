@@ -1,8 +1,8 @@
 """A gyroscope's nonlinearity: m = (g + odd |g| g + even g²) / k − b.
 
 g is the rate along the sensor's axis. At one speed the odd part belongs to the scale factor; several speeds separate
-them. Data sheets state the largest distance from the best straight line through ± full scale: a smooth curve is a cubic
-and a square, whose distances are a quarter and a half of their values at full scale.
+the two. Data sheets state the largest distance from the best straight line through ± full scale. A smooth curve is a
+cubic and a square, whose distances are a quarter and a half of their values at full scale.
 """
 
 from dataclasses import dataclass

@@ -101,7 +101,10 @@ class TurnedSolution:
 
 @dataclass(frozen=True, slots=True)
 class _ObservationEquations:
-    """The equations `observed` (r,) = `design` (r, 12) δθ + errors, the latter by cause: patterns (r, q) of one std."""
+    """The equations `observed` (r,) = `design` (r, 12) δθ + errors.
+
+    Each of the `causes` of errors is an array (r, q) of q patterns, each for one standard deviation of an error.
+    """
 
     observed: Array
     design: Array

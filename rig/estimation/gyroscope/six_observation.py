@@ -1,7 +1,7 @@
 """Scale factors and biases of a triaxial gyroscope from averaged revolutions: the equations of the paper SIX.
 
-Model: g = K (m + b), K = diag(k), b in rad/s of the reading. SIX prints g = K m + b as Eq. (1), but Eqs. (3), (4) and
-Algorithm 1 are this one. Each revolution gives one equation ‖g‖² = ω², Eq. (4):
+Model: g = K (m + b), K = diag(k), b in rad/s of the reading. The paper prints g = K m + b as Eq. (1), but its Eqs. (3),
+(4) and Algorithm 1 agree with the model here. Each revolution gives one equation ‖g‖² = ω², Eq. (4):
 
     ω² = β0 + x β,   x = [mx² my² mz² mx my mz],   β = [k² …, 2 k² b …],   β0 = Σ k² b² = Σ β_l² / (4 β_s)
 

@@ -29,7 +29,7 @@ class StatedMotion:
 
     `residuals_rad_s` (N, 3): readings minus the model's; `rates_rad_s` (N, 3), zero for a rest; `variances_rad2_s2` (N,
     3) of the noise of each mean. `rate_patterns` (N, 3): the effects of a relative rate error of 1; `axis_patterns` (2,
-    N, 3): of axes tilted by 1 rad about either direction across them.
+    N, 3): those of axes tilted by 1 rad about either direction across them.
     """
 
     residuals_rad_s: Array

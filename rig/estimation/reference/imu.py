@@ -2,8 +2,9 @@
 
 The model is that of `rig.estimation.reference.accelerometer_model`. F, b, the direction of v_ref, the lever arm r, the
 delay τ and, if requested, φ are estimated together by generalised least squares with the covariance of the arm's
-attitude errors. Each dwell has independent small rotations; the points of a sweep share errors. The size δ of all is
-estimated by restricted maximum likelihood over dwells and sweeps (`rig.estimation.reference.shared_errors`).
+attitude errors. Each dwell has independent small rotations; the points of a sweep share errors. The size δ of all these
+errors is estimated by restricted maximum likelihood over dwells and sweeps
+(`rig.estimation.reference.shared_errors`).
 """
 
 from collections.abc import Sequence

@@ -2,9 +2,9 @@
 
     m_m = F Rᵀ m + b,   F = M C_NO C_SI,   b = M C_NO b_HI + b_O
 
-C_SI and b_HI are the soft and hard iron, C_NO the non-orthogonality, M the scale factors, b_O the sensor's own offset.
-(Below Eq. (7) the paper writes S for M.) Only the products F and b are identifiable: the correction m = F⁻¹ (m_m − b)
-removes the effects of iron and sensor together.
+m is the field, C_SI and b_HI are the soft and hard iron, C_NO the non-orthogonality, M the scale factors, b_O the
+sensor's own offset. (Below Eq. (7) the paper writes S for M.) Only the products F and b are identifiable, so the
+correction m = F⁻¹ (m_m − b) removes the effects of iron and sensor together.
 """
 
 from dataclasses import dataclass
@@ -79,7 +79,7 @@ def uniformity(
 class FieldDrift:
     """The most significant change (3,) of the readings in one attitude, and its std (3,).
 
-    `limit` is the critical value of its χ², with a Bonferroni correction for the number of changes.
+    `limit` is the critical value of `chi_square`, with a Bonferroni correction for the number of changes.
     """
 
     change_t: Array

@@ -135,7 +135,7 @@ def per_axis(columns: Array) -> Array:
 
 
 def project_errors(theta: Array, movement: Movement, change: Callable[[Array], Array]) -> Array:
-    """Return patterns (3 K, 3) of a `change` of the force along each axis; in sweeps, its mean and first harmonic."""
+    """Return patterns (3 K, 3) of a `change` of the force along each axis, in sweeps as mean and first harmonic."""
     dwells, axes = len(movement.dwells.readings_m_s2), matrix(theta)
     felt_along = find_force(theta, movement) @ (axes / np.linalg.norm(axes, axis=1, keepdims=True)).T
     mean, cos, sin = np.moveaxis(felt_along[dwells:].reshape(-1, 3, 3), 1, 0)

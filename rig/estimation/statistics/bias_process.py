@@ -29,7 +29,7 @@ Chosen = Callable[[Array, Array], Array]
 class BiasProcess:
     """A drifting bias: random walk `walk_rad_s_sqrt_s` (q) and `scatter_rad_s` (s), zero if only noise was detected.
 
-    `dof`: the number of contrasts used, `instability_rad_s`: the given Allan deviation of its flicker.
+    `dof`: the number of contrasts used; `instability_rad_s`: the given Allan deviation of the bias' flicker.
     """
 
     walk_rad_s_sqrt_s: float

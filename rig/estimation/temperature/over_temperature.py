@@ -72,7 +72,7 @@ class TemperatureLine:
 
 @dataclass(frozen=True, slots=True)
 class ValuesAtTemperature:
-    """Scale and bias (6,) at a temperature, u (6,) and U (6,)."""
+    """Scale and bias (6,) at a temperature, with their standard and expanded uncertainties (6,)."""
 
     values: Array
     std: Array
@@ -86,8 +86,8 @@ class OverTemperature:
     - `scale`, `bias` (4, 3): the coefficients of k and c, SI units per Kⁿ; `orders` of k and of c.
     - `range_c`: the only range in which both are valid. `zero` (3,): the readings at the reference for zero input.
     - `lag_s`, `lag_std_s`: the thermometer's lag and its standard deviation.
-    - `hysteresis`: scale and bias (6,) while warming minus their mean of warming and cooling, in mid-range, and its
-      standard deviation; None with one direction only.
+    - `hysteresis`: scale and bias (6,) while warming minus the means of warming and cooling, in mid-range, and the
+      standard deviation of this difference; None with one direction only.
     """
 
     reference_c: float
@@ -430,8 +430,8 @@ class _ParameterFits:
 def _coefficients_from_changes(centre: Array, which: int) -> Array:
     """Return the matrix (12, 18) from the orders 1 to 3 of k and c to all four orders of k (`which` 0) or c (1).
 
-    The mean over the readings is fixed. So an overestimated order makes the value at the reference too small, by its
-    mean power: minus `centre` (2, 3, 3).
+    The mean over the readings is fixed. So an overestimated coefficient makes the value at the reference too small, by
+    the mean power of the coefficient's order, `centre` (2, 3, 3).
     """
     matrix = np.zeros((3 * (MAX_ORDER + 1), 6 * MAX_ORDER))
     first = 3 * MAX_ORDER * which

@@ -80,7 +80,7 @@ class PlacedReadings:
     """The averages of a file of samples in a file's attitudes, for the `quantities` that were recorded.
 
     - `rows`: a gyroscope's averages; `turning`: its readings and all rows, for a solution by rotation angles.
-    - `placements`: the placements of the other sensors, or the fault.
+    - `placements`: the placements of the other sensors, or the Fault that prevents them.
     - `clock`: the table's clock, if it had to be found.
     - `omitted`: rows that the recording does not cover; `incomplete`: rows with missing samples and no mean rate.
     """

@@ -32,7 +32,7 @@ MIN_ROW_RATIO = 0.25  # to a fix's usual number of rows
 
 @dataclass(frozen=True, slots=True)
 class OmittedIncrements:
-    """Increments that could not be made for one reason: the error's name, their number, the first one's start.
+    """`count` increments that could not be made because of the error `name`; the first of them starts at `first_s`.
 
     `longest_s`: the longest step from one reading to the next over which the motion is unknown.
     """
@@ -61,8 +61,8 @@ def gather(turning: Turning, window_s: float | None = None, clock_s: float = 0.0
     """Return the fixes of a reference's rows, in windows of a given or a suitable length.
 
     Time t of the reference is time t + `clock_s` of the readings. Raise Fault `too_few_observations` if the body moves
-    in too few of the remaining increments. Raise instead `lost_samples`, `saturation` or `turned_too_fast` if that is
-    why they are too few, or why more of them are left out than remain.
+    in too few of the remaining increments. Raise `lost_samples`, `saturation` or `turned_too_fast` instead if that
+    error left too few increments, or caused more of them to be left out than remain.
     """
     turning = select_covered(turning, clock_s)
     if len(turning.rows_s) < 2:

@@ -183,7 +183,7 @@ def _strip_columns(cells: Sequence[Sequence[str]], missing: Sequence[str]) -> li
 
 
 def _select_indices(columns: Sequence[Sequence[str]], accept: Callable[[str], bool]) -> list[int]:
-    """Return the indices of the columns that have cells and whose cells all satisfy the condition."""
+    """Return the indices of the columns that have cells, all of which `accept` accepts."""
     return [index for index, column in enumerate(columns) if column and all(map(accept, column))]
 
 

@@ -78,7 +78,7 @@ def accelerations(stream: Stream, inside: slice) -> Array:
 def check_acceleration(stream: Stream, inside: slice, where: str, *, turning: bool = False) -> None:
     """Raise Fault `saturation` or `stuck_sensor` for the accelerometer's samples `inside`.
 
-    In a rotation (`turning`), one axis with equal readings suffices.
+    In a rotation (`turning`), one axis with equal readings suffices for `stuck_sensor`; at rest all three are required.
     """
     channel, samples = stream.sensor.channel(ACCELERATION), stream.raw[inside]
     counts, saturated = channel.counts(samples), channel.is_saturated(samples)

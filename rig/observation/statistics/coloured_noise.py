@@ -1,4 +1,4 @@
-"""Variance inflation of a mean with coloured residuals: like neighbours raise the variance, a vibration lowers it."""
+"""The variance of a mean with coloured residuals: similar neighbours raise the variance, a vibration lowers it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

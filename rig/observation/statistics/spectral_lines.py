@@ -97,7 +97,7 @@ def waves(cycles: Array, fraction: Array, sidebands: int = SIDEBANDS) -> Array:
     """Return cosine and sine columns (n, w k) of k lines at elapsed fractions (n,) of the time, w = `column_count`.
 
     A line also has two linearly growing columns, for a vibration that begins or ends, and sidebands up to `sidebands`
-    cycles away: at one cycle, a vibration of the room in a rotating sensor; for others see
+    cycles away. A rotating sensor senses a vibration of the room one cycle away; for further sidebands see
     `rig.observation.motion.revolution.Revolution`.
     """
     line, turn = (np.exp(2j * np.pi * np.outer(number, fraction)) for number in (cycles, range(1, sidebands + 1)))

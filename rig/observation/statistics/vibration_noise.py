@@ -21,7 +21,7 @@ SHORT_ORDERS = (1, 2)  # orders of autoregression that fit coloured noise, but n
 
 
 def average_rest(readings: Array, time_s: Array, window: Window, steps: Steps) -> Mean:
-    """Average readings at rest with tapered weights, which cancel a vibration, and without its part of the noise."""
+    """Average readings at rest with weights that cancel a vibration (`average_tapered`), which is then not noise."""
     residuals = readings - readings.mean(axis=0)
     shaking = _columns(residuals, LineSearch(sidebands=0))
     columns = np.column_stack([np.ones(len(residuals)), shaking])

@@ -6,7 +6,7 @@ from rig.estimation.arrays import Array
 
 
 def find_least_around(values: Array, width: int) -> Array:
-    """Return, for each value, the minimum of `width` values ahead or of as many behind, whichever is larger (n,).
+    """Return the larger one (n,) of two minima for each value: of `width` values ahead, and of as many behind.
 
     At the ends, where one of the minima is missing, the other is returned.
     """

@@ -36,9 +36,9 @@ WRIST_1, WRIST_2, WRIST_3 = (JOINT_NAMES.index(name) for name in ("wrist_1", "wr
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """An order of sweeps: the poses `stations` in turn, and in each the sweeps in all `directions` of a repeat.
+    """An order of sweeps: passes through the poses `stations`, in each of which the joint turns in its `directions`.
 
-    `alternates`: whether every second station has the directions in reverse.
+    There is a pass for every speed of every repeat. `alternates`: whether every second pass reverses the directions.
     """
 
     stations: tuple[SweepPose, ...]

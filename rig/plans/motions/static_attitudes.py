@@ -35,7 +35,7 @@ def dwells(
 ) -> Iterator[Step]:
     """Yield the dwells, numbered from `first`, and the transfers from home and back; nothing if all are `done`.
 
-    Tests of the field at home precede and follow them.
+    A test of the field at home precedes the dwells, and another follows them, if `procedure.field_test_s` is not zero.
     """
     home = find_home(arm)
     pace = pace_of(arm.transfer_speed_deg_s, procedure.acceleration_deg_s2)
