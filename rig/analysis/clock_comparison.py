@@ -63,7 +63,7 @@ class ClockDifference:
 class ClockCheck:
     """The relative `error` of the controller's clock (positive if it is fast) and its standard uncertainty `std`.
 
-    They follow from the mean of all `comparisons` and the stated `half_width` about zero, weighted by inverse variance.
+    They are a mean, weighted by inverse variance, of all `comparisons` and of the stated error: zero ± `half_width`.
     """
 
     error: float

@@ -57,7 +57,7 @@ class Move:
 
 @dataclass(frozen=True, slots=True)
 class HandRecording:
-    """All readings (n, 3) at times (n,), rests (N,), the N − 1 moves between them.
+    """All readings (n, 3) at times (n,), the rests (N,), and the N − 1 moves between them.
 
     `held_in_air_s`, `creeping_s`: times at which the body was held still in the air, or crept on the table.
     """

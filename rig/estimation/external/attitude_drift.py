@@ -110,9 +110,10 @@ class DriftState:
 
 @dataclass(frozen=True, slots=True)
 class FixedAttitudes:
-    """The integrated attitudes at N fixes: E (N, 3, 3), with `sensitivities` S (N, 3, 12) and `turning` C ω (N, 3).
+    """The terms of the module's equation at N fixes and at k samples.
 
-    `middles_s` (N,) and `windows_s` (N, 2) are the fixes' times. Of all samples: E (k, 3, 3), and `rates` C ω (k, 3).
+    At the fixes: `attitudes` E (N, 3, 3), `sensitivities` S (N, 3, 12), `turning` C ω (N, 3), and the times `middles_s`
+    (N,), `windows_s` (N, 2). At the samples: `samples` E (k, 3, 3), `rates` C ω (k, 3).
     """
 
     attitudes: Array

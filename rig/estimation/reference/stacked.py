@@ -99,7 +99,10 @@ def estimate_as_published(
 
 
 def _solve(x: Array, sizes: Array, prior: ReferencePrior) -> Array:
-    """Return β (…, p) for X with columns of `sizes`: by Eq. (5) if the norm of v_ref is given, else by Eq. (6)."""
+    """Return β (…, p) for the design X by Eq. (5) if the norm of v_ref is given, else by Eq. (6).
+
+    X is scaled by the `sizes` of its columns.
+    """
     if isinstance(prior, KnownNorm):
         return null_vector(x, sizes, prior.norm, np.asarray(prior.side, dtype=np.float64))
     return least_squares(x, sizes, prior.v_bar(x.shape[-2] // 3))

@@ -222,8 +222,8 @@ def _smooth(time_s: Array, angle_rad: Array, mean_speed_rad_s: float) -> _Uneven
 def _motion_terms(uneven: _Unevenness, turn: JointTurn) -> Array:
     """Return the terms (6, n) of the joint's motion in the specific force; see `FirstHarmonic.turning_rad2_s2`.
 
-    α is that of `turn`, because `uneven` is smoothed by harmonics of the revolution, which have equal speeds at both
-    ends. A vibration without a whole number of periods has different ones, so that the mean of α is not zero.
+    The acceleration α is that of `turn`, because `uneven` is smoothed by harmonics of the revolution, which have equal
+    speeds at both ends. With a vibration of no whole number of periods the speeds differ, and α's mean is not zero.
     """
     mean_rate, acceleration = turn.speed_rad_s, turn.acceleration_rad_s2
     rate = mean_rate + uneven.rate

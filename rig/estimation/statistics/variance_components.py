@@ -38,10 +38,11 @@ FAILED_LOG_POSTERIOR = 1e30  # negative, if it cannot be computed
 
 @dataclass(frozen=True, slots=True)
 class Mixed:
-    """The model of `observed` (m,): `design` (m, p), C₀ `fixed` (m, m), A_k `components` (k, m, m).
+    """The model of `observed` (m,), y in the module's equation.
 
-    - `precision` (p,): the prior precision of each coefficient, 0 if none.
-    - `scales` (k,): the medians of the half-Cauchy priors of σ.
+    - `design` (m, p): X; `precision` (p,): the prior precision of each coefficient θ, 0 if none.
+    - `fixed` (m, m): C₀; `components` (k, m, m): A of each cause; `scales` (k,): the medians of the half-Cauchy priors
+      of the causes' σ.
     - `alone` (k, 2): sum of squares and dof of each cause's residuals, measured separately from y; 0 if not measured.
     """
 
