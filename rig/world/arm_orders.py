@@ -99,7 +99,7 @@ def _unlock(robot: Robot) -> None:
 
 
 def _free(robot: Robot) -> None:
-    """Release the registers that a fieldbus has claimed; the rig's remain claimed."""
+    """Release the registers that a fieldbus has claimed; those that the rig has claimed remain so."""
     for name in [name for name, owner in robot.claims.items() if owner is FIELDBUS]:
         del robot.claims[name]
 

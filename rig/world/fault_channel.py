@@ -6,7 +6,7 @@ A request is `{"do": NAME, …}`; the reply is one line, `{"ok": true, "time_s":
 
     state                                       the state of arm, board and clock
     hold · run · advance duration_s             the virtual clock; `advance` is answered when the time has passed
-    pace time_scale                             from now on the clock's greatest speed, in multiples of real time
+    pace time_scale                             limits the clock's speed from now on, in multiples of real time
     protective_stop · emergency_stop · safeguard_stop · release · power_off · power_on · brake_release
     unlock                                      the protective stop, on the pendant, 5 s after it at the earliest
     pause · play · stop_program · speed_slider fraction · remote_control on · robot_mode name
@@ -25,9 +25,11 @@ A request is `{"do": NAME, …}`; the reply is one line, `{"ok": true, "time_s":
     kvh_fault sensor bit_error_rate lose status test silent   each keeps its value until it is set again:
                                                 bit errors, messages to lose, valid bits, BIT's first byte, dead line
     kvh_power sensor on
-    autopilot_fault port lost doubled slowest armed deaf camera silent stolen bit_error_rate host_baud   as above
+    autopilot_fault port lost doubled slowest armed deaf camera silent stolen bit_error_rate host_baud
+                                                each keeps its value until it is set again
     autopilot_power port on
-    printer_fault sensor bit_error_rate lose stuck silent stolen host_baud   of a device that prints lines, as above
+    printer_fault sensor bit_error_rate lose stuck silent stolen host_baud
+                                                faults of a device that prints lines; each keeps its value likewise
     printer_power sensor on
     air temperature_c                           the air around the board from now on; needs a section `thermal`
     heater                                      the duty cycle of the heater's pin and the board's temperature
@@ -35,7 +37,8 @@ A request is `{"do": NAME, …}`; the reply is one line, `{"ok": true, "time_s":
     fit part                                    the board of another part of a series, by its serial number
     instruct say face turns again               the instruction for the operator, if a hand turns the sensors
     servo_power on · servo_torque on            the servo's supply; its torque, as written by another program
-    servo_fault held_fast dumb denies voltage_v temperature_c lose spoil   as above; `lose`, `spoil`: replies
+    servo_fault held_fast dumb denies voltage_v temperature_c lose spoil
+                                                `lose`, `spoil`: numbers of replies to lose and to corrupt
     servo_line silent listen                    `silent`: the line carries nothing; `listen` false: its port closes
     unplug_board · plug_in_board · reset_board · power_dip · silence_board on · host_baud baud (null: the board's own)
     write_truth windows                         writes the truth over these windows into the world's file

@@ -22,7 +22,7 @@ NS_PER_S = 1e9
 
 
 class FlightRecorder:
-    """A recorder that writes to the file `path`, never through a link, or to stderr if that is None.
+    """A recorder that writes to the file `path`, never through a link, or to stderr if `path` is None.
 
     `waits_for` names the clients for which the world waits. A record that cannot be written is lost.
     """

@@ -9,7 +9,7 @@ from rig.world.ur10e.motion.flange_motion import BodyMotion, Components
 class MotionSource(Protocol):
     """The turner of the sensors, simulated tick by tick.
 
-    Times are virtual. They lie inside the last tick or inside the memory that delayed sensors need.
+    Times are virtual. They lie inside the last tick, or a little before it, because delayed sensors sense the past.
     """
 
     @property
@@ -24,7 +24,7 @@ class MotionSource(Protocol):
 
     @property
     def waiting(self) -> bool:
-        """Whether only a client can make it move."""
+        """Whether only a client can make the turner move."""
         ...
 
     @property

@@ -149,7 +149,7 @@ class World:
 
     # -- faults of the wires ---------------------------------------------------------------------------------------
     def silence_arm(self, duration_s: float) -> None:
-        """Let the controller neither send nor read for `duration_s` of wall time, because clients time out by it."""
+        """Let the controller neither send nor read for `duration_s` of wall time, which clients' timeouts count."""
         self._silent_until_s = time.monotonic() + duration_s
         for listener in self.arm_listeners:
             listener.set_silent(True)
@@ -241,7 +241,7 @@ class World:
                 alive()
 
     def _tick(self) -> None:
-        """Simulate one tick, or all that are due, at most `MAX_LEAP_TICKS`, while only a client can make the arm move.
+        """Simulate one tick; if only a client can make the arm move, simulate up to `MAX_LEAP_TICKS` that are due.
 
         If a board is emulated, ticks are simulated one at a time: its processor takes most of the time, and clients
         would receive packets in bursts. If the arm is at rest, its motion is sensed once at the end of several ticks,
@@ -276,7 +276,7 @@ class World:
 
 
 def _find_host(config: RigConfig) -> str:
-    """Return the laboratory's address: the turner's; if the item is turned by hand, the board's or a sensor's."""
+    """Return the laboratory's address: that of the turner or, if a hand turns the item, of the board or a sensor."""
     if config.turner.simulated_at is not None:
         return config.turner.simulated_at
     ports = [("board.port", config.board.port)] if config.board is not None else []
@@ -324,7 +324,8 @@ def _open_pty(line: SerialLine, selector: selectors.BaseSelector) -> "PtyPort":
 def serve(loaded: Loaded, until_eof: bool, late: Path | None = None, truth: Path | None = None) -> None:
     """Run the world until end of input (`until_eof`) or Ctrl-C. Raise Refused if a port is not available.
 
-    Reports of late steps are written to the file `late`, or to stderr if that is None; the truth to the file `truth`.
+    Reports of late steps are written to the file `late`, or to stderr if `late` is None. The truth is written to the
+    file `truth`, if one is given.
     """
     world = World(loaded, truth)
     try:

@@ -123,7 +123,7 @@ class SimulatedAutopilot:
 
     # -- sending -----------------------------------------------------------------------------------------------------
     def _send_due(self, own_s: float, now_us: int) -> None:
-        """Send heartbeat, attitude and IMU messages that are due; both times are since power-up."""
+        """Send heartbeat, attitude and IMU messages that are due; `own_s` and `now_us` count from power-up."""
         if own_s >= self._due_s["heartbeat"]:
             self._due_s["heartbeat"] += HEARTBEAT_S
             mode, state = (128, ACTIVE) if self.armed else (0, STANDBY)
@@ -163,7 +163,7 @@ class SimulatedAutopilot:
     def _read_barometer(self, celsius: float) -> tuple[float, int]:
         """Return the temperature, °C, and the flags of updated fields.
 
-        PX4 flags it after a reading, ArduPilot always.
+        PX4 flags the temperature as updated only after a reading of the barometer, ArduPilot in every message.
         """
         if not self._provides_temperature:
             return 0.0, SENSORS_UPDATED

@@ -12,7 +12,7 @@ from rig.world.instruments import FieldOf, InstrumentMount, MotionOf, sensor_see
 
 
 def build_autopilot_mounts(config: RigConfig, world: WorldSection) -> dict[str, InstrumentMount]:
-    """Return the autopilots by port. Raise Refused `autopilot_parameters` for a parameter that one does not have."""
+    """Return the autopilots by port. Raise Refused `autopilot_parameters` for a parameter that an autopilot lacks."""
     imus_by_port: dict[str, dict[int, str]] = {}
     for name, sensor in config.sensors.items():
         if sensor.mavlink is not None:
@@ -22,7 +22,7 @@ def build_autopilot_mounts(config: RigConfig, world: WorldSection) -> dict[str, 
 
 
 def _mount(config: RigConfig, world: WorldSection, imus: dict[int, str], baud: int) -> InstrumentMount:
-    """Return an autopilot with these sensors by IMU number; an IMU without a sensor has the first one's motion."""
+    """Return an autopilot whose `imus` are sensors by IMU number; an IMU without a sensor moves as the first sensor."""
     sections = (world.sensors[name].autopilot for name in config.sensors if name in imus.values())
     section = next((section for section in sections if section is not None), SimulatedAutopilotSection())
     try:

@@ -19,10 +19,10 @@ from rig.world.ur10e.motion.forward_kinematics import rotation_from_vector
 
 
 class SensorTruth:
-    """A sensor with its true errors, `gyro` and `accelerometer`. The latter is None if nothing reads it.
+    """A sensor with its true errors, `gyro` and `accelerometer`; `accelerometer` is None if nothing reads it.
 
-    `powered_s`: when the part gets power and begins to warm up; a heated `part` sets its temperature instead.
-    `data_rate_ppm`: the error of its own oscillator, positive if fast.
+    `powered_s`: when the sensor gets power and begins to warm up. If a heated `part` is given, the part's temperature
+    is used instead. `data_rate_ppm`: the error of the sensor's own oscillator, positive if it is fast.
     """
 
     def __init__(
@@ -125,7 +125,11 @@ def _build_gyro_truth(simulated: SimulatedSensorSection) -> GyroTruth:
 
 
 def _build_accelerometer_truth(simulated: SimulatedAccelerometerSection, holds_at_c: float) -> AccelerometerTruth:
-    """Return the emulated accelerometer's errors. Its bias is added to a reading; TRIAX's is part of the reading."""
+    """Return the emulated accelerometer's errors.
+
+    The configured bias is to be added to a reading in order to correct it. `AccelerometerTruth` has the bias that the
+    reading contains, which is minus that.
+    """
     return AccelerometerTruth(
         scale=simulated.scale,
         bias_m_s2=[-bias for bias in simulated.bias_m_s2],

@@ -16,9 +16,10 @@ DROP_M_S2 = 160.0  # peak specific force of a drop
 
 @dataclass(frozen=True, slots=True)
 class HandMotion:
-    """The motion sensed on the body at times (n,), in body axes.
+    """The motion sensed on the body at n times, in body axes.
 
-    Rates, specific forces (n, 3), attitudes (n, 3, 3) body to room, bias jumps after falls (n, 3), lost readings (n,).
+    Rates, specific forces and the bias jumps since falls are arrays (n, 3), attitudes (n, 3, 3) rotate from the body to
+    the room, and `lost` (n,) marks the readings that are lost.
     """
 
     rate_rad_s: Array

@@ -39,7 +39,7 @@ CHOICES: Mapping[str, tuple[str, ...]] = {
 
 
 class KvhMemory:
-    """The instrument's memory: `settings` replace the factory's. Raise ValueError for one that it does not have."""
+    """The instrument's memory: `settings` replace the factory's. Raise ValueError for an unknown setting or value."""
 
     def __init__(self, settings: Mapping[str, str]) -> None:
         self._settings = dict(FACTORY_SETTINGS)

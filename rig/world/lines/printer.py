@@ -36,7 +36,7 @@ NO_FAULTS = SimulatedFaultySection()
 
 @dataclass(slots=True)
 class PrinterFaults:
-    """Faults that a test can set: samples to `lose`; `stuck`: it repeats one line."""
+    """Faults that a test can set: the number of samples to `lose`, and whether the device is `stuck` at one line."""
 
     lose: int = 0
     stuck: bool = False

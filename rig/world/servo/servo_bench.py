@@ -26,7 +26,7 @@ BAUDS = {57600: 1, 115200: 2, 1_000_000: 3, 2_000_000: 4, 3_000_000: 5, 4_000_00
 
 
 class ServoBench:
-    """The servo on its `bus`, a `MotionSource`.
+    """A `MotionSource`: the shaft of the servo on the `bus`.
 
     The servo lives in wall time, as does its client. The board lives in the world's ticks and may lag: its sensors then
     sense the shaft's past.

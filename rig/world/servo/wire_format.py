@@ -76,7 +76,7 @@ class Receiver:
             yield packet
 
     def _next(self) -> ServoPacket | None:
-        """Take the first complete packet out of the buffer, with the bytes before it; None if there is none."""
+        """Return the first complete packet in the buffer, or None; drop it and the bytes before it from the buffer."""
         buffer = self._buffer
         while True:
             start = buffer.find(HEADER)

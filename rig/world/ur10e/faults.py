@@ -20,7 +20,7 @@ class AtProgramStart:
 
 @dataclass(slots=True)
 class ArmFaults:
-    """Faults of the arm, each until it is set again. `payload_stays`: programs cannot change the payload.
+    """Faults of the arm; each lasts until it is set again. `payload_stays`: programs cannot change the payload.
 
     `safety_limit`: the fraction of the programmed speed that a safety limit permits. `clock_step_s`: the sum of all
     steps of the controller's clock. `encoder_error_rad`: errors of reported angles by joint (0 to 5), possibly NaN.

@@ -211,12 +211,12 @@ class Robot:
 
     @property
     def is_polyscope_x(self) -> bool:
-        """Whether the controller's software is PolyScope X, which has no dashboard, and later a Robot API."""
+        """Whether the controller's software is PolyScope X, which has no dashboard; later versions have a Robot API."""
         return self.identity.polyscope >= POLYSCOPE_X
 
     @property
     def local_control(self) -> bool:
-        """Whether the controller accepts orders from the pendant only; the CB3 series has no such mode."""
+        """Whether the controller accepts orders from the pendant only; always False for the CB3 series."""
         return not self.remote_control and self.identity.polyscope >= E_SERIES
 
     # -- programs ------------------------------------------------------------------------------------------------
@@ -368,7 +368,7 @@ class Robot:
         self.robot_mode = mode
 
     def set_payload(self, mass_kg: float, centre_m: Sequence[float]) -> None:
-        """Set the payload, unless a fault keeps it. Raise `ProgramError` for an impossible one."""
+        """Set the payload, unless the fault `payload_stays` prevents this. Raise `ProgramError` for invalid values."""
         limit_kg = self.model.payload_kg
         if not 0.0 <= mass_kg <= limit_kg:
             raise ProgramError(f"payload {mass_kg} kg is outside 0 to {limit_kg} kg")
@@ -410,7 +410,7 @@ class Robot:
     # -- outputs of RTDE ---------------------------------------------------------------------------------------------
     @property
     def speed_scaling(self) -> float:
-        """The joints' speed relative to that permitted by the slider; clients multiply both.
+        """The joints' speed relative to that permitted by the slider; clients multiply it by the slider's fraction.
 
         It is 0 while no program runs, as in logs of a UR3 of the CB3 series and of a UR10e.
         """

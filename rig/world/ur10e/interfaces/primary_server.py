@@ -1,7 +1,8 @@
-"""The primary and secondary interfaces, ports 30001 and 30002: the robot's state ten times a second, and its messages.
+"""The primary and secondary interfaces, ports 30001 and 30002, which send the robot's state and its messages.
 
-Source: the maker's client interface description for PolyScope 5. A package is a big-endian size (i32), a type (u8) and
-a payload. A robot state (16) contains sub-packages of this form; a robot message (20) time stamp, source and kind.
+The state is sent ten times a second. Source: the maker's client interface description for PolyScope 5. A package is a
+big-endian size (i32), a type (u8) and a payload. The payload of type 16, a robot state, consists of sub-packages of the
+same form; that of type 20, a robot message, begins with time stamp, source and kind.
 """
 
 import struct
@@ -64,7 +65,7 @@ class PrimarySession:
 
 
 def _timestamp_us(robot: Robot) -> int:
-    """Return the controller's time in a message, µs; a clock that is set to before its start sends zero."""
+    """Return the controller's time in a message, µs; zero if the clock was set back to before its start."""
     return max(int(robot.reported_time_s * 1e6), 0)
 
 

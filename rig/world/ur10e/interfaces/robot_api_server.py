@@ -124,7 +124,7 @@ class RobotApiSession:
         return b""
 
     def receive(self, data: bytes) -> bytes:
-        """Return the answer once the request is complete; an order is answered when it has been carried out."""
+        """Return the answer if the request is complete and is not an order that takes time; otherwise b""."""
         self._buffer += data
         head, has_end, body = bytes(self._buffer).partition(END)
         length = LENGTH.search(head)
@@ -148,7 +148,7 @@ class RobotApiSession:
         pass
 
     def _answer(self, method: str, path: str, body: bytes) -> bytes:
-        """Return the answer to a request; None while an order is being carried out."""
+        """Return the answer to a request; empty if it is an order that takes time, which `tick` answers."""
         version = self._robot.identity.polyscope
         if not path.startswith(BASE):
             return _http(HTTPStatus.NOT_FOUND, {"message": "not found"})

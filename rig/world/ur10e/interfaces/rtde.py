@@ -85,14 +85,14 @@ class RtdeSession:
 
     @property
     def dialogue(self) -> bool:
-        """Whether the client asks questions, as until its recipes are set up. Afterwards it reads and writes values."""
+        """Whether the client still asks questions: once its recipes are set up, it only reads and writes values."""
         return not self._started
 
     def greeting(self) -> bytes:
         return b""
 
     def receive(self, data: bytes) -> bytes:
-        """Answer every complete package, and keep the rest; refuse what is not a package."""
+        """Answer every complete package and keep the remaining bytes; close the connection at an impossible size."""
         self._buffer += data
         answer = b""
         while len(self._buffer) >= HEADER.size:
@@ -220,7 +220,7 @@ class RtdeSession:
 
 
 def _size_bytes(kinds: list[str]) -> int:
-    """Return the size in bytes of values of these types, or of the list of the types' names if larger."""
+    """Return the bytes that values of these types take, or those of the list of the types' names if these are more."""
     return max(struct.calcsize(">" + "".join(TYPES[kind][0] for kind in kinds if kind in TYPES)), len(",".join(kinds)))
 
 

@@ -31,7 +31,7 @@ class ScriptReader:
         self._size = 0  # bytes of the incomplete program
 
     def feed(self, data: bytes) -> Iterator[list[str]]:
-        """Yield the programs that are complete with `data`, as lines. Raise `ProgramError` if one is too long."""
+        """Yield the lines of each program that `data` completes. Raise `ProgramError` if a program is too long."""
         self._size += len(data)
         *lines, self._partial = (self._partial + data).split(b"\n")
         for raw in lines:
@@ -61,7 +61,7 @@ def compile_program(robot: Robot, lines: list[str]) -> Program:
 
 
 def _parse_register_offset(text: str) -> int:
-    """Return the register offset on the line after its name. Raise `ProgramError` for other lines."""
+    """Return the register offset that the program's `text` sets, 0 by default. Raise `ProgramError` for another one."""
     match = re.search(r"reg_offset_int\s*=[^\n]*\n\s*(\d+)", text)
     offset = int(match.group(1)) if match else 0
     if offset not in REGISTER_OFFSETS:

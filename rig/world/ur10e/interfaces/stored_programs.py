@@ -35,8 +35,8 @@ class StoredPrograms:
     def store(self, form: bytes, *, replace: bool) -> str:
         """Store the document that a client sends, and return its name.
 
-        Raise ValueError if the form contains no document, if a document of the same name is stored and `replace` is not
-        set, or if none is stored and it is set.
+        Raise ValueError if the form contains no document. Raise it too unless a document of the same name is already
+        stored with `replace`, and not yet stored without.
         """
         text = form[form.find(b"{") : form.rfind(b"}") + 1].decode()
         try:

@@ -22,14 +22,17 @@ KNOTS_PER_TICK = 5  # knots that are computed in one tick: a long line must not 
 
 
 def _twist(q: Sequence[float] | Array, rotation: Array, position: Array, links: Links) -> Array:
-    """Return the displacement (6,) from the flange at `q` to a frame: translation (m), rotation vector (rad)."""
+    """Return the displacement (6,) that moves the flange from its frame at `q` to the frame `rotation`, `position`.
+
+    The displacement is a translation, m, and a rotation vector, rad, in the base's axes.
+    """
     current, origin = flange_frame(list(q), links)
     turn = rotation @ np.array(current).T
     return np.array([*(position - np.array(origin)), *rotation_vector(turn.tolist())])
 
 
 def _length(twist: Array) -> float:
-    """Return the length of a displacement (6,), m."""
+    """Return the length of a displacement (6,), m; a rotation counts by an arc of radius `ROTATION_RADIUS_M`."""
     return max(hypot(*twist[:3]), ROTATION_RADIUS_M * hypot(*twist[3:]))
 
 
@@ -109,9 +112,9 @@ def plan_straight_line(
 def _sample_line(
     start: Joints, twist: Array, top_m_s: float, acceleration: float, links: Links
 ) -> Generator[None, None, tuple[list[MotionSegment], float]]:
-    """Sample a line at the speed `top_m_s`, some knots per tick; return its segments and a joint's largest speed ratio.
+    """Sample a line at the speed `top_m_s`, some knots per tick; return its segments and the largest speed ratio.
 
-    The ratio is a joint's speed over its limit.
+    The speed ratio of a joint is its speed divided by its limit.
     """
     length = _length(twist)
     ramp_s = top_m_s / acceleration

@@ -40,7 +40,10 @@ class Deflection(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class JointDrive:
-    """The drives of all six joints. `orders`: the ripple of each; other fields as in `world.arm.drive`."""
+    """The drives of all six joints. The fields but `orders` are the keys of `world.arm.drive`, in rad and s.
+
+    `orders`: for each joint the components (n, Rₙ/n, φₙ) of its ripple, as in the module's equation.
+    """
 
     orders: tuple[RippleOrders, ...] = ((),) * 6
     lag_s: float = 0.0
@@ -51,7 +54,8 @@ class JointDrive:
     def shake(self, joint: int, u: float, v: float, a: float) -> list[Shaken]:
         """Return the ripple of a joint whose motion without ripple has angle `u`, rate `v`, acceleration `a` (rad, s).
 
-        With crosstalk, also return the fraction of it that reaches each neighbour with a parallel axis.
+        A ripple is (joint, angle, rate, acceleration). With crosstalk, a fraction of the ripple of this joint is also
+        returned for each neighbour with a parallel axis.
         """
         sines = cosines = bends = 0.0
         for n, amplitude, phase in self.orders[joint]:
@@ -78,7 +82,7 @@ class JointDrive:
     def advance(self, before: Sequence[Deflection], change_rad_s: Sequence[float]) -> tuple[Deflection, ...]:
         """Return the joints' deflections in the next tick, if their targets' rates change by `change_rad_s`.
 
-        `before` are the deflections in the last tick. Joints without a deflection are left out.
+        `before` has the deflections in the last tick. Both leave out joints that are not deflected.
         """
         if not self.yield_s2 or not (before or any(change_rad_s)):
             return ()

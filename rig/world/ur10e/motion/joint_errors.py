@@ -26,7 +26,7 @@ class Errors:
 
     - `hysteresis_rad`: the full width between both directions.
     - `vibration_rms_rad_s`: RMS of each wrist's vibration rate.
-    - `vibration_rad_s` (of its tones), `settling_rad_s`: angular frequencies.
+    - `vibration_rad_s`, `settling_rad_s`: angular frequencies of the vibration's tones, and of the settling.
     """
 
     zero_rad: Sequence[float] = (0.0,) * 6
@@ -76,7 +76,8 @@ class JointErrors:
     def step(self, time_s: float, smooth_qd_rad_s: Joints, q_rad: Callable[[], Joints]) -> None:
         """Update the errors with the joints' speeds without ripple at the end of a tick, and their angles.
 
-        `q_rad` is called only at reversals. A joint's own speed changes its sign where the joint settles or is shaken.
+        `q_rad` is called only at reversals. These are found in the speeds without ripple, because a joint's full speed
+        also changes its sign when the joint settles or is shaken.
         """
         if smooth_qd_rad_s is self._speed:
             return

@@ -202,9 +202,10 @@ class JointMotion:
     def _apply_ripples(
         self, tick: _Tick, target: list[float], speed: list[float], change: list[float]
     ) -> tuple[list[float], list[float], list[float]]:
-        """Return angles, speeds and accelerations with the ripples that are proportional to speed.
+        """Return angles, speeds and accelerations of the joints with the ripples that are locked to their angles.
 
-        The lists `target`, `speed` and `change` are changed to those without ripple.
+        The arguments are the targets' angles, speeds and accelerations. They are changed in place to those of the
+        joints without ripple.
         """
         qd, qdd = [0.0] * 6, [0.0] * 6
         for joint, (offset, gain) in enumerate(zip(tick.offset, tick.gain, strict=True)):
@@ -291,7 +292,10 @@ class JointMotion:
         self._now = None
 
     def _map(self, start: Joints, end: Joints) -> tuple[Joints, Joints]:
-        """Return offset and gain from target to angle without ripple; joints rest exactly at the path's ends."""
+        """Return the offset and gain (6,) that convert each joint's target into its angle without ripple.
+
+        They are chosen such that the joints, with their ripple, are exactly on target at the path's two ends.
+        """
         first = [r.smooth(q) for r, q in zip(self._ripples, start, strict=True)]
         last = [r.smooth(q) for r, q in zip(self._ripples, end, strict=True)]
         gain = tuple(  # a path shorter than any useful precision has none

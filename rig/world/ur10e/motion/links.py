@@ -43,7 +43,7 @@ def links(
     alpha_rad: Sequence[float] = ZERO6,
     nominal: LinkSizes = UR10E,
 ) -> Links:
-    """Return links with the given deviations of each joint from the nominal ones; without any, twists are exact."""
+    """Return links that deviate from the nominal ones by the given values (6,), one for each joint."""
     return tuple(
         _link(theta, a + da, d + dd, quarters, twist)
         for (a, d, quarters), theta, da, dd, twist in zip(nominal, theta_rad, a_m, d_m, alpha_rad, strict=True)
