@@ -17,7 +17,9 @@ EntryT = TypeVar("EntryT", bound=BaseModel)
 
 
 def entry(kind: type[EntryT], /, *sources: object, **more: Any) -> EntryT:
-    """Return an entry of `kind`; each field comes from `more`, or else from the first source with it in the table.
+    """Return an entry of `kind`. A field that `more` does not give is taken from the first source that has it.
+
+    The table of `entry_sources.py` says which fields a source has.
 
     Arrays become tuples. Raise ValueError for a field without a source or with a value that does not fit; TypeError if
     `more` has a name that is not a field, or for a source that the table does not list; AttributeError if a source

@@ -31,7 +31,8 @@ def write_header(outcome: Outcome, document: ResultDocument, folder: Path) -> tu
 def g_sensitivity(result: SensorResult) -> Array | None:
     """Return the g-sensitivity (3, 3) in the frame of the corrected rates, rad/s per m/s²; None if unknown.
 
-    The vector model states it for gravity in the flange frame. Its `mounting` R transforms it to the sensor's: G Rᵀ.
+    The vector model's g-sensitivity G refers to gravity in the flange frame. With the model's `mounting` R, which
+    rotates from the flange to the sensor, G Rᵀ refers to gravity in the sensor's frame.
     """
     vector = result.vector_model
     if not isinstance(vector, VectorSolution) or vector.g_sensitivity is None:

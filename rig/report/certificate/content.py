@@ -60,7 +60,7 @@ class RestCalibration:
 
     @property
     def whose(self) -> str:
-        """The owner of the scale to which the values refer, with its article: "a gyroscope's scale"."""
+        """The scale to which the values refer, named by its sensor with an article: "a gyroscope's scale"."""
         return f"{'an' if self.kind[0] in 'aeiou' else 'a'} {self.kind}'s scale"
 
 

@@ -65,9 +65,11 @@ class PlotPoint:
 
 @dataclass(frozen=True, slots=True)
 class Residuals:
-    """Three values of each sweep, attitude or repeat; `ticks` are heights with their labels, rests begin at `split`.
+    """Three values of each sweep and rest, of each attitude, or of each repeat, as points with bars.
 
-    `shown` describes the points; `expectation` describes the bars of two standard deviations.
+    `ticks` are heights with their labels. `split` is the abscissa at which the rests begin, if there are any. `within`
+    is the number of bars that contain zero. `shown` describes the points, `expectation` the bars of two standard
+    deviations.
     """
 
     points: tuple[PlotPoint, ...]
@@ -82,9 +84,10 @@ class Residuals:
 
 @dataclass(frozen=True, slots=True)
 class Contributions:
-    """Contributions to the combined uncertainty on a logarithmic axis: (name, y, x of k, x of b).
+    """Contributions to the combined uncertainties of one scale factor and one bias, on a logarithmic axis.
 
-    The values are those of the printed budget, on their `axes`.
+    Each of `rows` is a contributor's name, its height, and its abscissas for the scale factor and for the bias. `axes`
+    are the sensor axes of the scale factor and of the bias, which are those of the printed budget.
     """
 
     axes: tuple[str, str]

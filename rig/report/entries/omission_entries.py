@@ -65,7 +65,7 @@ def _rests(solution: "HandSolution") -> Iterator[OmittedEntry]:
             what="rests",
             count=len(solution.creeping_s),
             total=len(solution.rests) + len(solution.creeping_s),
-            reason="bias_jumped: the body crept, because the gyroscope read differently before and after",
+            reason="bias_jumped: the body crept, which the gyroscope's other readings before and after show",
             first=f"from {start_s:.1f} to {end_s:.1f} s",
         )
 

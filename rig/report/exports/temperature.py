@@ -68,7 +68,7 @@ def _change(drift: ResultDocument, sensor: SensorCorrection, to_c: float) -> Arr
 
 
 def _check_same(result: ResultDocument, drift: ResultDocument) -> None:
-    """Raise Refused `another_sensor` if the drift is not that of this sensor."""
+    """Raise Refused `another_sensor` if a sensor of the result has another serial number in the run of the drift."""
     watched = drift.provenance.sensor_serial_numbers
     for name, serial_number in result.provenance.sensor_serial_numbers.items():
         if name in watched and watched[name] != serial_number:

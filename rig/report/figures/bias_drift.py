@@ -44,7 +44,10 @@ def _draw_all(figure: "Figure", drifts: Mapping[Quantity, BiasDrift]) -> None:
 
 
 def draw_drift(axes: "Axes", quantity: Quantity, drift: BiasDrift) -> None:
-    """Draw the bias by repeat: dots with scale and axes fixed, crosses with all estimated, lines at steps."""
+    """Draw the bias by repeat, with dotted lines at its steps.
+
+    Dots are biases estimated with scale and axes fixed, crosses those estimated together with scale and axes.
+    """
     size = quantity.drift.size
     repeat = np.arange(1, len(drift.scale_fixed.bias) + 1)
     free_solutions = [(index + 1, solution) for index, solution in drift.scale_free.results.items()]

@@ -102,7 +102,10 @@ def is_scale(name: str) -> bool:
 def scale_and_bias(
     sensor: str, quantity: "Quantity", entry: CalibratedEntry, bias: Sequence[float], document: "ResultDocument"
 ) -> Iterator[Parameter]:
-    """Yield scale factor and bias of each axis, then the mean scale factor, with its covariance and largest k."""
+    """Yield the mean scale factor, then scale factor and bias of each axis.
+
+    The mean's uncertainty includes the covariances of the axes; its coverage factor is the largest of theirs.
+    """
     from rig.data.meaning import JUDGED_PARAMETERS, find_conformity_limit
 
     axes, unit_rows = len(entry.scale), np.eye(2 * len(entry.scale))
@@ -128,7 +131,7 @@ def scale_and_bias(
 
 
 def parameters(characteristics: "Iterable[Term]") -> Iterator[Parameter]:
-    """Yield each number of the sensor's characteristics as a parameter, with std and degrees of freedom."""
+    """Yield each number of the sensor's characteristics as a parameter, with its uncertainty and coverage factor."""
     for term in characteristics:
         numbers = term.numbers
         sign = -1 if term.characteristic.opposite else 1

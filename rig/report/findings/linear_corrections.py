@@ -1,11 +1,13 @@
 """Corrections of a sensor's readings in the form of other programs: matrix, offset, noise. Pure.
 
-In SI units, in the right-angled frame nearest to a gyroscope's axes, whose rotation is the vector model's `mounting`:
+A reading m follows from the true value in SI units, with matrix F, offset c and g-sensitivity G:
 
-    gyroscope        m = F ω + G a + c,    c = −b, a the specific force, which at rest points upwards
-    any other triad  m = F s + c
+    gyroscope        m = F ω + G a + c,    for the rate ω and the specific force a, which at rest points upwards
+    any other triad  m = F s + c           for the specific force or flux density s
 
-Without a solution of the vector model a gyroscope's F is K⁻¹, and its g-sensitivity is unknown.
+The rig's bias b of a gyroscope is −c. A gyroscope's F, ω and a are in the right-angled frame nearest to its axes, whose
+rotation is the vector model's `mounting`. Without a solution of the vector model F is K⁻¹, the inverse of the rig's
+matrix of scale factors, and G is unknown.
 """
 
 from collections.abc import Sequence
@@ -78,8 +80,8 @@ class SensorCorrection:
 def noise_of(means: Sequence[AveragedInterval], at_rest: Sequence[tuple[Sequence[float], int]]) -> ReadingNoise:
     """Return the readings' noise, from each rest's standard deviation of one sample and number of samples.
 
-    The density is σ over √rate of the noisiest axis, for noise that is white up to half the rate. Without a rest it is
-    None, as for readings in attitudes that a file states.
+    The density is the standard deviation of the noisiest axis divided by the square root of the sample rate, which
+    holds for noise that is white up to half the rate. It is None without rests, as for attitudes that a file states.
     """
     duration_s = sum(mean.duration_s for mean in means)
     rate_hz = sum(mean.samples for mean in means) / duration_s if duration_s > 0 else None

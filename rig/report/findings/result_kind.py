@@ -88,9 +88,9 @@ class CertifiedItem:
 class Standard:
     """The reference standard of the scale factors of sensors in known attitudes, for certificates.
 
-    `size` is the required quantity, `value` formats its value from an entry, `origin` is the laboratory's statement of
-    its source. `quantity` is its name when a file gives the motion; `method` describes the measurement on an
-    arm, with or without sweeps of a gyroscope.
+    `size` names the quantity that the standard realises, `quantity` names it if a file gives the motion. `value`
+    formats the standard's value from an entry; `origin` returns the laboratory's statement of the value's source.
+    `method` describes the measurement on an arm, with or without sweeps of a gyroscope.
     """
 
     size: str
@@ -102,12 +102,12 @@ class Standard:
 
 @dataclass(frozen=True, slots=True)
 class ResultKind(Generic[EntryT]):
-    """A kind of result: for each output (outlet) its function, or the reason why the kind has no such output.
+    """A kind of result: a function for each output (outlet), or the reason why the kind does not have this output.
 
     - name: its name for people.
     - key: its key in result.json.
-    - entries: builds the entries there, if the run has any.
-    - find: finds the entries in a document.
+    - entries: builds this kind's entries of result.json from a run's outcome.
+    - find: finds this kind's entries in the document of a result.
     - printed: yields tables and lines for the terminal.
     - shown: builds the row of page and notebook.
     - followed: builds the record of a history.

@@ -151,7 +151,7 @@ def _lines(finding: Finding[GyroscopeEntry]) -> Iterator[str]:
 
 
 def _describe_difference(sensor: GyroscopeEntry, other: EstimateEntry | VectorEntry) -> Iterator[str]:
-    """Yield a sentence on the preferable one of two estimators that differ by more than U."""
+    """Yield a sentence if an `other` estimator differs by more than U from the table: the table's values are better."""
     expanded = expand_uncertainties(sensor.budget, sensor.covariance)
     values, others = ((*solution.scale, *solution.bias_rad_s) for solution in (sensor, other))
     differences = divide_or_infinity(np.abs(np.subtract(others, values)), expanded)
@@ -165,7 +165,7 @@ def _describe_difference(sensor: GyroscopeEntry, other: EstimateEntry | VectorEn
 
 
 def _angle_lines(sensor: GyroscopeEntry) -> Iterator[str]:
-    """Yield lines on how a file's sweeps were interpreted, and with which errors."""
+    """Yield lines on the interpretation of a file's sweeps, and on the errors assumed for their turns."""
     if (angles := sensor.by_angles) is None:
         if sensor.range_rad_s is None and sensor.in_attitudes is None and sensor.by_hand is None:
             yield "the axes of the sweeps are assumed exact: an error of theirs is an error of F across its rows"

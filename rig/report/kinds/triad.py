@@ -31,8 +31,8 @@ from rig.report.tables.budget import budget_table, heading_for
 class Words:
     """The texts of a kind of three-axis sensor, by its entry.
 
-    For the terminal, the words behind the sensor's name, its model, and lines below the table; for the digital
-    certificate, scale and bias with a reversal, and the temperatures.
+    The terminal prints `title` behind the sensor's name, the `model` of its readings, and `lines` below the table. The
+    digital certificate has scale and bias (`digital`, with a reversal if any) and `temperatures_c`.
     """
 
     title: str

@@ -41,7 +41,7 @@ def find_uncovered_in_container(der: bytes) -> Iterator[str]:
 
 
 def certificates_with(der: bytes) -> list[list[Certificate]]:
-    """Return the certificates of a signature and those of its time stamp, the signer's first in both."""
+    """Return the list of a signature's certificates, then that of its time stamp's; a signer's own begins each list."""
     contents = [cms.ContentInfo.load(der)["content"]]
     for attribute in contents[0]["signer_infos"][0]["unsigned_attrs"] or ():
         contents += [stamp["content"] for stamp in attribute["values"]]

@@ -13,8 +13,9 @@ from rig.report.signatures.reason import Reason
 class SignatureReport:
     """One signature: `signer` is the name in its certificate, `certificate_sha256` the certificate's fingerprint.
 
-    `when` is the time by the clock of `time_server`, or without one the signer's. `trusted` is None if no trusted
-    certificate was given. `long_term`: whether revocation lists in the file show that it was not revoked then.
+    `when` is the time by the clock of `time_server` or, without a time server, by the signer's clock. `trusted` is None
+    if no trusted certificate was given. `long_term`: whether revocation lists in the file show that the certificate was
+    not revoked at that time.
     """
 
     signer: str
@@ -69,7 +70,7 @@ def not_as_signed(name: str, why: str) -> Refused:
 
 
 def list_signer_doubts(name: str, report: SignatureReport, why: str) -> list[Refused]:
-    """Return the problem of an unaltered file: its signer is unknown, or not trusted.
+    """Return the problem of an unaltered file whose signer is unknown or not trusted; no problem if trusted.
 
     `why`: the reason of the distrust, empty if the signer is trusted.
     """
@@ -98,7 +99,7 @@ def stamp_not_trusted(name: str, server: str) -> Refused:
 
 
 def authority_not_trusted(name: str, authority: str) -> Refused:
-    """Return the problem of a file with an authority's certificate that may be altered."""
+    """Return the problem of a file with a certificate of `authority` that may be altered: nothing trusted vouches."""
     return Refused(
         "signer_not_trusted",
         f"{name} contains a certificate of {authority} that no trusted authority has issued",

@@ -111,9 +111,10 @@ def _other_name(certificate: "Certificate", expected: str | None) -> str:
 
 
 def find_unvouched(chain: "Sequence[Certificate]", trust: Trust) -> list["Certificate"]:
-    """Return those certificates of a signer's `chain` whose content nothing verifies, apart from the first.
+    """Return those certificates of a signer's `chain`, after the first one, whose content nothing verifies.
 
-    The signature itself identifies the first. The others must be trusted, or issued by a trusted one or by another.
+    The signature itself identifies the first certificate. Each further one is verified if it is trusted, or if a
+    trusted certificate or one in the chain has issued it.
     """
     from cryptography.hazmat.primitives.serialization import Encoding
     from cryptography.x509 import load_der_x509_certificate
@@ -129,7 +130,7 @@ def find_unvouched(chain: "Sequence[Certificate]", trust: Trust) -> list["Certif
 
 
 def chain_of(certificates: "Sequence[Certificate]") -> list["Certificate"]:
-    """Return the chain from the first certificate to its root, taken from the other certificates."""
+    """Return the first certificate, then its issuers up to the root, as far as the other certificates include them."""
     chain, rest = [certificates[0]], [other for other in certificates if other != certificates[0]]
     while issuers := [other for other in rest if any(_has_issued(other, one) for one in chain)]:
         chain += issuers

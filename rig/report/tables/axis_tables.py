@@ -63,9 +63,9 @@ def line_of(term: Term, lead: str, form: str, width: str = ".2g") -> str:
 
 
 def matrix_lines(matrix: Array, covariance: Array, factor: float) -> Iterator[str]:
-    """Yield F row by row and the angles between its axes, ± U; `covariance` (9, 9) is the covariance of F, row by row.
+    """Yield the rows of the sensor's `matrix` F (3, 3), then the angles between its axes, each ± U.
 
-    `factor` is the largest coverage factor of the scale factors.
+    `covariance` (9, 9) is that of the matrix, row by row. `factor` is the largest coverage factor of the scale factors.
     """
     widths = factor * np.sqrt(np.diag(covariance)).reshape(3, 3)
     for axis, row, row_widths in zip("xyz", matrix.tolist(), widths.tolist(), strict=True):

@@ -75,7 +75,10 @@ def rows_of(
     size: float = 1.0,
     too: float | None = None,
 ) -> list[AxisRow]:
-    """Return the certificate's row of each axis; `widths` (6,) are U of the scale factors, then of the biases."""
+    """Return the certificate's row of each axis; `widths` (6,) are U of the scale factors, then of the biases.
+
+    Biases are multiplied by `size` for print, and by `too`, if given, for a second unit.
+    """
 
     def bias_in(unit: float, i: int) -> Pair:
         return pair(unit * bias[i], unit * widths[3 + i])

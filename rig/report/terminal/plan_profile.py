@@ -23,9 +23,10 @@ class ProfilePoint:
 
 
 def profile(plan: Plan) -> list[ProfilePoint]:
-    """Return the corners of each axis's rate over time, axis after axis, from 0 s and 0°; rests follow sweeps.
+    """Return the corners of each axis's rate over time, axis after axis; each axis begins at 0 s and 0°.
 
-    Motions between sweeps are left out, because a rate table makes its own. Angles are right-handed about the axis.
+    The profile consists of the sweeps and the rests after them. Motions between sweeps are left out, because a rate
+    table makes its own. Angles are right-handed about the axis.
     """
     by_axis: dict[str, list[tuple[Sweep, float]]] = {}
     for index, step in enumerate(plan.steps):
