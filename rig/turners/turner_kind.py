@@ -62,7 +62,8 @@ class TurnerKind(Generic[SectionT, ReportT]):
     - problems: lists all reasons not to execute the last of the plans, before anything moves; without a report, only
       those due to the plans. Pure.
     - describe_configured: returns the configured turner with its nominal geometry, before any connection.
-    - describe_connected: returns the connected turner for the recording. Raise `Refused` for another turner.
+    - describe_connected: returns the connected turner for the recording. Raise `Refused` for a turner other than the
+      configured one.
     - carried: returns the payload to set on the turner.
     - words: its wording in documents and messages.
     - fields: the fields of its states after times and joints, in the order of `to_record`.

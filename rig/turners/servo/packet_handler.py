@@ -113,7 +113,7 @@ class Bus:
         return bytes(reply[DATA : DATA + register.size])
 
     def look_up(self, register: Register) -> tuple[int, ...]:
-        """Read a register's values, again after a lost reply. Raise ReplyLost, InstructionDenied, PortGone."""
+        """Read a register's values, repeatedly if replies are lost. Raise ReplyLost, InstructionDenied, PortGone."""
         for _ in range(MAX_ATTEMPTS - 1):
             try:
                 return self.read(register)
@@ -124,7 +124,7 @@ class Bus:
     def write(self, register: Register, *values: int) -> None:
         """Write absolute values, so that a repeated write does no harm.
 
-        Without an acknowledgement, read the register, and repeat a lost instruction. Raise ReplyLost,
+        If the acknowledgement is lost, read the register, and write again unless it has the values. Raise ReplyLost,
         InstructionDenied, PortGone.
         """
         data = register.pack(*values)

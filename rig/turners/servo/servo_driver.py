@@ -125,7 +125,10 @@ class Servo:
         ]
 
     def check(self) -> None:
-        """Raise the first problem, or the error of a requested stop, if any; before that, stop a controlled shaft."""
+        """Raise the first problem or, after a requested stop, `servo_stopped`; return if there is neither.
+
+        A shaft under control is stopped before the error is raised.
+        """
         if self._link is not None and (problem := self._thread_problem(self._link)) is not None:
             self._fail(problem)
         if self._problem is None and not (self._link is not None and self._stopper.begun):

@@ -74,7 +74,7 @@ class ServoLink:
         return self._thread.is_alive()
 
     def stop(self, work: Callable[[Bus], None]) -> None:
-        """Run a stop before anything else, and cancel jobs that have not begun."""
+        """Run `work`, which stops the shaft, before anything else, and cancel jobs that have not begun."""
         self._stopping = True
         self._jobs.appendleft(lambda: work(self._bus))
         self._woken.set()
@@ -110,7 +110,7 @@ class ServoLink:
 
     # Its thread -------------------------------------------------------------------------------------------------
     def _run(self) -> None:
-        """Poll states and run jobs until the link is closed; pauses while it must be quiet."""
+        """Poll states and run jobs until the link is closed; pause during the time set by `keep_quiet`."""
         due_s = looked_s = self._clock.now_s()
         try:
             while not self._closing.is_set():

@@ -65,6 +65,6 @@ ERROR_WORDS = {
 
 
 def error_words(bits: int) -> str:
-    """Return Hardware Error Status in words, with its number: the manual's pages disagree on one of the bits."""
+    """Return Hardware Error Status in words, with its number because the manual's pages disagree on one of the bits."""
     words = [word for bit, word in ERROR_WORDS.items() if bits & bit] or ["unknown"]
     return f"{', '.join(words)} (0x{bits:02x})"

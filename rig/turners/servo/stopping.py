@@ -1,9 +1,10 @@
 """The stop of the shaft.
 
 1. Goal Position becomes Present Position, with a short profile: the shaft brakes and holds. Torque remains on: without
-it an unbalanced board would fall, because these servos' gears do not lock. 2. Without an acknowledgement, a last write
-sets its watchdog to the shortest time, and nothing more is sent: the servo stops at once if it receives the write,
-otherwise after its armed watchdog time. 3. A *state* newer than the stop confirms that the shaft is at rest.
+it an unbalanced board would fall, because these servos' gears do not lock. 2. If the servo does not acknowledge this, a
+last write sets its watchdog to the shortest time, and nothing more is sent. The servo then stops at once if it receives
+the write, otherwise after the watchdog time that was armed before. 3. A *state* newer than the stop confirms that the
+shaft is at rest.
 
 None of this is a safety function. Only the switch of the servo's supply is sure.
 """

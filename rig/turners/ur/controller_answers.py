@@ -1,7 +1,7 @@
-"""The controller's answers while nothing moves: the rig's ability to stop its arm, and the arm's report.
+"""Queries of the controller while nothing moves: whether the rig could stop the arm, and what the arm reports.
 
-A controller with PolyScope 5 answers by its dashboard. A PolyScope X has none: RTDE, the primary interface and the
-Robot API answer what they can.
+A controller with PolyScope 5 answers through its dashboard. A PolyScope X has no dashboard, so the answers come from
+RTDE, the primary interface and the Robot API, as far as these provide them.
 """
 
 from contextlib import closing
@@ -35,7 +35,7 @@ def stop_problem(host: str, version: tuple[int, ...]) -> Problem | None:
 
 
 def no_states(host: str, error: OSError) -> Problem:
-    """Describe a host that sends no states: no arm answers, or only the arm's other ports answer."""
+    """Describe a host that sends no states, because no arm answers or because only the arm's other ports answer."""
     for interface in (Dashboard, PrimaryStop):
         try:
             interface(host, CLOSED_PORT_TIMEOUT_S).close()
@@ -54,7 +54,10 @@ def no_states(host: str, error: OSError) -> Problem:
 
 
 def reports_local_control(host: str, version: tuple[int, ...]) -> bool:
-    """Return whether a dashboard reports local control; False if there is none: then the trial of the stop shows it."""
+    """Return whether the dashboard reports local control; False without a dashboard.
+
+    Without a dashboard the trial of the stop shows local control.
+    """
     if is_polyscope_x(version) or host in SIMULATOR_HOSTS:
         return False
     try:

@@ -43,7 +43,7 @@ def version_text(version: tuple[int, ...]) -> str:
 def identify_model(report: ArmReport) -> str | None:
     """Return the maker's name of the arm that the controller reports, or None.
 
-    If it does not report the type, the geometry or the dashboard's name decides.
+    If the controller does not report the arm's type, the geometry or the dashboard's name decides.
     """
     models, robot_type = _models(report), _robot_type(report)
     return None if robot_type is None else models.get(robot_type, f"arm of type {robot_type}")
@@ -57,7 +57,7 @@ def is_polyscope_x(version: tuple[int, ...]) -> bool:
 def series_problem(host: str, version: tuple[int, ...]) -> Problem | None:
     """Return the problem of a controller of another series, or of software too old to stop its arm; else None.
 
-    For a configured arm of the CB3 series, `cb3_not_supported` does not apply.
+    `identity_problems` disregards `cb3_not_supported` if an arm of the CB3 series is configured.
     """
     if is_polyscope_x(version) and version < POLYSCOPE_X_MIN_VERSION:
         since = ".".join(map(str, POLYSCOPE_X_MIN_VERSION))

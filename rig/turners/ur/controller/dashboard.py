@@ -44,8 +44,8 @@ class Dashboard:
     def stop_program(self) -> None:
         """Stop the running program, and with it the arm.
 
-        In local control the controller refuses with a sentence. An answer that it failed to execute the command, as
-        without a running program, is not a refusal.
+        In local control the controller refuses the command, and its answer becomes the `refusal`. If no program runs,
+        it answers that it failed to execute the command, which does not count as a refusal.
         """
         answer = self.ask("stop")
         self.acknowledged = answer == STOPPED_ANSWER

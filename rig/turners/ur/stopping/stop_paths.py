@@ -15,9 +15,9 @@ from rig.turners.ur.identity import is_polyscope_x
 class StopConnection(Protocol):
     """A connection to the controller by which its program is ended.
 
-    After the order, `acknowledged` is whether the controller confirmed it, and `refusal` contains its words if it
-    refused. Either may arrive only with a later report on programs, if the controller `reports_programs`. Methods raise
-    `OSError` if the controller does not answer in time.
+    After the order to stop, `acknowledged` is whether the controller has confirmed the order, and `refusal` contains
+    its words if it has refused. If the connection `reports_programs`, both may also be set later, by a report on
+    programs. Methods raise `OSError` if the controller does not answer in time.
     """
 
     @property
