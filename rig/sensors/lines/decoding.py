@@ -89,7 +89,11 @@ class LineReader:
         return LineBatch(np.zeros((0, self._columns)), np.zeros(0, np.int64), comments, b"")
 
     def _decode(self, data: bytes) -> LineBatch:
-        """Return the samples of whole lines: all at once, then those that failed one by one."""
+        """Return the samples of whole lines: first all lines at once, then one by one those that failed.
+
+        `raw` has the bytes as received. In the copy `bare`, prefixes and checksums are blank; in `text`, keys are also
+        replaced by markers. All three have equal length, so positions in one are valid in the others.
+        """
         raw = np.frombuffer(data, np.uint8)
         self.unprintable += int(np.count_nonzero((raw >= 0x7F) | (raw < 9)))
         line_ends = np.flatnonzero(raw == _NEWLINE)
@@ -109,12 +113,12 @@ class LineReader:
             positions = line_starts[good][:, None] + np.arange(len(self._prefix))
             text[positions] = _BLANK
         sum_ok = self._match_checksums(raw, text, line_starts, line_ends) if self._has_checksum else np.ones_like(good)
-        prefixed, bare = good & sum_ok, text
+        prefixed, bare = good & sum_ok, text  # copied before `good` is changed in place
         if self._keys:
             text = self._mark_keys(text)
         classes = self._classes[text]
         good &= _have_valid_bytes(classes, line_starts, line_ends)
-        numbers = self._parse_values(text, classes, (line_starts, line_ends), good, sum_ok)
+        numbers = self._parse_values(text, classes, (line_starts, line_ends), good, sum_ok)  # also changes `good`
         is_sample = good & sum_ok
         values = np.full((len(is_sample), self._columns), np.nan)
         values[is_sample] = numbers
@@ -174,7 +178,7 @@ class LineReader:
         good: NDArray[np.bool_],
         sum_ok: NDArray[np.bool_],
     ) -> Array:
-        """Return the numbers (m, columns) of lines with a number in every column; mark these lines in `good`."""
+        """Return the numbers (m, columns) of the `good` lines with a right sum; unmark lines in `good` that lack one."""
         line_starts, line_ends = lines
         number = np.concatenate([[False], classes == _NUMBER, [False]])
         edges = np.flatnonzero(number[1:] != number[:-1])

@@ -13,7 +13,10 @@ ROUND_DIGITS = (1, 2, 2.5, 4, 5, 8, 10)
 
 @dataclass(frozen=True, slots=True)
 class StatedProperties:
-    """The user's statements about facts that no line shows, or None; `by_hand`: for a session by hand."""
+    """Properties that printed lines do not show, as the user states them; None if the user has not stated one.
+
+    `by_hand`: whether the section is for a session by hand.
+    """
 
     serial_number: str | None = None
     range_deg_s: str | None = None
@@ -24,7 +27,7 @@ class StatedProperties:
 def section(
     shape: Shape, guess: Guess, port: str, baud: int, name: str = "imu", *, user: StatedProperties | None = None
 ) -> str:
-    """Return the YAML of `sensors`, with `?` for unknown values, which `rig check` refuses by their keys."""
+    """Return the YAML of the section `sensors`, with `?` for each unknown value, whose key `rig check` then reports."""
     user = user or StatedProperties()
     lines: dict[str, object] = {"columns": _format_list(guess.columns)}
     if shape.keys:

@@ -277,7 +277,11 @@ def _unit(shape: Shape, guess: Guess, kind: str, still: Flags) -> dict[str, obje
 
 
 def _rate_unit(shape: Shape, guess: Guess, rates: Array, still: Flags) -> tuple[str, float] | None:
-    """Return unit and scale of the gyroscope, by a fit of gravity's rotation to its readings; None if it fits none."""
+    """Return unit and scale of the gyroscope, by a fit of gravity's rotation to its readings; None if no unit fits.
+
+    In the sensor's axes the direction f of gravity changes with df/dt = −ω × f, so the fitted factor of the readings is
+    the size of a printed 1 in rad/s.
+    """
     if "ax" not in guess.columns or not guess.rate_hz:
         return None
     forces = shape.values[:, [guess.columns.index("a" + axis) for axis in "xyz"]]

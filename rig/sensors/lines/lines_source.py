@@ -170,7 +170,8 @@ def _make_readers(
 def stamp_std_s(lines: LinesSection, rate_hz: float, step_s: float = 0.0) -> float | None:
     """Return the standard uncertainty of a sample's time on the clock that stamps it; None if it is negligible.
 
-    The device prints its time in steps of `step_s`; 0 stands for steps of the time's unit, or for none in seconds.
+    The device prints its time in steps of `step_s`. If this is 0, the step is the time's unit, or is neglected if the
+    unit is the second.
     """
     if lines.clock == "arrival":
         return 1e-3 * lines.jitter_ms / 3**0.5

@@ -42,9 +42,9 @@ ColumnEntry = Mapping[str, Any]  # a column's entry: its name or number, and its
 
 @dataclass(frozen=True, slots=True)
 class LogColumns:
-    """The columns of a log: maps of `samples` and `motion` as in the file of `--columns`, and sentences on them.
+    """The columns of a log: maps of `samples` and `motion`, in the form of the file of `--columns`.
 
-    `gaps`: sentences on unknown properties; `others`: the columns that are not read.
+    `gaps`: sentences on properties of the columns that are unknown; `others`: the columns that are not read.
     """
 
     samples: Mapping[str, ColumnEntry]
@@ -91,7 +91,7 @@ def guess_columns(layout: TableLayout, values: Array, time: Array | None) -> Log
 def _guess_samples(
     layout: TableLayout, values: Array, quaternion: Mapping[str, int], rate_hz: float
 ) -> tuple[dict[str, ColumnEntry], list[str]]:
-    """Return the column map of the readings (of the first of two sensors), and sentences on doubtful columns."""
+    """Return the column map of the readings, and sentences on doubtful columns; of two sensors, the first is mapped."""
     samples: dict[str, ColumnEntry] = {}
     gaps: list[str] = []
     for group in _group_columns(layout, values, quaternion, rate_hz):
@@ -123,13 +123,16 @@ def _guess_samples(
 
 
 def _is_undetermined(names: Sequence[str], guessed: Guess) -> bool:
-    """Return whether neither headings nor numbers show what three columns are; a field's size alone does not."""
+    """Return whether neither headings nor numbers show what three columns are.
+
+    The size of a magnetic field alone does not show it, because other readings may have the same size.
+    """
     is_nameless = not any(names) or all(map(_is_axis, names)) or not guessed.units
     return is_nameless and len(names) == 3 and set(guessed.units) <= {"m"}
 
 
 def _describe_undetermined(columns: Sequence[str | int], values: Array) -> str:
-    """Return a sentence on what three columns (n, 3) may be, and how to state it."""
+    """Return a sentence on three unknown columns with `values` (n, 3): what they may be, and how to state it."""
     size = float(np.median(np.linalg.norm(values, axis=1)))
     return (
         f"what {' '.join(map(str, columns))} are: no heading says it; their size is about {size:.3g}, and the Earth's "
@@ -164,7 +167,7 @@ def _list_others(layout: TableLayout, entries: Sequence[ColumnEntry]) -> list[st
 
 
 def _name_once(names: list[str]) -> list[str]:
-    """Return the names, blank where one is repeated: if two sensors have the same names, the first is read."""
+    """Return the names with repeated ones blank, so that of two sensors with the same names the first is read."""
     return [name if name not in names[:index] else "" for index, name in enumerate(names)]
 
 
@@ -236,9 +239,10 @@ UNIT_WORDS = {"rad", "s", "deg", "dps", "mdps", "m", "s2", "g", "mg", "t", "ut"}
 def _group_columns(
     layout: TableLayout, values: Array, quaternion: Mapping[str, int], rate_hz: float
 ) -> Iterator[_ColumnGroup]:
-    """Yield the columns that vary, in groups with values in the same rows: one group for each rate of the logger.
+    """Yield the columns that may be readings, in groups whose columns have numbers in the same rows.
 
-    Left out are columns of a reference: next to a quaternion its positions too, which look like readings; and counters,
+    There is one group for each rate of the logger. Columns of a reference are left out, including its positions if the
+    log has a quaternion, because positions look like readings. Constant columns are left out too, and so are counters,
     such as the numbers of the rows and a second clock.
     """
     names = _name_once([_plain_name(layout, index) for index in range(len(layout.headings))])
@@ -258,7 +262,7 @@ def _group_columns(
 
 
 def _order_axes(indices: Sequence[int], names: Sequence[str]) -> list[int]:
-    """Return the columns, in the order x, y, z if these are their names: some loggers write z first."""
+    """Return the columns, in the order x, y, z if these are their names, because some loggers write z first."""
     axes = iter(sorted((index for index in indices if _is_axis(names[index])), key=lambda index: names[index]))
     return [next(axes) if _is_axis(names[index]) else index for index in indices]
 

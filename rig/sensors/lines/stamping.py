@@ -91,7 +91,7 @@ class Stamper:
 
     # -- numbers -------------------------------------------------------------------------------------------------
     def _steps(self, values: Array, skipped: int) -> tuple[Array, NDArray[np.int64]]:
-        """Return the device time, s (0 if not printed), and the number of samples (n,) since the previous line."""
+        """Return the time (n,), s, and the number of samples (n,) since the previous line; 0 s without printed times."""
         columns = self.section.columns
         passed_s = np.zeros(len(values))
         steps = np.ones(len(values), np.int64)
@@ -149,7 +149,7 @@ class Stamper:
         return is_sample
 
     def _is_possible(self, passed_s: Array, steps: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Return a mask of samples that can follow the previous one: later, or equal for coarse times, within 2 s."""
+        """Return a mask of the samples that are within 2 s after the previous one; coarse times may also be equal."""
         later = passed_s > 0 if self.section.time is not None and not self._is_coarse else passed_s >= 0
         in_time = (passed_s <= MAX_GAP_S) & (steps >= 1) & (steps <= MAX_GAP_S * self.rate_hz + 1)
         possible: NDArray[np.bool_] = later & in_time
@@ -161,9 +161,10 @@ class Stamper:
         return self.section.time is not None and is_coarse(self.step_s, self.rate_hz)
 
     def _count_coarse_steps(self, device_s: Array) -> NDArray[np.int64]:
-        """Return the number of steps (n,) since the previous sample, from coarse times (n,): several after a jump.
+        """Return how many samples (n,) each sample is after the previous one, from coarse times (n,), s.
 
-        A loss that is shorter than a step of the time does not show.
+        The number exceeds 1 if the time jumps, because samples were lost. A loss that is shorter than a step of the
+        time does not show.
         """
         clock = SmoothedClock(self.rate_hz) if self._smoothed is None else copy(self._smoothed)
         steps = np.ones(len(device_s), np.int64)
@@ -186,7 +187,7 @@ class Stamper:
 
     # -- times ---------------------------------------------------------------------------------------------------
     def _add_late(self, steps: NDArray[np.int64], host_time_s: float) -> NDArray[np.int64]:
-        """Return the sequence steps; if lines come so late that samples must be lost, the first step includes them."""
+        """Return the `steps`; if lines come so late that samples must have been lost, the first step includes these."""
         if "sequence" in self.section.columns or self._smoothed is None:
             return steps
         late_s = host_time_s - (self._host_began_s or 0.0) - self._smoothed.predict_s(int(steps.sum()))
@@ -196,7 +197,7 @@ class Stamper:
         return steps
 
     def _compute_times_s(self, numbers: NDArray[np.int64], device_s: Array, host_time_s: float) -> Array:
-        """Return the samples' times: counted, the device's own, or from smoothed arrival, as the section states."""
+        """Return the samples' times (n,), s, by the section's `clock`: counted, printed, or smoothed arrival times."""
         if self.section.clock == "counted":
             return numbers / self.rate_hz
         if self.section.clock == "device":

@@ -45,7 +45,7 @@ class UdpPort:
         return bytes(received)
 
     def write(self, data: bytes) -> None:
-        """Send data, or drop it as long as no autopilot has sent anything: its address is unknown."""
+        """Send data, or drop it as long as no autopilot has sent anything, because its address is unknown."""
         if self._peer is not None:
             with suppress(BlockingIOError, ConnectionRefusedError):  # no receiver at present: it shows as silence
                 self._socket.sendto(data, self._peer)
