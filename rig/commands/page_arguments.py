@@ -49,7 +49,10 @@ class PageWish:
 
 @dataclass(frozen=True, slots=True)
 class OperatorsPage:
-    """The page of a run: its listeners, its questions instead of the terminal's, and its wait at the end."""
+    """The page of a run: its `listeners`, how it gets answers in place of the terminal, and its wait at the end.
+
+    `answer` is None if the terminal asks; `stay` keeps the page open after the run.
+    """
 
     listeners: "tuple[Listener, ...]" = ()
     answer: Answer | None = None

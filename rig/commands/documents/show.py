@@ -22,7 +22,10 @@ def add(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Print a finished run as judged; return 0. Raise Refused `no_result`, `not_a_result`, `no_such_sensor`."""
+    """Print the result of a finished run, without solving it again; return 0.
+
+    Raise Refused `no_result`, `not_a_result`, `no_such_sensor`.
+    """
     from rich.console import Console
 
     from rig.data.result_file import read_result

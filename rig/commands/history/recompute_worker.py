@@ -18,9 +18,10 @@ LOCAL_ONLY = ("missing_extra", "another_script", "no_script", "not_a_script", "s
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """Recordings to solve again, with the program's version, estimator (None: the procedure's own) and settings.
+    """The `recordings` of one run as they were entered, to be solved again, and where and how to solve them.
 
-    `key` names the result to compare with; `places` are pairs of computer and folder; `recordings`: as entered.
+    `key` names the result to compare with. `places` are pairs of computer and folder where the recordings may be.
+    `overrides` change settings; `estimator` is None for the procedure's own; `rig_version` must be the worker's.
     """
 
     key: str

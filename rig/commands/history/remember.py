@@ -114,7 +114,7 @@ def _find_own(folder: Path, history: str | None) -> "tuple[Loaded | None, Histor
 def find_journal_end(folder: Path, history: str | None = None) -> tuple[int, str] | None:
     """Return number and SHA-256 of the last entry in the journal of the history that `remember_certificate` would use.
 
-    None if there is no history, if it does not answer, or if it is empty.
+    Return None if there is no history, or if the history does not answer or is empty.
     """
     try:
         _, address = _find_own(folder, history)

@@ -36,8 +36,8 @@ def find_other_board(
 ) -> str | None:
     """Return another serial number that the history has for a sensor on this board, with its date, in words.
 
-    The newest calibration of one of the `parts` is decisive. Return None if there is none, if its number is one of
-    `own_serial_numbers`, or if the history does not answer.
+    Only the newest calibration of one of the `parts` counts. Return None if the history has no such calibration, if
+    its serial number is one of `own_serial_numbers`, or if the history does not answer.
     """
     from rig.history.storage.address import choose_history_address
 

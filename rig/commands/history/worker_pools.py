@@ -31,7 +31,7 @@ SolvedTask = tuple[Task, Answer]
 
 
 class Workers(Protocol):
-    """Workers that solve recordings, and the recordings in progress."""
+    """Workers that solve recordings; a task is one recording to solve."""
 
     @property
     def busy(self) -> bool:
@@ -39,7 +39,7 @@ class Workers(Protocol):
         ...
 
     def room(self) -> int:
-        """Return the number of tasks that the workers can still take. Raise Fault `cluster_lost` if none is left."""
+        """Return the number of tasks that the workers can still take. Raise Fault `cluster_lost` if there is no worker."""
         ...
 
     def give(self, solve: Solve, task: Task) -> None:
@@ -47,7 +47,7 @@ class Workers(Protocol):
         ...
 
     def answers(self) -> Iterator[SolvedTask]:
-        """Yield the answers that have arrived, after a short wait if there are none. Raise Fault `cluster_lost`."""
+        """Yield the answers that have arrived; wait a moment if no answer has. Raise Fault `cluster_lost`."""
         ...
 
 
@@ -132,7 +132,7 @@ class Cluster:
     def room(self) -> int:
         """Return the number of further tasks that the cluster can take: a few per thread, minus those in progress.
 
-        Raise Fault `cluster_lost` if there has been no worker for long.
+        Raise Fault `cluster_lost` if the scheduler does not answer, or has had no worker for `NEW_WORKERS_S`.
         """
         threads, now_s = sum(self.threads().values()), time.monotonic()
         if threads:

@@ -1,4 +1,4 @@
-"""Refusal of what needs Linux if the system is another: an arm, a servomotor, the simulated laboratory."""
+"""Refusal of an arm, a servomotor or the simulated laboratory on other systems than Linux, which these need."""
 
 import sys
 from importlib.util import find_spec
@@ -12,7 +12,7 @@ MODULES = ("fcntl", "termios")  # without them pyserial opens no port, not even 
 def refuse_unless_linux(what: str, system: str = sys.platform) -> None:
     """Raise Refused `only_on_linux`, about `what`, unless the system is Linux.
 
-    Others lack prompt stops by signals, loopback addresses or pseudo-terminals.
+    Other systems lack prompt stops by signals, loopback addresses or pseudo-terminals.
     """
     missing = [name for name in MODULES if find_spec(name) is None]
     if system == "linux" and not missing:

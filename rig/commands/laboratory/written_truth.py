@@ -21,7 +21,8 @@ def write_truth(
     """Have the laboratory at `control` write the truth over the windows of a run; yield the event of its file.
 
     The laboratory writes the file `written` that was named at its start, which is then moved to the run's `folder`.
-    Nothing is written for a calibration over temperature, whose values belong to another temperature than the run's.
+    Nothing is written for a calibration over temperature, because its values belong to the reference temperature, not
+    to the temperatures of the run.
     """
     if outcome.polynomials or not (outcome.results or outcome.accelerometers):
         return

@@ -1,4 +1,4 @@
-"""The command of the user's own that ends a run, for example to send a mail after hours of measurement."""
+"""A command of the user's own after the end of a run, for example to send a mail after hours of measurement."""
 
 import os
 import subprocess
@@ -26,7 +26,7 @@ def add_notice(parser: ArgumentParser) -> None:
 def notify_after(command: str | None, folder: Path, work: Callable[[], int]) -> int:
     """Carry out a run in `folder` and return its exit status; then run the command, even after an error.
 
-    If the command fails or hangs, that is printed and changes nothing.
+    If the command fails or hangs, this is printed, and the exit status remains that of the run.
     """
     if command is None:
         return work()

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def add(parser: ArgumentParser, *, script: bool = True) -> None:
-    """Add the arguments of `rig run`, without `--script` if `script` is itself run."""
+    """Add the arguments of `rig run`; with `script` also `--script`, which a script that is run itself does not need."""
     add_config(parser)
     if script:
         add_script(parser)

@@ -113,7 +113,7 @@ def _print(
 
 
 def _find_reference(looks: "Sequence[LookedFile]") -> "LookedFile | None":
-    """Return the file with the attitudes: one with readings too only if no other file has any."""
+    """Return the file with the attitudes, preferably one that has no readings; None if no file has attitudes."""
     with_attitudes = [looked for looked in looks if looked.attitudes is not None]
     return min(with_attitudes, key=_has_readings, default=None)
 
@@ -178,7 +178,10 @@ def _try_solutions(
 
 
 def _adopt(columns: dict[str, Any], *, inverse: bool, scalar_last: bool) -> None:
-    """Change the map of a reference's columns to the convention of its quaternions."""
+    """Change the map `columns` of a reference to the convention of its quaternions.
+
+    `inverse`: the quaternions rotate in the inverse direction. `scalar_last`: their scalar is the last of four numbers.
+    """
     from rig.data.recording.motion_file import QUATERNION
 
     if inverse:

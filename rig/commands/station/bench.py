@@ -63,7 +63,7 @@ class PartListener:
 
 @dataclass(frozen=True, slots=True)
 class BatchSettings:
-    """The settings of all parts: whether an operator attends, their name, the work order, and the listeners.
+    """The settings of all parts: whether an operator attends, the operator's name, the work order, and the listeners.
 
     `going_on` is the command that continues the batch.
     """
