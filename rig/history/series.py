@@ -34,8 +34,8 @@ Subject = tuple[str, str, str, float, bool]
 class Trend:
     """One parameter of one sensor over time: the times of the calibrations, and the parameter in each.
 
-    Lines, bands and charts use each result's statistical uncertainty and the additional scatter between runs, not
-    errors common to all results of a rig. They are None for fewer than five results.
+    `mean`, `line` and `chart` use each result's statistical uncertainty and the additional scatter between runs, not
+    errors common to all results of a rig. All three are None for fewer than five results.
     """
 
     name: str
@@ -133,8 +133,8 @@ class Change:
     def limit(self) -> float:
         """The limit of E_n: all unchanged values of a comparison are below it with `NO_CHANGE_PROBABILITY`.
 
-        By Student's t for the effective degrees of freedom of the difference, and Bonferroni's inequality, because a
-        history does not store correlations between parameters.
+        It follows from Student's t for the effective degrees of freedom of the difference. Bonferroni's inequality
+        extends it to all values, because a history does not store correlations between parameters.
         """
         both = (self.before, self.now)
         dof = effective_dof([parameter.std**2 for parameter in both], [parameter.dof for parameter in both])
@@ -194,7 +194,7 @@ def changes_between(before: Sequence[Past], now: Sequence[Past]) -> dict[Subject
 
 
 def rig_states(pasts: Sequence[Past]) -> list[RigState]:
-    """Return the state of every rig with check standards, that is sensors that were ever declared as such."""
+    """Return the state of every rig with check standards, which are all sensors ever declared to be check standards."""
     # Drifts and curves are not standards, and external readings have no rig.
     by_subject = subjects([past for past in pasts if past.quantity in quantities() and past.rig != NO_ARM])
     standards = {key: series for key, series in by_subject.items() if any(past.check_standard for past in series)}

@@ -155,7 +155,7 @@ def content_sha256(text: str) -> str:
 
 
 def read_configuration(folder: Path) -> "Loaded | None":
-    """Return the folder's configuration, or None if it has none or this program refuses it.
+    """Return the folder's configuration; None if there is none, or if this program refuses the configuration.
 
     A configuration is refused, for example, for an unknown key; the result is entered nevertheless.
     """

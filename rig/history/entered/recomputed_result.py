@@ -19,8 +19,8 @@ def differing_parts(claimed: ResultDocument, recomputed: ResultDocument) -> list
     """Return the parts of a `claimed` result that differ from the recomputed one beyond a processor's rounding.
 
     `recomputed` is solved from the recordings. Calibrations agree within 1e-6 of their standard uncertainty, other
-    numbers within 1e-6 of the largest in their list. Texts, and fields that the claim lacks, are not compared: both
-    change from version to version.
+    numbers within 1e-6 of the largest in their list. Texts, and fields that the claimed result lacks, are not compared,
+    because they change from version to version.
     """
     origin = _origin(recomputed)
     rows = [f"provenance.{name}" for name, value in _origin(claimed).items() if value != origin.get(name)]
@@ -38,7 +38,7 @@ def differing_parts(claimed: ResultDocument, recomputed: ResultDocument) -> list
 
 
 def _drop_later_parameters(recomputed: HistoryRecord, claimed: HistoryRecord | None) -> HistoryRecord:
-    """Return a record without characteristics that the claim lacks, because later versions may add some."""
+    """Return `recomputed` without characteristics that `claimed` lacks, because later versions may add some."""
     if claimed is None:
         return recomputed
     names = {*SCALES, *BIASES, *(parameter.name for parameter in claimed.parameters)}

@@ -1,6 +1,7 @@
 """The journal of a recomputation: a line for each solved recording, so that no recording is solved twice.
 
-The first line states program, settings and estimator; answers by others are not mixed in.
+The first line states program, settings and estimator. A journal with another first line is not continued, so that all
+its answers are comparable.
 """
 
 import json
@@ -36,9 +37,9 @@ class RecomputeQuestion:
 
 
 class RecomputeJournal(AbstractContextManager["RecomputeJournal"]):
-    """The journal of a recomputation in an existing folder, new or continued; `solved`: answers, by key.
+    """The journal of a recomputation in an existing folder, new or continued; `solved` has the answers so far, by key.
 
-    Raise Refused `another_question`, and `report_folder` if it cannot be read or, at any time, written.
+    Raise Refused `another_question`, and `report_folder` if the journal cannot be read or, at any time, written.
     """
 
     def __init__(self, folder: Path, question: RecomputeQuestion) -> None:

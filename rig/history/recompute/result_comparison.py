@@ -26,7 +26,7 @@ class StatedResult:
     - `run_id`, `content_sha256`, `started_utc`, `rig`, `verdict`: the run.
     - `calibrations`: the selected valid calibrations.
     - `recordings`: the run's recordings. `places`: their computers and folders, the newest first.
-    - `certificates`: those in force: valid, and not replaced.
+    - `certificates`: the certificates in force, that is valid and not replaced by another.
     """
 
     run_id: int

@@ -13,7 +13,7 @@ CONFIDENCE = 0.95
 class FittedModel:
     """The coefficients (p,), their covariance (p, p), and `between_std`, the scatter beyond the values' stated stds.
 
-    `dof` is n − p.
+    `dof` is the number of values minus that of coefficients.
     """
 
     coefficients: Array

@@ -36,9 +36,9 @@ def number_column() -> Column[int]:
 
 
 def fill_row(table: Table, record: object, **stated: object) -> dict[str, Any]:
-    """Return a row of the table: what is `stated`, and for every other column the record's attribute of its name.
+    """Return a row of the table: the `stated` values, and for every other column the record's attribute of that name.
 
-    Raise AttributeError if the record lacks one: a column that stayed empty would be lost unnoticed.
+    Raise AttributeError if the record lacks the attribute, because an empty column would remain unnoticed.
     """
     return {name: stated[name] if name in stated else getattr(record, name) for name in table.c.keys()}  # noqa: SIM118
 

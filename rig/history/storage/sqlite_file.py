@@ -57,7 +57,8 @@ def refuse_unmarked(connection: sqlite3.Connection, file: Path) -> None:
 def new_file_in_place(file: Path) -> Iterator[Path]:
     """Yield the path for a new database, which is moved to `file` when complete, or removed.
 
-    A file that another process creates at `file` meanwhile stays. An incomplete one is never visible. Raise OSError.
+    A file that another process creates at `file` meanwhile remains. No incomplete database is ever at `file`. Raise
+    OSError.
     """
     file.parent.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory(prefix=".history-", dir=file.parent) as folder:

@@ -117,7 +117,7 @@ def _file_triggers() -> Mapping[str, str]:
 
 
 def _same_row(table: Table) -> str:
-    """Return the SQL condition under which a row of `table` has the new row's primary key."""
+    """Return the SQL condition under which a row of `table` has the new row's primary key or one of its unique keys."""
     keys = [list(table.primary_key.columns)]
     keys += [list(unique.columns) for unique in table.constraints if isinstance(unique, UniqueConstraint)]
     keys += [list(index.columns) for index in table.indexes if index.unique]

@@ -40,7 +40,7 @@ def change_in_short(change: Change) -> str:
 
 
 def name_in_words(name: str) -> str:
-    """Return a parameter of the history in words within a sentence; an unknown name is unchanged."""
+    """Return words for the parameter `name`, to be used within a sentence; an unknown name is returned unchanged."""
     if name in SCALES:
         return f"the scale factor of {name[1]}" if len(name) > 1 else "the mean scale factor"
     if name in BIASES:
@@ -49,7 +49,7 @@ def name_in_words(name: str) -> str:
 
 
 def _size_words(change: Change) -> str:
-    """Return the size of a change with its sign: relative for a scale factor, else in the unit of screens."""
+    """Return the size of a change with its sign, for a scale factor as a fraction, otherwise in the displayed unit."""
     difference = change.now.value - change.before.value
     if is_scale(change.name):
         relative = difference / change.before.value
