@@ -59,7 +59,7 @@ class SensorCount:
 
 @dataclass(frozen=True, slots=True)
 class _Part:
-    """The data that arrived between two calls of `keep`."""
+    """The data that arrived between two calls of `Acquisition.keep`: `batches` of samples by sensor, and `states`."""
 
     batches: defaultdict[str, list[np.ndarray]]
     states: list[State]
@@ -153,8 +153,8 @@ class Acquisition:
     def collect_kept(self, sensor: str) -> tuple[np.ndarray, list[State], int]:
         """Return the samples (n,) of one sensor and the states of the arm in memory, and the number of new states.
 
-        States since the latest `keep` are new. Older states go back at most `CLOCK_DATA_S` before it, however long the
-        wait.
+        States since the latest `keep` are new. Older states and samples go back at most `CLOCK_DATA_S` before the first
+        new state, even if the arm has waited for longer.
         """
         with self._lock:
             batches = [batch for part in self._kept for batch in part.batches[sensor]]

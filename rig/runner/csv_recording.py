@@ -96,7 +96,7 @@ class ReadingsFile:
         self._write("".join(f"{self._format % tuple(row)}\n" for row in rows))
 
     def _write(self, lines: str) -> None:
-        """Write complete lines or none: half a number is another number. Raise OSError with the file's name."""
+        """Write complete lines or nothing: half a number would read as another. Raise OSError with the file's name."""
         whole_bytes = self._file.tell()
         rest = memoryview(lines.encode())
         try:

@@ -11,10 +11,11 @@ TIMEOUT_S = 2.0
 
 @dataclass(slots=True)
 class FirstSamples:
-    """The wait for first samples: the number of polls times `look_s`, or less if the turner's clock says so.
+    """The wait for first samples, measured as the number of polls times the interval `look_s`.
 
-    Elapsed time does not suffice: the threads that poll and read samples may be delayed. The limit grows with the load
-    of this computer, on which the simulated laboratory may run. A simulated turner's clock stops if its world is late.
+    Elapsed time would be too strict, because the threads that poll and read samples may be delayed. If the turner's
+    clock shows a shorter wait, that one counts: a simulated turner's clock stops if its world is late. The limit grows
+    with the load of this computer, on which the simulated laboratory may run.
     """
 
     look_s: float
@@ -24,7 +25,7 @@ class FirstSamples:
     def wait_on(self, silent: Collection[str], clock_s: float | None = None) -> None:
         """Count one more poll without data of the sensors `silent`.
 
-        Raise Fault `no_samples` after too many. `clock_s` is the reading of the turner's clock.
+        `clock_s` is the reading of the turner's clock. Raise Fault `no_samples` after too long a wait.
         """
         if self._clock_began_s is None:
             self._clock_began_s = clock_s

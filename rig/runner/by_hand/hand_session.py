@@ -252,7 +252,7 @@ class HandSession:
             self.note(self._request)
 
     def _face(self, of_sensor: str) -> Face:
-        """Return the face of the item that is up if the sensor's axis `of_sensor` is."""
+        """Return the face of the item that is up when the sensor's axis `of_sensor` points up."""
         return rotate_face(of_sensor, np.array(self.sensor.mounting).T)
 
     def _board_us(self, part: HandRest | Move) -> tuple[int, int]:
