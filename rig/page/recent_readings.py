@@ -15,7 +15,7 @@ Values = Mapping[str, tuple[float, ...]]  # by the name of a curve, such as "gyr
 
 @dataclass(slots=True)
 class PageHistory:
-    """Points in order. They are numbered from the first, so that a browser gets only new points."""
+    """The stored points, in order. They are numbered, so that a browser can request only the new points."""
 
     first: int = 0
     _points: deque[tuple[float, Values]] = field(default_factory=lambda: deque(maxlen=POINTS))

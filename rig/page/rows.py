@@ -31,7 +31,10 @@ class Look:
 
 
 def observation_row(sensor: str, observation: Observation) -> Row:
-    """Return the row of a revolution averaged by the host: one axis' reading, and the component of 2π/T along it."""
+    """Return the row of a revolution averaged by the host: the mean readings, and the mean speed of the turn.
+
+    `along` is the fraction of the speed about the sensor axis that is nearest to the axis of the turn.
+    """
     average = observation.average
     return {
         "sensor": sensor,

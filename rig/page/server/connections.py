@@ -1,7 +1,8 @@
 """Connections to the page: their number, their time-outs, and the one to close if there are too many.
 
 A connection takes a descriptor of the process that moves the arm, and anyone on this computer can open one. Connections
-without the token are strangers: if there are too many, the oldest of the address with the most is closed.
+without the token are strangers. If there are too many strangers, the address with the most of them loses its oldest
+connection.
 """
 
 import asyncio
@@ -29,7 +30,7 @@ class Connections:
         self._deadlines: dict[Client, asyncio.TimerHandle] = {}
 
     def add(self, client: Client, transport: asyncio.WriteTransport) -> None:
-        """Add a connection; if there are too many, close an older one."""
+        """Add a connection; if there are too many without the token, close an older one of these."""
         if len(self._strangers) >= MAX_STRANGERS:
             most = Counter(address for address, _ in self._strangers).most_common(1)[0][0]
             oldest = next(client for client in self._strangers if client[0] == most)

@@ -57,7 +57,7 @@ class Control:
             return True
 
     def ask(self, announcement: Sequence[str], to_do: str) -> bool | None:
-        """Wait for the operator's answer from a browser, whether to do `to_do`; None if no page is left to answer.
+        """Return the operator's answer, from a browser, whether to do `to_do`; None if no page is left to answer.
 
         The page shows the question, with the `announcement` before it, as it shows every event.
         """

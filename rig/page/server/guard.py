@@ -1,7 +1,7 @@
 """Access control of the server: requests need its proper name, its own page as origin, and the token to act.
 
 A foreign page can make a browser send requests here, even under its own name if its name server gives this address (DNS
-rebinding). It cannot change the Host, Origin and Sec-Fetch-Site that the browser sends.
+rebinding). The page cannot change the Host, Origin and Sec-Fetch-Site that the browser sends.
 """
 
 from collections.abc import Mapping
