@@ -16,9 +16,10 @@ from rig.station.questions import COMMAND_WORDS, Kind, Question, Voice, is_agree
 class Operator:
     """The source of serial numbers and answers: an operator at a terminal or page (`voice`), or a list of `numbers`.
 
-    An empty number ends the batch. Without a `voice` no questions are asked, so a doubt cannot be overridden. A refused
-    number from a list is entered in the table; the operator types another in place of a refused typed one. `asking` is
-    open during a question between two runs, with its subject, such as "to mount the part".
+    An empty number ends the batch. Without a `voice` no questions are asked, so a doubt cannot be overridden. If a
+    number from a list is refused, it is entered in the table as refused; if a typed number is refused, the operator
+    types another. The context manager `asking` is entered for each question between two runs; its argument is the
+    subject, such as "to mount the part".
     """
 
     voice: Voice | None

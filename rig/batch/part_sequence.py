@@ -107,7 +107,10 @@ class Work:
         return None
 
     def _carry_out(self, part: BatchPart) -> None:
-        """Measure the part, again after each error if the operator agrees; raise a Fault if no operator attends."""
+        """Measure the part, and enter its end; after each error, measure again if the operator agrees.
+
+        Pass on a Fault if no operator attends.
+        """
         while True:
             try:
                 if not self.operator.is_mounted(part):

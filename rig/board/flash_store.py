@@ -16,7 +16,7 @@ from rig.estimation.arrays import Array
 
 
 class SensorSolution(Protocol):
-    """A sensor's solution, g = M (m + b), from the analysis or from `result.json`."""
+    """A sensor's solution, from the analysis or from `result.json`: the rate is g = M (m + b) for the reading m."""
 
     @property
     def serial_number(self) -> str: ...

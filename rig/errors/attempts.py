@@ -52,7 +52,7 @@ def attempt_each(attempts: Mapping[Key, Callable[[], Result]]) -> Attempts[Key, 
 
 
 def attempt(faults: dict[str, Fault], name: str, solve: Callable[[], Result]) -> Result | None:
-    """Return the result of `solve`, or on a Fault store this in `faults` under `name` and return None."""
+    """Return the result of `solve`; if it raises a Fault, store the Fault in `faults` under `name` and return None."""
     try:
         return solve()
     except Fault as fault:

@@ -1,6 +1,7 @@
 """A station's heartbeat: writes its state to a shared history, in a thread of its own that delays nothing.
 
-If the history does not answer, the thread tries again; the station works without it, and the floor shows it as silent.
+If the history does not answer, the thread tries again. The station works without the history, and meanwhile the floor
+shows the station as silent.
 """
 
 import platform

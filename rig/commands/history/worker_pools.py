@@ -39,7 +39,7 @@ class Workers(Protocol):
         ...
 
     def room(self) -> int:
-        """Return the number of tasks that the workers can still take. Raise Fault `cluster_lost` if there is no worker."""
+        """Return the number of tasks that the workers can still take. Raise Fault `cluster_lost` without a worker."""
         ...
 
     def give(self, solve: Solve, task: Task) -> None:

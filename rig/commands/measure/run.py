@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def add(parser: ArgumentParser, *, script: bool = True) -> None:
-    """Add the arguments of `rig run`; with `script` also `--script`, which a script that is run itself does not need."""
+    """Add the arguments of `rig run`, with `--script` only if `script` is set: a script that runs itself needs none."""
     add_config(parser)
     if script:
         add_script(parser)

@@ -178,7 +178,7 @@ class LineReader:
         good: NDArray[np.bool_],
         sum_ok: NDArray[np.bool_],
     ) -> Array:
-        """Return the numbers (m, columns) of the `good` lines with a right sum; unmark lines in `good` that lack one."""
+        """Return the numbers (m, columns) of the `good` lines with a right sum, and unmark lines that lack a number."""
         line_starts, line_ends = lines
         number = np.concatenate([[False], classes == _NUMBER, [False]])
         edges = np.flatnonzero(number[1:] != number[:-1])

@@ -91,7 +91,7 @@ class Stamper:
 
     # -- numbers -------------------------------------------------------------------------------------------------
     def _steps(self, values: Array, skipped: int) -> tuple[Array, NDArray[np.int64]]:
-        """Return the time (n,), s, and the number of samples (n,) since the previous line; 0 s without printed times."""
+        """Return time (n,), s, and number of samples (n,) since the previous line; 0 s if no time is printed."""
         columns = self.section.columns
         passed_s = np.zeros(len(values))
         steps = np.ones(len(values), np.int64)
