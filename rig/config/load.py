@@ -381,7 +381,7 @@ def _world_fits(config: RigConfig, world: WorldSection) -> Iterator[str]:
 
 
 def _instruments_fit(config: RigConfig, world: WorldSection) -> Iterator[str]:
-    """Yield conflicts: simulated instruments at ports at which the rig has another sensor."""
+    """Yield a conflict for each simulated instrument at a port at which the rig has another sensor."""
     for name in sorted(config.sensors.keys() & world.sensors.keys()):
         where = "the sensor is on the board" if name in config.on_board else "the sensor is at another's port"
         if world.sensors[name].kvh1775 is not None and config.sensors[name].part != "kvh1775":

@@ -27,7 +27,7 @@ WholeNumber = Annotated[int, Field(json_schema_extra=RATIO)]
 
 
 def refuse_boolean_number(cls: type[BaseModel], value: Any, info: ValidationInfo) -> Any:
-    """Refuse true and false for numbers: YAML reads yes and on as true, which counts as 1."""
+    """Refuse true and false for numbers, because YAML reads yes and on as true, which would count as 1."""
     field = cls.model_fields.get(info.field_name or "")
     if isinstance(value, bool) and field is not None:
         kinds = _kinds(field.annotation)
@@ -52,8 +52,8 @@ class Section(BaseModel):
 def check_host(name: str) -> str:
     """Return a host's IP address or name unchanged. Raise ValueError for any other text.
 
-    A name has the form of RFC 1123, section 2.1, with non-ASCII letters after encoding (IDNA, RFC 3490). Refused are
-    names whose last part is a number, as in an IPv4 address, and addresses of many or unspecified hosts.
+    A name has the form of RFC 1123, section 2.1, once its non-ASCII letters are encoded (IDNA, RFC 3490). Names whose
+    last part is a number, as in an IPv4 address, and addresses of many or of unspecified hosts are refused.
     """
     try:
         address = ipaddress.ip_address(name)
@@ -80,7 +80,8 @@ PORT_NAME = re.compile(r".*[/\\].+|COM\d+", re.IGNORECASE)
 def check_port(value: str) -> str:
     """Return a serial port's name or `socket://host:port` unchanged. Raise ValueError for any other text.
 
-    A name is a path, or a port of Windows. Other addresses of pyserial are refused: `spy://` overwrites a file.
+    A name is a path, or a port of Windows. Other addresses of pyserial are refused, because one of them, `spy://`,
+    overwrites a file.
     """
     if "://" in value:
         try:

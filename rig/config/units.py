@@ -16,7 +16,7 @@ TIME, ANGLE, RATE, ACCELERATION, FIELD, TEMPERATURE, PRESSURE, NUMBER = (
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """A unit of `quantity`: number × `size` + `zero` is the value in SI, for a temperature in °C."""
+    """A unit of `quantity`: number × `size` + `zero` is the value in SI units, or in °C if it is a temperature."""
 
     quantity: str
     size: float

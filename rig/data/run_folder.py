@@ -74,7 +74,7 @@ def refuse_unwritable(folder: Path) -> Iterator[None]:
 
 
 def _write_all(folder: Path, texts: Mapping[str, str]) -> None:
-    """Write all new files or, on a full disk, none: no run may resume from half a configuration."""
+    """Write all new files or, on a full disk, no file, so that no run resumes from half a configuration."""
     begun: list[Path] = []
     try:
         for name, text in texts.items():

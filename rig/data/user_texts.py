@@ -1,6 +1,7 @@
 """Configurations and scripts that the user of this computer has run, recognized by their text in any folder.
 
-Each has an empty file, named by its SHA-256, in the user's own folder: nothing to parse, nothing to lock.
+Each text has an empty file, named by the text's SHA-256, in the user's own folder, so that nothing needs to be parsed
+or locked.
 """
 
 import hashlib

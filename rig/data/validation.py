@@ -37,7 +37,7 @@ def validate(kind: type[Kind], document: Any, where: str) -> Kind:
 
 
 def read_document(kind: type[Document], file: Path, limit_bytes: int, *, what: str, remedy: str) -> Document:
-    """Return a JSON file as type `kind`; messages call it a result of `what`.
+    """Return the content of a JSON file as type `kind`; error messages call the file a result of `what`.
 
     Raise Refused `no_result`, `not_a_result`.
     """

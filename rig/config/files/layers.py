@@ -163,6 +163,6 @@ def _override(
 
 
 def _example(item: str) -> str:
-    """Return the override `item` with "=" in place of ":"; a fixed example if it has no value."""
+    """Return an example of a valid override: `item` with "=" in place of ":", or a fixed one if `item` has no value."""
     path, colon, value = item.partition(":")
     return f"{path.strip()}={value.strip()}" if colon and value.strip() else "procedure.speed_deg_s=30"

@@ -293,7 +293,7 @@ class AttitudesSection(ProcedureSection):
     @field_validator("attitudes")
     @classmethod
     def refuse_repeated_attitudes(cls, value: tuple[Vector3, ...]) -> tuple[Vector3, ...]:
-        """Refuse a repeated attitude: the arm repeats its error, so it adds no information."""
+        """Refuse a repeated attitude, which adds no information because the arm repeats its error too."""
         listed: set[tuple[float, ...]] = set()
         for attitude in value:
             angles_deg = tuple(np.mod(attitude, 360).tolist())

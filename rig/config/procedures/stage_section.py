@@ -46,7 +46,8 @@ class StageSection(Section):
 def mount_matrix(mount: StageMountSection) -> np.ndarray:
     """Return the rotation (3, 3) from the flange's frame to the item's: row i is the item's axis i.
 
-    The stated axes place the item, then the rotation vector rotates it; components transform by the inverse.
+    The stated axes place the item, then the rotation vector rotates it, so components transform by the inverse of that
+    rotation.
     """
     matrix: np.ndarray = rotation_by(np.radians(mount.rotation_deg)).T @ mounting_matrix(mount)
     return matrix

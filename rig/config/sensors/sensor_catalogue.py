@@ -41,10 +41,11 @@ class PartSpec:
     - acceleration_noise_ug_sqrt_hz: noise density, one-sided, as data sheets state it.
     - acceleration_nonlinearity_percent: relative to the range that acceleration_nonlinear_over_g states.
     - acceleration_bias_mg_k, acceleration_scale_ppm_k, acceleration_bias_instability_ug: as the gyroscope's.
-    - acceleration_nonlinear_over_g: that range, in either direction; 0 for the configured range.
-    - delivered: the quantities that its calibration estimates.
+    - acceleration_nonlinear_over_g: the range of that nonlinearity, in either direction; 0 for the configured range.
+    - delivered: the errors, as delivered, of the quantities that a calibration estimates.
     - own_port: whether it has a port and a clock of its own.
-    - any_rate: whether it stands for any sensor, whose section states rates and ranges, with limits of a consumer part.
+    - any_rate: whether this kind stands for any sensor. Its section then states rates and ranges, and the limits here
+      are those of a consumer part.
     """
 
     rates_hz: tuple[float, ...]

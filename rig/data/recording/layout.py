@@ -106,7 +106,7 @@ def table_dtype(names: Sequence[str]) -> np.dtype[Any]:
 
 
 def lay_out(path: Path, contents: Contents, *, swmr: bool) -> None:
-    """Write a run file under a temporary name and rename it: a kill or a full disk leaves a complete file or none.
+    """Write a run file under a temporary name, then rename it, so a kill or a full disk leaves no incomplete file.
 
     With `swmr` the file can be opened for appending in that mode; otherwise any HDF5 tool opens it. Raise OSError.
     """

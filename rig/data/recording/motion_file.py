@@ -29,7 +29,8 @@ QUATERNION = ("qw", "qx", "qy", "qz")
 class Header:
     """The columns of a file: all `needed` ones, exactly one of `one_of`, and groups of optional ones.
 
-    `between`: for a file of `one_row`, the number that a column must exceed, and the largest allowed number.
+    `one_row`: whether the file has exactly one row. `between`: for each bounded column, the number that its values must
+    exceed, and the largest value allowed.
     """
 
     needed: tuple[str, ...]

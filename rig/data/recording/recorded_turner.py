@@ -27,8 +27,10 @@ JointName = Annotated[str, Field(pattern=r"^\w[\w -]*$", max_length=40)]  # beco
 class RecordedTurner:
     """A turner: its `kind`, by which it is registered, its maker and its model (None if unknown).
 
-    `joints`: the names of its n joints, 0 to `MAX_JOINTS`, beginning at the ground; `geometry`: of the chain of joints;
-    `fields`: of its states, other than times and joints; `reading_std_rad`: as in `TurnerIdentity`.
+    - `joints`: the names of its joints, at most `MAX_JOINTS`, beginning at the ground.
+    - `geometry`: the geometry of the chain of joints.
+    - `fields`: the fields of its states other than times and joints.
+    - `reading_std_rad`: the same as in `TurnerIdentity`.
     """
 
     kind: Kind

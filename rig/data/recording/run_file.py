@@ -297,7 +297,7 @@ def _read_external(contents: Contents) -> ExternalReadings:
 
 
 def _whole_rows(rows: NDArray[Any]) -> NDArray[Any]:
-    """Return the rows without the unwritten end, which holds zeros: a host time is never zero."""
+    """Return the rows before the unwritten end, whose host time is 0, which no written row has."""
     written = np.flatnonzero(rows["host_time_s"])
     count = int(written[-1]) + 1 if len(written) else 0
     return rows if count == len(rows) else rows[: max(count - 1, 0)]  # the last row may be incomplete

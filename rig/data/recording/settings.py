@@ -89,7 +89,7 @@ class Site:
 
 
 class Uncertainty(UncertaintyKeys[dict[str, NonNegative]]):
-    """Half-widths of errors that no recording shows: all values within are equally likely.
+    """Half-widths of errors that no recording shows; each error is equally likely to have any value within.
 
     `angle_std_deg` is the standard deviation of a joint's angle by its encoder, None if not stated. Errors of sensors
     are keyed by the sensor's name. `decision_rule` compares a limit with the value alone ("simple") or with the value
@@ -186,7 +186,8 @@ class RunSettings:
 
     - procedure: the procedure's name.
     - then_verify: whether a verification was to follow the calibration.
-    - observation, limits, uncertainty: sections of the configuration; external recordings lack the latter two.
+    - observation, limits, uncertainty: sections of the configuration; external recordings have no limits and no
+      uncertainty.
     - to_calibrate: names of the sensors to calibrate.
     - reference: the sensor with a given calibration.
     - home_q_rad: angles of the turner's joints, of which there may be none.
