@@ -11,7 +11,11 @@ from rig.history.statistics.random_effects import fit
 
 @dataclass(frozen=True, slots=True)
 class RigEffect:
-    """The mean difference of `rig` from `reference` for the same sensors, with its std and Student's t for 95 %."""
+    """The mean difference of `rig` from the rig `reference` for the same sensors, with its standard deviation.
+
+    `coverage_factor` is Student's t for 95 %. `between_std` is the scatter between runs. `sensors` is the number of
+    sensors that `rig` shares with other rigs.
+    """
 
     rig: str
     reference: str
@@ -28,10 +32,11 @@ class RigEffect:
 
 
 def rig_effects(rigs: Sequence[str], sensors: Sequence[str], values: Array, std: Array) -> tuple[RigEffect, ...]:
-    """Return the effects of rigs on results (n,) with stds (n,), by `rigs` (n) and `sensors` (n).
+    """Return the effects of rigs on results: result i has `values[i]` and `std[i]`, from `rigs[i]` and `sensors[i]`.
 
-    The two-way model is value = sensor + rig + run, with random runs (`random_effects.fit`). Within each group of rigs
-    connected by sensors, effects are relative to the rig with the most results; a rig without any has no effect.
+    The two-way model is value = sensor + rig + run, where the runs' effects are random (`random_effects.fit`). Within
+    each group of rigs connected by shared sensors, effects are relative to the rig with the most results. A rig that
+    shares no sensor has no effect.
     """
     effects: list[RigEffect] = []
     names = np.array(rigs)

@@ -17,8 +17,8 @@ _US_WRAP = 1 << 32
 class MessageCounter:
     """The numbers of one stream's messages from 0, with lost ones included.
 
-    Formats A and C have only the sequence number, modulo 128: a loss of 128 messages in a row would not be noticed. So
-    a silence of that length on the computer's clock is refused. Format B also has microseconds.
+    Formats A and C have only the sequence number, modulo 128, so a loss of 128 messages in a row would not be noticed.
+    Therefore a silence of that length on the computer's clock is refused. Format B also has microseconds.
     """
 
     where: str  # the name of the instrument in messages
@@ -48,7 +48,7 @@ class MessageCounter:
             silent_s = 0.0
         else:
             passed_us = np.diff(time_us, prepend=self._time_us % _US_WRAP) % _US_WRAP
-        steps = (np.diff(sequence, prepend=self._sequence) - 1) % SEQUENCE_NUMBERS + 1
+        steps = (np.diff(sequence, prepend=self._sequence) - 1) % SEQUENCE_NUMBERS + 1  # from 1: no message comes twice
         if self.timed:
             self._check_times(steps, passed_us)
         elif silent_s > (SEQUENCE_NUMBERS + 0.5) * self.interval_us * 1e-6 - self.host_jitter_s:

@@ -26,7 +26,7 @@ def parse_numbers(text: NDArray[np.uint8], starts: NDArray[np.intp], ends: NDArr
     signed = (signs == _MINUS) | (signs == _PLUS)
     first, last = int(starts[0]), int(ends[-1])
     points = first + np.flatnonzero(text[first:last] == _POINT)
-    owner = np.searchsorted(starts, points, side="right") - 1
+    owner = np.searchsorted(starts, points, side="right") - 1  # the number before or in which each point stands
     inside = points < ends[owner]
     points, owner = points[inside], owner[inside]
     dots = np.bincount(owner, minlength=len(starts))

@@ -182,13 +182,14 @@ class LineReader:
         line_starts, line_ends = lines
         number = np.concatenate([[False], classes == _NUMBER, [False]])
         edges = np.flatnonzero(number[1:] != number[:-1])
-        starts, ends = edges[::2], edges[1::2]
+        starts, ends = edges[::2], edges[1::2]  # of each run of number characters
         good &= _count(starts, line_starts, line_ends) == self._columns
         dividers = np.flatnonzero(classes == (_KEY if self._keys else _SEPARATOR))
         has_dividers = bool(self._keys or self._separator)
         divider_count = self._columns if self._keys else self._columns - 1
         if has_dividers:
             good &= _count(dividers, line_starts, line_ends) == divider_count
+        # Good lines now have equal numbers of runs and of dividers, so both become arrays with a row for each line.
         in_good_lines = _are_in_lines(starts, line_starts, line_ends, good)
         starts, ends = starts[in_good_lines].reshape(-1, self._columns), ends[in_good_lines].reshape(-1, self._columns)
         if has_dividers:

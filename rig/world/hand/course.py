@@ -41,12 +41,13 @@ def move(start: Array, end: Array, vector: Array, habits: Habits, rng: np.random
     push_rate = np.zeros(len(time_s))
     for begins_s, lasting_s, part in pushes:
         push_rate += part * _pulse(time_s, begins_s, lasting_s)
-    across = np.linalg.svd(axis[None])[2][1:]  # (2, 3)
+    across = np.linalg.svd(axis[None])[2][1:]  # (2, 3), two unit vectors at right angles to the axis
     rates = np.outer(push_rate, axis)
     wobble = np.radians(habits.wobble_deg) * _oscillate(time_s, (0.0, end_s), WOBBLE_HZ, rng, 2)
     tremor = np.radians(habits.tremor_deg) * _oscillate(time_s, (0.0, end_s), TREMOR_HZ, rng, 3)
     rates += wobble @ across + tremor + 1e-3 * habits.rock_mrad * _rock(time_s, end_s, rock_s, rng) @ across
     rates[0] = rates[-1] = 0.0
+    # The oscillations turn the body too, so a slow correction is added until the attitude at the end is the wanted one.
     last_s = grasp_s + 0.3 * (end_s - grasp_s)
     shape = _pulse(time_s, last_s, end_s - last_s)[:, None]
     for _ in range(CORRECTION_PASSES):

@@ -14,8 +14,8 @@ ITERATIONS = 12  # enough to invert the encoder's error to 1e-15 of a revolution
 class Shaft:
     """The shaft's angle and rate at any time, past and planned; a counterclockwise turn, seen on the horn, is positive.
 
-    The loop is closed over the encoder, so the readings follow the planned angle and the true angle contains the
-    encoder's error: if the readings are even, the shaft turns unevenly.
+    The servo controls the angle that its encoder reads. So the readings follow the planned angle, and the true angle
+    contains the encoder's error: if the readings advance evenly, the shaft turns unevenly.
     """
 
     def __init__(self, truth: ServoTruth, time_s: float) -> None:

@@ -17,7 +17,10 @@ CosineAndSine = Sequence[tuple[Any, Any]]  # of every joint: cosine and sine of 
 
 
 class BodyMotion(NamedTuple):
-    """A body's angular rate (rad/s), its derivative (rad/s²), specific force (m/s²): inertial, in the body's axes."""
+    """A body's angular rate (rad/s), the rate's derivative (rad/s²) and the specific force (m/s²), in the body's axes.
+
+    The rate is relative to inertial space.
+    """
 
     rate_rad_s: Components
     change_rad_s2: Components
@@ -74,7 +77,10 @@ def propagate(
 
 
 def transfer_force(rate: Components, change: Components, force: Components, lever_arm_m: Sequence[float]) -> Components:
-    """Return the force `lever_arm_m` away on the same body, in its axes; `change` is the angular acceleration."""
+    """Return the specific force at a point of the body, `lever_arm_m` from the point that has `force`, in its axes.
+
+    `rate` is the body's angular rate and `change` its angular acceleration.
+    """
     x, y, z = rate
     u, v, w = change
     a, b, c = lever_arm_m

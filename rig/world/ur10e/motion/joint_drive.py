@@ -57,7 +57,8 @@ class JointDrive:
         A ripple is (joint, angle, rate, acceleration). With crosstalk, a fraction of the ripple of this joint is also
         returned for each neighbour with a parallel axis.
         """
-        sines = cosines = bends = 0.0
+        # p = A(v) S(u) with A = v/(v² + v₀²), S = Σ Rₙ/n sin(n u + φₙ), and its first two derivatives over time.
+        sines = cosines = bends = 0.0  # S, dS/du and −d²S/du²
         for n, amplitude, phase in self.orders[joint]:
             angle = n * u + phase
             sine, cosine = amplitude * sin(angle), amplitude * n * cos(angle)
@@ -67,8 +68,8 @@ class JointDrive:
         square = v * v + RIPPLE_SPEED_SQUARED
         size = v / square
         if a:
-            growth = (RIPPLE_SPEED_SQUARED - v * v) / (square * square) * a  # rate of change of the ripple's size
-            bend = 2.0 * v * (v * v - 3.0 * RIPPLE_SPEED_SQUARED) / (square * square * square) * a * a
+            growth = (RIPPLE_SPEED_SQUARED - v * v) / (square * square) * a  # dA/dt, at constant acceleration
+            bend = 2.0 * v * (v * v - 3.0 * RIPPLE_SPEED_SQUARED) / (square * square * square) * a * a  # d²A/dt²
             angle, rate = size * sines, growth * sines + size * v * cosines
             change = bend * sines + 2.0 * growth * v * cosines + size * (a * cosines - v * v * bends)
         else:

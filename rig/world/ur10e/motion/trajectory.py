@@ -110,10 +110,11 @@ def plan_soft_joint_move(
     path = tuple(b - a for a, b in zip(start_rad, end_rad, strict=True))
     longest = max(abs(w) for w in path)
     steps = [SOFT_OVERSHOOT * (k / SOFT_STEPS) ** 2 * acceleration_rad_s2 for k in range(1, SOFT_STEPS + 1)]
-    gentle_speed, gentle = 0.0, 0.0
+    gentle_speed, gentle = 0.0, 0.0  # speed and path of the longest joint at the end of the gentle steps
     for acceleration in steps:
         gentle += (gentle_speed + 0.5 * acceleration * SOFT_STEP_S) * SOFT_STEP_S
         gentle_speed += acceleration * SOFT_STEP_S
+    # The speed v whose ramp and brake fill the remaining path: longest − gentle = (v² − gentle_speed²)/2a + v²/2a.
     reach = max(0.0, (longest - gentle) * acceleration_rad_s2 + 0.5 * gentle_speed**2)
     speed = min(speed_rad_s, sqrt(reach))
     if longest > 0.0:
