@@ -38,7 +38,7 @@ sensors:
 class Answers:
     """The turner, the measuring device, and their addresses.
 
-    `sensors` is the section written by `rig lines`, if the device's lines were read; `part` is on the board.
+    `sensors` is the section written by `rig lines`, if the device's lines were read. `part` is the sensor on the board.
     `arm_host`, `arm_model` and `payload_kg` belong to an arm, `servo_port` and `servo_model` to a servomotor.
     """
 

@@ -1,4 +1,4 @@
-"""Kinds of sensors that packages add through the entry-point group `rig.kinds`, and all quantities, theirs included."""
+"""Kinds of sensors that packages add through the entry-point group `rig.kinds`, and the quantities of all kinds."""
 
 from collections.abc import Mapping
 from functools import cache

@@ -54,7 +54,7 @@ _NOW: Mapping[str, str] = {
 class StationState:
     """The last state of the station of a `rig` on a `computer`, as JSON, and its age; None if the age is unknown.
 
-    Every user with write access to the history can change it.
+    Every user with write access to the history can change a station's state.
     """
 
     rig: str

@@ -131,8 +131,8 @@ def open_history(where: str | HistoryAddress | None = None) -> Iterator["History
 class History:
     """An open history.
 
-    Before a method returns, another connection reads each entry back. If it is missing, the method raises Refused
-    `entry_not_kept`.
+    Before a method that enters something returns, another connection reads the entry back. If the entry is missing, the
+    method raises Refused `entry_not_kept`.
     """
 
     address: HistoryAddress

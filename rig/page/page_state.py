@@ -57,8 +57,8 @@ ENDING_EVENTS = (VerdictReached, Failed, Interrupted, Crashed)
 class PageState:
     """The page's sections by name, in plain numbers and texts, and the `changed` ones since the last request.
 
-    Samples, states and progress come fifty times a second, but are requested ten times: only the newest are stored, and
-    `sections` converts them.
+    Samples, states and progress come fifty times a second, but the sections are requested ten times a second. So only
+    the newest are stored, and `sections` converts them.
     """
 
     def __init__(self, about: About) -> None:

@@ -2,7 +2,7 @@
 
 A row names the classes that it reads and, for each field of the entry, the attribute that fills it. Classes are given
 by name, so that writing one entry does not import the analysis of all others. The function that builds the entry sets
-fields without a row. So an attribute may be renamed without a change of the file.
+fields without a row. So an attribute may be renamed without a change of `result.json`.
 """
 
 from collections.abc import Mapping

@@ -16,8 +16,8 @@ class Turner(Protocol):
     """A connected turner, at rest until `take_control`, and stopped again at the end of its `with` block.
 
     The time of its states is the reference of a recording, which gets every state in order. A failure first stops the
-    turner; then every method raises a Fault that names it, or Refused if nothing has moved. `move` and `rest` call
-    `watch` at least every 20 ms; its exception stops the turner and is passed to the caller.
+    turner; then every method raises a Fault that names the failure, or Refused if nothing has moved. `move` and `rest`
+    call `watch` at least every 20 ms; an exception of `watch` stops the turner and is passed to the caller.
     """
 
     @property

@@ -8,18 +8,18 @@ A request is `{"do": NAME, …}`; the reply is one line, `{"ok": true, "time_s":
     hold · run · advance duration_s             the virtual clock; `advance` is answered when the time has passed
     pace time_scale                             limits the clock's speed from now on, in multiples of real time
     protective_stop · emergency_stop · safeguard_stop · release · power_off · power_on · brake_release
-    unlock                                      the protective stop, on the pendant, 5 s after it at the earliest
+    unlock                                      unlocks a protective stop on the pendant, 5 s after it at the earliest
     pause · play · stop_program · speed_slider fraction · remote_control on · robot_mode name
     safety_limit fraction                       a safety limit that slows the arm down
-    payload mass_kg · payload_stays on          a payload set on the pendant; programs cannot change it
+    payload mass_kg · payload_stays on          sets a payload on the pendant; whether programs cannot change it
     at_program_start then after_s               another request, carried out `after_s` after the start of every program,
                                                 as by a fieldbus adapter that is set to stop; null: none
     step_clock seconds · encoder joint error_rad   the controller's clock steps; a joint's reported angle has an error
     register_in_use name · register_free name   an RTDE input that a fieldbus claims
     registers_in_use first last                 all integer and double inputs from number `first` to number `last`
     registers_free                              all that a fieldbus has claimed
-    close_arm listen · silence_arm duration_s   the controller's sockets (the silence is in wall time)
-    close_dashboard · close_primary             only this one of the controller's sockets
+    close_arm listen · silence_arm duration_s   closes, or silences for a wall time, all sockets of the controller
+    close_dashboard · close_primary             closes only this one of the controller's sockets
     sensor_fault sensor fault   absent, other_part (its identity), damaged (occasional bit errors), silent (no
                                 data-ready), stuck (constant input) or saturated (far beyond its range); null: no fault
     kvh_fault sensor bit_error_rate lose status test silent   each keeps its value until it is set again:
@@ -31,11 +31,11 @@ A request is `{"do": NAME, …}`; the reply is one line, `{"ok": true, "time_s":
     printer_fault sensor bit_error_rate lose stuck silent stolen host_baud
                                                 faults of a device that prints lines; each keeps its value likewise
     printer_power sensor on
-    air temperature_c                           the air around the board from now on; needs a section `thermal`
-    heater                                      the duty cycle of the heater's pin and the board's temperature
-    mount stage                                 the item, as in `world.mounts` for that stage, counted from 0
-    fit part                                    the board of another part of a series, by its serial number
-    instruct say face turns again               the instruction for the operator, if a hand turns the sensors
+    air temperature_c                           sets the air around the board from now on; needs a section `thermal`
+    heater                                      reports the duty cycle of the heater's pin and the board's temperature
+    mount stage                                 mounts the item as in `world.mounts` for that stage, counted from 0
+    fit part                                    fits the board of another part of a series, by its serial number
+    instruct say face turns again               gives the operator an instruction, if a hand turns the sensors
     servo_power on · servo_torque on            the servo's supply; its torque, as written by another program
     servo_fault held_fast dumb denies voltage_v temperature_c lose spoil
                                                 `lose`, `spoil`: numbers of replies to lose and to corrupt

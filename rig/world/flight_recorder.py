@@ -1,7 +1,8 @@
 """The world's flight recorder: it reports the cause of a late step while the step is still delayed.
 
 A thread checks ten times a second when the loop last completed a step. It writes the stacks of all threads as soon as a
-step is late. When the loop continues, it writes the delay and its processor time, which shows the cause.
+step is late. When the loop continues, the recorder writes the delay and the processor time that the loop had during the
+delay, which shows the cause.
 """
 
 import faulthandler

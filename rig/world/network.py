@@ -290,7 +290,7 @@ class Network:
             connection.tick()
 
     def deliver(self, idle: bool = True, patient: bool = True) -> float:
-        """Send the bytes of past ticks to every client that can take them; return the wait for the others, s.
+        """Send the bytes of past ticks to every client that can take them; return the time to wait for others, s.
 
         A tick is over when this returns 0. `idle`: the next tick is not due yet, so that bytes need not be collected.
         `patient`: wait for clients that lag behind, which no real controller or board would do.

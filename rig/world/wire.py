@@ -1,7 +1,8 @@
 """The lag of a client: the bytes sent to it that it has not read.
 
-The world's clock is paced by this, as a sender is by a wire. The client is not asked: if both ends are on one Linux
-machine, the system knows how many bytes wait in the other end's socket (sock_diag(7)). Otherwise they count as read.
+This lag paces the world's clock, as a wire paces a sender. The client is not asked: if both ends are on one Linux
+machine, the system knows how many bytes wait in the other end's socket (sock_diag(7)). Otherwise all bytes count as
+read.
 """
 
 import itertools

@@ -1,10 +1,10 @@
 """Claims: a command reserves its arm, board or instrument, so that only one rig at a time uses it.
 
-A claim is a socket that listens under an abstract name of the kernel (unix(7)), without a file. It ends with the
-process that holds it, however that ends. Every user of the computer sees it, and the kernel names the holder. Only
-Linux has such names: on other systems nothing is claimed.
+A claim is a socket that listens under an abstract name of the kernel (unix(7)), without a file. The claim ends with the
+process that holds it, however the process ends. Every user of the computer sees the claim, and the kernel names its
+holder. Only Linux has such names, so on other systems nothing is claimed.
 
-The arm itself reports the use by another computer: `program_running`, `registers_in_use`.
+If another computer uses the arm, the arm itself reports this (`program_running`, `registers_in_use`).
 """
 
 import os

@@ -19,8 +19,8 @@ class Silence:
     Ticks are counted, not seconds, because the counting process may itself be delayed. A tick is ignored if the thread
     that is expected to answer (`thread`, any if None) mostly waited for a processor, unless the process was stopped.
     Linux shows this (proc(5)); on other systems no tick is ignored. On a busy machine the limit of a silence grows by
-    at most LARGEST_LOAD_FACTOR, because the arm must not be left alone. Ignored ticks extend it further, by at most the
-    factor `spared`.
+    at most LARGEST_LOAD_FACTOR, because the arm must not be left alone. Ignored ticks extend the limit further, by at
+    most the factor `spared`.
     """
 
     def __init__(self, pid: int, *, spared: int, thread: int | None = None) -> None:

@@ -97,7 +97,7 @@ def stored_bytes(path: Path) -> int:
 
 
 def _file_size_on_disk(path: Path, name: str = "it") -> int:
-    """Return the stored bytes without holes; raise UnfitFile if the file is too large for them."""
+    """Return a file's size on the disk, without holes. Raise UnfitFile if its full size is too large in comparison."""
     try:
         with open_regular_file(path, RECORDING_MAX_BYTES) as file:
             size, stored = os.fstat(file.fileno()).st_size, size_without_holes(file)

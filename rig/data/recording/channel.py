@@ -27,7 +27,8 @@ class Channel:
     """One quantity of a sensor: reading = number in the `column` × `unit_per_count` + `offset`, in the quantity's unit.
 
     - quantity: a name in `measured()`; type: the NumPy type of the numbers.
-    - full_scale_counts: number at which it saturates; range: the nominal end of scale, in the unit; None if unknown.
+    - full_scale_counts: the number at which the sensor saturates; range: the nominal end of scale, in the quantity's
+      unit; None if unknown.
     - step: largest distance of neighbouring readings, in the unit, if it is more than a count. Numbers truncated toward
       zero have this step at zero, and half of it elsewhere.
     - stated: whether the user stated the value. All numbers are then equal, and a count is the value's possible change.

@@ -116,7 +116,7 @@ def lay_out(path: Path, contents: Contents, *, swmr: bool) -> None:
 def _image(contents: Contents, libver: str | None) -> bytes:
     """Return the bytes of a complete run file.
 
-    h5py builds the file in memory: if a write to a real file fails, HDF5 repeats it at exit and crashes the process.
+    h5py builds the file in memory, because HDF5 repeats a failed write to a real file at exit and crashes the process.
     """
     import h5py
 

@@ -45,8 +45,9 @@ class RunRecorder:
     """The writer of a run file, from any number of threads; data are on their way to the disk within 0.5 s.
 
     `config` is the configuration's text without its `world:` section. The folder of `path` must exist and the file must
-    not. Raise Fault `recording_failed` from the constructor, `check` and `close`. The adding calls never wait for the
-    disk and do not report its failures, so a full disk stalls neither the board's link nor the turner's: call `check`.
+    not. The methods that add data never wait for the disk and do not report the disk's failures, so that a full disk
+    stalls neither the board's link nor the turner's. Call `check` for these failures. Raise Fault `recording_failed`
+    from the constructor, `check` and `close`.
     """
 
     def __init__(

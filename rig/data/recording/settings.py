@@ -69,8 +69,9 @@ class KnownReference:
 class Site:
     """The site of the arm, in its base frame: `up` (unit vector), gravity, and the Earth's rate, if known.
 
-    At most the norm of the magnetic field is known, and whether it points upwards. Without a heading, the latitude may
-    be known without the Earth's rate. `…_expanded_…` are expanded uncertainties (k = 2), None if not stated.
+    Of the magnetic field, at most the norm is known, and whether the field points upwards. If the heading is unknown,
+    the latitude may be known although the Earth's rate in the base frame is not. `…_expanded_…` are expanded
+    uncertainties (k = 2), None if not stated.
     """
 
     up: Vector3

@@ -1,7 +1,7 @@
 """Connection options of PostgreSQL's client: encryption, authentication, timeouts. Pure.
 
 The client itself takes passwords from `~/.pgpass` and PGPASSWORD. SCRAM proves that both sides have a password without
-disclosing it; a server that asks for it in clear text or as an MD5 hash is refused. Source: PostgreSQL 16's
+disclosing it. A server that asks for the password in clear text or as an MD5 hash is refused. Source: PostgreSQL 16's
 documentation, 34.1.2, `require_auth`, `sslmode`, `tcp_user_timeout`.
 """
 

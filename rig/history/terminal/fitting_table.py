@@ -20,10 +20,10 @@ FRAME_STROKES, CELL_FRAME = 1, 3  # width of the frame: one stroke, and for each
 
 @dataclass(frozen=True, slots=True)
 class TableColumn:
-    """A table's column. If columns do not fit, the highest `rank` is omitted first, and rank 0 never.
+    """A table's column. If columns do not fit, the column of the highest `rank` is omitted first, one of rank 0 never.
 
-    A `shorter` column replaces it before it is omitted. A column that `wraps` may use several lines, and is at least
-    `least` cells wide.
+    Before a column is omitted, it is replaced by its `shorter` column, if any. A column that `wraps` may use several
+    lines, and is at least `least` cells wide.
     """
 
     heading: str

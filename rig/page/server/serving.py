@@ -42,7 +42,7 @@ class PageAddress:
 
     @property
     def loopback(self) -> bool:
-        """Whether only this computer can reach it."""
+        """Whether only this computer can reach the page."""
         try:
             return ip_address(self.host).is_loopback
         except ValueError:

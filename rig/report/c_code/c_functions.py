@@ -131,5 +131,5 @@ def _array(values: Iterable[float]) -> str:
 
 
 def _comment(text: str) -> str:
-    """Return text without `*/`, which would end the comment around it: a serial number may contain it."""
+    """Return text without `*/`, which a serial number may contain and which would end the comment around the text."""
     return printable(" ".join(text.split())).replace("*/", "* /").replace("/*", "/ *")

@@ -37,7 +37,8 @@ class Units:
 class Series:
     """A characteristic's names in a history, `prefix` + label for each number, and the `words` that describe them.
 
-    `drawn`: whether the history draws it. `opposite`: whether its sign there is opposite to that in certificates.
+    `drawn`: whether the history draws the numbers. `opposite`: whether it stores them with the sign opposite to that in
+    certificates.
     """
 
     prefix: str
@@ -50,11 +51,11 @@ class Series:
 class Characteristic:
     """A quantity of a sensor other than scale factor and bias, with a number for each of `labels` in an entry.
 
-    - `units`: the units, by the quantity that the sensor measures.
+    - `units`: returns the units for the quantity that the sensor measures.
     - `read`: returns the numbers in an entry, or None.
     - `series`: the names of its numbers in a history; None if a history does not store it, which `exempt` explains.
     - `exempt`: the forms of output that do not show it, each with the reason.
-    - `remark`: the digital certificate's remark before ± U, by the entry.
+    - `remark`: returns the remark before ± U in the digital certificate, for an entry.
     """
 
     name: str

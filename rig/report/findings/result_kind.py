@@ -71,8 +71,8 @@ class DisplayRow:
 class CertifiedItem:
     """The digital certificate's content for one item: named results, and the temperatures of their readings.
 
-    The item is one kind of sensor (`item`: gyroscope) in the `sensor` of that name, with part and serial number if the
-    result states them.
+    `item` is the kind of sensor, such as gyroscope, and `sensor` the configured name. `part` and `serial_number` are
+    None if the result does not state them.
     """
 
     item: str

@@ -69,7 +69,7 @@ def _find_uncovered(content: Any, der: bytes, version: str) -> Iterator[str]:
 
 
 def _rebuild(container: Any, info: Any, signer: Any, version: str) -> Any:
-    """Return a container of only what the signature covers; the original must equal it byte for byte."""
+    """Return a container with nothing but the content that the signature covers, for comparison byte for byte."""
     digest = info["digest_algorithm"]
     digests = [one for one in container["digest_algorithms"] if one["algorithm"].native == digest["algorithm"].native]
     who = {"issuer": signer.issuer, "serial_number": signer.serial_number}

@@ -18,8 +18,9 @@ def sign_as_pades(
 ) -> bytes:
     """Return the PDF with a certification signature that permits no changes, at PAdES level B-B.
 
-    With a time server's URL it is B-T; with `authorities` it is B-LT, and their revocation lists are signed too. Raise
-    Refused `time_server` without the server's time stamp, `revocation_list` if the lists do not cover all certificates.
+    With a time server's URL the level is B-T. With `authorities` the level is B-LT, and their revocation lists are
+    signed too. Raise Refused `time_server` if the server sends no time stamp, `revocation_list` if the lists do not
+    cover all certificates.
     """
     from pyhanko.pdf_utils.incremental_writer import IncrementalPdfFileWriter
     from pyhanko.sign.fields import MDPPerm, SigSeedSubFilter

@@ -36,7 +36,7 @@ def is_token_address(text: str) -> bool:
 def token_key(address: str) -> TokenKey:
     """Return the key of an address. Raise Refused `signing_key` if it contains a PIN or is of another form.
 
-    No message repeats the address: any part of it may be a PIN.
+    No message repeats the address, because any part of it may be a PIN.
     """
     if _PIN.search(_decode(address)):
         what = "the address of the token contains a PIN, which every user of this computer can read"

@@ -72,8 +72,8 @@ def _no_path(chain: Sequence[bytes], trust: Trust, moment: datetime, lists: "Seq
 def unfit_for_documents(certificate: "Certificate") -> Iterator[str]:
     """Yield reasons why a key with this certificate may not sign documents: its key usage, purposes or length.
 
-    A certificate without key usage is not accepted, although RFC 5280 (4.2.1.3) permits it all usages: certificates of
-    web servers from small authorities often have none.
+    A certificate without key usage is not accepted, although RFC 5280 (4.2.1.3) permits it all usages, because
+    certificates of web servers from small authorities often state no key usage.
     """
     from cryptography.hazmat.primitives.asymmetric.ec import EllipticCurvePublicKey
     from cryptography.hazmat.primitives.asymmetric.rsa import RSAPublicKey

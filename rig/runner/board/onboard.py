@@ -1,7 +1,7 @@
 """The board's own calibration, as in SIX: the board keeps the readings of a sweep, averages the revolution and solves.
 
-Only the host knows the revolution's times and speed, from the arm's joints and both clocks. After each sweep it sends
-two board times and the speed, and at the end requests the solution. All answers are recorded;
+Only the host knows the revolution's times and speed, from the arm's joints and both clocks. After each sweep the host
+sends two board times and the speed, and at the end it requests the solution. All answers are recorded;
 `rig.analysis.gyroscope.onboard_check` compares them with the host's own results.
 """
 

@@ -1,6 +1,7 @@
 """A session by hand in progress: requests a move, waits for the rest after it, and accepts or refuses the move.
 
-The first sensor to calibrate decides; others are only recorded. All are solved afterwards, without the refused moves.
+The readings of the first sensor to calibrate decide about each move; other sensors are only recorded. All sensors are
+solved afterwards, without the refused moves.
 """
 
 import time

@@ -37,7 +37,8 @@ class LineBatch:
     """Decoded lines: `values` (n, columns) of the samples, as printed, and counts of all other lines.
 
     A value that the device does not provide is NaN, as is text in an unused column. `samples_before` (m,): the number
-    of this block's samples before each rejected line (no sample, no comment). `first_rejected`: how it begins.
+    of this block's samples before each rejected line, which is neither a sample nor a comment. `first_rejected`: the
+    beginning of the first rejected line.
     """
 
     values: Array

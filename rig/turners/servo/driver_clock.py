@@ -25,7 +25,7 @@ class Clock(Protocol):
 class HostClock:
     """The host's clock, with stamps of the raw monotonic clock, never slewed or set, if the system has one.
 
-    The servo's clock (Realtime Tick) is unsuitable: it counts milliseconds of an oscillator with 1 % tolerance.
+    The servo's clock (Realtime Tick) is unsuitable, because it counts milliseconds of an oscillator with 1 % tolerance.
     """
 
     def now_s(self) -> float:

@@ -46,8 +46,8 @@ def make_ready(bus: Bus, watchdog: int) -> None:
 def go(bus: Bus, move: ProfileMove) -> None:
     """Begin a move. Raise Refused `servo_setting_not_kept`, BusError.
 
-    The profile is written and read back before every goal: after a stop by the watchdog it is zero, and a goal would
-    cause a jump. The goal is absolute, so that repeating it after a lost reply has no effect.
+    The profile is written and read back before every goal, because a stop by the watchdog sets it to zero, and a goal
+    would then cause a jump. The goal is absolute, so that repeating it after a lost reply has no effect.
     """
     bus.write(PROFILE, move.ramp_ms, move.total_ms)
     _read_back(bus, PROFILE, move.ramp_ms, move.total_ms)

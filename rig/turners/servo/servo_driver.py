@@ -39,11 +39,11 @@ NOT_ENDED = StopOutcome(False, "the stop has not ended", f"Look at the shaft: {S
 
 
 class Servo:
-    """The servo `servo_id` at `port`, a context manager that receives from its entry and leaves the shaft at rest.
+    """The servo `servo_id` at `port`, a context manager that receives states and leaves the shaft at rest.
 
     `model` is the configured one (`servo_models`). `on_state` gets every state in order, from a thread of this class,
-    and must not wait: a servo without traffic for `watchdog_s` stops. A failure of the servo or its line first stops
-    the shaft; then every method raises a Fault that names it, or Refused if nothing has moved.
+    and must not wait, because a servo without traffic for `watchdog_s` stops. A failure of the servo or its line first
+    stops the shaft; then every method raises a Fault that names the failure, or Refused if nothing has moved.
     """
 
     def __init__(

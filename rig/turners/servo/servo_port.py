@@ -22,8 +22,8 @@ class Port:
     """The port at a path or at socket://host:port. Raise `serial.SerialException` if it cannot be opened.
 
     A path is locked against programs that request a lock; the server behind a socket takes one client at a time.
-    (TIOCEXCL would exclude all programs, but outlasts a killed program while another has the port open.) `slack_s`: the
-    delay of a reply beyond the time of its bytes.
+    (TIOCEXCL would exclude all programs, but outlasts a killed program while another program has the port open.)
+    `slack_s`: the delay of a reply beyond the time of its bytes.
     """
 
     def __init__(self, path: str, baud: int, slack_s: float, clock: Clock) -> None:

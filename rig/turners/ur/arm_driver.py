@@ -57,11 +57,12 @@ NOT_ENDED = StopOutcome(False, "the stop has not ended", "Look at the arm")
 
 
 class Arm:
-    """The arm at `host`, a context manager that receives states from its entry and leaves the arm stopped.
+    """The arm at `host`, a context manager that receives states and leaves the arm stopped.
 
     `on_state` gets every state in order, from a thread of this class. `state_rate_hz` is in the controller's time.
     `client_log` takes the output of the `ur_rtde` client; `robot_api_port` is for a PolyScope X. A failure of the arm
-    or its driver first stops the arm; then every method raises a Fault that names it, or Refused if nothing has moved.
+    or its driver first stops the arm; then every method raises a Fault that names the failure, or Refused if nothing
+    has moved.
     """
 
     def __init__(

@@ -1,8 +1,8 @@
 """The simulated board's flash in a file, so that the next run finds the board as this run left it.
 
 The file contains the 256 KB as the chip reads them, then the offset (u32, little-endian) of every doubleword that a
-power cut interrupted while it was written. Only the last pages of a file are used, those of the calibrations: the
-program is always the shipped one. A file that does not begin with a program is refused and not changed.
+power cut interrupted while it was written. Only the last pages of a file are used, which hold the calibrations, because
+the program is always the shipped one. A file that does not begin with a program is refused and not changed.
 """
 
 import struct

@@ -30,7 +30,7 @@ MISTAKE_SIZES: dict[MistakeKind, float] = {
 
 @dataclass(frozen=True, slots=True)
 class Mistake:
-    """A mistake of magnitude `size`; None takes the usual magnitude of its kind (`MISTAKE_SIZES`).
+    """A mistake of magnitude `size`; if `size` is None, it has the usual magnitude of its kind (`MISTAKE_SIZES`).
 
     - "short": the turn ends this many degrees early, as if the edge had slipped.
     - "two_turns": two turns in place of one; "other_way": a turn in the other direction; "wrong_face": another face up;

@@ -1,9 +1,9 @@
 """The search for a half of the controller's input registers that is free for the client.
 
-The client talks to its script through integers 0 to 7 and doubles 0 to 17, or the same from 24 on. A client keeps its
-registers until it disconnects: fieldbuses take the lower half (EtherNet/IP all 24 of each kind), URCaps usually some of
-the upper half. Sources: the maker's RTDE guide, on input recipes; `ur_rtde` 1.6.5, whose recipes ignore
-FLAG_UPPER_RANGE_REGISTERS if the controller's software is 5.23 or newer.
+The client talks to its script through integers 0 to 7 and doubles 0 to 17, or the same numbers from 24 on. Every client
+of RTDE keeps its registers until it disconnects. Fieldbuses take the lower half (EtherNet/IP all 24 of each kind),
+URCaps usually some of the upper half. Sources: the maker's RTDE guide, on input recipes; `ur_rtde` 1.6.5, whose recipes
+ignore FLAG_UPPER_RANGE_REGISTERS if the controller's software is 5.23 or newer.
 """
 
 import socket

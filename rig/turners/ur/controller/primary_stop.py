@@ -1,9 +1,9 @@
 """The script line that ends a program, sent to the primary interface over plain TCP: a stop in every PolyScope.
 
 The controller itself reads the line, not the program on its screen that serves the dashboard. The controller accepts
-lines only in remote control, and acknowledges none. In local control it answers each with an error, C210. Its states,
-ten a second, show whether a program runs. Sources: the maker's client library, `PrimaryClient::commandStop`; client
-interface description: robot mode data, sub-package 0 of a robot state.
+lines only in remote control, and acknowledges no line. In local control it answers each line with an error, C210. Its
+states, ten a second, show whether a program runs. Sources: the maker's client library, `PrimaryClient::commandStop`;
+client interface description: robot mode data, sub-package 0 of a robot state.
 """
 
 import socket
@@ -49,7 +49,7 @@ class PrimaryStop:
     def program_running(self) -> bool:
         """Return whether any program runs or is paused on the controller, according to its next state.
 
-        The first state is skipped: it may be older than the last script.
+        The first state is skipped, because it may be older than the last script.
         """
         deadline_s = time.monotonic() + self._timeout_s
         while True:

@@ -1,7 +1,7 @@
 """Checks that a state is possible for an arm, and that its time follows the previous one. Pure.
 
 The times of the states are the reference of a recording. If the controller's clock is set during a run, or its states
-are not finite, the run cannot be solved; so both end a run at once, with a named error.
+are not finite, the run cannot be solved, so either of these ends a run at once, with a named error.
 """
 
 import math

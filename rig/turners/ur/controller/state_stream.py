@@ -1,7 +1,8 @@
 """The complete stream of the arm's states: the receiving half of RTDE, port 30004, protocol version 2.
 
 The receive interface of `ur_rtde` keeps only the newest packet and does not signal its arrival, so a delayed reader
-loses states. Here they wait in the socket until they are read. This module only receives; `ur_rtde` drives the arm.
+loses states. In this stream the states wait in the socket until they are read. This module only receives; `ur_rtde`
+drives the arm.
 (Real-Time Data Exchange guide of the maker.)
 """
 

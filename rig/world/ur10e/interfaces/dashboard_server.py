@@ -1,9 +1,10 @@
 """The dashboard server, port 29999: one line in, one line out.
 
-Source: the maker's Dashboard Server manual, e-Series. In local control it answers questions and refuses every order,
-including `stop`; so does a connection that was opened in local control, until it is reopened (Universal Robots ROS
-Driver, issues 125 and 262). A CB3 has neither local control nor operational modes, nor the commands about them; it has
-user roles, which the e-Series lacks (the maker's client library, `dashboard_client_implementation_g5.cpp`).
+Source: the maker's Dashboard Server manual, e-Series. In local control the server answers questions and refuses every
+order, including `stop`. On a connection that was opened in local control it does so until the client opens a new one
+(Universal Robots ROS Driver, issues 125 and 262). A CB3 has neither local control nor operational modes, nor the
+commands about them; it has user roles, which the e-Series lacks (the maker's client library,
+`dashboard_client_implementation_g5.cpp`).
 """
 
 from collections.abc import Callable

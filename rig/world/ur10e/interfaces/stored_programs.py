@@ -35,8 +35,8 @@ class StoredPrograms:
     def store(self, form: bytes, *, replace: bool) -> str:
         """Store the document that a client sends, and return its name.
 
-        Raise ValueError if the form contains no document. Raise it too unless a document of the same name is already
-        stored with `replace`, and not yet stored without.
+        With `replace`, a document of the same name must already be stored, otherwise none may be. Raise ValueError if
+        this is not so, or if the form contains no document.
         """
         text = form[form.find(b"{") : form.rfind(b"}") + 1].decode()
         try:

@@ -29,7 +29,7 @@ Shaken = tuple[int, float, float, float]
 class Deflection(NamedTuple):
     """The deflection, rad, of a joint that yields to its acceleration, at a time t (s) in a tick.
 
-    It is end + (start + slope t) exp(−t/τ).
+    It is end + (start + slope t) exp(−t/τ), with τ the drive's `yield_time_s`.
     """
 
     joint: int
@@ -83,7 +83,8 @@ class JointDrive:
     def advance(self, before: Sequence[Deflection], change_rad_s: Sequence[float]) -> tuple[Deflection, ...]:
         """Return the joints' deflections in the next tick, if their targets' rates change by `change_rad_s`.
 
-        `before` has the deflections in the last tick. Both leave out joints that are not deflected.
+        `before` has the deflections in the last tick. Joints that are not deflected are left out of it and of the
+        result.
         """
         if not self.yield_s2 or not (before or any(change_rad_s)):
             return ()

@@ -136,7 +136,7 @@ class JointErrors:
         return angles, speeds, accelerations
 
     def _true_angle(self, joint: int, e: float) -> tuple[float, float, float]:
-        """Return the true angle at an encoder's angle, rad, and two derivatives with respect to the latter."""
+        """Return a joint's true angle, rad, at its encoder's angle `e`, and two derivatives with respect to `e`."""
         errors, (once, twice, _) = self._errors, self._phases[joint]
         a, b = errors.encoder_once_rad, errors.encoder_twice_rad
         lag, slope, bend = self._hysteresis(joint, e)

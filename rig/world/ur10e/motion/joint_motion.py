@@ -44,15 +44,15 @@ class _Tick(NamedTuple):
 
 
 class JointMotion:
-    """Angles and speeds of the six joints. `step` plays a tick; `joints_at` returns any time within the last one.
+    """Angles and speeds of the six joints. `step` plays a tick; `joints_at` returns them at any time within that tick.
 
     - `drive`: how the joints follow the trajectory.
     - `encoders`: the errors of what clients receive about the joints.
     - `memory_s`: the time before the last tick's end that `joints_at` covers too.
     - `vibration`: a vibration that the encoders show; it is added to their angles and to the true ones.
 
-    Three angles are in use: `target` (commanded), `smooth` (the same without the servo's static error, so that the
-    joint comes to rest exactly on target) and the joint's own, with the ripple.
+    Three angles are in use: `target` is the commanded one; `smooth` is the joint's without ripple, scaled such that the
+    joint with its ripple comes to rest exactly on target; the third is the joint's own, with the ripple.
     """
 
     def __init__(
