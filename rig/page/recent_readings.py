@@ -45,7 +45,7 @@ class PageHistory:
         self._points.clear()
 
     def since(self, number: int) -> dict[str, Any]:
-        """Return the points from `number` on as JSON values: times, and the values of each line (null if missing)."""
+        """Return the points from `number` on as JSON values: times, and the values of each curve (null if missing)."""
         start = max(number, self.first)
         points = list(self._points)[start - self.first :]
         lines = sorted({line for _, values in points for line in values})

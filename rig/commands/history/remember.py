@@ -101,7 +101,7 @@ def remember_certificate(
 def _find_own(folder: Path, history: str | None) -> "tuple[Loaded | None, HistoryAddress | None]":
     """Return the configuration of the run in `folder`, and the address of `history`, by default the user's own.
 
-    The address is None if there is no history, or if the configuration switches it off and none is named.
+    The address is None if there is no history, or if the configuration switches the history off and `history` is None.
     """
     from rig.history.entered.finished_run import read_configuration
     from rig.history.storage.address import default_history_address
