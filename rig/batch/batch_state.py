@@ -55,10 +55,10 @@ class Chip:
 class PartEnded:
     """The outcome of the present part.
 
-    - why: empty for a passed part.
+    - why: the reason of the outcome, empty for a passed part.
     - certificate: its number, empty without one.
     - repeated: how often refused sweeps were repeated.
-    - chip: None if unknown.
+    - chip: the part's hardware, None if unknown.
     - took_s: the duration from the start to the end.
     - truth: the agreement of the result with a simulated laboratory's truth, empty without a truth.
     """

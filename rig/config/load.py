@@ -51,7 +51,8 @@ class Loaded:
 
     - `simulated`: whether the file has a `world:` section, which only the simulated laboratory reads, from `text`.
     - `flash_file`: the file with the simulated board's memory, or None.
-    - `text`: the file as used, merged with base and overrides; `rig_text`: without the `world:` section, as recorded.
+    - `text`: the file as used, merged with base and overrides; `rig_text`: the same without the `world:` section, as
+      recorded.
     """
 
     config: RigConfig

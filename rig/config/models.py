@@ -267,7 +267,7 @@ class SensorsConfig(Section):
     @field_validator("sensors")
     @classmethod
     def check_link_rate(cls, sensors: dict[str, SensorSection], info: ValidationInfo) -> dict[str, SensorSection]:
-        """Refuse sensors on a missing board, and data rates beyond the link's capacity, by the larger message size."""
+        """Refuse sensors on a missing board, and data rates beyond the link's capacity, given the larger messages."""
         streams = _streams(sensors)
         if "board" not in info.data or not streams:
             return sensors

@@ -117,7 +117,8 @@ class Quantity:
 class Scalar:
     """One quantity without axes, which is recorded, shown and exported, and never calibrated.
 
-    `sensor`: the kind of sensor; `unit`: the unit of its values; `suffix`: that unit in names; `reading`: on a screen.
+    `sensor`: the kind of sensor; `unit`: the SI unit of its values; `suffix`: this unit in names; `reading`: the unit
+    on a screen.
     """
 
     name: str

@@ -126,7 +126,10 @@ class Change:
 
     @property
     def normalised_error(self) -> float:
-        """E_n = |y₂ − y₁| / √(U₁² + U₂²) (ISO 13528:2022, 9.7); above 1 the change of a single value is significant."""
+        """E_n = |y₂ − y₁| / √(U₁² + U₂²) for values y with expanded uncertainties U (ISO 13528:2022, 9.7).
+
+        Above 1 the change of a single value is significant.
+        """
         return abs(self.now.value - self.before.value) / math.hypot(self.before.expanded, self.now.expanded)
 
     @property

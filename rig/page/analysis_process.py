@@ -42,7 +42,7 @@ class Lookout:
 def looking_out(folder: Path, feed: Feed) -> Iterator[Lookout]:
     """Run the analysis during the block, and show its results by `feed`.
 
-    If its process fails, a message on stderr says so: the page lacks its results, and the run continues.
+    If its process fails, a message on stderr says so; the page then lacks these results, and the run continues.
     """
     lookout = Lookout()
     command = [sys.executable, "-P", "-m", "rig.page.live_analysis", str(folder)]

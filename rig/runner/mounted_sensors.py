@@ -91,7 +91,7 @@ def find_mounted(
 ) -> Mounted:
     """Return the sensors of a run that can be calibrated, on the board with the identifier `board`.
 
-    `sensors` are by name. Simulated and real sensors are never the same.
+    `sensors` are by name. A calibration of a simulated sensor does not count for a real one, nor the reverse.
     """
     turned = []
     for name, sensor in sensors.items():

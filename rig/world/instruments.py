@@ -35,9 +35,9 @@ class InstrumentMount:
     - kind: its name in control requests.
     - build: returns the instrument with power, at a virtual time in s; its non-volatile memory is bound in `build`.
     - pty: whether its port is also a pseudo-terminal.
-    - bit_error_rate: the fraction of wrong bits on its line, at first.
-    - stolen: the fraction of its bytes that another program on the port reads, at first.
-    - instrument: None without power.
+    - bit_error_rate: the fraction of wrong bits on its line when the world starts.
+    - stolen: the fraction of its bytes that another program on the port reads, when the world starts.
+    - instrument: the instrument, None without power.
     """
 
     kind: str

@@ -93,7 +93,7 @@ class SixSweepsSection(ProcedureSection):
 
     @model_validator(mode="after")
     def require_every_direction(self) -> Self:
-        """Refuse an order that lacks one of the six directions of SIX, section II-B, and a speed named twice."""
+        """Refuse an order that lacks one of the six directions (paper SIX, section II-B), and a speed named twice."""
         order, directions = self.order or get_args(Wrist), self.directions or ("cw", "ccw")
         if len(set(order)) < 3 or len(order) > 3 or set(directions) != {"cw", "ccw"}:
             raise ValueError("order must name wrist_1, wrist_2 and wrist_3 once each, and directions both cw and ccw")
@@ -198,9 +198,9 @@ class SixObservationSection(SixSweepsSection):
         return self.stages
 
     def problems(self, config: RigConfig) -> Iterator[str]:
-        """Yield the problems of sweeps, and what stages exclude: a target, a verification and magnetometers.
+        """Yield the problems of sweeps, and of a target, a verification or magnetometers, which stages exclude.
 
-        With stages or arcs a magnetometer could be recorded, not calibrated, which only the run's end would show.
+        With stages or arcs a magnetometer could be recorded but not calibrated, and only the run's end would show this.
         """
         yield from SixSweepsSection.problems(self, config)
         if self.stages and (self.target_scale_u or self.target_bias_u_rad_s):

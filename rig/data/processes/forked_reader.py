@@ -1,6 +1,6 @@
 """A reading process forked from this one, which saves the tenth of a second that loading modules takes.
 
-Only a process of one thread is forked: another thread's lock would stay locked in the child for ever.
+Only a process of one thread is forked, because a lock of another thread would stay locked in the child for ever.
 """
 
 import os

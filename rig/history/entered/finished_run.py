@@ -66,7 +66,7 @@ class FinishedRun:
 
     @property
     def content_sha256(self) -> str:
-        """The checksum of the result without its time of computation: equal numbers have equal checksums."""
+        """The checksum of the result without its time of computation, so that equal numbers have equal checksums."""
         return content_sha256(self.text)
 
 

@@ -91,7 +91,7 @@ class ParameterMove:
 
 @dataclass(frozen=True)
 class ComparedResult:
-    """A stated result, and the `answer` recomputed from its recordings, or None; changes above `of_u` U count."""
+    """A stated result, and the `answer` recomputed from its recordings, or None; a change counts above `of_u` × U."""
 
     stated: StatedResult
     answer: Answer | None

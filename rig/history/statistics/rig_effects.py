@@ -1,4 +1,4 @@
-"""Effects of rigs on results, separated from effects of sensors by sensors calibrated on several rigs."""
+"""Effects of rigs on results; sensors calibrated on several rigs separate them from the effects of sensors."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -34,7 +34,7 @@ MAX_HEADER_BYTES = 8192
 
 @dataclass(frozen=True, slots=True)
 class PageAddress:
-    """The page's address; without a `port` the usual port, or a free one if another program uses that."""
+    """The page's address; if `port` is None, the usual port, or a free one if another program uses the usual port."""
 
     host: str = ADDRESS
     port: int | None = None

@@ -87,7 +87,7 @@ class Block:
 class Certificate:
     """The content of a certificate.
 
-    `marks` are printed across every page; a certificate without any is ready to be signed. `reversals` are results of
+    `marks` are printed across every page; a certificate without marks is ready to be signed. `reversals` are results of
     turning magnetometers over, by the magnetometer's name.
     """
 

@@ -15,7 +15,10 @@ ROWS = 17  # rows of the table; a certificate shows every fourth
 def temperature_entry(
     quantity: Quantity, polynomials: OverTemperature, sensor: RecordedSensor | Item
 ) -> OverTemperatureEntry:
-    """Return a sensor's polynomials of temperature in SI units; for a gyroscope b = −c, as in g = K (m + b)."""
+    """Return a sensor's polynomials of temperature in SI units.
+
+    A gyroscope's bias has the sign that it has in g = K (m + b), so it is minus the polynomials' offset of the reading.
+    """
     signs = np.array(quantity.parameter_signs)
     of_coefficients = np.repeat(signs, COEFFICIENT_COUNT // len(signs))
     powers = powers_at(0.0)

@@ -1,6 +1,6 @@
 """A calibration's biases at another temperature, by the slopes of a run of `bias_drift`. Pure.
 
-A slope is valid only in its measured range: the calibration's temperature and the requested one must be inside.
+A slope is valid only in its measured range, which must contain the calibration's temperature and the requested one.
 """
 
 from dataclasses import replace

@@ -54,7 +54,7 @@ def _render(finding: Finding[VerificationEntry]) -> Iterator[Table | str]:
 
 
 def verification_table(name: str, entry: VerificationEntry) -> Table:
-    """Return a table of the errors of each axis before and after; a dash without readings from before."""
+    """Return a table of the errors of each axis before and after calibration; dashes if none were read before."""
     table = build_number_table(
         ("axis", "RMS before rad/s", "RMS after rad/s", "of that noise", "MSE before (rad/s)²", "MSE after"),
         f"{name} against {entry.reference}, sweeps and rests",

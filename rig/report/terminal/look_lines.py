@@ -69,7 +69,7 @@ def _describe_table(path: Path, layout: TableLayout, guess: LogColumns) -> Itera
 
 
 def describe_convention(convention: Convention | None, *, is_order_named: bool) -> Iterator[str]:
-    """Yield the quaternions' convention, which the gyroscope shows, and their numbers' order unless headings name it."""
+    """Yield the quaternions' convention, which the gyroscope shows, and the order of their numbers unless named."""
     if convention is None:
         yield _row(
             "direction", "the gyroscope does not show the direction of the quaternions: is it one body and one clock?"

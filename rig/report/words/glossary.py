@@ -42,6 +42,6 @@ def glossary() -> tuple[Word, ...]:
 
 
 def find_words(name: str) -> Iterator[Word]:
-    """Yield the words that are called `name`: U differs from u; capitals are ignored only if no word has that name."""
+    """Yield the words that are called `name`. Capitals matter (U is not u), unless no word has exactly that name."""
     matches = [word for word in glossary() if name in word.synonyms]
     yield from matches or [word for word in glossary() if name.casefold() in map(str.casefold, word.synonyms)]

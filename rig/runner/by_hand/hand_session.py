@@ -108,7 +108,8 @@ class HandSession:
     def carry_out(self, check: Callable[[], None]) -> None:
         """Request the wanted moves until all are made or U reaches the target.
 
-        `check` is called many times a second. Raise Fault for an error that no move corrects, or after ten in a row.
+        `check` is called many times a second. Raise Fault for an error that no move corrects, or after ten refused
+        moves in a row.
         """
         heard = self.acquisition.hear()
         self._ask(next_instruction(self._open, None))

@@ -124,7 +124,7 @@ def calibrate_by_board(
 
     The session ends after at least `moves` moves, once the standard uncertainty of the scale is at most `scale_std`.
     Raise Refused `clock_unknown`, `first_face_unknown`, and as `open_board_source` does; Fault `board_unverified`,
-    `board_disagrees`, the error of ten refused moves in a row, and the board's own.
+    `board_disagrees`, the error of the last of ten refused moves in a row, and the board's own errors.
     """
     arrived: SimpleQueue[tuple[str, NDArray[Any]]] = SimpleQueue()
     with ExitStack() as stack:

@@ -164,7 +164,7 @@ class LinesDevice:
         return float(passed.sum()) * UNITS[self._section.time.unit].size
 
     def _measure_rate_hz(self) -> float:
-        """Return the sample rate, from the median step of the device's time; if that is coarse, from the total time.
+        """Return the sample rate, from the median step of the device's time or, if times are coarse, the total time.
 
         Raise SensorError `lines_time_stands`.
         """

@@ -314,7 +314,7 @@ def _have_length_1(values: Array) -> bool:
 
 
 def _unit_of(kind: str, unit: dict[str, Any], values: Array, still: NDArray[np.bool_]) -> tuple[dict[str, Any], str]:
-    """Return unit and factor of a triad in the form of a column map, and the reason if these are uncertain."""
+    """Return unit and factor of a triad in the form of a column map, and the reason if unit or factor is uncertain."""
     if (scale := unit.pop("scale", None)) is not None:
         steps = 1 / float(scale)
         near = min(ROUND_STEPS, key=lambda round_steps: abs(steps / round_steps - 1))

@@ -36,7 +36,8 @@ def change(link: AutopilotLink, planned: ParameterChange, target: Mapping[str, A
 def find_unfinished_change(link: AutopilotLink) -> Iterator[SensorError]:
     """Yield the error `autopilot_mixture` if a change of this autopilot's parameters stopped half-way.
 
-    A change that stopped before the first parameter or after the last leaves the journal. Raise as `find_change`.
+    A change that stopped before the first parameter or after the last is removed from the journal. Raise as
+    `find_change` does.
     """
     begun = find_change(autopilot_id(link))
     if begun is None:

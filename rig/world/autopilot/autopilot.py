@@ -35,7 +35,10 @@ SENSORS_UPDATED, TEMPERATURE_UPDATED = 0x3F, 0x1000
 
 @dataclass(slots=True)
 class AutopilotFaults:
-    """Faults that a test can set: fractions of messages `lost` and `doubled`; `slowest`: actual over requested rate."""
+    """Faults that a test can set: fractions of messages `lost` and `doubled`, and of the requested rate (`slowest`).
+
+    A `deaf` autopilot ignores all messages.
+    """
 
     lost: float = 0.0
     doubled: float = 0.0
@@ -219,7 +222,7 @@ class SimulatedAutopilot:
         self._send(message)
 
     def _command(self, message: Any) -> int:
-        """Carry out a command for the version, a message's interval, or one message; return the command's result."""
+        """Carry out a command that asks for the version or one message, or sets an interval; return its result code."""
         if message.command == REQUEST_MESSAGE and int(message.param1) == AUTOPILOT_VERSION:
             uid = list(self._uid.ljust(18, b"\0"))
             version, zeros = VERSIONS[self._firmware], [0] * 8

@@ -16,8 +16,8 @@ from rig.world.site import Vector
 class MountedMagnetometer:
     """A magnetometer mounted on the flange; `truth` holds its errors.
 
-    The magnetometer is mounted as `mounting` states, rotated by the vector `mounting_error_deg`, `offset_mm` from the
-    flange's centre.
+    The magnetometer is mounted as `mounting` states and then rotated by the vector `mounting_error_deg`; its position
+    from the flange's centre is `offset_mm`.
     """
 
     def __init__(

@@ -35,7 +35,8 @@ def mount_sensors(
 ) -> dict[str, SpiDevice]:
     """Return the board's sensors of the `world:` section by name, powered at the virtual time `time_s`.
 
-    `motion_of`: a sensor's motion as a function of time, 3 components or 6. A `body` sets the temperature.
+    `motion_of` returns a sensor's motion as a function of time, with 3 components (rates) or 6 (specific forces too).
+    The temperatures are those of the `body`, if one is given.
     """
     return {
         name: _build_sensor(
@@ -53,7 +54,7 @@ def mount_sensors(
 def mount_magnetometers(
     config: RigConfig, world: WorldSection, field_of: Callable[[MountedMagnetometer], MotionAt]
 ) -> dict[str, SpiDevice]:
-    """Return the magnetometers of the `world:` section by name. `field_of`: flux density over time, T."""
+    """Return the magnetometers of the `world:` section by name. `field_of` returns the flux density over time, T."""
     mounted = {
         name: MountedMagnetometer(
             config.magnetometers[name].mounting,

@@ -60,7 +60,7 @@ class SensorTruth:
 
     @property
     def rows(self) -> list[list[float]]:
-        """Rotation from the flange's axes to the sensor's (rows); another list object after every remount."""
+        """Rotation from the flange's axes to the sensor's (rows); a new list object shows that it was remounted."""
         return self._rows
 
     @property

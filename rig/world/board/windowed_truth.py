@@ -24,7 +24,7 @@ Windows = Sequence[tuple[float, float]]
 
 
 class SimulatedTruth:
-    """The truth of all sensors of a laboratory, without noise: means over windows of its time (n, 2), s.
+    """The truth of all sensors of a laboratory, without noise; each value is a mean over windows (n, 2) of time, s.
 
     Rotation and gravity act on one axis after the other, so that oblique axes and mounting have no influence.
     """
@@ -92,10 +92,10 @@ class SimulatedTruth:
 def truth_document(truth: SimulatedTruth, windows: Mapping[str, Any], now_s: float) -> dict[str, Any]:
     """Return the truth over the windows of a run, by the keys of its result.
 
-    `windows` has, by name, for each of `gyroscopes` the windows of the sweeps (`sweeps_s`) and of all averages
-    (`averages_s`), and the speeds (`speeds_rad_s`); for each of `accelerometers` the windows of all readings
-    (`readings_s`). An empty list of windows is the whole time until `now_s`. A bias is a mean from the first to the
-    last window, as in the result. A scale factor that depends on the speed is left out unless there was one speed.
+    `windows` has two mappings by sensor name. `gyroscopes` gives the windows of the sweeps (`sweeps_s`) and of all
+    averages (`averages_s`), and the speeds (`speeds_rad_s`). `accelerometers` gives the windows of all readings
+    (`readings_s`). An empty list of windows stands for the whole time until `now_s`. A bias is a mean from the first to
+    the last window, as in the result. A scale factor that depends on the speed is left out unless there was one speed.
     """
     whole = [(0.0, now_s)]
     document: dict[str, Any] = {"schema": SCHEMA, "simulated": True, "gyroscopes": {}, "accelerometers": {}}

@@ -22,7 +22,10 @@ def log_map(matrix: Array) -> Array:
 
 
 def multiply_steps(steps: Array) -> Array:
-    """Return the products (n + 1, 3, 3) 1, exp(φ₁), exp(φ₁) exp(φ₂), … of steps (n, 3), √n rows at a time."""
+    """Return the products 1, exp(φ₁), exp(φ₁) exp(φ₂), … (n + 1, 3, 3) of the rotation vectors φ in `steps` (n, 3).
+
+    They are computed √n rows at a time.
+    """
     width = int(np.ceil(np.sqrt(len(steps))))
     padded = np.zeros((width * width, 3))
     padded[: len(steps)] = steps

@@ -1,8 +1,8 @@
 """The servo's profile generator: from the present angle and rate to a goal, in segments of constant acceleration.
 
 Source: ROBOTIS e-Manual, "What is the Profile" (profile_description.md). Velocity-based: a trapezoid, or a triangle,
-limited in speed and acceleration. Time-based: the whole move takes t3 and each of its ramps t1. A goal that comes
-during a move is approached from the present speed, without a stop.
+limited in speed and acceleration. Time-based: the whole move takes the time in Profile Velocity, and each of its ramps
+that in Profile Acceleration. A goal that comes during a move is approached from the present speed, without a stop.
 """
 
 from math import copysign, sqrt

@@ -8,10 +8,11 @@ from dataclasses import dataclass, field
 class ServoTruth:
     """One servo. Angles and rates are the shaft's.
 
-    `settings`: EEPROM values other than the factory's, by the manual's names. The encoder's error is e₁ sin(θ + φ₁) +
-    e₂ sin(2θ + φ₂); AS5045-class parts are within ±1.3° in total. The gear's ripple is a fraction of the rate,
-    `ripple_per_turn` times a revolution; the shaft follows the profile with `lag_s`. `tick_ppm`: the error of its
-    clock, positive if fast. With torque off the shaft falls with `fall_deg_s` (0: its load is balanced).
+    `settings`: EEPROM values other than the factory's, by the manual's names. The encoder's error at the angle θ is
+    e₁ sin(θ + φ₁) + e₂ sin(2θ + φ₂), with e₁, φ₁ the fields `encoder_once_…` and e₂, φ₂ `encoder_twice_…`. AS5045-class
+    parts are within ±1.3° in total. The gear's ripple is a fraction of the rate, `ripple_per_turn` times a revolution;
+    the shaft follows the profile with `lag_s`. `tick_ppm`: the error of the servo's clock, positive if fast. With
+    torque off the shaft falls with `fall_deg_s` (0: its load is balanced).
     """
 
     model: str = "XM430-W350"

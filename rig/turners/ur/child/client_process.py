@@ -180,7 +180,7 @@ class _Child:
                 self.abandon()
 
     def watch_move(self) -> NoReturn:
-        """Report the end of a move, in a thread of its own: heartbeats cannot wait for the client's answers."""
+        """Report the end of a move, in a thread of its own because heartbeats cannot wait for the client's answers."""
         while True:
             time.sleep(MOVE_POLL_S)
             changes_before = self._operations_before

@@ -1,4 +1,4 @@
-"""The packages of RTDE, port 30004: a big-endian size, u16, a type, one letter, and a payload (the maker's guide)."""
+"""The packages of RTDE, port 30004: big-endian size (u16), type (one letter) and payload (the maker's guide)."""
 
 import struct
 from collections.abc import Iterator

@@ -74,7 +74,7 @@ def impossible_motion(before: ArmState, after: ArmState) -> Problem | None:
 
 
 def clock_step(before_s: float, after_s: float, period_s: float, missed_s: float) -> Problem | None:
-    """Return the problem of a time that is not a whole number of periods after the last one, or None.
+    """Return the problem of a time `after_s` that is not a whole number of periods after `before_s`, or None.
 
     `missed_s` is the longest recent gap, on the controller's clock, in which states may have been lost.
     """

@@ -1,9 +1,10 @@
 """The response of a joint to its target: lag, deflection by acceleration, and the ripple of its harmonic drive.
 
 The joint's angle is u(t − lag) + y + p. u is the target. y is the deflection: a critically damped second-order system
-follows −k times the target's mean acceleration of the last 12 ms, within a bound. p is the ripple, a function of angle
-and speed v: p = v/(v² + v₀²) Σ Rₙ/n sin(n u + φₙ). For v ≫ v₀ its rate is Σ Rₙ cos(n u + φₙ) at every speed; a joint at
-rest is exactly on its target. Over a whole turn at constant speed p adds nothing.
+follows −`yield_s2` times the target's mean acceleration of the last 12 ms, within a bound. p is the ripple, a function
+of angle and speed v: p = v/(v² + v₀²) Σ Rₙ/n sin(n u + φₙ), with n cycles a turn, amplitude Rₙ and phase φₙ. At speeds
+far above v₀ the ripple's rate is Σ Rₙ cos(n u + φₙ), whatever the speed; a joint at rest is exactly on its target. Over
+a whole turn at constant speed p adds nothing.
 """
 
 from collections.abc import Sequence

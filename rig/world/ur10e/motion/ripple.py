@@ -1,7 +1,8 @@
 """The servo's vibration: a position ripple locked to the joint's angle, so that whole turns integrate exactly.
 
-q = u + Σ Aₙ sin(n u + φₙ), with u the angle without ripple and n whole cycles a turn. After a turn of u the joint has
-made a turn too, regardless of the ripple; the mean speed in SIX, section on vibration, requires this.
+The joint's angle is q = u + Σ Aₙ sin(n u + φₙ), with u the angle without ripple and, for n whole cycles a turn, the
+amplitude Aₙ and phase φₙ. After a turn of u the joint has made a turn too, regardless of the ripple; the mean speed in
+the paper SIX, section on vibration, requires this.
 """
 
 from collections.abc import Sequence

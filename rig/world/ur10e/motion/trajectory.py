@@ -12,7 +12,10 @@ SOFT_STEPS, SOFT_STEP_S, SOFT_OVERSHOOT = 19, 0.008, 1.38  # the gentle start of
 
 @dataclass(frozen=True, slots=True)
 class MotionSegment:
-    """A segment of `duration_s`: starts at `q_rad` with `qd_rad_s`, keeps `qdd_rad_s2` (six joints each)."""
+    """A segment that starts at angles `q_rad` with speeds `qd_rad_s` and keeps the accelerations `qdd_rad_s2`.
+
+    Each has a value for each of six joints.
+    """
 
     duration_s: float
     q_rad: Joints

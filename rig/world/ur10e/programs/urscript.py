@@ -189,7 +189,7 @@ class Arguments:
 
 
 def read_move(name: str, value: Arguments) -> ScriptMove:
-    """Return the move of a `movej` or `movel`. A blend radius is not simulated: the arm stops at every target."""
+    """Return the move of a `movej` or `movel`. A blend radius is not simulated, so the arm stops at every target."""
     target = value("0", "pose" if name == "movel" else "q")
     if not isinstance(target, (list, tuple)) or len(target) != 6:
         raise ProgramError(f"{name}: six joint angles or a pose expected, got {target}")
