@@ -22,7 +22,7 @@ FAILED, FELL_BEHIND = 1, 3
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """A bound of a figure, or of its `ratio` to a peer in the same run: upper if `most`, else lower."""
+    """A bound of a figure, or of its ratio to a peer's in the same run; the upper bound if `most`, else the lower."""
 
     bound: float
     compared: Literal["figure", "ratio"] = "figure"

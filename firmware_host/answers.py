@@ -23,9 +23,9 @@ _DTYPES = {"imu_samples": IMU_SAMPLE_DTYPE, "field_samples": FIELD_SAMPLE_DTYPE}
 class SampleBatch(NamedTuple):
     """Samples of one sensor in the order of their sequence numbers, which have no gap inside a batch.
 
-    `dropped` is the board's latest count of conversions lost on its side since the start; `samples` is (n,) of
-    `SAMPLE_DTYPE`, with accelerations of `IMU_SAMPLE_DTYPE`, for a magnetometer of `FIELD_SAMPLE_DTYPE`. Their counts
-    are the part's in the mode "raw", and microradians per second in the mode "calibrated".
+    `dropped` is the board's latest count of conversions that it has lost since the start. `samples` (n,) has the dtype
+    `IMU_SAMPLE_DTYPE` with accelerations, `FIELD_SAMPLE_DTYPE` for a magnetometer, else `SAMPLE_DTYPE`. A count is the
+    part's own in the mode "raw", and a microradian per second in the mode "calibrated".
     """
 
     sensor: int
@@ -35,9 +35,9 @@ class SampleBatch(NamedTuple):
 
 
 def sample_batches(frames: Iterable[Frame], host_time_s: float) -> Iterator[SampleBatch]:
-    """Yield the frames of a stream that came together at `host_time_s`, in as few batches of samples as possible.
+    """Yield the samples of frames that came together at `host_time_s`, in as few batches as possible.
 
-    Batches of a sensor are in order; a batch ends at missing samples, or at a change of their kind.
+    Batches of a sensor are in order; a new one begins after missing samples, and if the samples' kind changes.
     """
     runs = _runs(frames)
     samples = {name: _samples(name, runs, host_time_s) for name in {run[0].name for run in runs}}
@@ -67,7 +67,7 @@ def _runs(frames: Iterable[Frame]) -> list[list[Frame]]:
 def _samples(name: str, runs: Sequence[Sequence[Frame]], host_time_s: float) -> np.ndarray:
     """Return the samples (n,) of all frames of one name, run after run.
 
-    Joining their bytes and decoding once shares most of a frame's cost.
+    The bytes of all frames are joined and decoded at once, so that the frames share most of the cost.
     """
     frames = [frame for run in runs if run[0].name == name for frame in run]
     items = np.frombuffer(b"".join([frame.content for frame in frames]), protocol.MESSAGE_BY_NAME[name].item_dtype)
@@ -91,7 +91,7 @@ def _samples(name: str, runs: Sequence[Sequence[Frame]], host_time_s: float) -> 
 
 
 def _continues(before: Frame, frame: Frame) -> bool:
-    """Return whether a frame's samples follow those of the sensor's previous frame, and are of the same kind."""
+    """Return whether the samples of `frame` follow those of `before` without a gap and are of the same kind."""
     previous, current = before.values, frame.values
     return bool(
         frame.name == before.name
@@ -141,7 +141,7 @@ class BoardIdentity:
 
 @dataclass(frozen=True, slots=True)
 class Heating:
-    """The heater's state: its `power`, 0 to 1, and the `cause` for being off, of `protocol.HEATER_CAUSES`.
+    """The heater's state: its `power`, 0 to 1, and why it is off, the `cause` from `protocol.HEATER_CAUSES`.
 
     `temperature_c` is the temperature of the hottest part at the board's last check.
     """
@@ -200,7 +200,8 @@ class BoardStatus:
 
     - `frames_lost`, `frames_repeated`: frames that this program never received, and those received twice.
     - `uptime_s`: board time.
-    - `rx_errors`, `tx_overruns`, `bus_errors`: damaged frames from the host, frames without room, failed sensor reads.
+    - `rx_errors`, `tx_overruns`: damaged frames from the host, and frames not sent for lack of room.
+    - `bus_errors`: failed reads of sensors.
     - `stack_high_water_bytes`: the most stack ever used.
     - `fault_pc`, `reset_cause`: the address of the last processor fault, and the cause of the last start.
     - `clock_locked`, `streaming`: whether the clock follows the crystal, and whether the board streams.
@@ -242,10 +243,10 @@ class BoardStatus:
 
 @dataclass(frozen=True, slots=True)
 class BoardObservation:
-    """An average by the board of its stored readings, from `start_us` up to, not including, `end_us`.
+    """The board's average of a sensor's stored readings, from `start_us` up to, not including, `end_us`.
 
-    The times are the board's, in microseconds; `mean_rad_s` is uncalibrated; `index`: the number of the sensor's
-    earlier observations.
+    The times are the board's, in microseconds. `mean_rad_s` is not calibrated, and `index` is the number of the
+    sensor's earlier observations.
     """
 
     index: int
@@ -262,9 +263,10 @@ class BoardObservation:
 
 @dataclass(frozen=True, slots=True)
 class BoardSolution:
-    """The board's solution, g = K (m + b), in single precision; scale and bias are 0 unless `status` is "solved".
+    """The board's solution of g = K (m + b), rate g and reading m, in single precision.
 
-    `method` is one of `protocol.METHODS`, `status` of `protocol.SOLUTION_STATUSES`.
+    `method` is one of `protocol.METHODS`, and `status` one of `protocol.SOLUTION_STATUSES`; `scale` (the diagonal of K)
+    and `bias_rad_s` (b) are 0 unless `status` is "solved".
     """
 
     method: str
@@ -290,10 +292,10 @@ class BoardSolution:
 
 @dataclass(frozen=True, slots=True)
 class StoredPolynomials:
-    """The changes of scale and bias with the part's own temperature inside `range_c`, constant beyond its ends.
+    """The changes of scale and bias with the part's own temperature T in `range_c`; outside they stay constant.
 
-    Row n − 1 of each matrix (3, 3) belongs to (T − `temperature_c`)ⁿ, n from 1 to 3, with a column for each axis. One
-    plus the scale's change multiplies m + b; the bias' change is added to b.
+    Row n − 1 of each matrix (3, 3) has the coefficients of (T − `Calibration.temperature_c`)ⁿ, n from 1 to 3, one for
+    each axis. One plus the scale's change multiplies m + b, m the reading; the bias' change is added to b.
     """
 
     range_c: tuple[float, float]
@@ -301,17 +303,17 @@ class StoredPolynomials:
     bias_change_rad_s: Matrix
 
     def most(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return upper bounds on the changes within the range: of scale (3,) as a fraction, of bias (3,) in rad/s."""
+        """Return upper bounds of the scale's change (3,), as a fraction, and the bias' change (3,), rad/s, in range."""
         powers = (self.range_c[1] - self.range_c[0]) ** np.arange(1, 4)
         return powers @ np.abs(self.scale_change), powers @ np.abs(self.bias_change_rad_s)
 
 
 @dataclass(frozen=True, slots=True)
 class Calibration:
-    """A calibration as stored by the board: rate = `matrix` (m + `bias_rad_s`).
+    """A calibration as stored by the board: rate = `matrix` (m + `bias_rad_s`), m the reading.
 
-    `model` is one of `protocol.MODELS`, `serial_number` the sensor's, `temperature_c` its own during the calibration.
-    With `polynomials`, of a calibration over temperature, matrix and bias are valid at `temperature_c`.
+    `model` is one of `protocol.MODELS`; the sensor has the `serial_number`, and had `temperature_c` when calibrated. A
+    calibration over temperature has `polynomials`; its matrix and bias are valid at `temperature_c`.
     """
 
     model: str

@@ -52,8 +52,8 @@ _ABOUT_THE_BOARD = ("unknown_message", "bad_length", "busy_streaming")  # errors
 class Board:
     """The board on a serial port or `socket://host:port`; a context manager. `on_samples` runs on the reader thread.
 
-    Sensors are given by their index in `identity.sensors`. Every request raises BoardError: named as the board's
-    refusal in `protocol.ERRORS` (`sensor_absent`, `no_calibration`, …), or `board_link_lost`.
+    Sensors are given by their index in `identity.sensors`. Every request may raise BoardError `board_link_lost`, and
+    the board's refusal, with its name in `protocol.ERRORS` (`sensor_absent`, `no_calibration`, …).
     """
 
     def __init__(self, port: str, baud: int, on_samples: Callable[[SampleBatch], None], timeout_s: float = 4.0) -> None:
@@ -95,7 +95,7 @@ class Board:
         return self._configure(sensor, rate_hz, range_gauss=range_gauss)
 
     def start(self, calibrated: Collection[int] = ()) -> None:
-        """Stream every configured sensor, sequences from 0; apply the stored calibration to those in `calibrated`."""
+        """Stream every configured sensor, with sequence numbers from 0; the board calibrates those in `calibrated`."""
         self._ask("start", {"sensors": _mask(calibrated)})
 
     def stop(self) -> None:
@@ -113,8 +113,8 @@ class Board:
     def observe(self, sensor: int, index: int, start_us: int, end_us: int, speed_rad_s: float) -> BoardObservation:
         """Average stored readings between two board times and add the mean to the sensor's observations.
 
-        `index` is the number of earlier observations; 0 starts a new set. `speed_rad_s` is the magnitude of the rate
-        meanwhile. Raise BoardError, among others not_kept and bad_observation.
+        `index` is the number of earlier observations; with 0 the board discards these. `speed_rad_s` is the magnitude
+        of the rate between the two times. Raise BoardError, among others `not_kept` and `bad_observation`.
         """
         values = {"sensor": sensor, "index": index, "start_us": start_us, "end_us": end_us, "speed_rad_s": speed_rad_s}
         return BoardObservation.decode(self._ask("observe", values))
@@ -178,9 +178,9 @@ class Board:
         self.identity = self._hello()
 
     def check(self, clock_s: float | None = None) -> None:
-        """Raise errors since the last call: the board's own error, or board_link_lost (closed, or silent in a stream).
+        """Raise the link's fault, if any, or BoardError `board_link_lost` if a streaming board is silent for too long.
 
-        `clock_s`: the present time of another instrument's clock, if any: a silence must be as long on that clock too.
+        If `clock_s`, the present time of another instrument's clock, is given, it must show as long a silence.
         """
         if self._link.fault is not None:
             raise self._link.fault
@@ -264,7 +264,7 @@ class Board:
         return answer
 
     def _take_samples(self, frames: Iterable[Frame], host_time_s: float) -> None:
-        """Pass on the stream as it comes, on the reader thread; drop the rest of another program's stream."""
+        """Pass on the stream as it comes, on the reader thread; drop the end of an earlier program's stream."""
         if self._streaming:
             for batch in sample_batches(frames, host_time_s):
                 self._on_samples(batch)

@@ -14,8 +14,8 @@ def exceeds(delay: float, limit: float) -> bool:
 def load_factor() -> float:
     """Return the factor by which a delay may be longer: runnable programs per processor, limited to 1 … 5.
 
-    This is the mean of the last minute, or the present number if that is larger: after 15 s the mean shows only a
-    quarter of a new load.
+    The number of programs is the mean of the last minute, or the present number if that is larger, because after 15 s
+    the mean shows only a quarter of a new load.
     """
     if not hasattr(os, "getloadavg"):  # Windows
         return 1.0

@@ -98,7 +98,7 @@ _LAYOUTS = {code: _Layout.make(message) for code, message in MESSAGE_BY_CODE.ite
 
 
 def decode(block: bytes) -> Frame | None:
-    """Decode one COBS block (without its delimiter); return None if it is damaged, unknown or of invalid values.
+    """Decode one COBS block, without its delimiter; return None if it is damaged or unknown, or has invalid values.
 
     An identity of another protocol version is returned with only the two fields that every version has.
     """
@@ -124,8 +124,8 @@ def decode(block: bytes) -> Frame | None:
 class FrameReader:
     """The parser of a byte stream in chunks of any size, with counts of lost and repeated frames.
 
-    `lost` is exact as long as fewer than 256 frames are lost in a row; the samples' own sequence counts any number. A
-    frame equal to one of the latest, sequence and CRC included, is a repetition by the line.
+    `lost` is exact as long as fewer than 256 frames are lost in a row; the samples' own sequence numbers show any
+    loss. A frame equal to one of the latest, including sequence and CRC, counts as repeated by the line.
     """
 
     def __init__(self) -> None:

@@ -63,7 +63,7 @@ class HandReport:
 
 @dataclass(frozen=True, slots=True)
 class BoardHandSolution:
-    """A `hand_solution`, g = C (m + b), of `accepted` moves in single precision.
+    """A `hand_solution` from `accepted` moves, in single precision: rate g = C (m + b), with the reading m.
 
     - `sensor`, `state`, `accepted`: its index, one of `protocol.HAND_STATES`, and the number of accepted moves.
     - `scale_std`: the largest standard uncertainty of a scale factor by that session.

@@ -27,9 +27,9 @@ class _Request:
 class BoardLink:
     """An open serial port or `socket://host:port`, read by a thread of its own.
 
-    `on_frame(frame, request)` gets every frame outside the stream on that thread, with the name of the request it
-    answers or None; it returns before `ask` does. `on_stream(frames, host_time_s)` gets the frames of the stream, all
-    those received together. Exceptions of either become the `fault`, as does a lost port.
+    `on_frame(frame, request)` is called on that thread for every frame outside the stream, with the name of the request
+    that the frame answers, or None; the call ends before `ask` returns. `on_stream(frames, host_time_s)` is called for
+    all frames of the stream that came together. Exceptions of both become the `fault`, as does the loss of the port.
     """
 
     def __init__(
@@ -75,7 +75,7 @@ class BoardLink:
 
     @property
     def frames_lost(self) -> int:
-        """The number of frames that the board sent and that were not received, by their sequence."""
+        """The number of frames that the board sent and that were not received, according to the sequence numbers."""
         return self._frames.lost
 
     @property

@@ -25,7 +25,7 @@ class BoardPart:
     - `select`, `data_ready`: the chip's pins.
     - `model`: module and class of its register model in `emulator/`.
     - `identities`: the values of that register in other parts, and those parts' names.
-    - `model_options`: further arguments of that model, of `range_deg_s` and `ready_s`.
+    - `model_options`: the names of that model's further arguments: `range_deg_s`, `ready_s`, or none.
     """
 
     name: str

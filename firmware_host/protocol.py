@@ -3,8 +3,8 @@
 A frame is `COBS(type u8, sequence u8, payload, CRC u32) 0x00`, everything little-endian. The CRC is that of zlib and
 Ethernet, over type, sequence and payload. A frame is shorter than 254 bytes, so COBS never needs a second block.
 
-The CRC has 32 bits because one flipped bit can move a COBS zero: the decoded damage is then no short burst but nearly
-random, of which a 16-bit CRC accepts one in 65536.
+The CRC has 32 bits because one flipped bit can move a COBS zero. The damage after decoding is then no short burst but
+nearly random, and a CRC of 16 bits accepts one random frame in 65536.
 
 The host chooses the sequence of its frames, 1 … 255; the board's answer repeats it in `reply_to`. A board's own frames
 count modulo 256, so a missing number is a lost frame. `reply_to` 0 marks unrequested frames.
@@ -126,7 +126,7 @@ class Message:
         return None if any(field.rows for field in self.fields) else tuple(field.name for field in self.fields)
 
     def name_values(self, values: tuple[Any, ...]) -> dict[str, Any]:
-        """Return the values that `head` unpacks, by field name; vectors as tuples of three, matrices of three rows."""
+        """Return the values that `head` unpacks, by field name; a vector is a tuple, a matrix a tuple of three rows."""
         if self._names is not None:  # a short path for frequent frames
             return dict(zip(self._names, values))  # noqa: B905 - as many as `head` unpacks
         rest = iter(values)

@@ -21,7 +21,7 @@ def explain_closed(port: str, error: OSError) -> str:
 
 
 def describe_ports() -> str:
-    """Return a clause on the serial ports of this computer; "" where they cannot be listed."""
+    """Return a clause on the serial ports of this computer; "" if they cannot be listed."""
     try:
         ports = find_ports()
     except ImportError:
@@ -30,7 +30,7 @@ def describe_ports() -> str:
 
 
 def find_ports() -> dict[str, str]:
-    """Return a description of each serial port with a device, by its name. Raise ImportError without pyserial."""
+    """Return a description of each serial port with a device, by port. Raise ImportError without pyserial."""
     from serial.tools.list_ports import comports
 
     ports = [port for port in sorted(comports()) if port.hwid != "n/a"]  # else a name without a device behind it

@@ -80,7 +80,7 @@ def describe(log: Log) -> Iterator[str]:
 
 
 def describe_joint(log: Log, joint: int) -> Iterator[str]:
-    """Yield lines about one joint, if it moves."""
+    """Yield lines about one joint, if it moves: its lag, and the ripple, start and end of each of its moves."""
     names = "timestamp", "target_qd", "actual_q", "actual_qd", "target_q", "target_qdd"
     time_s, speed, q, qd, target, change = (log[n] if n == "timestamp" else log[n][:, joint] for n in names)
     moving = np.abs(speed) > 1e-3

@@ -42,7 +42,7 @@ print(cpu_s() - began_s)
 
 
 def measure(what: str, recorded: Path) -> float:
-    """Return the processor time of `what`, s, for a recorded run."""
+    """Return the processor time of the Python expression `what`, s, for a recorded run."""
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-c", MEASURE.format(what=what), str(recorded), folder]
         done = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, check=True)

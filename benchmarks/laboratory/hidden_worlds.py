@@ -5,9 +5,9 @@ one, 20 with a quiet one and an ADIS16465, 20 `imu` with three parts, 10 with a 
 of four other arms: 6 with a quiet LSM9DS1. On arms that ripple by any order of the turn: 100 pairs and 40 `imu`. Runs
 `rig run` in each, and keeps its recording in FOLDER/family/seed; existing ones are not repeated.
 
-Then all are solved. A table states for each family, part and parameter: RMS of error over u, the share within U, the
-largest error over U, the spread of u, and the undamaged runs that were refused, with the reason. `--solve-only` runs
-nothing. `--family NAME` and `--count N` select fewer.
+Then all are solved. A table states for each family, part and parameter, with u the standard and U the expanded
+uncertainty: the RMS of error/u, the share within U, the largest error/U, the spread of u, and the undamaged runs that
+were refused, with the reason. `--solve-only` runs nothing. `--family NAME` and `--count N` select fewer.
 """
 
 import argparse

@@ -69,7 +69,7 @@ def measure_look_up_s(history: History) -> float:
 
 
 def measure_process_s(*arguments: str) -> float:
-    """Return the shortest time of several processes, s."""
+    """Return the shortest time, s, of several Python processes with these arguments."""
     least = np.inf
     for _ in range(5):
         began_s = time.perf_counter()

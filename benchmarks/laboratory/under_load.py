@@ -36,7 +36,7 @@ VERDICTS = {0: "pass", 1: "fail"}
 
 @dataclass(frozen=True, slots=True)
 class Demo:
-    """The end of a run: verdict, or name of the error and message; numbers of recorded and of missing arm states."""
+    """A run's end, the verdict or the error's name and message, and the numbers of recorded and missing arm states."""
 
     ending: str
     message: str

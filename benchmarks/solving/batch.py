@@ -23,7 +23,7 @@ EVERY = 30  # of the runs go through the loop
 
 
 def simulate_mean_readings(speed_rad_s: float) -> Array:
-    """Return (15000, 6, 3) rad/s: SIX, section III-A, at the lower noise level."""
+    """Return mean readings (15000, 6, 3), rad/s, simulated as in section III-A of the paper SIX, with less noise."""
     rng = np.random.default_rng(1)
     means = []
     for _ in range(sim.SETS):
@@ -34,7 +34,7 @@ def simulate_mean_readings(speed_rad_s: float) -> Array:
 
 
 def solve_in_loop(means: Array, speed_rad_s: float) -> Array:
-    """Return (n, 6) parameters by one `least_squares` after another."""
+    """Return the parameters (n, 6), scale and bias of each run, by one `least_squares` after another."""
 
     def residuals(parameters: Array, readings: Array) -> Array:
         corrected = parameters[:3] * (readings + parameters[3:])

@@ -39,7 +39,7 @@ SESSIONS = 200
 
 
 def solve_by_imucal(session: HandRecording) -> Array:
-    """Return F (3, 3) from the first hold on each face and the turns."""
+    """Return imucal's matrix of scale and axes F (3, 3), from the first rest on each face and the turns."""
     assert session.acceleration is not None
     sections: dict[str, Array] = {}
     for rest in session.rests:

@@ -62,7 +62,7 @@ def convert_to_degrees(samples: Session) -> Session:
 
 
 def solve_by_imucal(samples: Session) -> Array:
-    """Return (6,) kx ky kz bx by bz; imucal also solves the accelerometer."""
+    """Return the parameters (6,) kx, ky, kz, bx, by, bz. Meanwhile imucal also solves the accelerometer."""
     regions = FerrarisSignalRegions(**samples)
     solution = FerrarisCalibration(grav=GRAVITY_M_S2).compute(
         regions, RATE_HZ, from_acc_unit="m/s^2", from_gyr_unit="deg/s"
@@ -71,7 +71,7 @@ def solve_by_imucal(samples: Session) -> Array:
 
 
 def solve_by_vector_model(samples: Session, *, with_gravity: bool = False) -> Array:
-    """Return (6,) from the same gyroscope samples, averaged; covariance and every gate included."""
+    """Return the parameters (6,) from averages of the same gyroscope samples, with covariance and all gates."""
     sections = [samples[f"gyr_{name}"] for name in (*HOLDS, "x_rot", "y_rot", "z_rot")]
     counts = np.array([len(section) for section in sections])
     begins = np.cumsum(counts) - counts

@@ -26,7 +26,7 @@ NOISE_RAD_S, SAMPLES = 0.035, 1428
 
 
 def simulate_mean_readings(seed: int) -> Array:
-    """Return (6, 3) rad/s: one turn at 60°/s, 238 Hz, 5° of mounting error."""
+    """Return simulated means (6, 3), rad/s, of a turn each at 60°/s with samples at 238 Hz and 5° of mounting error."""
     x, y, z = np.radians(5) * np.array([1, 1, 1]) / np.sqrt(3)
     mounting = np.eye(3) + np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     mounting /= np.linalg.norm(mounting, axis=0)

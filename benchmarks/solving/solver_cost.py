@@ -173,7 +173,7 @@ def add_observations(core: Core, observations: Observations) -> list[Cost]:
 
 
 def solve(core: Core, observations: Observations, method: str) -> Answer:
-    """Do all steps after the last observation: gates, solution, parameters."""
+    """Solve by `method`; the cost is that of all steps after the last observation: gates, solution, parameters."""
     add_observations(core, observations)
     _, cost = core.call("solver_solve", ACCUMULATOR, METHODS.index(method), SOLUTION)
     status, iterations = core.read(SOLUTION, 2)
@@ -183,7 +183,7 @@ def solve(core: Core, observations: Observations, method: str) -> Answer:
 
 
 def levenberg_marquardt(core: Core, observations: Observations, tolerance: float) -> Answer:
-    """Solve by Levenberg–Marquardt from k = 1 and b = 0, an uncalibrated sensor, as in SIX."""
+    """Solve by Levenberg–Marquardt from the scale 1 and the bias 0 of an uncalibrated sensor, as the paper SIX does."""
     core.write(MEANS, observations.means_rad_s.tobytes())
     core.write(SPEEDS, observations.speeds_rad_s.tobytes())
     core.write(PROBLEM, struct.pack("<III", MEANS, SPEEDS, len(observations.speeds_rad_s)))

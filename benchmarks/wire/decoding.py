@@ -78,7 +78,7 @@ def batches_without_compiler(once: bytes) -> int:
 
 
 def byte_loop(once: bytes) -> int:
-    """Return the number of samples by a small controller's decoder: COBS and CRC byte by byte, then the integers."""
+    """Return the number of samples, decoded as on a small controller: COBS and CRC by the byte, then the integers."""
     samples, body, remaining, crc = 0, bytearray(), -1, 0xFFFF_FFFF
     for byte in once:
         if byte == 0:

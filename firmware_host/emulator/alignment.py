@@ -1,4 +1,4 @@
-"""The check of word accesses for aligned addresses: the chip traps unaligned ones, Unicorn does not."""
+"""The check of word accesses for aligned addresses, because the chip traps unaligned ones and Unicorn does not."""
 
 from collections.abc import Callable
 
@@ -13,9 +13,10 @@ _ENOUGH = 1_000  # aligned runs after which an instruction is trusted
 
 
 class AlignmentWatch:
-    """The check of the base register of every word access before it runs, from the first run of its block on.
+    """The check of a word access's base register before each access, from the first run of its block on.
 
-    Only accesses in use are checked: Unicorn goes through the whole list of hooks at each hooked instruction.
+    An access that was aligned often enough is trusted and no longer checked, because Unicorn goes through the whole
+    list of hooks at each hooked instruction.
     """
 
     def __init__(self, engine: Engine) -> None:

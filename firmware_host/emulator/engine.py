@@ -204,10 +204,10 @@ class Engine:
     def watch_instruction(
         self, address: int, register: int, enough: int, ask: Callable[[int], None]
     ) -> Callable[[], None]:
-        """Call `ask(address)` before the instruction at `address` if a core register is no multiple of four there.
+        """Call `ask(address)` before the instruction at `address` if a core register there is no multiple of four.
 
-        `register`: Unicorn's number. After `enough` runs, `ask` is also called once. Call the returned function to end
-        the watch. Use between two runs.
+        `register` is Unicorn's number of the register. `ask` is also called once after `enough` executions with a
+        multiple of four. Return a function that ends the watch. Use both only between two runs of the core.
         """
 
         def call_ask(_handle: int, address: int, _size: int) -> None:
@@ -265,14 +265,14 @@ class Engine:
         return read_register
 
     def read(self, address: int, size: int) -> bytes:
-        """Read memory. Raise EngineFault if there is none."""
+        """Read memory. Raise EngineFault if there is no memory at the address."""
         for first, end, memory in self._memories:
             if first <= address and address + size <= end:
                 return memory[address - first : address - first + size]
         raise EngineFault(f"memory read of {size} bytes at 0x{address:08X}, where there is none")
 
     def write(self, address: int, data: bytes) -> None:
-        """Write memory, read-only or not, in which no code has run yet. Raise EngineFault if there is none."""
+        """Write memory, read-only or not, in which no code has run yet. Raise EngineFault if none is mapped there."""
         for first, end, memory in self._memories:
             if first <= address and address + len(data) <= end:
                 memory[address - first : address - first + len(data)] = data

@@ -79,7 +79,7 @@ class Counter(ctypes.Structure):
 
     - `clocked`: whether it can be read.
     - `since`, `counted`: the tick of its last setting, and its value then.
-    - `counts`, `ticks`: it counts `counts` in `ticks`; none while it is stopped.
+    - `counts`, `ticks`: it advances by `counts` in every `ticks` ticks; `counts` is 0 while it is stopped.
     - `modulus`: the value at which it wraps.
     - `read_at`, `polls`: the tick of the last read, and the number of consecutive reads.
     """
@@ -105,7 +105,7 @@ class Bus(ctypes.Structure):
     - `pair_ticks`, `half_bit_ticks`: the duration of two bytes, and of half a bit.
     - `polled`: whether the status was read in vain.
     - `waiting`: the number of pairs of bytes that are being sent or not read yet.
-    - `ready`, `answers`: the tick at which each of these is complete, and its answer.
+    - `ready`, `answers`: the tick at which each of these pairs is complete, and the device's answer.
     - `control`, `setups`: the control register, and the number of its changes.
     - `predictions`: the answers to the next pairs, valid in the setup `predicted_in`.
     - `predicted_from`, `predicted_to`: the range of unused indices of `predictions`.

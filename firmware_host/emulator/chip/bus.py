@@ -42,7 +42,7 @@ class Peripheral(Protocol):
 class StoredRegister:
     """A register that holds the written value. `name` begins with the peripheral's name.
 
-    Writing a one outside `modelled` fails the run by name.
+    Writing a one to a bit outside the mask `modelled` fails the run, with the register's name.
     """
 
     __slots__ = ("_after", "_initial", "_modelled", "_name", "value")

@@ -23,8 +23,8 @@ class Memory(Protocol):
 class Dma1:
     """The controller with its one used channel. `data_register`: address of the register that the channel may write.
 
-    The peripheral requests the bytes with `fetch`, and sets `on_switched`, which is called when the channel is
-    switched.
+    USART2 requests the bytes with `fetch`, and sets `on_switched(on)`, which is called when the channel is switched on
+    or off.
     """
 
     name = "DMA1"

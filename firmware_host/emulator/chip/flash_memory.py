@@ -20,8 +20,8 @@ class FlashMemory:
 
     - `image`: the program, from the start.
     - `store`: the last pages, erased if omitted.
-    - `torn`: offsets of doublewords with an interrupted erasure or programming. Reading one is an error that the chip
-      detects; with `flags_lost` it does not report which, as in the chip's errata on a power loss during an operation.
+    - `torn`: offsets of doublewords with an interrupted erasure or programming. The chip detects the reading of one;
+      with `flags_lost` it does not report its offset, as in the chip's errata on a power loss during an operation.
     - `on_change`: called after every change.
 
     Raise BoardError if the image does not fit.
@@ -39,9 +39,9 @@ class FlashMemory:
         self._fails_torn = False
 
     def fail_power(self, operation: int, torn: bool) -> None:
-        """Let the power fail at an operation, counted as `operations` counts.
+        """Let the power fail at the operation of this number, counted from 1.
 
-        With `torn`, the operation has begun and is cut off; without, it has not begun.
+        With `torn`, the power fails during the operation; else before the operation begins.
         """
         self._fails_at, self._fails_torn = operation, torn
 

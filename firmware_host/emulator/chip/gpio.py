@@ -55,7 +55,7 @@ class Port:
         )
 
     def watch(self, pin: int, on_level: Callable[[bool], None]) -> None:
-        """Call `on_level` after a change of the firmware's output on `pin`; other pins count as high."""
+        """Call `on_level` after a change of the firmware's output on `pin`, which counts as high if not an output."""
         self._watched[pin] = on_level
         self._watched_pins |= 1 << pin
 

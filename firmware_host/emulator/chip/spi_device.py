@@ -58,9 +58,9 @@ class SpiDevice(Protocol):
         """Exchange one byte. Raise Violation for accesses that the part forbids or the model lacks."""
 
     def predict(self) -> bytes:
-        """Return the answers to the next pairs of bytes, if they do not depend on these bytes, until chip select rises.
+        """Return the next answers of this access, in pairs of bytes, if they do not depend on the bytes received.
 
-        Called after the first pair of an access; predicted bytes count as exchanged.
+        Called after the first pair of an access; the device must treat predicted bytes as exchanged.
         """
 
     def deselect(self, time_s: float) -> None:
@@ -72,9 +72,10 @@ LOCKED_MSI = 122 * 32_768 / 4_000_000
 
 
 class BoardClock:
-    """Virtual seconds ↔ board ticks: the board starts at `boot_time_s`, its crystal is `crystal_ppm` fast.
+    """The conversion between virtual seconds and board ticks, which begin at `boot_time_s`.
 
-    The clock counts as locked to the crystal from the start; on the chip it has its own error for the first seconds.
+    The board's crystal is `crystal_ppm` fast. Here the clock is locked to the crystal from the start; on the chip it
+    has an error of its own for the first seconds.
     """
 
     def __init__(self, boot_time_s: float, crystal_ppm: float) -> None:

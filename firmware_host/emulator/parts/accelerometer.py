@@ -15,11 +15,11 @@ _SEED_KEY = 2  # the key of its random stream, apart from the gyroscope's and it
 
 @dataclass(frozen=True, slots=True)
 class AccelerometerTruth:
-    """The true errors of a simulated accelerometer: s = K (m + b) as for the gyroscope, m the reading, in m/s².
+    """The true errors of a simulated accelerometer in the model s = K (m + b): force s and reading m, both in m/s².
 
     - `scale`, `bias_m_s2`, `noise_m_s2`, `non_orthogonality_rad`: as in `GyroTruth`.
-    - `second_order_s2_m`: φ; each component of the specific force is sensed as s + φ s² before the other errors (TRIAX,
-      a_m = F (s + φ s²) + b, whose b is the negative of this one).
+    - `second_order_s2_m`: φ; each component s of the specific force is sensed as s + φ s² before the other errors. The
+      paper TRIAX writes a_m = F (s + φ s²) + b, where b has the opposite sign.
     - `holds_at_c`, `bandwidth_hz`, `delay_s`, the bias' drift and all fields of temperature: as in `GyroTruth`.
     """
 
@@ -45,8 +45,8 @@ class AccelerometerTruth:
 class Accelerometer:
     """Three sensing axes with the errors of `truth`, or without errors and noise if `truth` is None.
 
-    `motion_at`, `seed`, `temperature_c`: as for the part's `Gyroscope`, whose noise is independent. A motion of 3
-    components has no force: then the part rests with z up.
+    `motion_at`, `seed`, `temperature_c`: as for the part's `Gyroscope`, whose noise is independent. If the motion has
+    only the 3 components of the rate, the part rests with z up.
     """
 
     def __init__(

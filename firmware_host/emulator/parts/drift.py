@@ -15,10 +15,10 @@ _SIGMA_PER_FLOOR = sqrt(log(10.0) / (2.0 * log(2.0)))
 
 
 class Drift:
-    """The drift of three axes, in the units of their readings. `time_s` of its methods: since the world began.
+    """The drift of three axes, in the units of their readings. Its methods take times since the world began.
 
-    `instability`: floor of the Allan deviation, flat around an averaging time of `instability_time_s`;
-    `random_walk_per_sqrt_s`: standard deviation of the change in a second, growing with the root of time.
+    `instability` is the floor of the Allan deviation, flat around an averaging time of `instability_time_s`.
+    `random_walk_per_sqrt_s` is the standard deviation of the change in a second, which grows with the root of time.
     """
 
     def __init__(
@@ -34,14 +34,14 @@ class Drift:
         self._knots = [[0.0, 0.0, 0.0]]
 
     def evaluate(self, time_s: float) -> list[float]:
-        """Return the bias at one time, (3,)."""
+        """Return the drift (3,) at one time."""
         position, fraction = divmod(time_s / STEP_S, 1.0)
         knot = max(int(position), 0)
         self._extend(knot)
         return [a + fraction * (b - a) for a, b in zip(self._knots[knot], self._knots[knot + 1], strict=True)]
 
     def evaluate_all(self, time_s: np.ndarray) -> np.ndarray:
-        """Return the bias (n, 3) at times (n,)."""
+        """Return the drift (n, 3) at times (n,)."""
         self._extend(int(np.max(time_s, initial=0.0) / STEP_S))
         knots = np.array(self._knots)
         knot_times_s = np.arange(len(knots)) * STEP_S

@@ -14,7 +14,7 @@ __all__ = ["GyroTruth", "Gyroscope", "Temperature", "Warming", "readings", "satu
 
 @dataclass(frozen=True, slots=True)
 class GyroTruth:
-    """The true errors of a simulated gyroscope, in the model g = K (m + b) with m the reading (SIX, Eq. (3)).
+    """The true errors of a simulated gyroscope, in the model g = K (m + b): rate g, reading m (paper SIX, Eq. (3)).
 
     - `scale`: the diagonal of K.
     - `bias_rad_s`: b, in the units of the reading.
@@ -24,11 +24,11 @@ class GyroTruth:
 
     Errors beyond the model:
 
-    - `scale_per_k`, `bias_rad_s_per_k`, `scale_per_k2`, `bias_rad_s_per_k2`: the change of K (as a fraction) and b with
-      the degrees above `holds_at_c`, and with their square.
+    - `scale_per_k`, `bias_rad_s_per_k`, `scale_per_k2`, `bias_rad_s_per_k2`: the changes of K (as a fraction) and of b
+      per degree above `holds_at_c`, and per square of a degree.
     - `g_sensitivity_rad_s_per_g` (3 rows, or none): the change of a reading per g of specific force along x, y, z.
-    - `nonlinearity_even_per_rad_s`, `nonlinearity_odd_per_rad_s`: the fraction by which a reading grows with the rate
-      along its axis, and with the rate's magnitude.
+    - `nonlinearity_even_per_rad_s`, `nonlinearity_odd_per_rad_s`: the fractions by which a reading grows per rad/s of
+      the rate along its axis, and per rad/s of that rate's magnitude.
     - `bandwidth_hz`, `delay_s`: a low-pass of first order (None: no filter) and a delay, which noise and bias bypass.
     - `instability_rad_s`, `instability_time_s`, `random_walk_rad_s_per_sqrt_s`: the bias drift, see `Drift`.
     - `hysteresis_rad_s`: b is larger by this after warming, smaller by this after cooling.
@@ -73,9 +73,10 @@ class Warming:
 class Gyroscope:
     """Three sensing axes with the errors of `truth`.
 
-    `motion_at(time_s)`: the true angular rate in the part's own axes, 3 floats, rad/s, and for a part with
-    g-sensitivity the specific force there, 3 more floats, g; evaluated once for each reading, `truth.delay_s` earlier.
-    `seed`: of noise and drift; the noise is drawn per reading. `temperature_c`: the die's, or a function of time.
+    `motion_at(time_s)` returns the true angular rate in the part's own axes, 3 floats, rad/s, and for a part with
+    g-sensitivity also the specific force there, 3 floats, g. It is evaluated once for each reading, for the time
+    `truth.delay_s` before. `seed` is that of noise and drift; noise is drawn for each reading. `temperature_c` is the
+    part's temperature, one number or a function of time.
     """
 
     def __init__(

@@ -156,7 +156,7 @@ class Icm42688P:
         return 0xFF
 
     def predict(self) -> bytes:
-        """Return the outputs in advance if no conversion is due before a read ends: a read changes no output."""
+        """Return the outputs if no conversion is due before the read ends, because a read changes no output."""
         address = self._address
         if address is None or not self._reading or not _TEMP_DATA1 <= address <= _GYRO_DATA_Z0:
             return b""

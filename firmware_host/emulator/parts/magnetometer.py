@@ -11,10 +11,10 @@ _NONE = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True)
 class MagnetometerTruth:
-    """The true errors of a simulated magnetometer, in the model m = F B + b (TRIAX), m the reading, in tesla.
+    """The true errors of a simulated magnetometer in the paper TRIAX's model m = F B + b: reading m, field B, tesla.
 
-    `scale`: 1 over the length of each row of F; `bias_t`: b, including hard iron fixed to the part; `noise_t`: standard
-    deviation of one reading; `non_orthogonality_rad`: as in `GyroTruth`.
+    `scale`: the reciprocal length of each row of F. `bias_t`: b, including hard iron fixed to the part. `noise_t`: the
+    standard deviation of one reading. `non_orthogonality_rad`: as in `GyroTruth`.
     """
 
     scale: Sequence[float] = (1.0, 1.0, 1.0)

@@ -16,7 +16,7 @@ class PartRegisters:
     - `part`: its name, for messages.
     - `model`: the file of its model.
     - `reset_and_bits`: by address, the value after reset and the bits that have a model. Writing a one to another bit
-      fails the run: it would switch on a function that is not simulated.
+      fails the run, because it would switch on a function that is not simulated.
     - `digits`: the hexadecimal digits of a value.
     """
 
@@ -64,7 +64,7 @@ class Conversions:
         self.next_s = math.inf
 
     def start(self, time_s: float, rate_hz: float) -> None:
-        """Restart, with the first conversion one period of the nominal rate from now."""
+        """Restart, with the first conversion one period after `time_s`; the oscillator's error changes `rate_hz`."""
         self._started_s = time_s
         self._period_s = 1 / (rate_hz * self._speed)
         self.count = 0

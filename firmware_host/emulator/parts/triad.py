@@ -99,7 +99,7 @@ class Triad:
         return sensed
 
     def warmer_k(self, time_s: float) -> float:
-        """Return the part's temperature minus that of the stated errors, K."""
+        """Return the degrees above `holds_at_c`, K; 0 if the temperature is constant."""
         if not self._temperature_varies:
             return 0.0
         die = self._errors.die

@@ -25,7 +25,7 @@ EXAMPLE = "Give for example --target-uncertainty scale=5e-4 --target-uncertainty
 
 
 def add_target(parser: ArgumentParser) -> None:
-    """Add the argument `--target-uncertainty`, which may be repeated, and its companions."""
+    """Add `--target-uncertainty`, which may be repeated, and the arguments that limit the search for a run."""
     parser.add_argument(
         "--target-uncertainty",
         action="append",

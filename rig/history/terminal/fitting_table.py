@@ -82,7 +82,7 @@ def picture(trend: Trend) -> str:
     """Return a block for each of the newest results, whose height shows the value.
 
     The lowest block is the lowest value − U, the highest block the highest value + U, so values with equal blocks
-    differ by less than U. Empty for a single result.
+    differ by less than U. The text is empty for a single result.
     """
     newest = trend.parameters[-MAX_RESULTS:]
     if len(newest) < 2:

@@ -99,7 +99,7 @@ def stamp_not_trusted(name: str, server: str) -> Refused:
 
 
 def authority_not_trusted(name: str, authority: str) -> Refused:
-    """Return the problem of a file with a certificate of `authority` that may be altered: nothing trusted vouches."""
+    """Return the problem of a file with a certificate of `authority` that no trusted authority has issued."""
     return Refused(
         "signer_not_trusted",
         f"{name} contains a certificate of {authority} that no trusted authority has issued",

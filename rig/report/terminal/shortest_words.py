@@ -164,7 +164,7 @@ def _limits(title: str, budgets: Budgets) -> Table:
 
 
 def _main_contributors(budgets: Budgets) -> dict[str, list[tuple[str, float, float]]]:
-    """Return each sensor's main contributors, with their fractions of the worst scale factor's and bias' variance."""
+    """Return each sensor's main contributors, with fractions of the variances of its worst scale factor and bias."""
     lines_by_sensor = {}
     kinds = {**budgets.rates, **{f"{name}, acceleration": budget for name, budget in budgets.accelerations.items()}}
     for name, budget in kinds.items():

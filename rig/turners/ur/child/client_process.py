@@ -339,7 +339,7 @@ def _outlive_the_parent() -> None:
 
 
 def _send_output_to(log: str | None) -> None:
-    """Redirect stdout and stderr to the log: the client prints to both, and stdout is reserved for results.
+    """Redirect stdout and stderr to the log, because the client prints to both and stdout is reserved for results.
 
     If the run folder has been removed, nothing is logged; the parent reports this.
     """
