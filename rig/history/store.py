@@ -32,7 +32,7 @@ _MANY = 500  # keys in one query: SQLite allows a few thousand
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """A selection of calibrations; None selects all. `rig`: a name, or an arm's serial number; `board`: a unique ID."""
+    """A selection of calibrations; None selects all. `rig` is a name or an arm's serial number, `board` a unique ID."""
 
     serial_number: str | None = None
     part: str | None = None

@@ -89,7 +89,7 @@ class _Thinning:
 class Acquisition:
     """The data from the reader threads of the sources and the arm, read by the script's thread.
 
-    `counts` is by sensor name. Data that arrive before there is a `recorder` are not recorded. After the
+    The keys of `counts` are sensor names. Data that arrive before there is a `recorder` are not recorded. After the
     first call of `keep`, the data received since the last `KEPT_PARTS` calls of `keep` also stay in memory.
     """
 

@@ -69,7 +69,7 @@ class EndingEarly:
             self._note_repeat_end(sweep.end_q_rad, len(remaining))
 
     def due(self) -> bool:
-        """Return whether a repeat was completed whose uncertainty is not assessed yet."""
+        """Return whether the uncertainty must be assessed now, because a repeat was completed."""
         return self._due and not self.ended
 
     @contextmanager

@@ -35,7 +35,7 @@ class _RecentReadings:
     at_rest_counts: list[float] = field(default_factory=list)
 
     def scatter_counts(self, before: int = 0) -> float | None:
-        """Return the standard deviation of the newest span of readings, as RMS over the axes; None with too few.
+        """Return the standard deviation of the newest span of readings, RMS over the axes; None if there are too few.
 
         `before` is the number of spans to go back from the newest one.
         """

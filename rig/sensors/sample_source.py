@@ -28,5 +28,5 @@ class SampleSource(Protocol):
         ...
 
     def catch_up(self) -> None:
-        """Wait until all samples that have arrived by now are passed on; on a busy computer they wait to be read."""
+        """Wait until all samples that have arrived by now are passed on, because a busy computer reads them late."""
         ...

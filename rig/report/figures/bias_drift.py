@@ -1,4 +1,4 @@
-"""Biases by repeat, drawn as in TRIAX, Figs. 4 and 6."""
+"""Biases by repeat, drawn as in the paper TRIAX, Figs. 4 and 6."""
 
 from collections.abc import Mapping
 from functools import partial

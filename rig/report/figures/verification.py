@@ -1,4 +1,4 @@
-"""Plots of a verification, as in SIX, Figs. 7–10: sensor and reference over time, before and after."""
+"""Plots of a verification, as in the paper SIX, Figs. 7–10: sensor and reference over time, before and after."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Accelerometers: scale, bias and axes from attitudes to gravity, and from sweeps (TRIAX, section III-B)."""
+"""Accelerometers: scale, bias and axes from attitudes to gravity, and from sweeps (paper TRIAX, section III-B)."""
 
 from collections.abc import Iterator
 from typing import TYPE_CHECKING

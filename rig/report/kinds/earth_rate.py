@@ -1,4 +1,4 @@
-"""The Earth's rate, if a gyroscope was to measure it (TRIAX, section III-A)."""
+"""The Earth's rate, if a gyroscope was to measure it (paper TRIAX, section III-A)."""
 
 from collections.abc import Iterator
 

@@ -1,4 +1,4 @@
-"""Gyroscopes: scale, bias, axes and g-sensitivity from whole turns (SIX, TRIAX)."""
+"""Gyroscopes: scale, bias, axes and g-sensitivity from whole turns (papers SIX and TRIAX)."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Magnetometers: scale, bias and axes from attitudes to a field of known size, as mounted (TRIAX, Eq. (7))."""
+"""Magnetometers: scale, bias and axes from attitudes to a field of known size, as mounted (paper TRIAX, Eq. (7))."""
 
 from collections.abc import Iterator
 from typing import TYPE_CHECKING

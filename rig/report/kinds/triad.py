@@ -32,7 +32,7 @@ class Words:
     """The texts of a kind of three-axis sensor, by its entry.
 
     The terminal prints `title` behind the sensor's name, the `model` of its readings, and `lines` below the table. The
-    digital certificate has scale and bias (`digital`, with a reversal if any) and `temperatures_c`.
+    digital certificate has scale and bias (`digital`, including a reversal if the run has one) and `temperatures_c`.
     """
 
     title: str

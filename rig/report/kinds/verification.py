@@ -1,4 +1,4 @@
-"""Verifications: calibrated readings compared with a reference (SIX, Tables IV and V)."""
+"""Verifications: calibrated readings compared with a reference (paper SIX, Tables IV and V)."""
 
 from collections.abc import Iterator
 from typing import TYPE_CHECKING

@@ -1,4 +1,4 @@
-"""The coverage statements of a certificate: k with the values, and the sentence of EA-4/02 below them."""
+"""The coverage statements of a certificate: the factors k beside the values, and the sentence of EA-4/02 below."""
 
 import math
 from collections.abc import Sequence

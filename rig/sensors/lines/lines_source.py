@@ -86,7 +86,7 @@ class LinesSource:
         self._device.own_port.check(clock_s)
 
     def catch_up(self) -> None:
-        """Wait for what has arrived (see `OwnPort.catch_up`)."""
+        """Wait for the bytes that have arrived (see `OwnPort.catch_up`)."""
         self._device.own_port.catch_up()
 
     def close(self) -> None:

@@ -23,7 +23,7 @@ class Clock(Protocol):
 
 
 class HostClock:
-    """The host's clock, with stamps of the raw monotonic clock, never slewed or set, if the system has one.
+    """The host's clock; its time stamps are those of the raw monotonic clock, which is never slewed, if there is one.
 
     The servo's clock (Realtime Tick) is unsuitable, because it counts milliseconds of an oscillator with 1 % tolerance.
     """

@@ -85,7 +85,7 @@ class RtdeSession:
 
     @property
     def dialogue(self) -> bool:
-        """Whether the client still asks questions: once its recipes are set up, it only reads and writes values."""
+        """Whether the client still asks questions, because after setting up its recipes it only exchanges values."""
         return not self._started
 
     def greeting(self) -> bytes:
