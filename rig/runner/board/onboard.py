@@ -1,4 +1,4 @@
-"""The board's own calibration, as in the paper SIX: it stores a sweep's readings, averages the revolution and solves.
+"""The board's own calibration, as in the paper SIX: the board stores a sweep's readings, averages them and solves.
 
 Only the host knows the revolution's times and speed, from the arm's joints and both clocks. After each sweep the host
 sends two board times and the speed, and at the end it requests the solution. All answers are recorded;
