@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from rig.data.quantity import FIELD
@@ -20,6 +21,7 @@ from rig.observation.windows import Window, inside, iterate_rests
 
 HOME_TOLERANCE_RAD = 1e-3  # angle from home, of any joint
 SETTLING_S = 0.2  # time removed at either end of a rest
+MIN_NOISE_STEPS = 1.0  # median noise of an axis in all dwells: with this, one value in a whole dwell is no chance
 
 
 def find_companion(recording: ObservedRun, name: str) -> str | None:
@@ -38,13 +40,14 @@ def field_readings(recording: ObservedRun, name: str, thresholds: ObservationThr
     """Average a magnetometer's readings in the dwells in which an accelerometer with the same clock was read.
 
     The time base found for the accelerometer's sensor also serves the magnetometer: their delays may differ, but a
-    delay changes no mean at rest. Raise Fault `lost_samples`, `saturation`.
+    delay changes no mean at rest. Raise Fault `lost_samples`, `saturation`,
+    `stuck_axis`.
     """
     other = find_companion(recording, name)
     if other is None:
         return ()
     time_s = recording.time_s(name, other)
-    return tuple(
+    field_in_dwells = tuple(
         StaticReading(
             dwell.index,
             dwell.name,
@@ -54,6 +57,28 @@ def field_readings(recording: ObservedRun, name: str, thresholds: ObservationThr
         )
         for dwell in recording.sensors[other].dwells
     )
+    _check_frozen(recording, name)
+    return field_in_dwells
+
+
+def _check_frozen(recording: ObservedRun, name: str) -> None:
+    """Raise Fault `stuck_axis` if an axis has one value in a whole dwell, but noise in most dwells."""
+    channel = recording.run.sensors[name].channel(FIELD)
+    dwells = [(dwell, counts) for dwell, counts, _ in read_field_in_dwells(recording, name)]
+    if not dwells:
+        return
+    step_counts = (
+        steps_of(recording.run.samples[name], recording.run.sensors[name], FIELD).units / channel.unit_per_count
+    )
+    noisy = np.median([counts.std(axis=0) for _, counts in dwells], axis=0) >= MIN_NOISE_STEPS * step_counts
+    for dwell, counts in dwells:
+        for axis in np.flatnonzero(noisy & (np.ptp(counts, axis=0) == 0)):
+            raise Fault(
+                "stuck_axis",
+                f"in dwell {dwell.index} ({dwell.name}) the {'xyz'[axis]} axis of {name} repeats one reading "
+                f"{len(counts)} times; in most dwells it has noise",
+                "Check the sensor and its supply, then repeat the run; if it stays, replace the sensor",
+            )
 
 
 def field_mean(run: RunData, name: str, time_s: Array, dwell: DwellReading, thresholds: ObservationThresholds) -> Mean:

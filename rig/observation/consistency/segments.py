@@ -164,7 +164,8 @@ def _segment_revolution(
     """Average a revolution or an arc in segments, without the spectral lines of the whole average.
 
     Spectral lines slower than `SLOW_CYCLES` remain, because weights that cancel them would amplify the encoders' noise;
-    the variance of each segment includes them. A vibration that the encoders measure only in part is no noise.
+    the variance of each segment includes them, unless they are the harmonics of a step. A vibration that the encoders
+    measure only in part is no noise.
     """
     average, axis = turn.average, turn.axis_flange
     times_s = stream.time_s[slice_time(stream, average.start_s, average.end_s)]
@@ -184,7 +185,9 @@ def _segment_revolution(
     weights = mean_weights(division.groups, lines[:, ~is_slow])
     added: Array | float = 0.0
     if is_slow.any():
-        added = _slow_line_variance(lines[:, is_slow], weights, fit_residuals(encoded, division.readings_rad_s))
+        not_encoded = fit_residuals(encoded, division.readings_rad_s)
+        if not _is_step(lines[:, is_slow], not_encoded):
+            added = _slow_line_variance(lines[:, is_slow], weights, not_encoded)
     segments = _average(
         division,
         motion,
@@ -202,6 +205,17 @@ def _segment_revolution(
         vibration_counts=np.sqrt(np.mean(vibrating**2, axis=0)) / lsb,
     )
     return SegmentedAverage(average, segments, readings, turn.speed_std_rad_s / turn.speed_rad_s)
+
+
+def _is_step(slow: Array, residuals: Array) -> bool:
+    """Return whether one step explains more of the residuals (n, 3) than the slow spectral lines, columns (n, k).
+
+    The lines found in a step are its harmonics. A step is a fault, whereas a line may be an aliased vibration.
+    """
+    before = np.arange(1, len(residuals))[:, None]
+    sums = np.cumsum(residuals - residuals.mean(axis=0), axis=0)[:-1]
+    explained_by_step = np.sum(sums**2 * (1 / before + 1 / (len(residuals) - before)), axis=1).max()
+    return bool(explained_by_step > np.sum((slow @ fit_columns(slow, residuals)) ** 2))
 
 
 def _slow_line_variance(slow: Array, weights: Array, residuals: Array) -> Array:

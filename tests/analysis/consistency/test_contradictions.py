@@ -182,6 +182,14 @@ def test_a_change_of_all_scale_factors_is_no_transfer_that_is_disturbed() -> Non
     assert {"scale_changed", "disturbed_sweep"} <= failed(checks)
 
 
+@pytest.mark.slow
+def test_a_step_within_a_sweep_is_no_slow_vibration() -> None:
+    """Its harmonics are found as spectral lines of one, two and three cycles a turn."""
+    damage = scale(1.02, half_of_sweep_1)
+    checks, _, _ = judged(damage(readings_of(Setup(seed=5, noise_rad_s=NOISE[5]))).recording())
+    assert "disturbed_sweep" in failed(checks)
+
+
 def wandering(seen: Readings, rate: float) -> Readings:
     """With a bias that walks by `rate` rad/s per √s."""
     steps = seen.rng.normal(size=seen.counts.shape) * rate / np.sqrt(seen.setup.sample_rate_hz)
