@@ -32,6 +32,8 @@ RISE, DROP = 3.5, 2.0  # starting points of ln σ: one cause above the median of
 SINGLE_MAXIMUM_RESIDUALS = 240  # with more of them there is only one maximum
 # Least distance of two maxima in ln σ; a maximum lower than the greatest by more than this is ignored.
 MIN_MAXIMUM_DISTANCE, NEGLIGIBLE_DROP = 1.0, 5.0
+# A search ends near a point of an earlier one's ridge, whose points are lower than its maximum by at most this.
+RIDGE_DISTANCE, RIDGE_DROP = 0.5, 1.0
 FIRST_STEPS = 6  # Newton steps from each starting point: only the likely ones are continued
 FAILED_LOG_POSTERIOR = 1e30  # negative, if it cannot be computed
 
@@ -63,6 +65,25 @@ class MixedFit:
     covariance: Array
     likelihood: float
     residuals: Array
+
+
+@dataclass(frozen=True, slots=True)
+class _Ascent:
+    """A search for a maximum of the posterior, over ln σ (k,).
+
+    - point (k,): where it ended; value: the negative log-posterior there.
+    - ridge: the visited points that are lower than the last one by at most `RIDGE_DROP`.
+    - joins: whether it ended near the ridge of an earlier search, and would have followed it to the same maximum.
+    """
+
+    point: Array
+    value: float
+    ridge: list[Array]
+    joins: bool
+
+    def passes(self, logarithms: Array) -> bool:
+        """Return whether a point of the ridge is near `logarithms` (k,)."""
+        return any(np.abs(logarithms - point).max() < RIDGE_DISTANCE for point in self.ridge)
 
 
 class MixedModel:
@@ -106,25 +127,32 @@ class MixedModel:
         probable than the first by more than `NEGLIGIBLE_DROP` are left out.
         """
         if start is not None:
-            return np.exp([self._climb(np.log(start)).x])
+            return np.exp([self._climb(np.log(start)).point])
         middle = np.log(self.mixed.scales)
         if len(self.mixed.observed) > SINGLE_MAXIMUM_RESIDUALS:
-            return np.exp([self._climb(middle).x])
-        begun = [self._climb(middle - DROP + step, FIRST_STEPS) for step in (RISE + DROP) * np.eye(len(middle))]
-        likely = min(optimum.fun for optimum in begun) + 2 * NEGLIGIBLE_DROP  # most of them are nearly at a maximum
-        optima = [self._climb(point) for point in (middle, *(begin.x for begin in begun if begin.fun < likely))]
-        optima.sort(key=lambda optimum: float(optimum.fun))
+            return np.exp([self._climb(middle).point])
+        ascents = [self._climb(middle)]
+        starts = middle - DROP + (RISE + DROP) * np.eye(len(middle))
+        begun = [self._climb(point, ascents, FIRST_STEPS) for point in starts]
+        likely = min(begin.value for begin in begun) + 2 * NEGLIGIBLE_DROP  # most of them are nearly at a maximum
+        for begin in sorted(begun, key=lambda begin: begin.value):
+            if begin.value < likely and not begin.joins:
+                ascent = self._climb(begin.point, ascents)
+                ascents += [] if ascent.joins else [ascent]
+        ascents.sort(key=lambda ascent: ascent.value)
         distinct: list[Array] = []
-        for optimum in optima:
-            is_new = all(np.abs(optimum.x - other).max() > MIN_MAXIMUM_DISTANCE for other in distinct)
-            if is_new and optimum.fun < optima[0].fun + NEGLIGIBLE_DROP:
-                distinct.append(optimum.x)
+        for ascent in ascents:
+            is_new = all(np.abs(ascent.point - other).max() > MIN_MAXIMUM_DISTANCE for other in distinct)
+            if is_new and ascent.value < ascents[0].value + NEGLIGIBLE_DROP:
+                distinct.append(ascent.point)
         return np.exp(distinct)
 
-    def _climb(self, logarithms: Array, most_steps: int = MAX_NEWTON_STEPS) -> "OptimizeResult":
-        """Return the maximum of the posterior of the standard deviations' `logarithms` (k,) near a point.
+    def _climb(
+        self, logarithms: Array, earlier: Sequence["_Ascent"] = (), most_steps: int = MAX_NEWTON_STEPS
+    ) -> "_Ascent":
+        """Climb from `logarithms` (k,) of the standard deviations to a maximum of the posterior.
 
-        The method is Newton's in a trust region, and the curvature is the average information (Gilmour, Thompson and
+        The search ends early if it joins an `earlier` ascent. The method is Newton's in a trust region, and the curvature is the average information (Gilmour, Thompson and
         Cullis, Biometrics 51 (1995) 1440). The trust region undoes and shortens a step to ratios of standard deviations
         so large that rounding dominates.
         """
@@ -137,8 +165,19 @@ class MixedModel:
             "hess": lambda point: self._evaluate(point)[2],
             "options": {"gtol": GRADIENT_TOLERANCE, "maxiter": most_steps, "max_trust_radius": MAX_STEP},
         }
-        optimum: OptimizeResult = minimize(x0=logarithms, **newton)
-        return optimum
+        path: list[tuple[Array, float]] = []
+        joins = False
+
+        def follow(intermediate_result: "OptimizeResult") -> None:
+            nonlocal joins
+            path.append((intermediate_result.x.copy(), float(intermediate_result.fun)))
+            joins = any(ascent.passes(intermediate_result.x) for ascent in earlier)
+            if joins:
+                raise StopIteration
+
+        reached: OptimizeResult = minimize(x0=logarithms, callback=follow, **newton)
+        ridge = [point for point, value in path if value < reached.fun + RIDGE_DROP]
+        return _Ascent(reached.x, float(reached.fun), ridge, joins)
 
     def causes(self, std: Array, fit: MixedFit) -> list[Array]:
         """Return the parts (p, p) of θ's covariance that are due to C₀, each variance component, and the prior of θ."""
@@ -224,8 +263,12 @@ class MixedModel:
         shape = np.tanh(logarithms - np.log(self.mixed.scales))
         parts = squares[:, None] * (self.mixed.components @ innovation)
         alone, dof = self.mixed.alone.T
-        gradient = squares * (self._flat @ projected.ravel()) - parts @ innovation + shape + dof - alone / squares
-        curvature = 2 * parts @ projected @ parts.T + np.diag(1 - shape**2 + 2 * alone / squares)
+        fit_gradient = squares * (self._flat @ projected.ravel()) - parts @ innovation
+        gradient = fit_gradient + shape + dof - alone / squares
+        # Over ln σ the curvature contains twice the gradient: at a maximum the slope of the prior, which is at most 1.
+        # Far from a maximum a larger term would shorten the steps towards a small σ.
+        of_logarithm = 2 * np.clip(fit_gradient, 0.0, 1.0)
+        curvature = 2 * parts @ projected @ parts.T + np.diag(of_logarithm + 1 - shape**2 + 2 * alone / squares)
         evaluated = (-likelihood - self._log_prior(logarithms), gradient, curvature)
         self._last = (logarithms.copy(), evaluated)
         return evaluated
