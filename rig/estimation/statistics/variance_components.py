@@ -152,9 +152,9 @@ class MixedModel:
     ) -> "_Ascent":
         """Climb from `logarithms` (k,) of the standard deviations to a maximum of the posterior.
 
-        The search ends early if it joins an `earlier` ascent. The method is Newton's in a trust region, and the curvature is the average information (Gilmour, Thompson and
-        Cullis, Biometrics 51 (1995) 1440). The trust region undoes and shortens a step to ratios of standard deviations
-        so large that rounding dominates.
+        The search ends early if it joins an `earlier` ascent. The method is Newton's in a trust region, and the
+        curvature is the average information (Gilmour, Thompson and Cullis, Biometrics 51 (1995) 1440). The trust region
+        undoes and shortens a step to ratios of standard deviations so large that rounding dominates.
         """
         from scipy.optimize import minimize
 
