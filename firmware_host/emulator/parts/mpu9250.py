@@ -196,7 +196,7 @@ class Mpu9250:
             raise Violation(
                 "sensor_setup",
                 f"MPU-9250 register 0x{address:02X} read while RAW_RDY_EN is clear: it converts only while that is set",
-                "Set INT_ENABLE first, or model conversions that nobody is told of in mpu9250.py",
+                "Set INT_ENABLE first, or model conversions without interrupts in mpu9250.py",
             )
         return status if address == _INT_STATUS else self._output[address - _ACCEL_XOUT_H]
 
