@@ -336,3 +336,18 @@ def test_a_session_tells_more_with_every_move_and_names_the_last_one() -> None:
     assert (np.diff(known[8:]) < 1e-3).all()
     faces: set[Face | str | None] = set(assess_progress(refused.filter_session(feed.handled), TOLD).faces)
     assert faces == {"+x", "-x", "+y", "-y", "+z", "-z"}
+
+
+@pytest.mark.parametrize("jump_rad_s", [0.002, 0.004])
+def test_a_bias_that_jumps_where_a_rest_could_have_crept_is_right_or_named(jump_rad_s: float) -> None:
+    """Each face occurs once, so the last rest before the next face is the only witness of the jump."""
+    recorded = handle(SIX_TURNS, 3)
+    jumped = np.outer(recorded.time_s > 17.48, jump_rad_s * np.array([-0.68, 0.35, -0.64]))
+    after = replace(recorded, rates=recorded.rates + jumped, bias=recorded.bias + jumped[-1])
+    try:
+        found = solved(after)
+    except Fault as fault:
+        assert fault.name == "bias_jumped"
+        return
+    assert found.creeping_s == ()
+    assert (np.abs(found.bias_rad_s + after.bias) < found.budget.expanded[3:6]).all()

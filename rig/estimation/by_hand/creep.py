@@ -4,13 +4,14 @@ The mean reading of such a rest differs from that of the rests before and after.
 rest, so the fit explains the difference by a bias that jumps and returns, and overestimates the bias' random walk.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import product
 
 import numpy as np
 
 from rig.estimation.arrays import Array
 from rig.estimation.by_hand.fit import GraphFit, estimate_stds, solve_step
-from rig.estimation.by_hand.graph import REST, RESTS, Factor
+from rig.estimation.by_hand.graph import REST, RESTS, WALK, Factor
 from rig.estimation.by_hand.session_parts import STATED
 
 MAX_WALK_RATIO = 3.0  # of the bias' random walk with the creeping rests to that without them
@@ -20,13 +21,19 @@ MAX_CREEPING_FRACTION = 0.125  # of the rests: if more stand out, the bias itsel
 def find_creeping_rests(fit: GraphFit) -> tuple[int, ...]:
     """Return the few rests without which the bias' random walk is much smaller; empty if a few do not suffice.
 
-    Only a rest between two used rests can be identified, because elsewhere a creep looks like a jump of the bias.
+    Only a rest between two used rests can be identified, because elsewhere a creep looks like a jump of the bias. If a
+    jump before or after such a rest explains the readings as well, which happens on faces that occur once, no rest is
+    returned: the two causes lead to different biases.
     """
     if fit.stds.walk_rad_s_sqrt_s <= MAX_WALK_RATIO * STATED.walk_rad_s_sqrt_s:
         return ()
     middles_s = np.array([(rest.start_s + rest.end_s) / 2 for rest in fit.session.rests])
     left_out: list[int] = []
     rows: Sequence[Factor] = fit.factors
+
+    def explains(remaining: Sequence[Factor]) -> bool:
+        return estimate_stds(remaining, fit.stds)[1].walk_rad_s_sqrt_s * MAX_WALK_RATIO < fit.stds.walk_rad_s_sqrt_s
+
     for _ in range(max(1, int(MAX_CREEPING_FRACTION * len(middles_s)))):
         biases = fit.state.biases + solve_step(rows)[0][RESTS:].reshape(-1, 6)[:, 3:]
         distances = _distances_from_neighbours(middles_s, biases, left_out)
@@ -34,9 +41,24 @@ def find_creeping_rests(fit: GraphFit) -> tuple[int, ...]:
             return ()
         left_out.append(int(np.argmax(distances)))
         rows = [row for row in fit.factors if row.kind != REST or row.index not in left_out]
-        if estimate_stds(rows, fit.stds)[1].walk_rad_s_sqrt_s * MAX_WALK_RATIO < fit.stds.walk_rad_s_sqrt_s:
-            return tuple(sorted(left_out))
+        if explains(rows):
+            is_jump = any(explains(rows_with_jump) for rows_with_jump in _allow_jumps(fit.factors, left_out))
+            return () if is_jump else tuple(sorted(left_out))
     return ()
+
+
+def _allow_jumps(factors: Sequence[Factor], rests: Sequence[int]) -> Iterator[list[Factor]]:
+    """Yield the factors without one of the `rests`' links to its neighbours, so that the bias may jump there.
+
+    The other ones of these rests are left out.
+    """
+    for rest, first in product(rests, (-1, 0)):
+        others = {*rests} - {rest}
+        yield [
+            row
+            for row in factors
+            if not (row.kind == REST and row.index in others) and not (row.kind == WALK and row.index == rest + first)
+        ]
 
 
 def _distances_from_neighbours(times_s: Array, biases: Array, left_out: Sequence[int]) -> Array:
