@@ -12,7 +12,7 @@ BISECTION_STEPS = 30
 
 
 def scale_of(matrix: Array) -> Array:
-    """Return the scale factors (3,) of a sensor that reads `matrix` × input + offset: 1 over the length of each row."""
+    """Return the factors (3,) by which to multiply readings `matrix` × input: 1 over the length of each row."""
     scale: Array = 1 / np.linalg.norm(matrix, axis=1)
     return scale
 

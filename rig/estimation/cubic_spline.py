@@ -11,8 +11,9 @@ NEGLIGIBLE_WEIGHT = 1e-18  # of a distant neighbour in a slope: far below the re
 class CubicSpline:
     """The not-a-knot cubic spline through values at rising abscissae (de Boor, A Practical Guide to Splines, ch. IV).
 
-    x: (n,), strictly rising, n ≥ 2; y: (n, …). Called with abscissae of any shape, the spline returns values of that
-    shape followed by …; beyond the ends it extrapolates the outer polynomials. Raise ValueError for other x and y.
+    x (n,) rises strictly, with n ≥ 2; y is (n, …). Called with abscissae of any shape, the spline returns values whose
+    shape is that of the abscissae, followed by y.shape[1:]. Beyond the ends it extrapolates the outer polynomials.
+    Raise ValueError for other x and y.
     """
 
     def __init__(self, x: Array, y: Array) -> None:
@@ -77,7 +78,10 @@ def _slopes(step: Array, secants: Array) -> Array:
 
 
 def _end_condition(step: float, following: float, secant: Array, next_secant: Array) -> Array:
-    """Return r (k,) of the not-a-knot condition on the end's slopes, `following` s₀ + (step + following) s₁ = r."""
+    """Return the right side r (k,) of the not-a-knot condition: `following` · s₀ + (`step` + `following`) · s₁ = r.
+
+    s₀ and s₁ are the slopes at the end and at the next knot.
+    """
     both = step + following
     end: Array = ((step + 2 * both) * following * secant + step**2 * next_secant) / both
     return end

@@ -1,7 +1,7 @@
 """The solution of the graph by Gauss–Newton steps, with the hand's variance components from the residuals.
 
 Each component is estimated from the factors that it affects, weighted by their redundancy numbers (Förstner 1979). The
-stated value is a prior of `PRIOR_DOF` degrees of freedom, so a short session changes it little.
+value in `STATED` serves as a prior with `PRIOR_DOF` degrees of freedom, so a short session changes it little.
 """
 
 from collections.abc import Sequence
@@ -100,7 +100,7 @@ _REMEDY = "See that each move is between two rests on the table, that no reading
 
 
 def _start(integrals: MoveIntegrals, faces: RestFaces, initial: GyroscopeModel) -> GraphState:
-    """Return initial values, whose attitudes are by dead reckoning and have the vertical of each face."""
+    """Return initial values. The attitudes follow from `rotations`, and each is tilted so that its face is up."""
     attitudes = [_align_vertical(np.eye(3), faces.up[0])]
     for row, rotation in enumerate(integrals.rotations):
         attitudes.append(_align_vertical(attitudes[-1] @ rotation, faces.up[row + 1]))
@@ -194,7 +194,10 @@ def sum_squares(rows: Sequence[Factor], covariance: Array) -> tuple[float, float
 
 
 def _stds_of_rows(rows: Sequence[Factor], step: Array, covariance: Array, now: HandStds) -> HandStds:
-    """Return the stds at which squared residuals after `step` (p,) with `covariance` (p, p) equal their expectation."""
+    """Return the stds for which the squared residuals after `step` (p,) would equal their expected values.
+
+    `covariance` (p, p) is that of the parameters, which determines the redundancy numbers.
+    """
     stds: dict[str, float] = {}
     for name, (kind, cause) in CAUSE_OF_STD.items():
         stated = getattr(STATED, name)

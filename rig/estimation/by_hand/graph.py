@@ -1,17 +1,18 @@
 """The factor graph of a session by hand: its unknowns, and the equations of every rest and move.
 
-Unknowns: F, G, the gyroscope's nonlinearity, the accelerometer's F_a and b_a, the table's tilt, the faces' normals, and
-for each rest the attitude Q (body to table) and the gyroscope's bias. A factor has rows of equations, with the standard
-deviation of each cause of their errors (Dellaert and Kaess, Factor Graphs for Robot Perception, 2017).
+The unknowns are the gyroscope's matrix F, g-sensitivity G and nonlinearity, the accelerometer's matrix F_a and offset
+b_a, the table's tilt, the faces' normals, and for each rest the attitude Q (body to table) and the gyroscope's bias b.
+A factor has rows of equations, with the standard deviation of each cause of their errors (Dellaert and Kaess, Factor
+Graphs for Robot Perception, 2017).
 
-R is the body's rotation in a move by the gyroscope, from rest i to rest j; m̄ and ā are the mean readings of gyroscope
-and accelerometer in a rest, b is the bias and f the upward vertical in the body.
+R is the body's rotation from rest i to rest j, computed from the gyroscope's readings; m̄ and ā are the mean readings
+of gyroscope and accelerometer in a rest, and f is the upward vertical in the body.
 
 - move: Log(R (Qᵢᵀ Qⱼ)ᵀ), with the gyroscope's noise and an error in proportion to the angle
 - rest: m̄ − b − G f; walk: the change of the bias from rest to rest, minus the change of a parabolic drift
 - flat: the table's normal in the body equals the face's normal; box: the face's normal equals the nominal one
 - closure: the heading after a whole turn; lean: the mean axis of a turn is the face's normal
-- acceleration: ā − F_a Qᵀ g − b_a. It serves as a level, so the component along the vertical has little weight
+- acceleration: ā − F_a Qᵀ g − b_a. The accelerometer serves as a level, so the vertical component has little weight
 """
 
 from collections.abc import Iterator
@@ -61,7 +62,8 @@ class GraphState:
     - matrix (3, 3): F, the scale factors and axes.
     - sensitivity (3, 3): G, the g-sensitivity in rad/s per g.
     - nonlinearities: the even and the odd nonlinearity (6,), s/rad.
-    - drift_rad_s (2, 3): the bias' drift from the first rest to the last, and the deviation from a steady drift midway.
+    - drift_rad_s (2, 3): row 0 is the bias' steady drift from the first rest to the last, row 1 the deviation from it
+      at half time.
     - level: F_a (3, 3) of the accelerometer.
     - offset: b_a (3,) of the accelerometer, m/s².
     - table: the table's tilt (2,), rad.
@@ -223,7 +225,7 @@ def reading_noise(session: HandRecording) -> float:
 
 
 def _hand_held_std(scatter: Array, quiet: float, lasting_s: float) -> float:
-    """Return the std of the mean of a rest held in the hand, due to tremor: the `scatter` beyond a `quiet` rest's."""
+    """Return the std of a rest's mean reading due to a hand's tremor, from the part of `scatter` (3,) above `quiet`."""
     beyond = float(np.mean(scatter**2)) - (QUIET_SCATTER_RATIO * quiet) ** 2
     return float(np.sqrt(max(beyond, 0.0) / max(TREMOR_BANDWIDTH_HZ * lasting_s, 1.0)))
 
@@ -253,7 +255,7 @@ def _move(graph: Graph, row: int) -> Factor:
 
 
 def _tilt_factor(graph: Graph, row: int) -> Factor:
-    """Return the factor of a turn by α about a face's normal n: ∫(m − b) dt/α = F n, in both directions across F n."""
+    """Return the factor of a turn by α about a face's normal n: the part of ∫(reading − b) dt/α = F n across F n."""
     normal, matrix = graph.faces.up[row], graph.state.matrix
     integral_rad, duration_s = graph.integrals.swept_rad[row], graph.integrals.durations_s[row]
     angle_rad = float(normal @ integral_rad)

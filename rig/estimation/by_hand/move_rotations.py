@@ -1,4 +1,4 @@
-"""The rotation of the body in each move by the gyroscope, and its derivatives with respect to the unknowns.
+"""The body's rotation in each move, from the gyroscope's readings, and its derivatives with respect to the unknowns.
 
     m = r + even r² + odd r |r| + b + G f,   r = F ω
 
@@ -26,8 +26,8 @@ class MoveIntegrals:
       `by_nonlinearity` (k, 3, 6).
     - `swept_rad` (k, 3): the integral of the reading minus offset, g-sensitivity and nonlinearity.
     - `durations_s` (k,) of the moves; `paths_rad` (k,): the total angle turned, in whichever direction.
-    - `changes_rad_s` (k,): the root sum of squares of the rate's changes from sample to sample. The time stamps'
-      standard deviation times this is their contribution to the standard deviation of the rotation.
+    - `changes_rad_s` (k,): the root sum of squares of the rate's changes from sample to sample. Multiplied by
+      the time stamps' standard deviation, it is their contribution to the rotation's standard deviation.
     """
 
     rotations: Array

@@ -5,10 +5,10 @@ reports the rests and moves, and their faces.
 
     m = F ω + b + G u,   C = F⁻¹
 
-Unknowns are C and G (3, 3) row by row, b (3,), and two angles of each of six faces: their deviation from square. The
-state is an information matrix, of which the board keeps the square root (Bierman, Factorization Methods for Discrete
-Sequential Estimation, 1977, chapter V). The equations are linearised about a solution; the board reports after which
-moves it updates this solution.
+m is the reading, ω the rate and u the upward unit vector in the body. Unknowns are C and G (3, 3) row by row, b (3,),
+and two angles of each of six faces: their deviation from square. The state is an information matrix, of which the board
+keeps the square root (Bierman, Factorization Methods for Discrete Sequential Estimation, 1977, chapter V). The
+equations are linearised about a solution; the board reports after which moves it updates this solution.
 """
 
 from collections.abc import Iterator, Sequence
@@ -56,7 +56,7 @@ class BoardMove:
 
 @dataclass(frozen=True, slots=True)
 class BoardSolution:
-    """The solution of the board's equations: matrix C (3, 3) and bias b (3,) of g = C (m + b).
+    """The solution of the board's equations: `matrix` C and `bias_rad_s` −b, so that rate = matrix (reading + bias).
 
     `scale_std` is the largest standard uncertainty on the diagonal of C.
     """
@@ -110,7 +110,10 @@ def _vertical_on_face(centre: Array, face: int) -> tuple[Array, Array]:
 
 
 def _rest_equations(centre: Array, rest: BoardRest, noise_rad_s: float) -> Iterator[Equation]:
-    """Yield the equations of a rest, whose reading is bias plus gravity's effect, for a step from `centre` (33,)."""
+    """Yield the equations of a rest, whose reading is bias plus gravity's effect.
+
+    Their unknowns are the step (33,) from the values `centre` (33,), about which they are linearised.
+    """
     up, _ = _vertical_on_face(centre, rest.face)
     sensitivity = centre[GRAVITY].reshape(3, 3)
     for axis in range(3):

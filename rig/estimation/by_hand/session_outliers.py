@@ -140,9 +140,9 @@ def _fault_columns(fit: GraphFit, name: str, index: int) -> Array:
 
 
 def _tilt_columns(fit: GraphFit, row: Factor, index: int) -> Array:
-    """Return the columns (r, 2) by which a table that is tilted from rest `index` on changes a factor's equations.
+    """Return the changes (r, 2) of a factor's equations if the table is tilted before rest `index` and remains tilted.
 
-    They are zero for the move to the last rest, where a tilted table looks like a body that does not lie flat.
+    The changes are zero for the move to the last rest, where a tilted table looks like a body that does not lie flat.
     """
     other = np.zeros((len(row.design), 2))
     if row.kind == ACCELERATION and row.index >= index:

@@ -67,10 +67,11 @@ class MoveSummary:
 class HandSolution:
     """The solution of a session by hand.
 
-    - `turned`: the solution in the form of a solution from known rotations.
+    - `turned`: scale, bias and axes, in the type that the solution from known rotations has too.
     - `stds`: standard deviations of the hand by name: estimated, stated, and largest allowed.
     - `creeping_s`: times at which the body crept during intended rests, which are left out.
-    - `expanded_scale` (3,): U (k = 2) from this session and its clock; the budget adds recordings of real hands.
+    - `expanded_scale` (3,): U (k = 2) from this session and its clock. The budget of `turned` has one contributor more,
+      which is estimated from recordings of real hands.
     """
 
     turned: TurnedSolution
@@ -244,7 +245,10 @@ def _looseness(fit: GraphFit) -> float:
 
 
 def _find_first_face(session: HandRecording, conditions: SessionConditions, but: GraphFit | None) -> Fault | None:
-    """Return the Fault of a wrong first face if another face fits consistently, and better than in `but`, else None."""
+    """Return a Fault if a fit with another first face than the stated one is consistent and clearly better, else None.
+
+    `but` is the fit with the stated face, None if the session contradicts it.
+    """
     if session.acceleration is not None or conditions.first_face is None:
         return None
     for face in (face for face in FACES if face != conditions.first_face):
@@ -263,7 +267,10 @@ def _find_first_face(session: HandRecording, conditions: SessionConditions, but:
 
 
 def _budget(fit: GraphFit, to_parameters: Array, clock: Array) -> Budget:
-    """Return the budget; `to_parameters` (6, 12) maps F and b to scale and bias, `clock` (6, 6) is due to the clock."""
+    """Return the budget of scale and bias.
+
+    `to_parameters` (6, 12) maps F and b to scale and bias; `clock` (6, 6) is the covariance due to the clock's error.
+    """
     chosen = parameter_columns(fit)
     covariances = {name: np.zeros((6, 6)) for name in CONTRIBUTORS}
     line_of = {cause: name for name, (_, causes, _) in CONTRIBUTORS.items() for cause in causes}

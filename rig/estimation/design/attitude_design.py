@@ -1,8 +1,9 @@
 """The information that a planned set of attitudes gives about an accelerometer at rest in them.
 
 The model is that of `rig.estimation.reference.reference_model` for a reference v_ref of known norm, linearised about an
-ideal sensor: F = 1, b = 0, φ = 0 (Eqs. (10) and (11) of the paper TRIAX). Noise of the standard deviation σ and an
-attitude error δ give the readings the covariance σ² 1 + δ² E Eᵀ (`rig.estimation.reference.attitude_error`).
+ideal sensor: F = I, bias b = 0, nonlinearity φ = 0 (Eqs. (10) and (11) of the paper TRIAX). Noise of the standard
+deviation σ and an attitude error δ give the readings the covariance σ² I + δ² E Eᵀ, with the effects E of a small
+rotation (`rig.estimation.reference.attitude_error`).
 
 Attitudes R (N, 3, 3) take body to table coordinates, `up` (3,) is a unit vector of the table. The model of `order` 1
 has 14 free numbers, namely F, b and the direction of v_ref; that of order 2 has 17, because it has φ (3,) as well.
@@ -79,9 +80,9 @@ def assess_identifiability(attitudes: Array, up: Array, order: Order = 1) -> Ide
 def g_efficiency(attitudes: Array, up: Array, order: Order = 1) -> float:
     """Return the G-efficiency: the number of parameters over the worst prediction variance; 1 at best, 0 if singular.
 
-    The attitudes are exact and all readings have the same noise. The prediction variance of any orientation is the
-    trace over three axes, times N, in units of one reading's variance. Its mean over the design's own attitudes is the
-    number of parameters (Kiefer and Wolfowitz).
+    The attitudes are exact and all readings have the same noise. The prediction variance of any orientation is N times
+    the trace of the predicted reading's covariance (3, 3), in units of one reading's variance. Its mean over the
+    design's own attitudes is the number of parameters (Kiefer and Wolfowitz).
     """
     from scipy.optimize import minimize
     from scipy.spatial.transform import Rotation

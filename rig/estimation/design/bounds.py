@@ -14,11 +14,12 @@ from rig.estimation.sensor_axes import parameter_jacobian
 
 
 def six_observation_bound(scale: ArrayLike, rates_rad_s: ArrayLike, variances_rad2_s2: ArrayLike) -> Array:
-    """Return the Cramér–Rao bound (6, 6) for kx ky kz bx by bz by the paper SIX, Eqs. (1)–(4): only ‖g‖ is given.
+    """Return the Cramér–Rao bound (6, 6) for kx, ky, kz, bx, by, bz in the model of the paper SIX, Eqs. (1)–(4).
 
-    `scale` (3,); `rates_rad_s` (N, 3): true g in the sensor frame; `variances_rad2_s2` (N, 3) of the mean readings. The
+    In this model g = k (m + b) is the rate, k (3,) the `scale`, m a mean reading, and only ‖g‖ is given. `rates_rad_s`
+    (N, 3) are the true rates in the sensor frame, `variances_rad2_s2` v (N, 3) the variances of the mean readings. The
     two unknown components of a sweep's direction take two of its three readings; the third determines ‖g‖², with the
-    variance Σ 4 k⁴ (m + b)² v. The bias has no effect. Raise LinAlgError for a singular design.
+    variance Σ 4 k⁴ (m + b)² v. The value of the bias b has no effect. Raise LinAlgError for a singular design.
     """
     k, rates, variances = (np.asarray(a, dtype=np.float64) for a in (scale, rates_rad_s, variances_rad2_s2))
     theta = np.concatenate([k, np.zeros(3)])

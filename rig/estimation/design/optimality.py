@@ -63,7 +63,7 @@ def c_efficiency(directions: ArrayLike, what: Literal["scale", "bias"] = "scale"
 
     The criterion is Elfving's c-optimality: the variance N cᵀ(XᵀX)⁻¹c of one combination cᵀβ of parameters, here that
     of the worst axis. The squares of a direction's components add up to 1, so the worst variance is at least 3 for a
-    slope and 1 for an offset.
+    scale factor and 1 for a bias.
     """
     features = _features(directions, "vector")
     if np.linalg.matrix_rank(features) < PARAMETER_COUNT["vector"]:

@@ -37,7 +37,7 @@ class AbruptChange:
     evidence: float
 
     def find_covariance(self, matrix: Array) -> Array:
-        """Return the covariance (12, 12) of F `matrix` (3, 3), row by row, and bias that is due to the change.
+        """Return the covariance (12, 12) that the change adds to F, the `matrix` (3, 3), row by row, and then the bias.
 
         A solution lies between the sensor's states before and after. Half of the change is the standard uncertainty,
         so that U, the whole change, covers both states.
@@ -69,8 +69,9 @@ def find_change(
 ) -> AbruptChange | None:
     """Return the most probable change before a row, or None if its evidence is at most `least_evidence`.
 
-    The rows are in the order of time and begin at `begins_s` (n,). The row is searched for with each of s choices
-    `starts` (s, k) of the standard deviations of the model's k errors; the first are most probable without a change.
+    The rows are in the order of time and begin at `begins_s` (n,). The search is
+    repeated for each row of `starts` (s, k), a choice of standard deviations of the model's k errors. The first choice
+    is the most probable one if nothing changed.
     """
     count = sum(int(effect.possible.any(axis=1).sum()) for effect in effects)
     log_without, change = model.evaluate_posterior(starts[0]) + float(np.log(max(count, 1))), None
@@ -96,8 +97,9 @@ def find_change(
 def _weigh_rows(effects: PossibleChanges, inverse: Array, innovation: Array) -> Array:
     """Return ln of the Bayes factor (n,) of a change before each row: (sᵀ (1 + H)⁻¹ s − ln det(1 + H))/2.
 
-    s = Aᵀ P y and H = Aᵀ P A, with the effects A (3n, 3) of the change, and P `inverse` (3n, 3n) and P y `innovation`
-    (3n,) of the restricted likelihood. A change that lasts has the sums of s and H over this and all later rows.
+    s = Aᵀ P y and H = Aᵀ P A, where A (3n, 3) contains the effects of the change. `inverse` P (3n, 3n) and `innovation`
+    P y (3n,) are those of the restricted likelihood of the readings y. For a change that lasts, s and H are sums over
+    the row and all later rows.
     """
     of_axes, possible = effects.of_axes, effects.possible
     count = len(of_axes)

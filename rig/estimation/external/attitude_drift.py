@@ -1,15 +1,16 @@
 """The drift of a gyroscope's attitude from a reference's, as a linear model of its causes.
 
-    E(t) = R(t + τ) C(t)ᵀ          R: body → table by the reference, C: body → first reading by the gyroscope
+    E(t) = R(t + τ) C(t)ᵀ
 
-is constant if R and C are exact, and maps the first reading's coordinates to the table's. Otherwise E changes by
+is constant if R and C are exact. R maps body coordinates to table coordinates, as the reference states; C maps them to
+body coordinates at the first reading, as integrated from the gyroscope. If R and C have errors, E changes by
 
     E(t₁)ᵀ E(t₂) = exp(ΔS δθ + Δ(C ω) τ − Eᵀ ω_E Δt + e)
 
-with S the sensitivity of the integrated attitude to F and b (`increments`), τ the offset of the reference's clock, ω_E
-the Earth's rate in table coordinates. A fix is the mean of E over a window: it uses every sample of the reference and
-is robust to coloured errors within a window. Each e contains the errors of two fixes, which neighbours share, and the
-integrated white noise of the gyroscope.
+with S the sensitivity of C to errors δθ of F and b (`increments`), τ the offset of the reference's clock, ω_E the
+Earth's rate in table coordinates, and e the remaining errors. A fix is the mean of E over a window: it uses every
+sample of the reference and is robust to coloured errors within a window. Each e contains the errors of two fixes, which
+neighbours share, and the integrated white noise of the gyroscope.
 """
 
 from dataclasses import dataclass
@@ -63,7 +64,7 @@ class Fixes:
     - `std_rad` (k,): the stated standard deviation of each sample, None if none is stated.
     - `blind_rad` (N − 1,): standard deviation of the rotation that missing readings hide, None if none are missing.
     - `walk`: sum of squares in rad²/s, and dof, of the gyroscope's random walk at rest; zeros without rests.
-    - `hides_losses`: whether the readings' stamps do not show single lost readings.
+    - `hides_losses`: True if a single lost reading leaves no gap in the readings' time stamps.
     """
 
     at_s: Array
@@ -163,7 +164,7 @@ def _relative(fixes: Fixes) -> Array:
 
 
 def find_inliers(recorded: AttitudeSamples, fixes: FixedAttitudes) -> NDArray[np.bool_]:
-    """Return the samples (k,) near the median of their fix, without outliers such as a mistaken marker."""
+    """Return a mask (k,) of the samples near the mean of their fix; it excludes outliers such as a mistaken marker."""
     fix = recorded.fixes.fix
     deviations = np.linalg.norm(rotation_vectors(np.swapaxes(fixes.attitudes[fix], -1, -2) @ fixes.samples), axis=1)
     order = np.lexsort((deviations, fix))
@@ -234,7 +235,8 @@ def _list_errors(averaged: FixedAttitudes, fixes: Fixes, correlation: Array, ste
     """Return the covariance (3n, 3n) of the increments, by cause, due to unit errors of the reference or the times.
 
     The reference's errors vary with attitude, or are new in each visit to an attitude, each rest, or each fix in
-    motion. The errors of the times are jitter of the stamps and, if these hide lost readings, of the times in between.
+    motion. The errors of the times are jitter of the reference's stamps and, if lost
+    readings are hidden, an error of the time that passes from fix to fix.
     """
     count = len(fixes.placement)
     first = np.searchsorted(fixes.fix, np.arange(count))

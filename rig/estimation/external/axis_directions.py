@@ -36,9 +36,9 @@ class Inclinations:
     def widen(self, model: MixedModel, std: Array, fit: MixedFit, wanted: Array, variances: Array) -> Array:
         """Return the covariance (q, q) that inclinations add to `wanted` (q, p) combinations of the parameters.
 
-        Only inclinations that the residuals do not show are added. The model's other errors, with the standard
-        deviations `std` (k,), cause the `variances` (q,) and include the inclinations that the residuals do show.
-        From the sum of both variances, 2 u is the half-width of the 95.45 % interval.
+        Only inclinations that the residuals do not show are added; the others are part of the model's errors. These
+        have the standard deviations `std` (k,) and give the combinations the variances `variances` (q,). The square
+        root of the sum of old and new variance is half of the half-width of the 95.45 % interval.
         """
         from scipy.linalg import cho_factor, cho_solve
 
@@ -64,8 +64,9 @@ class Inclinations:
 def _weigh_sizes(sizes_rad: Array, values: Array, scores: Array) -> Array:
     """Return the probabilities (j,) of `sizes_rad`, standard deviations of the inclinations: prior times likelihood.
 
-    The restricted likelihood is a product with one factor for each eigenvector of the information about the
-    inclinations, with its eigenvalue of `values` (r,) and its `scores` (r,). All other errors keep their sizes.
+    The restricted likelihood is a product with one factor for each of r eigenvectors of the information about the
+    inclinations. `values` (r,) are their eigenvalues, `scores` (r,) the likelihood's derivatives along them. All other
+    errors keep their sizes.
     """
     variances = np.square(sizes_rad)[:, None]
     ratio = 1 + variances * values

@@ -40,9 +40,9 @@ def find_reset(
 ) -> tuple[float, float] | None:
     """Return time and angle (rad) of the largest lasting rotation of the attitudes' coordinates, None without one.
 
-    A new origin of the reference rotates all later attitudes, by the sum of consecutive outliers. After a single wrong
-    attitude, the next ones are as before. `aside` (N − 1,) is a mask of the increments between `fixes` that are
-    outliers; a `change` that the other increments show is considered too.
+    A new origin of the reference rotates all later attitudes: the rotations of consecutive outliers add up. After a
+    single wrong attitude they cancel. `aside` (N − 1,) is a mask of the increments between `fixes` that are outliers. A
+    `change` of the attitudes, found among the other increments, is returned if it is larger.
     """
     turned: tuple[float, float] | None = None
     if change is not None and change.what == "attitude" and np.linalg.norm(change.sizes) > MIN_RESET_RAD:

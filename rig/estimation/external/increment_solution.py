@@ -4,9 +4,10 @@ The reference's rates are not used: noise in the regressors would bias the scale
 between fixes (measured attitudes) is used (`attitude_drift`); the gyroscope's part of its noise grows only with the
 square root of time.
 
-The variances of the errors of fixes and gyroscope are estimated from the residuals (`variance_components`). So are
-those of changes of matrix and bias between intervals of the recording (by nonlinearity, g-sensitivity, temperature).
-Matrix and bias are their means over the intervals, with the uncertainty that follows from these variances.
+Matrix and bias may change between intervals of the recording, by nonlinearity, g-sensitivity and temperature. The
+variances of these changes, and of the errors of fixes and gyroscope, are estimated from the residuals
+(`variance_components`). The result is the mean matrix and bias over the intervals; its uncertainty follows from these
+variances. The parameters θ (16,) of the fit are F row by row, b, the clock's offset and the Earth's rate.
 """
 
 from dataclasses import dataclass, replace
@@ -86,7 +87,7 @@ class IncrementSolution:
     - matrix (3, 3), bias (3,): F, the scale factors and axes; b, the reading at rest.
     - covariance (15, 15): of F row by row, the Earth's rate, b.
     - causes: parts (15, 15) of the covariance, by name.
-    - earth: the Earth's rate from the increments, or the fault.
+    - earth: the Earth's rate from the increments, or the Fault that says why it is not determined.
     - clock_s, clock_std_s: the reference's attitude with the time stamp t belongs to the readings' time t + `clock_s`.
     - fix_std_rad: error of a fix about each axis.
     - random_walk_rad_sqrt_s: random walk of the gyroscope's angle.
@@ -246,7 +247,7 @@ def _check(fixes: Fixes, remaining: Fixes, settled: _ConvergedFit) -> None:
 
 
 def _check_identified(matrix: Array, covariance: Array) -> None:
-    """Raise Fault `ill_conditioned`, naming an axis about which, by θ's `covariance`, the body hardly turned."""
+    """Raise Fault `ill_conditioned` if, by the `covariance` of the solution, the body hardly turned about some axis."""
     std = np.sqrt(np.diag(covariance)[MATRIX]).reshape(3, 3).max(axis=0)
     unknown = std > MAX_IDENTIFIABLE_STD
     if not unknown.any():

@@ -2,7 +2,8 @@
 
     v_m = F (s + φ s²) + b + E ε + η,   ε ~ N(0, δ² 1),   η ~ N(0, ζ² 1)
 
-ε rotates the body (`rig.estimation.reference.attitude_error`) and does not change the norm of the reference. η changes
+s is the reference in body axes; the parameters θ are the matrix F, the nonlinearity φ, the bias b and the reference. ε
+rotates the body (`rig.estimation.reference.attitude_error`) and does not change the norm of the reference. η changes
 the norm, for example by a bias that depends on stress or temperature, or by a local disturbance. Longer dwells reduce
 neither ε nor η. A solution from six faces has hardly any redundancy to separate ζ from δ. So θ and its covariance are
 averaged over ζ and δ, weighted by the restricted likelihood, a uniform prior of δ and a half-Cauchy prior of ζ with a
@@ -41,7 +42,7 @@ class PlacementSolution:
     placement_uncertainty: float
 
     def add_change(self, change: AbruptChange) -> "PlacementSolution":
-        """Return the solution with a covariance that contains the sensor before and after an abrupt change."""
+        """Return the solution with a covariance so large that U covers the sensor before and after an abrupt change."""
         more, changed = np.zeros_like(self.covariance), np.r_[F, BIAS]
         more[np.ix_(changed, changed)] = change.find_covariance(self.theta[F].reshape(3, 3))
         return replace(self, covariance=self.covariance + more, causes=self.causes | {CHANGE: more})
@@ -54,7 +55,8 @@ NOISE, ATTITUDES, PLACEMENTS, CHANGE = "noise", "attitudes", "placements", "abru
 class _LinearisedPlacements:
     """The linearised readings of N placements.
 
-    - residuals (N, 3): readings minus model; design (N, 3, q) by θ's free directions; variances (N, 3) of the noise.
+    - residuals (N, 3): readings minus model; variances (N, 3) of their noise.
+    - design (N, 3, q): derivatives of the readings with respect to q free directions of θ.
     - turned (N, 3, 3): E, the effects of a small rotation; std_rad (N,): the attitudes' stated standard deviations.
     """
 
@@ -142,7 +144,7 @@ def laid_down(theta: Array, placed: AttitudeReadings, unplaced: Array, unplaced_
 
 
 def _relate_errors(laid: PlacementSolution, all_rests: AttitudeReadings, stated: int) -> PlacementSolution:
-    """Return the solution if the errors of the first `stated` attitudes may be a smooth function of the attitude.
+    """Return the solution of a model in which errors of the first `stated` attitudes may vary smoothly with attitude.
 
     The covariance is that at the most probable standard deviations of the errors, enlarged so that its 95 % intervals
     are those averaged over all standard deviations.

@@ -1,4 +1,4 @@
-"""The only attitude that determines a scale factor, so that no other attitude contradicts an error of it.
+"""The only attitude that determines a scale factor, so that no other attitude shows whether it is wrong.
 
 Repeated rests in one attitude agree even if the attitude is wrong, so they only show that placements repeat.
 """
@@ -48,7 +48,7 @@ def find_sole_attitude(theta: Array, placed: AttitudeReadings) -> tuple[int, int
 
 
 def _group(verticals: Array) -> NDArray[np.intp]:
-    """Return the number (N,) of each direction's group; directions (N, 3) near a group's first one belong to it."""
+    """Return the index (N,) of each direction's group; a group contains the directions (N, 3) near its first one."""
     group = np.full(len(verticals), -1, dtype=np.intp)
     for first in range(len(verticals)):
         if group[first] < 0:

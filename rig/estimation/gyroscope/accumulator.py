@@ -47,12 +47,12 @@ class Solution:
 class Accumulator:
     """Weighted normal equations of any number of revolutions, in constant memory.
 
-    With x̃ = [x 1], a mean reading m, its variance v, the speed ω and a weight w:
+    With x̃ = [x 1], x = [mx² my² mz² mx my mz], a mean reading m, its variance v, the speed ω and a weight w:
 
     - `geometry` (7, 7) = Σ x̃ᵀx̃: the geometry of the sweeps, regardless of their noise.
     - `normal` (7, 7) = Σ w x̃ᵀx̃, `right` (7,) = Σ w ω² x̃.
     - `moments` (3, 3, 7, 7) = Σ w² v_j m_j^a x̃ᵀx̃ for axis j and a = 0, 1, 2. The variance of ω² − ‖K(m + b)‖² is Σ_j
-      4 k_j⁴ (m_j + b_j)² v_j, and k and b are known only after the solution.
+      4 k_j⁴ (m_j + b_j)² v_j; the scale factors k and biases b are known only after the solution.
     - `speed_noise` (7, 7) = Σ w² (2 ω σ_ω)² x̃ᵀx̃.
     """
 
@@ -79,9 +79,9 @@ class Accumulator:
         """Return the sums with one more revolution.
 
         `mean_rad_s` (3,) is the revolution's mean reading, with the variance `variance_rad2_s2` (3,); `speed_rad_s` is
-        its mean speed 2π/T, with the standard deviation `speed_std_rad_s`. The default weight is the inverse variance
-        of ω² − ‖m + b‖² at k = 1 with equal noise on all axes; the paper uses 1. Raise Fault `not_finite`, `bad_speed`,
-        `zero_reading`, `bad_variance`.
+        its mean speed 2π/T, with the standard deviation `speed_std_rad_s`. The default `weight` is the inverse variance
+        of ω² − ‖m + b‖² for unit scale factors and equal noise on all axes; all weights of the paper SIX are 1. Raise
+        Fault `not_finite`, `bad_speed`, `zero_reading`, `bad_variance`.
         """
         mean = np.asarray(mean_rad_s, dtype=np.float64)
         variance = np.asarray(variance_rad2_s2, dtype=np.float64)
@@ -104,8 +104,8 @@ class Accumulator:
     def solve(self, estimator: SixObservationEstimator = "newton") -> Solution:
         """Return scale factors and biases with their covariance.
 
-        `newton` centres the readings on their mean, which is about −b, because uncentred the design of the paper's Eq.
-        (7) is singular if ‖K b‖ = ω. `algorithm_1` uses uncentred readings, as published. Raise Fault
+        `newton` centres the readings on their mean, which is about −b, because without centring the design of the
+        paper's Eq. (7) is singular if ‖K b‖ = ω. `algorithm_1` uses uncentred readings, as published. Raise Fault
         `too_few_observations`, `rank_deficient`, `negative_square`, `algorithm_1_diverged`, `wrong_unit`.
         """
         check_count(self.count, 6, 6)
@@ -147,8 +147,9 @@ class Accumulator:
     def _covariance(self, scale: Array, bias: Array, centre: Array) -> Array:
         """Return the covariance (6, 6) to first order in the errors e of the means.
 
-        δβ = (XᵀW X + XᵀW 1 ∂Γ/∂β)⁻¹ XᵀW e, then k and b from β. `bias` (3,) is that of the readings minus `centre`
-        (3,); the covariance does not depend on the centre.
+        β of `six_observation` changes by δβ = (XᵀW X + XᵀW 1 ∂Γ/∂β)⁻¹ XᵀW e. X has the rows x, W the weights, 1 is a
+        column of ones, and Γ(β) = β0. k and b follow from β. `bias` (3,) is that of the readings minus `centre` (3,);
+        the covariance does not depend on the centre.
         """
         translation = _translation(centre)[:6]
         powers = np.stack([(bias - centre) ** 2, 2 * (bias - centre), np.ones(3)], axis=1) * 4 * scale[:, None] ** 4

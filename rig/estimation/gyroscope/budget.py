@@ -252,7 +252,7 @@ def _evaluate_times(
 
 
 def _find_noise_dof(explained: VectorFit) -> float:
-    """Return the noise's smallest degrees of freedom in scale and bias (JCGM 100, G.4.1)."""
+    """Return the smallest of the degrees of freedom of scale and bias, (6,), for noise alone (JCGM 100, G.4.1)."""
     variances = explained.solution.response**2 * explained.inputs.variances_rad2_s2
     dof = np.broadcast_to(explained.inputs.noise_dof, variances.shape)
     parts, dofs = (array.reshape(len(variances), -1).T for array in (variances, dof))

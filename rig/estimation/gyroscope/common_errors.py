@@ -115,11 +115,11 @@ def _gain(design: Array, effects: Array, noise: Array) -> tuple[Array, Array]:
 
 
 def _add_covariances(
-    solution: VectorSolution, gain: Array, rest: Array, noise: Array, speed_noise: Array
+    solution: VectorSolution, gain: Array, remaining: Array, noise: Array, speed_noise: Array
 ) -> VectorSolution:
     """Return the solution with the covariances and the response of all coefficients and errors, estimated together.
 
-    `gain` (3, p, 3, N) maps readings to the coefficients; `rest` (3, p, P) is the coefficients' error due to the
+    `gain` (3, p, 3, N) maps readings to the coefficients; `remaining` (3, p, P) is the coefficients' error due to the
     unresolved part of the common errors. `noise` (3, N, N) excludes `speed_noise` (N, 3), which the three axes share.
     """
     columns = gain.shape[1]
@@ -130,7 +130,7 @@ def _add_covariances(
     matrix_covariance = raw[of_matrix[:, None], of_matrix]
     to_parameters = parameter_jacobian(solution.matrix, solution.scale)
     to_angles = angle_jacobian(solution.scale[:, None] * solution.matrix, solution.scale, solution.mounting)
-    of_errors = to_angles @ rest[:, :3].reshape(9, -1)
+    of_errors = to_angles @ remaining[:, :3].reshape(9, -1)
     response = np.einsum("qr,rin->qni", to_parameters, gain.reshape(3 * columns, 3, -1)[of_matrix])
     return replace(
         solution,

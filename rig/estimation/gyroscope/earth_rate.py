@@ -8,8 +8,9 @@ So does a sweep: in the mean of a revolution only the Earth's rate along its axi
 estimated: F, c and ω_E.
 
 e contains the arm's errors: its angles, as in `explain`, and its repeatability, which tilts the axis of each sweep
-independently. A tilt of a hundred microradians at 1 rad/s is 20 °/h across the axis, where a sweep determines only the
-bias, so the attitudes determine the Earth's rate. An error in a revolution's end time is a wrong speed, along the axis.
+independently. A tilt of a hundred microradians at 1 rad/s causes an error of 20 °/h perpendicular to the axis, and an
+error in a revolution's end time changes the speed along the axis. So sweeps contribute little more than the bias, and
+the rests in many attitudes determine the Earth's rate.
 
 Gravity and the Earth's axis are both fixed in the room. A g-sensitivity G = λ F has the same effect as an Earth's rate
 along the vertical, so one of them must be given: G, which is zero for an optical gyroscope, or the vertical component
@@ -246,7 +247,10 @@ def _check_identifiable(inputs: VectorInputs, directions: Array, gravity: Array 
 
 
 def _condition(inputs: VectorInputs, directions: Array, gravity: Array | None) -> tuple[refusals.Conditioning, int]:
-    """Return the conditioning of the design (3 N, 3 p + d), in blocks of unit RMS, and its number of columns."""
+    """Return the conditioning of the design, in blocks of unit RMS, and the number of its columns.
+
+    There are 3 p columns of the sensor, for F, c (and G), and d of the Earth's rate, for its `directions` (d, 3).
+    """
     sweeps = inputs.turns_rad_s / (np.linalg.norm(inputs.turns_rad_s) / len(inputs.turns_rad_s) ** 0.5 or 1.0)
     scaled_gravity = None if gravity is None else gravity / (np.linalg.norm(gravity) / len(gravity) ** 0.5)
     sensor_columns = np.kron(design_matrix(sweeps, scaled_gravity), np.eye(3))

@@ -7,7 +7,7 @@ from rig.estimation.arrays import Array
 
 @runtime_checkable
 class Estimate(Protocol):
-    """A solution of g = K (m + b): scale (3,), bias_rad_s (3,), covariance (6, 6) in the order kx ky kz bx by bz."""
+    """A solution of rate = scale × (reading + bias_rad_s); covariance (6, 6) of scale (3,), then bias_rad_s (3,)."""
 
     @property
     def estimator(self) -> str: ...

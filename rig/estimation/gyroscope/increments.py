@@ -152,7 +152,10 @@ def _find_slopes(time_s: Array, rates: Array) -> _Interval:
 
 
 def _integrate_block(interval: _Interval, at_s: Array, inverse: Array) -> tuple[Array, Array, Array]:
-    """Return C (k + 1, 3, 3) and S (k + 1, 3, 12) since the block's start at `at_s` (k,) and its end, and k rates."""
+    """Return C and S, integrated from the start of a block to each time in `at_s` (k,) and to its end, and the rates.
+
+    C is (k + 1, 3, 3), S (k + 1, 3, 12); the rates (k, 3) are those at `at_s`.
+    """
     before = np.clip(np.searchsorted(interval.time_s, at_s, side="right") - 1, 0, len(interval.time_s) - 2)
     whole = _whole_steps(interval)
     attitudes = _running_product(whole.vectors)
@@ -219,7 +222,7 @@ def _matrices(vectors: Array) -> Array:
 
 
 def _running_product(vectors: Array) -> Array:
-    """Return the products (n + 1, 3, 3) 1, exp(φ₁), exp(φ₁) exp(φ₂), …, computed √n rows at a time."""
+    """Return the running products I, exp(φ₁), exp(φ₁) exp(φ₂), … (n + 1, 3, 3), computed √n rows at a time."""
     width = int(np.ceil(np.sqrt(len(vectors))))
     padded = np.zeros((width * width, 3))
     padded[: len(vectors)] = vectors

@@ -22,7 +22,7 @@ REMEDY = "Sweep every wrist in both directions; a second sweep in one direction 
 
 @dataclass(frozen=True, slots=True)
 class LevenbergMarquardtSolution:
-    """A solution of g = K (m + b): scale (3,), bias_rad_s (3,), covariance (6, 6) in the order kx ky kz bx by bz.
+    """A solution of rate = scale × (reading + bias_rad_s); covariance (6, 6) of scale (3,), then bias_rad_s (3,).
 
     `iterations` counts evaluations of the model. `rank` and `condition` belong to the scaled design.
     """
@@ -46,10 +46,12 @@ def solve_levenberg_marquardt(
     speed_std_rad_s: ArrayLike | None = None,
     weighted: bool = True,
 ) -> LevenbergMarquardtSolution:
-    """Solve by `scipy.optimize.least_squares(method="lm")` with the exact Jacobian, from k = 1, b = −(mean m).
+    """Solve by `scipy.optimize.least_squares(method="lm")` with the exact Jacobian.
+
+    The start has unit scale factors, and the negative mean of the readings as bias.
 
     `means_rad_s`, `variances_rad2_s2` (N, 3): mean readings of N ≥ 6 sweeps and the variances of these means;
-    `speeds_rad_s`, `speed_std_rad_s` (N,). Weights are the inverse variances of ω² at k = 1; the paper has equal ones.
+    `speeds_rad_s`, `speed_std_rad_s` (N,). Weights are inverse variances of ‖m + b‖²; the paper SIX has equal weights.
 
     Raise Fault `too_few_observations`, `not_finite`, `bad_variance`, `bad_speed`, `zero_reading`,
     `duplicated_observation`, `lm_did_not_converge`, `rank_deficient`, `ill_conditioned`, `wrong_unit`,
@@ -109,7 +111,7 @@ def solve_levenberg_marquardt(
 
 
 def _conditioning(unit_means: Array, noise: float) -> refusals.Conditioning:
-    """Return the conditioning of Eq. (7)'s design for centred unit readings; squaring doubles `noise`."""
+    """Return the conditioning of Eq. (7)'s design for centred unit readings, whose squares have twice their `noise`."""
     return refusals.condition_of(design(unit_means), 6, 2 * noise * float(np.sqrt(len(unit_means))))
 
 

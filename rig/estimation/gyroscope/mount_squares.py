@@ -1,9 +1,10 @@
-"""The second-order effect of mounting errors on scale and bias, because a tilt reduces a rate by the tilt's cosine.
+"""The second-order effect of mounting errors on scale and bias: a tilt multiplies a rate by the tilt's cosine.
 
 If sweeps do not determine an item's mounting, only the size of the rates' angular errors is known. The first order of
 these errors is a pattern like that of any other error. The mean and the covariance of the second order, 150 ppm for 1°,
-follow from the covariance of the angles (JCGM 100, 5.1.2, note). Every stage has angles of its own, so that a rotation
-common to all stages, which changes no scale, adds nothing.
+follow from the covariance of the angles (JCGM 100, 5.1.2, note). Every stage of the run, that is, every mounting of
+the item, has its own angles, the first stage too. A rotation common to all stages, which changes no scale, then adds
+nothing.
 """
 
 import numpy as np

@@ -1,8 +1,9 @@
 """A gyroscope's nonlinearity: m = (g + odd |g| g + even g²) / k − b.
 
-g is the rate along the sensor's axis. At one speed the odd part belongs to the scale factor; several speeds separate
-the two. Data sheets state the largest distance from the best straight line through ± full scale. A smooth curve is a
-cubic and a square, whose distances are a quarter and a half of their values at full scale.
+m is the reading, g the rate along the sensor's axis, k the scale factor, b the bias. At one speed the odd part belongs
+to the scale factor; several speeds separate the two. Data sheets state the largest distance from the best straight line
+through ± full scale. A smooth curve is taken as the sum of a cube and a square of the rate; the largest distance of the
+cube is a quarter of its value at full scale, that of the square a half.
 """
 
 from dataclasses import dataclass
@@ -48,7 +49,8 @@ def curvature(matrix: Array, rates_rad_s: Array) -> Array:
 def nonlinear_effects(matrix: Array, rates_rad_s: Array, full_scale_rad_s: float, true_at_rad_s: float = 0.0) -> Array:
     """Return the effects (6, N, 3) of cubes along x, y, z, then of squares, each of unit size at full scale.
 
-    Arguments as in `curvature`; F is exact at the speed `true_at_rad_s`.
+    Arguments as in `curvature`. A linear term is subtracted from the cubes, so that F is exact at the speed
+    `true_at_rad_s`, that is, the cubes have no effect there.
     """
     readings = rates_rad_s @ matrix.T
     projected = readings / np.linalg.norm(matrix, axis=1) / full_scale_rad_s

@@ -9,8 +9,9 @@ with s the three squares and l the three linear terms. The columns of X have the
 (7) prints them last. m is the mean reading of the revolution, squared afterwards: averaging m², as Eq. (8) reads, adds
 the noise's variance to every square and shrinks the scale.
 
-β depends on the unknown β0 = γ through one scalar only: β(γ) = p − γ q with p = X⁺ω² and q = X⁺1 (X⁺: least squares).
-Both solvers find the fixed point of γ: `solve_by_newton`, and `solve_by_algorithm_1` as published in SIX.
+β0 is unknown too. If it has the value γ, least squares give β(γ) = p − γ q with p = X⁺ω² and q = X⁺1 (X⁺: pseudoinverse
+of X, 1: column of ones). With Γ(β) = Σ β_l² / (4 β_s) the solution is the γ that satisfies γ = Γ(β(γ)). Two functions
+find it: `solve_by_newton`, and `solve_by_algorithm_1` as published in SIX.
 `rig.estimation.gyroscope.accumulator` computes p and q from any number of revolutions.
 """
 
@@ -46,9 +47,9 @@ def closed_form(means_rad_s: Array, speed_rad_s: float) -> tuple[Array, Array]:
 
 
 def solve_by_newton(p: Array, q: Array, square_rad2_s2: float) -> tuple[Array, int]:
-    """Return β (6,) and the number of Newton steps on γ = Γ(p − γ q).
+    """Return β (6,) = p − γ q, with γ = Γ(β) found by Newton's method, and the number of steps.
 
-    The first iterate is the closed form for the mean squared speed (rad²/s²), which is exact if all speeds are equal.
+    The first γ is the closed form for the mean squared speed (rad²/s²), which is exact if all speeds are equal.
     From there the iteration converges for any bias. Raise Fault `negative_square`.
     """
     ps, qs = p.tolist(), q.tolist()

@@ -62,7 +62,8 @@ def six_observation_budget(explained: VectorFit, six: Solution, unknown: Unknown
 def response_of(solution: Solution, inputs: VectorInputs) -> Array:
     """Return the derivative (6, N, 3) of scale and bias with respect to the mean readings; zero for the unused rests.
 
-    To first order, as in `Accumulator.solve`: δβ = (XᵀW X + XᵀW 1 ∂Γ/∂β)⁻¹ XᵀW e with e = −2 Σ_j k_j² (m_j + b_j) δm_j.
+    The first order is that of `Accumulator._covariance`. An error δm of a mean reading m adds the error
+    e = −2 Σ_j k_j² (m_j + b_j) δm_j to its equation.
     """
     swept = np.linalg.norm(inputs.turns_rad_s, axis=1) > 0
     means, variances = inputs.means_rad_s[swept], inputs.variances_rad2_s2[swept]

@@ -3,10 +3,11 @@
     m_j = F ω_j + c + F (ω̂_j ω̂_jᵀ ε_j + (1 − ω̂_j ω̂_jᵀ) η_j) ‖ω_j‖ + noise,   ε_j ~ N(0, ρ²), η_j ~ N(0, α² 1₃)
 
 ρ is the relative error of a sweep's rate, α the tilt of its axis: random effects of unknown variance. Few sweeps
-determine a variance badly: the restricted maximum likelihood is often at zero, and its U covers the true value in only
-60 to 85 of 100 cases. So the result averages over all pairs (ρ, α), weighted by the restricted likelihood (Harville, J.
-Am. Stat. Assoc. 72 (1977) 320) and a prior: log-uniform from a tenth of the noise, below which ρ and α change nothing,
-to `PRIOR_KNEE_ERROR`; beyond, the density falls as the inverse. If the sweeps determine ρ and α, U approaches that of
+determine a variance badly: the restricted maximum likelihood estimate is often zero, and a U computed from it covers
+the true value in only 60 to 85 of 100 cases. So the result averages over all pairs (ρ, α), weighted by the restricted
+likelihood (Harville, J. Am. Stat. Assoc. 72 (1977) 320) and a prior. The prior is log-uniform from a tenth of the
+noise, below which ρ and α change nothing, to `PRIOR_KNEE_ERROR`; above this, its density over ln ρ falls as 1/ρ, and
+that over ln α as 1/α. If the sweeps determine ρ and α, U approaches that of
 Student's t with the dof of the redundant sweeps (Box and Tiao, Bayesian Inference in Statistical Analysis, 1973, 5.2;
 Gelman, Bayesian Analysis 1 (2006) 515).
 """
@@ -75,7 +76,7 @@ class MotionErrors:
         return _median(self.rate**2, self.weights), _median(self.axis_rad**2, self.weights)
 
     def expanded(self, fixed: Array, of_rate: Array, of_axis: Array) -> Array:
-        """Return the expanded uncertainty U (q,) of values at 95.45 %, over all pairs (ρ, α).
+        """Return the expanded uncertainties U (q,), at 95.45 %, of q values, over all pairs (ρ, α).
 
         For given ρ and α the values have a normal distribution. `fixed` (q,) are the variances that do not depend on
         them, `of_rate` and `of_axis` (q,) the variances per ρ² and per α².

@@ -39,14 +39,15 @@ class VectorInputs:
     - joints (N): the joint that turned, None for a rest.
     - axis_errors_rad_s (P, N, 3): effect of one standard uncertainty of each of the arm's angles on the rates.
     - return_errors_rad_s (P, N, 3): effect of one standard uncertainty of each return of a joint to an angle.
-    - mount_turns_rad (3 S, N, 3): rotation vectors of an item due to one std of each mount of S stages; those of the
-      first stage are last.
+    - mount_turns_rad (3 S, N, 3): rotation vectors of the item if its mounting in one of S stages is wrong by one std
+      about x, y or z; the first stage comes last.
     - arms_m (N, 3): lever arms from the rotation axis to the sensor in the flange frame, None to neglect them.
     - noise_dof (N, 3): degrees of freedom of the variances.
     - sensor: the sensor's properties from the data sheet, None if unknown.
     - encoder_errors_rad_s (P, N, 3): effect of encoders at the ends of arcs, None for whole revolutions.
     - ripples (N,): RMS ripple of each rotation as a fraction of its rate.
-    - state_gains (N,): noise that the arm's states cause in the mean rates, relative to their noise in Δθ/T.
+    - state_gains (N,): noise of the mean rates due to the arm's states, relative to its value in the quotient of a
+      joint's travel and the duration.
     - roundings_rad_s (N, 3): standard uncertainty of each mean due to rounding.
     """
 
@@ -102,7 +103,8 @@ class VectorInputs:
     def mount_errors_rad_s(self) -> Array | None:
         """The effects (3 S, N, 3) of one standard uncertainty of each mount on the rates.
 
-        The first stage defines the item's frame, so an error of its mount (the last three) changes only other stages.
+        The first stage defines the item's frame, so an error of its mount (the last three) appears with the opposite
+        sign in all other stages.
         """
         if self.mount_turns_rad is None:
             return None

@@ -217,7 +217,10 @@ def _unit(design: Array) -> Array:
 
 
 def regress(design: Array, means: Array, variances: Array, shared: Array | None = None) -> tuple[Array, Array]:
-    """Return coefficients (…, p, 3) and each axis's map (…, 3, p, N) to them; `shared` (N, N) adds to the variances."""
+    """Return coefficients (…, p, 3), and the map (…, 3, p, N) of each axis from its means to its coefficients.
+
+    `shared` (N, N) is a covariance that is added to the `variances`.
+    """
     transposed = np.swapaxes(design, -1, -2)[..., None, :, :]
     if shared is None:
         weights = 1 / np.swapaxes(variances, -1, -2)  # (…, 3, N)

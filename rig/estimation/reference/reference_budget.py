@@ -46,7 +46,7 @@ class FitUncertainty:
 
     @property
     def noise_dof_min(self) -> float:
-        """The smallest degrees of freedom of the noise in scale and bias."""
+        """The smallest of the degrees of freedom of scale and bias, (6,), for noise alone."""
         return fewest_dof(self.response, np.diag(self.noise), self.noise_dof)
 
     def covariance_of(self, patterns: Array) -> Array:
@@ -89,9 +89,10 @@ def scale_and_bias_covariance(matrix: Array, scale: Array, covariance: Array) ->
 
 
 def fewest_dof(response: Array, variances: Array, dof: Array) -> float:
-    """Return the smallest degrees of freedom of the noise in scale and bias.
+    """Return the smallest of the degrees of freedom of scale and bias, (6,), for noise alone.
 
-    `response` (6, n) is their derivative by the readings, whose `variances` (n,) have `dof` (n,) degrees of freedom.
+    `response` (6, n) contains the derivatives of scale and bias with respect to the readings, whose noise has the
+    `variances` (n,), with `dof` (n,) degrees of freedom.
     """
     return float(effective_dof((response**2 * variances).T, dof[:, None]).min())
 

@@ -26,7 +26,7 @@ class Turning:
     """A gyroscope's `readings_rad_s` (n, 3) at `time_s` (n,), and the rows of a reference.
 
     `rows_s` (N, 2): start and end of each row; `attitudes` (N, 3, 3), body to table; `std_rad` (N,) as stated.
-    `hides_losses`: the readings' stamps do not show single lost readings.
+    `hides_losses`: True if a single lost reading leaves no gap in the readings' time stamps.
     """
 
     time_s: Array
