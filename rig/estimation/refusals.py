@@ -292,8 +292,8 @@ class Conditioning:
 def condition_of(design: Array, needed: int, noise: float = 0.0) -> Conditioning:
     """Return the conditioning of a design (n, p) with columns in comparable units and a rank of `needed`.
 
-    Singular values at rounding, or within three times `noise` (the norm of measurement noise in a measured design), do
-    not count towards the rank.
+    Singular values below rounding errors, or below three times `noise` (the norm of measurement noise in a measured
+    design), do not count towards the rank.
     """
     singular = np.linalg.svd(design, compute_uv=False)
     floor = max(1e-10 * float(singular[0]), 3 * noise)

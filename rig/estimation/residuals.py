@@ -1,4 +1,4 @@
-"""The expected standard deviations of a solution's residuals: of the modelled errors, without what the fit absorbs."""
+"""The standard deviations that a solution's residuals would have if the modelled errors were the only errors."""
 
 from dataclasses import replace
 from typing import TYPE_CHECKING

@@ -25,7 +25,7 @@ class AccelerometerErrors:
     - norm_m_s2: norm of gravity.
     - bias_m_s2_k, scale_per_k: changes of bias and scale with temperature.
     - warmer_k (K',): recorded deviation from the mean temperature.
-    - unseen_k (K',): deviation of the temperature below the recorded steps.
+    - unseen_k (K',): deviation of the temperature that is smaller than the thermometer's step and so not recorded.
     - windows_s (K', 2): start and end of each dwell or sweep.
     - instability_m_s2: the least Allan deviation of the bias' flicker.
     - walk_m_s2_sqrt_s: random walk of the bias, estimated from the readings.

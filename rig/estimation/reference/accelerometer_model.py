@@ -2,7 +2,8 @@
 
     m = F (s + φ s²) + b,   s = Rᵀ v_ref + ω × (ω × (p + r)) + α × (p + r)
 
-in flange coordinates; F includes the mounting. v_ref is the specific force at rest, in base coordinates. The lever arm
+in flange coordinates; F includes the mounting, φ is the nonlinearity, b the bias, ω the angular rate, α the angular
+acceleration. v_ref is the specific force at rest, in base coordinates. The lever arm
 p, from the rotation axis to the flange, is given by the arm; r leads from the flange to the sensor.
 
 If a joint turns by θ about the flange-fixed axis a, from the attitude R₀, at the constant rate ω, the specific force
@@ -11,8 +12,9 @@ has a mean, a cosine and a sine over its angle. With u = R₀ᵀ v_ref and c = �
     mean: a (a·u) + c,   cosine: cos ψ (u − a (a·u)) + sin ψ a × u,   sine: sin ψ (u − a (a·u)) − cos ψ a × u
 
 A joint turns unevenly. The weights that form mean, cosine and sine of the readings are also applied to ω² and α of the
-encoders (`Sweeps.turning_rad2_s2`); c is the sum of these, times (a aᵀ − 1) (p + r) and a × (p + r). In uneven
-rotation, ω² and α are those of the time τ earlier, and gravity is rotated by a further (ω − ω₀) τ.
+encoders (`Sweeps.turning_rad2_s2`). Each of the three then contains c = ω² (a aᵀ − 1) (p + r) + α a × (p + r), with
+these weighted ω² and α. In uneven rotation, ω² and α are those of the time τ earlier, and gravity is rotated by a
+further (ω − ω₀) τ, with the mean rate ω₀.
 
 ψ = ω τ is the joint's rotation during the lag τ of the accelerometer behind the clock of its time stamps; its sign is
 that of ω. If a gyroscope's readings have set that clock, τ is the lag behind the gyroscope. The filter's attenuation,
@@ -56,12 +58,14 @@ class Sweeps:
     """Whole revolutions at nearly constant speed.
 
     - harmonics_m_s2 (M, 3, 3): mean, cosine and sine over the joint's angle (rows) of the axes x y z.
-    - swayed_m_s2 (M, 3, 3): the same of the specific force due to the sway of other joints, by the encoders.
+    - swayed_m_s2 (M, 3, 3): mean, cosine and sine of the specific force that the sway of other joints causes; their
+      encoders measure it.
     - covariances_m2_s4 (M, 9, 9): the harmonics' covariances, row by row (`rig.estimation.reference.sweep_harmonics`).
-    - axes_flange (M, 3): unit vector of a growing angle; speeds_rad_s (M,): negative if the angle falls.
+    - axes_flange (M, 3): unit vector about which the joint's angle grows; speeds_rad_s (M,): negative if it falls.
     - attitudes (M, 3, 3): flange to base at the angle zero.
     - arms_m (M, 3): p, from the axis to the flange's origin, in flange coordinates.
-    - stations (M,): the number of each sweep's joint and pose; sweeps of one station share errors in both directions.
+    - stations (M,): index of each sweep's station, a joint and a pose; sweeps of a station, in both directions, share
+      errors.
     - turning_rad2_s2 (M, 6, 3): mean, cosine and sine of the joint's motion, as in `FirstHarmonic`.
     """
 
@@ -100,7 +104,8 @@ class Movement:
 
     - `repeatability_rad`: std of each sweep's independent rotations; the sweeps of one station share all other errors.
     - `sensor_errors`: errors of the sensor itself; None if unknown.
-    - `arm_turns` (P, 3 N + 10 M): effects of P errors of the arm per δ, in the order of `effects`; None if unknown.
+    - `arm_turns` (P, 3 N + 10 M): small rotations of N dwells and waves of M sweeps, in the order of the columns of
+      `effects`, due to P constant errors of the arm, for δ = 1; None if unknown.
     - `independent_fraction`: the fraction of δ² that is independent in each dwell.
     """
 

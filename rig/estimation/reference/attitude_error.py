@@ -1,10 +1,11 @@
 """Uncertain attitudes: their standard deviation, and the fit that includes it.
 
-A small rotation ε of the body, (3,) rad, turns the reference in the body's frame and does not change its size:
+A small rotation ε of the body, (3,) rad, turns the reference v_ref in the body's frame and does not change its size:
 
     v_m = F (s + φ s²) + b + E ε,   s = Rᵀ v_ref + v̄,   E = F diag(1 + 2 φ s) [Rᵀ v_ref]×
 
-With ε ~ N(0, δ² 1) in every attitude a reading of noise σ (3,) has the covariance V = diag(σ²) + δ² E Eᵀ, which along
+v̄ is the part of the input that the table's own motion adds; F, φ and b are matrix, nonlinearity and bias. With
+ε ~ N(0, δ² I) in every attitude a reading with noise σ (3,) has the covariance V = diag(σ²) + δ² E Eᵀ, which along
 the reference does not depend on δ. The fit with these covariances is the fit to the reference as a vector for δ → 0,
 and the fit to its size alone for δ → ∞. δ is the restricted maximum likelihood estimate (Patterson and Thompson,
 Biometrika 58 (1971) 545).

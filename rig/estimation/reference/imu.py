@@ -189,7 +189,7 @@ def _find_worst_dwell(start: Array, movement: Movement, fixed: list[int], fit: F
 
 
 def _check(movement: Movement, parameters: int) -> None:
-    """Raise as `solve_imu` does for inputs of a wrong shape, number, value or rank; θ has `parameters` free ones."""
+    """Raise as `solve_imu` does for inputs of a wrong shape, number, value or rank, to fit so many `parameters`."""
     dwells, sweeps = movement.dwells, movement.sweeps
     count, swept = len(dwells.readings_m_s2), len(sweeps.speeds_rad_s)
     shapes = (

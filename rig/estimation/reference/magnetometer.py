@@ -25,7 +25,7 @@ FALSE_ALARM_PROBABILITY = 1e-3  # of one of the two tests, for a steady, uniform
 
 
 def hard_iron(solution: TriaxialSolution) -> Array:
-    """Return F⁻¹ b (3,), the field that an ideal sensor would read as the `solution`'s bias b."""
+    """Return F⁻¹ b (3,), the field that changes the readings by as much as the `solution`'s bias b."""
     return np.asarray(np.linalg.solve(solution.matrix, solution.bias), dtype=np.float64)
 
 

@@ -37,7 +37,10 @@ def noise(theta: Array, movement: Movement) -> Array:
 
 
 def nonlinearity_patterns(theta: Array, movement: Movement) -> Array:
-    """Return the patterns (P, 3 K) of one standard uncertainty of φ and χ, the nonlinearity, of each axis."""
+    """Return the effects (P, 3 K) on the readings of one standard uncertainty of each axis' nonlinearities φ and χ.
+
+    φ is the quadratic and χ the cubic one, as in `accelerometer_errors`; those of zero uncertainty are left out.
+    """
     sensor = movement.sensor_errors
     if sensor is None:
         return np.zeros((0, movement.readings().size))
@@ -135,7 +138,10 @@ def per_axis(columns: Array) -> Array:
 
 
 def project_errors(theta: Array, movement: Movement, change: Callable[[Array], Array]) -> Array:
-    """Return patterns (3 K, 3) of a `change` of the force along each axis, in sweeps as mean and first harmonic."""
+    """Return the effects (3 K, 3), on the readings, of an error of one axis that depends on the force along this axis.
+
+    `change` returns the error for forces of any shape. In sweeps the effects are mean, cosine and sine of the error.
+    """
     dwells, axes = len(movement.dwells.readings_m_s2), matrix(theta)
     felt_along = find_force(theta, movement) @ (axes / np.linalg.norm(axes, axis=1, keepdims=True)).T
     mean, cos, sin = np.moveaxis(felt_along[dwells:].reshape(-1, 3, 3), 1, 0)

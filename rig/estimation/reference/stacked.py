@@ -111,10 +111,11 @@ def _solve(x: Array, sizes: Array, prior: ReferencePrior) -> Array:
 def compute_published_covariance(
     theta: Array, readings: Array, attitudes: Array, prior: ReferencePrior, variances: Array
 ) -> Array:
-    """Return the covariance (p, p) of θ by the published method, to first order in errors of `variances` (N, 3).
+    """Return the covariance (p, p) of θ by the published method, to first order in the readings' errors.
 
-    An error e of a reading also changes the matrix X of the equations, so the error enters equation k as F⁻¹ e_k: δβ =
-    −X⁺ F⁻¹ e, projected to the normalisation. With second-order terms s² changes with v_ref. F and b follow from β.
+    The errors have `variances` (N, 3). An error e of a reading also changes the matrix X of the equations, so the error
+    enters equation k as F⁻¹ e_k. Hence δβ = −X⁺ F⁻¹ e, of which the part that would change ‖v_ref‖ is removed if that
+    norm is given. With second-order terms s² changes with v_ref. F and b follow from β.
     """
     second_order = len(theta) > 15
     norm_known = isinstance(prior, KnownNorm)

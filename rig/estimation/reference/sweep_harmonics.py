@@ -46,13 +46,13 @@ class FirstHarmonic:
     """The first harmonic of n samples, its uncertainty, and the joint's motion.
 
     - `harmonic_m_s2` (3, 3): mean, cosine, sine (rows) of the axes x y z; `covariance_m2_s4` (9, 9), row by row.
-    - `swayed_m_s2` (3, 3): the same of the force due to the sway of other joints, in the sensor's nominal axes.
+    - `swayed_m_s2` (3, 3): mean, cosine, sine of the force due to other joints' sway, in the sensor's nominal axes.
     - `speed_rad_s`: the joint's mean speed, negative if its angle falls.
     - `noise_m_s2` (3,): std of one sample, with `dof` degrees of freedom; `residuals_m_s2` (n, 3).
     - `vibration_m_s2` (3,): RMS of the removed vibration of servo and arm.
     - `turning_rad2_s2` (6, 3): mean, cosine and sine, by the same weights, of six terms of the joint's motion: ω², α,
-      and for the filter's lag their derivatives per radian of the mean rotation, then ω₀ (ω − ω₀) cos θ and
-      ω₀ (ω − ω₀) sin θ. ω is the joint's rate, ω₀ its mean, α its angular acceleration, θ its angle.
+      d(ω²)/dψ, dα/dψ, ω₀ (ω − ω₀) cos θ, ω₀ (ω − ω₀) sin θ. ω is the joint's rate, ω₀ the mean rate, α the angular
+      acceleration, θ the angle, ψ = ω₀ t. The last four terms describe the lag of the sensor's filter.
     """
 
     harmonic_m_s2: Array
@@ -124,10 +124,10 @@ def first_harmonic(
 
 
 def estimate_acceleration(angle_rad: Callable[[Array], Array], time_s: Array, speed_rad_s: float) -> Array:
-    """Return a joint's angular acceleration (n,), rad/s², as differences of its mean speeds between even samples.
+    """Return a joint's angular acceleration (n,), rad/s², from the mean speeds half a sample before and after.
 
     - angle_rad: returns the joint's angles (n,) at times (n,), also shortly before and after the samples.
-    - time_s (n,): the samples' times; speed_rad_s: the joint's speed, without its sign.
+    - time_s (n,): the samples' times, equally spaced; speed_rad_s: the joint's speed, without its sign.
 
     Each speed is a mean over `SPEED_MEAN_RAD`. The sum of the accelerations depends only on the speeds at both ends of
     the revolution, so the encoders' noise stays small.
@@ -168,7 +168,7 @@ def _find_long_run_covariance(residuals: Array, scatter: Array, coloured: Callab
 
 
 def _require_revolution(angle_rad: Array) -> None:
-    """Raise Fault `incomplete_revolution` unless angles (n,) of even samples cover one revolution."""
+    """Raise Fault `incomplete_revolution` unless angles (n,) of equally spaced samples cover one revolution."""
     travel = angle_rad[-1] - angle_rad[0] if len(angle_rad) else 0.0
     covered_rad = abs(travel) * len(angle_rad) / max(len(angle_rad) - 1, 1)  # with the last sample's interval
     if len(angle_rad) < MIN_SAMPLES or abs(covered_rad / (2 * np.pi) - 1) > REVOLUTION_TOLERANCE:

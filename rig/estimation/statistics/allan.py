@@ -80,8 +80,8 @@ class AllanAxis:
 def allan_curve(series: Sequence[Array], interval_s: float) -> AllanCurve:
     """Return the overlapping Allan deviation of series (nᵢ, 3) of readings that are `interval_s` apart.
 
-    The times τ are about powers of two of the interval, and 1 s. Raise Fault `not_finite`, and `recording_too_short`
-    if no series has three readings.
+    The times τ are `interval_s` times powers of two, and the multiple of `interval_s` nearest to 1 s. Raise Fault
+    `not_finite`, and `recording_too_short` if no series has three readings.
     """
     used = [np.asarray(readings, dtype=np.float64) for readings in series if len(readings) >= MIN_READINGS]
     if not used:

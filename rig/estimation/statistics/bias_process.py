@@ -160,9 +160,9 @@ def _root_mean_square(sizes: Array, log_posterior: Array, prior: Array | float =
 
 
 def select_by_akaike(sizes: Array, likelihood: Array) -> Array:
-    """Return the likeliest random walk and scatter (2,) of `sizes` (K, 2); zero unless Akaike's criterion decreases.
+    """Return the random walk and scatter (2,), of all pairs in `sizes` (K, 2), with the least Akaike criterion.
 
-    So there is no random walk if noise alone explains the averages.
+    Each size that is not zero increases the criterion. So both are zero if noise alone explains the averages.
     """
     return np.asarray(sizes[np.argmax(likelihood - PARAMETER_COST * np.count_nonzero(sizes, axis=1))], dtype=np.float64)
 

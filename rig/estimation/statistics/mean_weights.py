@@ -2,8 +2,9 @@
 
 A reading is F ω + c plus nuisance effects. Weights w orthogonal to the nuisance columns N give wᵀ m = F wᵀ ω + c: the
 mean of the readings corresponds to the mean of ω with the same weights, even if the samples cover a vibration
-incompletely or end at any time. Least squares by groups and nuisance columns together has these weights in its rows
-(the Frisch–Waugh–Lovell theorem).
+incompletely or end at any time. In a least-squares fit of the groups' means together with coefficients of the
+nuisance columns, the rows of the pseudoinverse that belong to the means are these weights (the Frisch–Waugh–Lovell
+theorem).
 """
 
 import numpy as np
@@ -33,6 +34,6 @@ def mean_weights(groups: Array, nuisance: Array) -> Array:
 
 
 def even_groups(part: NDArray[np.intp], parts: int) -> Array:
-    """Return the groups (n, p) for `mean_weights` from the number (n,) of each sample's part, −1 for none."""
+    """Return the groups (n, p) for `mean_weights`; `part` (n,) is the index of a sample's part, −1 if it has none."""
     groups: Array = (part[:, None] == np.arange(parts)).astype(np.float64)
     return groups

@@ -28,11 +28,12 @@ MIN_MEAN_LENGTH = 0.5  # of unit vectors that have one direction
 
 @dataclass(frozen=True, slots=True)
 class Steps:
-    """The steps of rounded numbers: `unit` (3,) of each axis, or one of all.
+    """The steps of rounded numbers: `unit` (3,) of each axis, or one number for all axes.
 
-    A number truncated (`cut`) toward zero is shifted to the middle of its interval. Zero represents all values
-    within one unit in either direction, so the next values are one and a half units away from it. `zero` (3,): the
-    value that readings truncated to zero have now, in units modulo 1; NaN if unknown.
+    If `cut`, numbers were truncated toward zero, then shifted to the middle of their interval. Zero represents all
+    values within one unit in either direction, so the next values are one and a half units away from it. An offset
+    added later moves the readings that were zero: `zero` (3,) is their present value in units, modulo 1, NaN if
+    unknown.
     """
 
     unit: Array | float
@@ -71,8 +72,9 @@ class Steps:
 def cut_steps(readings: Array, unit: float) -> Steps:
     """Return the resolution steps of readings (n, 3) that the source has truncated toward zero to multiples of `unit`.
 
-    The source may have applied an offset and a scale factor near one after truncation. Nonzero truncated values then
-    lie half a unit off the integers relative to zero, which shows where zero is.
+    The source may have applied an offset and a scale factor near one after truncation. Nonzero readings are in the
+    middle of their intervals, so they differ from the reading that was zero by whole units and a half. Most readings
+    are nonzero, so they show which reading was zero.
     """
     steps = find_steps(readings)
     units = np.where(np.abs(steps / unit - 1) < MAX_UNIT_CHANGE, steps, unit)

@@ -153,8 +153,8 @@ class MixedModel:
         """Climb from `logarithms` (k,) of the standard deviations to a maximum of the posterior.
 
         The search ends early if it joins an `earlier` ascent. The method is Newton's in a trust region, and the
-        curvature is the average information (Gilmour, Thompson and Cullis, Biometrics 51 (1995) 1440). The trust region
-        undoes and shortens a step to ratios of standard deviations so large that rounding dominates.
+        curvature is the average information (Gilmour, Thompson and Cullis, Biometrics 51 (1995) 1440). A step to
+        standard deviations so different that rounding dominates is undone and repeated in a smaller trust region.
         """
         from scipy.optimize import minimize
 

@@ -156,8 +156,9 @@ def fit_over_temperature(readings: RepeatedMeans, reference_c: float, gradient_k
     """Fit scale and bias as polynomials of T − `reference_c` to the readings.
 
     Plain least squares determine the scale factors at the reference; `combine_with_reference` replaces them by better
-    ones. `gradient_k` is the half-width of the change, in use, of the temperature difference between thermometer and
-    sensor. Raise Fault `too_few_observations`, `temperature_range_too_small`, `temperature_outside`, `not_finite`.
+    ones. The temperature difference between thermometer and sensor may be another when the sensor is in use, by at most
+    `gradient_k`. Raise Fault `too_few_observations`, `temperature_range_too_small`, `temperature_outside`,
+    `not_finite`.
     """
     check_finite(means=readings.means, temperature_c=readings.temperature_c)
     range_c = (float(readings.temperature_c.min()), float(readings.temperature_c.max()))
@@ -210,8 +211,8 @@ def combine_with_reference(
 ) -> OverTemperature:
     """Return the polynomials with k and c (6,) at the reference temperature replaced by `values`.
 
-    `values` are another solution, which holds at that temperature. `lines` are the contributors to `values`, with the
-    covariance (6, 6) of their means over all temperatures.
+    `values` come from another solution, of readings corrected to that temperature. `lines` are the contributors to its
+    uncertainty, each with a covariance (6, 6), without the error of the correction.
     """
     scale, bias = polynomials.scale * values[:3] / polynomials.scale[0], polynomials.bias.copy()
     bias[0] = values[3:]
@@ -245,7 +246,7 @@ def heating_rate(windows_s: Array, temperature_c: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, slots=True)
 class _TemperatureFit:
-    """One fit: the coefficients (3 orders, 3) of relative changes of k, and of c, in powers of T − reference.
+    """One fit: the coefficients of orders 1 to 3 (rows) of `relative` k (3, 3) and `bias` c (3, 3) in T − reference.
 
     `covariance` (18, 18) includes the effect of the fitted lag, `without_lag` (18, 18) does not.
     """
@@ -288,7 +289,7 @@ class _ParameterFits:
         self.count = 3 * (len(readings.means) - poses.shape[1])
 
     def refer(self, readings: RepeatedMeans, fit: "_TemperatureFit") -> None:
-        """Recompute the inputs from the readings at the reference temperature instead of at the mean temperature."""
+        """Recompute the inputs from the readings corrected to the reference by `fit`, instead of uncorrected ones."""
         powers = self.powers[:, 1:] * self.span ** np.arange(1.0, MAX_ORDER + 1)
         self._fit_inputs(
             readings, readings.means - powers @ fit.bias + (1 - 1 / (1 + powers @ fit.relative)) * self.inputs
@@ -428,10 +429,10 @@ class _ParameterFits:
 
 
 def _coefficients_from_changes(centre: Array, which: int) -> Array:
-    """Return the matrix (12, 18) from the orders 1 to 3 of k and c to all four orders of k (`which` 0) or c (1).
+    """Return the matrix (12, 18) from the orders 1 to 3 of k and c to the orders 0 to 3 of k (`which` 0) or c (1).
 
-    The mean over the readings is fixed. So an overestimated coefficient makes the value at the reference too small, by
-    the mean power of the coefficient's order, `centre` (2, 3, 3).
+    Order 0 is the value at the reference. The mean value over the readings is fixed, so an error of a coefficient
+    changes order 0 by minus that error times the mean power of T − reference, `centre` (2, 3, 3).
     """
     matrix = np.zeros((3 * (MAX_ORDER + 1), 6 * MAX_ORDER))
     first = 3 * MAX_ORDER * which
@@ -504,7 +505,7 @@ def _drop_rare_poses(readings: RepeatedMeans) -> RepeatedMeans:
 
 
 def group_by_input(inputs: Array, conditions: Array) -> NDArray[np.intp]:
-    """Return the number (N,) of each reading's pose: nearly equal inputs (N, 3) and conditions (N, q)."""
+    """Return the index (N,) of each reading's pose; in one pose `inputs` and `conditions` are nearly constant."""
 
     def scale_columns(columns: Array) -> Iterator[Array]:
         size = float(np.abs(columns).max(initial=0.0))
