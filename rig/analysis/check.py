@@ -17,7 +17,7 @@ UNCALIBRATED_FAULTS = ("no_attitudes", "field_strength_unknown")  # of sensors t
 class Check:
     """One check of the verdict, which passes if its value is a number not above limit - guard.
 
-    - name: the check in words, for people; programs read means.
+    - name: the check in words, for people; programs use means instead.
     - value, limit: in unit; None if nothing was measured, or no limit was set.
     - unit: the unit of value, limit, uncertainty and guard.
     - means: the sensor and quantity that the check is about.

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def angle_dof(result: "SensorResult") -> Array | None:
-    """Return the degrees of freedom (6,) of a gyroscope's non-orthogonality, then of its mounting, or None."""
+    """Return the degrees of freedom (6,) of a gyroscope's non-orthogonality, then its mounting; None if unknown."""
     explained, budget = result.explained, result.uncertainty
     if explained is None or budget is None:
         return None
@@ -74,7 +74,7 @@ def field_angle_dof(result: "MagnetometerResult") -> Array:
 def reversal_dof(reversal: "MagnetometerReversal") -> tuple[Array, Array]:
     """Return the degrees of freedom of the mean scale factors (3,), and of bias and arm's field (6,).
 
-    Those of bias and field are the lowest of any run's bias, which is a lower bound for a sum of independent parts.
+    For bias and field, they are the fewest of any run's bias: a sum of independent parts has at least as many.
     """
     budgets = [run.result.budget for run in reversal.runs]
     # Welch–Satterthwaite: u⁴ / ν = Σ u_i⁴ / ν_i. Errors common to the runs have infinite ν and add nothing.
@@ -93,7 +93,10 @@ def _axis_dof(result: "AccelerometerResult | MagnetometerResult", response: Arra
 
 
 def _attitude_dof(budget: Budget, response: Array, noise: Array, std: Array) -> Array:
-    """Return the degrees of freedom of `std` (q,), from the `response` (q, n) to readings with that `noise` (n, n)."""
+    """Return the degrees of freedom of `std` (q,) of values with the `response` (q, n) to readings.
+
+    `noise` (n, n) is the covariance of the readings.
+    """
     from rig.estimation.reference.reference_budget import ATTITUDES
 
     by_noise = np.einsum("qn,nm,qm->q", response, noise, response)
@@ -109,9 +112,10 @@ def _reading_parts(noise: Array, walk: Array, explained: VectorFit) -> dict[str,
 
 
 def _split(whole: Array, parts: dict[str, Array], budget: Budget) -> Array:
-    """Return the degrees of freedom (…) of variances (…), by those of their `parts`; the remainder's are infinite.
+    """Return the degrees of freedom (…) of variances `whole` (…), by Welch–Satterthwaite.
 
-    Raise KeyError if the budget has no such contributor.
+    Each of `parts` (…) has the degrees of freedom of the budget's contributor of its name, and the remainder of `whole`
+    has infinitely many. Raise KeyError if the budget has no such contributor.
     """
     clipped = [np.clip(part, 0.0, whole) for part in parts.values()]
     rest = np.clip(whole - np.sum(clipped, axis=0), 0.0, None)

@@ -16,7 +16,7 @@ SPLINE_NOISE_RATIO = 0.935  # the same for an angle between two readings, by the
 
 @dataclass(frozen=True, slots=True)
 class MeasurementEnvironment:
-    """The site, the stated uncertainty, the controller's clock, and its states' jitter in s.
+    """The site, the stated uncertainty, the controller's clock, and the jitter of the times of its states, s.
 
     - `clock`: the comparison that corrects the speeds; `clocks`: the comparisons of all recordings, for the checks.
     - `extension_m` (3,): the sensors' position relative to the flange, in the flange's frame.

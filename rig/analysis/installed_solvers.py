@@ -26,7 +26,7 @@ class OfKind:
 
 @dataclass(frozen=True, slots=True)
 class KindFound:
-    """The solution of one sensor of an installed kind, or None for the reason in `fault`."""
+    """The solution of one sensor of an installed kind; if it is None, `fault` says why."""
 
     name: str
     sensor: RecordedSensor | Item

@@ -61,7 +61,7 @@ class LookedFile:
 
 
 def look_at(path: Path, stated: ColumnMap | None = None) -> LookedFile:
-    """Return the contents of a file, by its headings and numbers, or by a `stated` map of its columns.
+    """Return the contents of a file, according to its headings and numbers or to a `stated` map of its columns.
 
     Raise Refused `bad_option` for a file of sweeps, and as `find_layout` does for a file that is not a table.
     """
@@ -229,7 +229,7 @@ def try_attitudes(
 
 
 def _find_obstacle(files: Files, request: SolveOptions, up: str) -> str | None:
-    """Return the reason why the files have no solution with `up` upwards, or which checks fail; None if all pass."""
+    """Return the reason why the files have no solution with `up` upwards, or the checks that fail; None if all pass."""
     x, y, z = axis_of(up).tolist()
     site = Site(up=(x, y, z), gravity_m_s2=STANDARD_GRAVITY_M_S2, earth_rate_rad_s=None)
     try:

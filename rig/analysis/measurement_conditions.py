@@ -39,7 +39,7 @@ class GyroscopeConditions:
 
 @dataclass(frozen=True, slots=True)
 class _WeightedReadings:
-    """Readings from start to end on the clock of the first recording, their weight and temperature (or NaN)."""
+    """Readings from start to end on the first recording's clock, with weight and temperature (NaN if unknown)."""
 
     start_s: float
     end_s: float

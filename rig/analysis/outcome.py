@@ -62,10 +62,10 @@ class Outcome:
 
     - settings, provenance: of the recordings.
     - recordings: of the calibration, with a finished sweep; empty if stored calibrations were verified.
-    - checks: the limits of the verdict.
+    - checks: the checks of the verdict.
     - results: the calibrations of gyroscopes; empty if stored calibrations were verified.
     - onboard: the board's own calibrations, compared with the host's; empty if stored ones were verified.
-    - verifications: all that were possible.
+    - verifications: of the sensors that could be verified.
     - clock: comparison of the controller's clock, None if its uncertainty is not stated.
     - accelerometers: the calibrations of accelerometers.
     - magnetometers: the calibrations of magnetometers, without limits of scale and bias.

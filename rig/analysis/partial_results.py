@@ -161,7 +161,7 @@ def _observe_sweeps(
 
 
 def _bias(rests: Sequence[Average]) -> tuple[Array, Array] | None:
-    """Return b (3,) of g = K (m + b), the negative weighted mean reading at rest, and its std; None without rests."""
+    """Return the bias (3,), which is minus the weighted mean reading at rest, and its std; None without rests."""
     if not rests:
         return None
     weights = 1 / np.array([rest.variance_rad2_s2 for rest in rests])

@@ -28,8 +28,8 @@ MIN_READINGS = 20  # fewer may be equal by chance
 class QuantityNoise:
     """The Allan deviation of one quantity at rest, in its SI unit, and the noise parameters of each axis.
 
-    `longest_s`: the longest interval without a gap; `total_s`: the sum of all; `temperature_c`: lowest and highest,
-    None without a thermometer.
+    `longest_s`: the longest of the `intervals` without a gap; `total_s`: the sum of all intervals; `temperature_c`:
+    lowest and highest temperature, None without a thermometer.
     """
 
     curve: AllanCurve
@@ -42,7 +42,7 @@ class QuantityNoise:
 
 @dataclass(frozen=True, slots=True)
 class SensorAtRest:
-    """The noise of each quantity of a sensor at rest, or the Fault that prevents it.
+    """The noise of each quantity of a sensor at rest, or the Fault that says why it is unknown.
 
     `sensor`: None if the readings do not name it; `notes`: what was left out of a log, and how its stamps were read.
     """

@@ -114,7 +114,8 @@ def judge(
 def verification_checks(sensor: str, verification: "Verification | None", limits: Limits | None) -> tuple[Check, ...]:
     """Return the checks of calibrated readings: the worst axis, and the worst mean over a revolution.
 
-    The same limit applies to the reference's error against the arm, which may be the cause. `verification` may be None.
+    The limit of the mean also applies to the reference's own error, which may be the cause. If `verification` is None,
+    the checks have no value.
     """
     rms = mean = verified = None
     if verification is not None:

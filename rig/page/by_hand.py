@@ -39,6 +39,7 @@ def live_section(event: HandSeen) -> Section:
 def step(event: HandSeen) -> Section:
     """Return the progress of the session's moves; the remaining time is unknown."""
     count = event.accepted + len(event.pairs) + len(event.turns)
+    # Step `number` is the last accepted move, which is complete. A hand's moves have no planned duration.
     return {
         "number": event.accepted,
         "count": count,

@@ -81,10 +81,10 @@ def open_run(
 
 
 def judge_phases(run: RecordedRun, estimator: str | None = None) -> Outcome:
-    """Return the outcome of a run, phase by phase; a missing planned phase counts as failed.
+    """Return the outcome of a run, phase by phase; `estimator` None stands for the procedure's own.
 
-    The estimator is by default the procedure's own; a single recording has its own outcome. Raise Fault and Refused as
-    the procedure's analysis does.
+    A planned phase that is missing counts as failed, unless the run is a single recording (`alone`). Raise Fault and
+    Refused as the procedure's analysis does.
     """
     procedure = _procedure_of(run, run.movement[0])
     estimator = estimator or procedure.estimator

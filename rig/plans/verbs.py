@@ -7,7 +7,7 @@ from rig.motion.steps import Dwell, Plan, Rest, Sweep, Transfer
 
 
 class Verbs(Protocol):
-    """A connected and recorded arm and board. Anything that ends a verb early first stops the arm."""
+    """The verbs of a connected and recorded arm and board. If a verb ends early, it first stops the arm."""
 
     @property
     def plan(self) -> Plan:

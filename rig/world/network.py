@@ -1,4 +1,4 @@
-"""Sockets around sessions: one listener per port, one connection per client, one selector for all."""
+"""The sockets of the world's sessions: one listener for each port, one connection for each client, one selector."""
 
 import selectors
 import socket

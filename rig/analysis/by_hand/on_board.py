@@ -22,7 +22,7 @@ BIAS_LIMIT_RAD_S = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class BoardReadings:
-    """Readings (n, 3), rad/s, at times (n,) of the board's counter, with their numbers (n,).
+    """Readings (n, 3), rad/s, with the times (n,) of the board's counter and their sequence numbers (n,).
 
     `microsecond_s`: the duration of the counter's microsecond.
     """

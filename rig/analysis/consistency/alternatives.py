@@ -42,7 +42,7 @@ class Means:
 
 
 def _axis_patterns(columns: Array) -> Array:
-    """Return patterns (3, N, 3): `columns` (N, 3) on one axis each."""
+    """Return three patterns (3, N, 3); each has one of the `columns` (N, 3) on the axis of the same index."""
     return np.moveaxis(split_per_axis(columns), -1, 0).swapaxes(1, 2)
 
 

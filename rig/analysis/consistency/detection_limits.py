@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class DetectionLimit:
-    """The `size` of a fault, in `unit`, that its check detects in 95 of 100 recordings; infinity if none is.
+    """The `size` of a fault, in `unit`, that its check detects in 95 of 100 recordings, infinite if it detects none.
 
     `off_by_expanded`: the largest error of scale factor or bias that a fault just below `size` causes, divided by the
     stated U.
@@ -54,7 +54,7 @@ def find_gyroscope_limits(
 
 
 def find_reference_limits(sizes: Mapping[str, float], quantity: Quantity) -> tuple[DetectionLimit, ...]:
-    """Return the detection limits in gravity or a field, from the minimal detectable `sizes` by fault mode."""
+    """Return the detection limits of readings of a reference, from the minimal detectable `sizes` by fault mode."""
     from rig.analysis.consistency.reference_alternatives import FAULT_MODES as REFERENCE_FAULT_MODES
 
     return tuple(

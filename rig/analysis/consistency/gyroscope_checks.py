@@ -71,10 +71,10 @@ MAX_RIPPLE_INFLATION, INFLATION_STEPS = 16.0, 7  # of the variance by a synchron
 
 @dataclass(frozen=True, slots=True)
 class ErrorPatterns:
-    """The known errors of N segments, each as the pattern that one standard deviation of it adds to the readings.
+    """The known errors of N segments. A pattern is the change of the readings by one standard deviation of one error.
 
-    - `patterns_rad_s` (P, N, 3): all patterns; `encoders_rad_s` (E, N, 3): those among them due to encoders in arcs.
-    - `transfers`: N segments and M − N transfers; `transfer_patterns_rad_s` (Q, M, 3): the error patterns of all M.
+    - `patterns_rad_s` (P, N, 3): all patterns; `encoders_rad_s` (E, N, 3): only those due to encoders in arcs.
+    - `transfers`: the N segments, then transfers, M in all; `transfer_patterns_rad_s` (Q, M, 3): their patterns.
     - `instability_rad_s`: the sensor's bias instability.
     """
 
@@ -207,8 +207,8 @@ def _inflate_transfers(
 ) -> _TestedSegments:
     """Whiten like `_whiten_with_transfers`, with the transfers' variance inflated until their χ² is at most its dof.
 
-    The transfers' χ² and dof are the differences of those with and without transfers. The factor on their unexplained
-    variance is at most `MAX_RIPPLE_INFLATION`.
+    The transfers' χ² is the χ² of segments with transfers minus that of segments alone, and so are their dof. The
+    factor on their unexplained variance is at most `MAX_RIPPLE_INFLATION`.
     """
     transfers, (segments_chi_square, segments_dof) = allowance.transfers, _residual_chi_square(segments_only)
     with_transfers = _whiten_with_transfers(matrix, allowance, bias, disturbed)

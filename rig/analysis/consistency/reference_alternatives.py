@@ -19,8 +19,8 @@ from rig.estimation.reference.reference_model import REFERENCE, matrix
 class ReferenceModel:
     """The model of readings in a reference: parameters θ (22,), estimated from the `movement`, and the known errors.
 
-    `error_patterns` (P, 3 K): independent errors of the readings, each of one standard uncertainty; `times_s` (N + M,):
-    the middles of dwells and sweeps.
+    The K = N + 3 M readings are those of N dwells, then mean, cosine and sine of M sweeps. `error_patterns` (P, 3 K):
+    independent errors of the readings, each of one standard uncertainty; `times_s` (N + M,): the windows' middles.
     """
 
     theta: Array
@@ -96,7 +96,10 @@ def _axis_components(model: ReferenceModel) -> Array:
 
 
 def _bend_pattern(change: Callable[[Array], Array]) -> Callable[[ReferenceModel], Array]:
-    """Return a function of a model: the patterns of a nonlinear `change` of the force relative to the reference."""
+    """Return a function that returns a model's patterns if the error of each axis is `change` of its force.
+
+    `change` takes and returns multiples of the reference.
+    """
 
     def patterns(model: ReferenceModel) -> Array:
         size = float(np.linalg.norm(model.theta[REFERENCE]))

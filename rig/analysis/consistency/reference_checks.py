@@ -47,7 +47,7 @@ class WhitenedReference:
     growth: Array
 
     def chi_square_of(self, alternatives: Sequence[Array], nuisance: Sequence[Array]) -> list[float]:
-        """Return the χ² of each alternative, as in `WhitenedModel`; δ is estimated with the most likely one."""
+        """Return the χ² of each alternative, as in `WhitenedModel`; δ is estimated with the likeliest alternative."""
         model = self._extend_model(nuisance)
         rotated = [self.rotation @ columns for columns in alternatives]
         delta_rad = self._estimate_delta(model)

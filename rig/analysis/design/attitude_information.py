@@ -28,9 +28,9 @@ MAX_CONDITION = 100.0  # the worst of a thousand random sets of ten has 19; beyo
 
 @dataclass(frozen=True, slots=True)
 class AttitudeAccount:
-    """The identifiability of a model of chosen `order` in `count` attitudes, and each sensor's expected uncertainty.
+    """How well `count` attitudes determine the model of the chosen `order`, and each sensor's expected uncertainty.
 
-    `first` and `second` are the identifiability of the models of both orders; `g_efficiency` is that of the chosen one.
+    `first` and `second` are the identifiability of the models of order 1 and 2; `g_efficiency` is for the chosen order.
     """
 
     count: int

@@ -1,8 +1,8 @@
 """The prediction of a plan's uncertainty: the budget of a simulated recording. Pure.
 
-The plan determines the joints' motion, the configuration the known errors of turner, site and sensor, the data sheet
-the sensor's noise. Only two parts of a budget come from readings alone: the bias drift beyond flicker, and the
-temperature change.
+The plan determines the joints' motion, the configuration determines the known errors of turner, site and sensor, and
+the data sheet determines the sensor's noise. Only two parts of a budget come from readings alone: the bias drift beyond
+flicker, and the temperature change.
 """
 
 from collections.abc import Iterator
@@ -76,12 +76,14 @@ def _budget(config: RigConfig, run: PlannedRun, turner: TurnerIdentity, name: st
     constant_sensor = describe_sensor(
         uncertainty, name, float(np.radians(sensor.range_deg_s)), np.full(len(inputs.windows_s), ROOM_C), STEP_K
     )
+    # A nominal mounting would be too good: then errors of the axes have no first-order effect on the scale factors.
     off_deg = MOUNTING_OFFSET_DEG if inputs.mount_turns_rad is None else uncertainty.mount_deg
     inputs = replace(
         inputs, means_rad_s=_simulate_readings(inputs, _mounting_rotation(off_deg) @ mounting), sensor=constant_sensor
     )
     explained = explain(inputs, mounting, BiasProcess(0.0, 0.0, 0, constant_sensor.instability_rad_s))
     uncertainty_inputs = list_uncertainties(environment, name, None)
+    # Only a servo's angles are noisy. Its procedure solves by the speeds alone, because hands mount the item inexactly.
     if not noisy_angles:
         return budget(explained, uncertainty_inputs)
     turns = [turn for part in parts for turn in part.turns]
@@ -99,7 +101,7 @@ def _mounting_rotation(angle_deg: float) -> Array:
 
 
 def _simulate_readings(inputs: VectorInputs, matrix: Array) -> Array:
-    """Return simulated readings (N, 3) of a sensor with matrix F (3, 3); noise makes all different."""
+    """Return simulated readings (N, 3) of a sensor with matrix F (3, 3), with noise, so that no two are equal."""
     noise = np.random.default_rng(len(inputs.windows_s)).standard_normal((len(inputs.windows_s), 3))
     readings: Array = inputs.rates_rad_s @ matrix.T + np.sqrt(inputs.variances_rad2_s2) * noise
     return readings

@@ -15,7 +15,7 @@ NO_BUDGETS: Mapping[str, Budget] = MappingProxyType({})
 
 @dataclass(frozen=True, slots=True)
 class ReachedUncertainty:
-    """The largest U of scale and bias (rad/s) of any sensor's axis, and of accelerometers (m/s²); 0 without any."""
+    """The largest U of any axis, for scale and bias of gyroscopes and of accelerometers; 0 without such sensors."""
 
     scale: float
     bias_rad_s: float
@@ -53,7 +53,7 @@ class Budgets:
 
 @dataclass(frozen=True, slots=True)
 class TargetUncertainty:
-    """The target of each U in `ReachedUncertainty`, infinite without one, for a run of at most `at_most_s`."""
+    """The targets of each U in `ReachedUncertainty` and of the run's duration (`at_most_s`), infinite if not set."""
 
     scale: float = inf
     bias_rad_s: float = inf

@@ -24,7 +24,7 @@ class Equations:
 
     - `means`, `variances` (N, 3), with `dof` (N, 3) degrees of freedom of the variances.
     - `attitudes` (N, 3, 3); `std_rad` (N,): their stated standard deviation.
-    - `reference`: the norm of the measured reference, or the vectors that the table's motion adds to it.
+    - `reference`: the norm of a constant reference, or, for a gyroscope, the rates (N, 3) of the table.
     """
 
     means: Array

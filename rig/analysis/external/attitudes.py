@@ -50,7 +50,7 @@ class AttitudeCalibration:
     - `other_methods`: the solutions by the other methods, or the Fault of a method that fails.
     - `measurements`: the means in attitudes; `dwells`: the placements.
     - `reference_fault`: why the estimated reference of a gyroscope is not the Earth's rate.
-    - `laid`: the estimated placement errors; `unplaced_rests` rests without an attitude contributed to them.
+    - `laid`: the estimated placement errors; `unplaced_rests`: how many rests without an attitude contribute to them.
     - `moving`: the number of rows left out because the body moved.
     """
 

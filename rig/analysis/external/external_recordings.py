@@ -150,7 +150,7 @@ def _solve_turns(read: ExternalReadings, samples: Samples, name: str | None) -> 
 def _solve_sweeps(
     read: ExternalReadings, samples: Samples, name: str | None, reference_c: float | None
 ) -> ExternalResult:
-    """Solve a file's sweeps and rests, corrected to `reference_c` if given; estimator `name` (None: automatic)."""
+    """Solve a file's sweeps and rests, corrected to `reference_c` if given, by the estimator `name` (None: choose)."""
     chosen = None if name is None else choose_estimator(SWEEP_ESTIMATORS, name)
     data, polynomials = average_sweeps(samples, read.motion), None
     if reference_c is not None and data.turned is not None:
@@ -296,7 +296,7 @@ def _gyroscope(item: Item, result: Result, clock: TimeBase | None) -> SensorResu
 
 
 def _describe_as_swept(result: Result) -> TurnedSolution:
-    """Return a solution for m = F ω + b in the form of a solution for g = K (m + b), with its budget."""
+    """Return a solution of reading = F ω + b in the form of a solution of rate = scale × (reading + bias)."""
     solution, matrix = result.solution, result.solution.matrix
     axes = SensorAxes.from_matrix(matrix)
     of_matrix = np.r_[F, OFFSET]

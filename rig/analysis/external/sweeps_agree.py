@@ -127,7 +127,7 @@ def count_redundant_rows(data: ExternalData) -> int:
 
 
 def noise_dof(solution: VectorSolution, data: ExternalData) -> float:
-    """Return the noise's smallest degrees of freedom, by the weights of the means in the vector model."""
+    """Return the smallest of the degrees of freedom of scale and bias, (6,), for noise alone, in the vector model."""
     averages = [*(sweep.average for sweep in data.sweeps), *data.rests]
     variances = np.array([average.variance_rad2_s2 for average in averages])
     dof = dof_by_axis(average.dof for average in averages)
@@ -178,7 +178,7 @@ def _redundancy_numbers(design: Array) -> Array:
 
 
 def _additional_std(noise_std: Array, expanded: Array, known_dof: float, dof: float) -> Array:
-    """Return the standard uncertainties (q,) to add to the noise (q,) so that k u equals `expanded` (q,)."""
+    """Return the standard uncertainties (q,) that give, together with `noise_std` (q,), the U `expanded` (q,)."""
 
     def is_too_small(std: Array) -> Array:
         variances = np.array([noise_std**2, std**2])

@@ -14,7 +14,7 @@ MIN_INDEPENDENCE = 1e-3  # least over greatest information about a rotation; rev
 
 
 class LinearCalibration(Protocol):
-    """A calibration g = M (m + b): correction_matrix M (3, 3) and bias_rad_s b (3,)."""
+    """A calibration: rate = correction_matrix (3, 3) · (reading + bias_rad_s (3,))."""
 
     @property
     def correction_matrix(self) -> Array: ...

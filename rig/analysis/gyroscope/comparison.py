@@ -87,7 +87,7 @@ class Comparison:
     - `movement`: the deviation over all n samples; `sweeps`: that over the sweeps with their ramps.
     - `noise_rad_s` (3,): standard deviation of the difference at rest, from both sensors' noise: the RMS of a perfect
       calibration; None without rests.
-    - `revolutions`: the errors of each.
+    - `revolutions`: the error of each revolution.
     - `delay_s`, `delay_std_s`: for each recording, the delay of the sensor's filter relative to the reference's, and
       its standard deviation; empty if no common clock stamps the samples.
     """

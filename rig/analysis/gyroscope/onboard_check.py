@@ -32,7 +32,8 @@ class Agreement:
     - `solutions`: the board's, by method.
     - `not_observed`: the sweeps without an observation by the board, and why.
     - `host_scale`, `host_bias_rad_s` (3,): the host's solution; None without one.
-    - `scale_difference` (relative), `bias_difference_rad_s`: largest of three axes, closed form; None if either failed.
+    - `scale_difference` (relative), `bias_difference_rad_s`: the largest of three axes, between the host's and the
+      board's closed form; None if either has no solution.
     """
 
     solutions: Mapping[str, BoardSolved]
@@ -90,7 +91,7 @@ def _list_unobserved(run: RunData, sensor: str) -> tuple[str, ...]:
 
 @dataclass(frozen=True, slots=True)
 class _BoardObservation:
-    """An observation of the board: mean reading (3,), rad/s, and speed; `averaged`: whether the mean is the host's."""
+    """The mean reading (3,) and the speed of an observation of the board; `averaged`: whether the host averaged."""
 
     mean_rad_s: Array
     speed_rad_s: float
@@ -109,7 +110,7 @@ def _list_observations(runs: Sequence[RunData], sensor: str) -> list[_BoardObser
 
 
 def _recall_observation(earlier: Sequence[RunData], recalled: BoardRecalled) -> _BoardObservation:
-    """Return the observation from the newest recording that contains it, or NaN."""
+    """Return the observation from the newest recording that contains it; its values are NaN if none does."""
     for run in reversed(earlier):
         if earlier_observations := find_board_averages([run], recalled.sensor, (recalled.sweep,)):
             return _average_observation(run, earlier_observations[recalled.sweep])
@@ -117,7 +118,10 @@ def _recall_observation(earlier: Sequence[RunData], recalled: BoardRecalled) -> 
 
 
 def _average_observation(run: RunData, event: BoardObserved) -> _BoardObservation:
-    """Return the mean of the board's samples; if some were lost on the way, the board's own mean, else NaN."""
+    """Return the host's mean of the board's samples, the board's own if some were lost on the way, or NaN.
+
+    It is NaN if the host has other samples than those that the board reports.
+    """
     samples, observed = run.samples[event.sensor], event.observation
     times_us = samples["board_time_us"]
     used = slice(*np.searchsorted(times_us, [observed.start_us, observed.end_us]).tolist())

@@ -28,9 +28,10 @@ WAVE_RATIO = 0.3  # of an encoder's error once or twice a revolution to the erro
 
 @dataclass(frozen=True, slots=True)
 class RecordingPart:
-    """A sensor's revolutions and rests in one recording, and the offset of its clock to the first recording's.
+    """A sensor's revolutions and rests in one recording.
 
-    The item was remounted for each `stage`; `mount` (3, 3) transforms the flange's frame into the item's.
+    Its clock begins `clock_offset_s` after that of the first recording. The item was remounted for each `stage`;
+    `mount` (3, 3) transforms the flange's frame into the item's.
     """
 
     turns: Sequence[Observation]

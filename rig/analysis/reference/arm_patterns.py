@@ -88,7 +88,7 @@ def _rotations(posture: Posture, arm: DenavitHartenberg, mounting: Array) -> Arr
 
 
 def _shift_harmonics(angle_rad: float) -> Array:
-    """Return the matrix (4, 4) from the first two harmonics of θ minus `angle_rad` to those of θ."""
+    """Return the matrix (4, 4) that maps the coefficients of two harmonics of θ − `angle_rad` to those of θ."""
     cos, sin, cos_2, sin_2 = angle_waves(angle_rad)
     waves: Array = np.zeros((4, 4))
     waves[:2, :2] = [[cos, -sin], [sin, cos]]

@@ -36,7 +36,7 @@ class MagnetometerResult:
 
     - `field_t`: the size of the field; `extension_m` (3,): the sensor's position on the flange.
     - `triad`: scale, relative to `field_t`, and axes, with the solution's uncertainty; `budget`: the uncertainty.
-    - `uniformity`: the test of the field over the attitudes; `drift`: between tests at home, None with fewer than two.
+    - `uniformity`: the test of the field over the attitudes; `drift`: its drift, None without two tests at home.
     - `measurements`: the means from which the solution is estimated, in tesla.
     - `other_methods`: the solutions by the other methods, or the Fault of a method that fails.
     """
@@ -123,7 +123,7 @@ def _calibrate(
 
 
 def _drift(name: str, recordings: Sequence[ObservedRun], settings: RunSettings) -> FieldDrift | None:
-    """Return the field's drift between the tests at home; None with fewer than two. Raise Fault `field_drifts`."""
+    """Return the field's drift between tests at home, None without two tests. Raise Fault `field_drifts`."""
     tests = [test for run in recordings for test in field_tests(run, name, settings.observation, settings.home_q_rad)]
     if len(tests) < 2:
         return None

@@ -104,7 +104,7 @@ def estimate_bias_drifts(recordings: Sequence[ObservedRun], settings: RunSetting
 
 
 def _select_complete(means: Mapping[int, DwellMean], table: Sequence[Sequence[int]]) -> list[list[DwellMean]]:
-    """Return the complete repeats, each with its attitudes in the same order. Raise Fault `not_all_attitudes`."""
+    """Return the complete repeats; a row of `table` has a repeat's dwell indices. Raise Fault `not_all_attitudes`."""
     complete = [[means[index] for index in repeat] for repeat in table if means.keys() >= set(repeat)]
     if len(complete) < MIN_REPEATS:
         raise Fault(
@@ -133,7 +133,7 @@ def _accelerations(recordings: Sequence[ObservedRun], name: str, sensor: Recorde
 
 
 def _rates(recordings: Sequence[ObservedRun], name: str, sensor: RecordedSensor) -> dict[int, DwellMean]:
-    """Return the means of the gyroscope in every dwell, which is a rest for it."""
+    """Return the gyroscope's means in every dwell, by the dwell's index, from the rest within the dwell."""
     mounting = np.array(sensor.mounting)
     means = {}
     for recording in recordings:

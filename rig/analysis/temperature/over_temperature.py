@@ -69,7 +69,10 @@ def correct_recordings(recordings: Sequence[ObservedRun], settings: RunSettings,
 
 
 def correct_files(data: ExternalData, reference_c: float) -> tuple[ExternalData, OverTemperature]:
-    """Return sweeps and rests of files at the reference temperature. Raise Fault as `correct_recordings` does."""
+    """Return sweeps and rests of files, with means as at `reference_c`, and the polynomials that corrected them.
+
+    Raise Fault as `correct_recordings` does.
+    """
     averages, inputs = stack_rows(data.sweeps, data.rests)
     repeated = RepeatedMeans(
         means=np.array([average.mean_rad_s for average in averages]),
@@ -108,7 +111,7 @@ def add_acceleration_polynomials(
 def _combine(
     quantity: Quantity, polynomials: OverTemperature, parameters: Array, budget: Budget
 ) -> tuple[Budget, OverTemperature]:
-    """Return the budget with the polynomials' fit as a contributor, and the polynomials with the budget's as theirs."""
+    """Return the budget, to which the polynomials' fit is added, and the polynomials with the budget's contributors."""
     sign = np.diag(quantity.parameter_signs)
     values = sign @ parameters
     lines = tuple(
@@ -207,7 +210,7 @@ def _correct_turn(turn: Observation, mean_rad_s: Array, reference_c: float) -> O
 
 
 def _correct_wave(turn: Observation, polynomials: OverTemperature) -> Observation:
-    """Correct the first harmonic of a revolution's accelerations, mean included, to the reference temperature."""
+    """Correct mean, cosine and sine of a revolution's accelerations to the reference temperature."""
     if turn.acceleration is None:
         return turn
     wave = turn.acceleration.harmonic

@@ -63,5 +63,5 @@ class ServoSection(TurnerSection):
         return urlsplit(self.port).hostname if self.port.startswith("socket://") else None
 
     def override_host(self, host: str) -> Mapping[str, str]:
-        """Return the key of the servo's port, with the same port number at another `host`."""
+        """Return the key of the servo's port with a new value: the same port number at another `host`."""
         return {"port": f"socket://{host}:{urlsplit(self.port).port}"}

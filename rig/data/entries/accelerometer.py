@@ -64,8 +64,9 @@ class AlignmentEntry(Entry):
 
 
 class AccelerometerEntry(Entry):
-    """A calibration a = F (s + φ s²) + b of the specific force s in the flange's frame.
+    """A calibration of readings a = F (s + φ s²) + b of the specific force s in the flange's frame.
 
+    - matrix, second_order_s2_m, bias_m_s2: F, φ and b.
     - covariance: of scale and bias, from the solution alone; covariance_combined: from all contributors in budget.
     - gravity_m_s2: the gravity to which the scale is relative.
     - scale, bias_m_s2: if the budget contains the nonlinearity, the scale is that between the readings at +1 g and −1
@@ -77,7 +78,7 @@ class AccelerometerEntry(Entry):
     - detection_limits: faults during the recording, and the sizes from which they are detected.
     - conditions: times and temperature (temperature_c) of the readings for scale and bias.
     - …_degrees_of_freedom: degrees of freedom of the standard deviations of that name, null if infinite.
-    - placement: only if a file gave the attitudes; range and temperature are then unknown.
+    - placement: errors of the placements, if a file gave the attitudes; range and temperature are then unknown.
     - correction_matrix: M of s = M (a − b), first order: with an alignment in the frame of the gyroscope's corrected
       rates (whole matrix), else in the right-angled frame nearest to the accelerometer's own axes.
     """

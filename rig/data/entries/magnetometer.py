@@ -91,7 +91,7 @@ class MagnetometerEntry(Entry):
       estimated from the readings.
     - detection_limits: faults during the recording, and the sizes from which they are detected.
     - conditions: times of the readings; non_orthogonality_degrees_of_freedom: null if infinite.
-    - placement: only if a file gave the attitudes; the range is then unknown.
+    - placement: errors of the placements, if a file gave the attitudes; the range is then unknown.
     - correction_matrix: M of B = M (m − b), in the right-angled frame nearest to the magnetometer's own axes.
     """
 

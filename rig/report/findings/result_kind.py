@@ -104,20 +104,22 @@ class Standard:
 class ResultKind(Generic[EntryT]):
     """A kind of result: a function for each output (outlet), or the reason why the kind does not have this output.
 
-    - name: its name for people.
-    - key: its key in result.json.
+    A function that serves an output is named by a participle: a result is printed on the terminal, shown on the page.
+
+    - name: the kind's name for people.
+    - key: the kind's key in result.json.
     - entries: builds this kind's entries of result.json from a run's outcome.
     - find: finds this kind's entries in the document of a result.
     - printed: yields tables and lines for the terminal.
     - shown: builds the row of page and notebook.
     - followed: builds the record of a history.
-    - header: yields the lines of calibration.h, by the g-sensitivities (3, 3) of the gyroscopes.
+    - header: yields the lines of calibration.h from a finding and the g-sensitivities (3, 3) of gyroscopes, by sensor.
     - figures: the writer of its pictures in a run folder ("module:function").
     - block: the macro of the certificate's page that prints a finding ("template:macro").
-    - measured: builds the content of the digital certificate, with reversals by sensor.
+    - measured: builds the content of the digital certificate from a finding and the reversal entries, by sensor.
     - standard: the statement of traceability in both certificates.
     - corrected: builds the correction of readings for exports; None for a reference.
-    - unexplained: builds the residuals of its means for pictures, or None.
+    - unexplained: builds the residuals of a finding's means for pictures, or None.
     - templates: the folder of the block's template.
     - unsolved: yields the reasons why sensors have no solution.
     - in_short: yields lines for the end of a run, if the kind has no row.

@@ -62,7 +62,7 @@ class ServoLink:
         self._thread.start()
 
     def close(self) -> None:
-        """End the thread; the bus remains open. A delayed thread ends later."""
+        """End the thread; the bus remains open. Wait at most 1 s for a thread that is busy."""
         self._closing.set()
         self._woken.set()
         if self._thread.ident is not None:

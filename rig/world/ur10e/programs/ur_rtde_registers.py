@@ -6,7 +6,7 @@ from rig.world.ur10e.robot import Robot
 
 
 class ProgramRegisters:
-    """The registers of one program: the first is number `offset` of the controller's."""
+    """The registers of one program, whose register 0 is the controller's register `offset`."""
 
     def __init__(self, robot: Robot, offset: int) -> None:
         self._robot = robot
