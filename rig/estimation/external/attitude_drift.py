@@ -59,7 +59,7 @@ class Fixes:
     """A reference's attitudes: k samples, grouped into N fixes.
 
     - `at_s` (k,): increasing times; `attitudes` (k, 3, 3): body to table; `fix` (k,): the fix of each sample.
-    - `placement` (N,): fixes with the same number share one error, because the body lay still.
+    - `placement` (N,): negative at rest, where fixes with the same number share one error; the body lay still.
     - `joined` (N − 1,): True if the gyroscope's readings are complete from one fix to the next.
     - `std_rad` (k,): the stated standard deviation of each sample, None if none is stated.
     - `blind_rad` (N − 1,): standard deviation of the rotation that missing readings hide, None if none are missing.
@@ -127,7 +127,7 @@ class FixedAttitudes:
 
 
 def average_fixes(recorded: AttitudeSamples, state: DriftState) -> FixedAttitudes:
-    """Return the mean attitude of each fix, minus the motion that the gyroscope measures with a state's parameters."""
+    """Return the mean attitude of each fix, minus the motion that the gyroscope, with the parameters `state`, measures."""
     fixes, time_s = recorded.fixes, recorded.time_s
     at_s = np.clip(fixes.at_s + state.clock_s, time_s[0], time_s[-1])
     integrated = integrate_attitudes(time_s, recorded.readings, state.matrix, state.bias, at_s)
@@ -235,8 +235,8 @@ def _list_errors(averaged: FixedAttitudes, fixes: Fixes, correlation: Array, ste
     """Return the covariance (3n, 3n) of the increments, by cause, due to unit errors of the reference or the times.
 
     The reference's errors vary with attitude, or are new in each visit to an attitude, each rest, or each fix in
-    motion. The errors of the times are jitter of the reference's stamps and, if lost
-    readings are hidden, an error of the time that passes from fix to fix.
+    motion. The errors of the times are jitter of the reference's stamps and, if lost readings are hidden, an error of
+    the time that passes from fix to fix.
     """
     count = len(fixes.placement)
     first = np.searchsorted(fixes.fix, np.arange(count))
@@ -320,8 +320,9 @@ def _weigh_bias(averaged: FixedAttitudes, fixes: Fixes) -> Array:
 def _find_bias_changes(sensitivities: Array, nearby: Array, middles_s: Array, weights: Array) -> Array:
     """Return the covariance (3n, 3n) of the increments due to unit changes of the bias b with attitude and time.
 
-    `sensitivities` (n, 3, 12) are the increments' derivatives by F and b, `nearby` (n, n) the correlation by attitude,
-    `middles_s` (n,) the middle times. Changes are relative to the mean bias with `weights` (n,).
+    `sensitivities` (n, 3, 12) are derivatives of the increments with respect to F and b, `nearby` (n, n) is the
+    correlation due to similar attitudes, `middles_s` (n,) are the middle times. Changes are relative to the mean bias
+    with `weights` (n,).
     """
     apart = np.abs(middles_s[:, None] - middles_s) / (np.ptp(middles_s) / BIAS_INTERVALS + 1e-9)
     from_mean = np.eye(len(weights)) - weights

@@ -98,7 +98,7 @@ class IncrementSolution:
       angle; None if there is none.
     - condition: condition number of the scaled design.
     - iterations: number of Gauss-Newton steps.
-    - change: an abrupt change, on the attitudes' clock; U contains both states of the gyroscope. None without one.
+    - change: an abrupt change, on the attitudes' clock, None if there is none; U covers both states of the gyroscope.
     """
 
     matrix: Array

@@ -122,7 +122,7 @@ class UnknownErrors:
     - g_sensitivity_rad_s_per_g: half-width of the change of a reading by 1 g.
     - earth_rate: whether the Earth's rate is unknown.
     - earth_covariance_rad2_s2 (3, 3): in the base frame, None if it was not estimated.
-    - clock_dof, state_jitter_dof, earth_dof: degrees of freedom of the estimated ones.
+    - clock_dof, state_jitter_dof, earth_dof: degrees of freedom of these uncertainties, if estimated.
     - clock_half_width: half-width of the error of a clock with stated limits, else None.
     - repeatability_rad: half-width of the error of a joint that returns to an angle.
     - angle_std_rad: error of a joint's encoder at the ends of arcs.

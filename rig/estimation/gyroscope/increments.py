@@ -3,10 +3,9 @@
     m = F ω + b,   Ċ = C [ω]×,   C(t₁)ᵀ C(t₂) = exp(φ₁) exp(φ₂) … exp(φₙ)
 
 C maps body coordinates at t to those of the first reading; ω is the inertial rate in body coordinates and m its reading
-by a gyroscope with the matrix F and the bias b. Between readings
-at ω₀ and ω₁ the rate follows a cubic whose slopes, per step, are those of five readings,
-ω̇ₖ = (8 (ωₖ₊₁ − ωₖ₋₁) − ωₖ₊₂ + ωₖ₋₂)/12, so that the rotation vector of a step h is, to fourth order (Magnus, Comm.
-Pure Appl. Math. 7 (1954) 649),
+by a gyroscope with the matrix F and the bias b. Between readings at ω₀ and ω₁ the rate follows a cubic whose slopes,
+per step, are those of five readings, ω̇ₖ = (8 (ωₖ₊₁ − ωₖ₋₁) − ωₖ₊₂ + ωₖ₋₂)/12, so that the rotation vector of a step h
+is, to fourth order (Magnus, Comm. Pure Appl. Math. 7 (1954) 649),
 
     φ = h (ω₀ + ω₁)/2 + h (ω̇₀ − ω̇₁)/12 + h² ω₀ × ω₁/12
 
@@ -39,8 +38,8 @@ class IntegratedAttitudes:
     """A gyroscope's integrated attitudes at k instants, in increasing order.
 
     - `attitudes` (k, 3, 3): C, from body coordinates to those of the first reading.
-    - `sensitivities` (k, 3, 12): S, derivative of C's rotation by F (row by row) and b, in coordinates of the first
-      reading.
+    - `sensitivities` (k, 3, 12): S, derivative of C's rotation with respect to F (row by row) and b, in coordinates of
+      the first reading.
     - `rates_rad_s` (k, 3) in body coordinates.
     """
 

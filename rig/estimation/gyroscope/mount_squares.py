@@ -30,7 +30,7 @@ def propagate_mount_squares(explained: VectorFit) -> Array:
 
 
 def _find_curvatures(explained: VectorFit, turns_rad: Array) -> Array:
-    """Return the second derivatives (6, E, E) of scale and bias by E mount errors, in units of their prior stds.
+    """Return the second derivatives (6, E, E) of scale and bias with respect to E mount errors in prior stds.
 
     The mount errors change the estimate of F to F + D + S, with D of first and S of second order. The second derivative
     of k = 1/‖row of F‖ has a part linear in S and a part quadratic in D.

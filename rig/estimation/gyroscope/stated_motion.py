@@ -7,9 +7,8 @@ determine a variance badly: the restricted maximum likelihood estimate is often 
 the true value in only 60 to 85 of 100 cases. So the result averages over all pairs (ρ, α), weighted by the restricted
 likelihood (Harville, J. Am. Stat. Assoc. 72 (1977) 320) and a prior. The prior is log-uniform from a tenth of the
 noise, below which ρ and α change nothing, to `PRIOR_KNEE_ERROR`; above this, its density over ln ρ falls as 1/ρ, and
-that over ln α as 1/α. If the sweeps determine ρ and α, U approaches that of
-Student's t with the dof of the redundant sweeps (Box and Tiao, Bayesian Inference in Statistical Analysis, 1973, 5.2;
-Gelman, Bayesian Analysis 1 (2006) 515).
+that over ln α as 1/α. If the sweeps determine ρ and α, U approaches that of Student's t with the dof of the redundant
+sweeps (Box and Tiao, Bayesian Inference in Statistical Analysis, 1973, 5.2; Gelman, Bayesian Analysis 1 (2006) 515).
 """
 
 from dataclasses import dataclass

@@ -274,7 +274,8 @@ def _all_variances(variances: Array, speed_noise: Array, shared: Array | None) -
 def _response(to_parameters: Array, inverse: Array) -> Array:
     """Return the derivative (6, N, 3) of k and b with respect to the mean readings, by the chain rule.
 
-    `to_parameters` (6, 12) is their derivative by the coefficients; `inverse` (3, p, N) maps readings to coefficients.
+    `to_parameters` (6, 12) is the derivative of k and b with respect to the coefficients; `inverse` (3, p, N) maps
+    readings to coefficients.
     """
     by_axis = np.concatenate([to_parameters[:, :9].reshape(6, 3, 3), to_parameters[:, 9:, None]], axis=2)
     response: Array = np.matmul(np.swapaxes(by_axis, 0, 1), inverse[:, :4]).transpose(1, 2, 0)

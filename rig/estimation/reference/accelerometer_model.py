@@ -3,8 +3,8 @@
     m = F (s + φ s²) + b,   s = Rᵀ v_ref + ω × (ω × (p + r)) + α × (p + r)
 
 in flange coordinates; F includes the mounting, φ is the nonlinearity, b the bias, ω the angular rate, α the angular
-acceleration. v_ref is the specific force at rest, in base coordinates. The lever arm
-p, from the rotation axis to the flange, is given by the arm; r leads from the flange to the sensor.
+acceleration. v_ref is the specific force at rest, in base coordinates. The lever arm p, from the rotation axis to the
+flange, is given by the arm; r leads from the flange to the sensor.
 
 If a joint turns by θ about the flange-fixed axis a, from the attitude R₀, at the constant rate ω, the specific force
 has a mean, a cosine and a sine over its angle. With u = R₀ᵀ v_ref and c = ω² (a aᵀ − 1) (p + r):
@@ -186,7 +186,7 @@ def project_reference(delay_s: float, movement: Movement) -> Array:
 
 
 def _differentiate_lag(waves: Array, sweeps: Sweeps) -> Array:
-    """Return the derivative of harmonics `waves` (M, 3, …) by the filter's lag, due to uneven rotation alone."""
+    """Return the change of harmonics `waves` (M, 3, …) per second of the filter's lag, by uneven rotation alone."""
     by_wave = (len(waves), 3, *(1,) * (waves.ndim - 2))
     cosine, sine = (sweeps.turning_rad2_s2[:, row] / sweeps.speeds_rad_s[:, None] for row in (4, 5))
     changed: Array = sine.reshape(by_wave) * waves[:, 1:2] - cosine.reshape(by_wave) * waves[:, 2:]

@@ -32,7 +32,7 @@ class JointTurn:
     """The motion of the joint that turns, at n times.
 
     - `speed_rad_s`: 2π over the time of a revolution, negative if the angle falls.
-    - `angle_rad` (n,): by the arm's states, zero in the known attitude.
+    - `angle_rad` (n,): from the arm's states, zero in the known attitude.
     - `acceleration_rad_s2` (n,): see `estimate_acceleration`.
     """
 

@@ -73,8 +73,8 @@ def cut_steps(readings: Array, unit: float) -> Steps:
     """Return the resolution steps of readings (n, 3) that the source has truncated toward zero to multiples of `unit`.
 
     The source may have applied an offset and a scale factor near one after truncation. Nonzero readings are in the
-    middle of their intervals, so they differ from the reading that was zero by whole units and a half. Most readings
-    are nonzero, so they show which reading was zero.
+    middle of their intervals, so they differ from the reading that was zero by whole units and a half, which shows
+    where zero is.
     """
     steps = find_steps(readings)
     units = np.where(np.abs(steps / unit - 1) < MAX_UNIT_CHANGE, steps, unit)

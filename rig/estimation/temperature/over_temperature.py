@@ -45,7 +45,7 @@ class RepeatedMeans:
     """Mean readings of repeated poses.
 
     - `means` (N, 3) and their `variances` (N, 3); `inputs` (N, 3): rates or specific forces in body axes.
-    - `poses` (N,): the number of the plan's pose, from 0; `windows_s` (N, 2); `temperature_c` (N,), as measured.
+    - `poses` (N,): the index of the plan's pose; `windows_s` (N, 2); `temperature_c` (N,), as measured.
     - `instability`: the Allan deviation of the bias' flicker.
     """
 
@@ -411,7 +411,7 @@ class _ParameterFits:
         return _TemperatureFit(relative, bias, covariance, without_lag, aicc, float(values[-1]), lag_std_s, loop)
 
     def centre(self, fit: _TemperatureFit) -> Array:
-        """Return the weighted mean powers (2, 3, 3) of T − reference, by the weights of k and of c."""
+        """Return the mean powers (2, 3, 3) of T − reference, weighted as in the means of k and of c."""
         powers = self.powers[:, 1:] * self.span ** np.arange(1.0, MAX_ORDER + 1)
         centre: Array = np.einsum("qan,np->qpa", self.weights, powers) / self.weights.sum(axis=2)[:, None, :]
         return centre
