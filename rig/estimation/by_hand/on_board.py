@@ -101,7 +101,7 @@ def _equations(centre: Array, move: BoardMove) -> Iterator[Equation]:
 
 
 def _vertical_on_face(centre: Array, face: int) -> tuple[Array, Array]:
-    """Return the vertical (3,) in the body's frame with `face` up, and its change (3, 2) per rad of the face's angles."""
+    """Return the vertical (3,) in the body's frame with `face` up, and its change (3, 2) per rad of that face."""
     axis, leans = face // 2, centre[FACES][2 * face : 2 * face + 2]
     up, face_axes = np.zeros(3), np.zeros((3, 2))
     face_axes[(axis + 1) % 3, 0] = face_axes[(axis + 2) % 3, 1] = 1.0

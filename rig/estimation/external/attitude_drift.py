@@ -127,7 +127,7 @@ class FixedAttitudes:
 
 
 def average_fixes(recorded: AttitudeSamples, state: DriftState) -> FixedAttitudes:
-    """Return the mean attitude of each fix, minus the motion that the gyroscope, with the parameters `state`, measures."""
+    """Return the mean attitude of each fix, minus the motion by the gyroscope with the parameters `state`."""
     fixes, time_s = recorded.fixes, recorded.time_s
     at_s = np.clip(fixes.at_s + state.clock_s, time_s[0], time_s[-1])
     integrated = integrate_attitudes(time_s, recorded.readings, state.matrix, state.bias, at_s)

@@ -95,7 +95,7 @@ def _propagate_speeds(inputs: VectorInputs, matrix: Array) -> Array:
 
 
 def _tilt_axes(sensed: Array, scale: Array, angle_rad: float) -> Array:
-    """Return the effects (3, N, 3) on readings of `sensed` rates (N, 3) for a tilt of y to x, of z to x, and of z to y."""
+    """Return the effects (3, N, 3) of tilts of y to x, z to x, and z to y on the readings of `sensed` rates (N, 3)."""
     patterns = np.zeros((3, *sensed.shape))
     for row, (tilted, towards) in enumerate(((1, 0), (2, 0), (2, 1))):
         patterns[row, :, tilted] = angle_rad * sensed[:, towards] / scale[tilted]
