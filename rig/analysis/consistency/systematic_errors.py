@@ -1,7 +1,7 @@
 """The known systematic errors of arm and sensor in the segments of a recording: one pattern for each unknown.
 
 A pattern is the effect of one standard deviation of one error on all readings, as in the model of common errors
-(`rig.estimation.gyroscope.common_errors`). Along the swept axis only clock, encoders and times of the arm may err.
+(`rig.estimation.gyroscope.common_errors`). Along the swept axis the arm errs only by clock, encoders and times.
 """
 
 from collections.abc import Sequence
@@ -250,8 +250,8 @@ def _encoder_patterns(segments: Segments, encoder_rad: float) -> Array:
 def _sweeps_between_moves(segments: Segments, joint: int) -> list[list[int]]:
     """Return lists of the sweeps and transfers between moves of a joint; a transfer that moves the joint begins a list.
 
-    `joint` counts from the end of the chain, from −1. If a transfer is missing, a changed angle or another recording
-    shows that the joint moved.
+    `joint` is counted from the end of the chain, −1 being the last joint. If a transfer is missing, a changed angle or
+    another recording shows that the joint moved.
     """
     sweeps, firsts = np.unique(segments.sweep, return_index=True)
     between_moves: list[list[int]] = []
@@ -328,7 +328,7 @@ def _mount_patterns(segments: Segments, mount_rad: float) -> list[Array]:
 
 
 def _nonlinearity_patterns(intervals: Sequence[MotionInterval], matrix: Array, curve: NonlinearityPrior) -> Array:
-    """Return the patterns (6, N, 3) of the rate's cube and square, each one standard deviation, as interval means."""
+    """Return patterns (6, N, 3), means over intervals: one standard deviation of the rate's cube, then its square."""
     by_interval = []
     for interval in intervals:
         edges = np.linspace(interval.start_s, interval.end_s, TRANSFER_STEPS + 1)

@@ -48,7 +48,8 @@ class AttitudeAccount:
 
 
 def attitude_account(config: RigConfig, plan: Plan) -> AttitudeAccount | None:
-    """Return the expected accuracy of a plan's attitudes, for nominal arm and noise; None for other procedures.
+    """Return the expected accuracy of a plan's attitudes, for nominal arm and noise; None for procedures without
+    attitudes.
 
     Repeats of an attitude average only noise, not the arm's error. Raise Refused `rank_deficient`, `ill_conditioned`.
     """

@@ -27,7 +27,7 @@ MIN_VERTICAL_GRAVITY = 0.97  # component along the vertical axis of the room
 
 @dataclass(frozen=True, slots=True)
 class Convention:
-    """The convention by which the gyroscope explains most of the attitudes' rates, the fraction `explained`.
+    """The convention by which the gyroscope explains most of the attitudes' rates, namely the fraction `explained`.
 
     `scalar_last`: the columns read as qw qx qy qz contain qx qy qz qw. `inverse`: quaternions take room to body
     coordinates. `lag_s`: the time by which the readings are later than the attitudes. `up`: the room's axis that points

@@ -41,7 +41,7 @@ class RelativeRotation:
     - `matrix` (3, 3): from a vector in the reference's frame to the sensor's.
     - `std_rad` (3,): standard deviations of small rotations about the sensor's x, y, z, from the readings' noise alone.
     - `from_nominal_rad` (3,): rotation vector from the nominal mountings, in the sensor's frame.
-    - `residuals_rad_s` (n, 3): noise, errors of scale and bias, and non-orthogonality.
+    - `residuals_rad_s` (n, 3): the effects of noise, errors of scale and bias, and non-orthogonality.
     """
 
     matrix: Array

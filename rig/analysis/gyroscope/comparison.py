@@ -85,8 +85,8 @@ class Comparison:
 
     - `time_s` (n,): controller time; `reading_rad_s`, `reference_rad_s` (n, 3): in the sensor's frame.
     - `movement`: the deviation over all n samples; `sweeps`: that over the sweeps with their ramps.
-    - `noise_rad_s` (3,): standard deviation of the difference at rest, from both sensors' noise: the RMS of a perfect
-      calibration; None without rests.
+    - `noise_rad_s` (3,): standard deviation of the difference at rest, from both sensors' noise. A perfect calibration
+      would have this RMS. None without rests.
     - `revolutions`: the error of each revolution.
     - `delay_s`, `delay_std_s`: for each recording, the delay of the sensor's filter relative to the reference's, and
       its standard deviation; empty if no common clock stamps the samples.

@@ -53,7 +53,7 @@ def assess_progress(session: HandRecording, conditions: SessionConditions) -> Se
         return SessionProgress(unknown, (), (), (), None, None, FACES)
     check_axes(session)
     fault_of_last = _check_last_move(session)
-    last = len(session.rests) - 1
+    last = len(session.rests) - 1  # not used for the variances: a faulty last move would inflate them and hide in them
     try:
         fitted = fit_session(session, conditions, trusted=last if last >= MIN_COMPARABLE_MOVES else None)
     except Fault as fault:
