@@ -85,8 +85,7 @@ def reversal_dof(reversal: "MagnetometerReversal") -> tuple[Array, Array]:
 
 
 def _axis_dof(result: "AccelerometerResult | MagnetometerResult", response: Array, noise: Array) -> Array:
-    """Return the dof of the angles between axes, for parameters with the `response` (p, n) to n readings with
-    `noise`."""
+    """Return the dof of the angles between axes; `response` (p, n): of all parameters to readings with `noise`."""
     from rig.estimation.reference.reference_model import F
 
     derivative = _angle_derivatives(result.solution.matrix)[:3].reshape(3, 9) @ response[F]

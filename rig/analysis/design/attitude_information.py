@@ -48,8 +48,7 @@ class AttitudeAccount:
 
 
 def attitude_account(config: RigConfig, plan: Plan) -> AttitudeAccount | None:
-    """Return the expected accuracy of a plan's attitudes, for nominal arm and noise; None for procedures without
-    attitudes.
+    """Return the expected accuracy of a plan's attitudes, for nominal arm and noise; None if attitudes are not used.
 
     Repeats of an attitude average only noise, not the arm's error. Raise Refused `rank_deficient`, `ill_conditioned`.
     """
