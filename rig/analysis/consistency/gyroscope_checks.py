@@ -207,8 +207,8 @@ def _inflate_transfers(
 ) -> _TestedSegments:
     """Whiten like `_whiten_with_transfers`, with the transfers' variance inflated until their χ² is at most its dof.
 
-    The transfers' χ² is the χ² of segments with transfers minus that of segments alone, and so are their dof. The
-    factor on their unexplained variance is at most `MAX_RIPPLE_INFLATION`.
+    The transfers' χ² and dof are those of segments with transfers minus those of segments alone. The factor on their
+    unexplained variance is at most `MAX_RIPPLE_INFLATION`.
     """
     transfers, (segments_chi_square, segments_dof) = allowance.transfers, _residual_chi_square(segments_only)
     with_transfers = _whiten_with_transfers(matrix, allowance, bias, disturbed)

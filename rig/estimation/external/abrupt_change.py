@@ -69,9 +69,9 @@ def find_change(
 ) -> AbruptChange | None:
     """Return the most probable change before a row, or None if its evidence is at most `least_evidence`.
 
-    The rows are in the order of time and begin at `begins_s` (n,). The search is repeated for each row of `starts` (s,
-    k), a choice of standard deviations of the model's k errors. The first choice is the most probable one if nothing
-    changed.
+    The rows are in the order of time and begin at `begins_s` (n,). The search is repeated with each row of
+    `starts` (s, k) as the standard deviations of the model's k errors; the first row is the most probable one if
+    nothing changed.
     """
     count = sum(int(effect.possible.any(axis=1).sum()) for effect in effects)
     log_without, change = model.evaluate_posterior(starts[0]) + float(np.log(max(count, 1))), None

@@ -59,7 +59,7 @@ class Fixes:
     """A reference's attitudes: k samples, grouped into N fixes.
 
     - `at_s` (k,): increasing times; `attitudes` (k, 3, 3): body to table; `fix` (k,): the fix of each sample.
-    - `placement` (N,): negative at rest, where fixes with the same number share one error; the body lay still.
+    - `placement` (N,): negative at rest, where fixes with the same number share one error, as the body lay still.
     - `joined` (N − 1,): True if the gyroscope's readings are complete from one fix to the next.
     - `std_rad` (k,): the stated standard deviation of each sample, None if none is stated.
     - `blind_rad` (N − 1,): standard deviation of the rotation that missing readings hide, None if none are missing.

@@ -37,8 +37,8 @@ class Inclinations:
         """Return the covariance (q, q) that inclinations add to `wanted` (q, p) combinations of the parameters.
 
         Only inclinations that the residuals do not show are added; the others are part of the model's errors. These
-        have the standard deviations `std` (k,) and give the combinations the variances `variances` (q,). The square
-        root of the sum of old and new variance is half of the half-width of the 95.45 % interval.
+        have the standard deviations `std` (k,) and give the combinations the variances `variances` (q,). With the added
+        variance, two standard deviations are the half-width of the 95.45 % interval.
         """
         from scipy.linalg import cho_factor, cho_solve
 

@@ -124,7 +124,7 @@ def first_harmonic(
 
 
 def estimate_acceleration(angle_rad: Callable[[Array], Array], time_s: Array, speed_rad_s: float) -> Array:
-    """Return a joint's angular acceleration (n,), rad/s², from the mean speeds half a sample before and after.
+    """Return a joint's angular acceleration (n,), rad/s², from mean speeds half a step before and after each sample.
 
     - angle_rad: returns the joint's angles (n,) at times (n,), also shortly before and after the samples.
     - time_s (n,): the samples' times, equally spaced; speed_rad_s: the joint's speed, without its sign.

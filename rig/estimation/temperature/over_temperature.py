@@ -156,7 +156,7 @@ def fit_over_temperature(readings: RepeatedMeans, reference_c: float, gradient_k
     """Fit scale and bias as polynomials of T − `reference_c` to the readings.
 
     Plain least squares determine the scale factors at the reference; `combine_with_reference` replaces them by better
-    ones. The temperature difference between thermometer and sensor may be another when the sensor is in use, by at most
+    ones. When the sensor is in use, the temperature difference between thermometer and sensor may differ by up to
     `gradient_k`. Raise Fault `too_few_observations`, `temperature_range_too_small`, `temperature_outside`,
     `not_finite`.
     """
