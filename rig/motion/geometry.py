@@ -40,10 +40,11 @@ NOMINAL = DenavitHartenberg(  # a UR10e's (maker's article 45257), the arm of re
 
 
 def axis_errors(q_rad: ArrayLike, joint: int, arm: DenavitHartenberg = NOMINAL) -> Array:
-    """Return the change (…, 13, 3) of a wrist axis' direction in the flange's frame, per radian of `AXIS_ERRORS`.
+    """Return the change (…, 13, 3) of a wrist axis' direction in the flange's frame, per radian of each axis error.
 
-    The joint angles are `q_rad` (…, n). Rotations of the whole flange are left out, as part of a sensor's mounting. The
-    last three joints of any chain count as wrists; errors of missing joints are zero.
+    The 13 errors are `AXIS_ERRORS`; the joint angles are `q_rad` (…, n). Rotations of the whole flange are left out,
+    because they count as part of a sensor's mounting. The last three joints of any chain count as wrists; the change is
+    zero for errors of missing joints.
     """
     q = np.asarray(q_rad, dtype=np.float64)
     frames = [frame[..., :3, :3] for frame in _frames(q, arm)]
@@ -61,10 +62,10 @@ def axis_errors(q_rad: ArrayLike, joint: int, arm: DenavitHartenberg = NOMINAL) 
 
 
 def flange_errors(q_rad: ArrayLike, arm: DenavitHartenberg = NOMINAL) -> Array:
-    """Return the flange's rotations (3, 6, 3) in the base's frame, per radian of each wrist's errors.
+    """Return the flange's rotation vector in the base's frame for each error of each wrist, per radian: (3, 6, 3).
 
-    The joint angles are `q_rad` (n,). Errors of a wrist are its twist, its zero, and the `WAVES` of its angle. The last
-    three joints of any chain count as wrists; errors of missing joints are zero.
+    The joint angles are `q_rad` (n,). The six errors of a wrist are its twist, its zero, and the four `WAVES` of its
+    angle. The last three joints of any chain count as wrists; the rotation is zero for errors of missing joints.
     """
     q = np.asarray(q_rad, dtype=np.float64)
     frames = np.array(_frames(q, arm))[:, :3, :3]
@@ -168,10 +169,11 @@ def lengths_m(arm: DenavitHartenberg) -> Array:
 
 
 def _find_bends(frames: list[Array]) -> tuple[Array, Array, Array]:
-    """Return shoulder, elbow and wrist 1, (…, 3) m, each in the plane of the previous one.
+    """Return points (…, 3), m, on the axes of shoulder, elbow and wrist 1.
 
-    The axes of these three are parallel except for the factory's calibration, so they intersect hundreds of metres
-    away, and the origins of a calibrated arm's frames may be anywhere along them.
+    The axes of these three joints are parallel except for the factory's calibration, so they intersect hundreds of
+    metres away, and the origins of a calibrated arm's frames may be anywhere along them. Elbow and wrist 1 are
+    therefore taken where their axes meet the plane through the previous point at right angles to that joint's axis.
     """
     shoulder = frames[1][..., :3, 3]
     elbow = _nearest_origin(shoulder, frames[1][..., :3, 2], frames[2])
@@ -209,7 +211,7 @@ def _dot(one: Array, other: Array) -> Array:
 
 
 def flange_axes(q_rad: ArrayLike, arm: DenavitHartenberg = NOMINAL) -> Array:
-    """Return unit axes (…, 3, n) of the n joints (columns) in the flange frame, for joint angles `q_rad` (…, n).
+    """Return matrices (…, 3, n) whose columns are the joints' unit axes in the flange's frame, at `q_rad` (…, n).
 
     A joint's axis does not depend on the joint's own angle, so it is constant in a sweep of this joint.
     """
@@ -221,8 +223,8 @@ def flange_axes(q_rad: ArrayLike, arm: DenavitHartenberg = NOMINAL) -> Array:
 def flange_arm(q_rad: ArrayLike, joint: int, arm: DenavitHartenberg = NOMINAL) -> Array:
     """Return the lever arm (…, 3), m, from a joint's axis to the flange's origin, in the flange's frame.
 
-    The joint angles are `q_rad` (…, n). The lever arm begins at the origin of the joint's frame, so its part along the
-    axis is arbitrary.
+    The joint angles are `q_rad` (…, n). The lever arm begins at the origin of the joint's frame, so the part of the
+    lever arm along the axis is arbitrary.
     """
     frames = _frames(q_rad, arm)
     to_flange = np.swapaxes(frames[-1][..., :3, :3], -1, -2)

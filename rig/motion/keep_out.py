@@ -42,8 +42,8 @@ def find_clearance_problems(
 ) -> list[Problem]:
     """Return the problems of steps that bring flange, payload's centre or extension too near to forearm or upper arm.
 
-    Lengths are those of `arm` if given, otherwise nominal. A dwell, or a motion from or to its attitude, must keep
-    `dwell_room_m` from the forearm, all other motions `sweep_room_m`.
+    Lengths are those of `arm` if given, otherwise nominal. A dwell, and each motion from or to the dwell's attitude,
+    must keep `dwell_room_m` away from the forearm; all other motions must keep `sweep_room_m`.
     """
     problems = []
     for path in _list_paths(plan, model):
@@ -109,7 +109,7 @@ def _measure_to_upper_arm(
 
 
 def _find_nearest(names: Sequence[str], distances_m: Array) -> tuple[str, float]:
-    """Return the smallest of the distances (k, N), m, and its part's name among k `names`."""
+    """Return the name, one of the k `names`, of the part with the smallest of the distances (k, N), and that one, m."""
     least_m = distances_m.min(axis=1)
     return names[int(least_m.argmin())], float(least_m.min())
 

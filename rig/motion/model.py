@@ -20,7 +20,7 @@ CLIENT_SPEED_RAD_S = 3.14  # the highest speed that `ur_rtde` accepts, slightly 
 
 @dataclass(frozen=True, slots=True)
 class Tube:
-    """A link of `radius_m`, whose middle is `offset_m` from its nominal line, towards wrist 1."""
+    """A link of the radius `radius_m`, whose middle is `offset_m` from the link's nominal line, towards wrist 1."""
 
     offset_m: float
     radius_m: float
@@ -55,7 +55,7 @@ class TurnerModel:
 
 @lru_cache
 def load_turner_model(key: ModelName) -> TurnerModel:
-    """Return the model called `key` in a configuration. Raise FileNotFoundError for an unknown one."""
+    """Return the model that a configuration calls `key`. Raise FileNotFoundError for an unknown model."""
     import yaml  # imported here: the process of the arm's client must start fast and needs no model
 
     text = files("rig.motion").joinpath("models", f"{key}.yaml").read_text(encoding="utf-8")

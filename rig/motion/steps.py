@@ -16,7 +16,7 @@ CLOSURE_TOLERANCE_RAD = 1e-6  # of a whole turn, for rounding
 
 
 class Motion(Protocol):
-    """A joint-space motion. Speed and acceleration are of the joint with the longest travel; the others keep step."""
+    """A joint-space motion. Speed and acceleration are those of the joint that travels farthest; the others keep step."""
 
     @property
     def name(self) -> str: ...
@@ -85,8 +85,8 @@ class Sweep:
 class Transfer:
     """A motion between sweeps or attitudes, without measurement.
 
-    A transfer that `tries` the mounting is a small turn of one joint. If the sensors do not sense it about the axis and
-    with the sign that follow from the stage's mounting, the run ends.
+    A transfer that `tries` the mounting is a small turn of one joint. The run ends unless the sensors sense this turn
+    about the axis, and with the sign, that the stage's mounting predicts.
     """
 
     name: str
@@ -100,9 +100,9 @@ class Transfer:
 
 @dataclass(frozen=True, slots=True)
 class Rest:
-    """A rest of the arm, in the controller's time.
+    """A rest of the arm for `duration_s` on the controller's clock.
 
-    A rest `for_temperature` lasts until the sensors have the next temperature; its duration is an estimate.
+    If `for_temperature`, the rest lasts until the sensors have the next temperature, and `duration_s` is an estimate.
     """
 
     name: str
@@ -112,7 +112,7 @@ class Rest:
 
 @dataclass(frozen=True, slots=True)
 class Dwell:
-    """A measured rest in the attitude `q_rad` for `duration_s` in the controller's time.
+    """A measured rest in the attitude `q_rad` for `duration_s` on the controller's clock.
 
     The dwell begins when the sensors have settled, at most `settle_s` after the arm's arrival; `duration_s` does not
     include this time. `index` is the number among the procedure's sweeps and dwells, from 0.
@@ -134,10 +134,10 @@ Step = Sweep | Transfer | Rest | Dwell
 
 @dataclass(frozen=True, slots=True)
 class Stage:
-    """A part of a plan with its own recording, before which the operator mounts the item by the `instruction`.
+    """A part of a plan with its own recording, before which the operator mounts the item as the `instruction` says.
 
     `mount` (3 rows of 3): nominal rotation from the flange's frame to the item's, to which sensors' mountings refer.
-    `indices`: the indices of its sweeps in the whole procedure; `begins`: the number of earlier steps.
+    `indices`: the indices of the stage's sweeps in the whole procedure; `begins`: the number of steps before the stage.
     """
 
     mount: tuple[Vector3, Vector3, Vector3]
@@ -148,9 +148,10 @@ class Stage:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """All steps in order. `home_q_rad`: the pose at the plan's end; `start_q_rad`: the expected pose at its start.
+    """All steps in order. `start_q_rad`: the expected pose at the plan's start; `home_q_rad`: the pose at the end.
 
-    Without `stages` the item's mounting does not change; else it is remounted for each stage, with the arm at home.
+    Without `stages` the item's mounting does not change; else the item is remounted for each stage, with the arm at
+    home.
     """
 
     steps: tuple[Step, ...]
@@ -187,7 +188,7 @@ class Plan:
 
 
 def closes(angle_rad: float) -> bool:
-    """Return whether an angle is a whole number of turns, which is exact because the circle closes."""
+    """Return whether an angle is a whole number of turns, which is known exactly, even from an inexact encoder."""
     turns = round(angle_rad / TURN_RAD)
     return turns > 0 and abs(angle_rad - turns * TURN_RAD) < CLOSURE_TOLERANCE_RAD
 
@@ -200,7 +201,7 @@ def turn_words(angle_rad: float) -> str:
 
 
 def trapezoid_duration(distance_rad: float, speed_rad_s: float, acceleration_rad_s2: float) -> float:
-    """Return the duration, s, of a motion with equal ramps, also over a distance too short to reach the speed."""
+    """Return the duration, s, of a motion with equal ramps, even if the distance is too short to reach the speed."""
     if distance_rad < speed_rad_s**2 / acceleration_rad_s2:
         return 2 * math.sqrt(distance_rad / acceleration_rad_s2)
     return distance_rad / speed_rad_s + speed_rad_s / acceleration_rad_s2

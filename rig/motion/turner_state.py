@@ -147,7 +147,7 @@ class TurnerIdentity:
     """A turner's maker and model (None if unknown), and the geometry with which results are computed.
 
     `tcp_offset`: an arm's tool centre point in the flange's frame, for information. `reading_std_rad`: the noise of one
-    reading of an angle, stated only if it is too large to ignore; a revolution then ends where a reading recurs.
+    reading of an angle, 0 if it can be ignored; otherwise a revolution is taken to end when a reading recurs.
     """
 
     maker: str
@@ -160,8 +160,9 @@ class TurnerIdentity:
 class Report(Protocol):
     """A turner's report about itself.
 
-    `host`: its address or port; `software`: its controller's version; `model`: None if unknown; `kinematics`: its
-    reported geometry, or None; `joints`: their names, the first at the ground; `words`: its name in a sentence.
+    `host`: the turner's address or port; `software`: the controller's version; `model`: None if unknown; `kinematics`:
+    the reported geometry, or None; `joints`: the joints' names, from the ground on; `words`: the turner's name in a
+    sentence.
     """
 
     @property

@@ -1,4 +1,4 @@
-"""The winding of the flange's cable by a plan, from each joint's travel to both sides of its present angle. Pure."""
+"""How far a plan winds the flange's cable: each joint's travel below and above the joint's present angle. Pure."""
 
 from collections.abc import Sequence
 from math import ceil, degrees, pi
@@ -23,7 +23,7 @@ def _round_up_deg(angle_rad: float) -> int:
 
 
 def cable_words(plan: Plan, q_rad: Joints, names: Sequence[str]) -> list[str]:
-    """Return sentences on the slack that the flange's cable needs from its present position, by joint `names`."""
+    """Return sentences on the slack that the flange's cable needs from its present position; `names`: of the joints."""
     travels = [
         f"{name} by {_round_up_deg(-low)}° one way (-) and {_round_up_deg(high)}° the other (+)"
         for name, (low, high) in zip(names, windings_rad(plan, q_rad), strict=True)

@@ -22,16 +22,17 @@ MIN_RESTS = 3  # fewest rests that show a drift of the bias
 def average_rests(
     run: RunData, stream: Stream, motion: ArmMotion, response: Array, superseded: Collection[int] = ()
 ) -> tuple[Average, ...]:
-    """Average all sufficiently long rests of the arm, except those next to a step in `superseded`.
+    """Average all sufficiently long rests of the arm, except rests next to a sweep or dwell that was `superseded`.
 
-    The means are corrected for the resting arm's oscillation, which `response` (3, 3) converts to readings.
+    A resting arm still oscillates. `response` (3, 3) converts the rates of this oscillation to readings, which are
+    subtracted.
     """
     rests = (_average_rest(stream, motion, window, response) for window in iterate_rests(run, superseded))
     return tuple(rest for rest in rests if rest is not None)
 
 
 def trim_rest(motion: ArmMotion, rest: Window) -> Window | None:
-    """Return a rest without its beginning and end; None if the arm moved in it or it has too few states."""
+    """Return a rest without its beginning and end; None if the arm moved in it or has fewer than two states in it."""
     still = Window(rest.start_s + REST_SETTLING_S, rest.end_s - REST_SETTLING_S)
     moved_rad = motion.travel_rad(still)
     return still if moved_rad is not None and moved_rad <= MAX_TRAVEL_AT_REST_RAD else None
@@ -56,9 +57,9 @@ def add_attitude(average: Average, motion: ArmMotion) -> Average:
 
 
 def estimate_bias_drift(rests: Sequence[Average]) -> Array:
-    """Return the variance (3,) of the bias between rests, (rad/s)², in excess of the noise of a rest.
+    """Return the part (3,) of the variance of the rests' means, (rad/s)², that the noise does not explain: bias drift.
 
-    The variance is zero unless χ² over all axes is significant at 0.999, so that noise does not count as drift.
+    The result is zero unless χ² over all axes is significant at 0.999, so that noise does not count as drift.
     """
     from scipy.special import chdtri
 

@@ -34,7 +34,7 @@ class Average:
     - start_s, end_s: the window on the controller's clock.
     - attitude (3, 3): mean rotation from the arm's base frame into the flange's; None without an arm.
     - drift_rad2_s2 (3,): the part of the variance due to bias drift from rest to rest.
-    - dof (3,): degrees of freedom of the noise's part of the variance, infinite if they were not counted.
+    - dof (3,): degrees of freedom of `noise_rad2_s2`, infinite if the noise counts as known.
     - lines_hz (k,): frequencies of the vibrations removed from the mean.
     - rounding_rad2_s2, slow_lines_rad2_s2 (3,): the parts of the variance due to rounding, and to spectral lines that
       are too slow to remove.
@@ -114,7 +114,7 @@ def synchronize_stream(raw: NDArray[Any], sensor: RecordedSensor, motion: KnownM
 
 
 def convert_stream(raw: NDArray[Any], sensor: RecordedSensor, clock: TimeBase) -> Stream:
-    """Return a gyroscope's samples (n,) in rad/s at controller times, by the time base `clock`."""
+    """Return a gyroscope's samples (n,) in rad/s at controller times, which the time base `clock` gives."""
     board_time_s = raw["board_time_us"] * 1e-6
     readings = sensor.channel(RATE).values(raw)
     return Stream(
@@ -129,7 +129,10 @@ def convert_stream(raw: NDArray[Any], sensor: RecordedSensor, clock: TimeBase) -
 
 
 def steps_of(raw: NDArray[Any], sensor: RecordedSensor, quantity: Quantity) -> Steps:
-    """Return the resolution steps of a quantity in a sensor's samples (n,); a board's are those of the converter."""
+    """Return the resolution steps of a quantity in a sensor's samples (n,).
+
+    If a board reads the sensor, the steps are those of its analogue-to-digital converter.
+    """
     channel = sensor.channel(quantity)
     return channel.steps(channel.values(raw), trusts_counts=sensor.on_board)
 

@@ -32,7 +32,10 @@ MIN_HELD_S, MAX_HELD_RATE_RAD_S, BLOCK_S = 0.75, 0.15, 0.25
 def segment_session(
     time_s: Array, rates: Array, acceleration: Array | None = None, *, range_rad_s: float | None = None
 ) -> HandRecording:
-    """Return the session of readings (n, 3), rad/s and m/s², at rising times (n,); an unknown range is None."""
+    """Divide readings (n, 3), in rad/s and m/s², at rising times (n,), into rests and moves.
+
+    `range_rad_s` is the gyroscope's range, None if unknown.
+    """
     windows = find_rests(time_s, {RATE: rates}, still_at_first=_began_still(time_s, rates)) if len(time_s) > 1 else ()
     rests = tuple(_rest(time_s, rates, acceleration, window) for window in windows)
     top = _find_clipped(rates, range_rad_s)
@@ -47,7 +50,7 @@ def segment_session(
 
 
 def _find_gaps(time_s: Array, rates: Array) -> NDArray[np.bool_]:
-    """Return a mask (n,) of the readings before a gap in which the body may have turned unobserved."""
+    """Return a mask (n,) of the last reading before each gap in which the body may have turned unobserved."""
     mask = np.zeros(len(time_s), dtype=np.bool_)
     if len(time_s) > 1:
         steps = np.flatnonzero(find_sampling(time_s).gaps(time_s, MIN_GAP_READINGS))
@@ -98,7 +101,7 @@ def _find_clipped(rates: Array, range_rad_s: float | None) -> NDArray[np.bool_]:
 
 
 def _find_held_intervals(time_s: Array, rates: Array, rests: tuple[HandRest, ...]) -> tuple[tuple[float, float], ...]:
-    """Return the intervals in which a hand held the body, which turned more slowly than in a move, but did not rest."""
+    """Return the intervals in which a hand held the body: it did not rest, but turned more slowly than in a move."""
     if not rests:
         return ()
     width = max(2, int(np.ceil(BLOCK_S / find_sampling(time_s).interval_s - ROUNDING_TOLERANCE)))
@@ -122,7 +125,10 @@ State = Literal["starting", "resting", "moving", "held"]
 
 @dataclass(frozen=True, slots=True)
 class Live:
-    """The body's `state` at `time_s`, the time since which it lasts, and the present move's rotation and peak rate."""
+    """The body's `state` at `time_s` and the time `since_s` at which this state began; the present move so far.
+
+    `turned_rad` (3,) and `peak_rad_s` are the move's rotation and largest rate.
+    """
 
     time_s: float
     state: State
@@ -134,7 +140,8 @@ class Live:
 class Segmenter:
     """A segmentation in progress. At any time its result equals what `segment_session` returns for the readings so far.
 
-    A rest is settled after `MIN_REST_S`. `range_rad_s` is the range of the gyroscope, None if unknown.
+    A rest is final, that is, `feed` returns it, once it has lasted `MIN_REST_S`. `range_rad_s` is the range of the
+    gyroscope, None if unknown.
     """
 
     def __init__(self, range_rad_s: float | None = None) -> None:
@@ -145,7 +152,7 @@ class Segmenter:
         self._session = HandRecording(np.empty(0), np.empty((0, 3)), None, (), ())
 
     def feed(self, time_s: Array, rates: Array, acceleration: Array | None = None) -> tuple[HandRest | Move, ...]:
-        """Add the next readings (k, 3) at times (k,); return the moves and rests settled since the last call."""
+        """Add the next readings (k, 3) at times (k,); return the moves and rests that are final since the last call."""
         if not len(time_s):
             return ()
         self._blocks.append((time_s, rates, acceleration))
@@ -165,7 +172,7 @@ class Segmenter:
 
     @property
     def handled(self) -> HandRecording:
-        """The recording's rests and moves up to the last rest of `MIN_REST_S`."""
+        """The recording's rests and moves up to the last rest that has lasted `MIN_REST_S`."""
         session = self._session
         count = len(session.rests)
         while count and session.rests[count - 1].end_s - session.rests[count - 1].start_s < MIN_REST_S - 2 * MARGIN_S:

@@ -28,5 +28,5 @@ def mask_knocks(readings: Array, quantity: Quantity) -> NDArray[np.bool_]:
 
 
 def smallest_steps(readings: Array) -> Array:
-    """Return the smallest difference between distinct readings (n, 3), by axis: an estimate of their resolution."""
+    """Return the smallest difference (3,) between distinct readings (n, 3) of each axis: an estimate of resolution."""
     return np.array([np.diff(np.unique(axis)).min() if np.ptp(axis) > 0 else 0.0 for axis in readings.T])

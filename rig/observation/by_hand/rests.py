@@ -3,11 +3,11 @@
 A recording is divided into blocks of a quarter of a second. A block is at rest if its readings scatter at most a few
 times as much as in the quietest tenth of all blocks, and if a gyroscope reads its bias, that is, the most frequent
 reading of quiet blocks. A steady turn is as quiet as a rest, so of several nearly equally frequent readings the
-smallest is taken as the bias. Adjacent blocks with equal readings form one rest, which a few missing readings do not
-end.
+smallest is taken as the bias. Adjacent blocks whose mean readings agree form one rest, which a few missing readings do
+not end.
 
-If there is a gyroscope, it alone decides, because it measures every turn, and hardly a knock against the table. Other
-sensors do measure knocks, so the few readings of a knock are left out.
+If there is a gyroscope, it alone decides, because it measures every turn, and hardly reacts to a knock against the
+table. Other sensors do react to knocks, so the few readings of a knock are left out.
 """
 
 from collections.abc import Mapping, Sequence
@@ -40,8 +40,8 @@ def find_rests(
 ) -> tuple[Window, ...]:
     """Return the rests of at least two blocks, from readings (n, 3) of one or several quantities at rising times (n,).
 
-    `still_at_first`: whether the first second scatters like a rest. `lying`: declared rests, in a part of which the
-    body lies still.
+    `still_at_first`: whether the first second scatters like a rest. `lying`: windows in which, by the file of the
+    motion, the body lies still for at least a part of the time.
     """
     quantity = next(quantity for quantity in quantities().values() if quantity in readings)
     if len(time_s) < 2 * MIN_BLOCK_SAMPLES:
@@ -90,7 +90,10 @@ def _average_unknocked(blocks: Array, noise: Array) -> tuple[Array, Array]:
 
 
 def _find_steady_blocks(still: NDArray[np.bool_], pairs: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return a mask of the blocks (count,) that agree with a neighbour (`pairs`); all still blocks if none agrees."""
+    """Return a mask (count,) of the blocks that agree with a neighbour; the `still` blocks if no two blocks agree.
+
+    `pairs` (count - 1,) says of each block whether it agrees with the next one.
+    """
     steady = np.append(pairs, False) | np.append(False, pairs)
     return steady if steady.any() else still
 
@@ -107,20 +110,23 @@ def _mask_blocks(times: Array, windows: Sequence[Window]) -> NDArray[np.bool_]:
 def _find_unturned(
     means: Array, steady: NDArray[np.bool_], tolerance: Array, lying: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """Return a mask (count,) of the blocks with a gyroscope's bias, that is, the most frequent reading at rest.
+    """Return a mask (count,) of the blocks in which a gyroscope reads its bias: their `means` (count, 3) agree with it.
 
-    A steady turn may last nearly as long as the rests, so of nearly equally frequent readings the smallest is the bias.
-    `lying` marks the blocks in declared rests, in which the body mostly lies still: if there are any, the most frequent
-    reading in these is the bias.
+    The bias is the most frequent mean among the `steady` blocks (count,), within `tolerance` (3,). A steady turn may
+    last nearly as long as the rests, so of nearly equally frequent means the smallest is taken. `lying` (count,) marks
+    the blocks in declared rests, in which the body mostly lies still. If any of these are steady, only they are
+    searched, and the most frequent mean is taken, however large it is.
     """
     declared = steady & lying
-    pool = means[declared if declared.any() else steady]
-    candidates = pool[:: -(-len(pool) // CANDIDATES)]
-    often = np.array(
-        [np.count_nonzero((np.abs(pool - candidate) <= tolerance).all(axis=1)) for candidate in candidates]
+    searched = means[declared if declared.any() else steady]
+    candidates = searched[:: -(-len(searched) // CANDIDATES)]  # evenly chosen, because all pairs would take long
+    agreeing_counts = np.array(
+        [np.count_nonzero((np.abs(searched - candidate) <= tolerance).all(axis=1)) for candidate in candidates]
     )
-    frequent = candidates[often == often.max() if declared.any() else often >= MIN_BLOCK_RATIO * often.max()]
-    middle = frequent[np.argmin(np.linalg.norm(frequent, axis=1))]
-    at_rest = np.median(pool[(np.abs(pool - middle) <= tolerance).all(axis=1)], axis=0)
-    agreeing: NDArray[np.bool_] = (np.abs(means - at_rest) <= tolerance).all(axis=1)
-    return agreeing
+    most = agreeing_counts.max()
+    is_frequent = agreeing_counts == most if declared.any() else agreeing_counts >= MIN_BLOCK_RATIO * most
+    frequent = candidates[is_frequent]
+    rough_bias = frequent[np.argmin(np.linalg.norm(frequent, axis=1))]
+    bias = np.median(searched[(np.abs(searched - rough_bias) <= tolerance).all(axis=1)], axis=0)
+    reads_bias: NDArray[np.bool_] = (np.abs(means - bias) <= tolerance).all(axis=1)
+    return reads_bias

@@ -42,7 +42,7 @@ def microsecond_of(sensor: RecordedSensor) -> float:
 
 
 def readings_of(sensor: RecordedSensor, samples: NDArray[np.void], from_s: float = 0.0) -> Readings:
-    """Return samples (n,) in SI units, at times that are those of their stamps plus `from_s`."""
+    """Return samples (n,) in SI units; their times are their time stamps in true seconds, plus `from_s`."""
     time_s = from_s + microsecond_of(sensor) * samples["board_time_us"].astype(np.float64)
     force = sensor.channel(ACCELERATION).values(samples) if sensor.measures(ACCELERATION) else None
     return time_s, sensor.channel(RATE).values(samples), force
@@ -59,7 +59,8 @@ class NotCounted:
     """The parts of a session that are left out, in the session's seconds.
 
     `moves` and `rests`: the intervals of refused moves and rests; `seams`: the middles of the gaps between recordings;
-    `from_s`: the time before which everything is left out. Events have times in microseconds of `microsecond_s`.
+    `from_s`: the time before which everything is left out. Recorded events state times in microseconds of the sensor's
+    clock, each of which truly lasts `microsecond_s` seconds.
     """
 
     moves: list[tuple[float, float]] = field(default_factory=list)
@@ -69,7 +70,10 @@ class NotCounted:
     microsecond_s: float = MICROSECOND_S
 
     def take(self, event: Event, shift_s: float) -> None:
-        """Leave out what an `event` refuses, in a recording whose clock is `shift_s` behind the session's."""
+        """Leave out the move or rest that an `event` reports as refused, or everything before a new beginning.
+
+        The clock of the event's recording is `shift_s` behind the session's.
+        """
         match event:
             case HandMoveRefused(begin_us, end_us):
                 self.moves.append(self._span_s(begin_us, end_us, shift_s))
@@ -84,7 +88,10 @@ class NotCounted:
         return shift_s + self.microsecond_s * begin_us, shift_s + self.microsecond_s * end_us
 
     def filter_session(self, session: HandRecording) -> HandRecording:
-        """Return the session without the `rests`; the two moves around a rest are merged into one with a pause."""
+        """Return the session without the refused `rests`, and with the refused `moves` marked.
+
+        The moves before and after a refused rest are merged into one move, which contains a pause.
+        """
         rests, moves, through = list[HandRest](), list[Move](), list[Move]()
         for index, rest in enumerate(session.rests):
             if _middle_s(rest) < self.from_s:
@@ -113,10 +120,10 @@ def _is_within(part: HandRest | Move, spans: Sequence[tuple[float, float]]) -> b
 
 
 def replay_runs(runs: Sequence[RunData], name: str) -> tuple[Segmenter, NotCounted, float]:
-    """Return one sensor's rests and moves so far, the omitted parts, and the time at which to continue.
+    """Return one sensor's rests and moves so far, the omitted parts, and the time at which to continue, s.
 
-    The item may have been moved between two recordings, so no move connects their rests. Raise Fault as
-    `check_readings` does.
+    The item may have been moved between two recordings, so no move connects the rests of different recordings. Raise
+    Fault as `check_readings` does.
     """
     microsecond_s, ends_s = microsecond_of(runs[0].sensors[name]), None
     segmenter, refused = Segmenter(range_of(runs[0].sensors[name])), NotCounted(microsecond_s=microsecond_s)
@@ -147,8 +154,8 @@ def session_of(runs: Sequence[RunData], name: str) -> HandRecording:
 def collect_inputs(settings: RunSettings, provenance: Provenance, sensor: RecordedSensor) -> SessionConditions:
     """Return the inputs of a session's solution other than a sensor's readings.
 
-    Without an accelerometer, the first face is the one requested first. Raise Refused `clock_unknown` if the error of
-    the clock that stamps the readings is not stated.
+    One input is the face that is up at first: None if an accelerometer shows it, otherwise the face requested first.
+    Raise Refused `clock_unknown` if the error of the clock that stamps the readings is not stated.
     """
     by_hand, uncertainty = settings.by_hand, settings.uncertainty
     if by_hand is None or uncertainty is None or (sensor.on_board and not provenance.board_follows_crystal):
@@ -173,6 +180,6 @@ def clock_unknown() -> Refused:
 
 
 def rotate_face(face: str, rotation: Array) -> Face:
-    """Return the face nearest to the axis of `face` after a `rotation` (3, 3) to other axes."""
+    """Return the name of a face in other axes, the nearest one; `rotation` (3, 3) converts vectors to these axes."""
     name = nearest_face(rotation @ axis_of(face))
     return next(candidate for candidate in FACES if candidate == name)
