@@ -1,8 +1,8 @@
 """The board's clock relative to the controller's, estimated from the data alone.
 
-The gyroscope and the arm measure the same rotation. A coarse search correlates turn rate with joint rate over all data;
-a weighted least-squares fit then finds the offset to a fraction of a millisecond, from the data near motion. The delay
-of the sensor's own filter is part of the offset.
+The gyroscope and the arm (or another turner) measure the same rotation. A coarse search correlates turn rate with joint
+rate over all data; a weighted least-squares fit to the data near motion then finds the offset to a fraction of a
+millisecond. The delay of the sensor's own filter is part of the offset.
 """
 
 from dataclasses import dataclass
@@ -77,7 +77,7 @@ def _check_samples(board_time_s: Array, readings: Array, motion: KnownMotion) ->
 
 
 def _turns_every_axis(motion: KnownMotion) -> bool:
-    """Return whether the motion turns every sensor axis in any mounting, so that the readings of each must change."""
+    """Return whether the body turns about all directions, so that every sensor axis, however mounted, must respond."""
     rates = motion.rate(motion.time_s[motion.covered(motion.time_s)])
     return bool(np.linalg.eigvalsh(rates.T @ rates).min() > MIN_TURN_RATE_RAD_S**2 * len(rates))
 
@@ -105,10 +105,10 @@ def check_readings(board_time_s: Array, readings: Array) -> None:
 
 
 def _find_first_clock(board_time_s: Array, readings: Array, motion: KnownMotion) -> tuple[TimeBase, int]:
-    """Return the coarse clock by as few first samples as suffice to find one, and the number of these samples.
+    """Return a coarse clock found from only the first samples of a long recording, and the number of these samples.
 
-    A recording of ordinary length needs all samples. In a recording of hours a part suffices; the caller then extends
-    the fine clock repeatedly, each time to twice as many samples.
+    All samples are used in a recording of ordinary length, or if fewer do not suffice. The caller then extends the
+    fine clock repeatedly, each time to twice as long a time.
     """
     span_s = LONG_RUN_S
     while True:
@@ -128,9 +128,10 @@ def _count_until(board_time_s: Array, span_s: float) -> int:
 
 @dataclass(frozen=True, slots=True)
 class _MovingTimes:
-    """The m blocks of `BLOCK_S` after `start_s`; `near` (m,) marks those in or near which a body turns.
+    """The m blocks of `BLOCK_S` after `start_s`; `near` (m,) marks the blocks in or near which the body turns.
 
-    At rest there are only vibrations, which the turner's encoders and the sensor show differently.
+    Only the times of these are used for a fit: at rest there are only vibrations, which the turner's encoders and the
+    sensor show differently.
     """
 
     start_s: float

@@ -49,11 +49,11 @@ def _average_samples(time_s: Array, readings: Array, count: int) -> tuple[Array,
 
 
 def fit_clock(clock: TimeBase, board_time_s: Array, readings: Array, motion: KnownMotion) -> TimeBase:
-    """Return the clock with the best fit of readings and motion, first by the slow parts of both.
+    """Return the clock with which readings and motion agree best, at first only in their slow parts, then in all.
 
-    A ripple looks the same after one period, and a fast ripple differs between readings and states because of their
-    filters. If the finest fit has no optimum for this reason, return the clock of the slow parts, with its uncertainty.
-    Raise Fault `time_base_not_found`.
+    The slow parts come first because a fast ripple fits as well if the offset is wrong by one of its periods, and
+    because filters change a fast ripple differently in readings and in states. If a finer fit fails or contradicts the
+    fit before it for this reason, return the clock of the earlier fit. Raise Fault `time_base_not_found`.
     """
     first, *finer = _list_stages(clock, board_time_s, readings, motion)
     clock = _iterate_clock(clock, *first)

@@ -50,7 +50,7 @@ def estimate_coarse_offset(board_time_s: Array, readings_rad_s: Array, motion: K
 
 
 def _arm_rate(motion: KnownMotion, step_s: float) -> tuple[float, Array]:
-    """Return the start of the motion, s, and from then its rate (3, n) at even steps, minus the mean."""
+    """Return the start of the motion, s, and its rate (3, n) every `step_s` from then on, with the mean subtracted."""
     grid = np.arange(motion.time_s[0], motion.time_s[-1], step_s)
     rate = motion.rate(grid).T
     return float(grid[0]), rate - rate.mean(axis=1, keepdims=True)
@@ -60,10 +60,10 @@ def _arm_rate(motion: KnownMotion, step_s: float) -> tuple[float, Array]:
 class _Match:
     """A candidate for the offset (controller − board); the larger of two matches is the better one.
 
-    - `share`: the fraction of the sum of squares of all readings that the arm's motion explains. A wrong offset, which
-      matches each sweep with the next, explains fewer sweeps.
-    - `fraction`: the same fraction of the readings taken while the arm's motion was recorded. `enough`: whether
-      `fraction` is at least `MIN_EXPLAINED`.
+    - `share`: the fraction of the sum of squares of all readings that the arm's motion explains. It is lower for a
+      wrong offset that matches each sweep with the next one, because one sweep then has no match.
+    - `fraction`: defined like `share`, but only for the readings taken while the arm's motion was recorded. `enough`:
+      whether `fraction` is at least `MIN_EXPLAINED`.
     """
 
     enough: bool
@@ -73,11 +73,11 @@ class _Match:
 
 
 def _coarse_offset(time_s: Array, readings: Array, arm_rate: Callable[[float], tuple[float, Array]]) -> _Match:
-    """Return the best offset from `time_s` (n,) to the controller's clock, to within a step.
+    """Return the best offset from `time_s` (n,) to the controller's clock, to within a bin.
 
-    Readings are averaged in steps, each of which contains at least one sample. Every axis of the board is
-    cross-correlated with every axis of the arm, because the readings' norm would contain the bias. Of the offsets at
-    the highest peaks, that with the best linear fit of the vectors is returned.
+    Readings are averaged in bins of equal duration, which is longer than the samples' interval. Every axis of the board
+    is cross-correlated with every axis of the arm, because the norm of the readings would contain the bias. Of the
+    offsets at the highest peaks, the one with the best linear fit of the vectors is returned.
     """
     step_s = max(COARSE_STEP_S, 1.1 * float(np.median(np.diff(time_s))))
     bins = ((time_s - time_s[0]) / step_s).astype(np.intp)
@@ -115,7 +115,7 @@ def _fast_length(least: int) -> int:
 def _compute_explained_shares(
     turning: Array, filled: NDArray[np.bool_], moving: Array, lags: NDArray[np.intp]
 ) -> tuple[Array, Array]:
-    """Return the shares (k,) and fractions (k,) of a `_Match` at each lag (k,) of bins; 0 if few overlap.
+    """Return `share` and `fraction` of a `_Match` (k,) at each lag (k,), in bins; 0 if too few bins overlap the motion.
 
     The arm's rate (3, m) explains the board's rate (3, n) by a linear map, over the bins that are `filled` (n,). The
     normal equations are precise enough, because the best lag is only the start of the fine fit.

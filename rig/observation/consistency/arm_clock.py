@@ -36,9 +36,9 @@ class ClockRate:
 
 
 def compare_with_computer(motion: ArmMotion) -> ClockRate:
-    """Return the rate of the controller's clock relative to the computer's, by a straight line through arrival times.
+    """Return the rate of the controller's clock relative to the computer's, from a straight line through arrival times.
 
-    States arrive in bursts after delays, so only some of them count as independent.
+    States arrive in bursts after delays, so the degrees of freedom are fewer than the states.
     """
     host_s, arm_s = motion.host_time_s - motion.host_time_s[0], motion.time_s - motion.time_s[0]
     design = np.column_stack([np.ones_like(host_s), host_s])
@@ -54,7 +54,8 @@ def state_jitter(recordings: Sequence[ObservedRun]) -> Jitter:
 
     Differences of the sixth order remove the servo's motion, which is slow compared with the states, and keep the
     errors of the times and the noise and steps of the encoder. Neighbouring differences share states and so are
-    correlated, by ρ at each lag: n differences have n / Σ ρ² degrees of freedom, with Σ ρ² = C(24, 12) / C(12, 6)².
+    correlated. With the correlation ρ(k) of differences k apart, n differences have n / Σ ρ(k)² degrees of freedom,
+    with Σ ρ(k)² = C(24, 12) / C(12, 6)² over all k, where C is the binomial coefficient.
     """
     count = 0
     scatter = []
@@ -71,8 +72,8 @@ def state_jitter(recordings: Sequence[ObservedRun]) -> Jitter:
 def find_encoder_noise_rad(recordings: Sequence[ObservedRun]) -> float:
     """Return the noise of one reading of a joint's angle, rad, from the joints that are at rest during a sweep.
 
-    The noise is the scatter of sixth differences, as in `state_jitter`, and includes the encoders' steps. It is zero
-    for a turner with a single shaft, or if single angles are inaccurate.
+    The noise is the scatter of sixth differences, as in `state_jitter`, and includes the encoders' steps. Return zero
+    if the noise is unknown: for a turner with a single shaft, which never rests in a sweep, or with inaccurate angles.
     """
     squares = [
         np.mean(np.delete(steps_rad, sweep.joint, axis=1) ** 2)

@@ -1,5 +1,7 @@
 """The board's own average of each sweep, compared with the computer's mean of the same turn. Pure.
 
+The comparison shows an error that no residual shows: a mean reading that is paired with a wrong mean rate.
+
 Board and computer average the same samples, with different weights. The board's weights are equal over whole blocks of
 readings, so its window begins and ends a little before or after the turn; the computer's weights cancel the spectral
 lines that the computer found. The arm's rotation and the spectral lines, averaged with the board's weights, are
@@ -22,10 +24,10 @@ TIME_ROUNDING_S = 1e-7  # at most
 
 
 def compare_board_means(sensor: str, recordings: Sequence[ObservedRun]) -> dict[int, float]:
-    """Return the deviation of the board's average from the computer's mean, by the index of the sweep.
+    """Return by how much the board's average of each sweep deviates from the computer's mean, by the sweep's index.
 
-    The deviation is the worst axis', in standard deviations of the computer's mean. Sweeps not averaged by the board
-    are absent.
+    The deviation is that of the worst axis, in standard deviations of the computer's mean. Sweeps that the board did
+    not average are absent.
     """
     deviations = dict[int, float]()
     for recording in recordings:
@@ -42,13 +44,16 @@ def compare_board_means(sensor: str, recordings: Sequence[ObservedRun]) -> dict[
 
 
 def _deviation(recording: ObservedRun, stream: Stream, turn: Observation, observed: BoardObserved) -> float:
-    """Return the largest deviation of the three axes, board's average minus computer's mean, in standard deviations.
+    """Return the largest deviation of the three axes, in standard deviations: board's average minus prediction.
 
-    First the effects of the different windows, rotation and spectral lines, are subtracted from the board's average.
+    The computer's mean predicts the board's average, after two corrections for the board's different window and
+    weights. The reading due to the rotation, mean minus zero, is scaled to the arm's mean rate in the board's window;
+    the average of the spectral lines in that window is added.
     """
     zero, average, board = stream.clock.zero_rate_rad_s, turn.average, observed.observation
     axis = turn.axis_flange
-    # From the flange's rate to readings: along the axis as the computer's mean shows, across it (small) nominal.
+    # From the flange's rate to readings: along the axis by the computer's mean; across it, where the rate is small, by
+    # the nominal mounting.
     across = np.array(stream.sensor.mounting) @ (np.eye(3) - np.outer(axis, axis))
     by_rate = np.outer(average.mean_rad_s - zero, axis) / turn.speed_rad_s + across
     edges = np.searchsorted(stream.time_s, [average.start_s, average.end_s])
@@ -61,6 +66,7 @@ def _deviation(recording: ObservedRun, stream: Stream, turn: Observation, observ
     residuals = (stream.readings_rad_s[first:last] - zero - rates @ by_rate.T)[of_turn]
     columns = np.column_stack([np.ones(len(residuals)), regressors[of_turn]])
     line_means = regressors[of_board].mean(axis=0) @ fit_columns(columns, residuals)[1:]
+    # The prediction is zero + by_rate @ mean rate + line means.
     deviation = np.array(board.mean_rad_s) - zero - by_rate @ rates[of_board].mean(axis=0) - line_means
     return float(np.max(np.abs(deviation) / average.mean_std_rad_s))
 

@@ -8,7 +8,7 @@ from rig.observation.windows import Window
 
 
 def compare_halves(dwell: RawDwell, steps: Steps) -> tuple[Array, Array]:
-    """Return the difference of the means of a dwell's halves and its variance due to noise, (3,) each, in counts.
+    """Return the difference (3,) of the means of a dwell's halves, in counts, and its variance (3,) due to noise.
 
     `steps` is the resolution of the counts. The arm's oscillation, as encoders measure it, is removed.
     """

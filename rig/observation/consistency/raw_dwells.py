@@ -44,7 +44,7 @@ class RawDwell:
 
 
 def raw_acceleration_dwells(name: str, recording: ObservedRun, matrix: Array) -> list[RawDwell]:
-    """Return a sensor's raw accelerations in each of its dwells; `matrix` is the accelerometer's F (3, 3)."""
+    """Return a sensor's raw accelerations in each of its dwells; `matrix` (3, 3) converts forces to readings."""
     stream, site = recording.stream(name), recording.run.settings.site
     per_count = matrix / stream.sensor.channel(ACCELERATION).unit_per_count
     dwells = []
@@ -58,7 +58,7 @@ def raw_acceleration_dwells(name: str, recording: ObservedRun, matrix: Array) ->
 
 
 def raw_acceleration_sweeps(name: str, recording: ObservedRun) -> list[RawReadings]:
-    """Return a sensor's raw accelerations in its revolutions, each with its number in the recording."""
+    """Return a sensor's raw accelerations in its revolutions, each with the revolution's number in the recording."""
     stream = recording.stream(name)
     sweeps = []
     for index, turn in enumerate(recording.sensors[name].revolutions):

@@ -20,11 +20,12 @@ MAD_TO_STD = 1.4826  # standard deviation over median absolute deviation
 class RawReadings:
     """Raw readings of one revolution, rest or dwell.
 
-    - sweep: index among the sensor's revolutions, −1 for a rest.
+    - sweep: index among the sensor's revolutions, −1 for a rest or dwell.
     - counts (n, 3): the readings as recorded.
     - residual_counts (m, 3): readings minus their segment's mean and the vibration, for samples with recorded motion.
     - vibration_counts (3,): RMS of the arm's vibration.
-    - vibration_rad2 (3,): mean square of the angle by which the vibration turns the body between two times in a rest.
+    - vibration_rad2 (3,): mean square of the angle by which vibration turns the body from one random time of a rest to
+      another.
     """
 
     sweep: int
@@ -41,9 +42,10 @@ def counts_of(stream: Stream, quantity: Quantity, inside: slice) -> NDArray[np.i
 
 
 def innovation_std(counts: NDArray[np.int64]) -> Array:
-    """Return the standard deviation (3,), in counts, of a reading's prediction error.
+    """Return the standard deviation (3,), in counts, of the noise of a reading: the error of its prediction.
 
-    The prediction by previous readings excludes drift and vibration, which shift neighbouring readings together.
+    A reading is predicted from previous readings, which excludes drift and vibration, because these shift neighbouring
+    readings together.
     """
     return np.array([_innovation_std(axis - axis.mean()) for axis in counts.T])
 

@@ -44,7 +44,7 @@ REST_SEARCH = LineSearch(stands_out=30.0, sidebands=0)  # noise alone exceeds th
 
 
 def segment_counts(revolutions: int) -> tuple[int, int]:
-    """Return the number of segments of each of the `revolutions`, then of each rest."""
+    """Return two numbers: of segments in each revolution, and in each rest, if there are `revolutions` revolutions."""
     segments = max(1, min(REVOLUTION_SEGMENTS, MAX_SEGMENTS // max(revolutions, 1)))
     return segments, max(1, segments // REST_SEGMENTS)
 
@@ -68,7 +68,7 @@ class Segment:
 
     - position: from −1 in the first segment to 1 in the last.
     - mean: the mean of the readings, rad/s.
-    - rate_rad_s (3,): the flange's mean rate relative to the base, in the flange's frame, by the weights of `mean`.
+    - rate_rad_s (3,): the flange's mean rate relative to the base, in the flange's frame, weighted like `mean`.
     - attitude (3, 3): mean rotation from the base into the flange's frame.
     """
 
@@ -119,9 +119,9 @@ def segment_recordings(name: str, recordings: Sequence[ObservedRun]) -> tuple[Se
 class _Division:
     """Samples of a window that lie in segments.
 
-    - inside: all n samples of the window; used (n,): those in a segment with `enough` samples.
-    - time_s (m,), readings_rad_s (m, 3): the used samples; groups (m, p): their segments.
-    - ends_s (p + 1,): the segments' ends.
+    - inside: all n samples of the window; used (n,): mask of those in a segment with enough samples.
+    - enough: the indices of these segments among all p segments; ends_s (p + 1,): the segments' ends.
+    - time_s (m,), readings_rad_s (m, 3): the used samples; groups (m, p): above zero where a sample lies in a segment.
     """
 
     inside: slice
@@ -164,8 +164,8 @@ def _segment_revolution(
     """Average a revolution or an arc in segments, without the spectral lines of the whole average.
 
     Spectral lines slower than `SLOW_CYCLES` remain, because weights that cancel them would amplify the encoders' noise;
-    the variance of each segment includes them, unless they are the harmonics of a step. A vibration that the encoders
-    measure only in part is no noise.
+    the variance of each segment includes them, unless they are the harmonics of a step. The noise is that of the whole
+    average, in which a vibration does not count as noise, even if the encoders measure it only in part.
     """
     average, axis = turn.average, turn.axis_flange
     times_s = stream.time_s[slice_time(stream, average.start_s, average.end_s)]
@@ -268,8 +268,9 @@ def _segment_rest(stream: Stream, motion: ArmMotion, average: Average, count: in
 def _noise_at_rest(residuals: Array, segments: int, columns: int, steps: Steps) -> MeanNoise:
     """Return the noise of readings, from the residuals (n, 3) of a fit of segment means and spectral lines.
 
-    If there are spectral lines, a part of a vibration may remain in the scatter; then the noise of a long mean is that
-    at zero frequency.
+    `segments` and `columns` are the numbers of fitted means and of fitted columns of spectral lines. If there are
+    lines, a part of a vibration may remain in the scatter; if so, the noise of a long mean is taken from the spectrum
+    at zero frequency instead.
     """
     dof = max(len(residuals) - segments - columns, 1)
     scatter = np.maximum(np.sum(residuals**2, axis=0) / dof, steps.variance)
@@ -290,7 +291,7 @@ def _average(
     noise: MeanNoise,
     added: Array | float = 0.0,
 ) -> tuple[Segment, ...]:
-    """Return the segments with enough samples, averaged by weights (p, m): readings and the flange's rates (m, 3).
+    """Return the segments with enough samples; weights (p, m) average the readings and the flange's rates (m, 3).
 
     `added` (3,): the variance of each mean due to slow spectral lines.
     """

@@ -1,8 +1,8 @@
 """Transfers of the arm between sweeps and rests: rotations about other axes than the sweeps before and after.
 
-The sweeps about an axis follow each other, so they do not show a change of that axis's scale factor at another time.
-In a transfer two wrists turn by half a revolution, from rest to rest, and the arm states the mean rate as in a sweep.
-Each transfer is averaged as a whole.
+All sweeps about one axis follow each other, so they do not show a change of that axis's scale factor before or after
+them; transfers do. In a transfer two wrists turn by half a revolution, from rest to rest, and the encoders give the
+arm's mean rate as in a sweep. Each transfer is averaged as a whole.
 
 No spectral lines are sought in a transfer, because it is short, and the frequency of the servo's vibration rises and
 falls. A vibration at the data rate aliases to zero, an error of the mean that the scatter does not show: see
@@ -52,8 +52,8 @@ class WristTransfer:
     """A transfer in which only the wrists turned, averaged; times are on the clock of its recording.
 
     - clock_offset_s: converts the transfer's times to the clock of the first recording.
-    - mean_rad_s (3,): mean of the readings; scatter_rad2_s2, rounding_rad2_s2 (3,): the mean's variances due to noise,
-      by the residuals of a fit of the arm's rate and gravity, and due to rounding.
+    - mean_rad_s (3,): mean of the readings; rounding_rad2_s2 (3,): variance of the mean due to rounding.
+    - scatter_rad2_s2 (3,): variance of the mean due to noise, from residuals after a fit of the arm's rate and gravity.
     - rate_rad_s (3,): the flange's mean rate relative to the base, in the flange's frame.
     - gravity_m_s2 (3,): gravity minus the acceleration at the sensors' position, in the same frame.
     - attitude (3, 3): rotation from the base into the flange's frame.
@@ -72,9 +72,9 @@ class WristTransfer:
 def average_transfers(
     name: str, recordings: Sequence[ObservedRun], matrix: Array, site: Site, extension_m: Array
 ) -> list[WristTransfer]:
-    """Average all transfers of a gyroscope with matrix F (3, 3), mounted at `extension_m` (3,) in the flange's frame.
+    """Average a gyroscope's readings in all transfers, except those with a missing or saturated sample.
 
-    Transfers with a missing or saturated sample are left out.
+    The gyroscope is mounted at `extension_m` (3,) in the flange's frame; `matrix` (3, 3) converts rates to readings.
     """
     transfers = list[WristTransfer]()
     for recording in recordings:

@@ -5,9 +5,9 @@ The file of samples is that of `rig.observation.external.csv_samples`.
 The file of attitudes has `start_s`, `end_s` on the same clock, or `time_s` alone, and `qw qx qy qz`, the unit
 quaternion that takes body to table coordinates. If the table turns, it also has the table's rate in body coordinates,
 `rate_x_rad_s rate_y_rad_s rate_z_rad_s`; optionally it has `attitude_std_rad` about each axis. While the table turns, a
-row refers to its middle and should be short. A row may contain a single sample; the noise is then estimated from the
-scatter of all rows about the model. Accelerometers and magnetometers use only the rows in which the body is at rest
-(`rig.observation.external.placements`).
+row states the attitude at the middle of its window and should be short. The window may contain a single sample; the
+noise is then estimated from the scatter of all rows about the model. Accelerometers and magnetometers use only the rows
+in which the body is at rest (`rig.observation.external.placements`).
 
 Columns may have any order; the first row holds their names.
 
@@ -60,10 +60,12 @@ MOMENTS = Header(  # forms of a file: rows with a duration, or with a moment eac
 
 @dataclass(frozen=True, slots=True)
 class Rows:
-    """A gyroscope's averages in N rows: `means` (N, 3), their `variances` (N, 3) and the `dof` (N, 3) of these.
+    """A gyroscope's averages in N rows of a file of attitudes.
 
-    `variances` is None if rows hold too few samples to show their noise. `samples` (N,) are counts; `attitudes` (N, 3,
-    3), body to table; `rates_rad_s` (N, 3) of the table in body coordinates and `attitude_std_rad` (N,), if given.
+    - `means` (N, 3), their `variances` (N, 3) and the variances' degrees of freedom `dof` (N, 3); `variances` and `dof`
+      are None if a row has too few samples to show its noise.
+    - `samples` (N,): the number of samples in each row; `attitudes` (N, 3, 3): rotations from body to table.
+    - `rates_rad_s` (N, 3), in body coordinates, and `attitude_std_rad` (N,): None unless the file states them.
     """
 
     means: Array
@@ -77,12 +79,13 @@ class Rows:
 
 @dataclass(frozen=True, slots=True)
 class PlacedReadings:
-    """The averages of a file of samples in a file's attitudes, for the `quantities` that were recorded.
+    """Averages of the samples in one file in each attitude that another file states; `quantities` were recorded.
 
     - `rows`: a gyroscope's averages; `turning`: its readings and all rows, for a solution by rotation angles.
     - `placements`: the placements of the other sensors, or the Fault that prevents them.
     - `clock`: the table's clock, if it had to be found.
-    - `omitted`: rows that the recording does not cover; `incomplete`: rows with missing samples and no mean rate.
+    - `omitted`: rows that the recording does not cover, or that repeat a time; `incomplete`: rows that are not in
+      `rows`, because samples are missing in them.
     """
 
     quantities: tuple[Quantity, ...]
@@ -97,11 +100,11 @@ class PlacedReadings:
 def read_attitudes(
     path: Path, mapped: MappedColumns | None = None, origin_s: int = 0, *, inverse: bool = False
 ) -> dict[str, Array]:
-    """Return the columns (N,) of a file of attitudes in any format; `mapped` if its columns have other names.
+    """Return the columns (N,) of a file of attitudes in any format; `mapped` describes columns with other names.
 
     Times of a text table are relative to `origin_s`. A row with `time_s` in place of `start_s` and `end_s` is valid at
-    one instant. `inverse` quaternions take table to body coordinates. Raise as `attitudes_in`; Refused `no_file`,
-    `wrong_columns`, `wrong_unit`, `not_a_number`.
+    one instant. If `inverse`, the quaternions in the file take table to body coordinates. Raise as `attitudes_in` does;
+    Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`.
     """
     in_format = attitudes_in(path)
     if in_format is None:
@@ -189,7 +192,7 @@ def average_placements(samples: Samples, table: Mapping[str, Array], *, find_clo
 
 @dataclass(frozen=True, slots=True)
 class _ReferenceRows:
-    """The rows of a reference: `windows` (N, 2), `attitudes` (N, 3, 3), and if given rates (N, 3) and stds (N,).
+    """The N rows of a reference: `windows`, `attitudes` (N, 3, 3), and rates (N, 3) and stds (N,), None if not stated.
 
     `numbers` (N,) are the rows' numbers in the file, from 1.
     """
@@ -210,7 +213,7 @@ class _ReferenceRows:
 
 
 def _select_different_times(rows: Mapping[str, Array]) -> NDArray[np.intp]:
-    """Return the rows' numbers, from 1, without rows of zero length at the time of another row."""
+    """Return the numbers, from 1, of the rows to keep: a row of zero length is dropped if another has the same time."""
     middles_s = (rows["start_s"] + rows["end_s"]) / 2
     lasting = rows["end_s"] != rows["start_s"]
     return 1 + np.flatnonzero(lasting | ~np.isin(middles_s, middles_s[lasting]))

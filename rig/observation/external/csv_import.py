@@ -8,8 +8,8 @@ from start to end). A row of speed or angle 0 is a rest, without an axis. If the
 be a whole turn, whose mean speed is 2π/T in any case. Standard deviations may be given: `angle_std_rad` of the angle
 reached, and `axis_std_rad` of the direction of the axis.
 
-A row with an angle whose body is at rest at both ends is solved by the angle that the gyroscope measured
-(`rig.estimation.gyroscope.rotations_by_angle`).
+If a row states an angle, and the body is at rest before and after it, the solution compares the stated angle with the
+integral of the gyroscope's readings (`rig.estimation.gyroscope.rotations_by_angle`).
 
 Columns may have any order; the first row holds their names.
 """
@@ -65,10 +65,11 @@ SWEEPS_MB = 1  # some ten thousand sweeps
 class ExternalData:
     """Averages of samples over the sweeps and rests of a file, in the order of its rows, and turns with a stated angle.
 
-    - `at_reference`: whether means are corrected to one temperature, by polynomials whose uncertainty includes the
-      contradictions between repeated measurements.
-    - `by_mean`: numbers of rows that state an angle but are solved by mean speed, as the body moved before or after.
-    - `omitted`: rows left out for missing readings, and the readings missing in the others.
+    - `at_reference`: whether polynomials have corrected the means to one temperature. The polynomials' uncertainty then
+      includes the differences between repeated measurements, so checks of these differences are omitted.
+    - `by_mean`: numbers of rows that state an angle but are solved by mean speed, because the body moved before or
+      after.
+    - `omitted`: rows left out for missing readings, and the readings that are missing in the other rows.
     - `change`: an abrupt change of the gyroscope that the rows show.
     """
 
@@ -115,7 +116,7 @@ def average_sweeps(samples: Samples, sweeps: Mapping[str, Array]) -> ExternalDat
 
 
 def _add_turns(samples: Samples, sweeps: Mapping[str, Array], data: ExternalData) -> ExternalData:
-    """Return the data with the turns that have a stated angle, and that start and end at rest."""
+    """Return the data with those turns that have a stated angle and start and end at rest."""
     declared = DeclaredTurns(sweeps["angle_rad"], *(sweeps.get(name) for name in STD_COLUMNS))
     by_angle = find_turns(samples.time_s, samples.readings[RATE], declared, data.sweeps, data.rests)
     if by_angle is None:
@@ -270,7 +271,7 @@ def _observation(row: int, mean: Average, speed_rad_s: float, axis: Array) -> Ob
 
 
 def _check_noisy(mean: Average, row: int) -> None:
-    """Raise Fault `stuck_sensor` if an axis has one value throughout a row, so that the mean is uncertain by a step."""
+    """Raise Fault `stuck_sensor` if an axis has one value in a whole row: no scatter then shows the mean's error."""
     quiet = np.flatnonzero(mean.noise_rad_s <= ROUNDING_RATIO * np.abs(mean.mean_rad_s))
     if len(quiet):
         axis = int(quiet[0])
@@ -293,7 +294,7 @@ def _check_unit(turns: Sequence[Observation]) -> None:
 
 
 def _check_directions(turns: Sequence[Observation], rests: Sequence[Average]) -> None:
-    """Raise Refused `bad_sweep` if two sweeps about one axis have readings that contradict their directions."""
+    """Raise Refused `bad_sweep` if the readings of two sweeps about one axis contradict the stated directions."""
     if len(turns) < 2:
         return
     means = np.array([turn.average.mean_rad_s for turn in turns])

@@ -76,7 +76,7 @@ def read_sample_table(
 ) -> SampleTable:
     """Return the columns of a file in any format, which must hold the quantities `needed`.
 
-    `mapped` is for a table whose columns have other names. Rows of a table with a blank cell are left out; if `only`
+    `mapped` describes a table whose columns have other names. Rows of a table with a blank cell are left out; if `only`
     names sensors, blank cells of other sensors do not matter. Raise Refused `no_file`, `wrong_columns`, `wrong_unit`,
     `not_a_number`, `blank_cells`, and as `readings_in` does.
     """
@@ -102,7 +102,7 @@ def read_sample_table(
 def _convert(path: Path, columns: Columns, mapped: MappedColumns | None) -> Columns:
     """Return columns renamed as in the rig's files, and multiplied by the factors of a map.
 
-    The map can state a mirrored axis, or a topic in another unit. Raise Refused `wrong_columns`.
+    A factor serves for a mirrored axis (−1), or for a column in another unit. Raise Refused `wrong_columns`.
     """
     if mapped is None:
         return columns
@@ -132,7 +132,7 @@ def _read(path: Path, table: CsvTable, quantity: Quantity) -> NDArray[np.bool_]:
 def _drop_blanks(
     path: Path, table: CsvTable, read: Mapping[Quantity, NDArray[np.bool_]], wanted: Sequence[Quantity]
 ) -> SampleTable:
-    """Return the rows that hold the wanted quantities. Raise Refused `blank_cells` if some rows hold a part of them."""
+    """Return the rows that hold all `wanted` quantities. Raise Refused `blank_cells` if some rows hold only some."""
     columns, time_s = dict(table.columns), table.columns[TIME]
     if not wanted or all(read[quantity].all() for quantity in read):
         kept = np.ones(len(time_s), dtype=np.bool_)

@@ -50,9 +50,9 @@ def find_overlap(windows: Sequence[Window]) -> tuple[int, int] | None:
 
 
 def scatter_of(readings: Array) -> tuple[Array, Array, Array]:
-    """Return the variance of the mean of readings (n, 3), its degrees of freedom, and one reading's std, (3,) each.
+    """Return three arrays (3,): the variance of the mean of readings (n, 3), its degrees of freedom, one reading's std.
 
-    A vibration counts as noise, because no arm measures it.
+    A vibration counts as noise, because no arm's encoders show which part of the scatter it is.
     """
     variance = readings.var(axis=0, ddof=1)
     residuals = (readings - readings.mean(axis=0)).T
@@ -79,7 +79,8 @@ def average_of(readings: Array, window: Window) -> Average:
 def average_bridged(readings: Array, numbers: NDArray[np.intp], window: Window, hidden_rad: float) -> Average:
     """Return the average of a window's readings (n, 3), with missing ones interpolated.
 
-    Gaps in `numbers` (n,) show which are missing. The variance includes the rotation that they may hide.
+    Gaps in the readings' `numbers` (n,) show which are missing. The variance includes the rotation `hidden_rad`, a
+    standard deviation, that the gaps may hide.
     """
     mean = average_of(readings, window)
     if not hidden_rad:
@@ -130,7 +131,7 @@ def find_row_gaps(time_s: Array, readings: Array, sampling: Sampling, windows: S
 
 
 def is_losing(rows: Sequence[RowGaps]) -> bool:
-    """Return whether single readings are missing throughout the rows, as on a link that drops some."""
+    """Return whether single readings are missing throughout the rows, as they are if a link drops readings."""
     return sum(row.gaps for row in rows) > MAX_LOST_FRACTION * sum(row.count for row in rows)
 
 

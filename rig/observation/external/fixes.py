@@ -1,9 +1,11 @@
-"""Attitude fixes from a reference's rows, between which a gyroscope is integrated, and the omitted intervals.
+"""Fixes of the attitude, gathered from a reference's rows; a gyroscope is integrated from each fix to the next.
 
-Rows that follow each other while the body moves are gathered over windows; a row is valid for its middle. If the
-gyroscope shows that the body lay still during a row, both ends of the row are fixes, which share the row's error.
+An increment is the rotation from one fix to the next. Rows that follow each other while the body moves are gathered
+into one fix for each window; each row states the attitude at the row's middle. If the gyroscope shows that the body lay
+still during a row, both ends of the row are fixes, which share the row's error.
 
-A gyroscope cannot be integrated over missing or saturated samples, or if it turns too far between two readings.
+Increments are left out, and listed, if samples are missing or saturated, or if the gyroscope turns too far between two
+readings.
 """
 
 from collections.abc import Iterator
@@ -60,9 +62,9 @@ class GatheredFixes:
 def gather(turning: Turning, window_s: float | None = None, clock_s: float = 0.0) -> GatheredFixes:
     """Return the fixes of a reference's rows, in windows of a given or a suitable length.
 
-    Time t of the reference is time t + `clock_s` of the readings. Raise Fault `too_few_observations` if the body moves
-    in too few of the remaining increments. Raise `lost_samples`, `saturation` or `turned_too_fast` instead if that
-    error left too few increments, or caused more of them to be left out than remain.
+    Time t of the reference is time t + `clock_s` of the readings. Raise Fault if the body moves in too few increments,
+    or in fewer than were left out: `too_few_observations`, or the most frequent reason for leaving out increments,
+    `lost_samples`, `saturation` or `turned_too_fast`.
     """
     turning = select_covered(turning, clock_s)
     if len(turning.rows_s) < 2:
@@ -111,8 +113,8 @@ def _fixes(turning: Turning, still: NDArray[np.bool_], window_s: float) -> Fixes
 def _measure_walk(turning: Turning, rests_s: Array) -> tuple[float, float]:
     """Return the sum of squares, rad²/s, of a gyroscope's angle random walk in k rests, and its degrees of freedom.
 
-    `rests_s` (k, 2) are the rests' ends. The readings are first averaged over `BATCH_MEAN_S`, because their noise may
-    be coloured over a few samples.
+    `rests_s` (k, 2) are the rests' starts and ends. The readings are first averaged over `BATCH_MEAN_S`, because their
+    noise may be coloured over a few samples.
     """
     squares, dof = 0.0, 0.0
     for start_s, end_s in rests_s.tolist():
@@ -147,10 +149,10 @@ def _drop_thin(fixes: Fixes) -> Fixes:
 def _find_joined(
     turning: Turning, fixes: Fixes, clock_s: float
 ) -> tuple[NDArray[np.bool_], Array, tuple[OmittedIncrements, ...]]:
-    """Return which fixes are joined to the next fix, the std of the hidden rotation, and the omitted increments.
+    """Return for each increment whether it is used and the std of its hidden rotation; return the omitted increments.
 
-    The mask and the stds, rad, have shape (N − 1,). Two fixes are not joined over a step that may hide too much
-    rotation.
+    The mask and the stds, rad, have shape (N − 1,) for N fixes. An increment is not used if it contains a step, from
+    one reading to the next, that may hide too much rotation.
     """
     count = len(fixes.placement)
     first_s = clock_s + fixes.at_s[np.searchsorted(fixes.fix, np.arange(count))]
@@ -173,9 +175,10 @@ def _find_joined(
 
 
 def _find_unknown_steps(turning: Turning) -> Iterator[tuple[str, NDArray[np.intp], Array]]:
-    """Yield an error's name, the steps (k,) with motion unknown for this reason, and the stds (k,) of their rotation.
+    """Yield the name of each error, the steps (k,) in which the motion is unknown for this reason, and their stds (k,).
 
-    A step has the index of the reading before it. The stds are in rad.
+    A step, from one reading to the next, has the index of the reading before it. The stds, in rad, are those of the
+    unknown rotation.
     """
     steps_s = np.diff(turning.time_s)
     readings = turning.readings_rad_s
@@ -191,7 +194,7 @@ def _find_unknown_steps(turning: Turning) -> Iterator[tuple[str, NDArray[np.intp
 
 
 def _all_lost(count: int, total: int, left_out: tuple[OmittedIncrements, ...]) -> Fault:
-    """Return the Fault of too few increments, which names the commonest cause."""
+    """Return the Fault of too few increments; its name is the commonest reason for leaving increments out."""
     if not left_out:
         return _too_few(f"{count} increments between attitudes are left")
     most = max(left_out, key=lambda cause: cause.count)

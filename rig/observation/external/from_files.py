@@ -35,11 +35,12 @@ THRESHOLDS = ObservationThresholds(max_lost_fraction=0.01, max_speed_deviation=0
 
 @dataclass(frozen=True, slots=True)
 class Files:
-    """The files of `readings` and of their motion, and their item.
+    """The file of `readings`, the file of the motion, and the item that was turned.
 
-    `recorded` is the time of recording, None for the time at which the readings' file was last written. `columns` maps
-    columns with other names than the rig's. `tells` is the kind of motion. "turns" have no file; their `motion` holds
-    the user's declarations, by column.
+    - `tells`: the kind of motion, "sweeps", "attitudes" or "turns". For "turns" there is no file; `motion` then holds
+      the user's declarations, by column.
+    - `recorded`: the time of recording, None for the time at which the readings' file was last written.
+    - `columns`: a map of columns with other names than the rig's.
     """
 
     readings: Path
@@ -53,7 +54,7 @@ class Files:
 def build_recording(
     files: Files, site: Site, request: SolveOptions, *, second_order: bool = False, reference_c: float | None = None
 ) -> RunData:
-    """Return the recording of a calibration, over temperature if there is a reference temperature.
+    """Return the recording of a calibration, over temperature if the reference temperature `reference_c` is given.
 
     Raise Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`, `time_not_increasing`.
     """

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 class Omitted:
     """An omission: `count` out of a `total` of `what` (rows, increments, readings), for a `reason` in words.
 
-    `first` gives the row or time of the first omitted one.
+    `first` gives the row or time of the first one omitted.
     """
 
     what: str

@@ -29,10 +29,11 @@ class AttitudeRows:
 
 @dataclass(frozen=True, slots=True)
 class Account:
-    """The placements among `rows` (N,) of a reference, for readings at `time_s` (n,).
+    """The placements among the N `rows` of a reference, for readings at `time_s` (n,).
 
-    For each row, `rest` (N,) is the number of its rest, or −1, and `cuts` (N,) are its samples at rest. `dwells` (N,)
-    marks rows so long that they declare a rest.
+    - `rest` (N,): for each row the number of the rest that contains the row, −1 without one.
+    - `cuts`: for each row the indices of those of its samples that were taken at rest.
+    - `dwells` (N,): mask of rows that last so long that they declare a rest.
     """
 
     time_s: Array
@@ -44,7 +45,7 @@ class Account:
     def check_mostly_at_rest(self) -> None:
         """Raise Fault `not_at_rest` if the body moves in all rows, or in more than half of the dwells.
 
-        Raise `lost_samples` instead if most of these lack the readings that would show a rest.
+        Raise `lost_samples` instead if most of the dwells without a rest have a gap in the readings that hides it.
         """
         left_out, windows = int((self.rest[self.dwells] < 0).sum()), self.rows.windows
         if (self.rest >= 0).any() and 2 * left_out <= int(self.dwells.sum()):
@@ -85,7 +86,7 @@ class Account:
         yield from self._missing(kept)
 
     def _missing(self, kept: Sequence[NDArray[np.intp]]) -> Iterator[Omitted]:
-        """Yield one entry for all readings that are missing in the dwells, if any; `kept` are each dwell's samples."""
+        """Yield one entry for all readings missing in the dwells, if any; `kept` holds the samples of each dwell."""
         sampling = find_sampling(self.time_s)
         windows_s = np.array([(window.start_s, window.end_s) for window in self.rows.windows]).reshape(-1, 2)
         expected = np.floor(sampling.count_expected(self.time_s, windows_s[self._kept])).astype(int)
@@ -127,7 +128,7 @@ class Account:
             yield Omitted("rows", len(moving), total, "not_at_rest: the body moves in them", where)
 
     def _find_gaps_s(self, rows: NDArray[np.bool_]) -> Array:
-        """Return the longest gap (N,), s, in each of `rows` without a rest; 0 in other rows, or if below a block."""
+        """Return the longest gap (N,), s, in each of `rows` without a rest; 0 for other rows, or up to `BLOCK_S`."""
         gaps_s = np.zeros(len(rows))
         for row in np.flatnonzero((self.rest < 0) & rows).tolist():
             longest_s = float(np.diff(self.time_s[self._inside(row)]).max(initial=0.0))
@@ -140,7 +141,8 @@ class Account:
     def _find_moved(self, row: int) -> NDArray[np.intp]:
         """Return the samples of a dwell in which the body moves.
 
-        Readings within `BLOCK_S` of an end of the dwell or of a gap are not counted: a rest's ends are that uncertain.
+        Readings within `BLOCK_S` of an end of the dwell or of a gap are left out, because the ends of a rest are
+        uncertain by as much.
         """
         window, samples = self.rows.windows[row], self._inside(row)
         gaps = np.flatnonzero(np.diff(self.time_s[samples]) > BLOCK_S)

@@ -1,7 +1,7 @@
-"""Sensor readings in the attitudes in which a body was laid down; only rests show gravity, or a field.
+"""Sensor readings in the attitudes in which a body was laid down: only there they show gravity, or a field, alone.
 
-A placement is a rest of the recording (`rig.observation.by_hand.rests`) with the rows of a reference in it. Consecutive
-rows without a movement in between are one placement. Rests without a row still show the quantity's norm.
+A placement is a rest of the recording (`rig.observation.by_hand.rests`) that contains rows of a reference. Consecutive
+rows without a movement in between are one placement. Rests without a row still show the norm of gravity or the field.
 
 A knock or a gap does not end a placement if the readings before and after are equal: the body then lay still, and only
 the readings in between are left out.
@@ -36,7 +36,7 @@ MIN_STILL_FRACTION = 0.5  # of a dwell in which the body lies still; otherwise t
 class RestMeans:
     """Averages in N rests: `means` (N, 3) of every quantity, their `variances` (N, 3), and the variances' `dof` (N, 3).
 
-    `windows` reach from the first to the last of the `samples` (N,) of each rest.
+    `samples`: the number of samples of each rest; `windows`: from the first to the last of these samples.
     """
 
     means: Mapping[Quantity, Array]
@@ -54,10 +54,11 @@ class RestMeans:
 
 @dataclass(frozen=True, slots=True)
 class Placements:
-    """N placements: the averages `read`, `attitudes` (N, 3, 3), body to table, and `attitude_std_rad` (N,) as stated.
+    """N placements: averages of the readings (`read`), and attitudes as a reference states them.
 
-    `unplaced` are rests without an attitude; `left_out` is the number of rows in which the body moved; `omitted` lists
-    everything else that is left out.
+    - `attitudes` (N, 3, 3): rotations from body to table; `attitude_std_rad` (N,): their standard deviations, or None.
+    - `unplaced`: averages in rests without an attitude.
+    - `left_out`: number of rows in which the body moved; `omitted`: everything else that is left out.
     """
 
     read: RestMeans
@@ -70,7 +71,7 @@ class Placements:
 
 @dataclass(frozen=True, slots=True)
 class _PlacedRest:
-    """The rest of this `number`: its `windows` between knocks, and the indices of its `samples`."""
+    """A rest: its `number` among all rests, its `windows` between knocks, and the indices of its `samples`."""
 
     number: int
     windows: tuple[Window, ...]
@@ -86,9 +87,10 @@ class _PlacedRest:
 
 
 def find_placements(time_s: Array, readings: Mapping[Quantity, Array], rows: AttitudeRows) -> Placements:
-    """Return the placements that a reference's rows state in readings (n, 3) at rising times (n,).
+    """Return the placements: the rests in readings (n, 3), at rising times (n,), for which a row states the attitude.
 
-    Raise Fault `not_at_rest` if the body moves in every row, or in more than half of the dwells.
+    Raise Fault `not_at_rest` if the body moves in every row, or in more than half of the dwells (long rows), or
+    `lost_samples` if gaps hide the rests.
     """
     dwells = np.array([window.end_s - window.start_s >= MIN_DWELL_S for window in rows.windows])
     windows_s = np.array([(window.start_s, window.end_s) for window in rows.windows])
@@ -128,7 +130,7 @@ def _closed_slice(time_s: Array, window: Window) -> NDArray[np.intp]:
 
 
 def _join_rests(time_s: Array, readings: Mapping[Quantity, Array], rests: Sequence[Window]) -> list[tuple[Window, ...]]:
-    """Return rests joined across knocks if readings are equal before and after, and the body has not turned between."""
+    """Return the rests, joined across a knock if the readings before and after agree and the body has not turned."""
     joined: list[tuple[Window, ...]] = []
     for rest in rests:
         if joined and _same_rest(time_s, readings, joined[-1][-1], rest):
@@ -172,8 +174,8 @@ def _reads_alike(read: Array, quantity: Quantity, before: NDArray[np.intp], afte
 def _find_rest(time_s: Array, window: Window, rests: Sequence[_PlacedRest]) -> tuple[int, NDArray[np.intp]]:
     """Return the number of the rest that contains a row, −1 if none does, and the row's samples at rest.
 
-    A rest contains a row if neither end of the row is more than a block outside the rest. For a dwell that no rest
-    contains, a rest with most of the dwell suffices.
+    A rest contains a row that extends at most `BLOCK_S` beyond the rest at either end. For a dwell (a long row) it
+    suffices that a rest overlaps at least half of it, and that no other rest overlaps it by more than `BLOCK_S`.
     """
     row, nothing = inside(time_s, window), np.zeros(0, dtype=np.intp)
     met: list[tuple[int, float, NDArray[np.intp]]] = []
@@ -195,10 +197,10 @@ def _find_rest(time_s: Array, window: Window, rests: Sequence[_PlacedRest]) -> t
 
 
 def _mask_inner(rest: NDArray[np.intp], windows_s: Array, starts_s: Array, ends_s: Array) -> NDArray[np.bool_]:
-    """Return a mask of the rows (N,) in a rest, except those near its start or end.
+    """Return a mask (N,) of the rows in a rest, except rows near the start or end of the rest.
 
-    A reference that lags shows motion there. A rest keeps all its rows if all are near an end. `rest` (N,) are the
-    numbers of the rows' rests, −1 without one.
+    Near the ends a reference that lags shows motion. If all rows of a rest are near an end, the mask includes them
+    all. `rest` (N,) are the numbers of the rows' rests, −1 without one.
     """
     at_rest = np.flatnonzero(rest >= 0)
     middles_s, number = windows_s[at_rest].mean(axis=1), rest[at_rest]
@@ -230,7 +232,10 @@ def _angle_between_rad(one: Array, other: Array) -> float:
 def _read(
     time_s: Array, readings: Mapping[Quantity, Array], cuts: Sequence[NDArray[np.intp]]
 ) -> tuple[RestMeans, NDArray[np.intp]]:
-    """Return the means of the rests, and the samples of knocks; rests with few samples get the other rests' noise."""
+    """Return the means of the rests, and the samples of knocks.
+
+    The variance of a rest with few samples is computed from the noise of the other rests.
+    """
     means = {}
     variances = {}
     dof = {}
@@ -252,7 +257,10 @@ def _read(
 
 
 def _fill_variances(variances: Array, counts: NDArray[np.intp], readings: Array, quantity: Quantity) -> Array:
-    """Return variances (N, 3), the missing ones from other rests, or from differences of successive readings (n, 3)."""
+    """Return variances (N, 3) of the rests' means, with those that are NaN computed from the noise elsewhere.
+
+    The noise is that of the other rests, or of the differences of successive readings (n, 3) if all variances are NaN.
+    """
     unknown = np.isnan(variances[:, 0])
     if not unknown.any():
         return variances

@@ -1,9 +1,9 @@
 """The offset of a reference's clock relative to the readings' clock, from the rotation that both show.
 
 The rates of densely written, evenly stamped rows determine offset and drift to a fraction of a millisecond
-(`rig.observation.clocks`). Rows that come slowly, or are stamped on arrival, have no such rates, and a fitted drift
-would be a time-stamp error. The offset of such rows, without drift, minimises the absolute deviations between the
-rotations from row to row (`robust_start`).
+(`rig.observation.clocks`). Rows that come slowly, or are stamped on arrival, have no such rates, and a drift fitted to
+them would only show errors of the time stamps. So only an offset is fitted to them, without drift: it minimises the sum
+of the absolute differences between the rows' and the readings' rotations from row to row (`robust_start`).
 """
 
 from dataclasses import replace
@@ -31,7 +31,7 @@ MIN_EXPLAINED = 0.3  # fraction of the readings' variance, by the coarse offset
 
 
 def find_reference_clock(turning: Turning, rates_rad_s: Array | None) -> TimeBase:
-    """Return the clock of a reference from its rows. `rates_rad_s` (N, 3) are their rates, None for attitudes alone.
+    """Return the clock of a reference; `rates_rad_s` (N, 3) are the rates of its rows, None for attitudes alone.
 
     Raise Fault `inverted_attitudes`, and those of `TableMotion` and `estimate_time_base`.
     """
@@ -60,7 +60,8 @@ def _estimate_clock(turning: Turning, rates_rad_s: Array | None) -> TimeBase:
 def check_one_clock(turning: Turning, rates_rad_s: Array | None) -> None:
     """Raise Fault `clocks_apart` if the rotation shows that the clocks of rows and readings run at different rates.
 
-    A gap of the readings may also be a step of a clock, which looks like another rate.
+    Raise nothing if the readings have a long gap, because a clock may have been set there, which looks like another
+    rate.
     """
     drift = 0.0
     for find in (_estimate_clock, find_reference_clock):  # the first is fast, and shows that nothing is wrong
@@ -81,7 +82,7 @@ def check_one_clock(turning: Turning, rates_rad_s: Array | None) -> None:
 
 
 def _find_steady_clock(turning: Turning, motion: TableMotion) -> tuple[TimeBase, float]:
-    """Return the clock without drift, and the fraction (0 to 1) of the rotation that remains unexplained."""
+    """Return the clock without drift, and the fraction (0 to 1) of the rotation that this clock leaves unexplained."""
     time_s = turning.time_s
     explained, offset_s = estimate_coarse_offset(time_s, turning.readings_rad_s, motion)
     unexplained, bias_rad_s = 1.0, np.zeros(3)
@@ -93,7 +94,7 @@ def _find_steady_clock(turning: Turning, motion: TableMotion) -> tuple[TimeBase,
 
 
 def _check_not_inverted(turning: Turning, unexplained: float) -> None:
-    """Raise Fault `inverted_attitudes` if the inverse rotations leave less than half of `unexplained` unexplained."""
+    """Raise Fault `inverted_attitudes` if inverse rotations reduce the fraction `unexplained` to less than half."""
     inverse = replace(turning, attitudes=np.swapaxes(turning.attitudes, -1, -2))
     motion = TableMotion(inverse.rows_s.mean(axis=1), inverse.attitudes, None)
     if _find_steady_clock(inverse, motion)[1] < unexplained / 2:

@@ -2,10 +2,11 @@
 
     ∫ m dt = F φ + b Δt        from t₁ + τ to t₂ + τ
 
-with the readings m, the offset τ of the clock, and φ the rotation vector from the row at t₁ to the row at t₂. This
-holds to second order for any φ below π, however far apart the rows are. The fit minimises the sum of the residuals'
-lengths (least absolute deviations by reweighting), over a grid of τ. Only pairs between which the body moves determine
-F and τ, so neither a few bad rows nor long rests have an effect.
+Here m are the readings, b is the bias, F (3, 3) converts rates to readings, τ is the offset of the clock, and φ is the
+rotation vector from the row at t₁ to the row at t₂, Δt later. The equation holds to second order for any φ below π,
+however far apart the rows are. The fit minimises the sum of the residuals' lengths (least absolute deviations by
+reweighting), over a grid of τ, so a few bad rows have no effect. Long rests have none either, because only pairs of
+rows between which the body moves determine F and τ.
 """
 
 from dataclasses import dataclass
@@ -30,7 +31,7 @@ MIN_EXPLAINED = 0.5  # fraction of the readings' variance, by F
 
 @dataclass(frozen=True, slots=True)
 class RobustStart:
-    """Initial values, and the fraction of the readings' rotation that they do not explain: 1 without suitable rows."""
+    """Initial values, and the fraction of the readings' rotation that they leave `unexplained`: 1 if none was found."""
 
     state: DriftState
     unexplained: float
@@ -46,7 +47,7 @@ class _Pairs:
 
 
 def find_start(turning: Turning) -> RobustStart:
-    """Return initial values of F, b and τ; without suitable rows, those of an aligned sensor on the same clock."""
+    """Return initial values of F, b and τ of the module; without suitable rows, for an aligned sensor on one clock."""
     aligned = RobustStart(DriftState(np.eye(3), np.zeros(3), 0.0), 1.0)
     pairs = _find_pairs(turning)
     if len(pairs.begin_s) < MIN_PAIRS:
@@ -73,7 +74,7 @@ def find_start(turning: Turning) -> RobustStart:
 
 
 def _find_pairs(turning: Turning) -> _Pairs:
-    """Return pairs of rows in close succession: all pairs with motion between the rows, and as many pairs at rest."""
+    """Return pairs of rows in close succession: at most `PAIRS` with motion between the rows, and as many at rest."""
     middles_s = turning.rows_s.mean(axis=1)
     later = np.searchsorted(middles_s, middles_s + MIN_PAIR_S)
     later = np.maximum(later, np.arange(len(middles_s)) + 1)
@@ -98,7 +99,7 @@ def _select_evenly(indices: NDArray[np.intp]) -> NDArray[np.intp]:
 
 
 def _fit(design: Array, turned: Array) -> tuple[float, Array]:
-    """Fit Fᵀ and b (4, 3) to `turned` (k, 3) by the `design` (k, 4); return the unexplained fraction, and the fit."""
+    """Fit `turned` (k, 3) = `design` (k, 4) × Fᵀ above b; return the unexplained fraction, and the fit (4, 3)."""
     aligned = np.concatenate([np.eye(3), np.zeros((1, 3))])
     weight = np.ones(len(design))
     solution = aligned

@@ -1,4 +1,4 @@
-"""The rests of a body, from a reference's attitudes: a row over a long window, or successive rows of equal attitude."""
+"""The rests of a body as a reference's attitudes show them: a long row, or successive short rows of equal attitude."""
 
 import numpy as np
 

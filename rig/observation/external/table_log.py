@@ -32,7 +32,10 @@ def read_table_log(
 
 
 def _attitudes(log: Columns, table: TableSection) -> dict[str, Array]:
-    """Return one row (N,) around the middle of each record of the log; the outermost axis carries the others."""
+    """Return the columns (N,) of attitudes, with one row for each of the N records of the log.
+
+    A row's window reaches half-way to the records before and after. The outermost axis carries the others.
+    """
     from scipy.spatial.transform import Rotation
 
     time_s = log[TIME]

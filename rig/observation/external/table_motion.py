@@ -22,7 +22,7 @@ STEP_SCATTER, COARSE_STEP_S = 0.2, 0.05
 
 
 class TableMotion:
-    """A `KnownMotion` from rows that follow each other closely; a row is valid for its middle.
+    """A `KnownMotion` from rows that follow each other closely; a row states the attitude at its middle.
 
     `middles_s` (n,) are on the table's clock, in any order; `attitudes` (n, 3, 3) transform body to table coordinates;
     `rates_rad_s` (n, 3) are in body coordinates, None if only the attitudes are known. Raise Fault
@@ -66,8 +66,8 @@ class TableMotion:
 def check_rates_agree(middles_s: Array, attitudes: Array, rates_rad_s: Array) -> None:
     """Raise Fault `wrong_unit` if a table's rates (N, 3) differ by a factor from those of its attitudes (N, 3, 3).
 
-    Rows are valid for their middles (N,). The check is needed because a solution by rates alone does not show a wrong
-    unit that the readings have too.
+    `middles_s` (N,) are the times of the rows. The check is needed because a solution that uses only the rates does not
+    show a wrong unit that the readings have too.
     """
     order = np.argsort(middles_s)
     time_s, rates = middles_s[order], rates_rad_s[order]

@@ -1,6 +1,7 @@
 """Turns from rest to rest among the rows of a table of sweeps; the other rows are sweeps at a constant speed.
 
-A turn is solved by the angle that the gyroscope measured, at any speed; a sweep by its mean rate.
+For a turn the solution compares the stated angle with the integral of the readings, so the speed may vary; for a sweep
+it compares mean rates. Readings are integrated from the rest before a turn to the rest after it.
 """
 
 from collections.abc import Iterator, Sequence
@@ -34,9 +35,10 @@ BY_HAND_AXIS_RAD = 0.02  # default tilt during the turn
 class TurnedData:
     """The input of a solution by increments.
 
-    - `gyroscope`: the gyroscope's readings; `turns`: the turns from rest to rest, with the numbers `rows` in the file;
-      `means`: the means of the sweeps.
-    - `noise_dof`, `bias_dof`: degrees of freedom of the noise, and of the bias' change between `rests`.
+    - `gyroscope`: the gyroscope's readings; `turns`: the turns from rest to rest, with the numbers `rows` in the file.
+    - `means`: the mean readings in the rests, and in the sweeps, which do not start and end at rest.
+    - `noise_dof`, `bias_dof`: degrees of freedom of the noise, and of the bias' change from rest to rest.
+    - `rests`: the rests of the file and of the readings, also those in which the bias had changed.
     - `hiding`: numbers of omitted rows, in which missing readings may hide a part of the turn.
     """
 
@@ -62,23 +64,28 @@ class DeclaredTurns:
 def find_turns(
     time_s: Array, readings: Array, declared: DeclaredTurns, sweeps: Sequence[Observation], rests: Sequence[Average]
 ) -> TurnedData | None:
-    """Return the turns that start and end at rest, by readings (n, 3) in rad/s at `time_s` (n,); None without any."""
+    """Return the turns that start and end at rest, as the readings (n, 3), rad/s at `time_s` (n,), show; or None.
+
+    The other `sweeps` stay sweeps: their mean readings are among the `means` of the result. Turns with gaps that may
+    hide too much rotation are left out. `rests` are the rests that the file states.
+    """
     pauses = _find_pauses(time_s, sweeps)
-    lying = find_rests(time_s, {RATE: readings}, lying=pauses)
-    if not lying:
+    found_rests = find_rests(time_s, {RATE: readings}, lying=pauses)
+    if not found_rests:
         return None
-    resting = [*rests, *(average_of(readings[inside(time_s, window)], window) for window in _find_others(lying, rests))]
+    unstated = _find_others(found_rests, rests)
+    resting = [*rests, *(average_of(readings[inside(time_s, window)], window) for window in unstated)]
     bias = np.median([rest.mean_rad_s for rest in resting], axis=0)
     rates = readings - bias
     sampling = find_sampling(time_s)
     gaps = np.flatnonzero(sampling.missing)
     turns = []
-    rows = []
+    turn_rows = []
     hiding = []
     means = [RateMean(rest.mean_rad_s, rest.variance_rad2_s2, np.zeros(3)) for rest in resting]
     for sweep in sweeps:
         row = sweep.sweep - 1
-        window = _enclosing_window(sweep, lying)
+        window = _enclosing_window(sweep, found_rests)
         if window is None or not _starts_and_stops(time_s, rates, sweep):
             average = sweep.average
             means.append(RateMean(average.mean_rad_s, average.variance_rad2_s2, sweep.speed_rad_s * sweep.axis_flange))
@@ -93,29 +100,34 @@ def find_turns(
         angle = float(declared.angle_rad[row])
         angle_std = float(np.hypot(angle_std, hidden_rad))
         turns.append(Turn(window.start_s, window.end_s, sweep.axis_flange, angle, angle_std, axis_std))
-        rows.append(sweep.sweep)
+        turn_rows.append(sweep.sweep)
     if not turns:
         return None
-    otherwise = _find_other_bias(time_s, rates, pauses, lying)
+    rests_at_other_bias = _find_other_bias(time_s, rates, pauses, found_rests)
     noise = np.sqrt(np.mean([np.square(rest.noise_rad_s) for rest in resting]) * sampling.interval_s)
     gyroscope = Gyroscope(time_s, readings, float(noise), np.sqrt(estimate_bias_drift(resting)))
-    samples = sum(rest.samples - 1 for rest in resting)
     return TurnedData(
-        gyroscope,
-        tuple(turns),
-        tuple(rows),
-        tuple(means),
-        samples,
-        max(len(resting) - 1, 1),
-        (*resting, *(average_of(readings[inside(time_s, window)], window) for window in otherwise)),
-        tuple(hiding),
+        gyroscope=gyroscope,
+        turns=tuple(turns),
+        rows=tuple(turn_rows),
+        means=tuple(means),
+        noise_dof=sum(rest.samples - 1 for rest in resting),
+        bias_dof=max(len(resting) - 1, 1),
+        rests=(
+            *resting,
+            *(average_of(readings[inside(time_s, window)], window) for window in rests_at_other_bias),
+        ),
+        hiding=tuple(hiding),
     )
 
 
 def _find_other_bias(
     time_s: Array, rates: Array, pauses: Sequence[Window], lying: Sequence[Window]
 ) -> Iterator[Window]:
-    """Yield the pauses in which a quiet reading may be another bias; `rates` (n, 3) are minus the usual bias."""
+    """Yield the pauses in which the body lies still but the bias had changed: the readings are quiet, but not near 0.
+
+    `rates` (n, 3) are the readings minus the usual bias.
+    """
     middles = [
         Window(pause.start_s + (pause.end_s - pause.start_s) / 4, pause.end_s - (pause.end_s - pause.start_s) / 4)
         for pause in pauses
@@ -126,7 +138,7 @@ def _find_other_bias(
 
 
 def _find_others(lying: Sequence[Window], rests: Sequence[Average]) -> list[Window]:
-    """Return the found rests that do not overlap a stated one."""
+    """Return the windows `lying`, found in the readings, that do not overlap any of the stated `rests`."""
     return [
         window
         for window in lying
