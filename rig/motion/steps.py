@@ -16,7 +16,7 @@ CLOSURE_TOLERANCE_RAD = 1e-6  # of a whole turn, for rounding
 
 
 class Motion(Protocol):
-    """A joint-space motion. Speed and acceleration are those of the joint with the longest travel; the others keep step."""
+    """A joint-space motion. Speed and acceleration are those of the joint that travels farthest; others keep step."""
 
     @property
     def name(self) -> str: ...

@@ -55,7 +55,7 @@ def check_possible(readings: Array, rows: NDArray[np.intp], quantity: Quantity, 
 
 
 def check_temperatures(temperature_c: Array, rows: NDArray[np.intp], where: str) -> None:
-    """Raise Refused `wrong_unit` for a temperature (n,) too low or high for a laboratory; see `check_possible`."""
+    """Raise Refused `wrong_unit` for a temperature too low or high for a laboratory; see also `check_possible`."""
     wrong = np.flatnonzero((temperature_c < MIN_TEMPERATURE_C) | (temperature_c > MAX_TEMPERATURE_C))
     if len(wrong):
         raise Refused(
@@ -92,7 +92,8 @@ def _find_overflows(time_s: Array, axis: Array, narrowest: float) -> NDArray[np.
     """Return the indices (k,) of the readings (n,) before an overflow of the number that they are stored in.
 
     A change of sign between two joined recordings looks similar. But before an overflow the readings rise towards the
-    end of the range, and go on rising after it; close to the end, noise causes overflows in both directions.
+    end of the range, and go on rising after it; or they return at once, because noise causes overflows in both
+    directions.
     """
     none = np.zeros(0, dtype=np.intp)
     span, steps, steps_s = float(np.ptp(axis)), np.diff(axis), np.diff(time_s)

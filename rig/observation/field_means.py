@@ -105,8 +105,8 @@ def field_tests(
 ) -> tuple[Mean, ...]:
     """Average the magnetometer's readings, in tesla, in each rest at the home pose, in the order of time.
 
-    Raise Fault as `field_readings` does. Rests with fewer samples than a dwell needs are skipped: the last samples of a
-    run may arrive after its end.
+    Raise Fault as `field_readings` does, but skip rests with fewer samples than a dwell needs, because the last samples
+    of a run may arrive after its end.
     """
     other = find_companion(recording, name)
     if other is None:

@@ -71,7 +71,7 @@ def survey_log(samples: Samples) -> LogSurvey:
 
 
 def _find_turns(time_s: Array, rates: Array, rests: Sequence[Window]) -> Iterator[SurveyedTurn]:
-    """Yield the turns between adjacent rests, by the integral of the rates less the bias of both rests."""
+    """Yield the turns between adjacent rests: the integral of the rates minus the mean reading in the two rests."""
     for before, after in pairwise(rests):
         bias = np.mean([rates[inside(time_s, rest)].mean(axis=0) for rest in (before, after)], axis=0)
         window = Window(before.end_s, after.start_s)

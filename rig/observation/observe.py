@@ -49,15 +49,16 @@ class Observation:
     - axis ("x", "y", "z"), sign: the sensor axis that is nominally along the turn.
     - axis_flange (3,), speed_rad_s: unit vector, in the flange's frame, and size (nominally 2π/T; Δθ/T for an arc) of
       the arm's mean rate, with the weights of the mean reading.
-    - speed_std_rad_s: standard deviation of the speed, if the arm's states are too far apart to locate the turn's ends.
+    - speed_std_rad_s: standard deviation of the speed, because the turn's ends lie between the arm's states.
     - lost: number of samples missing from the average.
     - axis_errors (13, 3): change of the axis per radian of each of the arm's errors
       (`rig.motion.geometry.AXIS_ERRORS`).
     - arm_m (3,): vector from the joint's axis to the flange's origin, in the flange's frame.
     - acceleration: the accelerometer's readings in the same turn, if one is to be calibrated.
-    - angle_rad: angle of an arc; arc_rad: the joint's angles at its ends, the lower first. None for whole turns.
-    - ripple: RMS unevenness of the turn, relative to its rate.
-    - state_gain: noise of the arm's states in the mean rate, relative to that in Δθ/T.
+    - angle_rad: the angle turned, None in external data; arc_rad: the joint's angles at an arc's ends, the lower first,
+      None for whole turns.
+    - ripple: RMS unevenness of the turn, relative to its rate; sidebands: as in `Revolution`.
+    - state_gain: ratio of the noise that the arm's states cause in the mean rate to that in Δθ/T.
     """
 
     sweep: int
@@ -84,7 +85,7 @@ class Observation:
 class SensorObservations:
     """The observations of one sensor: its clock, its revolutions and its rests (mean readings at zero rate).
 
-    `dwells` are the averages of its accelerometer in attitudes, if accelerations were recorded.
+    `dwells` are the averages of the sensor's accelerations in attitudes, if accelerations were recorded.
     """
 
     time_base: TimeBase
@@ -133,7 +134,7 @@ def observe_sensor(
 def observe_each_sweep(
     run: RunData, stream: Stream, motion: ArmMotion, settings: ObservationThresholds
 ) -> Attempts[int, Observation]:
-    """Return the observations of finished sweeps, and the faults of others, both by the sweep's index.
+    """Return the observations of finished sweeps, and the faults of sweeps without one, both by the sweep's index.
 
     A fault of one sweep does not affect the others.
     """
@@ -228,7 +229,7 @@ def _average_revolution(
 
 
 def _sample_turn(time_s: Array, motion: ArmMotion, turn: Revolution, covered: NDArray[np.bool_]) -> SampledTurn:
-    """Return a turn at the times at which the arm's motion is recorded, and `covered`, the mask (n,) of these times."""
+    """Return a turn at those times (n,) at which the arm's motion is recorded, that is, where `covered` (n,) is set."""
     fraction = (time_s - turn.start_s) / turn.duration_s
     waves = harmonics(turn.angle_rad * fraction, 2 * turn.sidebands)[covered]
     if not turn.closed:
@@ -277,7 +278,7 @@ def _check_saturation(stream: Stream, inside: slice, where: str) -> None:
 
 
 def _check_stuck(stream: Stream, inside: slice, where: str) -> None:
-    """Raise Fault `stuck_sensor` if all axes repeat one reading for long, although the noise is a count or more."""
+    """Raise Fault `stuck_sensor` if all axes repeat one reading for long, although the noise is at least one count."""
     counts = stream.sensor.channel(RATE).counts(stream.raw)
     if np.median(np.abs(np.diff(counts, axis=0)), axis=0).min() < 1:
         return

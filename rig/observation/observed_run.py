@@ -35,10 +35,10 @@ class Delay:
 
 @dataclass(frozen=True, slots=True)
 class ObservedRun:
-    """One recording with its observations; `sensors` by name.
+    """One recording with the observations of its `sensors`, by name.
 
-    With `polynomials` its readings are corrected to one temperature. `clock_offset_s` converts its times to the clock
-    of the first recording of its run.
+    If there are `polynomials` of a sensor, they correct its readings to one temperature. `clock_offset_s` converts the
+    recording's times to the clock of the run's first recording.
     """
 
     run: RunData
@@ -55,9 +55,9 @@ class ObservedRun:
     def time_s(self, sensor: str, gyroscope: str | None = None) -> Array:
         """Return the times (n,) of all samples of a sensor on the arm's clock.
 
-        The times are by the time base of `gyroscope`; by default, by the sensor's own time base, or else by that of the
-        first gyroscope on the same clock. Without any time base, arrival times at the computer relate samples to arm
-        states, to within milliseconds.
+        The time base of `gyroscope` converts the times; by default the sensor's own does, or if the sensor has none,
+        that of the first gyroscope on the same clock. Without a time base, arrival times at the computer relate samples
+        to arm states, to within milliseconds.
         """
         bases = {name: observations.time_base for name, observations in self.sensors.items()}
         return times_s(self.run, sensor, bases, gyroscope)
@@ -111,8 +111,8 @@ def observe_run(
 def observe_runs(runs: Sequence[RunData], corrections: Mapping[int, Array] = NO_ROTATIONS) -> tuple[ObservedRun, ...]:
     """Observe each recording of a run with a finished sweep or dwell; if a step was repeated, the last is used.
 
-    The first recording's thresholds apply to all. `corrections`: by the procedure's stage, as in `observe_run`. Raise
-    as `turner_of` does, and Fault as `observe_run` does.
+    The first recording's thresholds apply to all. `corrections` contains, for a stage of the procedure, the
+    `correction` of `observe_run`. Raise as `turner_of` does, and Fault as `observe_run` does.
     """
     for run in runs:
         turner_of(run)
@@ -132,8 +132,8 @@ def observe_runs(runs: Sequence[RunData], corrections: Mapping[int, Array] = NO_
 def _clock_offsets_s(recordings: Sequence[ObservedRun]) -> list[float]:
     """Return the offset of each recording's clock to the first one's; the controller may restart in between.
 
-    A recording begins after the previous one has ended, even if the computer's clock disagrees, because that clock may
-    have been set. In an accelerated laboratory, more time passes than by the computer's clock.
+    A recording begins after the previous one has ended, even if the computer's clock disagrees: that clock may have
+    been set, or the arm may be simulated faster than real time.
     """
     offsets_s = [0.0] * bool(recordings)
     for last, recording in pairwise(recordings):

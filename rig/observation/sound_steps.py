@@ -41,7 +41,7 @@ def _find_sound_steps_of(
 ) -> frozenset[int]:
     """Return one sensor's sweeps and dwells that have no fault.
 
-    Return no step if the sensor ever failed to follow the arm, because the fault's onset is unknown.
+    Return no step if the sensor ever failed to follow the arm, because it is unknown when the fault began.
     """
     try:
         stream = synchronize_stream(run.samples[sensor], run.sensors[sensor], motion)

@@ -21,7 +21,10 @@ REMEDY = "Check the sensor's supply and its bus wiring, then repeat the run"
 
 
 def check_rests(rests: Sequence[Average], slowest_rad_s: float) -> None:
-    """Raise Fault `stuck_sensor` if means at rest differ as in rotations, `stuck_axis` if that axis has no noise."""
+    """Raise Fault `stuck_sensor` if an axis' means in two rests differ by as much as a rotation would change them.
+
+    Raise `stuck_axis` instead if this axis has no noise.
+    """
     if len(rests) < 2:
         return
     apart = np.ptp([rest.mean_rad_s for rest in rests], axis=0)

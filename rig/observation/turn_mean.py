@@ -69,8 +69,9 @@ class Lines:
 
     - `encoded` (n, m): columns to remove from the residuals: a slow ripple that the encoders measure, its changes, and
       the remainder of the encoders' rate, mostly noise.
-    - `rate` (n, 0 to 2): columns that the weights cancel too. They are the rate itself if few samples or a gap do not
-      sample a ripple evenly; otherwise the changes of the slow ripple in a whole turn, which a lagging sensor reads.
+    - `rate` (n, 0 to 2): columns that the weights cancel in addition to the lines. If few samples or a gap sample the
+      ripple unevenly, the column is the rate itself. Otherwise, for whole turns, the columns are the changes of the
+      slow ripple, of which a lagging sensor reads a small part.
     """
 
     cycles: Array
@@ -104,7 +105,7 @@ def turn_mean(readings: Array, steps: Steps, turn: SampledTurn) -> tuple[Mean, A
 
 
 def _gain(weights: Array) -> float:
-    """Return the ratio of the angles' noise in a mean rate with weights (1, n) to their noise in Δθ/T."""
+    """Return how many times more noise the angles cause in a mean rate with weights (1, n) than in the plain mean."""
     return float(np.linalg.norm(np.diff(weights[0], prepend=0.0, append=0.0)) * weights.size / np.sqrt(2))
 
 
@@ -112,9 +113,9 @@ def _slow_line_variance(readings: Array, turn: SampledTurn, slow: Array, change:
     """Return the variance (3,) of the mean due to slow spectral lines, with columns `slow` (n, k).
 
     The readings determine these lines poorly. `change` (n,) are weights that cancel the lines minus weights that do
-    not, so `change` gives the difference between two means. The variance is the square of this difference, or its
-    variance for the lines' fitted amplitudes at random phases if that is larger. `explained` (n, m) are the columns of
-    everything else.
+    not, so `change` gives the difference between two means. The result is the larger of two numbers: the square of this
+    difference, and the variance that lines with the fitted amplitudes but random phases would add to the mean.
+    `explained` (n, m) are the columns of everything else.
     """
     without_ripple = fit_residuals(np.column_stack([whole(readings), turn.uneven_rad_s]), readings)
     residuals = fit_residuals(explained, readings)
@@ -136,7 +137,7 @@ def _find_turn_lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines
     """Find the vibrations in readings (n, 3) that the `steady` columns (n, k) do not explain.
 
     The encoders' rate is searched for spectral lines first, because its fast lines appear in the readings at the same
-    frequency. The readings' residuals without these show the other lines.
+    frequency. The residuals of the readings, without these lines, are then searched for the other lines.
     """
     uneven = turn.uneven_rad_s[:, None]
     none = uneven[:, :0]
@@ -171,22 +172,25 @@ def _find_turn_lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines
 
 
 def lag_columns(rate: Array, columns: Array, fraction: Array) -> Array:
-    """Return columns (n, 0 or 2) of a lag behind the slow ripple of a rate (n,) that columns (n, k) do not explain."""
+    """Return the columns (n, 2) by which a lagging sensor misreads the slow ripple of a rate (n,), (n, 0) without one.
+
+    The ripple is sought in the part of the rate that `columns` (n, k) do not explain.
+    """
     residuals = rate[:, None] - columns @ fit_columns(columns, rate[:, None])
     return _changes(_find_slow_ripple(residuals, fraction))
 
 
 def _changes(slow: Array) -> Array:
-    """Return the first and second differences of a rate (n, k), the effects of a lag and of a filter (n, 2 k)."""
+    """Return the first and second differences (n, 2 k) of a rate (n, k): the effects of a sensor's lag and filter."""
     change = np.gradient(slow, axis=0)
     return np.column_stack([change, np.gradient(change, axis=0)])
 
 
 def _find_slow_ripple(rate: Array, fraction: Array) -> Array:
-    """Return the part (n, 1) of a rate (n, 1) with less than `SLOW_CYCLES` per turn, or no column if it is noise.
+    """Return the part (n, 1) of a rate (n, 1) with less than `SLOW_CYCLES` per turn, or (n, 0) if this part is noise.
 
-    `fraction` (n,) is the elapsed fraction of the time. The angle, the sum of the rate, is tested, because the
-    encoders' noise is white in it.
+    `fraction` (n,) is the elapsed fraction of the time. The test uses the angle, the sum of the rate, because the
+    encoders' noise is white in the angle.
     """
     powers = np.abs(np.fft.rfft(apply_window(np.cumsum(rate, axis=0))[:, 0])) ** 2
     slow_bins = int(SLOW_CYCLES) + MAIN_LOBE

@@ -60,8 +60,8 @@ def swept(run: RunData) -> Iterator[FinishedSweep]:
 def iterate_rests(run: RunData, superseded: Collection[int] = ()) -> Iterator[Window]:
     """Yield the rests and dwells that were started and finished, in order.
 
-    Steps whose index is in `superseded`, and rests next to them, are left out: a disturbance may begin earlier or last
-    longer.
+    Dwells whose index is in `superseded`, and rests next to a superseded sweep or dwell, are left out, because a
+    disturbance may begin earlier or last longer.
     """
     rests = [
         window

@@ -79,7 +79,7 @@ def bag_attitudes(path: Path, inside: str | None) -> Iterator[Part]:
 def _inertial(
     messages: Iterator[tuple[float, Any]], columns: list[str | None], counts: dict[str, Any]
 ) -> Iterator[tuple[float, ...]]:
-    """Yield the time, rate and acceleration of `sensor_msgs/Imu`; absent columns are set to None.
+    """Yield the time, rate and acceleration of `sensor_msgs/Imu`; replace absent columns in `columns` by None.
 
     Messages without a rate are left out and counted in `counts`. Raise Refused `bag_topic` if no message holds a rate
     or an acceleration.

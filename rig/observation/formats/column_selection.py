@@ -16,9 +16,10 @@ from rig.observation.formats.csv_cells import DAY_S, is_value
 class MappedColumns:
     """The columns of another program's file.
 
-    - columns: each column's name in the file, or its number from 1, and the factor to SI, by the rig's own name.
+    - columns: for each of the rig's column names, the column's name in the file, or its number from 1, and the factor
+      to SI.
     - skip_lines: lines before the heading.
-    - wraps: the number at which a counter of time begins again at 0, by the rig's name of the time.
+    - wraps: for a time, under the rig's name, the number at which its counter begins again at 0.
     - rate_hz: rows per second, for a file without times.
     - missing: texts that stand for a blank cell.
     - in_any_unit: the numbers are used as they are, whatever a row of units states.
@@ -38,7 +39,7 @@ class MappedColumns:
 
 
 def map_samples(columns: ColumnMap) -> MappedColumns | None:
-    """Return the column map of a file of readings, or None; without a map an unknown column is an error."""
+    """Return the column map of a file of readings; None if the user gave none, so that unknown columns are refused."""
     return _unless_empty(
         _build_map(columns.samples, columns.samples_skip_lines, columns.samples_rate_hz, columns.samples_missing)
     )

@@ -38,7 +38,7 @@ LINE = "line"  # an additional column: the number of each row's line
 
 @dataclass(frozen=True, slots=True)
 class CsvTable:
-    """A file's `columns` (n,) by name, NaN for a blank cell, and the `lines` (n,) of its rows.
+    """A file's `columns` (n,) by name, NaN for a blank cell, and the line number (n,) of each row in the file.
 
     Times are relative to `origin_s`, a whole number of seconds: 0, unless the clock began in 1970 or so.
     """
@@ -71,15 +71,14 @@ def blank_cell(path: Path, name: str, line: int) -> Refused:
 def read_table(
     path: Path, header: Header, largest_mb: int, mapped: MappedColumns | None = None, origin_s: int | None = None
 ) -> CsvTable:
-    """Return the columns of a file by the names in its header; each group of optional columns is complete or absent.
+    """Return the columns of a file that `header` names; each group of optional columns is complete or absent.
 
     The first row holds the names. All rows have this row's separators: commas, tabs, or semicolons as in spreadsheets
     with a decimal comma. Empty rows, rows of units below the heading, and repetitions of the heading are skipped. If
     the file is `mapped`, only columns in the map, or with the rig's names, are returned. A file packed by gzip is
-    unpacked.
-    Times count from `origin_s`, by default determined by the first time. A packed or long file is read in a process of
-    its own, because it might exhaust the memory. Raise Refused `no_file`, `file_too_costly`, `temporary_folder_full`,
-    `wrong_columns`, `wrong_unit`, `not_a_number`.
+    unpacked. Times count from `origin_s`, by default determined by the first time. A packed or long file is read in a
+    process of its own, because it might exhaust the memory. Raise Refused `no_file`, `file_too_costly`,
+    `temporary_folder_full`, `wrong_columns`, `wrong_unit`, `not_a_number`.
     """
     rate_hz = None if mapped is None else mapped.rate_hz
     if rate_hz is not None:
@@ -109,10 +108,10 @@ def read_table(
 def csv_parts(
     path: Path, names: Sequence[Any], largest_mb: int, mapped: dict[str, Any] | None, origin_s: int | None
 ) -> Iterator[Part]:
-    """Yield the parts that `read_table` reads; `names` are fields of a header, `mapped` fields of a column map.
+    """Yield what `_parts` yields, in a reading process, which receives its arguments as JSON and not as objects.
 
-    The rows come in blocks, with the line number as an additional column. The last part states `origin_s`, and whether
-    times are times of day.
+    `names` are the fields of a `Header`, `mapped` those of a `MappedColumns`. A part is a message of the process: a
+    block of rows (n, columns), or a dictionary.
     """
     return _parts(path, Header(*names), largest_mb, None if mapped is None else MappedColumns(**mapped), origin_s)
 
@@ -120,7 +119,10 @@ def csv_parts(
 def _parts(
     path: Path, header: Header, largest_mb: int, mapped: MappedColumns | None, origin_s: int | None
 ) -> Iterator[Part]:
-    """Yield a file's table in blocks of rows, then the origin of its times."""
+    """Yield a file's rows in blocks, with the line number as an additional column, then the names of the columns.
+
+    The last part states `origin_s`, and whether times are times of day (`by_day`).
+    """
     skipped = 0 if mapped is None else mapped.skip_lines
     rows = read_mat_rows(path, header, mapped) if is_mat(path) else read_rows(path, largest_mb, skipped)
     headings, first = [name.strip() for name in next(rows, list[str]())], next(rows, list[str]())
@@ -172,7 +174,7 @@ def _parts(
 
 @dataclass(frozen=True, slots=True)
 class _WantedColumns:
-    """The columns to read from a file: their `names` by index, out of `width`, and their `factors` to SI.
+    """The columns to read from a file with `width` columns: their `names` by index, and their `factors` to SI.
 
     A cell with a text of `missing` is blank. `in_any_unit`: units that a row states are ignored.
     """
@@ -212,7 +214,7 @@ class _WantedColumns:
         return True
 
     def cells(self, line: int, row: Sequence[str]) -> list[str]:
-        """Return the cells to read, blank if the row ends too early. Raise Refused `wrong_columns`."""
+        """Return the cells to read, blank if the row ends too early. Raise Refused `wrong_columns` for a longer row."""
         if any(map(str.strip, row[self.width :])):
             raise Refused(
                 "wrong_columns",

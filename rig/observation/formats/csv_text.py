@@ -54,7 +54,7 @@ def is_harmless(path: Path, largest_mb: int) -> bool:
 
 @contextmanager
 def _raise_no_file(path: Path) -> Iterator[None]:
-    """Raise Refused `no_file` for any error of the block, which reads a file."""
+    """Raise Refused `no_file` instead of any error in the `with` block, which reads a file."""
     try:
         yield
     except (UnfitFile, OSError, EOFError, zlib.error, ValueError, csv.Error) as error:
@@ -65,8 +65,8 @@ def _raise_no_file(path: Path) -> Iterator[None]:
 def _text(file: BinaryIO | GzipFile) -> TextIOWrapper:
     """Return a file's text, unpacked, in the encoding that its beginning shows.
 
-    Raise UnfitFile if it is not text. A text that is not UTF-8 is read in the Windows encoding. Later damaged
-    characters are replaced; the row that contains them is refused by its line number.
+    Raise UnfitFile if it is not text. A text that does not begin in UTF-8 is read in the Windows encoding. Damaged
+    characters after the beginning are replaced; the row that contains them is refused, with its line number.
     """
     if _read_beginning(file).startswith(GZIP):
         file = GzipFile(fileobj=file)

@@ -74,7 +74,7 @@ def _is_number_of(column: str, names: list[str]) -> bool:
 
 
 def read_mat_columns(path: Path) -> dict[str, Array]:
-    """Return all columns of numbers in a file, by name. Raise Refused `wrong_columns` for a file without any."""
+    """Return all columns of numbers in a file, by name. Raise Refused `wrong_columns` if there are no numbers."""
     with path.open("rb") as file:
         is_hdf5 = file.read(len(HDF5_HEADER)) == HDF5_HEADER
     objects: list[str] = []

@@ -29,9 +29,9 @@ class Format:
     """A kind of file: its `name` in messages, and its readers, which run in a process of their own.
 
     `readings` and `attitudes` are readers ("module:function", as in `rig.data.processes.reading_process`), None if a
-    file cannot hold them. A reader's arguments are the path that `reads` returns for the user's path, and the part
-    `inside`. A reader yields columns by `rig.observation.formats.table_parts.read_blocks`, named as in a CSV file;
-    attitudes are times and quaternions. `remedy` is for a file that cannot be read.
+    file cannot hold them. A reader is called with two arguments: the path to read, to which the function `reads`
+    converts the user's path, and the part `inside`. It yields columns as `rig.observation.formats.table_parts` says,
+    named as in a CSV file; attitudes are times and quaternions. `remedy`: advice if a file cannot be read.
     """
 
     name: str
@@ -70,7 +70,7 @@ def whole(path: Path) -> Path:
 class FormatColumns:
     """The `columns` (n,) of a file, ordered by time; `others`: the number of rows without readings.
 
-    The reader's `note` states what the readings lack, "" if nothing.
+    `note`: what the readings lack, in words; "" if nothing is missing.
     """
 
     columns: Columns

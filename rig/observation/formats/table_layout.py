@@ -121,7 +121,7 @@ def layout_parts(path: Path, largest_mb: int) -> Iterator[Part]:
 
 
 def _find_table_rows(columns: Mapping[str, Array]) -> int:
-    """Return the number of rows of a workspace's table: the most common length of its columns, short ones excluded."""
+    """Return the number of rows of the table in a `.mat` file: the most common length of columns that are not short."""
     lengths = Counter(map(len, columns.values()))
     longest = max(lengths)
     return max(lengths, key=lambda length: (length >= min(longest, FEWEST_ROWS), lengths[length], length))
@@ -204,9 +204,9 @@ def _largest_number(column: Sequence[str]) -> float:
 def _find_time(
     headings: Sequence[str], units: Sequence[str], columns: Sequence[Sequence[str]], times: Sequence[int]
 ) -> int | None:
-    """Return the index of the time column by its name or unit, or else of the first column that increases, or None.
+    """Return the index of the time column: the first that rises and has a time's name or unit, or None.
 
-    A column with a time's name is accepted only if its values rise.
+    If no rising column has such a name or unit, the first rising one that does not count rows is taken.
     """
     rising = [index for index in times if _rises(columns[index])]
     for index in rising:

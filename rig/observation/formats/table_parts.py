@@ -26,7 +26,7 @@ def read_blocks(
     """Yield rows, with a number for each column, in blocks (n, columns), then the names of the columns.
 
     The names are read after the last row: until then the reader may replace a name by None, which omits the column.
-    `counts` are further entries: the number of `LEFT_OUT` rows, and a `NOTE`.
+    `counts` is added to the names in the last part: the number of `LEFT_OUT` rows, and a `NOTE`.
     """
     values, width = array("d"), len(columns)
     for row in rows:
@@ -62,8 +62,8 @@ def note_of(parts: Sequence[Part]) -> str:
 def parts_read_apart(reader: str, path: Path, arguments: Mapping[str, Any], *, else_: str, remedy: str) -> list[Part]:
     """Return the parts of a file that a `reader` ("module:function") yields in a process of its own.
 
-    Raise Refused as the reader does, `temporary_folder_full`, and the error named `else_`, `no_file` or
-    `file_too_costly`.
+    Raise Refused as the reader does, `temporary_folder_full`, and for any other failure `no_file` or `file_too_costly`,
+    with `else_` as the predicate of its message.
     """
     try:
         return read_apart(reader, path, arguments, limits_for(stored_bytes(path)))

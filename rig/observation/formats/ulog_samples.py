@@ -1,8 +1,8 @@
 """Readings from PX4's log (`.ulg`), by `pyulog`: the sensors' readings before the autopilot corrects them.
 
 The readings are those of one instance of `sensor_gyro` and one of `sensor_accel`, in rad/s and m/s²; `timestamp_sample`
-is the autopilot's time of the sample in µs. If gyroscope and accelerometer are separate parts, the accelerometer's
-readings are interpolated to the gyroscope's times; in one part the times of both are equal.
+is the autopilot's time of the sample in µs. If gyroscope and accelerometer are separate chips, the accelerometer's
+readings are interpolated to the gyroscope's times; if they are one chip, both have the same times.
 
 PX4's default profile logs these topics once a second or not at all. Then `sensor_combined`, at about 200 Hz, is read,
 with a note on its shortcomings. The reader runs in a process of its own (`rig.observation.formats.sample_files`).
@@ -41,7 +41,7 @@ def is_ulog(path: Path) -> bool:
 
 
 def ulog_readings(path: Path, inside: str | None = None) -> Iterator[Part]:
-    """Yield, in blocks, a log's readings by the sensors of the instance `inside`, or by `sensor_combined`.
+    """Yield, in blocks, a log's readings: those of the instance `inside` of each sensor, or those of `sensor_combined`.
 
     Raise Refused `missing_extra` or `ulog_topic`, and any error of the parser for a damaged log.
     """

@@ -1,1 +1,1 @@
-"""The turner's motion as a function of time: joints, revolutions, speeds."""
+"""The motion of the turner (arm, rate table or servo) as a function of time: joints, revolutions, speeds."""

@@ -37,9 +37,10 @@ class ArmMotion:
 
     Rates come from the recorded joint angles, because the controller filters its velocity signal. `states` (m,) are
     rows of `state_dtype`; `kinematics` and `names` describe the joints. `mount` (3, 3) transforms all vectors in the
-    flange's frame to the item's: the identity unless a stage mounts the item differently. If single readings of an
-    angle scatter (`reading_std_rad`), angles and rates are fitted over a window, and a turn ends at the time at which
-    its first reading recurs. Raise Fault `no_motion`, `not_finite`, `impossible_times`, `arm_clock_stepped`.
+    flange's frame to the item's: the identity unless a stage mounts the item differently. `reading_std_rad` is the
+    standard deviation of one reading of an angle. If it is not 0, angles and rates are fitted over a window, and a turn
+    ends when its first reading recurs, because the encoder is accurate only over whole turns. Raise Fault `no_motion`,
+    `not_finite`, `impossible_times`, `arm_clock_stepped`.
     """
 
     def __init__(
@@ -101,7 +102,7 @@ class ArmMotion:
         return axes
 
     def axis_errors(self, q_rad: Array, joint: int) -> Array:
-        """Return the rotation (…, 13, 3) of a joint's axis per radian of each error in `geometry.AXIS_ERRORS`."""
+        """Return the change (…, 13, 3) of a joint's axis per radian of each error in `geometry.AXIS_ERRORS`."""
         errors: Array = axis_errors(q_rad, joint, self.kinematics) @ self.mount.T
         return errors
 
@@ -111,7 +112,7 @@ class ArmMotion:
 
     @property
     def has_accurate_angles(self) -> bool:
-        """Whether single angles are accurate, not only the difference between equal readings a turn apart."""
+        """Whether single angles are accurate; if not, only a whole turn is, from one reading to its recurrence."""
         return not self._noisy_angles
 
     def travel_rad(self, window: Window) -> float | None:
@@ -162,9 +163,10 @@ class ArmMotion:
         return self._mean_rates(time_s, _averaging_time(time_s), standing_rad)
 
     def state_gain(self, time_s: Array, weights: Array) -> float:
-        """Return the ratio of the states' noise in a weighted mean of `rates_at_samples` to their noise in Δθ/T.
+        """Return how many times more noise the states' angles cause in a mean of `rates_at_samples` than in Δθ/T.
 
-        `weights` (n,) are those of the mean. For this ratio, angles between states are interpolated linearly.
+        `weights` (n,) are those of the mean; Δθ/T is the angle from first to last state, divided by the time. For this
+        ratio, angles between states are interpolated linearly.
         """
         lasting_s = _averaging_time(time_s)
         # A rate at a sample is the difference of two interpolated angles; `by_state` is the weight of each state.
@@ -249,8 +251,8 @@ def is_sparse(time_s: Array) -> bool:
 def motion_of(run: RunData, correction: Array | None = None) -> ArmMotion:
     """Return the turner's motion in a recording, in the item's frame.
 
-    `correction` (3, 3) is the rotation from the nominal to the actual mount. Raise as `turner_of` does; Fault
-    `no_motion`, `not_finite`, `impossible_times`, `arm_clock_stepped`.
+    `correction` (3, 3) is the rotation of the item from its nominal to its actual mounting. Raise as `turner_of` does;
+    Fault `no_motion`, `not_finite`, `impossible_times`, `arm_clock_stepped`.
     """
     turner = turner_of(run)
     mount = np.array(run.settings.mount)
@@ -272,7 +274,7 @@ def _check_order(time_s: Array) -> None:
 
 
 def turner_of(run: RunData) -> "RecordedTurner":
-    """Return the turner of a recording. Raise Refused `recorded_elsewhere` for a recording from files."""
+    """Return the machine that turned the sensor. Raise Refused `recorded_elsewhere` for a recording from files."""
     if run.turner is None:
         raise Refused(
             "recorded_elsewhere",

@@ -1,9 +1,9 @@
 """A whole turn of a shaft whose single readings scatter, from a reading to its recurrence one turn later.
 
 An arm's encoder resolves microradians, so a turn begins and ends at a reading. A servo's encoder resolves a
-milliradian, and has errors of a degree that recur at the same angle of the shaft. A quarter of a turn of recurring
-readings averages the scatter. In the time of one turn the gyroscope rotates by 2π, wherever this time begins in the
-even part of the sweep; this module chooses the middle.
+milliradian, and has errors of a degree that recur at the same angle of the shaft. A sweep is a quarter of a turn longer
+than one turn, so that many readings recur; the scatter averages out over these. In the time of one turn the gyroscope
+rotates by 2π, wherever this time begins in the even part of the sweep; this module chooses the middle.
 """
 
 from typing import Any
@@ -34,7 +34,7 @@ def well_timed(states: NDArray[Any]) -> NDArray[Any]:
 
 
 def fit_lines(time_s: Array, q_rad: Array) -> tuple[Array, Array, Array]:
-    """Return times (k,), angles (k, n) and rates (k, n) by straight lines through windows of readings (m, n)."""
+    """Fit straight lines to readings (m, n) in k windows; return their middle times (k,), angles and rates (k, n)."""
     count = max(MIN_ANGLES, round(SMOOTHING_S / float(np.median(np.diff(time_s)))))
     half = count // 2
     windows = np.lib.stride_tricks.sliding_window_view

@@ -21,9 +21,9 @@ class RateFunction(Protocol):
 
 
 class KnownMotion(Protocol):
-    """A body's rotation as a function of its turner's time, in axes fixed to the body.
+    """A body's rotation in axes fixed to the body, as a function of time on the clock of the machine that turns it.
 
-    The sensors' mounting on the body does not matter for finding the clock.
+    The axes need not be those of the sensors, because the fit of the clock also fits the sensors' mounting.
     """
 
     @property

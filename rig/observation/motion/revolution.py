@@ -45,9 +45,10 @@ class Revolution:
 
     @property
     def sidebands(self) -> int:
-        """The number of sidebands of each spectral line: the highest harmonic of a turn in the shaft's speed.
+        """The number of sidebands on either side of a spectral line: the highest harmonic of a turn in the speed.
 
-        A bad encoder errs once and twice a turn; products of these errors come up to four times a turn.
+        A bad encoder errs, and so makes the shaft's speed vary, once and twice per turn. The readings contain products
+        of two such waves, so twice as many harmonics are fitted to them.
         """
         return 2 if self.uneven else SIDEBANDS
 
@@ -68,7 +69,7 @@ class Revolution:
 
     @property
     def speed_std_rad_s(self) -> float:
-        """Standard deviation of the mean speed, from that of the duration."""
+        """Standard deviation of the mean speed, due to that of the duration."""
         return self.speed_rad_s * self.duration_std_s / self.duration_s
 
 
@@ -138,8 +139,8 @@ def _describe_extent(sweep: Sweep) -> str:
 def _find_ends(time_s: Array, travelled: Array, first: int, last: int, turn_rad: float) -> tuple[float, float, float]:
     """Return the start and end of the revolution, and the standard deviation of the time between, s.
 
-    The angle is interpolated between two neighbouring states. If states are missing there, a ramp may be among them, so
-    the straight line through the whole revolution gives the time, to within the ripple.
+    The angle is interpolated between two neighbouring states. If states are missing there, the joint may have been
+    accelerating, so the straight line through the whole revolution gives the time instead; the error is the ripple.
     """
     t, angle = time_s[first : last + 1], travelled[first : last + 1]
     speed, offset = np.polyfit(t - t[0], angle, 1)
@@ -161,7 +162,7 @@ def _find_ends(time_s: Array, travelled: Array, first: int, last: int, turn_rad:
 
 
 def _check_slider(turning: NDArray[Any], where: str) -> None:
-    """Raise Fault `speed_slider` or `speed_limited` if an arm's states show it; other turners have no such states."""
+    """Raise Fault `speed_slider` or `speed_limited` if an arm's states show that the speed was reduced."""
     if not {"target_speed_fraction", "speed_scaling"} <= {*(turning.dtype.names or ())}:
         return
     slider, scaling = (float(turning[name].min()) for name in ("target_speed_fraction", "speed_scaling"))
@@ -181,7 +182,7 @@ def _check_slider(turning: NDArray[Any], where: str) -> None:
 
 
 def _check_speed(time_s: Array, travelled: Array, where: str, settings: ObservationThresholds) -> None:
-    """Raise Fault `speed_not_constant` if the smoothed rate strays from its mean, as after a halt, not by vibration."""
+    """Raise Fault `speed_not_constant` if the rate strays from its mean, as after a halt; smoothing hides vibration."""
     middles = np.arange(time_s[0] + SMOOTHING_S / 2, time_s[-1] - SMOOTHING_S / 2, SMOOTHING_S / 5)
     ahead = np.interp(middles + SMOOTHING_S / 2, time_s, travelled)
     behind = np.interp(middles - SMOOTHING_S / 2, time_s, travelled)

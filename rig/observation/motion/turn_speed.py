@@ -30,11 +30,11 @@ class TurnSpeed:
 def turn_speed(time_s: NDArray[np.float64], q_rad: NDArray[np.float64]) -> TurnSpeed:
     """Return the speed 2π/T of a shaft that turns evenly through more than a whole turn.
 
-    `time_s` (n,): rising; `q_rad` (n,): the encoder's readings between the ramps, turns counted. T is the mean time
-    between readings one turn apart. A quarter of a turn more than one, read at 100 Hz at 60°/s by a 12-bit encoder with
-    a noise of 0.06°, determines T to 2e-5. The standard deviation of T follows from the scatter of the readings'
-    differences over one turn, for white noise of the single readings. Raise Fault `turn_too_short` unless readings
-    cover a turn and `MIN_PAIRS` readings more, or if the shaft stands still.
+    `time_s` (n,): rising; `q_rad` (n,): the encoder's readings without the ramps, continuous over several turns. T is
+    the mean time between readings one turn apart. For example, a 12-bit encoder with a noise of 0.06° that is read at
+    100 Hz over 1¼ turns at 60°/s determines T to 2e-5. The standard deviation of T follows from the scatter of the
+    readings' differences over one turn, if the noise of single readings is white. Raise Fault `turn_too_short` unless
+    readings cover a turn and `MIN_PAIRS` readings more, or if the shaft stands still.
     """
     far_rad = abs(float(q_rad[-1] - q_rad[0])) if len(q_rad) > MIN_PAIRS else 0.0
     if far_rad <= TURN_RAD:
@@ -66,10 +66,10 @@ def turn_speed(time_s: NDArray[np.float64], q_rad: NDArray[np.float64]) -> TurnS
 def _std_of_mean(later_s: NDArray[np.float64], time_s: NDArray[np.float64], beyond_rad: NDArray[np.float64]) -> float:
     """Return the std of the mean of `beyond_rad` (n,), the angles by which n readings one turn later exceed one turn.
 
-    Difference i is that of the angle at `later_s`, interpolated with the weight w between readings j and j + 1, and
-    reading i. With white errors e of the readings its error is (1 − w) e_j + w e_{j+1} − e_i. The differences' scatter
-    gives the variance of a single reading. The variance of their mean then follows from the total weight of each
-    reading in all differences.
+    Difference i is the angle at `later_s[i]`, interpolated between readings j and j + 1 with the weight w, minus
+    reading i. With white errors e of the readings, the error of difference i is (1 − w) e_j + w e_{j+1} − e_i. The
+    scatter of the differences gives the variance of a single reading. The variance of the mean difference then follows
+    from the total weight of each reading in all differences.
     """
     pairs, count = len(beyond_rad), len(time_s)
     after = np.searchsorted(time_s, later_s, side="right").clip(1, count - 1)

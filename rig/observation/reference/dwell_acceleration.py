@@ -29,7 +29,7 @@ LEAVING_S = 0.05  # before a dwell's end: the board's times include the gyroscop
 
 @dataclass(frozen=True, slots=True)
 class DwellReading:
-    """A dwell of the procedure, by its `index`: the mean reading in m/s².
+    """The mean reading, in m/s², in the dwell `index` of the procedure.
 
     `attitude` (3, 3) is the mean rotation from the arm's base frame into the flange's, weighted like the readings. The
     `window` is in controller times.
@@ -58,7 +58,7 @@ def dwell_readings(
 def read_each_dwell(
     run: RunData, stream: Stream, motion: ArmMotion, settings: ObservationThresholds
 ) -> Attempts[int, DwellReading]:
-    """Return the averages of finished dwells, and the faults of others, both by the dwell's index.
+    """Return the averages of finished dwells, and the faults of dwells without one, both by the dwell's index.
 
     A fault of one dwell does not affect the others. There are no averages and no faults without accelerations.
     """
@@ -78,7 +78,8 @@ def accelerations(stream: Stream, inside: slice) -> Array:
 def check_acceleration(stream: Stream, inside: slice, where: str, *, turning: bool = False) -> None:
     """Raise Fault `saturation` or `stuck_sensor` for the accelerometer's samples `inside`.
 
-    In a rotation (`turning`), one axis with equal readings suffices for `stuck_sensor`; at rest all three are required.
+    In a rotation (`turning`), one axis with equal readings suffices for `stuck_sensor`; at rest all three axes must
+    have equal readings.
     """
     channel, samples = stream.sensor.channel(ACCELERATION), stream.raw[inside]
     counts, saturated = channel.counts(samples), channel.is_saturated(samples)

@@ -1,7 +1,7 @@
 """The acceleration of the sensors while one joint turns and the others sway, from the encoders of all joints.
 
-A faster sway can be removed from the readings by its spectral line. A sway of about one period per turn cannot be
-separated from gravity in the readings, so it must be computed from the encoders.
+A fast sway is removed from the readings as a spectral line. A sway of about one period per turn cannot be separated
+from gravity in the readings, so it must be computed from the encoders.
 """
 
 import numpy as np

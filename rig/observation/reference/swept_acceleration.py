@@ -20,11 +20,11 @@ from rig.observation.statistics.vibration_noise import fit_inflation, line_colum
 
 @dataclass(frozen=True, slots=True)
 class SweptAcceleration:
-    """An accelerometer's first harmonic in the sweep `sweep` of the plan, by the joint's angle from the sweep's start.
+    """The first harmonic of an accelerometer's readings in the sweep `sweep` of the plan, over the joint's angle.
 
-    At the start, `attitude` (3, 3) transforms a vector from the arm's base frame to the flange's. `axis_flange` (3,):
-    unit vector of a growing angle, `arm_m` (3,): from the axis to the flange's origin, both in the flange's frame.
-    `station`: the `joint`, from 0 at the base, and the pose in which it turned.
+    The angle counts from the turn's start, where `attitude` (3, 3) transforms a vector from the arm's base frame to the
+    flange's. In the flange's frame, `axis_flange` (3,) is the unit vector of the joint's positive rotation, and `arm_m`
+    (3,) leads from the axis to the flange's origin. `station`: the `joint`, from 0 at the base, and its pose.
     """
 
     sweep: int
@@ -41,9 +41,9 @@ def swept_acceleration(
 ) -> SweptAcceleration:
     """Fit the first harmonic of one sweep's revolution, together with its vibrations.
 
-    In the model only the sweep's joint moves, and the other joints stand at their mean angles. Their sway about these
-    angles, by the encoders, tilts and accelerates the sensor, which adds a further specific force to the model. Raise
-    Fault `saturation`, `stuck_sensor`, `incomplete_revolution` or `not_finite`.
+    In the model only the sweep's joint moves, and the other joints stand at their mean angles. In truth these sway a
+    little, as the encoders show, and so tilt and accelerate the sensor: this specific force is added to the model.
+    Raise Fault `saturation`, `stuck_sensor`, `incomplete_revolution` or `not_finite`.
     """
     inside = slice_time(stream, turn.start_s, turn.end_s)
     check_acceleration(stream, inside, describe(sweep), turning=True)

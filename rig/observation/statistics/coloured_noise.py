@@ -23,9 +23,9 @@ class VarianceInflation:
 
 
 def correlation_inflation(residuals: Array) -> float:
-    """Return the factor ≥ 1 on the variance of a mean of residuals (n,): 1 if they are white, else 1 + 2 Σ ρ.
+    """Return the factor ≥ 1 on the variance of a mean of residuals (n,): 1 + 2 Σ ρ, with their lag correlations ρ.
 
-    The lag correlations ρ count only if they are significant together (Box–Pierce): white noise is not inflated.
+    Return 1 unless the correlations are significant together (Box–Pierce), so that white noise is not inflated.
     """
     rho = _correlations(residuals)
     return 1.0 if rho is None else max(1.0, 1 + 2 * float(rho.sum()))
@@ -44,8 +44,9 @@ def fit_noise_factor(residuals: Array) -> float:
 def fit_autoregression(residuals: Array, memories: Sequence[int] = ORDERS) -> VarianceInflation:
     """Return the factor of `fit_noise_factor`, and the degrees of freedom of the resulting variance.
 
-    For n white residuals these are n − 1. For others they are 2 / v (JCGM 100, G.4.2), where v is the relative variance
-    of the spectrum: 2/n from the innovations, plus 4 var(Σ a) / (1 − Σ a)² from the coefficients.
+    `memories` are the orders to choose from. White residuals have n − 1 degrees of freedom, others 2 / v (JCGM 100,
+    G.4.2). Here v is the relative variance of the spectrum at zero: 2/n from the innovations, plus
+    4 var(Σ a) / (1 − Σ a)² from the coefficients a.
     """
     if _correlations(residuals) is None:
         return VarianceInflation(1.0, max(len(residuals) - 1.0, 1.0))
@@ -68,9 +69,10 @@ def _spectrum_dof(centred: Array, memory: int) -> float:
 
 
 def _autoregression(products: Array, count: int, memory: int) -> tuple[float, float, int]:
-    """Return Akaike's criterion and the spectrum at zero for the order `memory`, from `_products` of `count` residuals.
+    """Return Akaike's criterion, the spectrum at zero, and `memory`, the order, from `_products` of `count` residuals.
 
-    The spectrum is 0 / 0 for residuals that only repeat, such as coarse readings.
+    Residuals that only repeat, such as coarse readings, are predicted without error, and their spectrum would be 0 / 0.
+    The criterion is then infinite, so that this order is not chosen.
     """
     coefficients, power = _predict(products[-memory - 1 :, -memory - 1 :])
     likelihood = count * float(np.log(power / count)) if power else -np.inf

@@ -1,4 +1,4 @@
-"""Means of readings in any unit, with the variance of the mean: at rest, and if the arm vibrates."""
+"""Means of readings in any unit, with the variance of the mean, at rest and while the arm vibrates."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -21,7 +21,7 @@ class Mean:
     """The mean of readings in any unit.
 
     - `mean` (3,), its `variance` (3,), the `noise` (3,) of one reading, and the number of `samples`.
-    - `dof` (3,): degrees of freedom of the variance, fewer than samples if these are not independent.
+    - `dof` (3,): degrees of freedom of the variance, fewer than the samples if these are not independent.
     - `cycles` (k,): for each spectral line removed from the mean, its number of cycles in the window.
     - `rounding`, `slow_lines` (3,): the parts of the variance due to rounding, and to lines too slow to remove.
     - `weights` (n,): weights of the readings, for averages of other data of the same samples; empty if not stored.
@@ -42,8 +42,8 @@ class Mean:
 class MeanNoise:
     """Noise of single readings in any unit, by axis.
 
-    `scatter` (3,) is the variance of one reading; `in_a_mean` (3,) is its part that remains in a long mean, with `dof`
-    (3,) degrees of freedom.
+    `scatter` (3,) is the variance of one reading. `in_a_mean` (3,) is the variance of a long mean times its number of
+    readings, with `dof` (3,) degrees of freedom; it differs from `scatter` if readings are correlated.
     """
 
     scatter: Array
@@ -67,7 +67,7 @@ class StaticReading:
 
 @dataclass(frozen=True, slots=True)
 class QuantityInDwell:
-    """A `quantity` of a sensor in one dwell, by its `index`; the name is empty if it is not known."""
+    """A `quantity` of a sensor in one dwell, with the dwell's `index` and its name `dwell`, "" if not known."""
 
     sensor: str
     quantity: Quantity
@@ -85,7 +85,7 @@ class ReadAtRest:
 
 
 def dof_by_axis(dofs: Iterable[Array | float]) -> Array:
-    """Return degrees of freedom (N, 3) of the variances of N means, from one number for all axes or three."""
+    """Return degrees of freedom (N, 3) from N items, each of which is one number for all axes or an array (3,)."""
     return np.array([np.broadcast_to(dof, 3) for dof in dofs])
 
 
@@ -152,8 +152,8 @@ def mean_at_rest(readings: Array, time_s: Array, window: Window, steps: Steps) -
     """Return the mean of readings (n, 3) with resolution `steps`, at times (n,), and the window that it represents.
 
     If the arm vibrates, weights are tapered (`average_tapered`), because 2 mg at 14 Hz leave 10 µg in an unweighted
-    mean of three seconds. The window then reaches from half-way up the first flank to half-way down the last: a random
-    walk of the bias changes unweighted means over such windows as it changes the tapered means, within a thousandth.
+    mean of three seconds. The window then reaches from half-way up the first flank to half-way down the last: over it
+    an unweighted mean would have the same variance due to a random walk of the bias, within a thousandth.
     """
     if vibrates(readings):
         half_s = flank_s(window.end_s - window.start_s) / 2

@@ -32,7 +32,7 @@ class LineSearch:
     """The criteria of a spectral line.
 
     - `stands_out`: the line's power exceeds this multiple of the median power around it, and of `floor`.
-    - `floor`: the median power of the readings in the same window, if the line is sought in data with less noise.
+    - `floor`: 0, or the median power of the readings if lines are sought in quieter data, the encoders' rates.
     - `slowest`: the least number of cycles in all readings; `sidebands`: the number of a line's sidebands (`waves`).
     - `most`: the largest number of lines, previous ones included.
     """
@@ -70,11 +70,11 @@ def find_lines(residuals: Array, search: LineSearch, previous: Array = EMPTY, fr
 
 
 def _are_too_near(cycles: Array, search: LineSearch) -> bool:
-    """Return whether two spectral lines cannot be separated, or the slowest line cannot from the turn's own waves.
+    """Return whether two spectral lines cannot be told apart, or the slowest one cannot from the turn's harmonics.
 
     A line that is refined to below the search's lowest frequency is valid only if its sidebands do not overlap those of
-    another line. Otherwise two lines, of a vibration and a ripple less than a cycle apart, would explain a part of the
-    mean.
+    another line. Otherwise a vibration and a ripple whose frequencies differ by less than a cycle would together
+    explain a part of the mean.
     """
     ordered = np.sort(cycles)
     gaps = np.diff(ordered)
@@ -97,8 +97,8 @@ def waves(cycles: Array, fraction: Array, sidebands: int = SIDEBANDS) -> Array:
     """Return cosine and sine columns (n, w k) of k lines at elapsed fractions (n,) of the time, w = `column_count`.
 
     A line also has two linearly growing columns, for a vibration that begins or ends, and sidebands up to `sidebands`
-    cycles away. A rotating sensor senses a vibration of the room one cycle away; for further sidebands see
-    `rig.observation.motion.revolution.Revolution`.
+    cycles above and below it: a rotating sensor measures a vibration of the room at one cycle per turn above and below
+    the vibration's own frequency. For further sidebands see `rig.observation.motion.revolution.Revolution`.
     """
     line, turn = (np.exp(2j * np.pi * np.outer(number, fraction)) for number in (cycles, range(1, sidebands + 1)))
     shifted = [line * shift for once in turn for shift in (once.conj(), once)]
@@ -138,10 +138,10 @@ def fit_residuals(columns: Array, values: Array) -> Array:
 
 
 def find_angle_change_rad2(residuals: Array, columns: Array, lines_hz: Array) -> Array:
-    """Return the mean square (3,), rad², of the change of the lines' angle between two moments.
+    """Return the mean square (3,), rad², of the change of the body's angle, due to vibration, between random moments.
 
-    The lines are the columns (n, w k) fitted to residuals (n, 3). A line of mean square P and frequency f has the angle
-    amplitude √(2 P) / (2π f), so its mean square change is P / (2 π² f²).
+    The vibration is the spectral lines whose columns (n, w k) are fitted to residuals (n, 3). A line of mean square P
+    and frequency f has the angle amplitude √(2 P) / (2π f), so the mean square of its change is P / (2 π² f²).
     """
     width = columns.shape[1] // max(len(lines_hz), 1)
     sizes = fit_columns(columns, residuals).reshape(len(lines_hz), width, residuals.shape[1])
@@ -181,8 +181,8 @@ def _find_strongest(residuals: Array, previous: Array, fraction: Array, search: 
 def _choose_middle(peak: float, residuals: Array, previous: Array, fraction: Array, search: LineSearch) -> float:
     """Return the frequency, in cycles, of the line of which the `peak` is either the centre or a sideband.
 
-    Of these, the line that explains most is chosen. A rotating sensor may sense a vibration of the room only across the
-    axis of rotation, that is, in the sidebands and not in the line itself.
+    Of the possible lines, the one that explains most is chosen. A rotating sensor may sense a vibration of the room
+    only across the axis of rotation, that is, in the sidebands and not in the line itself.
     """
     whitened = residuals / (residuals.std(axis=0) + np.finfo(np.float64).tiny)
     sidebands = [peak + shift for shift in (-1.0, 1.0) if search.slowest <= peak + shift]

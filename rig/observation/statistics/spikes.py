@@ -4,8 +4,8 @@ A body needs several readings to turn there and back, so a single deviating read
 is. A vibration, or a knock that rings, also moves the neighbouring readings, and is kept.
 
 A reading is compared with the cubic through two readings on either side. A spike of size 1 leaves deviations of 1/6,
-−2/3, 1, −2/3, 1/6, while a step leaves −1/6, 1/2, −1/2, 1/6. Remainders of a motion or a vibration also show in the
-readings farther away.
+−2/3, 1, −2/3, 1/6, while a step leaves −1/6, 1/2, −1/2, 1/6. A motion or a vibration, unlike a spike, also leaves
+deviations at readings farther away.
 """
 
 import numpy as np
@@ -49,7 +49,7 @@ def bridge_spikes(time_s: Array, rates: Array, spikes: NDArray[np.intp]) -> Arra
 
 
 def _changes_around(rates: Array) -> Array:
-    """Return the largest change (n,) of rates (n, 3) among the two readings before and the two after each."""
+    """Return for each of the rates (n, 3) the largest change (n,) among the two before it and the two after it."""
     steps, across = np.abs(np.diff(rates, axis=0)).max(axis=1), np.abs(rates[2:] - rates[:-2]).max(axis=1)
     changes = np.zeros(len(rates))
     changes[2:-2] = np.maximum(np.maximum(steps[:-3], steps[3:]), across[1:-1])

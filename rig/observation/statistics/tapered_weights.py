@@ -1,10 +1,10 @@
 """The mean over a rest in which the arm vibrates, with weights that rise and fall smoothly at either end.
 
-In a plain mean over the time T, a vibration leaves a remainder: the change of its angle from start to end, divided by
-T. 2 mrad/s at 14 Hz leave 0.7 deg/h RMS in ten seconds, three times the noise of a KVH 1775. Weights with raised-cosine
-flanks of length L (Tukey's window) reduce the remainder of a vibration of frequency f by the factor 4 (f L)² − 1: 200
-for half a second. White noise averages out a little worse: for weights w of n readings that add up to 1, its variance
-grows by the factor n Σ w², which is 4 % in ten seconds and 10 % in the shortest rests.
+In a plain mean over the time T, a vibration leaves a remainder: the change of the body's angle from start to end,
+divided by T. 2 mrad/s at 14 Hz leave 0.7 deg/h RMS in ten seconds, thrice the noise of a KVH 1775. With raised-cosine
+flanks of length L (Tukey's window), weights reduce the remainder at the frequency f by the factor 4 (f L)² − 1: 200 for
+half a second. White noise averages out a little worse: with n weights w that add up to 1, the variance of the mean
+grows by the factor n Σ w², that is, by 4 % in ten seconds and by 10 % in the shortest rests.
 """
 
 from functools import lru_cache
@@ -45,11 +45,11 @@ def weights(time_s: Array, start_s: float, end_s: float) -> Array:
 
 
 def noise_at_zero(readings: Array, low: float = LOW_FRACTION) -> Array:
-    """Return the variance (3,) per reading for a long mean: the spectrum near zero without its lines.
+    """Return the variance (3,) of a long mean times its number of readings: the spectrum near zero without its lines.
 
-    The median power over low frequencies, which spectral lines hardly change, is divided by the median of χ² with two
-    degrees of freedom, relative to its mean. Low frequencies reach up to the fraction `low` of the data rate, in at
-    least `MIN_BINS` bins.
+    The spectrum is estimated from the median power over low frequencies, because spectral lines hardly change a median.
+    ln 2 converts it to the mean power (χ² with two degrees of freedom). Low frequencies reach up to the fraction `low`
+    of the data rate, in at least `MIN_BINS` bins.
     """
     powers = np.abs(np.fft.rfft(apply_window(readings), axis=0)[MAIN_LOBE : _count_low_bins(len(readings), low)]) ** 2
     medians: Array = np.median(powers, axis=0) / np.log(2)

@@ -21,7 +21,7 @@ SHORT_ORDERS = (1, 2)  # orders of autoregression that fit coloured noise, but n
 
 
 def average_rest(readings: Array, time_s: Array, window: Window, steps: Steps) -> Mean:
-    """Average readings at rest with weights that cancel a vibration (`average_tapered`), which is then not noise."""
+    """Average readings at rest with weights that cancel a vibration (`average_tapered`), so that it is not noise."""
     residuals = readings - readings.mean(axis=0)
     shaking = _columns(residuals, LineSearch(sidebands=0))
     columns = np.column_stack([np.ones(len(residuals)), shaking])
@@ -41,7 +41,7 @@ def average_standstill(readings: Array, time_s: Array, window: Window, steps: St
 
 
 def line_columns(residuals: Array) -> Array:
-    """Return columns (n, 8 k) of the k spectral lines in residuals (n, 3) of a rotating sensor."""
+    """Return columns (n, 8 k), eight for each of the k spectral lines in residuals (n, 3) of a rotating sensor."""
     return _columns(residuals, LineSearch())
 
 
@@ -55,7 +55,7 @@ def _columns(residuals: Array, search: LineSearch) -> Array:
 
 
 def estimate_noise(residuals: Array, parameters: int, steps: Steps, memories: Sequence[int]) -> MeanNoise:
-    """Return the noise from residuals (n, 3) of a fit of `parameters` columns, by autoregressions of `memories`."""
+    """Return the noise of residuals (n, 3) after a fit of `parameters` columns; for `memories` see `fit_autoregression`."""
     scatter = np.maximum(np.sum(residuals**2, axis=0) / (len(residuals) - parameters), steps.variance)
     inflations = [fit_autoregression(axis, memories) for axis in residuals.T]
     return MeanNoise(

@@ -13,7 +13,7 @@ def find_sampling_times(time_s: Array, sampling: Sampling) -> Array:
     """Return the strictly rising times (n,) at which readings were taken; good, distinct stamps are unchanged.
 
     Arrival times are never early, so the least late ones determine the times. Coarse stamps err in both directions, so
-    their mean determines them. A latency that all readings share remains.
+    moving averages of them determine the times. A latency that all readings share remains.
     """
     if sampling.late is not None:
         return _separate(time_s)

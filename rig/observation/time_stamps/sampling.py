@@ -1,8 +1,8 @@
 """The sampling interval of a log and its missing readings, from time stamps that may be bad.
 
-Loggers round their stamps (8, 9, 8, 9 ms of 119 Hz) or stamp readings on arrival (five at once every 50 ms). So two
-neighbouring stamps show neither the interval nor a loss. But errors of stamps do not add up, while every lost reading
-shifts all later stamps. So the stamps are compared with an even series,
+Loggers round their stamps (8, 9, 8, 9 ms at 119 Hz) or stamp readings on arrival (five at once every 50 ms). So two
+neighbouring stamps show neither the interval nor a loss. But errors of stamps do not accumulate, while every lost
+reading shifts all later stamps. So the stamps are compared with an even series of the interval T,
 
     lateness of stamp k = t[k] − T (k + readings missing before it)
 
@@ -52,7 +52,7 @@ MAX_DISPERSION, BLOCK_LOSSES, MIN_BLOCKS = 0.35, 8, 20
 
 @dataclass(frozen=True, slots=True)
 class Sampling:
-    """The sampling of n readings.
+    """The sampling of n readings: how often a reading was taken, and which readings are missing.
 
     - `interval_s`: mean time from one reading to the next.
     - `missing` (n − 1,): number of readings missing between each reading and the next.
@@ -72,13 +72,13 @@ class Sampling:
 
     @property
     def hides_losses(self) -> bool:
-        """Whether the stamps, as smoothed arrival times or because they are bad, do not show single lost readings."""
+        """Whether single lost readings do not show, because the stamps are bad or are smoothed arrival times."""
         return self.on_arrival or self.late is not None
 
     def gaps(self, time_s: Array, fewest: int = 1) -> NDArray[np.bool_]:
         """Return a mask (n − 1,) of steps between readings at times (n,) with at least `fewest` readings missing.
 
-        With bad stamps, these are the steps as long as such a gap, and those from or to a late reading.
+        If stamps are bad, these are the steps that last as long as such a gap, and those from or to a late reading.
         """
         if self.late is None:
             return np.asarray(self.missing >= fewest)
@@ -104,7 +104,10 @@ class Sampling:
 
 @dataclass(frozen=True, slots=True)
 class _PeriodCandidate:
-    """The interval and missing readings (n − 1,) for a `width`; `fit`: the fraction of differences that agree."""
+    """The interval and missing readings (n − 1,) if `width` stamps are compared together.
+
+    `fit`: the fraction of the differences of lateness that are whole multiples of the interval.
+    """
 
     width: int
     interval_s: float
@@ -124,7 +127,13 @@ class _PeriodCandidate:
 
 
 def find_sampling(time_s: Array) -> Sampling:
-    """Return the sampling of readings at rising times (n ≥ 2,)."""
+    """Return the sampling of readings at rising times (n ≥ 2,), by the first of three methods that succeeds.
+
+    1. If the stamps are good, each step between two readings shows the readings missing in it (`width` 1).
+    2. If stamps are coarse, or readings arrived several at once, groups of `width` stamps are compared; the narrowest
+       suitable width is used.
+    3. Otherwise only the fraction of missing readings is estimated (`scattered`), not where they are missing.
+    """
     typical_s, rounded_s = find_typical_interval_s(time_s), find_resolution_s(time_s)
     is_uneven = float(np.quantile(np.diff(time_s), MIN_SHORT_FRACTION)) < SHORT_STEP * typical_s
     single = _count_missing(time_s, 1, MEDIAN)
@@ -152,7 +161,7 @@ def _has_late(time_s: Array, single: _PeriodCandidate) -> bool:
 
 
 def _list_wider(time_s: Array) -> list[_PeriodCandidate]:
-    """Return the candidates that span several readings, narrowest first, without those that `_lost_regularly`."""
+    """Return the candidates of width above 1, narrowest first, except those with regular losses (`_lost_regularly`)."""
     widths = takewhile(lambda width: 4 * width <= len(time_s), WIDTHS[1:])
     wider = (_count_missing(time_s, width, quantile) for width in widths for quantile in (MEDIAN, LOW_QUANTILE))
     return [candidate for candidate in wider if not _lost_regularly(candidate.missing)]
@@ -207,7 +216,7 @@ def _lost_regularly(missing: NDArray[np.intp]) -> bool:
     """Return whether `missing` readings (n − 1,) recur so regularly that they are a beat of two clocks, not losses.
 
     Such a beat occurs if the stamps of a polled port are multiples of a time shorter than the interval. The stamps of a
-    logger that loses every n-th reading look the same, but such a logger hardly loses as many.
+    logger that loses every n-th reading look the same, but a logger is unlikely to lose as large a fraction.
     """
     missing = np.minimum(missing, 1)  # a gap counts once
     lost = int(missing.sum())
@@ -238,8 +247,8 @@ def _estimate_unlocated_losses(time_s: Array) -> Sampling:
     """Return the sampling for losses that cannot be located, because stamps are bad or losses too many.
 
     If a fraction p of all readings is lost at random, the variance of the lateness gained over m readings is p m T²,
-    with the interval T, so that from m to 4 m readings it grows fourfold. By this growth losses are recognised: the
-    variance of errors that do not accumulate is constant, and that of a clock's random walk grows much more.
+    with the interval T, so that from m to 4 m readings it grows fourfold. This growth distinguishes losses from errors
+    that do not accumulate, whose variance is constant, and from a clock's random walk, whose variance grows much more.
     """
     mean_s = float(time_s[-1] - time_s[0]) / (len(time_s) - 1)
     apart = min(len(time_s) // MIN_SEGMENTS, MAX_SEGMENT)

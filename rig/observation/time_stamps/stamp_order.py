@@ -78,7 +78,7 @@ class OrderedStamps:
 
 @dataclass(frozen=True, slots=True)
 class _UnorderedLog:
-    """The rows (m,) of a log that are not left out, with `stamps_s` (m,) and `readings` (m, c)."""
+    """The rows (m,) of a log that are not left out, in the log's order, with `stamps_s` (m,) and `readings` (m, c)."""
 
     rows: NDArray[np.intp]
     stamps_s: Array
@@ -286,5 +286,5 @@ def _separate_equal(log: _UnorderedLog) -> _UnorderedLog:
 
 
 def _estimate_usual_delay_s(late_s: Array, interval_s: float) -> float:
-    """Return the largest delay, s, of a reading against the most punctual ones after it if no reading was buffered."""
+    """Return how late, s, a reading that was not buffered can be, relative to the most punctual reading after it."""
     return DELAY_RATIO * float(np.median(late_s - find_least_ahead(late_s, LONG_WIDTHS[-1]))) + MAX_DELAY * interval_s
