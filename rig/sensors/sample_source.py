@@ -24,7 +24,10 @@ class SampleSource(Protocol):
         ...
 
     def check(self, clock_s: float | None = None) -> None:
-        """Raise errors since the last call; a silence counts only if another clock, now at `clock_s`, confirms it."""
+        """Raise an error that has occurred since the last call.
+
+        A silence counts only if another instrument's clock, now at `clock_s`, confirms it.
+        """
         ...
 
     def catch_up(self) -> None:

@@ -55,7 +55,7 @@ def _columns(residuals: Array, search: LineSearch) -> Array:
 
 
 def estimate_noise(residuals: Array, parameters: int, steps: Steps, memories: Sequence[int]) -> MeanNoise:
-    """Return the noise of residuals (n, 3) after a fit of `parameters` columns; for `memories` see `fit_autoregression`."""
+    """Return the noise of residuals (n, 3) after a fit of `parameters` columns, with the orders `memories`."""
     scatter = np.maximum(np.sum(residuals**2, axis=0) / (len(residuals) - parameters), steps.variance)
     inflations = [fit_autoregression(axis, memories) for axis in residuals.T]
     return MeanNoise(

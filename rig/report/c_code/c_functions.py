@@ -13,7 +13,7 @@ from rig.report.findings.finding import Finding
 
 
 def gyroscope_lines(finding: Finding[GyroscopeEntry], sensitivities: Mapping[str, Array]) -> Iterator[str]:
-    """Yield C source for a calibrated gyroscope; none for a reference gyroscope."""
+    """Yield C source for a calibrated gyroscope; nothing for a reference gyroscope."""
     if finding.entry.role != "calibrate":
         return
     prefix, sensitivity = prefix_of(finding.sensor), sensitivities.get(finding.sensor)

@@ -1,4 +1,4 @@
-"""Numbers of accelerometers, magnetometers and biases by repeat, as a certificate prints them."""
+"""Numbers of accelerometers, of magnetometers and of bias drifts, as a certificate prints them."""
 
 import math
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ MICRO = 1e6
 
 @dataclass(frozen=True, slots=True)
 class ReversalRow:
-    """One axis of a magnetometer's reversal; `mixed`: the axis was not turned over, so its bias has the arm's field."""
+    """One axis of a magnetometer's reversal; `mixed`: it was not turned over, so its bias includes the arm's field."""
 
     axis: str
     scale: Pair
@@ -30,7 +30,10 @@ class ReversalRow:
 
 @dataclass(frozen=True, slots=True)
 class DriftRow:
-    """The bias of one axis: in the first and the last repeat, its largest change, and its temperature slope if any."""
+    """The bias of one axis in the first and the last repeat of the attitudes, its largest change, and its `slope`.
+
+    `slope` is the change with temperature, None if not determined.
+    """
 
     axis: str
     first: Pair

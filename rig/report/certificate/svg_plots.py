@@ -108,12 +108,12 @@ def attitude_residuals(finding: Finding[Any]) -> Residuals:
 
 
 def biases_by_repeat(finding: Finding[DriftEntry]) -> Residuals:
-    """Return the biases by repeat, minus their mean over the repeats."""
+    """Return the bias in each repeat of the attitudes, minus the mean over all repeats."""
     return _draw(find_repeat_residuals(finding))
 
 
 def _draw(unexplained: Unexplained) -> Residuals:
-    """Return a plot of values (n, 3) with bars of two standard deviations, in a unit for the largest value."""
+    """Return a plot of values (n, 3) with bars of two standard deviations, in a unit that suits the largest value."""
     values, bars, split = unexplained.values, 2 * unexplained.stds, unexplained.split
     upright = UprightAxis.fit(float((np.abs(values) + bars).max()), unexplained.quantity.residuals)
     across, height = (WIDTH - LEFT_MARGIN - RIGHT_MARGIN) / len(values), upright.height

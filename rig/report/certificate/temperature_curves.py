@@ -27,7 +27,7 @@ class Curves:
 
 @dataclass(frozen=True, slots=True)
 class TemperatureRow:
-    """A row of the temperature table: k of the three axes, then b."""
+    """A row of the temperature table: the scale factors of the three axes, then the biases."""
 
     temperature: str
     values: tuple[Pair, ...]

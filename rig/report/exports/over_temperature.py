@@ -23,7 +23,7 @@ Polynomials = Mapping[str, Mapping[str, OverTemperatureEntry]]  # by sensor and 
 
 
 def offset_of(quantity: str, entry: OverTemperatureEntry, order: int) -> tuple[float, ...]:
-    """Return the coefficients (3,) of Kⁿ, n = `order`, in the form that an autopilot subtracts."""
+    """Return each axis' coefficient of the temperature to the power `order`, with the sign that autopilots subtract."""
     return tuple(quantities()[quantity].offset * bias for bias in entry.bias[order])
 
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 class AttitudePlot:
     """A sensor in N attitudes; arrays (N, 3): residuals, their expected standard deviation, and the noise.
 
-    `towards` (N, 3): the reference in the sensor's nominal axes.
+    `towards` (N, 3): the reference, gravity or the field, in the sensor's nominal axes.
     """
 
     quantity: Quantity

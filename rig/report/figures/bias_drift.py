@@ -1,4 +1,4 @@
-"""Biases by repeat, drawn as in the paper TRIAX, Figs. 4 and 6."""
+"""The bias in each repeat of the attitudes, drawn as in the paper TRIAX, Figs. 4 and 6."""
 
 from collections.abc import Mapping
 from functools import partial
@@ -44,7 +44,7 @@ def _draw_all(figure: "Figure", drifts: Mapping[Quantity, BiasDrift]) -> None:
 
 
 def draw_drift(axes: "Axes", quantity: Quantity, drift: BiasDrift) -> None:
-    """Draw the bias by repeat, with dotted lines at its steps.
+    """Draw the bias in each repeat of the attitudes, with dotted lines at its steps.
 
     Dots are biases estimated with scale and axes fixed, crosses those estimated together with scale and axes.
     """

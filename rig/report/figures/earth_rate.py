@@ -1,4 +1,4 @@
-"""The Earth's rate of a gyroscope, drawn as in TRIAX, Figs. 2 and 3: the motion, and the residuals."""
+"""The Earth's rate as a gyroscope measured it, drawn as in the paper TRIAX, Figs. 2 and 3: motion and residuals."""
 
 from functools import partial
 from pathlib import Path

@@ -69,7 +69,7 @@ def find_attitude_residuals(finding: Finding[Any]) -> Unexplained:
 
 
 def find_repeat_residuals(finding: Finding[DriftEntry]) -> Unexplained:
-    """Return the biases by repeat, minus their mean over the repeats."""
+    """Return the bias in each repeat of the attitudes, minus the mean over all repeats."""
     repeats = finding.entry.repeats
     bias = np.array([repeat.scale_fixed.bias for repeat in repeats])
     std = np.array([repeat.scale_fixed.std for repeat in repeats])

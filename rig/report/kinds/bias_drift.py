@@ -1,4 +1,4 @@
-"""Biases by repeat: attitudes that were repeated (paper TRIAX, section IV)."""
+"""Bias drift: the bias in each repeat of the same attitudes (paper TRIAX, section IV)."""
 
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING

@@ -34,7 +34,7 @@ def kinds() -> tuple[ResultKind[Any], ...]:
 def outlets(
     document: ResultDocument, outlet_of: Callable[[ResultKind[Any]], OutletT | NoOutlet]
 ) -> Iterator[tuple[ResultKind[Any], OutletT, Finding[Any]]]:
-    """Yield kind, outlet and finding for each part of a result for whose kind `outlet_of` returns an outlet."""
+    """Yield kind, outlet and finding for each part of a result whose kind has the outlet that `outlet_of` selects."""
     for kind in kinds():
         if not isinstance(outlet := outlet_of(kind), NoOutlet):
             yield from ((kind, outlet, finding) for finding in kind.find(document))

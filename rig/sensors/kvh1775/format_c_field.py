@@ -15,8 +15,8 @@ GAUSS_T = 1e-4
 class MagneticFieldReader:
     """The assembler of one stream's samples, FIELD_SAMPLE_DTYPE; a reading with a missing axis is lost.
 
-    `t_per_count` is the size of a count, `full_scale_counts` the largest count. A sample has the time of its middle
-    axis; numbers start at the first complete reading.
+    `t_per_count` is the size of a count, `full_scale_counts` the largest count. A sample has the time of the message
+    with its y axis; samples are numbered from the first complete reading.
     """
 
     def __init__(self, t_per_count: float, full_scale_counts: int) -> None:

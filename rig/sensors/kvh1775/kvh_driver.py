@@ -88,7 +88,7 @@ class Kvh1775:
         )
 
     def test(self) -> BuiltInTest:
-        """Return the result of its built-in test in normal mode. Raise SensorError `kvh_no_test`, `kvh_test_failed`."""
+        """Return the result of the built-in test in normal mode. Raise SensorError `kvh_no_test`, `kvh_test_failed`."""
         self._tests.clear()
         period_s = 1.0 / float(self.settings["DR"])  # its result follows the next message
         for wait_s in self._patience.attempts(MAX_ATTEMPTS * period_s):

@@ -80,7 +80,7 @@ _CRC_RIGHT = 0xFFFFFFFF
 
 @dataclass(frozen=True, slots=True)
 class BuiltInTest:
-    """The instrument's test result of six bytes, or eight on request; each good one is `GOOD_TEST_BYTE`."""
+    """The instrument's test result of six bytes, or eight on request; a byte is `GOOD_TEST_BYTE` if its test passed."""
 
     values: bytes
 

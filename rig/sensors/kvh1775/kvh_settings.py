@@ -1,8 +1,8 @@
 """A KVH 1775's persistent settings: which of them the rig corrects, and which it refuses. Pure.
 
 Most settings that a previous user may have made would spoil a calibration unnoticed, so all are read. Settings of the
-output are corrected for the run; settings that change the readings serve a purpose, and are refused. Names and values:
-ICD 56-0298 Rev. B, section 8.
+output are corrected for the run. Settings that change the readings are refused, because only the owner knows whether
+they are needed. Names and values: ICD 56-0298 Rev. B, section 8.
 """
 
 from collections.abc import Iterable, Mapping

@@ -77,7 +77,7 @@ class Kvh1775Source:
         self._driver.start(self._required)
 
     def check(self, clock_s: float | None = None) -> None:
-        """Raise errors since the last call: SensorErrors of `OwnPort.check`, and `kvh_axis_invalid`."""
+        """Raise an error that has occurred since the last call: as `OwnPort.check` does, or `kvh_axis_invalid`."""
         self._driver.own_port.check(clock_s)
 
     def catch_up(self) -> None:

@@ -1,8 +1,8 @@
 """Lines of text decoded to arrays of numbers, in blocks of bytes as they arrive. Pure.
 
 A line is a sample if it contains a number for each column, with the right separators and checksum, if any. Allowed are
-a trailing separator, colour codes around the line, any text in an unused column, and an empty field or a word for
-"none" in others (`rig.sensors.lines.fields`). All other lines are counted by their kind.
+a trailing separator, colour codes around the line, any text in an unused column, and in other columns an empty field or
+a word for "none" (`rig.sensors.lines.fields`). All other lines are comments, or are rejected; both kinds are counted.
 """
 
 import re
@@ -36,9 +36,9 @@ for _value, _digit in enumerate("0123456789abcdef"):
 class LineBatch:
     """Decoded lines: `values` (n, columns) of the samples, as printed, and counts of all other lines.
 
-    A value that the device does not provide is NaN, as is text in an unused column. `samples_before` (m,): the number
-    of this block's samples before each rejected line, which is neither a sample nor a comment. `first_rejected`: the
-    beginning of the first rejected line.
+    A value that the device does not provide is NaN, as is text in an unused column. `samples_before` (m,): for each of
+    the m rejected lines, which are neither samples nor comments, the number of this block's samples before it.
+    `first_rejected`: the beginning of the first rejected line.
     """
 
     values: Array
@@ -48,7 +48,7 @@ class LineBatch:
 
 
 class LineReader:
-    """The parser of a byte stream in blocks of any size, which skips the first line, as it may be incomplete."""
+    """The parser of a byte stream in blocks of any size, which skips the first line, because it may be incomplete."""
 
     def __init__(self, section: LinesSection) -> None:
         self._columns = len(section.columns)
@@ -90,7 +90,10 @@ class LineReader:
         return LineBatch(np.zeros((0, self._columns)), np.zeros(0, np.int64), comments, b"")
 
     def _decode(self, data: bytes) -> LineBatch:
-        """Return the samples of whole lines: first all lines at once, then one by one those that failed.
+        """Return the samples of whole lines.
+
+        All lines are parsed at once. Lines with a right prefix and checksum that this fails to parse, usually because a
+        field holds no number, are then read one by one, which is slower.
 
         `raw` has the bytes as received. In the copy `bare`, prefixes and checksums are blank; in `text`, keys are also
         replaced by markers. All three have equal length, so positions in one are valid in the others.
@@ -114,7 +117,7 @@ class LineReader:
             positions = line_starts[good][:, None] + np.arange(len(self._prefix))
             text[positions] = _BLANK
         sum_ok = self._match_checksums(raw, text, line_starts, line_ends) if self._has_checksum else np.ones_like(good)
-        prefixed, bare = good & sum_ok, text  # copied before `good` is changed in place
+        is_framed, bare = good & sum_ok, text  # right prefix and checksum; copied before `good` is changed in place
         if self._keys:
             text = self._mark_keys(text)
         classes = self._classes[text]
@@ -123,7 +126,7 @@ class LineReader:
         is_sample = good & sum_ok
         values = np.full((len(is_sample), self._columns), np.nan)
         values[is_sample] = numbers
-        for line in np.flatnonzero(prefixed & ~is_sample).tolist():
+        for line in np.flatnonzero(is_framed & ~is_sample).tolist():  # these need the slower reader
             line_values = self._fields.read(bare[line_starts[line] : line_ends[line]].tobytes())
             if line_values is not None:
                 values[line], is_sample[line] = line_values, True
@@ -179,7 +182,10 @@ class LineReader:
         good: NDArray[np.bool_],
         sum_ok: NDArray[np.bool_],
     ) -> Array:
-        """Return the numbers (m, columns) of the `good` lines with a right sum, and unmark lines that lack a number."""
+        """Return the numbers (m, columns) of `good` lines with a right sum; clear `good` for lines without all numbers.
+
+        `good` and `sum_ok` are masks of the lines; `lines` are the positions of their starts and ends.
+        """
         line_starts, line_ends = lines
         number = np.concatenate([[False], classes == _NUMBER, [False]])
         edges = np.flatnonzero(number[1:] != number[:-1])

@@ -1,4 +1,4 @@
-"""The section of a sensor that `rig lines` writes: the guess, and a gap for each unknown. Pure."""
+"""The section of a sensor that `rig lines` writes: the guessed values, and a gap for each unknown one. Pure."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

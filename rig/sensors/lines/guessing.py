@@ -218,7 +218,10 @@ def _find_triads(shape: Shape, guess: Guess, still: Flags) -> None:
 
 
 def _kind(values: Array, still: Flags) -> str | None:
-    """Return the kind of a triad (n, 3), "g", "a" or "m", by its norms at rest and in rotation; None if unclear."""
+    """Return the kind of a triad (n, 3) as its norms at rest and in rotation show it; None if unclear.
+
+    The kinds are "g" (gyroscope), "a" (accelerometer) and "m" (magnetometer).
+    """
     rest, moving = values[still], values[~still]
     sizes = np.linalg.norm(values, axis=1)
     level = float(np.median(sizes[still]))

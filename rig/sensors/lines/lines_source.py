@@ -119,7 +119,7 @@ class LinesSource:
 
 @dataclass(frozen=True, slots=True)
 class _Printed:
-    """The columns of a channel in a line; a printed 1 is `size` in the channel's unit, a printed 0 `zero`."""
+    """The columns of a channel in a line; a printed number n means n × `size` + `zero` in the channel's unit."""
 
     columns: tuple[int, ...]
     size: float = 1.0
@@ -236,7 +236,10 @@ def _mean(values: Array) -> Array:
 def _make_triad(
     lines: LinesSection, quantity: Quantity, section: _TriadSection, full_scale: float
 ) -> tuple[Channel, _Printed]:
-    """Return a channel of three axes, with the step of the last digit or a coarser 32-bit step, and its columns."""
+    """Return a channel of three axes, and its columns.
+
+    The channel's step is that of the last printed digit, or if larger, that with which the range fits into 32 bits.
+    """
     unit = section.scale * UNITS[section.unit].size
     step = 0.0 if section.decimals is None else unit * 10.0**-section.decimals
     step = max(step, full_scale / FULL_SCALE_COUNTS)
@@ -245,7 +248,7 @@ def _make_triad(
 
 
 def _make_thermometer(lines: LinesSection, *, provides: bool) -> Iterator[tuple[Channel, _Printed]]:
-    """Yield the channel of the printed temperature, else of the stated one; nothing if there is neither."""
+    """Yield the channel of the printed temperature, or else of the stated one; nothing if there is neither."""
     printed, printed_channel = None, _Printed(())
     if provides and "temperature" in lines.columns:
         temperature = lines.temperature

@@ -91,7 +91,10 @@ def guess_columns(layout: TableLayout, values: Array, time: Array | None) -> Log
 def _guess_samples(
     layout: TableLayout, values: Array, quaternion: Mapping[str, int], rate_hz: float
 ) -> tuple[dict[str, ColumnEntry], list[str]]:
-    """Return the column map of the readings, and sentences on doubtful columns; of two sensors, the first is mapped."""
+    """Return the column map of the readings, and sentences on doubtful columns.
+
+    If there are two sensors of one kind, only the first is mapped.
+    """
     samples: dict[str, ColumnEntry] = {}
     gaps: list[str] = []
     for group in _group_columns(layout, values, quaternion, rate_hz):

@@ -152,7 +152,7 @@ class MavlinkSource:
         self.link.own_port.stream()
 
     def check(self, clock_s: float | None = None) -> None:
-        """Raise errors since the last call: those of `OwnPort.check`, and SensorError `autopilot_armed`."""
+        """Raise an error that has occurred since the last call: as `OwnPort.check` does, or `autopilot_armed`."""
         self.link.own_port.check(clock_s)
 
     def catch_up(self) -> None:

@@ -1,7 +1,7 @@
 """A parameter's value in transfer: four bytes, which the two firmwares interpret differently. Pure.
 
-The field is a float. ArduPilot casts integers to one (GCS_Param.cpp, `cast_to_float`); PX4 copies their four bytes into
-it (mavlink_parameters.cpp, "MAVLink encodes float and int params in the same space").
+The field is a float. ArduPilot casts an integer to a float (GCS_Param.cpp, `cast_to_float`); PX4 copies the integer's
+four bytes into the field (mavlink_parameters.cpp, "MAVLink encodes float and int params in the same space").
 """
 
 import struct

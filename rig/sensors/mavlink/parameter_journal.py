@@ -1,7 +1,7 @@
 """Two sets of an autopilot's parameters, old and new: a file that restores them, and a journal during the change.
 
-The journal is in the user's folder, by the autopilot's number, from before the first write until all parameters are
-read back. So the next connection after an interruption detects a mixed set.
+The journal is a file in the user's folder, named by the autopilot's number. It exists from before the first write until
+all parameters are read back, so the next connection after an interruption detects a mixed set.
 """
 
 import json
@@ -53,7 +53,7 @@ class ParameterChange:
         return json.dumps({**head, **sets}, indent=2) + "\n"
 
     def keep(self) -> None:
-        """Write the file that restores the old parameters. Raise Refused `autopilot_not_kept`, also if it exists."""
+        """Write the file that restores the old parameters. Raise Refused `autopilot_not_kept`, also if there is one."""
         try:
             _write(self.backup, self.serialize(), exclusive=True)
         except OSError as error:

@@ -19,7 +19,7 @@ class Clock(Protocol):
         """Wait for an event. Return whether the event occurred in time."""
 
     def wait_for(self, changed: threading.Condition, done: Callable[[], bool], timeout_s: float) -> bool:
-        """Wait until `done`, evaluated on each notice of the locked condition `changed`, is true; return its value."""
+        """Wait until `done` is true, which is tested at each notice of the locked `changed`; return its last value."""
 
 
 class HostClock:

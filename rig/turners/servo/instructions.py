@@ -20,7 +20,7 @@ BRAKE_MS, BRAKE_RAMP_MS = 200, 100  # the profile of a stop
 
 
 def make_ready(bus: Bus, watchdog: int) -> None:
-    """Hold the shaft in place, watchdog armed. Raise Refused if the servo does not keep a setting, BusError.
+    """Hold the shaft in place and arm the watchdog. Raise Refused if the servo does not keep a setting, and BusError.
 
     `watchdog` is in the register's units. Operating mode and drive mode are in the EEPROM and written only if they
     differ. Writing the mode sets the profile to zero, the fastest motion, so the order is mode, profile, goal, torque.

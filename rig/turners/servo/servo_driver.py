@@ -113,7 +113,7 @@ class Servo:
         return self._states[-1]
 
     def report(self) -> ServoReport:
-        """Return the servo's report from the opening of the port, for the pre-flight check."""
+        """Return the servo's report, read when the port was opened, for the pre-flight check."""
         self.check()
         return self._report
 
@@ -145,7 +145,7 @@ class Servo:
     # Moving -----------------------------------------------------------------------------------------------------
 
     def take_control(self, carried: FlangeLoad) -> None:
-        """Hold the shaft in place, watchdog armed. Raise Refused for `problems`, or `servo_moves`."""
+        """Hold the shaft in place and arm the watchdog. Raise Refused for `problems`, or `servo_moves`."""
         self.check()
         refuse(self.problems(carried))
         ends_s = self._clock.now_s() + MAX_REST_PROOF_S

@@ -98,7 +98,7 @@ def stands(states: Sequence[ServoState]) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class ServoReport:
-    """A `Report` of the servo's settings and state for pre-flight; `startup` is None without such a register.
+    """A `Report` of the servo's settings and state for pre-flight; `startup` is None if the servo has no such register.
 
     `round_trip_s` is the duration of reading a state.
     """

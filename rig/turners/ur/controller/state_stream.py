@@ -197,7 +197,7 @@ class StateStream:
             raise ConnectionError("it does not start to send")
 
     def _ask(self, kind: str, payload: bytes) -> bytes:
-        """Send a request and return its answer; skip messages that come before it."""
+        """Send a request and return its answer; skip messages that come before the answer."""
         self._socket.sendall(package(kind, payload))
         while True:
             self._await_bytes()
