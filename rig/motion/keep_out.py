@@ -109,7 +109,7 @@ def _measure_to_upper_arm(
 
 
 def _find_nearest(names: Sequence[str], distances_m: Array) -> tuple[str, float]:
-    """Return the name, one of the k `names`, of the part with the smallest of the distances (k, N), and that one, m."""
+    """Return the name, among k `names`, of the part with the smallest of the distances (k, N), and this distance, m."""
     least_m = distances_m.min(axis=1)
     return names[int(least_m.argmin())], float(least_m.min())
 

@@ -150,8 +150,7 @@ class Stage:
 class Plan:
     """All steps in order. `start_q_rad`: the expected pose at the plan's start; `home_q_rad`: the pose at the end.
 
-    Without `stages` the item's mounting does not change; else the item is remounted for each stage, with the arm at
-    home.
+    Without `stages` the item's mounting does not change; else it changes before each stage, with the arm at home.
     """
 
     steps: tuple[Step, ...]
@@ -188,7 +187,7 @@ class Plan:
 
 
 def closes(angle_rad: float) -> bool:
-    """Return whether an angle is a whole number of turns, which is known exactly, even from an inexact encoder."""
+    """Return whether an angle is a whole number of turns; such an angle is exact even if the encoder is not."""
     turns = round(angle_rad / TURN_RAD)
     return turns > 0 and abs(angle_rad - turns * TURN_RAD) < CLOSURE_TOLERANCE_RAD
 

@@ -161,8 +161,7 @@ class Report(Protocol):
     """A turner's report about itself.
 
     `host`: the turner's address or port; `software`: the controller's version; `model`: None if unknown; `kinematics`:
-    the reported geometry, or None; `joints`: the joints' names, from the ground on; `words`: the turner's name in a
-    sentence.
+    the reported geometry, or None; `joints`: the joints' names, from the ground on; `words`: a name for sentences.
     """
 
     @property

@@ -22,7 +22,7 @@ MIN_RESTS = 3  # fewest rests that show a drift of the bias
 def average_rests(
     run: RunData, stream: Stream, motion: ArmMotion, response: Array, superseded: Collection[int] = ()
 ) -> tuple[Average, ...]:
-    """Average all sufficiently long rests of the arm, except rests next to a sweep or dwell that was `superseded`.
+    """Average all sufficiently long rests of the arm, except rests next to a sweep or dwell in `superseded`.
 
     A resting arm still oscillates. `response` (3, 3) converts the rates of this oscillation to readings, which are
     subtracted.
@@ -32,7 +32,7 @@ def average_rests(
 
 
 def trim_rest(motion: ArmMotion, rest: Window) -> Window | None:
-    """Return a rest without its beginning and end; None if the arm moved in it or has fewer than two states in it."""
+    """Return a rest without its beginning and end; None if the arm moved, or if fewer than two states are in it."""
     still = Window(rest.start_s + REST_SETTLING_S, rest.end_s - REST_SETTLING_S)
     moved_rad = motion.travel_rad(still)
     return still if moved_rad is not None and moved_rad <= MAX_TRAVEL_AT_REST_RAD else None

@@ -92,8 +92,7 @@ def _find_overflows(time_s: Array, axis: Array, narrowest: float) -> NDArray[np.
     """Return the indices (k,) of the readings (n,) before an overflow of the number that they are stored in.
 
     A change of sign between two joined recordings looks similar. But before an overflow the readings rise towards the
-    end of the range, and go on rising after it; or they return at once, because noise causes overflows in both
-    directions.
+    end of the range, and go on rising after it, or return soon, because noise causes overflows in both directions.
     """
     none = np.zeros(0, dtype=np.intp)
     span, steps, steps_s = float(np.ptp(axis)), np.diff(axis), np.diff(time_s)

@@ -1,8 +1,9 @@
 """Averaged revolutions of a recording, the input of the estimators.
 
-An observation is the mean reading over exactly one turn of a joint, or over an arc of it. Over a whole turn the mean
-speed is 2π/T regardless of the servo's vibration; over an arc it is Δθ/T, from the encoders at its ends. The same
-weights average the readings and the arm's rate, so a vibration that the encoders measure adds no noise.
+An observation is the mean reading over exactly one turn of a joint, or over an arc. Over a whole turn in the time T the
+mean speed is 2π/T regardless of the servo's vibration; over an arc it is Δθ/T, with the angle Δθ between the encoders'
+readings at its ends. The same weights average the readings and the arm's rate, so a vibration that the encoders measure
+adds no noise.
 
 Whatever does not belong in a calibration raises a Fault with a name of its own.
 """
@@ -47,8 +48,8 @@ class Observation:
 
     - sweep: index of the sweep in the plan; joint_name, direction: of the joint's turn, None in external data.
     - axis ("x", "y", "z"), sign: the sensor axis that is nominally along the turn.
-    - axis_flange (3,), speed_rad_s: unit vector, in the flange's frame, and size (nominally 2π/T; Δθ/T for an arc) of
-      the arm's mean rate, with the weights of the mean reading.
+    - axis_flange (3,), speed_rad_s: unit vector, in the flange's frame, and size, nominally 2π/T or Δθ/T, of the arm's
+      mean rate, which is weighted like the mean reading.
     - speed_std_rad_s: standard deviation of the speed, because the turn's ends lie between the arm's states.
     - lost: number of samples missing from the average.
     - axis_errors (13, 3): change of the axis per radian of each of the arm's errors

@@ -125,9 +125,9 @@ State = Literal["starting", "resting", "moving", "held"]
 
 @dataclass(frozen=True, slots=True)
 class Live:
-    """The body's `state` at `time_s` and the time `since_s` at which this state began; the present move so far.
+    """The body's `state` at `time_s`, and the time `since_s` at which this state began.
 
-    `turned_rad` (3,) and `peak_rad_s` are the move's rotation and largest rate.
+    `turned_rad` (3,) and `peak_rad_s` are the rotation and the largest rate of the present move so far.
     """
 
     time_s: float

@@ -20,8 +20,7 @@ MAD_TO_STD = 1.4826  # standard deviation over median absolute deviation
 def contiguous_slices(time_s: Array, sampling: Sampling) -> Iterator[slice]:
     """Yield the rows between the gaps of a log with increasing times (n,).
 
-    A few missing readings do not count as a gap, because `fill_missing` interpolates them, which hardly reduces the
-    noise.
+    A few missing readings are no gap, because `fill_missing` interpolates them, which hardly reduces the noise.
     """
     gaps = sampling.gaps(time_s)
     short = gaps & (np.diff(time_s) <= MAX_GAP_S)

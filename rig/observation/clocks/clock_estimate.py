@@ -130,8 +130,8 @@ def _count_until(board_time_s: Array, span_s: float) -> int:
 class _MovingTimes:
     """The m blocks of `BLOCK_S` after `start_s`; `near` (m,) marks the blocks in or near which the body turns.
 
-    Only the times of these are used for a fit: at rest there are only vibrations, which the turner's encoders and the
-    sensor show differently.
+    Only samples in these blocks are used for a fit, because at rest there are only vibrations, which the turner's
+    encoders and the sensor show differently.
     """
 
     start_s: float

@@ -24,8 +24,7 @@ class RawReadings:
     - counts (n, 3): the readings as recorded.
     - residual_counts (m, 3): readings minus their segment's mean and the vibration, for samples with recorded motion.
     - vibration_counts (3,): RMS of the arm's vibration.
-    - vibration_rad2 (3,): mean square of the angle by which vibration turns the body from one random time of a rest to
-      another.
+    - vibration_rad2 (3,): mean square of the body's rotation by vibration from one random time of a rest to another.
     """
 
     sweep: int

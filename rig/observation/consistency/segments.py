@@ -44,7 +44,7 @@ REST_SEARCH = LineSearch(stands_out=30.0, sidebands=0)  # noise alone exceeds th
 
 
 def segment_counts(revolutions: int) -> tuple[int, int]:
-    """Return two numbers: of segments in each revolution, and in each rest, if there are `revolutions` revolutions."""
+    """Return the numbers of segments in a revolution and in a rest, for the number of all `revolutions` of a sensor."""
     segments = max(1, min(REVOLUTION_SEGMENTS, MAX_SEGMENTS // max(revolutions, 1)))
     return segments, max(1, segments // REST_SEGMENTS)
 

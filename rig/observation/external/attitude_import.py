@@ -213,7 +213,7 @@ class _ReferenceRows:
 
 
 def _select_different_times(rows: Mapping[str, Array]) -> NDArray[np.intp]:
-    """Return the numbers, from 1, of the rows to keep: a row of zero length is dropped if another has the same time."""
+    """Return the numbers, from 1, of the rows to keep: a row of zero length is dropped if a longer one has its time."""
     middles_s = (rows["start_s"] + rows["end_s"]) / 2
     lasting = rows["end_s"] != rows["start_s"]
     return 1 + np.flatnonzero(lasting | ~np.isin(middles_s, middles_s[lasting]))

@@ -50,7 +50,7 @@ def find_overlap(windows: Sequence[Window]) -> tuple[int, int] | None:
 
 
 def scatter_of(readings: Array) -> tuple[Array, Array, Array]:
-    """Return three arrays (3,): the variance of the mean of readings (n, 3), its degrees of freedom, one reading's std.
+    """Return three arrays (3,): variance of the mean of readings (n, 3), its degrees of freedom, one reading's std.
 
     A vibration counts as noise, because no arm's encoders show which part of the scatter it is.
     """
@@ -79,8 +79,8 @@ def average_of(readings: Array, window: Window) -> Average:
 def average_bridged(readings: Array, numbers: NDArray[np.intp], window: Window, hidden_rad: float) -> Average:
     """Return the average of a window's readings (n, 3), with missing ones interpolated.
 
-    Gaps in the readings' `numbers` (n,) show which are missing. The variance includes the rotation `hidden_rad`, a
-    standard deviation, that the gaps may hide.
+    Gaps in the readings' `numbers` (n,) show which are missing. The variance includes `hidden_rad`, the standard
+    deviation of the rotation that the gaps may hide.
     """
     mean = average_of(readings, window)
     if not hidden_rad:

@@ -55,7 +55,7 @@ def means_at_rest(turning: Turning, clock_s: float) -> MeansAtRest | None:
 def find_rests_at_other_bias(
     time_s: Array, readings: Array, lying: Sequence[Window], rests: Sequence[Window]
 ) -> list[Window]:
-    """Return the declared windows that are quiet but were not found to be rests: there the bias had changed.
+    """Return the declared windows that are quiet but were not found to be rests, because the bias had changed.
 
     `lying` are the declared windows, `rests` the rests found in the readings (n, 3) at times (n,).
     """

@@ -1,4 +1,4 @@
-"""Sensor readings in the attitudes in which a body was laid down: only there they show gravity, or a field, alone.
+"""Sensor readings in the attitudes in which a body was laid down, because only a rest shows gravity or a field alone.
 
 A placement is a rest of the recording (`rig.observation.by_hand.rests`) that contains rows of a reference. Consecutive
 rows without a movement in between are one placement. Rests without a row still show the norm of gravity or the field.

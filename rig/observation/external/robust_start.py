@@ -31,7 +31,7 @@ MIN_EXPLAINED = 0.5  # fraction of the readings' variance, by F
 
 @dataclass(frozen=True, slots=True)
 class RobustStart:
-    """Initial values, and the fraction of the readings' rotation that they leave `unexplained`: 1 if none was found."""
+    """Initial values, and the fraction of the readings' rotation that they leave `unexplained`: 1 for the default."""
 
     state: DriftState
     unexplained: float
@@ -47,7 +47,7 @@ class _Pairs:
 
 
 def find_start(turning: Turning) -> RobustStart:
-    """Return initial values of F, b and τ of the module; without suitable rows, for an aligned sensor on one clock."""
+    """Return initial values of F, b and τ (see the module); by default those of an aligned sensor on the same clock."""
     aligned = RobustStart(DriftState(np.eye(3), np.zeros(3), 0.0), 1.0)
     pairs = _find_pairs(turning)
     if len(pairs.begin_s) < MIN_PAIRS:
@@ -99,7 +99,7 @@ def _select_evenly(indices: NDArray[np.intp]) -> NDArray[np.intp]:
 
 
 def _fit(design: Array, turned: Array) -> tuple[float, Array]:
-    """Fit `turned` (k, 3) = `design` (k, 4) × Fᵀ above b; return the unexplained fraction, and the fit (4, 3)."""
+    """Fit X (4, 3), Fᵀ above b, so that `design` (k, 4) X ≈ `turned` (k, 3); return the unexplained fraction, and X."""
     aligned = np.concatenate([np.eye(3), np.zeros((1, 3))])
     weight = np.ones(len(design))
     solution = aligned

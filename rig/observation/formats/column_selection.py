@@ -16,10 +16,9 @@ from rig.observation.formats.csv_cells import DAY_S, is_value
 class MappedColumns:
     """The columns of another program's file.
 
-    - columns: for each of the rig's column names, the column's name in the file, or its number from 1, and the factor
-      to SI.
+    - columns: for each of the rig's column names, the name in the file, or the number from 1, and the factor to SI.
     - skip_lines: lines before the heading.
-    - wraps: for a time, under the rig's name, the number at which its counter begins again at 0.
+    - wraps: for the rig's name of a time, the number at which the counter of this time begins again at 0.
     - rate_hz: rows per second, for a file without times.
     - missing: texts that stand for a blank cell.
     - in_any_unit: the numbers are used as they are, whatever a row of units states.

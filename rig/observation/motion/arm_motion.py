@@ -112,7 +112,7 @@ class ArmMotion:
 
     @property
     def has_accurate_angles(self) -> bool:
-        """Whether single angles are accurate; if not, only a whole turn is, from one reading to its recurrence."""
+        """Whether single angles are accurate; if not, only whole turns are, from one reading to its recurrence."""
         return not self._noisy_angles
 
     def travel_rad(self, window: Window) -> float | None:

@@ -78,8 +78,7 @@ def accelerations(stream: Stream, inside: slice) -> Array:
 def check_acceleration(stream: Stream, inside: slice, where: str, *, turning: bool = False) -> None:
     """Raise Fault `saturation` or `stuck_sensor` for the accelerometer's samples `inside`.
 
-    In a rotation (`turning`), one axis with equal readings suffices for `stuck_sensor`; at rest all three axes must
-    have equal readings.
+    One axis with equal readings suffices for `stuck_sensor` in a rotation (`turning`); at rest, all three are needed.
     """
     channel, samples = stream.sensor.channel(ACCELERATION), stream.raw[inside]
     counts, saturated = channel.counts(samples), channel.is_saturated(samples)

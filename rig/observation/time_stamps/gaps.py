@@ -3,8 +3,7 @@
 A gap between rates is bridged by the trapezoidal rule. If the body is at rest or turns evenly, a gap hides nothing; if
 the body starts or oscillates, a short gap hides much. So artificial gaps of the same length are made among the readings
 on either side and bridged, and the result is compared with the integral of those readings. If the rate changes over the
-gap by more than on either side, the error includes that this change may lie anywhere in the gap. All functions are
-pure.
+gap by more than on either side, the error allows for this change anywhere in the gap. All functions are pure.
 """
 
 import numpy as np
