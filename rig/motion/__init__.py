@@ -1,1 +1,1 @@
-"""The motion of turners, that is, of arms, rate tables and servos: joints, geometry, steps, limits, clearances."""
+"""The motion of turners (arms, rate tables, servos): joints, geometry, steps, limits, clearances."""

@@ -163,6 +163,7 @@ def _find_joined(
     for name, steps, hidden_rad in _find_unknown_steps(turning):
         begins, ends = turning.time_s[steps], turning.time_s[steps + 1]
         from_step, to_step = np.searchsorted(ends, first_s[:-1], side="right"), np.searchsorted(begins, last_s[1:])
+        # The hidden variance of an increment is the sum over its steps, a difference of cumulative sums.
         squares = np.concatenate([[0.0], np.cumsum(np.square(hidden_rad))])
         amount = np.maximum(squares[np.maximum(to_step, from_step)] - squares[from_step], 0.0)
         lost = np.flatnonzero((amount > MAX_HIDDEN_STD_RAD**2) & joined)
