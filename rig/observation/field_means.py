@@ -40,8 +40,7 @@ def field_readings(recording: ObservedRun, name: str, thresholds: ObservationThr
     """Average a magnetometer's readings in the dwells in which an accelerometer with the same clock was read.
 
     The time base found for the accelerometer's sensor also serves the magnetometer: their delays may differ, but a
-    delay changes no mean at rest. Raise Fault `lost_samples`, `saturation`,
-    `stuck_axis`.
+    delay changes no mean at rest. Raise Fault `lost_samples`, `saturation`, `stuck_axis`.
     """
     other = find_companion(recording, name)
     if other is None:

@@ -28,7 +28,7 @@ def revolution_on_the_board(
     kinematics: DenavitHartenberg,
     reading_std_rad: float = 0.0,
 ) -> tuple[int, int, float]:
-    """Return a revolution's start and end on the board's clock, µs, and its speed by the arm's joints, rad/s.
+    """Return a revolution's start and end on the board's clock, µs, and its speed from the joint angles, rad/s.
 
     The sweep began after the state `first`. `samples` (n,) of SAMPLE_DTYPE and the turner's `states` (m,) should
     include the arm's motion to the sweep's start, because a slow sweep alone may not determine the time base. Raise

@@ -4,8 +4,8 @@ The comparison shows an error that no residual shows: a mean reading that is pai
 
 Board and computer average the same samples, with different weights. The board's weights are equal over whole blocks of
 readings, so its window begins and ends a little before or after the turn; the computer's weights cancel the spectral
-lines that the computer found. The arm's rotation and the spectral lines, averaged with the board's weights, are
-subtracted from the board's average. The remainder must agree with the computer's mean.
+lines that the computer found. So the computer's mean is converted to the rotation and the spectral lines in the board's
+window, and the board's average must agree with the result.
 """
 
 from collections.abc import Sequence

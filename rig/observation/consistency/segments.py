@@ -44,7 +44,7 @@ REST_SEARCH = LineSearch(stands_out=30.0, sidebands=0)  # noise alone exceeds th
 
 
 def segment_counts(revolutions: int) -> tuple[int, int]:
-    """Return the numbers of segments in a revolution and in a rest, for the number of all `revolutions` of a sensor."""
+    """Return the numbers of segments in a revolution and in a rest, for a sensor with so many `revolutions` in all."""
     segments = max(1, min(REVOLUTION_SEGMENTS, MAX_SEGMENTS // max(revolutions, 1)))
     return segments, max(1, segments // REST_SEGMENTS)
 

@@ -62,9 +62,9 @@ class GatheredFixes:
 def gather(turning: Turning, window_s: float | None = None, clock_s: float = 0.0) -> GatheredFixes:
     """Return the fixes of a reference's rows, in windows of a given or a suitable length.
 
-    Time t of the reference is time t + `clock_s` of the readings. Raise Fault if the body moves in too few increments,
-    or in fewer than were left out: `too_few_observations`, or the most frequent reason for leaving out increments,
-    `lost_samples`, `saturation` or `turned_too_fast`.
+    Time t of the reference is time t + `clock_s` of the readings. Raise Fault if the body moves in too few of the
+    increments that remain, or in fewer than were left out: the most frequent reason for leaving out an increment
+    (`lost_samples`, `saturation` or `turned_too_fast`), or else `too_few_observations`.
     """
     turning = select_covered(turning, clock_s)
     if len(turning.rows_s) < 2:

@@ -16,7 +16,7 @@ from rig.observation.windows import Window, inside
 
 @dataclass(frozen=True, slots=True)
 class AttitudeRows:
-    """Rows (N,) of a reference: their `windows`, `attitudes` (N, 3, 3), body to table, and `numbers` (N,) in its file.
+    """N rows of a reference: `windows`, `attitudes` (N, 3, 3) from body to table, and the rows' `numbers` in the file.
 
     `std_rad` (N,): the attitudes' stated standard deviations, or None.
     """

@@ -81,7 +81,7 @@ def _build_map(
 def unwrap_times(columns: Mapping[str, Array], mapped: MappedColumns | None, *, by_day: bool) -> dict[str, Array]:
     """Return the columns with continuous times, without the restarts of counters at 0.
 
-    With `by_day`, times restart at midnight.
+    If `by_day`, times are times of day, which restart at midnight.
     """
     unwrapped = dict(columns)
     for name in TIMES:

@@ -23,7 +23,7 @@ class Mean:
     - `mean` (3,), its `variance` (3,), the `noise` (3,) of one reading, and the number of `samples`.
     - `dof` (3,): degrees of freedom of the variance, fewer than the samples if these are not independent.
     - `cycles` (k,): for each spectral line removed from the mean, its number of cycles in the window.
-    - `rounding`, `slow_lines` (3,): the parts of the variance due to rounding, and to lines too slow to remove.
+    - `rounding`, `slow_lines` (3,): parts of the variance due to rounding, and to spectral lines too slow to remove.
     - `weights` (n,): weights of the readings, for averages of other data of the same samples; empty if not stored.
     """
 

@@ -228,7 +228,7 @@ def _drop_stale(log: _UnorderedLog) -> _UnorderedLog:
 
 
 def _spread_stalled(log: _UnorderedLog) -> _UnorderedLog:
-    """Return the log with the times at which waiting readings were taken during a stall of the link.
+    """Return the log in which readings that waited during a stall of the link have the times at which they were taken.
 
     If some of the readings of a stall were lost, it is unknown which, so all of them are left out.
     """

@@ -41,7 +41,7 @@ def find_uncovered_in_container(der: bytes) -> Iterator[str]:
 
 
 def certificates_with(der: bytes) -> list[list[Certificate]]:
-    """Return the list of a signature's certificates, then that of its time stamp's; a signer's own begins each list."""
+    """Return lists of certificates: a signature's, then its time stamp's; each list begins with the signer's own."""
     contents = [cms.ContentInfo.load(der)["content"]]
     for attribute in contents[0]["signer_infos"][0]["unsigned_attrs"] or ():
         contents += [stamp["content"] for stamp in attribute["values"]]

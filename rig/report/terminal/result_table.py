@@ -41,7 +41,7 @@ def print_outcome(document: ResultDocument, *, as_json: bool, whole: bool = Fals
 
 
 def print_kept(folder: Path, document: ResultDocument, since: Sequence[str] = (), *, as_json: bool = False) -> None:
-    """Print the end of the finished run in `folder`. `since` has the comparison with the last calibrations in lines."""
+    """Print the end of the finished run in `folder`. `since`: lines that compare it with the last calibrations."""
     if as_json:
         print(document.text())
         for line in since:  # the JSON does not contain these lines

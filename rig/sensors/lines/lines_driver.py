@@ -36,7 +36,7 @@ OnValues = Callable[[Array, NDArray[np.int64], NDArray[np.int64], float], None]
 
 @dataclass(slots=True)
 class Counts:
-    """Counts of samples, comments, and lines rejected before the first sample and after it; the first rejected line."""
+    """Counts of samples, of comments, and of lines rejected before and after the first sample; first rejected line."""
 
     samples: int = 0
     comments: int = 0

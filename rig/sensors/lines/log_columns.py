@@ -175,7 +175,7 @@ def _name_once(names: list[str]) -> list[str]:
 
 
 def find_still(values: Array, rate_hz: float) -> NDArray[np.bool_]:
-    """Return a mask (n,) of rows at rest: blocks in which each column scatters little more than in its quietest one."""
+    """Return a mask (n,) of rows at rest: in their blocks each column scatters little more than in its quietest block."""
     width = max(int(BLOCK_S * rate_hz), 5)
     count = len(values) // width
     if count < 2:

@@ -1,6 +1,6 @@
 """An operator's hand as a kind of turner: without joints, states or motion of its own.
 
-The sensors' readings determine its motion; the clock of a recording is the board's.
+The sensors' readings determine the motion; the clock of a recording is the board's.
 """
 
 import time

@@ -52,7 +52,7 @@ def _plan_problems_on(plan: Plan, arm: ArmSection, report: ArmReport) -> list[Pr
 def arm_problems(plan: Plan, report: ArmReport) -> list[Problem]:
     """Return the problems of the arm's state for this plan: modes, stops, control, the motion to the start.
 
-    `Arm.take_control` sets and confirms the payload.
+    The payload is not checked here, because `Arm.take_control` sets and confirms it.
     """
     problems = []
     if unready := readiness(report.state):
