@@ -175,7 +175,7 @@ def _name_once(names: list[str]) -> list[str]:
 
 
 def find_still(values: Array, rate_hz: float) -> NDArray[np.bool_]:
-    """Return a mask (n,) of rows at rest: in their blocks each column scatters little more than in its quietest block."""
+    """Return a mask (n,) of rows at rest: each column scatters little more in their block than in the quietest one."""
     width = max(int(BLOCK_S * rate_hz), 5)
     count = len(values) // width
     if count < 2:
