@@ -18,9 +18,12 @@ from rig.estimation.arrays import Array
 SPAN_S = 0.5  # time span of the readings in one scatter, all after the motion
 SPANS_AT_REST = 6  # spans at rest: the vibration of an arm varies, so the largest scatter of these counts
 MAX_QUIET_RATIO = 1.2  # to the scatter at rest, whose standard uncertainty is 4 % for a hundred samples on three axes
-# Largest ratio of a constant scatter to that at rest, and the least ratio of a scatter to the one before that counts as
-# constant: an arm vibrates differently in each attitude, so a constant scatter is no decaying oscillation.
-MAX_STEADY_RATIO, MIN_STEADY_DECREASE = 2.0, 0.85
+# Largest ratio of a constant scatter to that at rest, and the least ratio of a scatter to an earlier one that counts as
+# constant. A constant scatter is no decaying oscillation; a larger one has to be constant for longer. An arm vibrates
+# differently in each attitude, and a vibration near a multiple of half the data rate comes and goes in the samples.
+MAX_STEADY_RATIO, MIN_STEADY_DECREASE = 2.0, 0.85  # of the newest span to the one before
+MAX_LONG_STEADY_RATIO, MIN_LONG_STEADY_DECREASE = 5.0, 0.9  # of the newest `LONG_SPANS` to as many before
+LONG_SPANS = 3
 MIN_SCATTER_COUNTS = 0.5  # a smaller scatter is rounding
 
 
@@ -54,12 +57,21 @@ class _RecentReadings:
 
     @property
     def settled(self) -> bool:
-        """Whether the readings scatter as at rest, or slightly more if their scatter no longer decreases."""
-        ratio, scatter, earlier = self.over_rest(), self.scatter_counts(), self.scatter_counts(before=1)
-        if ratio is None or scatter is None:
+        """Whether the readings scatter as at rest, or more if their scatter no longer decreases."""
+        ratio = self.over_rest()
+        if ratio is None:
             return False
-        steady = earlier is not None and scatter >= MIN_STEADY_DECREASE * earlier
-        return ratio <= MAX_QUIET_RATIO or (ratio <= MAX_STEADY_RATIO and steady)
+        return (
+            ratio <= MAX_QUIET_RATIO
+            or (ratio <= MAX_STEADY_RATIO and self._is_steady(1, MIN_STEADY_DECREASE))
+            or (ratio <= MAX_LONG_STEADY_RATIO and self._is_steady(LONG_SPANS, MIN_LONG_STEADY_DECREASE))
+        )
+
+    def _is_steady(self, spans: int, least: float) -> bool:
+        """Return whether the mean scatter of the newest spans is at least this fraction of that of as many before."""
+        scatters = [self.scatter_counts(before) for before in range(2 * spans)]
+        known = [scatter for scatter in scatters if scatter is not None]
+        return len(known) == len(scatters) and sum(known[:spans]) >= least * sum(known[spans:])
 
 
 @dataclass(slots=True)
@@ -73,7 +85,7 @@ class Settling:
         """Watch a sensor: its accelerations if it sends them, otherwise its rates."""
         enough = max(2, round(SPAN_S * sensor.rate_hz))
         column = sensor.channel(ACCELERATION if sensor.measures(ACCELERATION) else RATE).column
-        self._watched[name] = _RecentReadings(name, column, enough, deque(maxlen=2 * enough))
+        self._watched[name] = _RecentReadings(name, column, enough, deque(maxlen=2 * LONG_SPANS * enough))
 
     def add(self, sensor: str, samples: NDArray[Any]) -> None:
         """Add the newest readings (n,) of a watched sensor."""
