@@ -307,11 +307,12 @@ def _rotations(rows: Mapping[str, Array]) -> Array:
     norms = np.linalg.norm(quaternions, axis=1)
     worst = int(np.argmax(np.abs(norms - 1)))
     if abs(norms[worst] - 1) > NORM_TOLERANCE:
-        raise Refused(
-            "bad_quaternion",
-            f"the quaternion of attitude {worst + 1} has the length {norms[worst]:.4g}",
-            "Give unit quaternions qw qx qy qz that take body to table coordinates",
-        )
+        what = f"the quaternion of attitude {worst + 1} has the length {norms[worst]:.4g}"
+        remedy = "Give unit quaternions qw qx qy qz that take body to table coordinates"
+        if 0 < worst < len(norms) - 1 and quaternions[worst - 1] @ quaternions[worst + 1] < 0:
+            what += ", and those before and after it have opposite signs: it seems to be interpolated from q to −q"
+            remedy = "Give the reference's own attitudes, or make neighbours of one sign before interpolating"
+        raise Refused("bad_quaternion", what, remedy)
     return np.asarray(Rotation.from_quat(quaternions[:, [1, 2, 3, 0]]).as_matrix(), dtype=np.float64)
 
 

@@ -71,9 +71,9 @@ def _describe_table(path: Path, layout: TableLayout, guess: LogColumns) -> Itera
 def describe_convention(convention: Convention | None, *, is_order_named: bool) -> Iterator[str]:
     """Yield the quaternions' convention, which the gyroscope shows, and the order of their numbers unless named."""
     if convention is None:
-        yield _row(
-            "direction", "the gyroscope does not show the direction of the quaternions: is it one body and one clock?"
-        )
+        what = "the gyroscope does not show the direction of the quaternions"
+        why = "the body turned slowly, briefly or about one axis at a time, or they are of another body or clock"
+        yield _row("direction", f"{what}: {why}")
         return
     order = "" if is_order_named else f", read as {'x y z w' if convention.scalar_last else 'w x y z'}"
     direction = "room to body (motion_inverse)" if convention.inverse else "body to room"

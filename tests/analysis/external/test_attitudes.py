@@ -214,6 +214,12 @@ def of_other_rows(table: Table) -> Table:
     return [quaternion(row, attitude(other)) for row, other in zip(table, reversed(table), strict=True)]
 
 
+def interpolated_through_zero(table: Table) -> Table:
+    """The seventh, halfway from q to the −q of a later row."""
+    shorter = times(0.3, "qw", "qx", "qy", "qz")
+    return [*table[:6], *shorter(table[6:7]), *times(-1, "qw", "qx", "qy", "qz")(table[7:])]
+
+
 ACCELERATION = ("x_m_s2", "y_m_s2", "z_m_s2")
 WRONG: dict[str, tuple[str, Change | None, Change | None]] = {
     "g for m/s²": ("wrong_unit: .* given as m/s²", times(1 / 9.80665, *ACCELERATION), None),
@@ -221,6 +227,9 @@ WRONG: dict[str, tuple[str, Change | None, Change | None]] = {
     "mirrored axis": ("mirrored_axis", times(-1, "z_m_s2"), None),
     "two axes swapped": ("mirrored_axis", swapped("x_m_s2", "y_m_s2"), None),
     "quaternions of length 1.01": ("bad_quaternion: .* length 1.01", None, times(1.01, "qw", "qx", "qy", "qz")),
+    "a quaternion between q and −q": (
+        "bad_quaternion: .* attitude 7 .* interpolated from q to −q", None, interpolated_through_zero
+    ),
     "table to body": ("inverted_attitudes", None, times(-1, "qx", "qy", "qz")),
     "quaternions of a mirrored table": ("mirrored_axis", None, times(-1, "qx", "qy")),
     "scalar last": ("attitude_untrustworthy", None, each(
