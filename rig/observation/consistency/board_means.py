@@ -11,14 +11,15 @@ window, and the board's average must agree with the result.
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig.data.recording.recorded_events import BoardObserved
 from rig.estimation.arrays import Array
 from rig.observation.average import Stream
 from rig.observation.observe import Observation
 from rig.observation.observed_run import ObservedRun
-from rig.observation.statistics.spectral_lines import fit_columns, harmonics, waves
-from rig.observation.turn_mean import lag_columns
+from rig.observation.statistics.spectral_lines import column_count, fit_columns, harmonics, waves
+from rig.observation.turn_mean import SLOW_CYCLES, lag_columns
 
 TIME_ROUNDING_S = 1e-7  # at most
 
@@ -46,6 +47,9 @@ def compare_board_means(sensor: str, recordings: Sequence[ObservedRun]) -> dict[
 def _deviation(recording: ObservedRun, stream: Stream, turn: Observation, observed: BoardObserved) -> float:
     """Return the largest deviation of the three axes, in standard deviations: board's average minus prediction.
 
+    The frequencies of slow spectral lines are uncertain, so the variance contains what they change in the board's
+    average at random phases.
+
     The computer's mean predicts the board's average, after two corrections for the board's different window and
     weights. The reading due to the rotation, mean minus zero, is scaled to the arm's mean rate in the board's window;
     the average of the spectral lines in that window is added.
@@ -62,17 +66,21 @@ def _deviation(recording: ObservedRun, stream: Stream, turn: Observation, observ
     of_turn, of_board = slice(*(edges - first).tolist()), slice(*(boards - first).tolist())
     time_s = stream.time_s[first:last]
     rates = recording.motion.rates_at_samples(time_s)
-    regressors = _nuisance_columns(time_s, turn, rates @ axis)
+    regressors, is_slow = _nuisance_columns(time_s, turn, rates @ axis)
     residuals = (stream.readings_rad_s[first:last] - zero - rates @ by_rate.T)[of_turn]
     columns = np.column_stack([np.ones(len(residuals)), regressors[of_turn]])
-    line_means = regressors[of_board].mean(axis=0) @ fit_columns(columns, residuals)[1:]
-    # The prediction is zero + by_rate @ mean rate + line means.
-    deviation = np.array(board.mean_rad_s) - zero - by_rate @ rates[of_board].mean(axis=0) - line_means
-    return float(np.max(np.abs(deviation) / average.mean_std_rad_s))
+    sizes, of_columns = fit_columns(columns, residuals)[1:], regressors[of_board].mean(axis=0)
+    # The prediction is zero + by_rate @ mean rate + means of the nuisance columns.
+    deviation = np.array(board.mean_rad_s) - zero - by_rate @ rates[of_board].mean(axis=0) - of_columns @ sizes
+    powers = np.sum(sizes[is_slow].reshape(-1, 2, 3) ** 2, axis=1)
+    by_lines = np.sum(of_columns[is_slow].reshape(-1, 2) ** 2, axis=1) @ powers / 2
+    return float(np.max(np.abs(deviation) / np.sqrt(average.mean_std_rad_s**2 + by_lines)))
 
 
-def _nuisance_columns(time_s: Array, turn: Observation, rates_rad_s: Array) -> Array:
-    """Return the nuisance columns (n, k) of the computer's mean, at times (n,) with rates (n,) about the axis.
+def _nuisance_columns(time_s: Array, turn: Observation, rates_rad_s: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Return the nuisance columns (n, k) of the computer's mean and a mask (k,) of those of slow spectral lines.
+
+    The columns are at times (n,) with rates (n,) about the axis.
 
     The weights of that mean cancel these columns: the turn's first two harmonics, spectral lines, and the effect of a
     slow ripple on a lagging sensor.
@@ -83,8 +91,11 @@ def _nuisance_columns(time_s: Array, turn: Observation, rates_rad_s: Array) -> A
     of_turn = harmonics(angle_rad * fraction, 2 * turn.sidebands)
     if turn.arc_rad is not None:
         of_turn -= harmonics(angle_rad * np.linspace(0.0, 1.0, len(fraction)), 2 * turn.sidebands).mean(axis=0)
-    lines = waves(average.lines_hz * average.duration_s, fraction, turn.sidebands)
-    if turn.arc_rad is not None:
-        return np.column_stack([of_turn, lines])
-    columns = np.column_stack([np.ones(len(fraction)), of_turn, lines])
-    return np.column_stack([of_turn, lines, lag_columns(rates_rad_s, columns, fraction)])
+    cycles = average.lines_hz * average.duration_s
+    lines = waves(cycles, fraction, turn.sidebands)
+    late = lines[:, :0]
+    if turn.arc_rad is None:
+        late = lag_columns(rates_rad_s, np.column_stack([np.ones(len(fraction)), of_turn, lines]), fraction)
+    is_slow = np.zeros(of_turn.shape[1] + lines.shape[1] + late.shape[1], dtype=np.bool_)
+    is_slow[of_turn.shape[1] :][: lines.shape[1]] = np.repeat(cycles < SLOW_CYCLES, column_count(turn.sidebands))
+    return np.column_stack([of_turn, lines, late]), is_slow
