@@ -70,8 +70,8 @@ class _RecentReadings:
     def _is_steady(self, spans: int, least: float) -> bool:
         """Return whether the mean scatter of the newest spans is at least this fraction of that of as many before."""
         scatters = [self.scatter_counts(before) for before in range(2 * spans)]
-        known = [scatter for scatter in scatters if scatter is not None]
-        return len(known) == len(scatters) and sum(known[:spans]) >= least * sum(known[spans:])
+        present = [scatter for scatter in scatters if scatter is not None]
+        return len(present) == len(scatters) and sum(present[:spans]) >= least * sum(present[spans:])
 
 
 @dataclass(slots=True)
