@@ -58,8 +58,9 @@ MIN_STD_RATIO = 1e-3  # to the usual std, for a sample that is stated to be exac
 class Fixes:
     """A reference's attitudes: k samples, grouped into N fixes.
 
-    - `at_s` (k,): increasing times; `attitudes` (k, 3, 3): body to table; `fix` (k,): the fix of each sample.
-    - `placement` (N,): negative at rest, where fixes with the same number share one error, as the body lay still.
+    - `at_s` (k,): increasing times; `attitudes` (k, 3, 3): body to table; `fix` (k,): the index of its fix.
+    - `placement` (N,): a number for each fix: negative at rest, the same for both fixes of one rest, which share one
+      error because the body lay still; in motion a different number for each fix, at least 0.
     - `joined` (N − 1,): True if the gyroscope's readings are complete from one fix to the next.
     - `std_rad` (k,): the stated standard deviation of each sample, None if none is stated.
     - `blind_rad` (N − 1,): standard deviation of the rotation that missing readings hide, None if none are missing.
@@ -87,7 +88,7 @@ class Fixes:
 
 @dataclass(frozen=True, slots=True)
 class AttitudeSamples:
-    """The recording, and the samples (k,) of the reference that are used."""
+    """A gyroscope's readings, the reference's `fixes`, and a mask `kept` (k,) of the samples in fixes that are used."""
 
     time_s: Array
     readings: Array
@@ -127,7 +128,7 @@ class FixedAttitudes:
 
 
 def average_fixes(recorded: AttitudeSamples, state: DriftState) -> FixedAttitudes:
-    """Return the mean attitude of each fix, minus the motion by the gyroscope with the parameters `state`."""
+    """Return the terms of the module's equation, with C integrated from the readings with the parameters `state`."""
     fixes, time_s = recorded.fixes, recorded.time_s
     at_s = np.clip(fixes.at_s + state.clock_s, time_s[0], time_s[-1])
     integrated = integrate_attitudes(time_s, recorded.readings, state.matrix, state.bias, at_s)
@@ -177,7 +178,7 @@ def find_inliers(recorded: AttitudeSamples, fixes: FixedAttitudes) -> NDArray[np
 
 @dataclass(frozen=True, slots=True)
 class DriftModel:
-    """The mixed linear model of the increments between fixes, with the names of its `causes` (k,) of errors."""
+    """The mixed linear model of the increments between fixes, with the names of the k `causes` of its errors."""
 
     mixed: Mixed
     causes: tuple[str, ...]
@@ -232,11 +233,12 @@ def drift_model(averaged: FixedAttitudes, fixes: Fixes) -> DriftModel:
 
 
 def _list_errors(averaged: FixedAttitudes, fixes: Fixes, correlation: Array, step: Array) -> dict[str, Array]:
-    """Return the covariance (3n, 3n) of the increments, by cause, due to unit errors of the reference or the times.
+    """Return the covariances (3n, 3n) of n increments due to unit errors of reference and times, by the errors' names.
 
     The reference's errors vary with attitude, or are new in each visit to an attitude, each rest, or each fix in
     motion. The errors of the times are jitter of the reference's stamps and, if lost readings are hidden, an error of
-    the time that passes from fix to fix.
+    the time that passes from fix to fix. `correlation` (N, N) is that of `_correlate`; `step` (n, N) maps the errors of
+    N fixes to the increments.
     """
     count = len(fixes.placement)
     first = np.searchsorted(fixes.fix, np.arange(count))
@@ -264,10 +266,11 @@ def _list_errors(averaged: FixedAttitudes, fixes: Fixes, correlation: Array, ste
 
 
 def _correlate(fixes: Fixes) -> Array:
-    """Return the correlation (N, N) between fixes of an error that varies smoothly with attitude, averaged in each fix.
+    """Return the correlation (N, N), from fix to fix, of an error that varies smoothly with attitude.
 
-    Matérn's function, ν = 3/2, of the chordal distance ‖R − R′‖/√2, which is nearly the angle if small; it is positive
-    definite on SO(3) (Rasmussen and Williams, Gaussian Processes for Machine Learning (2006), 4.2).
+    The error is averaged in each fix. At two attitudes R and R′ its correlation is Matérn's function, ν = 3/2, of the
+    chordal distance ‖R − R′‖/√2, which is nearly the angle if small. This function is positive definite on SO(3)
+    (Rasmussen and Williams, Gaussian Processes for Machine Learning (2006), 4.2).
     """
     counts = np.bincount(fixes.fix)
     begins = np.cumsum(counts) - counts
@@ -305,9 +308,9 @@ def _find_matrix_changes(sensitivities: Array, nearby: Array) -> Array:
 
 
 def _weigh_bias(averaged: FixedAttitudes, fixes: Fixes) -> Array:
-    """Return the weights (n,) of the increments in the mean bias: the durations of those at rest.
+    """Return the weights (n,), of sum 1, of the increments in the mean bias, in proportion to their durations.
 
-    A gyroscope's bias is its reading at rest. Without rests all increments have their durations as weights.
+    A gyroscope's bias is its reading at rest, so increments in motion have weights only if there is too little rest.
     """
     joined = np.flatnonzero(fixes.joined)
     lasts_s = np.diff(averaged.middles_s)[joined]

@@ -36,9 +36,9 @@ class Inclinations:
     def widen(self, model: MixedModel, std: Array, fit: MixedFit, wanted: Array, variances: Array) -> Array:
         """Return the covariance (q, q) that inclinations add to `wanted` (q, p) combinations of the parameters.
 
-        Only inclinations that the residuals do not show are added; the others are part of the model's errors. These
-        have the standard deviations `std` (k,) and give the combinations the variances `variances` (q,). With the added
-        variance, two standard deviations are the half-width of the 95.45 % interval.
+        Only inclinations that the residuals do not show are added; the others are part of the model's errors. The
+        model's errors have standard deviations `std` (k,) and give the combinations the `variances` (q,). With the
+        added variance, two standard deviations are the half-width of the 95.45 % interval.
         """
         from scipy.linalg import cho_factor, cho_solve
 
@@ -80,7 +80,8 @@ def _weigh_sizes(sizes_rad: Array, values: Array, scores: Array) -> Array:
 def find_inclinations(averaged: FixedAttitudes, fixes: Fixes, matrix: Array) -> Inclinations:
     """Return the inclinations of the axes about which the body turned between fixes, with F `matrix` (3, 3).
 
-    They vary smoothly with the axis in body coordinates: Matérn's function, ν = 3/2, of the distance between the axes.
+    Inclinations vary smoothly with the axis in body coordinates: their correlation is Matérn's function, ν = 3/2, of
+    the distance between the axes.
     """
     joined = np.flatnonzero(fixes.joined)
     cross_products = np.array([np.cross(np.eye(3), -axis) for axis in np.eye(3)])
@@ -98,7 +99,10 @@ def find_inclinations(averaged: FixedAttitudes, fixes: Fixes, matrix: Array) -> 
 
 
 def _find_moments(fixes: Fixes) -> Array:
-    """Return the second moment (N, 9) of the rotation vectors, in body coordinates, between the samples of each fix."""
+    """Return the sums Σ v vᵀ (N, 9), as flattened (3, 3) matrices, of the rotations that begin at each fix's samples.
+
+    v is the rotation vector, in body coordinates, from one sample to the next.
+    """
     turns = rotation_vectors(np.swapaxes(fixes.attitudes[:-1], -1, -2) @ fixes.attitudes[1:])
     turns = np.concatenate([turns, turns[-1:]])
     moments = np.zeros((len(fixes.placement), 9))

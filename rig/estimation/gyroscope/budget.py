@@ -33,7 +33,7 @@ class Contributor:
     """One contributor of the budget.
 
     - `kind`: the type of evaluation (JCGM 100, 4.2 and 4.3).
-    - `half_width`: as assumed, in `unit`; for a normal distribution the stated U (k = 2); None if estimated.
+    - `half_width`: the assumed half-width, or the U (k = 2) of a normal distribution, in `unit`; None if estimated.
     - `dof`: degrees of freedom, infinite for an exact uncertainty.
     - `covariance` (6, 6): of kx ky kz bx by bz.
     """
@@ -223,11 +223,11 @@ def _contributors(explained: VectorFit, unknown: UnknownErrors) -> Iterator[Cont
 
 
 def _evaluate_mounts(explained: VectorFit, unknown: UnknownErrors, propagate: Propagate) -> Iterator[Contributor]:
-    """Yield the contributors of the ends of arcs and of the mountings; `propagate` as in `_contributors`."""
+    """Yield the contributors of encoders at the ends of arcs, and of remounting; `propagate` as in `_contributors`."""
     inputs, matrix = explained.inputs, explained.solution.matrix
     if inputs.encoder_errors_rad_s is not None:
         spread = propagate(inputs.encoder_errors_rad_s @ matrix.T)
-        stated = 2 * float(np.degrees(unknown.angle_std_rad))
+        stated = 2 * float(np.degrees(unknown.angle_std_rad))  # a normal distribution is listed with its U (k = 2)
         yield Contributor(ENCODERS, "B", "normal", stated, "°", "uncertainty.angle_std_deg", np.inf, spread)
     if inputs.mount_errors_rad_s is not None:
         spread = propagate(inputs.mount_errors_rad_s @ matrix.T) + propagate_mount_squares(explained)

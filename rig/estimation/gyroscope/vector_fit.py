@@ -114,7 +114,7 @@ class VectorInputs:
 
     @property
     def arm_errors_rad_s(self) -> Array:
-        """The effects (P, N, 3) of all errors of the arm's angles on the rates, then of the mounts."""
+        """The effects (P, N, 3) of P errors on the rates: first those of the arm's angles, then those of the mounts."""
         none = np.zeros((0, *self.means_rad_s.shape))
         kinds = (self.axis_errors_rad_s, self.return_errors_rad_s, self.encoder_errors_rad_s, self.mount_errors_rad_s)
         return np.concatenate([none, *(kind for kind in kinds if kind is not None)])

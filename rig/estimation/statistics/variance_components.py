@@ -244,7 +244,7 @@ class MixedModel:
         return projected, projected @ self.mixed.observed
 
     def _log_prior(self, logarithms: Array) -> float:
-        """Return the log-density of ln σ, up to a constant: half-Cauchy for σ, χ² for squares measured separately."""
+        """Return the log-density of ln σ, up to a constant: half-Cauchy priors, and the χ² likelihood of `alone`."""
         relative = logarithms - np.log(self.mixed.scales)
         squares, dof = self.mixed.alone.T
         measured = dof * logarithms + squares / 2 * np.exp(-2 * logarithms)

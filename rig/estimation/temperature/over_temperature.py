@@ -246,8 +246,9 @@ def heating_rate(windows_s: Array, temperature_c: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, slots=True)
 class _TemperatureFit:
-    """One fit: the coefficients of orders 1 to 3 (rows) of `relative` k (3, 3) and `bias` c (3, 3) in T − reference.
+    """One fit: the coefficients of (T − reference)ⁿ for n = 1 to 3 (rows) and each axis (columns).
 
+    `relative` (3, 3): those of k, as fractions of k at the reference; `bias` (3, 3): those of c.
     `covariance` (18, 18) includes the effect of the fitted lag, `without_lag` (18, 18) does not.
     """
 
