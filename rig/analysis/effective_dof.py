@@ -54,7 +54,7 @@ def acceleration_angle_dof(result: "AccelerometerResult") -> Array:
 
 
 def second_order_dof(result: "AccelerometerResult") -> Array | None:
-    """Return the degrees of freedom (3,) of an accelerometer's φ; None if it was not estimated."""
+    """Return the degrees of freedom (3,) of an accelerometer's quadratic terms; None if they were not estimated."""
     from rig.estimation.reference.accelerometer_model import SECOND
 
     if result.solution.second_order_s2_m is None:

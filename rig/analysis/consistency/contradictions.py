@@ -113,8 +113,8 @@ def _non_orthogonality_deg(solution: VectorSolution, stated_deg: float, false_al
     """Return the non-orthogonality that most exceeds the stated one, and its limit, both in degrees.
 
     `stated_deg` is a half-width. The limit includes the angle's uncertainty at this false-alarm probability. This check
-    is needed because sweeps about three axes cannot separate a wrist's zero error from a tilted sensor axis: no
-    residual shows the zero error, and the scale factors of an askew sensor are wrong.
+    is needed because sweeps about three axes cannot separate a wrist's zero error from a tilted sensor axis. So
+    no residual shows the zero error, although it makes the scale factors wrong if the sensor is mounted askew.
     """
     from scipy.special import ndtri
 

@@ -162,7 +162,11 @@ def _steady_rates(segments: Segments, matrix: Array) -> Segments:
 def predict_detection_limits(
     segments: Segments, matrix: Array, false_alarm_probability: float, allowance: ErrorPatterns
 ) -> dict[str, float]:
-    """Return the detection limits of segments without a fault, whose bias drifts only by its instability (flicker)."""
+    """Return the minimal detectable size of each fault mode, by its name, in planned segments.
+
+    `matrix` (3, 3) is F; `allowance` contains the known errors and the transfers. The bias drifts only by its
+    instability (flicker), because no readings show a random walk or scatter.
+    """
     bias = BiasProcess(0.0, 0.0, 0, allowance.instability_rad_s)
     scatter = _build_scatter(segments, allowance.patterns_rad_s, allowance)
     segments_only = _TestedSegments(segments, segments.rates_rad_s @ matrix.T, whiten_segments(segments, scatter, bias))
@@ -180,9 +184,10 @@ def _free_disturbed_transfers(
 ) -> tuple[_TestedSegments, Statistic | None]:
     """Return the result of `_inflate_transfers` with a separate mean for each outlying transfer, and the axis test.
 
-    The axis test is that of a change of one axis's scale factor. A ripple at the data rate shifts the mean of one
-    transfer. A change of scale factors or of the mounting shifts all later transfers, so a transfer is an outlier only
-    if its own mean explains clearly more of the residuals than any such change.
+    The axis test is the statistic of a change of one axis's scale factor, None if the model contains it. A ripple at
+    the data rate shifts the mean of one transfer. A change of scale factors or of the mounting shifts all later
+    transfers, so a transfer is an outlier only if its own mean explains clearly more of the residuals than any such
+    change.
     """
     disturbed: list[int] = []
     while True:
@@ -254,7 +259,7 @@ def _whiten_with_transfers(
 def _detection_limits(
     segments_only: _TestedSegments, with_transfers: _TestedSegments, false_alarm_probability: float
 ) -> Iterator[tuple[str, float]]:
-    """Yield every fault mode with the minimal detectable size of its check."""
+    """Yield the name of every fault mode with the size that its check detects, on the segments of `check_gyroscope`."""
     segments, chance = segments_only.segments, critical_value(false_alarm_probability)
     steps, sweeps = step_columns(segments), np.unique(segments.sweep[segments.sweep >= 0]).tolist()
     of_transfers, of_segments = (

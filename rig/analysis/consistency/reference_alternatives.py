@@ -17,10 +17,13 @@ from rig.estimation.reference.reference_model import REFERENCE, matrix
 
 @dataclass(frozen=True, slots=True)
 class ReferenceModel:
-    """The model of readings in a reference: parameters θ (22,), estimated from the `movement`, and the known errors.
+    """The model of readings in a constant reference: the parameters `theta` (22,), estimated from the `movement`.
 
-    The K = N + 3 M readings are those of N dwells, then mean, cosine and sine of M sweeps. `error_patterns` (P, 3 K):
-    independent errors of the readings, each of one standard uncertainty; `times_s` (N + M,): the windows' middles.
+    The K = N + 3 M readings are those of N dwells, then the mean, cosine and sine of M sweeps.
+
+    - `error_patterns` (P, 3 K): the effects of one standard uncertainty of each of P known, independent errors.
+    - `times_s` (N + M,): the middles of the dwells' and sweeps' windows.
+    - `second_order`: whether quadratic terms were estimated.
     """
 
     theta: Array
@@ -41,7 +44,7 @@ class ReferenceModel:
 
 
 def alternatives(model: ReferenceModel) -> Alternatives:
-    """Return every alternative's effects (3 K, k) on readings, by the check's name; None stands for all residuals."""
+    """Return every alternative's effects (3 K, k) on readings, by the check's name; None tests all residuals."""
     s, f, time = find_force(model.theta, model.movement), matrix(model.theta), _time(model)
     columns: dict[str, Array | None] = {
         "bias_changed": bias_drift_columns(model),

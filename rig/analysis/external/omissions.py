@@ -27,14 +27,16 @@ NOISE_LIMIT_RAD_S = 0.04  # standard deviation of single readings, 2.3 °/s: SIX
 def list_omitted(
     placed: PlacedReadings, results: Mapping[Quantity, Result | OfKind]
 ) -> Iterator[tuple[Quantity | None, Omitted]]:
-    """Yield the readings left out of a solution in attitudes, by the quantity concerned, None for all quantities."""
+    """Yield the readings left out of a solution in attitudes, each with its quantity, None for all quantities."""
     yield from ((None, omitted) for omitted in placed.omitted)
     rates = results.get(RATE)
+    # A solution by increments omits increments; one by means in attitudes omits rows in which samples are missing.
     if isinstance(rates, IncrementCalibration | AttitudeCalibration):
         yield from (
             (RATE, one) for one in (rates.omitted if isinstance(rates, IncrementCalibration) else placed.incomplete)
         )
     solved = [quantity for quantity in results if quantity != RATE]
+    # All other quantities have the same placements, so their omissions are listed once, with the first quantity.
     if isinstance(placed.placements, Placements) and solved:
         yield from ((solved[0], omitted) for omitted in placed.placements.omitted)
 

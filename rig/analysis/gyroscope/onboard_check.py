@@ -91,7 +91,10 @@ def _list_unobserved(run: RunData, sensor: str) -> tuple[str, ...]:
 
 @dataclass(frozen=True, slots=True)
 class _BoardObservation:
-    """The mean reading (3,) and the speed of an observation of the board; `averaged`: whether the host averaged."""
+    """The mean reading (3,) and the speed of an observation of the board.
+
+    `averaged`: True if the host averaged the samples, False if the mean is the board's own, or NaN without a recording.
+    """
 
     mean_rad_s: Array
     speed_rad_s: float
@@ -99,7 +102,7 @@ class _BoardObservation:
 
 
 def _list_observations(runs: Sequence[RunData], sensor: str) -> list[_BoardObservation]:
-    """Return every observation of the board's solution, computed from the recorded samples."""
+    """Return the observations from which the board solved, each as `_average_observation` computes it."""
     observations: list[_BoardObservation] = []
     for event in _events(runs[-1], sensor):
         if isinstance(event, BoardObserved):
@@ -118,9 +121,9 @@ def _recall_observation(earlier: Sequence[RunData], recalled: BoardRecalled) -> 
 
 
 def _average_observation(run: RunData, event: BoardObserved) -> _BoardObservation:
-    """Return the host's mean of the board's samples, the board's own if some were lost on the way, or NaN.
+    """Return the host's mean of the samples that the board averaged; if some were lost on the way, the board's mean.
 
-    It is NaN if the host has other samples than those that the board reports.
+    The mean is NaN if the host has other samples than those that the board reports.
     """
     samples, observed = run.samples[event.sensor], event.observation
     times_us = samples["board_time_us"]
