@@ -299,16 +299,16 @@ class GyroscopeEntry(Entry):
 
     - covariance: due to noise and bias random walk; covariance_combined: due to all contributors in the budget.
     - correction_matrix: M of g = M (m + b), by which the board and the C header correct readings.
-    - speeds_rad_s: of the sweeps. A calibration at one speed, in either direction, is valid at that speed, without
-      nonlinearity. axis_rate_ranges_rad_s: smallest and largest rate along each of the sensor's axes in the sweeps that
-      determine its scale factor.
-    - temperature_c: mean over the samples of all sweeps. scale_conditions, bias_conditions: times and temperatures of
-      the readings: scale factors come from sweeps, biases from rests too.
-    - board: null for a reference sensor, for which the board does not solve.
-    - earth_rate: if requested, or why it is missing.
+    - speeds_rad_s: the speeds of the sweeps. Sweeps at one speed do not show the nonlinearity, so the calibration is
+      then valid only at that speed, in both directions. axis_rate_ranges_rad_s: smallest and largest rate along each of
+      the sensor's axes in the sweeps that determine its scale factor.
+    - temperature_c: mean over the samples of all sweeps. scale_conditions: times and temperatures of the sweeps, from
+      which the scale factors come. bias_conditions: those of sweeps and rests, from which the biases come.
+    - board: the board's own solutions; null for a reference sensor, for which the board does not solve.
+    - earth_rate: the Earth's rate, or the reason why it is missing; null if it was not requested.
     - detection_limits: faults during the recording, and the sizes from which they are detected.
-    - in_attitudes: only if a file gave the attitudes; range and temperature are then null. by_angles: only if a file's
-      sweeps were solved by the angle turned. by_hand: only if it was turned by hand.
+    - in_attitudes: the solution in attitudes, only if a file gave these; range and temperature are then null.
+    - by_angles: only if a file's sweeps were solved by the angle turned. by_hand: only if a hand turned the sensor.
     """
 
     part: str

@@ -197,7 +197,7 @@ def changes_between(before: Sequence[Past], now: Sequence[Past]) -> dict[Subject
 
 
 def rig_states(pasts: Sequence[Past]) -> list[RigState]:
-    """Return the state of every rig with check standards, which are all sensors ever declared to be check standards."""
+    """Return the state of every rig that calibrated a check standard: a sensor that was ever declared to be one."""
     # Drifts and curves are not standards, and external readings have no rig.
     by_subject = subjects([past for past in pasts if past.quantity in quantities() and past.rig != NO_ARM])
     standards = {key: series for key, series in by_subject.items() if any(past.check_standard for past in series)}

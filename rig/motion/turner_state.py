@@ -146,8 +146,9 @@ class JointLimits:
 class TurnerIdentity:
     """A turner's maker and model (None if unknown), and the geometry with which results are computed.
 
-    `tcp_offset`: an arm's tool centre point in the flange's frame, for information. `reading_std_rad`: the noise of one
-    reading of an angle, 0 if it can be ignored; otherwise a revolution is taken to end when a reading recurs.
+    `tcp_offset`: an arm's tool centre point in the flange's frame, for information. `reading_std_rad`: the standard
+    deviation of one reading of an angle, 0 if negligible. If it is not 0, a revolution ends when its first reading
+    recurs (`rig.observation.motion.arm_motion`).
     """
 
     maker: str

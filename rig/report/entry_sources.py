@@ -1,8 +1,8 @@
 """The table of the attributes of analysis results that fill the entries of `result.json`.
 
 A row names the classes that it reads and, for each field of the entry, the attribute that fills it. Classes are given
-by name, so that writing one entry does not import the analysis of all others. The function that builds the entry sets
-fields without a row. So an attribute may be renamed without a change of `result.json`.
+by name, so that writing one entry does not import the analysis of all others. The function that builds an entry sets
+the fields that no row names. Because of this table, an attribute may be renamed without a change of `result.json`.
 """
 
 from collections.abc import Mapping

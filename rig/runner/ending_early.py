@@ -26,13 +26,13 @@ TARGET_RATIO = 0.99  # the complete recording determines clocks and noise slight
 
 @dataclass(slots=True)
 class EndingEarly:
-    """The condition on which a run ends early. It moves nothing.
+    """The condition on which a run ends early; `skips` then tells the runner which motions to omit.
 
     - `wanted`: the target uncertainty.
     - `plan`: the remaining motions of the run.
     - `sweeps`, `repeats`: numbers of sweeps and repeats in the complete run.
     - `path`: the file of this recording.
-    - `earlier`: the previous recordings; after complete repeats, the run may end before anything moves.
+    - `earlier`: the run's recordings before an interruption; after complete repeats, the run may end before any motion.
     """
 
     wanted: TargetUncertainty

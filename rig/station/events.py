@@ -299,10 +299,10 @@ class RunFolderWritten:
 
 @dataclass(frozen=True, slots=True)
 class LastCalibration:
-    """The last calibration of the `quantity` of a `sensor`: its number, its day, its values by parameter (`kx`).
+    """The last calibration of a sensor's `quantity` before this run, with its `number` in the history and its `day`.
 
-    `before` has values with their U, in SI units; `normalised_error` is E_n of the changes since. `changed` are the
-    significant changes among all values of the run.
+    `before`: its values with their U, in SI units, by parameter (`kx`); `normalised_error`: E_n of the changes since
+    then. `changed`: the parameters whose changes are significant among all values of the run.
     """
 
     sensor: str
@@ -316,9 +316,10 @@ class LastCalibration:
 
 @dataclass(frozen=True, slots=True)
 class Remembered:
-    """The run was entered in `history` as the calibrations with these `numbers`, for `rig history`.
+    """The run was entered in `history` as the calibrations with these `numbers`, by which `rig history` finds them.
 
-    `usual`: whether this is the command's default history; `since`: the previous calibrations of the sensors.
+    `usual`: whether `history` is the user's default, which commands use if no history is named. `since`: each sensor's
+    last calibration before this run, and the changes since then.
     """
 
     history: str

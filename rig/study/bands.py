@@ -47,12 +47,12 @@ def _list_conditions() -> list[_Condition]:
 
 
 def normal(settings: Settings) -> StudyReport:
-    """Reproduce Fig. 2: scale factors U(0.8, 1.2), biases U(−0.1, 0.1) rad/s."""
+    """Reproduce Fig. 2 of the paper SIX: scale factors U(0.8, 1.2), biases U(−0.1, 0.1) rad/s."""
     return _study(sim.NORMAL, settings)
 
 
 def extreme(settings: Settings) -> StudyReport:
-    """Reproduce Fig. 5: scale factors U(1.2, 2), biases ±U(0.1, 0.2) rad/s."""
+    """Reproduce Fig. 5 of the paper SIX: scale factors U(1.2, 2), biases ±U(0.1, 0.2) rad/s."""
     return _study(sim.EXTREME, settings)
 
 

@@ -88,7 +88,7 @@ def _gyroscope_rows(ratios: Array) -> Iterator[dict[str, Any]]:
 
 
 def _simulate_rate_table(runs: int, rng: np.random.Generator, _: int) -> dict[str, Array]:
-    """Return, by estimator, mean squared errors (2, p) of p = 15 or 18 parameters: over the bound, and absolute."""
+    """Return, by estimator, the mean squared errors (2, p) of p = 15 or 18 parameters, as `_compare` returns them."""
     attitudes = rt.draw_attitudes(TABLE_POSES)
     ratios = {}
     rates = 0.5 * np.random.default_rng(TABLE_POSES).normal(size=(TABLE_POSES, 3))  # rad/s, the same in every run
@@ -133,7 +133,7 @@ def _simulate_rate_table(runs: int, rng: np.random.Generator, _: int) -> dict[st
 
 
 def _compare(errors: Array, bound: Array) -> Array:
-    """Return the mean squared errors of R runs (R, p), relative to the bound's diagonal and absolute, (2, p)."""
+    """Return the mean squares (2, p) of `errors` (R, p) over R runs, divided by the bound's diagonal and absolute."""
     return np.array([efficiency(errors, bound), np.mean(errors**2, axis=0)])
 
 

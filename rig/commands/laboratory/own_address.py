@@ -1,4 +1,4 @@
-"""A loopback address for each simulated laboratory: it gets another one if the file's address is in use."""
+"""A loopback address for each simulated laboratory: that in its file or, if that is in use, another one."""
 
 import os
 import socket

@@ -63,8 +63,9 @@ def gather(turning: Turning, window_s: float | None = None, clock_s: float = 0.0
     """Return the fixes of a reference's rows, in windows of a given or a suitable length.
 
     Time t of the reference is time t + `clock_s` of the readings. Raise Fault if the body moves in too few of the
-    increments that remain, or in fewer than were left out: the most frequent reason for leaving out an increment
-    (`lost_samples`, `saturation` or `turned_too_fast`), or else `too_few_observations`.
+    increments that remain, or in fewer than were left out. The Fault's name is the most frequent reason for
+    leaving out an increment (`lost_samples`, `saturation` or `turned_too_fast`), or `too_few_observations` if no
+    increment was left out.
     """
     turning = select_covered(turning, clock_s)
     if len(turning.rows_s) < 2:
@@ -89,8 +90,8 @@ def _suitable_s(span_s: float) -> float:
 def _fixes(turning: Turning, still: NDArray[np.bool_], window_s: float) -> Fixes:
     """Group the reference's attitudes into fixes, without regard to the gyroscope's gaps.
 
-    Rows of the reference that are `still` are rests: each gives a fix at its start and one at its end, which have the
-    same `placement`. The other rows give one fix for each window of `window_s` between two rests.
+    Rows of the reference that are `still` are rests: each gives a fix at its start and one at its end, and these two
+    have the same `placement`. The other rows give one fix for each window of `window_s` between two rests.
     """
     rows_s = turning.rows_s
     passed = np.cumsum(still)

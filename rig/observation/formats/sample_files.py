@@ -29,9 +29,10 @@ class Format:
     """A kind of file: its `name` in messages, and its readers, which run in a process of their own.
 
     `readings` and `attitudes` are readers ("module:function", as in `rig.data.processes.reading_process`), None if a
-    file cannot hold them. A reader is called with two arguments: the path to read, to which the function `reads`
-    converts the user's path, and the part `inside`. It yields columns as `rig.observation.formats.table_parts` says,
-    named as in a CSV file; attitudes are times and quaternions. `remedy`: advice if a file cannot be read.
+    file cannot hold them. A reader gets two arguments: the path that the function `reads` returns for the user's path,
+    and `inside`, the part of the file that the user selected, or None. It yields columns as described in
+    `rig.observation.formats.table_parts`, named as in a CSV file; attitudes are times and quaternions. `is_one`:
+    whether a path names such a file. `remedy`: advice if a file cannot be read.
     """
 
     name: str

@@ -94,7 +94,10 @@ class TemperatureCourse:
         ]
 
     def _gap(self, temperatures_c: Sequence[float]) -> tuple[float, float] | None:
-        """Return the coldest interval without a set that is too wide, from rising temperatures of the sets, or None."""
+        """Return the coldest gap between the sets' ascending `temperatures_c` that is too wide; None if there is none.
+
+        The ends of the course's range count too: a gap may lie before the first set or after the last one.
+        """
         end_k = END_FRACTION * self.max_step_k
         if temperatures_c[0] > self.from_c + end_k:
             return self.from_c, temperatures_c[0]

@@ -48,7 +48,7 @@ def why_untrusted(
 
 
 def _no_path(chain: Sequence[bytes], trust: Trust, moment: datetime, lists: "Sequence[CertificateList]") -> str:
-    """Return why the certificate does not lead to a trusted one at the moment; empty if it does."""
+    """Return why the certificate does not lead to a trusted one at the time `moment`; empty if it does."""
     from asn1crypto.x509 import Certificate
     from pyhanko_certvalidator import CertificateValidator, ValidationContext
     from pyhanko_certvalidator.errors import PathError, ValidationError

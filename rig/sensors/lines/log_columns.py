@@ -64,7 +64,7 @@ class _ColumnGroup:
 
 
 def guess_columns(layout: TableLayout, values: Array, time: Array | None) -> LogColumns:
-    """Return the map of a log with numbers (n, k) in the columns of its layout.
+    """Return a guess at the meaning of a log's columns, from their `layout` and their numbers `values` (n, k).
 
     `time` (n,) is in the layout's unit, None without times. Values may be NaN in rows that belong to other sensors.
     """

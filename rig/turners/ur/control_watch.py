@@ -124,7 +124,8 @@ class ControlWatch:
     def _listen(self, remote: ControlMode) -> None:
         """Read messages of the primary interface for `POLL_S`; return at once if it closes."""
         ends_s = time.monotonic() + POLL_S
-        # One that hides its control mode accepts connections in local control too, so a new one proves nothing.
+        # A PolyScope X that hides its control mode accepts connections in local control too. So after it has closed
+        # one, a new connection would not prove remote control, and none is opened.
         may_open = not (self._is_x and remote is None and self._closed_s is not None)
         if self._primary is None and may_open:
             with suppress(OSError):

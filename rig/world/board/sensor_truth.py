@@ -60,7 +60,7 @@ class SensorTruth:
 
     @property
     def rows(self) -> list[list[float]]:
-        """Rotation from the flange's axes to the sensor's (rows); a new list object shows that it was remounted."""
+        """The rotation, row by row, from the flange's axes to the sensor's; each remounting makes a new list object."""
         return self._rows
 
     @property

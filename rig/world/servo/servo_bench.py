@@ -85,7 +85,7 @@ class ServoBench:
         return not any(self._site.earth_rate_rad_s)
 
     def step(self) -> None:
-        """Simulate one tick of the world, and the servo until now."""
+        """Simulate one tick of the world, and the servo until the time `now_s()`."""
         self._ticks += 1
         self.bus.advance()
 
