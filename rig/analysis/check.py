@@ -17,12 +17,12 @@ UNCALIBRATED_FAULTS = ("no_attitudes", "field_strength_unknown")  # of sensors t
 class Check:
     """One check of the verdict, which passes if its value is a number not above limit - guard.
 
-    - name: the check in words, for people; programs use means instead.
-    - value, limit: in unit; None if nothing was measured, or no limit was set.
+    - name: the check in words, for people; programs use `means` instead.
+    - value, limit: the measured value and its limit, in `unit`; None if nothing was measured, or no limit was set.
     - unit: the unit of value, limit, uncertainty and guard.
     - means: the sensor and quantity that the check is about.
     - uncertainty: U of the value, None without one.
-    - guard: U if the decision rule is the guard band (ILAC-G8, 4.2), else 0.
+    - guard: the distance from the limit that the decision rule requires: U for the guard band (ILAC-G8, 4.2), else 0.
     - coverage_factor: k of U.
     - dof: degrees of freedom of U.
     """

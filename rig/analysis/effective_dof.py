@@ -74,7 +74,7 @@ def field_angle_dof(result: "MagnetometerResult") -> Array:
 def reversal_dof(reversal: "MagnetometerReversal") -> tuple[Array, Array]:
     """Return the degrees of freedom of the mean scale factors (3,), and of bias and arm's field (6,).
 
-    For bias and field, they are the fewest of any run's bias: a sum of independent parts has at least as many.
+    For bias and field, they are the fewest of any run's bias, because a sum of independent parts has at least as many.
     """
     budgets = [run.result.budget for run in reversal.runs]
     # Welch–Satterthwaite: u⁴ / ν = Σ u_i⁴ / ν_i. Errors common to the runs have infinite ν and add nothing.
@@ -85,7 +85,10 @@ def reversal_dof(reversal: "MagnetometerReversal") -> tuple[Array, Array]:
 
 
 def _axis_dof(result: "AccelerometerResult | MagnetometerResult", response: Array, noise: Array) -> Array:
-    """Return the dof of the angles between axes; `response` (p, n): of all parameters to readings with `noise`."""
+    """Return the degrees of freedom of the angles between axes, for readings with `noise` (n, n).
+
+    `response` (p, n): the derivatives of all parameters with respect to the readings.
+    """
     from rig.estimation.reference.reference_model import F
 
     derivative = _angle_derivatives(result.solution.matrix)[:3].reshape(3, 9) @ response[F]
@@ -106,7 +109,7 @@ def _attitude_dof(budget: Budget, response: Array, noise: Array, std: Array) -> 
 def _reading_parts(noise: Array, walk: Array, explained: VectorFit) -> dict[str, Array]:
     """Return the parts of a gyroscope's variances due to readings, by contributor: `noise` and the bias's `walk`.
 
-    Without drift in the readings `walk` is omitted: the data sheet's flicker has infinite dof.
+    Without drift in the readings `walk` is omitted, because the data sheet's flicker has infinite dof.
     """
     return {NOISE: noise, **({BIAS_DRIFT: walk} if explained.bias.is_drifting else {})}
 

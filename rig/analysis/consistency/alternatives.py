@@ -17,11 +17,11 @@ from rig.observation.consistency.raw_readings import REST
 
 @dataclass(frozen=True, slots=True)
 class Means:
-    """The mean readings of N sweeps and rests.
+    """The means that a perfect sensor would read in N sweeps and rests.
 
     - sensed_rad_s (N, 3): the arm's rates along the sensor's axes.
     - times_s (N, 2): start and end.
-    - sweep (N,): index of the sweep, negative for a rest.
+    - sweep (N,): index of the sweep, −1 for a rest, a smaller number for a transfer.
     """
 
     sensed_rad_s: Array

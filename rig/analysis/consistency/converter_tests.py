@@ -1,9 +1,9 @@
 """Tests of readings as the output of a converter with a noisy input: their bits, range and repetitions. Pure.
 
 If the noise exceeds one step, a healthy converter sets every low bit in half of its readings, and there is no gap, no
-pile-up at an end of the range, no run of equal readings and no repeated sequence. With less noise there may be. A step
-is the resolution of the source: one count of a converter, one unit of an integer message, the last digit of a printed
-number.
+pile-up at an end of the range, no run of equal readings and no repeated sequence. With less noise, a healthy converter
+may show these too. A step is the resolution of the source: one count of a converter, one unit of an integer message,
+the last digit of a printed number.
 """
 
 from collections.abc import Sequence

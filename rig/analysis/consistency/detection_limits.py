@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class DetectionLimit:
-    """The `size` of a fault, in `unit`, that its check detects in 95 of 100 recordings, infinite if it detects none.
+    """The `size` of the fault `what`, in `unit`, that the check `check` detects in 95 of 100 recordings.
 
-    `off_by_expanded`: the largest error of scale factor or bias that a fault just below `size` causes, divided by the
-    stated U.
+    `size` is infinite if the check detects no size. `off_by_expanded`: the largest error of scale factor or bias that a
+    fault just below `size` causes, divided by the stated U; None if not computed, or if the fault prevents a solution.
     """
 
     what: str

@@ -35,7 +35,7 @@ def find_longest_frozen(recording: ObservedRun, name: str) -> int:
 def _rate_change(recording: ObservedRun, time_s: Array, axis: Array) -> float:
     """Return the change of the rate along an axis (3,) of the flange over times (n,), rad/s.
 
-    Rates are averaged over `SMOOTHING_S`: between two states the noise of times would dominate.
+    Rates are averaged over `SMOOTHING_S`, because the noise of times would dominate the rate between two states.
     """
     covered_s = time_s[recording.motion.covered(time_s)] if len(time_s) else time_s
     if len(covered_s) < MIN_EQUAL_READINGS:

@@ -73,9 +73,10 @@ MAX_RIPPLE_INFLATION, INFLATION_STEPS = 16.0, 7  # of the variance by a synchron
 class ErrorPatterns:
     """The known errors of N segments. A pattern is the change of the readings by one standard deviation of one error.
 
-    - `patterns_rad_s` (P, N, 3): all patterns; `encoders_rad_s` (E, N, 3): only those due to encoders in arcs.
-    - `transfers`: the N segments, then transfers, M in all; `transfer_patterns_rad_s` (Q, M, 3): their patterns.
-    - `instability_rad_s`: the sensor's bias instability.
+    - `patterns_rad_s` (P, N, 3): all patterns; `encoders_rad_s` (E, N, 3): only those of encoder errors in arcs.
+    - `transfers`: M segments, the N segments first and then the transfers; `transfer_patterns_rad_s` (Q, M, 3): the
+      patterns of the M segments.
+    - `instability_rad_s`: the sensor's bias instability, 0 if unknown.
     """
 
     patterns_rad_s: Array

@@ -36,9 +36,10 @@ from rig.estimation.reference.shared_errors import decorrelate, information
 
 @dataclass(frozen=True, slots=True)
 class WhitenedReference:
-    """Residuals (n,) and model columns (n, q) with unit noise, in coordinates in which all errors are independent.
+    """Residuals (n,) and `model` columns (n, q) with unit noise, in coordinates in which all errors are independent.
 
-    `growth` (n,) is the increase of the residuals' variance with δ²: see `rig.estimation.reference.shared_errors`.
+    `rotation` (n, n) maps readings to these coordinates. `growth` (n,) is the increase of the residuals' variance with
+    δ², the arm's attitude error squared (`rig.estimation.reference.shared_errors`).
     """
 
     residuals: Array
@@ -64,8 +65,8 @@ class WhitenedReference:
 
         The statistic is twice the logarithm of the ratio, which would be χ² for a given δ. The likelihoods with and
         without the columns each have their own restricted maximum-likelihood δ (Welham and Thompson, J. R. Stat. Soc. B
-        59 (1997) 701). The larger δ's part of the variance, the closer is the critical value to a quantile of F instead
-        of χ². Columns None stand for the χ² of all residuals.
+        59 (1997) 701). The larger the part of the variance due to δ, the closer is the critical value to a quantile of
+        F instead of χ². If `columns` is None, the statistic is the χ² of all residuals.
         """
         from scipy.special import chdtri
 

@@ -39,9 +39,9 @@ DISTURBED_DWELL = "disturbed_dwell"
 
 @dataclass(frozen=True, slots=True)
 class SegmentName:
-    """A sweep or dwell that contradicts the others, by its index in the plan.
+    """The check's name `what`, and the index in the plan of the `sweep` or `dwell` that contradicts the others.
 
-    If all agree, the name stands for the worst of them, and both indices are None.
+    If all agree, the name stands for the worst sweep or dwell, and both indices are None.
     """
 
     what: str
@@ -76,8 +76,8 @@ class ReferenceReadings:
 class ReferenceStatistics:
     """The statistics of a sensor with their critical values, and the detection limits by fault mode.
 
-    `segments`: the dwells and sweeps that contradict the others, or the worst one if all agree; `statistics`: the other
-    statistics, by the check's name.
+    `segments`: the dwells and sweeps that contradict the others, or only the worst one if all agree, each with its
+    statistic; `statistics`: all other statistics, by the check's name.
     """
 
     segments: list[tuple[SegmentName, Statistic]]

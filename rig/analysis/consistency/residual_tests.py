@@ -26,7 +26,7 @@ Alternatives = Mapping[str, Array | None]  # by the check's name; None: all resi
 
 @dataclass(frozen=True, slots=True)
 class FaultMode(Generic[Subject]):
-    """A possible fault, the `check` that detects it, and the `unit` of its size: None for the readings' unit.
+    """A possible fault `what`, the `check` that detects it, and the `unit` of its size, None for the readings' unit.
 
     `patterns` returns the changes of the readings by one unit of the fault, a column for each form that it may have. A
     change half-way through the recording is given a zero mean, because the calibration would absorb any mean.
@@ -42,9 +42,9 @@ class FaultMode(Generic[Subject]):
 class TestResults:
     """The statistics of one sensor by the name of their check, each with its critical value.
 
-    - `worst`: the statistic of the segment that differs most from the others; `disturbed`: the statistics of all
-      outlying segments, by index.
-    - `detection_limits`: the minimal detectable size of fault modes, by name, if known.
+    - `worst`: the statistic of the segment that differs most from the others.
+    - `disturbed`: the statistics of all outlying segments, by index.
+    - `detection_limits`: the minimal detectable sizes by fault mode, empty if not computed.
     """
 
     statistics: dict[str, Statistic]
@@ -121,7 +121,8 @@ def remaining_directions(model_basis: Array, columns: Array) -> Array:
 def chi_square_of(readings: Array, base: Array, columns: Array | None) -> tuple[float, int]:
     """Return the χ² of readings (n,) that columns (n, k) explain after a fit of `base` (n, p), and its dof.
 
-    Columns None stand for all residuals, without a decomposition, which would be slow and need not converge.
+    If `columns` is None, the χ² is that of all residuals; it needs no decomposition, which would be slow and might not
+    converge.
     """
     model_basis = orthonormal_basis(base)
     unexplained = readings - model_basis @ (model_basis.T @ readings)

@@ -44,9 +44,10 @@ TRANSFER_STEPS = 24  # directions count as constant within one
 
 @dataclass(frozen=True, slots=True)
 class NonlinearityPrior:
-    """A sensor's nonlinearity: standard deviations of `cube` and `square` at full scale, relative to full scale.
+    """The prior of a sensor's nonlinearity, which has a part with the rate's cube and a part with its square.
 
-    If `free`, it is unknown, and may have a kink at zero.
+    `cube`, `square`: the parts' standard deviations at full scale, as fractions of full scale. If `free`, the
+    nonlinearity is unknown, and may have a kink at zero.
     """
 
     cube: float
@@ -59,13 +60,14 @@ class NonlinearityPrior:
 class KnownErrors:
     """The standard uncertainties of arm, site and sensor.
 
-    - angles_rad (17,): sizes of the errors in ANGLES.
-    - repeatability_rad: error of a joint that was moved away and back.
+    - angles_rad (17,): sizes of the errors named in `ANGLE_ERRORS`.
+    - repeatability_rad: error of the angle of a joint that was moved away and back.
     - encoder_rad: encoder error at an angle of a joint; zero if all sweeps are whole turns.
     - mount_rad: mounting error of an item that was remounted, about each axis.
     - jitter_s: jitter of the times of the arm's states.
     - reading_rad: noise of one reading of a joint's angle.
-    - earth_rad_s (3, k): error of the Earth's rate in the base's frame, a column for each unknown direction.
+    - earth_rad_s (3, k): error of the Earth's rate in the base's frame, a column for each unknown direction; k = 0 if
+      the rate is known.
     - curve: prior of the sensor's nonlinearity.
     - sensor: the sensor's properties from the data sheet, None if unknown.
     - temperature_times_s: the times of the sensor's temperatures.
@@ -328,7 +330,7 @@ def _mount_patterns(segments: Segments, mount_rad: float) -> list[Array]:
 
 
 def _nonlinearity_patterns(intervals: Sequence[MotionInterval], matrix: Array, curve: NonlinearityPrior) -> Array:
-    """Return patterns (6, N, 3), means over intervals: one standard deviation of the rate's cube, then its square."""
+    """Return the effects (6, N, 3), means over N intervals, of one std of the axes' odd parts, then of their even parts."""
     by_interval = []
     for interval in intervals:
         edges = np.linspace(interval.start_s, interval.end_s, TRANSFER_STEPS + 1)

@@ -25,7 +25,7 @@ class Scatter:
 
     - variances_rad2_s2 (N, 3): the variances of independent errors.
     - shared_rad_s (P, N, 3): independent patterns of shared errors.
-    - instability_rad_s: the least Allan deviation of the bias, if known.
+    - instability_rad_s: the least Allan deviation of the bias, 0 if unknown.
     """
 
     variances_rad2_s2: Array

@@ -116,7 +116,10 @@ class PlannedCandidate:
 
 @dataclass(frozen=True, slots=True)
 class SearchResult:
-    """The result of a search: the shortest candidate that meets the target, the nearest one, all evaluated budgets."""
+    """The result of a search: the `best` candidate, the shortest that meets the target, and all evaluated budgets.
+
+    `nearest`: the evaluated candidate with the smallest ratio to the target. Either is None if no candidate qualifies.
+    """
 
     best: PlannedCandidate | None = None
     nearest: PlannedCandidate | None = None
@@ -129,7 +132,7 @@ class ShortestRun:
     """The shortest run for a target.
 
     - `before`: the procedure in the file, None if its uncertainty cannot be predicted.
-    - `nearest`: the candidate with the smallest ratio to the target if none meets it.
+    - `best`, `nearest`: as in `SearchResult`.
     - `endless`: the budgets of all evaluated plans and, for each family of candidates, of a run of unlimited length.
     - `unreachable`: whether no run of this kind meets the target, however long.
     - `directions` (N, 3): the sweeps' directions, None if there are none.

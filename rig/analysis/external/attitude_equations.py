@@ -23,7 +23,7 @@ class Equations:
     """The readings of a sensor and the attitudes in which they were taken.
 
     - `means`, `variances` (N, 3), with `dof` (N, 3) degrees of freedom of the variances.
-    - `attitudes` (N, 3, 3); `std_rad` (N,): their stated standard deviation.
+    - `attitudes` (N, 3, 3); `std_rad` (N,): their stated standard deviations, None if not stated.
     - `reference`: the norm of a constant reference, or, for a gyroscope, the rates (N, 3) of the table.
     """
 

@@ -29,11 +29,11 @@ BIAS_LIMIT_RAD_S = 1e-5
 class Agreement:
     """A sensor's calibration by the board, compared with the host's in double precision.
 
-    - `solutions`: the board's, by method.
+    - `solutions`: the board's solutions, by method.
     - `not_observed`: the sweeps without an observation by the board, and why.
-    - `host_scale`, `host_bias_rad_s` (3,): the host's solution; None without one.
-    - `scale_difference` (relative), `bias_difference_rad_s`: the largest of three axes, between the host's and the
-      board's closed form; None if either has no solution.
+    - `host_scale`, `host_bias_rad_s` (3,): the host's solution, None if there is none.
+    - `scale_difference` (relative), `bias_difference_rad_s`: the largest difference on any axis between the host's
+      solution and the board's solution in closed form; None if either is missing.
     """
 
     solutions: Mapping[str, BoardSolved]
