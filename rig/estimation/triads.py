@@ -16,7 +16,7 @@ from rig.estimation.sensor_axes import SensorAxes
 
 @dataclass(frozen=True, slots=True)
 class Alignment:
-    """`rotation` (3, 3) from the gyroscope's frame to the accelerometer's.
+    """The `rotation` (3, 3) from the gyroscope's frame to the accelerometer's.
 
     `vector_rad` (3,) is the rotation vector of this rotation; `covariance_rad2` (3, 3) is the covariance of small
     rotations about the accelerometer's x, y, z.

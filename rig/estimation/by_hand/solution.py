@@ -54,7 +54,10 @@ class RestSummary:
 
 @dataclass(frozen=True, slots=True)
 class MoveSummary:
-    """A move by `angle_rad`: a flip, or whole `turns` on a face with the closure error `closure_rad`."""
+    """A move of the `kind` by `angle_rad`; `turns`: the number of whole turns, 0 for a flip.
+
+    `closure_rad`: the error of the heading after whole turns, None if the model does not contain this error for the move.
+    """
 
     kind: Literal["flip", "turn", "omitted"]
     angle_rad: float

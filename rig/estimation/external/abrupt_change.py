@@ -27,7 +27,8 @@ MIN_FITTED_EVIDENCE = 1.0  # ln of the Bayes factor with the sizes of the model 
 class AbruptChange:
     """A change of `what` at the time `from_s`; "attitude" is a rotation of the reference's own coordinates.
 
-    - `sizes` (3,): the change of each axis, in the readings' unit, as a fraction, or in rad; zero if unknown.
+    - `sizes` (3,): the change on each axis; of a bias in the readings' unit, of a scale factor as a fraction, of the
+      attitude in rad; zero if unknown.
     - `evidence`: ln of the Bayes factor minus ln of the number of possible changes (Bonferroni's correction).
     """
 
@@ -37,7 +38,7 @@ class AbruptChange:
     evidence: float
 
     def find_covariance(self, matrix: Array) -> Array:
-        """Return the covariance (12, 12) that the change adds to F, the `matrix` (3, 3), row by row, and then the bias.
+        """Return the covariance (12, 12) of F row by row, then bias, that the change adds; `matrix` (3, 3) is F.
 
         A solution lies between the sensor's states before and after. Half of the change is the standard uncertainty,
         so that U, the whole change, covers both states.
@@ -54,7 +55,8 @@ class AbruptChange:
 class PossibleChanges:
     """Possible changes of `what`, of prior standard deviation `size`; `of_axes` (n, 3, 3) are their effects on n rows.
 
-    `possible` (n, 3): whether the axis may have changed just before the row. `lasts`: whether later rows change too.
+    `possible` (n, 3): whether an axis may have changed just before a row. `lasts`: whether the change affects all later
+    rows too.
     """
 
     what: Changing

@@ -20,7 +20,7 @@ def find_increment_change(
     """Return the abrupt change that the increments show, None if they show none.
 
     `model` describes the increments between `fixes`, with the errors' most probable standard deviations `std` (k,);
-    `matrix` (3, 3) is F. The time is on the attitudes' clock.
+    `matrix` (3, 3) is F. The change's time is on the attitudes' clock.
     """
     sensitivities = np.diff(averaged.sensitivities, axis=0)[fixes.joined]
     of_rows = sensitivities[..., MATRIX].reshape(-1, 3, 3, 3)  # sensitivities to F's elements, by row and column
@@ -40,9 +40,10 @@ def find_reset(
 ) -> tuple[float, float] | None:
     """Return time and angle (rad) of the largest lasting rotation of the attitudes' coordinates, None without one.
 
-    A new origin of the reference rotates all later attitudes: the rotations of consecutive outliers add up. After a
-    single wrong attitude they cancel. `aside` (N − 1,) is a mask of the increments between `fixes` that are outliers. A
-    `change` of the attitudes, found among the other increments, is returned if it is larger.
+    A new origin of the reference rotates all later attitudes, so the rotations of consecutive outliers add up to a
+    lasting one. At a single wrong attitude, the rotations of the increments before and after it cancel. `aside`
+    (N − 1,) is a mask of the increments between `fixes` that are outliers. A `change` of the attitudes, found among the
+    other increments, is returned if it is larger.
     """
     turned: tuple[float, float] | None = None
     if change is not None and change.what == "attitude" and np.linalg.norm(change.sizes) > MIN_RESET_RAD:

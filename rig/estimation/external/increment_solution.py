@@ -1,4 +1,4 @@
-"""A gyroscope's matrix and bias from its rotations between attitudes of a reference: cameras, a table.
+"""A gyroscope's matrix and bias from its rotations between attitudes of a reference, such as cameras or a table.
 
 The reference's rates are not used: noise in the regressors would bias the scale (errors in variables). The rotation
 between fixes (measured attitudes) is used (`attitude_drift`); the gyroscope's part of its noise grows only with the
@@ -89,13 +89,13 @@ class IncrementSolution:
     - causes: parts (15, 15) of the covariance, by name.
     - earth: the Earth's rate from the increments, or the Fault that says why it is not determined.
     - clock_s, clock_std_s: the reference's attitude with the time stamp t belongs to the readings' time t + `clock_s`.
-    - fix_std_rad: error of a fix about each axis.
+    - fix_std_rad: standard deviation of a fix about each axis.
     - random_walk_rad_sqrt_s: random walk of the gyroscope's angle.
     - matrix_scatter, bias_scatter_rad_s: standard deviation of each element between intervals of the recording.
-    - residuals_rad (n, 3): of the increments.
-    - aside_s (k,): start of each omitted outlier.
-    - reset: the time from which all attitudes are rotated relative to the earlier ones, as after a new origin, and the
-      angle; None if there is none.
+    - residuals_rad (n, 3): the residuals of the increments.
+    - aside_s (k,): start of each increment that was omitted as an outlier.
+    - reset: time and angle of a rotation of all later attitudes relative to the earlier ones, as after a new origin;
+      None if there is none.
     - condition: condition number of the scaled design.
     - iterations: number of Gauss-Newton steps.
     - change: an abrupt change, on the attitudes' clock, None if there is none; U covers both states of the gyroscope.
@@ -126,7 +126,7 @@ class IncrementSolution:
 
 
 def solve_known_increments(time_s: Array, readings: Array, fixes: Fixes, start: DriftState) -> IncrementSolution:
-    """Estimate a gyroscope's matrix and bias from readings (n, 3) in rad/s at times (n,), with outlying fixes left out.
+    """Estimate a gyroscope's matrix and bias from readings (n, 3) in rad/s at times (n,), without outlying increments.
 
     `start` holds the initial values of F, b and τ. Raise Fault `rank_deficient`, `ill_conditioned`,
     `attitude_untrustworthy`, `clocks_apart`, `wrong_unit`, `mirrored_axis`.
@@ -150,7 +150,7 @@ def solve_known_increments(time_s: Array, readings: Array, fixes: Fixes, start: 
 
 @dataclass(frozen=True, slots=True)
 class _ConvergedFit:
-    """The converged fit, its model, and the maxima (n, k) of its variance components' posterior."""
+    """The converged fit and its model; `maxima` (n, k): k errors' standard deviations at n maxima of the posterior."""
 
     state: DriftState
     fixes: Fixes
@@ -247,7 +247,7 @@ def _check(fixes: Fixes, remaining: Fixes, settled: _ConvergedFit) -> None:
 
 
 def _check_identified(matrix: Array, covariance: Array) -> None:
-    """Raise Fault `ill_conditioned` if, by the `covariance` of the solution, the body hardly turned about some axis."""
+    """Raise Fault `ill_conditioned` if the `covariance` shows that the body hardly turned about some axis."""
     std = np.sqrt(np.diag(covariance)[MATRIX]).reshape(3, 3).max(axis=0)
     unknown = std > MAX_IDENTIFIABLE_STD
     if not unknown.any():
@@ -333,7 +333,7 @@ def _causes(settled: _ConvergedFit) -> dict[str, Array]:
 
 
 def _earth(rate_rad_s: Array, covariance: Array) -> EarthRateEstimate | Fault:
-    """Return the Earth's rate from the increments, without the prior of its norm; the Fault if it is undetected."""
+    """Return the Earth's rate from the increments, without the prior of its norm, or a Fault if undetected."""
     information = np.linalg.inv(covariance)
     data_information: Array = information - EARTH_PRECISION * np.eye(3)
     data_information = data_information + 1e-9 * EARTH_PRECISION * np.eye(3)

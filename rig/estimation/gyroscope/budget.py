@@ -121,11 +121,11 @@ class UnknownErrors:
     - sensor_offset_m: half-width of the sensor's position.
     - g_sensitivity_rad_s_per_g: half-width of the change of a reading by 1 g.
     - earth_rate: whether the Earth's rate is unknown.
-    - earth_covariance_rad2_s2 (3, 3): in the base frame, None if it was not estimated.
-    - clock_dof, state_jitter_dof, earth_dof: degrees of freedom of these uncertainties, if estimated.
+    - earth_covariance_rad2_s2 (3, 3): covariance of the Earth's rate in the base frame, None if it was not estimated.
+    - clock_dof, state_jitter_dof, earth_dof: degrees of freedom of these uncertainties, infinite if not estimated.
     - clock_half_width: half-width of the error of a clock with stated limits, else None.
     - repeatability_rad: half-width of the error of a joint that returns to an angle.
-    - angle_std_rad: error of a joint's encoder at the ends of arcs.
+    - angle_std_rad: standard deviation of the error of a joint's encoder at the ends of arcs.
     - mount_rad: half-width of a mounted item's tilt about each axis.
     """
 

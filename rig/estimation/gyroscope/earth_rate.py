@@ -46,7 +46,7 @@ class EarthRatePrior:
     """The given properties of arm and sensor.
 
     - `up` (3,): unit vector upwards in the base frame.
-    - `latitude_rad`: as given, or None.
+    - `latitude_rad`: the stated latitude, None if not stated.
     - `g_sensitivity`: whether to estimate the sensor's sensitivity to gravity; the latitude then fixes the Earth's rate
       along the vertical.
     - `repeatability_rad`: standard deviation of the orientation to which the arm returns, about each axis perpendicular

@@ -15,7 +15,7 @@ from rig.estimation.gyroscope.six_observation import ALGORITHM_1_LIMIT, ALGORITH
 
 @dataclass(frozen=True, slots=True)
 class BatchSolution:
-    """Scale (R, 3), bias_rad_s (R, 3), iterations (R,) and the convergence of each run (R,)."""
+    """The solutions of R runs: `scale` and `bias_rad_s` (R, 3), number of `iterations` (R,), and `converged` (R,)."""
 
     scale: Array
     bias_rad_s: Array

@@ -40,14 +40,15 @@ class VectorInputs:
     - axis_errors_rad_s (P, N, 3): effect of one standard uncertainty of each of the arm's angles on the rates.
     - return_errors_rad_s (P, N, 3): effect of one standard uncertainty of each return of a joint to an angle.
     - mount_turns_rad (3 S, N, 3): rotation vectors of the item if its mounting in one of S stages is wrong by one std
-      about x, y or z; the first stage comes last.
+      about x, y or z; the first stage comes last; None without remounting.
     - arms_m (N, 3): lever arms from the rotation axis to the sensor in the flange frame, None to neglect them.
     - noise_dof (N, 3): degrees of freedom of the variances.
     - sensor: the sensor's properties from the data sheet, None if unknown.
-    - encoder_errors_rad_s (P, N, 3): effect of encoders at the ends of arcs, None for whole revolutions.
+    - encoder_errors_rad_s (P, N, 3): effect of one standard uncertainty of each encoder error at the ends of arcs; None
+      for whole revolutions.
     - ripples (N,): RMS ripple of each rotation as a fraction of its rate.
-    - state_gains (N,): noise of the mean rates due to the arm's states, relative to its value in the quotient of a
-      joint's travel and the duration.
+    - state_gains (N,): ratio of the noise that the arm's states cause in the mean rate to the noise that they cause in
+      Δθ/T, a joint's travel over the duration.
     - roundings_rad_s (N, 3): standard uncertainty of each mean due to rounding.
     """
 

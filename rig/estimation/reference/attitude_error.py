@@ -50,7 +50,7 @@ class AttitudeReadings:
     """Readings (N, 3) with the `variances` (N, 3) of their noise, in `attitudes` (N, 3, 3), body to table.
 
     `v_bar` (N, 3) is the table's own motion; `attitude_std_rad` (N,) the stated uncertainty of each attitude, zero if
-    none; `norm_known`: True if ‖v_ref‖ is given.
+    none; `norm_known`: True if the norm of the reference is given.
     """
 
     readings: Array

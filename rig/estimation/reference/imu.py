@@ -56,7 +56,7 @@ class ImuSolution:
     - matrix (3, 3): F, the scale factors and axes; bias_m_s2 (3,): b, the reading at zero specific force.
     - reference_m_s2 (3,): v_ref, the specific force at rest, in base coordinates.
     - lever_arm_m (3,), delay_s: r in the flange's frame, and the filter's lag τ; None without sweeps.
-    - second_order_s2_m (3,): quadratic terms φ, or None.
+    - second_order_s2_m (3,): quadratic terms φ, None if they were not estimated.
     - covariance (22, 22): in the order F by rows, v_ref, b, r, τ, φ; zero for fixed parameters.
     - response (22, 3 K): derivative of the parameters with respect to the readings.
     - attitude_error: standard deviation δ of the arm's attitudes, about each axis.

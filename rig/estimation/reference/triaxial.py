@@ -65,7 +65,7 @@ class TriaxialSolution:
     - method: the method's name.
     - matrix (3, 3): F, the scale factors and axes; bias (3,): b, the reading at zero input.
     - reference (3,): the reference v_ref in table coordinates.
-    - second_order (3,): quadratic terms φ, the diagonal of F̄ in 1/unit, or None.
+    - second_order (3,): quadratic terms φ, the diagonal of F̄ in 1/unit, None if they were not estimated.
     - covariance (15, 15) or (18, 18): of the rows of F, v_ref, b, φ.
     - residuals (N, 3): readings minus model.
     - rank, condition: of the scaled design; the full rank is 15 (18), one less if ‖v_ref‖ is given.

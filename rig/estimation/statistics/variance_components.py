@@ -71,9 +71,9 @@ class MixedFit:
 class _Ascent:
     """A search for a maximum of the posterior, over ln σ (k,).
 
-    - point (k,): where it ended; value: the negative log-posterior there.
+    - point (k,): the end of the search; value: the negative log-posterior there.
     - ridge: the visited points that are lower than the last one by at most `RIDGE_DROP`.
-    - joins: whether it ended near the ridge of an earlier search, and would have followed it to the same maximum.
+    - joins: whether the search ended near the ridge of an earlier search, which it would have followed to its maximum.
     """
 
     point: Array

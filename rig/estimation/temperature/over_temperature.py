@@ -249,7 +249,8 @@ class _TemperatureFit:
     """One fit: the coefficients of (T − reference)ⁿ for n = 1 to 3 (rows) and each axis (columns).
 
     `relative` (3, 3): those of k, as fractions of k at the reference; `bias` (3, 3): those of c.
-    `covariance` (18, 18) includes the effect of the fitted lag, `without_lag` (18, 18) does not.
+    `covariance` (18, 18) includes the effect of the fitted lag, `without_lag` (18, 18) does not. `loop`: hysteresis
+    (6,) of scale and bias, and its standard deviation; None unless the sensor was both warmed and cooled.
     """
 
     relative: Array
