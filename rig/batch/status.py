@@ -42,10 +42,10 @@ class Now:
     - over: whether this is the last state.
     - fraction: the finished fraction of the run (0 to 1), None without a run.
     - turn_deg_s: the present rate of the turner.
-    - sensors: each one's name, number of samples and number of lost samples.
+    - sensors: each sensor's name, number of samples and number of lost samples.
     - verdict: the last part's serial number and state, until the next part begins.
     - why: the reason of that part's state.
-    - truth: the agreement of its result with a simulated laboratory's truth, empty without a truth.
+    - truth: the agreement of that part's result with a simulated laboratory's truth, empty without a truth.
     """
 
     state: State = "waiting"

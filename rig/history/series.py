@@ -249,7 +249,7 @@ def days_to_limit(
 ) -> int | None:
     """Return the days after the last result until |value − nominal| + U reaches `max_deviation`, or None.
 
-    None means more than ten years. `line` is value = c₀ + c₁ t, t in days like `last_days`. U combines the line's
+    None means more than ten years. `line` is value = c₀ + c₁ t with t in days, as is `last_days`. U combines the line's
     uncertainty at that time, the scatter between runs, and the `expanded` uncertainty of the last result.
     """
     ahead = np.arange(MAX_HORIZON_DAYS + 1.0)

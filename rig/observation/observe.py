@@ -48,8 +48,8 @@ class Observation:
 
     - sweep: index of the sweep in the plan; joint_name, direction: of the joint's turn, None in external data.
     - axis ("x", "y", "z"), sign: the sensor axis that is nominally along the turn.
-    - axis_flange (3,), speed_rad_s: unit vector, in the flange's frame, and size, nominally 2π/T or Δθ/T, of the arm's
-      mean rate, which is weighted like the mean reading.
+    - axis_flange (3,), speed_rad_s: direction, in the flange's frame, and size of the arm's mean rate, which is
+      weighted like the mean reading; the size is nominally 2π/T or Δθ/T.
     - speed_std_rad_s: standard deviation of the speed, because the turn's ends lie between the arm's states.
     - lost: number of samples missing from the average.
     - axis_errors (13, 3): change of the axis per radian of each of the arm's errors

@@ -183,10 +183,10 @@ class HandSeen:
     - doing: "starting", "resting", "moving" or "held".
     - since_s: the duration of that state.
     - turned_rad: the angle of the move so far.
-    - peak_rad_s: its fastest reading.
+    - peak_rad_s: the fastest reading of the move so far.
     - range_rad_s: the sensor's range.
     - expanded_scale: the largest U (k = 2) of the scale factors so far, None before a solution.
-    - faces: the sides done.
+    - faces: the sides that have been up in a rest.
     - pairs, turns: the remaining moves.
     - accepted: the number of accepted moves.
     """

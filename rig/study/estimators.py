@@ -36,7 +36,7 @@ TABLE_POSES = 40
 
 
 def study(settings: Settings) -> StudyReport:
-    """Simulate 30 mounted gyroscopes × 500 runs at each speed; and 30 tri-axial sensors × 500 runs in 40 poses."""
+    """Simulate 30 mounted gyroscopes × 500 runs at each speed, and 30 tri-axial sensors × 500 runs in 40 poses."""
     runs = settings.runs or sim.RUNS
     ratios = run_parallel(partial(_simulate_gyroscope, runs), range(sim.SETS), settings)
     rows = list(_gyroscope_rows(np.mean(ratios, axis=0)))
@@ -46,7 +46,7 @@ def study(settings: Settings) -> StudyReport:
 
 
 def _simulate_gyroscope(runs: int, rng: np.random.Generator, _: int) -> Array:
-    """Return mean squared errors of kx ky kz bx by bz, relative to bounds, and absolute, (speeds, estimators, 2, 6)."""
+    """Return the mean squared errors (speeds, estimators, 2, 6) of kx ky kz bx by bz, as `_compare` returns them."""
     scale, bias = sim.NORMAL.draw(rng)
     mounting = sim.draw_mountings(rng, 1)[0]
     F = sim.build_sensitivity(scale, mounting)

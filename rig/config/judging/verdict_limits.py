@@ -19,7 +19,7 @@ Need = Literal["verification", "accelerometer", "repeated attitudes", "bias drif
 
 @dataclass(frozen=True, slots=True)
 class Limit:
-    """A limit for a sensor's `quantity`: `what` names its check, `unit` is the unit of value and limit.
+    """A limit for a sensor's `quantity`; `what` names the check, and `unit` is the unit of value and limit.
 
     A "conformity" limit judges a property of the item, a "fitness" limit the measurement's fitness for use. `parameter`
     is the judged parameter of the calibration, None if it is not a parameter. `needed_by`: the kind of run that cannot

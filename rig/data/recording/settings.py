@@ -198,10 +198,10 @@ class RunSettings:
     - second_order: whether the accelerometers' model has terms of second order.
     - finds_earth_rate: whether the Earth's rate is estimated from the gyroscopes' readings.
     - extension_m: end of the extension that carries the sensors, in the flange's frame.
-    - elsewhere: settings of an external recording.
+    - elsewhere: settings of an external recording, None for a recording of the rig.
     - mounts: nominal rotations from the flange's to the item's frame by stage, empty for an item that is mounted once.
     - stage: number of this recording's stage, from 0.
-    - by_hand: settings of a session by hand.
+    - by_hand: settings of a session by hand, None for other runs.
     - reference_c: temperature at which a calibration over temperature is stated, None for other calibrations.
     """
 

@@ -40,7 +40,7 @@ class FinishedRun:
     """A finished run.
 
     - text: result.json in compact form.
-    - document: its content.
+    - document: the content of result.json.
     - rig: the rig's name.
     - check_standards: serial numbers of the sensors that monitor the rig.
     - simulated: whether the laboratory is simulated.
@@ -48,7 +48,7 @@ class FinishedRun:
     - recordings: the recordings in the folder.
     - operator, note: statements of the configuration.
     - certificate: the certificate in the folder, if any.
-    - documents: name and SHA-256 of each document; for result.json the hash of its content.
+    - documents: name and checksum of each document, as `document_sha256` returns it.
     """
 
     text: str

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
 class IssuedCertificate:
     """An issued certificate.
 
-    `issued` is a day; `replaces` the number of the certificate that it amends; `marks` the text across its pages, or
-    empty; `files` the names and SHA-256 of its files.
+    `issued`: the day of issue; `replaces`: the number of the certificate that this one amends, or None; `marks`: the
+    text printed across its pages, empty if there is none; `files`: the names and SHA-256 of its files.
     """
 
     number: str

@@ -26,9 +26,9 @@ MIN_SCATTER = 1e-12  # relative to a value: the rounding of equal values is not 
 class Chart:
     """A control chart, all arrays (…, n).
 
-    `deviation` is standard normal in control, NaN for the first results; `ewma` is its moving average, `limit` the
-    limit of `ewma`. `alarm` is true if `deviation` exceeds Shewhart's limit or `ewma` exceeds `limit`. Results with an
-    alarm are not used to judge later ones.
+    `deviation` is NaN for the first results, and standard normal if the process is in control; `ewma` is the moving
+    average of `deviation`, and `limit` is the limit of `ewma`. `alarm` is true if `deviation` exceeds Shewhart's limit
+    or `ewma` exceeds `limit`. Results with an alarm are not used to judge later ones.
     """
 
     deviation: Array

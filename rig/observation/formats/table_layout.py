@@ -42,7 +42,8 @@ class TableLayout:
     - skip_lines: lines before the heading.
     - headings: the names of the columns, "" without one; units: as stated by the heading or the row below it, or "".
     - numbers: the indices of the columns of numbers; texts: the indices of the others that are not blank.
-    - time: the index of the column of time, or None; time_unit: the unit of its numbers, None for texts.
+    - time: the index of the column of time, None without one; time_unit: the unit of its numbers, None if its cells are
+      texts.
     - missing: the texts that stand for missing values.
     - rows: the number of rows.
     """

@@ -32,7 +32,7 @@ class LineSearch:
     """The criteria of a spectral line.
 
     - `stands_out`: the line's power exceeds this multiple of the median power around it, and of `floor`.
-    - `floor`: 0, or the median power of the readings if lines are sought in quieter data, the encoders' rates.
+    - `floor`: the median power of the readings if lines are sought in quieter data, the encoders' rates; else 0.
     - `slowest`: the least number of cycles in all readings; `sidebands`: the number of a line's sidebands (`waves`).
     - `most`: the largest number of lines, previous ones included.
     """

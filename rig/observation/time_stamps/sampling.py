@@ -59,8 +59,8 @@ class Sampling:
     - `scattered`: fraction of readings that are missing at unknown positions.
     - `width`: number of stamps to compare together; 1 if every stamp is good.
     - `on_arrival`: whether readings were stamped when they arrived, several at once.
-    - `late` (n,): readings that waited in a buffer, stamped much later than the next ones; only given if stamps are too
-      bad to count missing readings.
+    - `late` (n,): mask of readings that waited in a buffer, stamped much later than the next ones; None unless stamps
+      are too bad to count missing readings.
     """
 
     interval_s: float

@@ -16,7 +16,7 @@ NEGLIGIBLE_RATIO = 1e-6  # to the largest singular value: directions that attitu
 
 @dataclass(frozen=True, slots=True)
 class PlannedAverage:
-    """A planned average: the flange's rate, the arm's pose (of a sweep, at the start), and the middle and duration.
+    """A planned average: the flange's rate, the arm's pose (at the start of a sweep), and the middle and duration.
 
     `on_the_way`: poses evenly along an arc; empty for whole turns.
     """

@@ -30,7 +30,7 @@ class SweepPose:
 
 @dataclass(frozen=True, slots=True)
 class Profile:
-    """A sweep's course: a ramp, `even_rad` at constant speed with `averaged_rad` in the middle, a ramp."""
+    """A sweep's course: a ramp, then `even_rad` at constant speed with `averaged_rad` in the middle, then a ramp."""
 
     averaged_rad: float
     even_rad: float

@@ -33,7 +33,7 @@ class TemperatureCourse:
     warming: bool | None = None
 
     def begin(self, temperature_c: float) -> None:
-        """Choose the direction: that of an interrupted run, or else away from the nearer end of the range."""
+        """Choose the direction that an interrupted run had, or else the one away from the nearer end of the range."""
         self.warming = temperature_c <= (self.from_c + self.to_c) / 2
         if self.sets:
             self.warming = self.sets[-1].warming

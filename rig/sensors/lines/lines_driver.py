@@ -36,7 +36,10 @@ OnValues = Callable[[Array, NDArray[np.int64], NDArray[np.int64], float], None]
 
 @dataclass(slots=True)
 class Counts:
-    """Counts of samples, of comments, and of lines rejected before and after the first sample; first rejected line."""
+    """Counts of samples, of comments, and of lines rejected before (`before`) and after (`damaged`) the first sample.
+
+    `first_other`: the beginning of the first rejected line, empty if there is none.
+    """
 
     samples: int = 0
     comments: int = 0

@@ -24,15 +24,15 @@ class ArmReport:
     - host: its address.
     - version: its software (major, minor, bugfix, build).
     - polyscope: the software in its own words.
-    - serial_number: the arm's, or "not reported".
+    - serial_number: the arm's serial number, or "not reported".
     - remote_control: whether the pendant's mode is remote control.
     - program_running: whether the controller runs a program.
-    - state: the state at that time.
+    - state: the arm's state at the time of the report.
     - kinematics: the arm's geometry as measured in the factory.
     - tcp_offset: the pose of its tool centre point in the flange's frame.
     - setup: the arm for which the controller is set up.
     - called: the dashboard's name for it.
-    - model: the maker's name of the arm, from these items.
+    - model: the maker's name of the arm, found from the other items.
     - registers_free: whether a half of the registers is free for the client's script.
     """
 

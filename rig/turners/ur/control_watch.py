@@ -33,7 +33,7 @@ ControlMode = Remote | Literal["gone"]
 class ControlWatch:
     """A thread that calls `on_problem` once, if the arm at `host` can no longer be stopped through its ports.
 
-    `newest_s()` returns the monotonic time of the newest state; the link itself reports that states do not come.
+    `newest_s()` returns the monotonic time of the newest state. If no states come, the link itself reports this.
     """
 
     def __init__(

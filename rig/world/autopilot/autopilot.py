@@ -35,9 +35,9 @@ SENSORS_UPDATED, TEMPERATURE_UPDATED = 0x3F, 0x1000
 
 @dataclass(slots=True)
 class AutopilotFaults:
-    """Faults that a test can set: fractions of messages `lost` and `doubled`, and of the requested rate (`slowest`).
+    """Faults that a test can set: the fractions of messages `lost` and `doubled`.
 
-    A `deaf` autopilot ignores all messages.
+    `slowest`: the provided fraction of the requested rate. A `deaf` autopilot ignores all messages.
     """
 
     lost: float = 0.0

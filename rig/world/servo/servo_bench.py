@@ -81,7 +81,7 @@ class ServoBench:
 
     @property
     def ideal(self) -> bool:
-        """Whether `rate_at` gives all that a gyroscope senses: the ground does not rotate."""
+        """Whether `rate_at` gives all that a gyroscope senses, which is so if the ground does not rotate."""
         return not any(self._site.earth_rate_rad_s)
 
     def step(self) -> None:

@@ -329,8 +329,7 @@ def _exit_at_once(status: int) -> NoReturn:
 def _outlive_the_parent() -> None:
     """Ignore signals to the process group, because this process has to stop the arm.
 
-    A closed pipe ends the process. SIGTERM stops the arm. If the stop in `_Child.abandon` hangs,
-    SIGALRM ends the process.
+    A closed pipe ends the process, as does SIGALRM if the stop in `_Child.abandon` hangs. SIGTERM stops the arm.
     """
     for number in ENDING_SIGNALS:
         if number not in (signal.SIGTERM, getattr(signal, "SIGALRM", None)):

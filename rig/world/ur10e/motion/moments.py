@@ -30,7 +30,7 @@ class Bodies:
 
 @dataclass(frozen=True, slots=True)
 class Load:
-    """`moments_nm` of the six joints; payload's `wrench` (N, N m) in the flange's axes; total `momentum_kg_m_s`."""
+    """The moments of the six joints, the payload's `wrench` (N, N m) in the flange's axes, and the total momentum."""
 
     moments_nm: tuple[float, ...]
     wrench: tuple[float, ...]
