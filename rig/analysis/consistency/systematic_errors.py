@@ -330,7 +330,7 @@ def _mount_patterns(segments: Segments, mount_rad: float) -> list[Array]:
 
 
 def _nonlinearity_patterns(intervals: Sequence[MotionInterval], matrix: Array, curve: NonlinearityPrior) -> Array:
-    """Return the effects (6, N, 3), means over N intervals, of one std of the axes' odd parts, then of their even parts."""
+    """Return the mean effects (6, N, 3) in N intervals of one std of the axes' odd parts, then of their even parts."""
     by_interval = []
     for interval in intervals:
         edges = np.linspace(interval.start_s, interval.end_s, TRANSFER_STEPS + 1)

@@ -56,7 +56,7 @@ class RestSummary:
 class MoveSummary:
     """A move of the `kind` by `angle_rad`; `turns`: the number of whole turns, 0 for a flip.
 
-    `closure_rad`: the error of the heading after whole turns, None if the model does not contain this error for the move.
+    `closure_rad`: the error of the heading after whole turns, None if the model has no such error for the move.
     """
 
     kind: Literal["flip", "turn", "omitted"]

@@ -55,7 +55,7 @@ class LogColumns:
 
 @dataclass(frozen=True, slots=True)
 class _ColumnGroup:
-    """Columns with numbers in the same rows: their indices and names (k,), values (m, k), and the rows at rest (m,)."""
+    """Columns with numbers in the same rows: indices and names (k,), values (m, k), and a mask (m,) of rows at rest."""
 
     indices: Sequence[int]
     names: tuple[str, ...]

@@ -31,7 +31,7 @@ class Instant:
 
 
 class _Tick(NamedTuple):
-    """A tick's start, and at that moment the trajectory's time and the time scaling with its derivative."""
+    """A tick's start, and at that moment the trajectory's time, the time scaling (`fraction`) and its derivative."""
 
     start_s: float
     trajectory_s: float
