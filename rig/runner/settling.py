@@ -5,6 +5,7 @@ The arm's controller reports standstill while the carried parts still oscillate,
 
 import threading
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -37,23 +38,24 @@ class _RecentReadings:
     recent: deque[Array]
     at_rest_counts: list[float] = field(default_factory=list)
 
-    def scatter_counts(self, before: int = 0) -> float | None:
-        """Return the standard deviation of the newest span of readings, RMS over the axes; None if there are too few.
+    def find_scatters_counts(self, most: int) -> list[float]:
+        """Return the standard deviation of each of the newest spans of readings, RMS over the axes, the newest first.
 
-        `before` is the number of spans to go back from the newest one.
+        There are at most `most`, and fewer if there are not enough readings.
         """
-        if len(self.recent) < (before + 1) * self.enough:
-            return None
-        end = len(self.recent) - before * self.enough
-        span = np.array(self.recent)[end - self.enough : end]
-        return float(np.sqrt(np.var(span, axis=0).mean()))
+        count = min(most, len(self.recent) // self.enough)
+        if not count:
+            return []
+        newest = np.array(self.recent)[-count * self.enough :].reshape(count, self.enough, -1)
+        scatters: list[float] = np.sqrt(np.var(newest, axis=1).mean(axis=1))[::-1].tolist()
+        return scatters
 
     def over_rest(self) -> float | None:
         """Return the ratio of the newest scatter to that at rest, or None with too few readings."""
-        scatter = self.scatter_counts()
-        if scatter is None or not self.at_rest_counts:
+        scatters = self.find_scatters_counts(1)
+        if not scatters or not self.at_rest_counts:
             return None
-        return scatter / max(*self.at_rest_counts, MIN_SCATTER_COUNTS)
+        return scatters[0] / max(*self.at_rest_counts, MIN_SCATTER_COUNTS)
 
     @property
     def settled(self) -> bool:
@@ -61,17 +63,18 @@ class _RecentReadings:
         ratio = self.over_rest()
         if ratio is None:
             return False
-        return (
-            ratio <= MAX_QUIET_RATIO
-            or (ratio <= MAX_STEADY_RATIO and self._is_steady(1, MIN_STEADY_DECREASE))
-            or (ratio <= MAX_LONG_STEADY_RATIO and self._is_steady(LONG_SPANS, MIN_LONG_STEADY_DECREASE))
+        if ratio <= MAX_QUIET_RATIO:
+            return True
+        scatters = self.find_scatters_counts(2 * LONG_SPANS)
+        return (ratio <= MAX_STEADY_RATIO and _is_steady(scatters, 1, MIN_STEADY_DECREASE)) or (
+            ratio <= MAX_LONG_STEADY_RATIO and _is_steady(scatters, LONG_SPANS, MIN_LONG_STEADY_DECREASE)
         )
 
-    def _is_steady(self, spans: int, least: float) -> bool:
-        """Return whether the mean scatter of the newest spans is at least this fraction of that of as many before."""
-        scatters = [self.scatter_counts(before) for before in range(2 * spans)]
-        present = [scatter for scatter in scatters if scatter is not None]
-        return len(present) == len(scatters) and sum(present[:spans]) >= least * sum(present[spans:])
+
+def _is_steady(scatters: Sequence[float], spans: int, least: float) -> bool:
+    """Return whether the mean scatter of the newest spans is at least this fraction of that of as many before."""
+    newest, before = scatters[:spans], scatters[spans : 2 * spans]
+    return len(before) == spans and sum(newest) >= least * sum(before)
 
 
 @dataclass(slots=True)
@@ -104,9 +107,8 @@ class Settling:
         """Add the present scatter to the scatters at rest; return False while there are too few."""
         with self._lock:
             for watched in self._watched.values():
-                scatter = watched.scatter_counts()
-                if scatter is not None:
-                    watched.at_rest_counts.append(scatter)
+                if scatters := watched.find_scatters_counts(1):
+                    watched.at_rest_counts += scatters
                     watched.recent.clear()
             return all(len(watched.at_rest_counts) >= SPANS_AT_REST for watched in self._watched.values())
 
