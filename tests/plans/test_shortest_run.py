@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rig.analysis.by_hand.hand_prediction import INSTRUCTION_S
 from rig.analysis.design.candidate_search import (
     Budgets,
     Candidate,
@@ -146,7 +147,7 @@ def reached_by_hand(of: Run, seed: int) -> ReachedUncertainty:
     asked = simulate_session(Asked(int(keys["flips"]), int(keys["turns"])))
     actions: list[Action] = [TurnAction(each.turns) if each.turns else FlipAction(each.face) for each in asked]
     part = Part(SAMPLED_HZ, noise_of(of), clock_ppm=20.0)
-    told = handle(actions, seed, part, rest_s=1.5)
+    told = handle(actions, seed, part, rest_s=1.0 + INSTRUCTION_S)
     session = segment_session(told.time_s, told.rates, told.acceleration)
     return ReachedUncertainty.worst_case({"gyro": solve_by_hand(session, SessionConditions(50.0)).budget})
 
@@ -169,10 +170,15 @@ def predicted_of(of: Run) -> ReachedUncertainty:
 @pytest.mark.proof
 @pytest.mark.timeout(3000)
 def test_what_is_predicted_is_reached(thorough: bool) -> None:
+    """On average over three recordings: U of a single one scatters by 4 %, because it contains estimated variances."""
     ratios = {}
-    for seed, each in enumerate(RUNS if thorough else FEW):
-        foretold, found = predicted_of(each), reached(each, seed)
-        ratios[each] = found.scale / foretold.scale, found.bias_rad_s / foretold.bias_rad_s
+    for number, each in enumerate(RUNS if thorough else FEW):
+        foretold, seeds = predicted_of(each), [number, number + 100, number + 200][: 3 if thorough else 1]
+        found = [reached(each, seed) for seed in seeds]
+        ratios[each] = (
+            float(np.mean([uncertainty.scale for uncertainty in found])) / foretold.scale,
+            float(np.mean([uncertainty.bias_rad_s for uncertainty in found])) / foretold.bias_rad_s,
+        )
         print(f"{each.turner} {each.part} {dict(each.keys)}: {ratios[each][0]:.3f} {ratios[each][1]:.3f}")
     low, high = RATIO
     assert not {each: found for each, found in ratios.items() if not low <= min(found) <= max(found) <= high}
