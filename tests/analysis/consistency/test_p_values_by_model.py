@@ -13,9 +13,9 @@ from support.recordings.drawn_recording import KINDS, Kind, drawn
 from support.recordings.synthetic_run import Setup
 
 CHI_SQUARE = ("scale_changed", "loose_mounting", "cw_against_ccw", "residuals", "sweeps_against_rests")
-# Between sweeps about other axes only the transfers show a change of scale, and their stated variance is a bound: it
-# contains a ripple faster than the states, whether there is one or not.
-BOUNDED = ("scale_changed",)
+# Between sweeps about other axes only the transfers show a change of scale or mounting, and their stated variance is a
+# bound: it contains a ripple faster than the states, whether there is one or not.
+BOUNDED = ("scale_changed", "loose_mounting")
 MOST_OF_MANY = ("axis_changed", "disturbed_sweep", "bias_jumped", "skewed_noise")
 LARGER = 0.05  # rate of false alarms of each: so that there are some
 REFUSED = 0.01
