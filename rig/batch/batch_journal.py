@@ -44,8 +44,8 @@ class Journal:
 def open_journal(out: Path | None, parent: Path, entry: Begun) -> Journal:
     """Continue or begin the batch in the folder `out`; without `out` begin one in a new folder below `parent`.
 
-    Raise Refused `run_folder`, and as `resume_journal` does; `no_batch` if the begun batch is simulated and this one is
-    not, or the reverse.
+    Raise Refused `run_folder`, and what `resume_journal` raises; `no_batch` if the begun batch is simulated and this
+    one is not, or the reverse.
     """
     if out is not None and (out / JOURNAL).exists():
         journal = resume_journal(out)
@@ -66,7 +66,7 @@ def open_journal(out: Path | None, parent: Path, entry: Begun) -> Journal:
 def resume_journal(folder: Path) -> Journal:
     """Return the journal in `folder` without an incomplete last line.
 
-    Raise Refused `no_batch`, and as `refuse_links` does.
+    Raise Refused `no_batch`, and what `refuse_links` raises.
     """
     path = folder / JOURNAL
     try:

@@ -44,7 +44,7 @@ class Bench(Protocol):
         ...
 
     def fit(self, serial: str) -> None:
-        """Exchange the part in the laboratory, if the operator is simulated."""
+        """Exchange the part in the simulated laboratory, if the operator is simulated."""
         ...
 
     def run(self, part: BatchPart, folder: Path, desk: "Desk") -> PartEnded:

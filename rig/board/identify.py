@@ -73,7 +73,7 @@ def _missing(name: str, section: ConfiguredSensor, finding: str) -> Refused:
 def read_stored_calibration(board: Board, name: str, section: SensorSection) -> StoredCalibration:
     """Read the calibration with which the board corrects a sensor's readings.
 
-    Raise Refused `no_calibration`, and as `find_sensor` and `refuse_other_sensor` do.
+    Raise Refused `no_calibration`, and what `find_sensor` and `refuse_other_sensor` raise.
     """
     stored = board.read_calibration(find_sensor(board.identity, name, section).index)
     if stored is None:

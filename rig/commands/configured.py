@@ -28,7 +28,7 @@ def load_configured(
 ) -> Configured:
     """Load a configuration. A `script` (a file, or loaded) replaces the configuration's procedure.
 
-    Raise Refused as `load`, `load_procedures`, `load_script` and `first_phase` do; also `script_failed`.
+    Raise Refused `script_failed`, and what `load`, `load_procedures`, `load_script` and `first_phase` raise.
     """
     if isinstance(script, Path):
         script = load_script(script)

@@ -118,7 +118,7 @@ def export(
 
     `format` is one of csv, parquet, mat, ros2, imucal, px4, ardupilot, kalibr; `out` is a folder, by default one in the
     run's. `run` may be a log of another program, and `columns` is then the file that describes its columns. Return the
-    files. Raise Refused `bad_option` for another format, and as `rig export` does.
+    files. Raise Refused `bad_option` for another format, and what `rig export` raises.
     """
     from rig.commands.documents.export import add, export_files
 

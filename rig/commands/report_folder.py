@@ -20,7 +20,7 @@ def refuse_unwritable(folder: Path, option: str = "--out") -> Iterator[None]:
 
 
 def draw_into(folder: Path, draw: Callable[[Path], list[Path]], option: str) -> list[Path]:
-    """Draw into a folder and return the files. Raise Refused `missing_extra`, and as `refuse_unwritable` does."""
+    """Draw into a folder and return the files. Raise Refused `missing_extra`, and what `refuse_unwritable` raises."""
     with requiring("study"):
         import matplotlib  # noqa: F401
     with refuse_unwritable(folder, option):

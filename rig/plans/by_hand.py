@@ -23,7 +23,7 @@ Pair = tuple[Face, Face]
 def plan_by_hand(
     turner: HandSection, procedure: ByHandSection, start_q_rad: Joints | None = None, done: Collection[int] = ()
 ) -> Plan:
-    """Return a plan without steps, because moves by hand are requested during the session."""
+    """Return a plan without steps, because the moves of a session by hand are requested during it."""
     return Plan((), (), ())
 
 

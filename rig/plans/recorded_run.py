@@ -59,7 +59,7 @@ def open_run(
     """Return the recordings in a run folder, or a run file; `script`, if given, is executed.
 
     `only` selects recordings of a folder by name; by default all are included, also those added to the folder later.
-    Raise Refused `no_run`, and as `read_run` and `load_script` do.
+    Raise Refused `no_run`, and what `read_run` and `load_script` raise.
     """
     named = None if script is None else load_script(script)
     if not path.is_dir():
@@ -117,7 +117,7 @@ def _procedure_of(run: RecordedRun, recording: RunData) -> AnyProcedure:
     """Return the procedure of a recording: installed, or defined by the user's own script.
 
     If neither is available, return an installed procedure for the same kind of readings: a solution needs no script.
-    Raise Refused `another_script` if the script is not that of the recording, and as `kept_script` does.
+    Raise Refused `another_script` if the script is not that of the recording, and what `kept_script` raises.
     """
     if _is_by_installed(recording):
         return load_procedures()[recording.settings.procedure]

@@ -68,7 +68,7 @@ def kept_script(folder: Path, kept: ScriptIdentity, named: ScriptFile | None = N
 
     An installed script is taken from its package. A user who has `named` the same script consents. The text in the
     folder is the user's own if the user has begun a run with it before. Raise Refused `another_script`,
-    `foreign_script`, and as `load_script` does.
+    `foreign_script`, and what `load_script` raises.
     """
     if named is not None:
         if named.sha256 != kept.sha256:

@@ -1,4 +1,4 @@
-"""The verbs of a procedure's script, carried out by `rig.runner.procedure_runner.Rig`."""
+"""The methods that a procedure's script calls, implemented by `rig.runner.procedure_runner.Rig`."""
 
 from collections.abc import Callable
 from typing import Protocol
@@ -7,7 +7,7 @@ from rig.motion.steps import Dwell, Plan, Rest, Sweep, Transfer
 
 
 class Verbs(Protocol):
-    """The verbs of a connected and recorded arm and board. If a verb ends early, it first stops the arm."""
+    """The methods that a script calls to move the arm and record samples. One that ends early first stops the arm."""
 
     @property
     def plan(self) -> Plan:

@@ -138,7 +138,7 @@ class Run:
     def _record_stage(
         self, phase: Phase, stage: int, resumed: Resumption, *, moved: bool, results: Mapping[str, SensorResult] | None
     ) -> Path:
-        """Carry out the phase's script for one stage, or a plan without stages; return the recording's path."""
+        """Carry out the phase's script for a stage, or for a whole plan without stages; return the recording's path."""
         path = next_recording(self.folder, phase.procedure.readings)
         is_own = phase.procedure is self.script.procedure
         script = self.script if is_own else find_installed_script(phase.procedure.name)

@@ -1,6 +1,6 @@
-"""The implementation of the verbs of a script (`rig.plans.verbs`).
+"""The implementation of the methods that a script calls (`rig.plans.verbs`).
 
-During every verb the board and the recording are supervised. An early end (an error, Ctrl-C, a lost link) first stops
+During every call the board and the recording are supervised. An early end (an error, Ctrl-C, a lost link) first stops
 the arm and is then reported.
 """
 
@@ -118,7 +118,7 @@ class Recording:
 
 @dataclass(slots=True)
 class Rig:
-    """The verbs of one phase.
+    """The methods that a script calls in one phase: moves, rests, sampling.
 
     - `plan`: the motions of this recording; `whole_plan`: also those done before an interruption or in other stages.
     - `stage`: the number of this stage, from 0; `last`: whether no stage follows.

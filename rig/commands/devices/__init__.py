@@ -1,1 +1,1 @@
-"""Commands about one device: board, KVH 1775, autopilot, a device that prints lines."""
+"""Commands about one device: board, KVH 1775, autopilot, a device that sends lines of text."""

@@ -123,7 +123,7 @@ def _read_values(
 ) -> dict[str, float]:
     """Return the values of the parameters that store a run's calibrations of the sensors.
 
-    Raise Refused `not_in_result`, and as `refuse_other_sensor` does.
+    Raise Refused `not_in_result`, and what `refuse_other_sensor` raises.
     """
     from math import degrees
 

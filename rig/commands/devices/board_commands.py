@@ -157,7 +157,7 @@ def _read_slots(
 
 
 def _select_calibration(slot: BoardSlot, result: ResultDocument, path: Path) -> Calibration:
-    """Return the run's calibration of a sensor. Raise Refused `not_in_result`, and as `refuse_other_sensor` does."""
+    """Return a sensor's calibration in the run. Raise Refused `not_in_result` and what `refuse_other_sensor` raises."""
     entry = result.gyroscopes.get(slot.name)
     if entry is None or entry.role == "reference":
         raise Refused(

@@ -46,8 +46,8 @@ UNCHECKED_NOTE = "the board's own result: its readings are not stored, so double
 def hand(options: Namespace) -> int:
     """Let the board calibrate, or read its last result; print it with its difference from double precision.
 
-    Raise Refused `bad_option`, `no_such_sensor`, `not_confirmed`, `another_sensor`, `another_range`, and as
-    `calibrate_by_board` and `read_kept_solution` do; Fault as `calibrate_by_board` does.
+    Raise Refused `bad_option`, `no_such_sensor`, `not_confirmed`, `another_sensor`, `another_range`, and what
+    `calibrate_by_board` and `read_kept_solution` raise; Fault as `calibrate_by_board` does.
     """
     if options.moves not in MOVE_RANGE or not 0 < options.scale_std < 1:
         raise Refused(

@@ -1,4 +1,4 @@
-"""`rig lines PORT`: inspect a device that prints lines; write its section or a configuration for use by hand."""
+"""`rig lines PORT`: inspect a device that sends lines of text, and write its section or a configuration."""
 
 import sys
 from argparse import ArgumentParser, Namespace
@@ -35,7 +35,7 @@ def add(parser: ArgumentParser) -> None:
 
 
 def add_stated(parser: ArgumentParser) -> None:
-    """Add the arguments for properties that printed lines do not show: serial number and ranges."""
+    """Add the arguments for properties that the lines of text do not show: serial number and ranges."""
     parser.add_argument("--serial-number", metavar="NUMBER", help="serial number of this specimen")
     parser.add_argument(
         "--range-deg-s", metavar="DEG_S", help="full scale to which the device's program sets the gyroscope"
@@ -112,7 +112,7 @@ def look_at_device(
     """Read lines of a device at rest, then in rotation; return its section as YAML, and print their properties.
 
     `seconds` are the two durations. Raise Refused as `listen` does; `lines_no_pattern` for lines without a common
-    pattern; for a configuration by hand, `lines_not_turned` if no columns look like a gyroscope's.
+    pattern; for a session by hand, `lines_not_turned` if no columns look like a gyroscope's.
     """
     import numpy as np
 

@@ -45,8 +45,9 @@ def export_files(options: Namespace) -> list[Path]:
     """Write readings of the first movement with its motion, or the calibrations of a passed run, into `--out`.
 
     `--at-temperature`: a temperature in °C, and the run of `bias_drift` with the slopes. Return the files. Raise
-    Refused `report_folder`, `bad_option`, `missing_extra`, and as `refuse_links` does; for readings as `open_run`,
-    `read_log` and `export_recordings`; for calibrations as `read_passed_result`, `at_temperature` and the format.
+    Refused `report_folder`, `bad_option`, `missing_extra`, and what `refuse_links` raises; for readings also what
+    `open_run`, `read_log` and `export_recordings` raise; for calibrations what `read_passed_result`, `at_temperature`
+    and the format raise.
     """
     from rig.report.exports.exported_recording import export_recordings
 

@@ -70,8 +70,8 @@ def write_documents(options: Namespace) -> tuple[list[Path], list[Refused]]:
     `--sign` is the key that signs XML and PDF, `--time-server` the server that dates the signature. `--reversal` is the
     file by `rig reversal` for its magnetometers. `--history` is the history in which the certificate is entered, by
     default the user's own, never one that the folder names. Return the files, and why requested forms could not be
-    made. Raise Refused `report_folder`, `bad_option`, and as `read_result`, `read_reversal`, `refuse_links`,
-    `certificate_of`, `folder_statements` and `signatory`.
+    made. Raise Refused `report_folder`, `bad_option`, and what `read_result`, `read_reversal`, `refuse_links`,
+    `certificate_of`, `folder_statements` and `signatory` raise.
     """
     if options.sign is None and options.time_server is not None:
         raise Refused("bad_option", "--time-server is for signed documents", "Give --sign KEY too, or leave it out")

@@ -70,7 +70,8 @@ class VerifiedFile:
 def run(options: Namespace) -> int:
     """Verify each file and print the findings; return 0, or the exit status that `--help` lists.
 
-    Raise Refused `bad_option`, `verify_file`, and as `read_trusted_certificates`, `inspect_file` and `open_history` do.
+    Raise Refused `bad_option`, `verify_file`, and what `read_trusted_certificates`, `inspect_file` and `open_history`
+    raise.
     """
     from rig.report.signatures.inspection import inspect_file, read_trusted_certificates
     from rig.report.signatures.trust import Trust
@@ -106,7 +107,7 @@ def _read_content(file: Path) -> bytes:
 def _look_up(
     named: str, contents: Mapping[Path, bytes], looks: "Mapping[Path, FileInspection]"
 ) -> "dict[Path, FileEntries]":
-    """Return the history's entry of each file. Raise Refused `history_unreachable`, and as `open_history` does."""
+    """Return the history's entry of each file. Raise Refused `history_unreachable`, and what `open_history` raises."""
     from rig.commands.history.history_answer import await_answer
     from rig.history.entered_file import find_file_entries
     from rig.history.storage.address import resolve_address

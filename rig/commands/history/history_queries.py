@@ -39,7 +39,7 @@ MAX_NUMBER_DIGITS = 18  # a database's numbers have no more; serial numbers do
 
 
 def list_calibrations(options: Namespace) -> int:
-    """Print calibrations, and trends of a serial number. Raise `not_in_history`, and as `open_named_history` does."""
+    """Print calibrations, and a serial number's trends. Raise `not_in_history` and what `open_named_history` raises."""
     selection, address = _read_selection(options), _read_address(options)
     pasts = list[Past]()
     if selection.serial_number is not None or is_there(address):
@@ -182,7 +182,7 @@ def verify(options: Namespace) -> int:
 def compare(options: Namespace) -> int:
     """Print how two calibrations of one sensor differ, and draw it with `--plot`; return 0.
 
-    Raise Refused `not_in_history`, `not_comparable`, and as `plot` does.
+    Raise Refused `not_in_history`, `not_comparable`, and what `plot` raises.
     """
     with open_named_history(options) as history:
         first, second = history.calibration(options.first), history.calibration(options.second)
@@ -222,8 +222,8 @@ def void(options: Namespace) -> int:
 def open_named_history(options: Namespace) -> AbstractContextManager[History]:
     """Open the named history.
 
-    Raise Refused `no_history` if there is none, because opening would make an empty one. Raise as `open_history` does,
-    and as `load` does if a configuration names the history.
+    Raise Refused `no_history` if there is none, because opening would make an empty one, and what `open_history`
+    raises; what `load` raises if a configuration names the history.
     """
     return _open_existing(_read_address(options))
 

@@ -39,8 +39,8 @@ def recompute_history(options: Namespace, solve: Solve = solve_task) -> int:
     """Solve the chosen recordings again and write the report into `--out`.
 
     Return 1 if a result needs attention. Raise Refused `bad_option`, `unknown_setting`, `unknown_estimator`,
-    `not_in_history`, `another_question`, `report_folder`, and as `open_named_history`, `refuse_links` and
-    `connect_client` do; Fault `cluster_lost`, after a report of the recordings solved until then.
+    `not_in_history`, `another_question`, `report_folder`, and what `open_named_history`, `refuse_links` and
+    `connect_client` raise; Fault `cluster_lost`, after a report of the recordings solved until then.
     """
     question = _question(options)
     selection = Selection(options.serial_number, options.part, options.since, options.rig)

@@ -12,7 +12,7 @@ MODULES = ("fcntl", "termios")  # without them pyserial opens no port, not even 
 def refuse_unless_linux(what: str, system: str = sys.platform) -> None:
     """Raise Refused `only_on_linux`, about `what`, unless the system is Linux.
 
-    Other systems lack prompt stops by signals, loopback addresses or pseudo-terminals.
+    Other systems lack signals that stop a program at once, loopback addresses besides 127.0.0.1, or pseudo-terminals.
     """
     missing = [name for name in MODULES if find_spec(name) is None]
     if system == "linux" and not missing:

@@ -1,4 +1,4 @@
-"""Incidents (faults, remedies, moves by hand) that a person causes by typed words in a running laboratory."""
+"""Incidents (faults, remedies, moves by hand) that a person causes by typed words in a simulated laboratory."""
 
 import re
 from collections.abc import Mapping
@@ -15,7 +15,7 @@ Request = Mapping[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class Incident:
-    """An incident in the laboratory: the request to the control channel, and a description of its effect."""
+    """An incident in the simulated laboratory: the request to the control channel, and a description of its effect."""
 
     request: Request
     text: str
@@ -57,7 +57,7 @@ INCIDENTS: Mapping[str, Incident] = MappingProxyType(
 
 
 def opening_text(control: str) -> str:
-    """Return the greeting of a laboratory for a person who practises in it. Raise Fault `world_ended`."""
+    """Return the greeting of a simulated laboratory for a person who practises in it. Raise Fault `world_ended`."""
     return (
         f"The laboratory is ready. {_help_text(control)}\nAn empty line shows this again; Ctrl-D ends the laboratory."
     )

@@ -1,4 +1,4 @@
-"""The simulated operator, who receives the instructions of a session by hand."""
+"""The link from a run to the simulated operator, who turns the item by hand as instructed."""
 
 from rig.commands.laboratory.laboratory_process import send_request
 from rig.data.recording.hand_events import HandAsked
@@ -6,13 +6,13 @@ from rig.station.events import RunEvent
 
 
 class OperatorListener:
-    """A listener of a run that passes instructions by hand on to the laboratory's operator.
+    """A listener of a run that passes its instructions on to the simulated operator.
 
-    The operator receives only the content of the line of text and the drawing: the motion, and the side that points up.
+    The operator receives only what a person reads in the text and the drawing: the motion, and the side that points up.
     """
 
     def __init__(self, control: str) -> None:
-        """Connect to the laboratory's control channel `control` for each instruction."""
+        """Connect to the simulated laboratory's control channel `control` for each instruction."""
         self._control = control
 
     def event(self, event: RunEvent) -> None:

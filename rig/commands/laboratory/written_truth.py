@@ -35,7 +35,7 @@ def write_truth(
 def _windows(outcome: "Outcome", *, follows_arm: bool) -> dict[str, Any]:
     """Return the windows of all calibrated sensors in the form of `rig.world.board.windowed_truth`.
 
-    Only an arm's controller shares the laboratory's clock; otherwise the whole time is one window.
+    Only an arm's controller shares the simulated laboratory's clock; otherwise the whole time is one window.
     """
     recordings = outcome.recordings if follows_arm else ()
     gyroscopes = {}

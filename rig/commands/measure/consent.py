@@ -70,7 +70,7 @@ def address_keys(loaded: Loaded) -> list[str]:
 
 
 def refuse_other_changes(loaded: Loaded, overrides: Sequence[str]) -> list[str]:
-    """Return the addresses that `overrides` give. Raise Refused `no_address` for any other key."""
+    """Return the addresses in `overrides` (key=address). Raise Refused `no_address` for a key not in `address_keys`."""
     keys = address_keys(loaded)
     for override in overrides:
         key = override.partition("=")[0]

@@ -27,7 +27,7 @@ def add(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     """Run the demonstration and return the exit status of `rig run`; with `--files` copy the files and return 0.
 
-    Raise Refused `files_not_copied`, and as `rig run` does.
+    Raise Refused `files_not_copied`, and what `rig run` raises.
     """
     if options.files is not None:
         return _copy(options.files)

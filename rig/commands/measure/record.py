@@ -29,7 +29,7 @@ def add(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     """Record into CSV files in `--out` and print the content of each; return 0.
 
-    Raise Refused `bad_option`, and as `load_sensors` and `record_readings` do; Fault as the latter does.
+    Raise Refused `bad_option`, and what `load_sensors` and `record_readings` raise; Fault as `record_readings` does.
     """
     if not 0 < options.duration_s < float("inf"):
         raise Refused("bad_option", f"--duration-s is {options.duration_s:g}", "Give a time above 0, in seconds")

@@ -30,8 +30,9 @@ def run(options: Namespace) -> int:
 
     Sweeps that the verdict named as disturbed are repeated. In another user's folder, `--script` names the script,
     which is executed, and `--connect` the addresses that may be used; `--set` gives new addresses of devices. Return an
-    exit status as `rig run` does. Raise Refused `no_run`, `already_finished`, `another_script`, and as `refuse_links`,
-    `read_result`, `refuse_other_changes`, `refuse_foreign_addresses`, `script_identity` and `kept_script` do.
+    exit status as `rig run` does. Raise Refused `no_run`, `already_finished`, `another_script`, and what
+    `refuse_links`, `read_result`, `refuse_other_changes`, `refuse_foreign_addresses`, `script_identity` and
+    `kept_script` raise.
     """
     page = read_page_wish(options)
     from rig.commands.configured import open_configured

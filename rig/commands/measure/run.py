@@ -60,8 +60,8 @@ def run(options: Namespace) -> int:
 def prepare_run(options: Namespace) -> "Iterator[tuple[Path, Configured]]":
     """Yield a new run folder and its configuration; during the block a simulated laboratory has its own address.
 
-    If the operator does not agree, the folder is removed, so that the same command can be repeated. Raise Refused as
-    `load_configured` and `new_folder` do; `only_on_linux` for a simulated laboratory on another system.
+    If the operator does not agree, the folder is removed, so that the same command can be repeated. Raise Refused
+    `only_on_linux` for a simulated laboratory on another system, and what `load_configured` and `new_folder` raise.
     """
     from rig.commands.configured import open_configured
     from rig.commands.laboratory.only_on_linux import refuse_unless_linux

@@ -41,7 +41,7 @@ def add_target(parser: ArgumentParser) -> None:
 def print_shortest_run(options: Namespace) -> int:
     """Print the shortest run for the target, and write its configuration; return 1 if there is none.
 
-    Raise Refused `bad_option`, `configuration_not_written`, `not_predictable`, and as `load_configured` does.
+    Raise Refused `bad_option`, `configuration_not_written`, `not_predictable`, and what `load_configured` raises.
     """
     say("rig plan: looking for the shortest run …", file=sys.stderr)
     from rig.commands.configured import load_configured

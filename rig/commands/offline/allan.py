@@ -28,7 +28,7 @@ def run(options: Namespace) -> int:
     """Print the Allan deviations of a run folder, a run file or a log; draw them into the folder `--plot`.
 
     Return 0. Raise Refused `report_folder`, `missing_extra`, `not_at_rest`; for a log also as `read_samples` does; for
-    a run also `bad_option`, `no_raw_readings`, and as `open_run` and `at_rest` do.
+    a run also `bad_option`, `no_raw_readings`, and what `open_run` and `at_rest` raise.
     """
     from rig.report.figures.allan import draw_at_rest, print_at_rest
 

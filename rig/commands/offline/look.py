@@ -64,7 +64,7 @@ def run(options: Namespace) -> int:
 
 
 def _refuse_run(path: Path) -> None:
-    """Raise Refused `bad_option` for a run of the rig, which other commands read; and as `meant_run` does."""
+    """Raise Refused `bad_option` for a run of the rig, which other commands read, and what `meant_run` raises."""
     from rig.data.latest_run import meant_run
     from rig.data.run_folder import recordings
 

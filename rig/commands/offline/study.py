@@ -58,7 +58,7 @@ def _list_studies() -> int:
 def _run_study(options: Namespace) -> int:
     """Run one study, print its findings and write its files into `--out`.
 
-    Raise Refused `unknown_study`, `bad_option`, `missing_extra`, `study_folder`, and as `refuse_links` does.
+    Raise Refused `unknown_study`, `bad_option`, `missing_extra`, `study_folder`, and what `refuse_links` raises.
     """
     from rig.data.run_folder import refuse_links
     from rig.errors.extras import requiring

@@ -225,8 +225,8 @@ class RigBench:
 def open_bench(configured: Configured, folder: Path, station: BatchSettings) -> Iterator[RigBench]:
     """Open the bench during the block; `folder` is the batch's.
 
-    Raise Refused `station_sensors` if the configuration has no sensors that a station can calibrate, and as
-    `claim_devices` does.
+    Raise Refused `station_sensors` if the configuration has no sensors that a station can calibrate, and what
+    `claim_devices` raises.
     """
     config = configured.loaded.config
     refuse_other_sensors(config)

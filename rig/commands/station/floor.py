@@ -18,7 +18,7 @@ def add(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     """Show the state of each rig until Ctrl-C; the history is only read.
 
-    Return 0. Raise Refused `page_address`, `no_history`, and as `open_history` does.
+    Return 0. Raise Refused `page_address`, `no_history`, and what `open_history` raises.
     """
     from rig.floor.floor_feed import polled_feed
     from rig.history.storage.address import default_history_address

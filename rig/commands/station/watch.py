@@ -27,7 +27,7 @@ MAX_LOG_BYTES = 50_000_000
 
 
 def add(parser: ArgumentParser) -> None:
-    """Add the arguments of `rig watch`, which always has a page."""
+    """Add the arguments of `rig watch`. No `--page` is among them, because the replay always has a page."""
     add_run(parser, "run_folder", "a run folder", metavar="RUN_DIR")
     parser.add_argument("--speed", type=_speed, default=1.0, metavar="N", help="replay N times as fast (default: 1)")
     add_page_address(parser)
@@ -43,8 +43,8 @@ def _speed(text: str) -> float:
 def run(options: Namespace) -> int:
     """Replay every recording in a run folder, `--speed` times as fast; the page remains until Ctrl-C.
 
-    Return 0. Raise Refused `no_run`, `page_address`, and as `read_run`, `turner_of`, `check_arms_times` and
-    `read_result` do.
+    Return 0. Raise Refused `no_run`, `page_address`, and what `read_run`, `turner_of`, `check_arms_times` and
+    `read_result` raise.
     """
     from rig.data.recording.run_file import read_run
     from rig.data.result_file import read_result

@@ -50,6 +50,6 @@ def _sets(arm: ArmSection, procedure: ThermalSection) -> Iterator[list[Step]]:
 
 
 def _wait_s(procedure: ThermalSection, steps: list[Step]) -> float:
-    """Return the shortest possible time of heating to the next set, s, which the plan assumes."""
+    """Return the shortest wait before the next set, s: that at the largest permitted rate of the temperature."""
     gap_s = 60 * procedure.max_step_k / (procedure.max_rate_k_per_min * 2)
     return max(MIN_WAIT_S, gap_s - sum(step.duration_s for step in steps))

@@ -1,1 +1,1 @@
-"""Sessions by hand while they happen, solved by the host or by the board."""
+"""Sessions by hand while they happen. The host or the board solves them."""

@@ -286,5 +286,5 @@ def drain(heard: "SimpleQueue[tuple[str, NDArray[Any]]]") -> Iterator[tuple[str,
 
 
 def _explain(wrong: Fault) -> str:
-    """Return what was wrong, and what to do about it by hand."""
+    """Return what was wrong, and the remedy in a session by hand."""
     return f"{wrong.what}. {remedies_by_method(wrong.name).get('hand', wrong.remedy).rstrip('.')}."

@@ -123,7 +123,7 @@ def calibrate_by_board(
     """Let the board calibrate one of its sensors; the board remains connected in the block.
 
     The session ends after at least `moves` moves, once the standard uncertainty of the scale is at most `scale_std`.
-    Raise Refused `clock_unknown`, `first_face_unknown`, and as `open_board_source` does; Fault `board_unverified`,
+    Raise Refused `clock_unknown`, `first_face_unknown`, and what `open_board_source` raises; Fault `board_unverified`,
     `board_disagrees`, the error of the last of ten refused moves in a row, and the board's own errors.
     """
     arrived: SimpleQueue[tuple[str, NDArray[Any]]] = SimpleQueue()
