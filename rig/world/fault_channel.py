@@ -131,7 +131,7 @@ class ControlSession:
         }
 
     def _motion_orders(self) -> dict[str, Callable[..., Reply | None]]:
-        """Return the orders that the laboratory's turner obeys."""
+        """Return the orders that the simulated turner obeys."""
         match self._world.laboratory.motion_source:
             case ArmMotionSource():
                 return {

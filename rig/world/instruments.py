@@ -1,4 +1,4 @@
-"""The interface that all instruments with a port of their own share with the laboratory and its sockets."""
+"""The interface that all instruments with a port of their own share with the simulated laboratory and its sockets."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ class SimulatedInstrument(Device, Protocol):
 
 @dataclass(slots=True)
 class InstrumentMount:
-    """The place of an instrument in the laboratory, with its port.
+    """The place of an instrument in the simulated laboratory, with its port.
 
     - kind: its name in control requests.
     - build: returns the instrument with power, at a virtual time in s; its non-volatile memory is bound in `build`.

@@ -63,7 +63,7 @@ class Laboratory:
 
     @property
     def has_board(self) -> bool:
-        """Whether a board belongs to the laboratory, powered or not."""
+        """Whether a board belongs to the simulated laboratory, powered or not."""
         return self._config.board is not None
 
     @property

@@ -1,4 +1,4 @@
-"""The laboratory's magnetic field: flux density as a function of position and time, in the axes of the arm's base.
+"""The simulated magnetic field: flux density as a function of position and time, in the axes of the arm's base.
 
 The field of the Earth and the room is smooth: uniform, a gradient that no current within the room causes (∇·B = 0 and
 ∇×B = 0, so five numbers), and a steady drift. The arm's iron is modelled as dipoles fixed to its links.

@@ -1,4 +1,4 @@
-"""The interface of the turners in the laboratory: an arm's flange, a servo's shaft, an operator's hand."""
+"""The interface of the turners in the simulated laboratory: an arm's flange, a servo's shaft, an operator's hand."""
 
 from typing import Protocol
 

@@ -1,4 +1,4 @@
-"""The laboratory's location: Earth rate and specific force at rest, in the axes of the arm's base."""
+"""The simulated laboratory's location: Earth rate and specific force at rest, in the axes of the arm's base."""
 
 from dataclasses import dataclass
 from math import cos, radians, sin

@@ -1,4 +1,4 @@
-"""The world's process: one thread, one loop, the laboratory in the middle and sockets around it."""
+"""The world's process: one thread, one loop, the simulated laboratory in the middle and sockets around it."""
 
 import gc
 import json
@@ -276,7 +276,7 @@ class World:
 
 
 def _find_host(config: RigConfig) -> str:
-    """Return the laboratory's address: that of the turner or, if a hand turns the item, of the board or a sensor."""
+    """Return the simulated devices' host: the turner's or, if a hand turns the item, the board's or a sensor's."""
     if config.turner.simulated_at is not None:
         return config.turner.simulated_at
     ports = [("board.port", config.board.port)] if config.board is not None else []

@@ -1,1 +1,1 @@
-"""Devices that print samples as lines of text, on a serial port of their own."""
+"""Devices that send samples as lines of text, on a serial port of their own."""

@@ -13,7 +13,7 @@ ROUND_DIGITS = (1, 2, 2.5, 4, 5, 8, 10)
 
 @dataclass(frozen=True, slots=True)
 class StatedProperties:
-    """Properties that printed lines do not show, as the user states them; None if the user has not stated one.
+    """Properties that lines of text do not show, as the user states them; None if the user has not stated one.
 
     `by_hand`: whether the section is for a session by hand.
     """

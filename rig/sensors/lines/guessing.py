@@ -1,4 +1,4 @@
-"""A guess at the columns of an unknown device, from ten seconds at rest and then in rotation by hand. Pure.
+"""A guess at the columns of an unknown device, from ten seconds at rest and then while a hand rotates it. Pure.
 
 Names in a header decide first. Otherwise the readings decide: time and sequence number increase steadily, an
 accelerometer's norm is that of gravity, and a gyroscope reads little at rest and much in rotation; the rotation of

@@ -1,4 +1,4 @@
-"""The host end of a device that prints lines: a thread that reads, and a named error for each fault.
+"""The host end of a device that sends lines of text: a thread that reads, and a named error for each fault.
 
 Nothing is sent to the device. It has no identification, so only its lines show that it is the configured one.
 """
@@ -108,7 +108,7 @@ class LinesDevice:
 
     @property
     def time_step_s(self) -> float:
-        """The step, s, of the device's printed time; 0 if it prints none."""
+        """The step, s, of the time in the device's lines; 0 if they contain none."""
         if self._section.time is None or not self._first_blocks:
             return 0.0
         printed = self.first_values[:, self._section.columns.index("time")]
@@ -127,7 +127,7 @@ class LinesDevice:
 
     # -- the first lines -----------------------------------------------------------------------------------------
     def _look(self, timeout_s: float) -> float:
-        """Return the sample rate by the device's own time, NaN if it prints none. Raise SensorError."""
+        """Return the sample rate by the device's own time, NaN if it sends none. Raise SensorError."""
         has_enough = self.own_port.wait(self._has_enough, timeout_s)
         if not has_enough and not self.counts.samples:
             raise self._why_no_sample(timeout_s)

@@ -1,4 +1,4 @@
-"""A configured device that prints lines, as a source of samples: its numbers are converted to counts."""
+"""A configured device that sends lines of text, as a source of samples: their numbers are converted to counts."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import closing
@@ -50,7 +50,7 @@ UNCONNECTED_LINES = FirstLines()  # before a connection, according to the sectio
 
 
 class LinesSource:
-    """A device that prints as configured; samples are passed on after `start`."""
+    """A device that sends its samples as lines of text, in the configured columns; they are passed on after `start`."""
 
     def __init__(
         self, name: str, section: SensorSection, on_samples: OnSamples, *, patience: Patience = PATIENCE
@@ -74,7 +74,7 @@ class LinesSource:
 
     @property
     def sensors(self) -> Mapping[str, RecordedSensor]:
-        """The device's sensors by name: gyroscope, magnetometer if printed, and sensors of one number."""
+        """The device's sensors by name: gyroscope, magnetometer if configured, and sensors of one number."""
         return {name: sensor for name, (sensor, _) in self._readers.items()}
 
     def start(self) -> None:
@@ -170,7 +170,7 @@ def _make_readers(
 def stamp_std_s(lines: LinesSection, rate_hz: float, step_s: float = 0.0) -> float | None:
     """Return the standard uncertainty of a sample's time on the clock that stamps it; None if it is negligible.
 
-    The device prints its time in steps of `step_s`. If this is 0, the step is the time's unit, or is neglected if the
+    The device sends its time in steps of `step_s`. If this is 0, the step is the time's unit, or is neglected if the
     unit is the second.
     """
     if lines.clock == "arrival":

@@ -20,7 +20,7 @@ _RESTARTED = "Check its supply and cable, and that its program prints nothing el
 
 
 def is_coarse(step_s: float, rate_hz: float) -> bool:
-    """Return whether the step of a printed time is a large part of the sample interval."""
+    """Return whether the step of a device's time is a large part of the sample interval."""
     return step_s * rate_hz > COARSE_STEP_FRACTION
 
 
@@ -30,7 +30,7 @@ class Stamper:
 
     - `section`, `rate_hz`: the configuration.
     - `where`: the device in messages.
-    - `step_s`: the step of the printed time; a coarse time is smoothed.
+    - `step_s`: the step of the device's time; a coarse time is smoothed.
     - `lost`: the number of samples that did not arrive.
     - `odd`: the number of samples left out because their time or number goes back or jumps by more than 2 s.
     """
@@ -113,7 +113,7 @@ class Stamper:
         return passed_s, steps
 
     def _unwrap_time_s(self, printed: Array, column: LineTimeSection) -> Array:
-        """Return the time, s, that passed before each row, across wraps of the printed time."""
+        """Return the time, s, that passed before each row, across wraps of the device's time."""
         unit_s, wrap = UNITS[column.unit].size, column.wrap
         last_time = printed[0] if self._last_time is None else self._last_time
         passed = np.diff(printed, prepend=last_time)

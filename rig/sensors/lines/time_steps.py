@@ -1,4 +1,4 @@
-"""The step of a device's printed time, from its digits or from the resolution of a single-precision number. Pure."""
+"""The step of a device's time, from its digits or from the resolution of a single-precision number. Pure."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ STEP_GROWTH = 2.0  # by which the step of a single-precision number grows if the
 
 
 def find_time_step_s(printed: Array, decimals: int, unit: str) -> float:
-    """Return the step, s, of printed times (n,) with `decimals` digits, also for later times of the same device.
+    """Return the step, s, of a device's times (n,) with `decimals` digits, also for later times of the same device.
 
     A time in single precision, with 24 bits, has the step of its last bit, regardless of the number of printed digits.
     """

@@ -115,8 +115,8 @@ class MavlinkSource:
     ) -> None:
         """Connect and set up.
 
-        Raise as `AutopilotLink` and `refusals` do; SensorError `autopilot_rate`, `autopilot_other_uid`,
-        `autopilot_several_imus`.
+        Raise SensorError `autopilot_rate`, `autopilot_other_uid`, `autopilot_several_imus`, and what `AutopilotLink`
+        and `refusals` raise.
         """
         self._on_samples = on_samples
         self._imus: dict[str, _ImuStream] = {

@@ -1,4 +1,4 @@
-"""The autopilots of the laboratory: their parameters, and their IMUs on the flange."""
+"""The autopilots of the simulated laboratory: their parameters, and their IMUs on the flange."""
 
 from rig.config.models import RigConfig
 from rig.config.world.autopilot import SimulatedAutopilotSection

@@ -1,1 +1,1 @@
-"""The emulated board as the laboratory mounts it: sensors, memory and serial line."""
+"""The emulated board as the simulated laboratory mounts it: sensors, memory and serial line."""

@@ -1,4 +1,4 @@
-"""The emulated board as the laboratory mounts it: the firmware image, and sensors that move with the flange."""
+"""The emulated board as the simulation mounts it: the firmware image, and sensors that move with the flange."""
 
 from collections.abc import Callable, Collection
 from functools import cache, partial

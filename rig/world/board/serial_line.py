@@ -44,7 +44,7 @@ class Device(Protocol):
 
 
 class SerialLine:
-    """The line between the host and a device of the laboratory; `device` returns None for a device without power.
+    """The line between the host and a simulated device; `device` returns None for a device without power.
 
     `host_baud`: the host's baud rate if the transport does not carry it; None if it equals the device's. A `silent`
     line loses everything. Each bit from the device is wrong with the probability `bit_error_rate`. In a tick, another

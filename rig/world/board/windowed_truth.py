@@ -24,7 +24,7 @@ Windows = Sequence[tuple[float, float]]
 
 
 class SimulatedTruth:
-    """The truth of all sensors of a laboratory, without noise; each value is a mean over windows (n, 2) of time, s.
+    """The truth of all simulated sensors, without noise; each value is a mean over windows (n, 2) of time, s.
 
     Rotation and gravity act on one axis after the other, so that oblique axes and mounting have no influence.
     """

@@ -1,4 +1,4 @@
-"""The KVH 1775s of the laboratory: their memories, and the instruments on the flange that use them."""
+"""The KVH 1775s of the simulated laboratory: their memories, and the instruments on the flange that use them."""
 
 from rig.config.models import RigConfig
 from rig.config.world.laboratory import SimulatedKvhSection, WorldSection
@@ -16,7 +16,7 @@ def build_kvh_mounts(config: RigConfig, world: WorldSection) -> dict[str, Instru
 
 
 def _mount(config: RigConfig, world: WorldSection, name: str) -> InstrumentMount:
-    """Return the place of one KVH 1775 in the laboratory. Raise Refused `kvh_settings`."""
+    """Return the mount of one simulated KVH 1775. Raise Refused `kvh_settings`."""
     sensor, simulated = config.sensors[name], world.sensors[name]
     section = simulated.kvh1775 or SimulatedKvhSection()
     try:

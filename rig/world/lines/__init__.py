@@ -1,1 +1,1 @@
-"""The simulated device that prints its samples as lines of text, on its own serial line."""
+"""The simulated device that sends its samples as lines of text, on its own serial line."""

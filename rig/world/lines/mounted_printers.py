@@ -1,4 +1,4 @@
-"""The devices on the flange that print lines of text."""
+"""The devices on the flange that send lines of text."""
 
 from rig.config.models import RigConfig
 from rig.config.world.laboratory import WorldSection
@@ -9,13 +9,13 @@ from rig.world.lines.printer import Printer
 
 
 def build_printer_mounts(config: RigConfig, world: WorldSection) -> dict[str, InstrumentMount]:
-    """Return the devices by sensor name."""
+    """Return the mounts of the devices that send lines of text, by sensor name."""
     names = sorted(name for name, sensor in config.sensors.items() if sensor.part == "lines")
     return {name: _mount(config, world, name) for name in names}
 
 
 def _mount(config: RigConfig, world: WorldSection, name: str) -> InstrumentMount:
-    """Return the place in the laboratory of the device that prints the lines of the sensor `name`."""
+    """Return the mount of the device that sends the lines of the sensor `name`."""
     sensor, simulated = config.sensors[name], world.sensors[name]
     section = simulated.lines or SimulatedLinesSection()
 
@@ -23,7 +23,7 @@ def _mount(config: RigConfig, world: WorldSection, name: str) -> InstrumentMount
         if sensor.lines is None or sensor.serial is None:
             raise ValueError(f"{name} prints no lines")
         prints = section.prints or sensor.lines
-        # It prints accelerations whether the rig reads them or not.
+        # It sends accelerations whether the rig reads them or not.
         truth = SensorTruth(sensor, simulated, time_s, accelerometer="ax" in prints.columns)
         magnetometer = mount_magnetometer(config, world, name)
         return Printer(

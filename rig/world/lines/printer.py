@@ -1,4 +1,4 @@
-"""The simulated device: it samples by its own oscillator and prints lines of formatted numbers.
+"""The simulated device: it samples by its own oscillator and sends lines of formatted numbers.
 
 It formats as C's and Python's `%.3f` do, one number after another, independently of the rig's parser.
 """
@@ -43,7 +43,7 @@ class PrinterFaults:
 
 
 class Printer:
-    """A device that prints its samples, switched on at the virtual time `time_s`, when its clock reads `uptime_s`.
+    """A device that sends lines of text, switched on at the virtual time `time_s`, when its clock reads `uptime_s`.
 
     - `motion_at`: its motion over time, rate in rad/s and specific force in g.
     - `field_at`: flux density in its axes over time, T; `magnetometer`: the errors of its reading.
@@ -64,7 +64,7 @@ class Printer:
         time_s: float,
         faulty: SimulatedFaultySection = NO_FAULTS,
     ) -> None:
-        """Switch the device on: it prints its boot text, then the columns of `prints`."""
+        """Switch the device on: it sends its boot text, then lines with the columns of `prints`."""
         self.faults = PrinterFaults()
         self.baud_rate = baud_rate
         self._section, self._prints, self._motion_at = section, prints, motion_at
@@ -155,7 +155,7 @@ class Printer:
 
 
 def _format_value(value: float, section: LineRateSection | LineAccelerationSection | LineFieldSection | None) -> str:
-    """Format a reading in SI units as the program prints it."""
+    """Format a reading in SI units as the device's program writes it."""
     if section is None:  # printed in SI units; the rig does not read it
         return f"{value:.{DEFAULT_DECIMALS}f}"
     decimals = DEFAULT_DECIMALS if section.decimals is None else section.decimals

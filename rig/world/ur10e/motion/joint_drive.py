@@ -109,7 +109,7 @@ class JointDrive:
 
 
 def build_drive(section: SimulatedDriveSection, seed: int) -> JointDrive:
-    """Return the drives of a simulated arm. The phases of the ripple are drawn by the laboratory's seed."""
+    """Return the drives of a simulated arm. The phases of the ripple are drawn with the simulated laboratory's seed."""
     random = Random(f"drive {seed}")
     orders = tuple(
         tuple(
