@@ -63,7 +63,7 @@ class LookedFile:
 def look_at(path: Path, stated: ColumnMap | None = None) -> LookedFile:
     """Return the contents of a file, according to its headings and numbers or to a `stated` map of its columns.
 
-    Raise Refused `bad_option` for a file of sweeps, and as `find_layout` does for a file that is not a table.
+    Raise Refused `bad_option` for a file of sweeps, and what `find_layout` raises for a file that is not a table.
     """
     if is_in_format(path):
         return _read_contents(LookedFile(path, None, None, {}), STANDARD_NAMES, has_readings=True, has_attitudes=True)

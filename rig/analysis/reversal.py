@@ -41,7 +41,7 @@ def reversals(runs: Sequence[tuple[str, Outcome]]) -> dict[str, MagnetometerReve
     """Separate bias and field of every magnetometer of the first run, from at least two named runs.
 
     Raise Refused `too_few_runs`, `no_magnetometer` if a run did not record or calibrate a magnetometer of the first
-    run, `runs_do_not_match` with the difference, and as `separate` does.
+    run, `runs_do_not_match` with the difference, and what `separate` raises.
     """
     if len(runs) < 2:
         raise Refused("too_few_runs", "one run cannot separate the bias from the arm's field", REMEDY)

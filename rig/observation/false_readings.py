@@ -91,8 +91,9 @@ def check_unwrapped(time_s: Array, readings: Array, rows: NDArray[np.intp], quan
 def _find_overflows(time_s: Array, axis: Array, narrowest: float) -> NDArray[np.intp]:
     """Return the indices (k,) of the readings (n,) before an overflow of the number that they are stored in.
 
-    A change of sign between two joined recordings looks similar. But before an overflow the readings rise towards the
-    end of the range, and go on rising after it, or return soon, because noise causes overflows in both directions.
+    A change of sign between two joined recordings looks similar. But before an overflow the readings rise towards one
+    end of the range. After it they rise on from the other end, or soon jump back, because noise makes a number at the
+    limit overflow in both directions.
     """
     none = np.zeros(0, dtype=np.intp)
     span, steps, steps_s = float(np.ptp(axis)), np.diff(axis), np.diff(time_s)

@@ -104,7 +104,7 @@ def observe_sensor(
     repeats, and the rests next to them. Raise Fault `incomplete_revolution`, `arm_states_lost`, `speed_slider`,
     `speed_not_constant`, `other_joint_moved`, `lost_samples`, `saturation`, `stuck_sensor`, `stuck_axis`, `wrong_axis`,
     `wrong_sign`, `wrong_unit`, `not_finite`, `time_base_not_found`, `board_clock_restarted`, `duplicated_samples`,
-    `impossible_times`, and as `dwell_readings` does.
+    `impossible_times`, and what `dwell_readings` raises.
     """
     stream = synchronize_stream(run.samples[sensor], run.sensors[sensor], motion)
     revolutions = list[Observation]()

@@ -135,8 +135,8 @@ def check_references(
 ) -> ConsistencyChecks:
     """Return the checks for contradictions within the readings of each accelerometer and magnetometer.
 
-    A check of a disturbed dwell or sweep is named like `gyro.acceleration_disturbed_dwell.13`, as for gyroscopes. If
-    `drifting`, the bias may drift.
+    A check of a disturbed dwell or sweep has the motion's index at the end of its name, as in
+    `gyro.acceleration_disturbed_dwell.13`. `drifting`: whether the bias may drift.
     """
     from rig.analysis.consistency.reference_contradictions import (
         ReferenceReadings,

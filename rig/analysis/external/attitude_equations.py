@@ -81,7 +81,7 @@ class Equations:
         return AttitudeReadings(self.means, self.variances, self.attitudes, nothing, std_rad, norm_known=True)
 
     def solve(self, method: Method) -> TriaxialSolution:
-        """Return the solution. Raise Fault `inverted_attitudes`, and as `solve_triaxial` does."""
+        """Return the solution. Raise Fault `inverted_attitudes`, and what `solve_triaxial` raises."""
         return solve_unless_inverted(self.attitudes, partial(self._solve, method), ["attitude_untrustworthy"])
 
     def _solve(self, method: Method, attitudes: Array) -> TriaxialSolution:

@@ -153,8 +153,8 @@ def _solve_placements(
 ) -> AttitudeCalibration:
     """Return the calibration from placements, with placement errors if the method models attitude errors.
 
-    Raise Fault `bias_jumped` or `scale_changed` if the sensor changed abruptly by more than U covers, and as
-    `Equations.solve` does.
+    Raise Fault `bias_jumped` or `scale_changed` if the sensor changed abruptly by more than U covers, and what
+    `Equations.solve` raises.
     """
     unplaced, moving = placements.unplaced, placements.left_out
     solution, laid = _solve(equations, method, placements), None

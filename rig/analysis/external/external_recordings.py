@@ -97,7 +97,7 @@ class ExternalResult:
 def solve_external(read: ExternalReadings, settings: RunSettings, estimator: str | None) -> ExternalResult:
     """Return the solution of readings whose motion a file describes; `estimator` None chooses one.
 
-    Raise Refused `unknown_estimator`, Fault as `average_sweeps` and `average_placements` do. If no quantity has a
+    Raise Refused `unknown_estimator`, and what `average_sweeps` and `average_placements` raise. If no quantity has a
     solution, raise the estimator's Fault, or `nothing_solved` with every reason if there are several.
     """
     samples = samples_in(read.readings, "the recording")

@@ -72,8 +72,8 @@ def _spell_time(time_s: float) -> str:
 def solve_turning(turning: Turning, window_s: float | None, *, any_mounting: bool) -> IncrementCalibration:
     """Return the gyroscope's matrix and bias, with windows of a given or an automatically chosen length.
 
-    Raise Fault `inverted_attitudes`, and as `gather`, `solve_known_increments`, `check_steady`, `check_rests_agree` and
-    `check_axes` do.
+    Raise Fault `inverted_attitudes`, and what `gather`, `solve_known_increments`, `check_steady`, `check_rests_agree`
+    and `check_axes` raise.
     """
     solved = solve_unless_inverted(
         turning.attitudes, lambda attitudes: _solve(replace(turning, attitudes=attitudes), window_s), CONTRADICTIONS

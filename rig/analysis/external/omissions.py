@@ -98,7 +98,7 @@ def notes_on_changes(data: ExternalData) -> Iterator[str]:
 
 
 def notes_on_turns(data: ExternalData, solution: Estimate) -> Iterator[str]:
-    """Yield a note if rows with an angle were solved by their mean speed."""
+    """Yield a note if rows with an angle were solved from their mean speed."""
     if not data.by_mean:
         return
     why = "the body moves before or after them"

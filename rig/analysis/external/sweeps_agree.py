@@ -94,10 +94,10 @@ def sweep_errors(solution: VectorSolution, data: ExternalData) -> SweepErrors | 
     rate_variance, axis_variance = sizes.median_variances
 
     def inflate(to_values: Array, dof: float, noise_dof: float) -> Array:
-        """Return the covariance (q, q), without noise, of values with derivatives `to_values` (q, 12) to F and c.
+        """Return the covariance (q, q), without noise, of values whose derivatives by F and c are `to_values` (q, 12).
 
-        The covariance is for errors of the median size, but scaled value by value, so that the expanded uncertainty
-        together with the noise is U over the posterior distribution of the sizes.
+        It is that of motion errors of the median size, scaled for each value so that, together with the noise, it gives
+        the expanded uncertainty that follows from the posterior distribution of the errors' sizes.
         """
         by_noise, of_rate, of_axis, by_wrong = (
             to_values @ effects @ effects.T @ to_values.T for effects in (noise, by_rate, by_axis, wrong)

@@ -51,7 +51,7 @@ def verify(
       of `after`, if estimated.
 
     Raise Fault `sensor_missing`, `wrong_mode`, `nothing_to_compare`, `incomplete_verification`, `no_overlap`,
-    `different_clocks`, and as `fit_rotation` does.
+    `different_clocks`, and what `fit_rotation` raises.
     """
     if not after:
         raise Fault("nothing_to_compare", "no sweep was finished in the recording", "Let the whole movement finish")

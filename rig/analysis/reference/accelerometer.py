@@ -117,8 +117,8 @@ def calibrate_accelerometers(
 ) -> dict[str, AccelerometerResult]:
     """Calibrate every sensor whose accelerations were recorded in dwells; align it with its gyroscope.
 
-    Raise Fault `not_all_attitudes`, `second_order_not_seen`, `swapped_axes`, `mirrored_axis`, `wrong_mounting`, and as
-    `solve_imu` and `solve_triaxial` do.
+    Raise Fault `not_all_attitudes`, `second_order_not_seen`, `swapped_axes`, `mirrored_axis`, `wrong_mounting`, and
+    what `solve_imu` and `solve_triaxial` raise.
     """
     if not settings.planned_dwells:
         return {}

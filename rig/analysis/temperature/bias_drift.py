@@ -85,7 +85,8 @@ class DwellMean:
 def estimate_bias_drifts(recordings: Sequence[ObservedRun], settings: RunSettings) -> Drifts:
     """Return the drift of every sensor to calibrate, over all recordings of a run, by its finished repeats.
 
-    Raise Fault `not_all_attitudes` with fewer than two finished repeats, and as `solve_triaxial` does for the first.
+    Raise Fault `not_all_attitudes` with fewer than two finished repeats, and what `solve_triaxial` raises for the
+    first.
     """
     site = settings.site
     repeats: defaultdict[int, dict[tuple[float, ...], int]] = defaultdict(dict)

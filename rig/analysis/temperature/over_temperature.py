@@ -53,7 +53,7 @@ class CorrectedRuns:
 def correct_recordings(recordings: Sequence[ObservedRun], settings: RunSettings, reference_c: float) -> CorrectedRuns:
     """Return the recordings with rates and dwells' accelerations as at `reference_c`, for the sensors to calibrate.
 
-    Raise Fault `temperature_not_recorded`, and as `fit_over_temperature` does.
+    Raise Fault `temperature_not_recorded`, and what `fit_over_temperature` raises.
     """
     environment = find_environment(recordings, settings)
     runs, polynomials = list(recordings), dict[str, dict[Quantity, OverTemperature]]()

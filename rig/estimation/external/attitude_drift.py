@@ -88,7 +88,7 @@ class Fixes:
 
 @dataclass(frozen=True, slots=True)
 class AttitudeSamples:
-    """A gyroscope's readings, the reference's `fixes`, and a mask `kept` (k,) of the samples in fixes that are used."""
+    """A gyroscope's readings, the reference's `fixes`, and a mask `kept` (k,), false for attitude samples left out."""
 
     time_s: Array
     readings: Array

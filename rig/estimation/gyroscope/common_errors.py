@@ -82,6 +82,7 @@ def solve_with_common_errors(
         noise = np.array([np.diag(axis) for axis in (variances + speed_noise**2).T]) + shared  # (3, N, N)
         error_patterns = effects(matrix)
         gain, covariance = _gain(design, error_patterns, noise)
+        # The gain applies to the means themselves, because it maps what F, c and G explain to zero.
         sizes = np.einsum("pni,ni->p", gain, means)
         errors = CommonErrors(sizes, covariance, np.einsum("p,pni->ni", sizes, error_patterns))
         return speed_noise, error_patterns, gain, errors
@@ -92,12 +93,15 @@ def solve_with_common_errors(
         solution = solve(errors.readings_rad_s)
         speed_noise, error_patterns, gain, errors = estimate(solution.matrix)
     solution = solve(errors.readings_rad_s)
+    # The errors of a sweep's speed are left out here: the axes share them, and `_add_covariances` adds them.
     noise = np.array([np.diag(axis) for axis in variances.T]) + shared
     _, inverse = regress(design, means, variances + speed_noise**2, shared_covariance_rad2_s2)
     shifts = np.einsum("ipn,kni->ipk", inverse, error_patterns)  # changes of the coefficients, per standard deviation
+    # The coefficients are inverse (m − B e), and e is gain m. So their derivative by the means m has two parts.
     total_gain = -np.einsum("ipk,knj->ipjn", shifts, gain)
     for axis in range(3):
         total_gain[axis, :, axis] += inverse[axis]
+    # Prediction leaves (1 − gain B) e of the errors e.
     remaining = shifts @ (np.eye(len(error_patterns)) - np.einsum("kni,lni->kl", gain, error_patterns))
     return _add_covariances(solution, total_gain, remaining, noise, speed_noise), errors
 

@@ -65,8 +65,8 @@ class Increments:
     """The body's rotation between w pairs of instants.
 
     - `rotations` (w, 3, 3): each maps body coordinates at the end to those at the start.
-    - `jacobian` (w, 3, 12): J. A change δθ of F (row by row) and b makes a rotation exp(J δθ) × rotation, in body
-      coordinates at the start.
+    - `jacobian` (w, 3, 12): J. A change δθ of F (row by row) and b turns `rotations` R into exp(J δθ) R; J is in
+      body coordinates at the start.
     """
 
     rotations: Array

@@ -109,8 +109,8 @@ class MixedModel:
     def evaluate_posterior(self, std: Array) -> float:
         """Return the log-posterior density of ln σ (k,).
 
-        The density lacks a constant, which is the same for a model of the same observations with further columns whose
-        prior precision is 1. So the posteriors of these models may be compared.
+        The density lacks an additive constant. It does not change if columns with prior precision 1 are added to the
+        design, so models of the same observations that differ only in such columns can be compared.
         """
         return self._whiten(std)[-1] + self._log_prior(np.log(std))
 

@@ -1,4 +1,4 @@
-"""A recording by hand, segmented into rests and moves by its readings alone.
+"""The recording of a session by hand, segmented into rests and moves by its readings alone.
 
 Rests are found by `rig.observation.by_hand.rests`; a move extends from one rest to the next, and a little into both,
 because the body still rocks or already moves there.

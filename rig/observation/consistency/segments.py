@@ -135,7 +135,7 @@ class _Division:
 
     @property
     def averages(self) -> Array:
-        """The weights (p, m) of an unweighted mean of each segment."""
+        """The weights (p, m) that average each segment's samples: equal for all samples of the segment."""
         return mean_weights(self.groups, self.groups[:, :0])
 
     def subtract_means(self, values: Array, weights: Array) -> Array:

@@ -78,7 +78,7 @@ def read_sample_table(
 
     `mapped` describes a table whose columns have other names. Rows of a table with a blank cell are left out; if `only`
     names sensors, blank cells of other sensors do not matter. Raise Refused `no_file`, `wrong_columns`, `wrong_unit`,
-    `not_a_number`, `blank_cells`, and as `readings_in` does.
+    `not_a_number`, `blank_cells`, and what `readings_in` raises.
     """
     readings = readings_in(path)
     if readings is not None:

@@ -67,8 +67,8 @@ def origin_of(times_s: Iterable[float]) -> int:
 
 
 def since(cell: str, factor: float, origin_s: int) -> float:
-    """Return the exact time in a cell, in units of `factor` s, counted from `origin_s`. Raise as `seconds_of` does."""
-    return float(seconds_of(cell, factor) - origin_s)
+    """Return the seconds from `origin_s` to a cell's time, whose unit is `factor` s. Raise as `seconds_of` does."""
+    return float(seconds_of(cell, factor) - origin_s)  # subtracted before it is rounded
 
 
 def unit_of(cell: str) -> Unit | None:

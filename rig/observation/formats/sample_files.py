@@ -92,7 +92,7 @@ def attitudes_in(path: Path) -> Columns | None:
     """Return the attitudes in a file, each with a short interval about its time; None for a text table.
 
     The file has a format of `FORMATS`; the intervals are those of `rows_around`. Raise Refused `no_attitudes` if the
-    file holds none, and as `readings_in` does.
+    file holds none, and what `readings_in` raises.
     """
     form = _format(path)
     if form is None:

@@ -242,10 +242,11 @@ def _spread_stalled(log: _UnorderedLog) -> _UnorderedLog:
         late_s = ahead_s - interval_s * np.arange(1, len(ahead_s) + 1)
         caught_up = int(np.argmax(late_s <= late_s.min() + MAX_DELAY * interval_s))
         missing = max(round(float(late_s[caught_up]) / interval_s), 0)  # readings that never came
+        # No stall: the first reading after it is on time, too many never came, or the one before it waited itself.
         if not caught_up or missing > (1 - MIN_DELAYED_FRACTION) * steps_s[last] / interval_s or waited[last]:
             continue
         late = slice(last + 1, last + 1 + caught_up)
-        if missing * interval_s > usual_s + MAX_DELAY * interval_s:
+        if missing * interval_s > usual_s + MAX_DELAY * interval_s:  # more than a late reading explains
             lost[late] = True
             continue
         waited[late] = True
