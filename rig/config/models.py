@@ -34,7 +34,7 @@ HOME_POSES = "`[0, -90, 90, -90, -90, 0]`, of a `ur3e` `[0, -90, 90, -90, -60, 0
 
 
 class TurnerSection(Section):
-    """The base of every turner's section, without any common key. A kind of turner adds its own keys."""
+    """The base class of all turners' sections, which share no key. A kind of turner adds its own keys."""
 
     @property
     def address(self) -> str:
@@ -154,7 +154,7 @@ class BoardSection(Section):
 
 
 class ProcedureSection(Section):
-    """The base of every procedure's section: its name. A procedure adds its own keys and states what else it needs."""
+    """The base class of all procedures' sections. A procedure adds its own keys and states what else it needs."""
 
     name: str = Field(description="which procedure is run")
 

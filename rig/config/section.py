@@ -1,4 +1,4 @@
-"""The base of all sections of a configuration file: common checks and types of values."""
+"""The base class of all sections of a configuration file, with common checks and types of values."""
 
 import ipaddress
 import re

@@ -308,7 +308,7 @@ class GyroscopeEntry(Entry):
     - earth_rate: the Earth's rate, or the reason why it is missing; null if it was not requested.
     - detection_limits: faults during the recording, and the sizes from which they are detected.
     - in_attitudes: the solution in attitudes, only if a file gave these; range and temperature are then null.
-    - by_angles: only if a file's sweeps were solved by the angle turned. by_hand: only if a hand turned the sensor.
+    - by_angles: only if a file's sweeps were solved from the angle turned. by_hand: only if a hand turned the sensor.
     """
 
     part: str

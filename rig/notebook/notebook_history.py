@@ -127,7 +127,7 @@ def calibrations(
     """Return all calibrations of a serial number, of a part, or of all sensors, as `rig history` lists them.
 
     `history` is a file or a URL, by default RIG_HISTORY or, if not set, the user's own. Raise Refused `not_in_history`
-    if the history has no calibration of this serial number, and as `open_history` does.
+    if the history has no calibration of this serial number, and what `open_history` raises.
     """
     address = None if history is None else str(history)
     with open_history(default_history_address(address) or resolve_address(None)) as opened:

@@ -131,7 +131,7 @@ def solve(run: Run | str | Path, estimator: str | None = None, **changes: float)
     """Solve and judge a run, as `rig solve` does, by `estimator` or that of its procedure.
 
     `run` is loaded if it is a path. `changes` are thresholds or limits to use instead of the recorded ones:
-    `max_lost_fraction=0.01`. Raise Fault and Refused as `rig solve` does, and as `load`; `unknown_setting` lists the
+    `max_lost_fraction=0.01`. Raise Fault and Refused as `rig solve` and `load` do; Refused `unknown_setting` lists the
     possible changes.
     """
     run = run if isinstance(run, Run) else load(run)

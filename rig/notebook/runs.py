@@ -95,7 +95,7 @@ def load(path: str | Path, script: str | Path | None = None) -> Run:
     """Load a run folder or a run file, without executing foreign code in the folder.
 
     `latest` is your last run. `script`, the script of another user's recording, is executed. Raise Refused `no_run`,
-    `no_latest_run`, and as `read_run` and `load_script` do.
+    `no_latest_run`, and what `read_run` and `load_script` raise.
     """
     return Run(open_run(meant_run(path), None if script is None else Path(script)))
 

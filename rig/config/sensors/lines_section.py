@@ -1,4 +1,4 @@
-"""The section `lines` of a sensor: the columns of the lines that a device prints, one sample in each."""
+"""The section `lines` of a sensor: the columns of the lines that a device sends, one sample in each."""
 
 import re
 from collections import Counter

@@ -53,7 +53,7 @@ Gradient = Annotated[float, Field(ge=-1000, le=1000)]
 
 
 class WorldSiteSection(Section):
-    """The site of the laboratory, and the attitude of the arm's base in it."""
+    """The site of the simulated laboratory, and the attitude of the arm's base in it."""
 
     latitude_deg: float | None = Field(
         default=None, ge=-90, le=90, description="geographic latitude; without it the Earth does not turn"

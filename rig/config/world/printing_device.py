@@ -1,4 +1,4 @@
-"""The section of a simulated device that prints lines: its clock, its other lines, its losses."""
+"""The section of a simulated device that sends lines of text: its clock, its other lines, its losses."""
 
 from typing import Annotated
 

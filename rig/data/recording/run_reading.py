@@ -17,7 +17,7 @@ LIBRARIES_BYTES = 1 << 29  # memory: more than the libraries and the structures 
 def begin_reading(path: Path, timeout_s: float | None = None) -> ReadingTask:
     """Begin to read a run file (`rig.data.recording.extract`), within `timeout_s` (None: by its size).
 
-    Raise Refused `no_run_file`, and as `ReadingTask` does.
+    Raise Refused `no_run_file`, and what `ReadingTask` raises.
     """
     stored = _measure_stored_bytes(path)
     if timeout_s is None:

@@ -112,7 +112,7 @@ class ComparedResult:
 
     @property
     def moved(self) -> tuple[int, ...]:
-        """The calibrations, by number, with a value shifted, or a U grown, by more than `of_u` of the stated U."""
+        """The calibrations, by number, with a value shifted, or a U grown, by more than `of_u` × stated U."""
         return tuple(number for number, moves in self.moves.items() if moves and moves[0].size > self.of_u)
 
     @property
@@ -140,7 +140,7 @@ class ComparedResult:
 
 @dataclass(frozen=True, slots=True)
 class RecomputeOutcome:
-    """All comparisons in the order of time; values that moved by more than `of_u` of the stated U count as changed."""
+    """All comparisons in the order of time. A value counts as changed if it moved by more than `of_u` × stated U."""
 
     of_u: float
     compared: tuple[ComparedResult, ...]

@@ -20,8 +20,8 @@ from rig.history.storage.sqlite_file import history_is_there, new_file_in_place
 def engine_of(address: HistoryAddress) -> Iterator[Engine]:
     """Yield the engine of a history, migrated and ready; a process has one engine for each file.
 
-    Raise Refused `missing_extra`, `history_gone`, `history_exchanged`, and as `bring_up_to_date` and `history_is_there`
-    do; SQLAlchemyError and OSError.
+    Raise SQLAlchemyError, OSError, Refused `missing_extra`, `history_gone`, `history_exchanged`, and what
+    `bring_up_to_date` and `history_is_there` raise.
     """
     continuity.refuse_another_file(address)
     where = address.where

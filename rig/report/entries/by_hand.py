@@ -30,7 +30,7 @@ UNITS = {"face_repeatability_rad": 1e3, "closure_error_rad": 1e3, "angle_fractio
 
 
 def hand_entry(solution: "HandSolution") -> ByHandEntry:
-    """Return the entry of a solution by hand."""
+    """Return the entry of the solution of a session by hand."""
     return ByHandEntry(
         rests=tuple(entry(RestByHandEntry, rest) for rest in solution.rests),
         moves=tuple(entry(MoveByHandEntry, move) for move in solution.moves),

@@ -1,4 +1,4 @@
-"""Entries of `result.json` for external readings, solved by the attitudes or angles of a file."""
+"""Entries of `result.json` for external readings, whose motion a file gives as attitudes or angles."""
 
 from typing import Any
 

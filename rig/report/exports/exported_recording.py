@@ -86,7 +86,7 @@ class WithMotion:
 
 @dataclass(frozen=True, slots=True)
 class ReadingsAlone:
-    """Readings without a recorded motion, by hand or from files, with the clock of their times."""
+    """Readings without a recorded motion, from a session by hand or from files, with the clock of their times."""
 
     run: RunData
 

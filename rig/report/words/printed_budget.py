@@ -20,7 +20,7 @@ STD_DIGITS = 3  # of a combined standard uncertainty: its parts are printed to t
 
 @dataclass(frozen=True, slots=True)
 class BudgetColumn:
-    """The uncertainty of one value, whose `index` is among kx ky kz bx by bz, with numbers in `unit`."""
+    """The printed uncertainty, in `unit`, of one value: number `index`, from 0, of kx ky kz bx by bz."""
 
     index: int
     unit: str
@@ -76,7 +76,7 @@ def lay_out_budget(budget: BudgetEntry, scale: Sequence[float], bias: DisplayUni
 
 
 def find_printed_indices(budget: BudgetEntry, scale: Sequence[float]) -> tuple[int, int]:
-    """Return the indices of the printed scale factor and bias, among kx ky kz bx by bz."""
+    """Return the positions of the printed scale factor and bias in kx ky kz bx by bz."""
     return int(np.argmax(np.divide(budget.expanded[:3], scale))), 3 + int(np.argmax(budget.expanded[3:]))
 
 
