@@ -4,7 +4,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from rig.data.quantity import FIELD
@@ -17,11 +16,11 @@ from rig.observation.average import steps_of
 from rig.observation.observed_run import ObservedRun, one_clock
 from rig.observation.reference.dwell_acceleration import DwellReading, check_complete
 from rig.observation.statistics.mean import Mean, StaticReading, even_mean
+from rig.observation.stuck_check import check_noise
 from rig.observation.windows import Window, inside, iterate_rests
 
 HOME_TOLERANCE_RAD = 1e-3  # angle from home, of any joint
 SETTLING_S = 0.2  # time removed at either end of a rest
-MIN_NOISE_STEPS = 1.0  # median noise of an axis in all dwells: with this, one value in a whole dwell is no chance
 
 
 def find_companion(recording: ObservedRun, name: str) -> str | None:
@@ -56,28 +55,10 @@ def field_readings(recording: ObservedRun, name: str, thresholds: ObservationThr
         )
         for dwell in recording.sensors[other].dwells
     )
-    _check_frozen(recording, name)
+    sensor, samples = recording.run.sensors[name], recording.run.samples[name]
+    step_counts = steps_of(samples, sensor, FIELD).units / sensor.channel(FIELD).unit_per_count
+    check_noise(name, [(dwell, counts) for dwell, counts, _ in read_field_in_dwells(recording, name)], step_counts)
     return field_in_dwells
-
-
-def _check_frozen(recording: ObservedRun, name: str) -> None:
-    """Raise Fault `stuck_axis` if an axis has one value in a whole dwell, but noise in most dwells."""
-    channel = recording.run.sensors[name].channel(FIELD)
-    dwells = [(dwell, counts) for dwell, counts, _ in read_field_in_dwells(recording, name)]
-    if not dwells:
-        return
-    step_counts = (
-        steps_of(recording.run.samples[name], recording.run.sensors[name], FIELD).units / channel.unit_per_count
-    )
-    noisy = np.median([counts.std(axis=0) for _, counts in dwells], axis=0) >= MIN_NOISE_STEPS * step_counts
-    for dwell, counts in dwells:
-        for axis in np.flatnonzero(noisy & (np.ptp(counts, axis=0) == 0)):
-            raise Fault(
-                "stuck_axis",
-                f"in dwell {dwell.index} ({dwell.name}) the {'xyz'[axis]} axis of {name} repeats one reading "
-                f"{len(counts)} times; in most dwells it has noise",
-                "Check the sensor and its supply, then repeat the run; if it stays, replace the sensor",
-            )
 
 
 def field_mean(run: RunData, name: str, time_s: Array, dwell: DwellReading, thresholds: ObservationThresholds) -> Mean:

@@ -2,8 +2,10 @@
 
 from collections.abc import Collection, Sequence
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig.data.quantity import Quantity
 from rig.data.recording.settings import Site
@@ -17,6 +19,7 @@ MAX_BIAS_CHANGE_RATIO = 0.5  # to the slowest sweep's speed, from rest to rest
 MIN_TURN_FRACTION = 0.5  # of gravity: the difference between two consecutive attitudes that is judged
 MIN_SENSED_FRACTION = 0.05  # of the expected difference; readings in g that are declared as m/s² show twice as much
 MIN_NOISE_RATIO = 0.01  # to the noise of the other axes
+MIN_NOISE_STEPS = 1.0  # of an axis, the median of its dwells: with so much, one value in a whole dwell is no chance
 REMEDY = "Check the sensor's supply and its bus wiring, then repeat the run"
 
 
@@ -54,6 +57,22 @@ def check_dwells(dwells: Sequence[DwellReading], site: Site) -> None:
         sensed_m_s2 = float(np.linalg.norm(one.reading.mean - other.reading.mean))
         if differ > MIN_TURN_FRACTION and sensed_m_s2 < MIN_SENSED_FRACTION * differ * site.gravity_m_s2:
             raise Fault("stuck_sensor", f"the accelerometer reads the same in {one.name} and {other.name}", REMEDY)
+
+
+def check_noise(name: str, dwells: Sequence[tuple[DwellReading, NDArray[Any]]], step_counts: Array) -> None:
+    """Raise Fault `stuck_axis` if an axis has one value in a whole dwell, but noise in most dwells.
+
+    Each dwell has the raw counts (n, 3) of the sensor `name`; `step_counts` (3,) are the steps of its readings.
+    """
+    noise_counts = np.median([counts.std(axis=0) for _, counts in dwells], axis=0) if dwells else np.zeros(3)
+    for dwell, counts in dwells:
+        for axis in np.flatnonzero((noise_counts >= MIN_NOISE_STEPS * step_counts) & (np.ptp(counts, axis=0) == 0)):
+            raise Fault(
+                "stuck_axis",
+                f"in dwell {dwell.index} ({dwell.name}) the {'xyz'[axis]} axis of {name} repeats one reading "
+                f"{len(counts)} times; in most dwells it has noise",
+                "Check the sensor and its supply, then repeat the run; if it stays, replace the sensor",
+            )
 
 
 def check_reads(readings: Array, quantity: Quantity) -> None:

@@ -10,6 +10,7 @@ The residuals of the readings, without lines and rate, are the noise, which is u
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.mean_weights import mean_weights
@@ -88,7 +89,7 @@ def turn_mean(readings: Array, steps: Steps, turn: SampledTurn) -> tuple[Mean, A
     vibration = waves(lines.cycles, turn.fraction, turn.sidebands)
     weights = mean_weights(ones, np.column_stack([turn.regressors, lines.rate, vibration]))
     added = np.zeros(3)
-    is_slow = np.repeat(lines.cycles < SLOW_CYCLES, column_count(turn.sidebands))
+    is_slow = slow_columns(lines.cycles, turn.sidebands)
     if is_slow.any():
         nuisance = np.column_stack([turn.regressors, lines.rate, vibration[:, ~is_slow]])
         without_slow = mean_weights(ones, nuisance)
@@ -119,18 +120,24 @@ def _slow_line_variance(readings: Array, turn: SampledTurn, slow: Array, change:
     """
     without_ripple = fit_residuals(np.column_stack([whole(readings), turn.uneven_rad_s]), readings)
     residuals = fit_residuals(explained, readings)
-    return np.maximum((change @ without_ripple) ** 2, _line_variance(slow, change, residuals))
+    return np.maximum((change @ without_ripple) ** 2, line_variance(fit_columns(slow, residuals), change @ slow))
 
 
-def _line_variance(slow: Array, weights: Array, residuals: Array) -> Array:
-    """Return the variance (3,) of a mean with weights (n,) due to slow columns (n, k) fitted to residuals (n, 3).
+def line_variance(sizes: Array, means: Array) -> Array:
+    """Return the variance (3,) that spectral lines add to a mean, from the fitted `sizes` (k, 3) of their columns.
 
-    Only the lines' amplitude is used, because with some phases even a large line hardly changes the mean.
+    `means` (k,) are the columns' means with the weights of that mean. Only the lines' amplitude is used, because with
+    some phases even a large line hardly changes the mean.
     """
-    powers = (fit_columns(slow, residuals) ** 2).reshape(-1, 2, 3).sum(axis=1)
-    kept = ((weights @ slow) ** 2).reshape(-1, 2).sum(axis=1)
+    powers = (sizes**2).reshape(-1, 2, 3).sum(axis=1)
+    kept = (means**2).reshape(-1, 2).sum(axis=1)
     variance: Array = kept @ powers / 2
     return variance
+
+
+def slow_columns(cycles: Array, sidebands: int) -> NDArray[np.bool_]:
+    """Return a mask (k,) of the columns of spectral lines slower than `SLOW_CYCLES`, as `waves` makes columns."""
+    return np.repeat(cycles < SLOW_CYCLES, column_count(sidebands))
 
 
 def _find_turn_lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines:
@@ -159,7 +166,7 @@ def _find_turn_lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines
     ripple = find_lines(ripple_rate, search, fraction=turn.fraction)
     columns = waves(ripple, turn.fraction, ENCODER_SEARCH.sidebands)
     sizes = fit_columns(columns, ripple_rate)
-    fast = np.repeat(ripple >= SLOW_CYCLES, column_count(ENCODER_SEARCH.sidebands))
+    fast = ~slow_columns(ripple, ENCODER_SEARCH.sidebands)
     slow = ripple_rate - columns[:, fast] @ sizes[fast]
     smooth = _find_slow_ripple(slow, turn.fraction)
     late = _changes(smooth) if turn.closed else none  # over an arc it resembles encoder errors

@@ -50,30 +50,28 @@ class _RecentReadings:
         scatters: list[float] = np.sqrt(np.var(newest, axis=1).mean(axis=1))[::-1].tolist()
         return scatters
 
-    def over_rest(self) -> float | None:
-        """Return the ratio of the newest scatter to that at rest, or None with too few readings."""
-        scatters = self.find_scatters_counts(1)
-        if not scatters or not self.at_rest_counts:
-            return None
-        return scatters[0] / max(*self.at_rest_counts, MIN_SCATTER_COUNTS)
-
-    @property
-    def settled(self) -> bool:
-        """Whether the readings scatter as at rest, or more if their scatter no longer decreases."""
-        ratio = self.over_rest()
-        if ratio is None:
-            return False
-        if ratio <= MAX_QUIET_RATIO:
-            return True
-        scatters = self.find_scatters_counts(2 * LONG_SPANS)
-        return (ratio <= MAX_STEADY_RATIO and _is_steady(scatters, 1, MIN_STEADY_DECREASE)) or (
-            ratio <= MAX_LONG_STEADY_RATIO and _is_steady(scatters, LONG_SPANS, MIN_LONG_STEADY_DECREASE)
-        )
+    def over_rest(self) -> list[float]:
+        """Return the ratios of the newest scatters to that at rest, the newest first; empty with too few readings."""
+        if not self.at_rest_counts:
+            return []
+        at_rest_counts = max(*self.at_rest_counts, MIN_SCATTER_COUNTS)
+        return [scatter / at_rest_counts for scatter in self.find_scatters_counts(2 * LONG_SPANS)]
 
 
-def _is_steady(scatters: Sequence[float], spans: int, least: float) -> bool:
+def _has_settled(ratios: Sequence[float]) -> bool:
+    """Return whether readings scatter as at rest, or more if their scatter (`_RecentReadings.over_rest`) is steady."""
+    if not ratios:
+        return False
+    return (
+        ratios[0] <= MAX_QUIET_RATIO
+        or (ratios[0] <= MAX_STEADY_RATIO and _is_steady(ratios, 1, MIN_STEADY_DECREASE))
+        or (ratios[0] <= MAX_LONG_STEADY_RATIO and _is_steady(ratios, LONG_SPANS, MIN_LONG_STEADY_DECREASE))
+    )
+
+
+def _is_steady(ratios: Sequence[float], spans: int, least: float) -> bool:
     """Return whether the mean scatter of the newest spans is at least this fraction of that of as many before."""
-    newest, before = scatters[:spans], scatters[spans : 2 * spans]
+    newest, before = ratios[:spans], ratios[spans : 2 * spans]
     return len(before) == spans and sum(newest) >= least * sum(before)
 
 
@@ -115,4 +113,5 @@ class Settling:
     def find_unsettled(self) -> dict[str, float | None]:
         """Return the unsettled sensors by name: their scatter relative to that at rest, None with too few readings."""
         with self._lock:
-            return {watched.name: watched.over_rest() for watched in self._watched.values() if not watched.settled}
+            over_rest = {watched.name: watched.over_rest() for watched in self._watched.values()}
+        return {name: next(iter(ratios), None) for name, ratios in over_rest.items() if not _has_settled(ratios)}

@@ -4,7 +4,7 @@ The mean reading of such a rest differs from that of the rests before and after.
 rest, so the fit explains the difference by a bias that jumps and returns, and overestimates the bias' random walk.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from itertools import product
 
 import numpy as np
@@ -40,11 +40,16 @@ def find_creeping_rests(fit: GraphFit) -> tuple[int, ...]:
         if not distances.any():
             return ()
         left_out.append(int(np.argmax(distances)))
-        rows = [row for row in fit.factors if row.kind != REST or row.index not in left_out]
+        rows = _leave_out_rests(fit.factors, left_out)
         if explains(rows):
             is_jump = any(explains(rows_with_jump) for rows_with_jump in _allow_jumps(fit.factors, left_out))
             return () if is_jump else tuple(sorted(left_out))
     return ()
+
+
+def _leave_out_rests(factors: Sequence[Factor], rests: Collection[int]) -> list[Factor]:
+    """Return the factors without the readings in the `rests`."""
+    return [row for row in factors if row.kind != REST or row.index not in rests]
 
 
 def _allow_jumps(factors: Sequence[Factor], rests: Sequence[int]) -> Iterator[list[Factor]]:
@@ -53,12 +58,8 @@ def _allow_jumps(factors: Sequence[Factor], rests: Sequence[int]) -> Iterator[li
     The other ones of these rests are left out.
     """
     for rest, first in product(rests, (-1, 0)):
-        others = {*rests} - {rest}
-        yield [
-            row
-            for row in factors
-            if not (row.kind == REST and row.index in others) and not (row.kind == WALK and row.index == rest + first)
-        ]
+        kept = _leave_out_rests(factors, {*rests} - {rest})
+        yield [row for row in kept if row.kind != WALK or row.index != rest + first]
 
 
 def _distances_from_neighbours(times_s: Array, biases: Array, left_out: Sequence[int]) -> Array:

@@ -138,7 +138,8 @@ class MixedModel:
         for begin in sorted(begun, key=lambda begin: begin.value):
             if begin.value < likely and not begin.joins:
                 ascent = self._climb(begin.point, ascents)
-                ascents += [] if ascent.joins else [ascent]
+                if not ascent.joins:
+                    ascents.append(ascent)
         ascents.sort(key=lambda ascent: ascent.value)
         distinct: list[Array] = []
         for ascent in ascents:
@@ -147,9 +148,7 @@ class MixedModel:
                 distinct.append(ascent.point)
         return np.exp(distinct)
 
-    def _climb(
-        self, logarithms: Array, earlier: Sequence["_Ascent"] = (), most_steps: int = MAX_NEWTON_STEPS
-    ) -> "_Ascent":
+    def _climb(self, logarithms: Array, earlier: Sequence[_Ascent] = (), most_steps: int = MAX_NEWTON_STEPS) -> _Ascent:
         """Climb from `logarithms` (k,) of the standard deviations to a maximum of the posterior.
 
         The search ends early if it joins an `earlier` ascent. The method is Newton's in a trust region, and the
@@ -166,18 +165,18 @@ class MixedModel:
             "options": {"gtol": GRADIENT_TOLERANCE, "maxiter": most_steps, "max_trust_radius": MAX_STEP},
         }
         path: list[tuple[Array, float]] = []
-        joins = False
+
+        def joins(point: Array) -> bool:
+            return any(ascent.passes(point) for ascent in earlier)
 
         def follow(intermediate_result: "OptimizeResult") -> None:
-            nonlocal joins
             path.append((intermediate_result.x.copy(), float(intermediate_result.fun)))
-            joins = any(ascent.passes(intermediate_result.x) for ascent in earlier)
-            if joins:
+            if joins(intermediate_result.x):
                 raise StopIteration
 
         reached: OptimizeResult = minimize(x0=logarithms, callback=follow, **newton)
         ridge = [point for point, value in path if value < reached.fun + RIDGE_DROP]
-        return _Ascent(reached.x, float(reached.fun), ridge, joins)
+        return _Ascent(reached.x, float(reached.fun), ridge, joins(reached.x))
 
     def causes(self, std: Array, fit: MixedFit) -> list[Array]:
         """Return the parts (p, p) of θ's covariance that are due to C₀, each variance component, and the prior of θ."""

@@ -11,15 +11,14 @@ window, and the board's average must agree with the result.
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rig.data.recording.recorded_events import BoardObserved
 from rig.estimation.arrays import Array
 from rig.observation.average import Stream
 from rig.observation.observe import Observation
 from rig.observation.observed_run import ObservedRun
-from rig.observation.statistics.spectral_lines import column_count, fit_columns, harmonics, waves
-from rig.observation.turn_mean import SLOW_CYCLES, lag_columns
+from rig.observation.statistics.spectral_lines import fit_columns, harmonics, waves
+from rig.observation.turn_mean import lag_columns, line_variance, slow_columns
 
 TIME_ROUNDING_S = 1e-7  # at most
 
@@ -66,24 +65,22 @@ def _deviation(recording: ObservedRun, stream: Stream, turn: Observation, observ
     of_turn, of_board = slice(*(edges - first).tolist()), slice(*(boards - first).tolist())
     time_s = stream.time_s[first:last]
     rates = recording.motion.rates_at_samples(time_s)
-    regressors, is_slow = _nuisance_columns(time_s, turn, rates @ axis)
+    regressors = _nuisance_columns(time_s, turn, rates @ axis)
     residuals = (stream.readings_rad_s[first:last] - zero - rates @ by_rate.T)[of_turn]
     columns = np.column_stack([np.ones(len(residuals)), regressors[of_turn]])
     sizes, of_columns = fit_columns(columns, residuals)[1:], regressors[of_board].mean(axis=0)
     # The prediction is zero + by_rate @ mean rate + means of the nuisance columns.
     deviation = np.array(board.mean_rad_s) - zero - by_rate @ rates[of_board].mean(axis=0) - of_columns @ sizes
-    powers = np.sum(sizes[is_slow].reshape(-1, 2, 3) ** 2, axis=1)
-    by_lines = np.sum(of_columns[is_slow].reshape(-1, 2) ** 2, axis=1) @ powers / 2
+    is_slow = np.flatnonzero(slow_columns(average.lines_hz * average.duration_s, turn.sidebands))
+    by_lines = line_variance(sizes[is_slow], of_columns[is_slow])
     return float(np.max(np.abs(deviation) / np.sqrt(average.mean_std_rad_s**2 + by_lines)))
 
 
-def _nuisance_columns(time_s: Array, turn: Observation, rates_rad_s: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Return the nuisance columns (n, k) of the computer's mean and a mask (k,) of those of slow spectral lines.
+def _nuisance_columns(time_s: Array, turn: Observation, rates_rad_s: Array) -> Array:
+    """Return the nuisance columns (n, k) of the computer's mean, at times (n,) with rates (n,) about the axis.
 
-    The columns are at times (n,) with rates (n,) about the axis.
-
-    The weights of that mean cancel these columns: the turn's first two harmonics, spectral lines, and the effect of a
-    slow ripple on a lagging sensor.
+    The weights of that mean cancel these columns: spectral lines, the turn's first two harmonics, and the effect of a
+    slow ripple on a lagging sensor, in this order.
     """
     average = turn.average
     fraction = (time_s - average.start_s) / average.duration_s
@@ -91,11 +88,8 @@ def _nuisance_columns(time_s: Array, turn: Observation, rates_rad_s: Array) -> t
     of_turn = harmonics(angle_rad * fraction, 2 * turn.sidebands)
     if turn.arc_rad is not None:
         of_turn -= harmonics(angle_rad * np.linspace(0.0, 1.0, len(fraction)), 2 * turn.sidebands).mean(axis=0)
-    cycles = average.lines_hz * average.duration_s
-    lines = waves(cycles, fraction, turn.sidebands)
-    late = lines[:, :0]
-    if turn.arc_rad is None:
-        late = lag_columns(rates_rad_s, np.column_stack([np.ones(len(fraction)), of_turn, lines]), fraction)
-    is_slow = np.zeros(of_turn.shape[1] + lines.shape[1] + late.shape[1], dtype=np.bool_)
-    is_slow[of_turn.shape[1] :][: lines.shape[1]] = np.repeat(cycles < SLOW_CYCLES, column_count(turn.sidebands))
-    return np.column_stack([of_turn, lines, late]), is_slow
+    lines = waves(average.lines_hz * average.duration_s, fraction, turn.sidebands)
+    if turn.arc_rad is not None:
+        return np.column_stack([lines, of_turn])
+    columns = np.column_stack([np.ones(len(fraction)), of_turn, lines])
+    return np.column_stack([lines, of_turn, lag_columns(rates_rad_s, columns, fraction)])

@@ -23,7 +23,6 @@ from rig.observation.statistics.coloured_noise import correlation_inflation
 from rig.observation.statistics.mean import Mean, MeanNoise, compute_weighted_means
 from rig.observation.statistics.spectral_lines import (
     LineSearch,
-    column_count,
     find_angle_change_rad2,
     find_lines,
     fit_columns,
@@ -31,7 +30,7 @@ from rig.observation.statistics.spectral_lines import (
     waves,
 )
 from rig.observation.statistics.tapered_weights import noise_at_zero
-from rig.observation.turn_mean import SLOW_CYCLES
+from rig.observation.turn_mean import slow_columns
 
 # Not four segments: one of an encoder's waves with two periods per revolution is zero at the ends of quarters, and no
 # segment would show it.
@@ -181,13 +180,11 @@ def _segment_revolution(
     vibrating = vibration @ np.linalg.lstsq(vibration, residual, rcond=None)[0]
     noise_alone = residual - vibrating  # without the vibration that the encoders measure
     noise = MeanNoise(average.noise_rad_s**2, average.noise_rad2_s2 * average.samples, average.dof)
-    is_slow = np.repeat(average.lines_hz * average.duration_s < SLOW_CYCLES, column_count(turn.sidebands))
+    is_slow = slow_columns(average.lines_hz * average.duration_s, turn.sidebands)
     weights = mean_weights(division.groups, lines[:, ~is_slow])
     added: Array | float = 0.0
     if is_slow.any():
-        not_encoded = fit_residuals(encoded, division.readings_rad_s)
-        if not _is_step(lines[:, is_slow], not_encoded):
-            added = _slow_line_variance(lines[:, is_slow], weights, not_encoded)
+        added = _slow_line_variance(lines[:, is_slow], weights, fit_residuals(encoded, division.readings_rad_s))
     segments = _average(
         division,
         motion,
@@ -207,30 +204,30 @@ def _segment_revolution(
     return SegmentedAverage(average, segments, readings, turn.speed_std_rad_s / turn.speed_rad_s)
 
 
-def _is_step(slow: Array, residuals: Array) -> bool:
-    """Return whether one step explains more of the residuals (n, 3) than the slow spectral lines, columns (n, k).
-
-    The lines found in a step are its harmonics. A step is a fault, whereas a line may be an aliased vibration.
-    """
-    before = np.arange(1, len(residuals))[:, None]
-    sums = np.cumsum(residuals - residuals.mean(axis=0), axis=0)[:-1]
-    explained_by_step = np.sum(sums**2 * (1 / before + 1 / (len(residuals) - before)), axis=1).max()
-    return bool(explained_by_step > np.sum((slow @ fit_columns(slow, residuals)) ** 2))
-
-
 def _slow_line_variance(slow: Array, weights: Array, residuals: Array) -> Array:
     """Return the variance (3,) that slow spectral lines, columns (n, k) fitted to residuals (n, 3), add to means.
 
     The means have weights (p, n). The frequencies of slow lines are uncertain, so the variance is at least the means'
-    scatter around a linear drift in time. The drift is excluded, because it would be a fault, not a vibration.
+    scatter around a linear drift in time. The drift is excluded, because it would be a fault, not a vibration. So would
+    be a step, whose harmonics are found as lines: if one step explains more than the lines, these add nothing.
     """
-    fitted = np.mean((weights @ slow @ fit_columns(slow, residuals)) ** 2, axis=0)
+    vibration = slow @ fit_columns(slow, residuals)
+    if _explain_by_step(residuals) > np.sum(vibration**2):
+        return np.zeros(3)
+    fitted = np.mean((weights @ vibration) ** 2, axis=0)
     if len(weights) <= MIN_SCATTER_SEGMENTS:
         return np.asarray(fitted, dtype=np.float64)
     means, straight = weights @ residuals, np.vander(np.linspace(-1, 1, len(weights)), 2)
     around = fit_residuals(straight, means)
     variance: Array = np.maximum(fitted, np.sum(around**2, axis=0) / (len(weights) - 2))
     return variance
+
+
+def _explain_by_step(residuals: Array) -> float:
+    """Return the largest part of the sum of squares of residuals (n, 3) that one step explains, wherever it is."""
+    before = np.arange(1, len(residuals))[:, None]
+    sums = np.cumsum(residuals - residuals.mean(axis=0), axis=0)[:-1]
+    return float(np.sum(sums**2 * (1 / before + 1 / (len(residuals) - before)), axis=1).max())
 
 
 def _segment_rest(stream: Stream, motion: ArmMotion, average: Average, count: int, response: Array) -> SegmentedAverage:
