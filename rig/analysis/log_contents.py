@@ -17,9 +17,10 @@ from rig.errors import Refused, RigError
 from rig.estimation.arrays import Array, axis_of
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from rig.observation.by_hand.steadiness import check_at_rest
-from rig.observation.external.attitude_import import read_attitudes
+from rig.observation.external.attitude_import import read_attitudes, select_reports
 from rig.observation.external.csv_samples import SAMPLES_MB, Samples, read_sample_table, samples_in
 from rig.observation.external.from_files import Files, build_recording
+from rig.observation.external.omission import Omitted
 from rig.observation.formats.column_selection import MappedColumns, map_motion, map_samples
 from rig.observation.formats.csv_table import read_table
 from rig.observation.formats.mat_table import is_mat
@@ -38,7 +39,7 @@ class LookedFile:
     - samples, survey: its readings, if any can be read; others: number of rows without readings; note: what the
       readings lack.
     - origin_s: origin of the readings' times; the attitudes' times are on their own clock.
-    - attitudes: the rows of its reference, if it has one.
+    - attitudes: the reports of its reference, if it has one; omitted_attitudes: its rows that are no reports.
     - refusals: why readings or attitudes could not be read.
     """
 
@@ -52,6 +53,7 @@ class LookedFile:
     note: str = ""
     origin_s: int = 0
     attitudes: Columns | None = None
+    omitted_attitudes: tuple[Omitted, ...] = ()
     refusals: tuple[RigError, ...] = ()
 
     @property
@@ -155,7 +157,9 @@ def _read_contents(looked: LookedFile, column_map: ColumnMap, *, has_readings: b
     if has_attitudes:
         try:
             attitudes = read_attitudes(looked.path, map_motion(column_map), inverse=column_map.motion_inverse)
-            looked = replace(looked, attitudes=attitudes)
+            numbers, omitted = select_reports(attitudes)
+            reported = {name: column[numbers - 1] for name, column in attitudes.items()}
+            looked = replace(looked, attitudes=reported, omitted_attitudes=omitted)
         except RigError as error:
             refusals.append(error)
     if looked.layout is None and (looked.samples is not None or looked.attitudes is not None):

@@ -1,9 +1,10 @@
 """The convention of a reference's quaternions, from the readings of a gyroscope on the same body.
 
 A quaternion may transform body to room coordinates, or room to body. Under the right convention the body's rates are a
-linear function of the gyroscope's readings. The position of the scalar part, first or last, only rotates the frames of
-body and room, so the gyroscope does not show this position. The accelerometer does, because with the right position the
-room's z axis is vertical. The other position leads to the same calibration, in other axes of the body.
+linear function of the gyroscope's readings, and the specific force has one direction in the room. The position of the
+scalar part, first or last, only rotates the frames of body and room, so the gyroscope does not show this position. The
+accelerometer does, because with the right position the room's z axis is vertical. The other position leads to the same
+calibration, in other axes of the body.
 """
 
 from dataclasses import dataclass
@@ -21,7 +22,7 @@ COARSE_LAGS_S, FINE_LAGS_S = np.arange(-0.5, 0.501, 0.02), np.arange(-0.02, 0.02
 MIN_PAIRS, MAX_PAIRS = 30, 3000  # of rows
 MAX_PAIR_S = 1.0  # between the two rows of a pair
 MIN_RMS_RATE_RAD_S = 0.05  # a smaller one shows nothing
-MIN_EXPLAINED, MIN_LEAD = 0.7, 0.1  # of the rates' variance; lead over the other direction
+MIN_EXPLAINED, MIN_LEAD = 0.7, 0.1  # of the rates' variance, or of gravity; lead over the other direction
 MIN_VERTICAL_GRAVITY = 0.97  # component along the vertical axis of the room
 
 
@@ -30,14 +31,16 @@ class Convention:
     """The convention by which the gyroscope explains most of the attitudes' rates, namely the fraction `explained`.
 
     `scalar_last`: the columns read as qw qx qy qz contain qx qy qz qw. `inverse`: quaternions take room to body
-    coordinates. `lag_s`: the time by which the readings are later than the attitudes. `up`: the room's axis that points
-    upwards, as for `--up`; "" if no accelerometer shows it.
+    coordinates. `lag_s`: the time by which the readings are later than the attitudes. `gravity`: length of the mean
+    specific force in the room, relative to the mean length; 0 without an accelerometer. `up`: the room's axis that
+    points upwards, as for `--up`; "" if no accelerometer shows it.
     """
 
     scalar_last: bool
     inverse: bool
     lag_s: float
     explained: float
+    gravity: float = 0.0
     up: str = ""
 
 
@@ -61,10 +64,22 @@ def find_convention(samples: Samples, attitudes: Columns, *, is_order_named: boo
             _fit(samples, middles_s[inside], quaternions, scalar_last=scalar_last, inverse=inverse)
             for inverse in (False, True)
         ]
-        best, other = sorted(fits, key=lambda fit: -fit.explained)
-        if best.explained >= max(MIN_EXPLAINED, other.explained + MIN_LEAD):
-            conventions.append(best)
+        conventions += _choose_direction(*sorted(fits, key=lambda fit: -fit.explained))
     return max(conventions, key=lambda convention: "z" in convention.up, default=None)
+
+
+def _choose_direction(best: Convention, other: Convention) -> list[Convention]:
+    """Return the fit in the right direction, if the readings show it.
+
+    Turns about one axis at a time fit both directions. Gravity then keeps its direction in the room only in the right
+    one.
+    """
+    if best.explained < MIN_EXPLAINED:
+        return []
+    if best.explained >= other.explained + MIN_LEAD:
+        return [best]
+    by_gravity, against = sorted((best, other), key=lambda fit: -fit.gravity)
+    return [by_gravity] if by_gravity.gravity >= max(MIN_EXPLAINED, against.gravity + MIN_LEAD) else []
 
 
 def _fit(samples: Samples, time_s: Array, quaternions: Array, *, scalar_last: bool, inverse: bool) -> Convention:
@@ -87,11 +102,11 @@ def _fit(samples: Samples, time_s: Array, quaternions: Array, *, scalar_last: bo
     coarse_s = max(COARSE_LAGS_S.tolist(), key=fit_at)
     lag_s = max((coarse_s + FINE_LAGS_S).tolist(), key=fit_at)
     fraction, matrix = _explain(rates, _mean_rates(samples.time_s, total, time_s + lag_s, close))
-    up = ""
+    gravity, up = 0.0, ""
     if ACCELERATION in samples.readings:
         forces = interpolate(time_s + lag_s, samples.time_s, samples.readings[ACCELERATION])
-        up = _find_up(rotations.apply(forces @ nearest_rotation(matrix).T))
-    return Convention(scalar_last, inverse, lag_s, fraction, up)
+        gravity, up = _find_up(rotations.apply(forces @ nearest_rotation(matrix).T))
+    return Convention(scalar_last, inverse, lag_s, fraction, gravity, up)
 
 
 def _mean_rates(time_s: Array, total: Array, edges_s: Array, close: NDArray[np.bool_]) -> Array:
@@ -110,11 +125,10 @@ def _explain(rates: Array, readings: Array) -> tuple[float, Array]:
     )
 
 
-def _find_up(forces: Array) -> str:
-    """Return the axis of the room along which the mean of forces (n, 3) points; "" if none."""
+def _find_up(forces: Array) -> tuple[float, str]:
+    """Return the relative length of the mean of forces (n, 3), and the axis of the room along it, "" if none."""
     mean = forces.mean(axis=0)
     mean /= max(float(np.linalg.norm(forces, axis=1).mean()), 1e-9)
     axis = int(np.argmax(np.abs(mean)))
-    if abs(mean[axis]) < MIN_VERTICAL_GRAVITY:
-        return ""
-    return f"{'+' if mean[axis] > 0 else '-'}{'xyz'[axis]}"
+    up = f"{'+' if mean[axis] > 0 else '-'}{'xyz'[axis]}" if abs(mean[axis]) >= MIN_VERTICAL_GRAVITY else ""
+    return float(np.linalg.norm(mean)), up

@@ -46,6 +46,7 @@ from rig.observation.external.table_motion import check_rates_agree
 from rig.observation.formats.column_selection import MappedColumns
 from rig.observation.formats.csv_table import CsvTable, blank_cell, read_table
 from rig.observation.formats.sample_files import attitudes_in, rows_around
+from rig.observation.motion.interpolated_attitudes import find_interpolated
 from rig.observation.time_stamps.sampling import find_sampling
 from rig.observation.windows import Window, inside
 
@@ -84,8 +85,8 @@ class PlacedReadings:
     - `rows`: a gyroscope's averages; `turning`: its readings and all rows, for a solution by rotation angles.
     - `placements`: the placements of the other sensors, or the Fault that prevents them.
     - `clock`: the table's clock, if it had to be found.
-    - `omitted`: rows that the recording does not cover, or that repeat a time; `incomplete`: rows that are not in
-      `rows`, because samples are missing in them.
+    - `omitted`: rows that the recording does not cover, that repeat a time or are interpolated; `incomplete`: rows that
+      are not in `rows`, because samples are missing in them.
     """
 
     quantities: tuple[Quantity, ...]
@@ -139,8 +140,7 @@ def average_placements(samples: Samples, table: Mapping[str, Array], *, find_clo
     """
     time_s, readings = samples.time_s, samples.readings
     hides_losses = samples.sampling is not None and samples.sampling.hides_losses
-    numbers = _select_different_times(table)
-    total = len(table["start_s"])
+    numbers, not_reported = select_reports(table)
     table = {name: column[numbers - 1] for name, column in table.items()}
     rates = np.column_stack([table[name] for name in RATE_COLUMNS]) if RATE_COLUMNS[0] in table else None
     windows = _windows(table)
@@ -185,7 +185,7 @@ def average_placements(samples: Samples, table: Mapping[str, Array], *, find_clo
         else Turning(time_s, rate, rows_found.rows_s, rows_found.attitudes, rows_found.std_rad, hides_losses),
         None if set(readings) == {RATE} else or_fault(find),  # a gyroscope needs none
         clock,
-        (*_list_repeated(numbers, total), *_list_omitted(all_rows, covered, "not covered by the recording")),
+        (*not_reported, *_list_omitted(all_rows, covered, "not covered by the recording")),
         tuple(_list_omitted(covered, whole, "lost_samples: samples are missing in them")),
     )
 
@@ -212,17 +212,24 @@ class _ReferenceRows:
         return _ReferenceRows([self.windows[row] for row in rows], self.attitudes[rows], rates, std, self.numbers[rows])
 
 
-def _select_different_times(rows: Mapping[str, Array]) -> NDArray[np.intp]:
-    """Return the numbers, from 1, of the rows to keep: a row of zero length is dropped if a longer one has its time."""
+def select_reports(rows: Mapping[str, Array]) -> tuple[NDArray[np.intp], tuple[Omitted, ...]]:
+    """Return the numbers, from 1, of the attitudes that the reference reported, and the rows that are left out.
+
+    Left out are rows that were interpolated between reports, and rows of zero length whose time a longer one has.
+    """
     middles_s = (rows["start_s"] + rows["end_s"]) / 2
     lasting = rows["end_s"] != rows["start_s"]
-    return 1 + np.flatnonzero(lasting | ~np.isin(middles_s, middles_s[lasting]))
-
-
-def _list_repeated(numbers: NDArray[np.intp], total: int) -> Iterator[Omitted]:
-    """Yield an entry for the rows out of `total` that repeat another row's time, if any."""
-    if len(repeated := np.setdiff1d(np.arange(1, total + 1), numbers)):
-        yield Omitted("rows", len(repeated), total, "they repeat the time of another attitude", f"row {repeated[0]}")
+    repeated = ~lasting & np.isin(middles_s, middles_s[lasting])
+    interpolated = find_interpolated(middles_s, np.column_stack([rows[name] for name in QUATERNION])) & ~repeated
+    omitted = tuple(
+        Omitted("rows", int(left_out.sum()), len(left_out), reason, f"row {1 + int(np.argmax(left_out))}")
+        for left_out, reason in (
+            (repeated, "they repeat the time of another attitude"),
+            (interpolated, "they are interpolated between the attitudes that the reference reported"),
+        )
+        if left_out.any()
+    )
+    return 1 + np.flatnonzero(~repeated & ~interpolated), omitted
 
 
 def _is_covered(rows_s: Array, time_s: Array) -> NDArray[np.bool_]:
@@ -307,12 +314,11 @@ def _rotations(rows: Mapping[str, Array]) -> Array:
     norms = np.linalg.norm(quaternions, axis=1)
     worst = int(np.argmax(np.abs(norms - 1)))
     if abs(norms[worst] - 1) > NORM_TOLERANCE:
-        what = f"the quaternion of attitude {worst + 1} has the length {norms[worst]:.4g}"
-        remedy = "Give unit quaternions qw qx qy qz that take body to table coordinates"
-        if 0 < worst < len(norms) - 1 and quaternions[worst - 1] @ quaternions[worst + 1] < 0:
-            what += ", and those before and after it have opposite signs: it seems to be interpolated from q to −q"
-            remedy = "Give the reference's own attitudes, or make neighbours of one sign before interpolating"
-        raise Refused("bad_quaternion", what, remedy)
+        raise Refused(
+            "bad_quaternion",
+            f"the quaternion of attitude {worst + 1} has the length {norms[worst]:.4g}",
+            "Give unit quaternions qw qx qy qz that take body to table coordinates",
+        )
     return np.asarray(Rotation.from_quat(quaternions[:, [1, 2, 3, 0]]).as_matrix(), dtype=np.float64)
 
 

@@ -28,6 +28,7 @@ MISSING_WORDS = frozenset({"NaN", "nan", "NAN", "NA", "N/A", "null", "None", "-"
 TIME_NAME = re.compile(
     r"(sys|sample|sensor|elapsed|header|gps)?_?(time|timestamp|t|ts|stamp|millis|micros|sec|seconds)_?\w{0,3}"
 )
+SENSOR_WORD = re.compile("gyr|acc|mag|quat", re.IGNORECASE)
 BRACKETED_UNIT = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]\s*$")
 UNDERSCORED_UNIT = re.compile(r"_(deg_s|dps|mdps|rad_s|m_s2|mg|g|ms|us|ns|s|deg|rad|t|ut|c)$", re.IGNORECASE)
 SPELLED_UNITS = {"deg_s": "deg/s", "rad_s": "rad/s", "m_s2": "m/s2", "t": "T", "ut": "uT", "c": "C"}
@@ -122,10 +123,19 @@ def layout_parts(path: Path, largest_mb: int) -> Iterator[Part]:
 
 
 def _find_table_rows(columns: Mapping[str, Array]) -> int:
-    """Return the number of rows of the table in a `.mat` file: the most common length of columns that are not short."""
+    """Return the number of rows of the table in a `.mat` file: the length of the columns that name most sensors.
+
+    If several lengths name equally many, the most common one is taken. Short columns are parameters.
+    """
     lengths = Counter(map(len, columns.values()))
     longest = max(lengths)
-    return max(lengths, key=lambda length: (length >= min(longest, FEWEST_ROWS), lengths[length], length))
+    sensors: dict[int, set[str]] = {length: set() for length in lengths}
+    for name, column in columns.items():
+        sensors[len(column)] |= {word.lower() for word in SENSOR_WORD.findall(name)}
+    return max(
+        lengths,
+        key=lambda length: (length >= min(longest, FEWEST_ROWS), len(sensors[length]), lengths[length], length),
+    )
 
 
 def _have_nan(columns: Any) -> bool:

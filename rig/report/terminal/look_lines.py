@@ -46,6 +46,7 @@ def describe_file(looked: LookedFile) -> Iterator[str]:
         yield from _describe_readings(looked, looked.survey)
     if looked.attitudes is not None:
         yield from _describe_attitudes(looked.attitudes)
+        yield from (_row("left out", str(omitted)) for omitted in looked.omitted_attitudes)
     for refusal in looked.refusals:
         yield _row("refused", str(refusal))
 

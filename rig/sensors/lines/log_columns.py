@@ -30,6 +30,7 @@ MIN_STEPS, MIN_RISING = 10, 0.9  # of a counter; fraction of steps that rise; no
 AXES = ("x", "y", "z")
 REFERENCE = {name for group in MOTIONS["attitudes"].optional for name in group} | {"start_s", "end_s"}
 QUATERNION_NAME = re.compile(r"(?:.*_)?(?:q|quat|quaternion|orientation|rot|rotation|attitude)_?([wxyz0-3])")
+TIME_NAME = re.compile(r"time|stamp", re.IGNORECASE)
 POSITION_NAME = re.compile(r"(?:(?:p|t|pos|position|trans|translation)_?)?[xyz](?: \[.*\])?")
 KIND_OF = {UNITS["rad/s"].quantity: ("gyro",), UNITS["m/s2"].quantity: ("acc",), UNITS["T"].quantity: ("mag",)}
 QUATERNION_DIGITS = {"0": "qw", "1": "qx", "2": "qy", "3": "qz"}
@@ -246,11 +247,11 @@ def _group_columns(
 
     There is one group for each rate of the logger. Columns of a reference are left out, including its positions if the
     log has a quaternion, because positions look like readings. Constant columns are left out too, and so are counters,
-    such as the numbers of the rows and a second clock.
+    such as the numbers of the rows and a second clock, and durations.
     """
     names = _name_once([_plain_name(layout, index) for index in range(len(layout.headings))])
     used = {layout.time, *quaternion.values(), *(i for i, name in enumerate(layout.headings) if name in REFERENCE)}
-    used |= set(_list_angles(layout))
+    used |= {*_list_angles(layout), *(i for i, name in enumerate(layout.headings) if TIME_NAME.search(name))}
     if quaternion:
         used |= {index for index, name in enumerate(names) if not name or POSITION_NAME.fullmatch(name)}
     groups: dict[bytes, list[int]] = {}

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shlex
 from argparse import Namespace
 from collections.abc import Callable
 from pathlib import Path
@@ -9,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.io import savemat
+from scipy.spatial.transform import Rotation
 
 from rig.analysis.external.convention import find_convention
 from rig.analysis.log_contents import look_at
@@ -17,7 +19,7 @@ from rig.config.column_map import ColumnMap
 from rig.errors import Refused
 from rig.report.terminal.look_lines import describe_file
 from support.external.csv_tables import write_table
-from support.external.robot_log import make_log, write_log
+from support.external.robot_log import MATRIX, make_log, write_log
 from support.external.turned_body import Hand, turn
 from support.laboratories.commands import rig_here
 from support.paths import DOCS
@@ -202,6 +204,46 @@ def test_a_file_of_attitudes_counts_before_those_in_the_log(tmp_path: Path) -> N
     looked = rig_here("look", tmp_path / "log.mat", tmp_path / "robot_poses.csv", "--write", columns)
     assert "attitudes     rig solve " in looked.stdout, looked.stdout
     assert "direction     room to body (motion_inverse)" in looked.stdout and "quat" not in columns.read_text("utf-8")
+
+
+def test_a_workspace_with_interpolated_poses_is_solved_by_the_printed_command(tmp_path: Path) -> None:
+    log, path, columns = make_log(), tmp_path / "log.mat", tmp_path / "columns.yaml"
+    poses = log.poses * np.where(np.arange(len(log.pose_s)) < 400, 1, -1)[:, None]  # the same attitudes
+    by_row = np.column_stack([np.interp(log.time_ms / 1e3, log.pose_s, column) for column in poses.T])
+    assert np.linalg.norm(by_row, axis=1).min() < 0.9  # between q and -q
+    table = {"SENSgyro": log.rates_deg_s.T, "SENSacc": log.forces_g.T, "MATLABtime": log.time_ms / 1e3}
+    raw = np.random.default_rng(1).normal(size=(12, len(log.time_ms) + 300))  # more columns, without a sensor's name
+    savemat(path, {**table, "ABBquaternion": by_row.T, "s_read": raw, "cycle_time": np.arange(raw.shape[1]) / 40})
+    looked = rig_here("look", path, "--write", columns).stdout
+    assert re.search(r"left out +\d+ of \d+ rows, they are interpolated between the attitudes", looked), looked
+    assert "direction     room to body (motion_inverse)" in looked
+    (command,) = re.findall(r"^ +attitudes +rig (solve .*)$", looked, re.MULTILINE)
+    solved = rig_here(*shlex.split(command), "--json")
+    assert solved.returncode == 0, solved.stderr
+    result = json.loads(solved.stdout)
+    gyroscope = result["gyroscopes"]["imu"]
+    error = np.array(gyroscope["scale"]) - 1 / np.linalg.norm(MATRIX, axis=1)
+    assert (np.abs(error) < np.array(gyroscope["budget"]["expanded"][:3])).all(), (error, gyroscope["budget"])
+    assert any("interpolated" in omitted["reason"] for omitted in result["omitted"]["imu"])
+
+
+def test_gravity_shows_the_direction_if_the_body_turns_about_one_axis_at_a_time(tmp_path: Path) -> None:
+    time_s = np.arange(0, 24, 0.01)
+    angles = np.zeros((len(time_s), 3))
+    for number in range(6):  # a quarter turn about x, back, about y, back, about z, back: each the other's inverse
+        part = np.clip((time_s - 1 - 4 * number) / 2, 0, 1)
+        angles[:, number // 2] += (-1) ** number * np.pi / 2 * part**3 * (10 - 15 * part + 6 * part**2)
+    attitudes = Rotation.from_rotvec(angles)
+    forces = attitudes.inv().apply([0, 0, 9.8])
+    savemat(tmp_path / "log.mat", {"t": time_s, "gyro": np.gradient(angles, time_s, axis=0), "acc": forces})
+    samples = look_at(tmp_path / "log.mat").samples
+    assert samples is not None
+    for inverse in (False, True):
+        poses = (attitudes.inv() if inverse else attitudes)[::7].as_quat(scalar_first=True)
+        rows = look_at(write(tmp_path / "poses.csv", "time,qw,qx,qy,qz", [time_s[::7], *poses.T])).attitudes
+        assert rows is not None
+        convention = find_convention(samples, rows, is_order_named=True)
+        assert convention is not None and convention.inverse == inverse
 
 
 def test_turns_have_their_times_as_the_file_of_sweeps_needs_them(tmp_path: Path) -> None:
