@@ -95,6 +95,23 @@ def count_from(looked: LookedFile, origin_s: int) -> LookedFile:
     return replace(looked, attitudes={**looked.attitudes, **times})
 
 
+def correct_rate_unit(looked: LookedFile, ratio: float) -> LookedFile:
+    """Return a file with the gyroscope's unit corrected, if it was guessed by the size of its readings.
+
+    `ratio`: how many times as fast as its readings the gyroscope turned, according to attitudes.
+    """
+    if (
+        looked.layout is None
+        or looked.guess is None
+        or (guess := looked.guess.correct_rate_unit(ratio)) is looked.guess
+    ):
+        return looked
+    columns = _map_of(looked.layout, guess)
+    corrected = LookedFile(looked.path, looked.layout, guess, columns)
+    column_map = ColumnMap.model_validate(columns)
+    return _read_contents(corrected, column_map, has_readings=True, has_attitudes=looked.attitudes is not None)
+
+
 def is_incomplete(columns: Mapping[str, Any]) -> bool:
     """Return whether a map contains a "?" in place of a number."""
     return UNSTATED in columns.values() or any(

@@ -7,7 +7,7 @@ accelerometer does, because with the right position the room's z axis is vertica
 calibration, in other axes of the body.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,8 @@ COARSE_LAGS_S, FINE_LAGS_S = np.arange(-0.5, 0.501, 0.02), np.arange(-0.02, 0.02
 MIN_PAIRS, MAX_PAIRS = 30, 3000  # of rows
 MAX_PAIR_S = 1.0  # between the two rows of a pair
 MIN_RMS_RATE_RAD_S = 0.05  # a smaller one shows nothing
-MIN_EXPLAINED, MIN_LEAD = 0.7, 0.1  # of the rates' variance, or of gravity; lead over the other direction
+MIN_EXPLAINED, MAX_UNEXPLAINED_RATIO = 0.7, 0.7  # of the rates' variance; unexplained part, relative to the other fit's
+MIN_GRAVITY, MIN_LEAD = 0.7, 0.1  # relative length of the mean specific force; lead over the other direction
 MIN_VERTICAL_GRAVITY = 0.97  # component along the vertical axis of the room
 
 
@@ -30,16 +31,19 @@ MIN_VERTICAL_GRAVITY = 0.97  # component along the vertical axis of the room
 class Convention:
     """The convention by which the gyroscope explains most of the attitudes' rates, namely the fraction `explained`.
 
-    `scalar_last`: the columns read as qw qx qy qz contain qx qy qz qw. `inverse`: quaternions take room to body
-    coordinates. `lag_s`: the time by which the readings are later than the attitudes. `gravity`: length of the mean
-    specific force in the room, relative to the mean length; 0 without an accelerometer. `up`: the room's axis that
-    points upwards, as for `--up`; "" if no accelerometer shows it.
+    - scalar_last: the columns read as qw qx qy qz contain qx qy qz qw.
+    - inverse: the quaternions take room to body coordinates; None if the motion does not show it.
+    - lag_s: the time by which the readings are later than the attitudes.
+    - ratio: how many times as fast as its readings the gyroscope turned.
+    - gravity: length of the mean specific force in the room, relative to the mean length; 0 without an accelerometer.
+    - up: the room's axis that points upwards, as for `--up`; "" if no accelerometer shows it.
     """
 
     scalar_last: bool
-    inverse: bool
+    inverse: bool | None
     lag_s: float
     explained: float
+    ratio: float = 1.0
     gravity: float = 0.0
     up: str = ""
 
@@ -64,22 +68,23 @@ def find_convention(samples: Samples, attitudes: Columns, *, is_order_named: boo
             _fit(samples, middles_s[inside], quaternions, scalar_last=scalar_last, inverse=inverse)
             for inverse in (False, True)
         ]
-        conventions += _choose_direction(*sorted(fits, key=lambda fit: -fit.explained))
-    return max(conventions, key=lambda convention: "z" in convention.up, default=None)
+        conventions.append(_choose_direction(*sorted(fits, key=lambda fit: -fit.explained)))
+    best = max(conventions, key=lambda fit: (fit.inverse is not None, "z" in fit.up, fit.explained))
+    return best if best.explained >= MIN_EXPLAINED else None
 
 
-def _choose_direction(best: Convention, other: Convention) -> list[Convention]:
-    """Return the fit in the right direction, if the readings show it.
+def _choose_direction(best: Convention, other: Convention) -> Convention:
+    """Return the better of two fits, whose direction is None if the readings do not show it.
 
     Turns about one axis at a time fit both directions. Gravity then keeps its direction in the room only in the right
     one.
     """
-    if best.explained < MIN_EXPLAINED:
-        return []
-    if best.explained >= other.explained + MIN_LEAD:
-        return [best]
+    if 1 - best.explained <= MAX_UNEXPLAINED_RATIO * (1 - other.explained):
+        return best
     by_gravity, against = sorted((best, other), key=lambda fit: -fit.gravity)
-    return [by_gravity] if by_gravity.gravity >= max(MIN_EXPLAINED, against.gravity + MIN_LEAD) else []
+    if by_gravity.gravity >= max(MIN_GRAVITY, against.gravity + MIN_LEAD):
+        return by_gravity
+    return replace(best, inverse=None)
 
 
 def _fit(samples: Samples, time_s: Array, quaternions: Array, *, scalar_last: bool, inverse: bool) -> Convention:
@@ -101,12 +106,14 @@ def _fit(samples: Samples, time_s: Array, quaternions: Array, *, scalar_last: bo
 
     coarse_s = max(COARSE_LAGS_S.tolist(), key=fit_at)
     lag_s = max((coarse_s + FINE_LAGS_S).tolist(), key=fit_at)
-    fraction, matrix = _explain(rates, _mean_rates(samples.time_s, total, time_s + lag_s, close))
+    turned = _mean_rates(samples.time_s, total, time_s + lag_s, close)
+    fraction, matrix = _explain(rates, turned)
     gravity, up = 0.0, ""
     if ACCELERATION in samples.readings:
         forces = interpolate(time_s + lag_s, samples.time_s, samples.readings[ACCELERATION])
         gravity, up = _find_up(rotations.apply(forces @ nearest_rotation(matrix).T))
-    return Convention(scalar_last, inverse, lag_s, fraction, gravity, up)
+    ratio = float(np.sqrt(max(fraction, 0.0) * np.var(rates, axis=0).sum() / max(np.var(turned, axis=0).sum(), 1e-30)))
+    return Convention(scalar_last, inverse, lag_s, fraction, ratio, gravity, up)
 
 
 def _mean_rates(time_s: Array, total: Array, edges_s: Array, close: NDArray[np.bool_]) -> Array:

@@ -43,7 +43,7 @@ def run(options: Namespace) -> int:
 
     Return 0. Raise Refused `bad_option`, `no_latest_run`, `configuration_not_written`, and as the files' readers do.
     """
-    from rig.analysis.log_contents import is_incomplete, look_at
+    from rig.analysis.log_contents import correct_rate_unit, is_incomplete, look_at
 
     if len(options.files) > 2:
         raise Refused("bad_option", f"{len(options.files)} files are given", "Give a log, or a log and its attitudes")
@@ -53,8 +53,11 @@ def run(options: Namespace) -> int:
         _refuse_run(path)
     stated = None if options.columns is None else read_column_map(options.columns)
     looks = [look_at(path, stated) for path in options.files]
+    convention = _find_convention(looks)
+    if convention is not None and stated is None:
+        looks = [correct_rate_unit(looked, convention.ratio) for looked in looks]
     columns = _join_maps(looks)
-    _print(looks, columns, stated, options.write or options.columns)
+    _print(looks, convention, columns, stated, options.write or options.columns)
     if options.write is not None:
         _write(options.write, looks, columns)
     if is_incomplete(columns):
@@ -81,27 +84,24 @@ def _refuse_run(path: Path) -> None:
 
 
 def _print(
-    looks: "Sequence[LookedFile]", columns: dict[str, Any], stated: "ColumnMap | None", named: Path | None
+    looks: "Sequence[LookedFile]",
+    convention: "Convention | None",
+    columns: dict[str, Any],
+    stated: "ColumnMap | None",
+    named: Path | None,
 ) -> None:
     """Print the files and the commands that can use them. Enter the gyroscope's convention into `columns`."""
-    from rig.analysis.log_contents import count_from
     from rig.data.quantity import RATE
     from rig.report.terminal.look_lines import describe_convention, describe_file, describe_solutions
 
     for looked in looks:
         for line in describe_file(looked):
             say(line)
-    log = next((looked for looked in looks if looked.samples is not None), None)
-    reference = _find_reference(looks)
-    convention = None
-    if log is not None and reference is not None:
-        reference = count_from(reference, log.origin_s)
+    log, reference = _find_pair(looks)
     if log is not None and reference is not None and RATE in log.quantities:
-        is_order_named = _names_order(reference)
-        convention = _find_convention(log, reference, is_order_named=is_order_named)
-        for line in describe_convention(convention, is_order_named=is_order_named):
+        for line in describe_convention(convention, is_order_named=_names_order(reference)):
             say(line)
-        if convention is not None and stated is None:
+        if convention is not None and convention.inverse is not None and stated is None:
             _adopt(columns, inverse=convention.inverse, scalar_last=convention.scalar_last)
     tried = _try_solutions(log, reference, convention, stated, columns)
     needs_map = bool(columns) or stated is not None
@@ -110,6 +110,15 @@ def _print(
         print(printable(line))  # not wrapped: a command must stay in one line
     if needs_map and named is None:
         say(f"--write {PLACEHOLDER} writes the map of these columns")
+
+
+def _find_pair(looks: "Sequence[LookedFile]") -> "tuple[LookedFile | None, LookedFile | None]":
+    """Return the file with the readings, and the one with the attitudes, on the same origin of times; None if none."""
+    from rig.analysis.log_contents import count_from
+
+    log = next((looked for looked in looks if looked.samples is not None), None)
+    reference = _find_reference(looks)
+    return log, reference if log is None or reference is None else count_from(reference, log.origin_s)
 
 
 def _find_reference(looks: "Sequence[LookedFile]") -> "LookedFile | None":
@@ -140,11 +149,14 @@ def _names_order(reference: "LookedFile") -> bool:
     return reference.layout is None or all(name in headings for name in QUATERNION)
 
 
-def _find_convention(log: "LookedFile", reference: "LookedFile", *, is_order_named: bool) -> "Convention | None":
+def _find_convention(looks: "Sequence[LookedFile]") -> "Convention | None":
+    """Return the convention of the attitudes' quaternions, if a gyroscope's readings show it."""
     from rig.analysis.external.convention import find_convention
 
-    assert log.samples is not None and reference.attitudes is not None, "both were read"
-    return find_convention(log.samples, reference.attitudes, is_order_named=is_order_named)
+    log, reference = _find_pair(looks)
+    if log is None or log.samples is None or reference is None or reference.attitudes is None:
+        return None
+    return find_convention(log.samples, reference.attitudes, is_order_named=_names_order(reference))
 
 
 def _try_solutions(

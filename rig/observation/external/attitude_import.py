@@ -53,7 +53,7 @@ from rig.observation.windows import Window, inside
 RATE_COLUMNS = ("rate_x_rad_s", "rate_y_rad_s", "rate_z_rad_s")
 STD_COLUMN = "attitude_std_rad"
 ATTITUDES_MB = 32  # an hour's table at 50 Hz
-NORM_TOLERANCE = 1e-3
+NORM_TOLERANCE, MAX_WRONG_FRACTION = 1e-3, 0.01  # of a quaternion's length; of the rows that exceed it
 MOMENTS = Header(  # forms of a file: rows with a duration, or with a moment each
     QUATERNION, (TIME, "start_s"), (("start_s", "end_s"), *MOTIONS["attitudes"].optional)
 )
@@ -215,21 +215,33 @@ class _ReferenceRows:
 def select_reports(rows: Mapping[str, Array]) -> tuple[NDArray[np.intp], tuple[Omitted, ...]]:
     """Return the numbers, from 1, of the attitudes that the reference reported, and the rows that are left out.
 
-    Left out are rows that were interpolated between reports, and rows of zero length whose time a longer one has.
+    Left out are rows that were interpolated between reports, rows of zero length whose time a longer one has, rows of
+    four zeros, and a few others whose quaternions are no unit quaternions.
     """
+    quaternions = np.column_stack([rows[name] for name in QUATERNION])
+    lengths = np.linalg.norm(quaternions, axis=1)
+    absent = lengths == 0
     middles_s = (rows["start_s"] + rows["end_s"]) / 2
     lasting = rows["end_s"] != rows["start_s"]
     repeated = ~lasting & np.isin(middles_s, middles_s[lasting])
-    interpolated = find_interpolated(middles_s, np.column_stack([rows[name] for name in QUATERNION])) & ~repeated
+    absent &= ~repeated
+    present = np.flatnonzero(~absent & ~repeated)
+    interpolated = np.zeros(len(lengths), dtype=np.bool_)
+    interpolated[present] = find_interpolated(middles_s[present], quaternions[present])
+    wrong = (np.abs(lengths - 1) > NORM_TOLERANCE) & ~repeated & ~absent & ~interpolated
+    if wrong.sum() > MAX_WRONG_FRACTION * len(wrong):  # the file is wrong, not a few of its rows
+        wrong[:] = False
     omitted = tuple(
         Omitted("rows", int(left_out.sum()), len(left_out), reason, f"row {1 + int(np.argmax(left_out))}")
         for left_out, reason in (
             (repeated, "they repeat the time of another attitude"),
+            (absent, "their quaternions are zero: the reference had no attitude"),
             (interpolated, "they are interpolated between the attitudes that the reference reported"),
+            (wrong, "their quaternions are not of unit length"),
         )
         if left_out.any()
     )
-    return 1 + np.flatnonzero(~repeated & ~interpolated), omitted
+    return 1 + np.flatnonzero(~repeated & ~absent & ~interpolated & ~wrong), omitted
 
 
 def _is_covered(rows_s: Array, time_s: Array) -> NDArray[np.bool_]:

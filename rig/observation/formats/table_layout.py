@@ -59,6 +59,7 @@ class TableLayout:
     missing: tuple[str, ...]
     rows: int
     is_shifted: bool = False  # rows have one cell more than the heading has names
+    has_groups: bool = False  # two lines of headings: of groups of columns, and of the columns of each group
 
     @property
     def has_heading(self) -> bool:
@@ -68,7 +69,7 @@ class TableLayout:
     def name(self, index: int) -> str | int:
         """Return the name of a column in a column map: its heading, or its number from 1."""
         heading = self.headings[index]
-        is_name = heading and self.headings.count(heading) == 1 and not self.is_shifted
+        is_name = heading and self.headings.count(heading) == 1 and not (self.is_shifted or self.has_groups)
         return heading if is_name else index + 1
 
 
@@ -98,7 +99,10 @@ def layout_parts(path: Path, largest_mb: int) -> Iterator[Part]:
         return
     skip, heading = _find_beginning(path, largest_mb)
     data = read_rows(path, largest_mb, skip)
-    if heading:
+    groups = heading if heading and _names_columns(heading, [*islice(read_rows(path, largest_mb, skip), 1, 3)]) else []
+    if groups:
+        skip, heading = skip + 1, _join_headings(next(data), next(data))
+    elif heading:
         next(data)
     sampled: list[list[str]] = []
     units, missing, count = [""] * len(heading), set[str](), 0
@@ -119,7 +123,30 @@ def layout_parts(path: Path, largest_mb: int) -> Iterator[Part]:
     headings += [""] * (width - len(headings))
     units = [""] * shift + units + [""] * (width - shift - len(units))
     cells = [[*row[:width], *[""] * (width - len(row))] for row in sampled]
-    yield {**_describe(skip, headings, units, cells, sorted(missing), count), "is_shifted": bool(shift)}
+    named = {"is_shifted": bool(shift), "has_groups": bool(groups)}
+    yield {**_describe(skip, headings, units, cells, sorted(missing), count), **named}
+
+
+def _names_columns(heading: Sequence[str], below: Sequence[Sequence[str]]) -> bool:
+    """Return whether the row below a heading names columns, of which the heading names groups.
+
+    The heading of a group is above its first column, so some of its cells are blank.
+    """
+    if len(below) < 2 or all(map(str.strip, heading)):
+        return False
+    names = [cell.strip() for cell in below[0] if cell.strip()]
+    units = sum(unit_of(name) is not None for name in names)
+    return len(names) >= 2 and 2 * units < len(names) and not any(map(is_value, names)) and any(map(is_value, below[1]))
+
+
+def _join_headings(groups: Sequence[str], names: Sequence[str]) -> list[str]:
+    """Return the heading of each column: its group, stated above the first column, and the column's name or unit."""
+    joined: list[str] = []
+    group = ""
+    for index, name in enumerate(map(str.strip, names)):
+        group = (groups[index].strip() if index < len(groups) else "") or group
+        joined.append(f"{group} [{name}]" if unit_of(name) else f"{group} {name}".strip())
+    return joined
 
 
 def _find_table_rows(columns: Mapping[str, Array]) -> int:

@@ -55,6 +55,8 @@ def _describe_table(path: Path, layout: TableLayout, guess: LogColumns) -> Itera
     """Yield lines on the table's columns, on unknown properties and on missing values."""
     heading = f"heading in line {layout.skip_lines + 1}" if layout.has_heading else "no heading"
     yield f"{path}: {layout.rows} rows, {len(layout.headings)} columns, {heading}"
+    if layout.has_groups:
+        yield _row("note", "the heading has two lines: columns are named by number")
     if layout.is_shifted:
         yield _row("note", "the rows have one cell more than the heading: columns are named by number")
     entries = {**guess.motion, **guess.samples}
@@ -71,7 +73,7 @@ def _describe_table(path: Path, layout: TableLayout, guess: LogColumns) -> Itera
 
 def describe_convention(convention: Convention | None, *, is_order_named: bool) -> Iterator[str]:
     """Yield the quaternions' convention, which the gyroscope shows, and the order of their numbers unless named."""
-    if convention is None:
+    if convention is None or convention.inverse is None:
         what = "the gyroscope does not show the direction of the quaternions"
         why = "the body turned slowly, briefly or about one axis at a time, or they are of another body or clock"
         yield _row("direction", f"{what}: {why}")

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,8 @@ SENSORS = {"g": "gyroscope", "a": "accelerometer", "m": "magnetometer"}
 SI_UNITS = {"g": "rad/s", "a": "m/s2", "m": "T"}
 UNSTATED = "?"  # where a number is still to be stated
 ASSUMED_RATE_HZ = 100.0  # of a log without times
+MAX_SCALE_ERROR = 0.3  # of a gyroscope whose readings confirm a unit
+BY_SIZE = "by size alone"
 MIN_COUNT = 500.0  # larger whole numbers are steps of a converter
 # A block is at rest if its scatter is at most this many times that of the quietest tenth.
 BLOCK_S, QUIETEST_FRACTION, QUIET_RATIO = 0.25, 0.1, 3.0
@@ -52,6 +54,22 @@ class LogColumns:
     motion: Mapping[str, ColumnEntry]
     gaps: Sequence[str] = ()
     others: Sequence[str] = ()
+
+    def correct_rate_unit(self, ratio: float) -> "LogColumns":
+        """Return the columns with the gyroscope's unit corrected, if it was guessed by size alone.
+
+        `ratio`: how many times as fast as its readings, in the guessed unit, the gyroscope turned.
+        """
+        gaps = [gap for gap in self.gaps if BY_SIZE not in gap]
+        names = [f"{axis}{NAMES['g']}" for axis in AXES]
+        if len(gaps) == len(self.gaps) or not all(name in self.samples for name in names):
+            return self
+        guessed = UNITS[str(self.samples[names[0]]["unit"])].size
+        fitting = [unit for unit in ("rad/s", "deg/s") if abs(ratio * guessed / UNITS[unit].size - 1) < MAX_SCALE_ERROR]
+        if not fitting:
+            return self
+        corrected = {name: {**self.samples[name], "unit": fitting[0]} for name in names}
+        return replace(self, samples={**self.samples, **corrected}, gaps=gaps)
 
 
 @dataclass(frozen=True, slots=True)
@@ -335,9 +353,9 @@ def _unit_of(kind: str, unit: dict[str, Any], values: Array, still: NDArray[np.b
     noise = np.median(np.abs(np.diff(values, axis=0)), axis=0).max()  # a steady turn is as quiet as a rest
     if np.abs(turned).max() > MAX_RATE_RAD_S or noise > MAX_SCATTER_RAD_S:
         largest = f"{np.abs(values).max():.4g}"
-        reason = f"deg/s by size alone (up to {largest}); if these are counts, give factor or lsb_per_unit"
+        reason = f"deg/s {BY_SIZE} (up to {largest}); if these are counts, give factor or lsb_per_unit"
         return {"unit": "deg/s"}, reason
-    return {"unit": "rad/s"}, f"rad/s by size alone (up to {np.abs(values).max():.3g})"
+    return {"unit": "rad/s"}, f"rad/s {BY_SIZE} (up to {np.abs(values).max():.3g})"
 
 
 def _compare_stated(kind: str, stated: str, values: Array, still: NDArray[np.bool_]) -> tuple[dict[str, Any], str]:

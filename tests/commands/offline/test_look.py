@@ -246,6 +246,28 @@ def test_gravity_shows_the_direction_if_the_body_turns_about_one_axis_at_a_time(
         assert convention is not None and convention.inverse == inverse
 
 
+def test_attitudes_show_the_unit_of_a_gyroscope_that_turns_slowly_below_two_lines_of_headings(tmp_path: Path) -> None:
+    log, path, columns = make_log(), tmp_path / "log.csv", tmp_path / "columns.yaml"
+    time_s = log.time_s[log.time_s < log.pose_s[-1]]
+    poses = log.attitudes.as_quat(scalar_first=True)[: len(time_s)]
+    poses[:50] = 0.0  # the cameras had not found the body yet
+    poses[1000] *= 0.99
+    table = np.column_stack([time_s, poses, np.radians(log.rates_deg_s)[: len(time_s)]])
+    heading = "Time (s);Vicon Orientation;;;;IMU Gyroscope;;;\n;W;X;Y;Z;X;Y;Z;"
+    rows = [";".join(f"{cell:.8g}" for cell in row) for row in table]
+    path.write_text("\n".join([heading, *rows]) + "\n", encoding="utf-8")
+    looked = rig_here("look", path, "--write", columns).stdout
+    assert "the heading has two lines: columns are named by number" in looked, looked
+    assert "gyroscope     6 7 8                    rad/s" in looked and "by size" not in looked
+    assert "their quaternions are zero: the reference had no attitude; the first row 1" in looked
+    assert "left out      1 of 2360 rows, their quaternions are not of unit length; the first row 1001" in looked
+    (command,) = re.findall(r"^ +attitudes +rig (solve .*)$", looked, re.MULTILINE)
+    result = json.loads(rig_here(*shlex.split(command), "--json").stdout)
+    gyroscope = result["gyroscopes"]["imu"]
+    error = np.array(gyroscope["scale"]) - 1 / np.linalg.norm(MATRIX, axis=1)
+    assert (np.abs(error) < np.array(gyroscope["budget"]["expanded"][:3])).all(), (error, gyroscope["budget"])
+
+
 def test_turns_have_their_times_as_the_file_of_sweeps_needs_them(tmp_path: Path) -> None:
     session = turn(Hand(np.vstack([np.eye(3), -np.eye(3)])), seed=1)
     time_s = 1_800_000_000 + session.time_s
