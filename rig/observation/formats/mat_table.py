@@ -21,6 +21,7 @@ from rig.observation.formats.column_selection import MappedColumns
 
 SUFFIX = ".mat"
 HDF5_HEADER = b"MATLAB 7.3"
+HEAD_BYTES = 128  # of a binary file: they contain zeros, unless they say which version of MATLAB wrote them
 MAX_DEPTH = 4  # of structs inside structs
 MAX_COLUMNS = 1000
 NAN = "NaN"  # as MATLAB spells it
@@ -29,8 +30,14 @@ OBJECT_FIELDS = ("s0", "s1", "s2", "arr")  # fields by which SciPy represents a 
 
 
 def is_mat(path: Path) -> bool:
-    """Return whether a path has the suffix of MATLAB files."""
-    return path.suffix.lower() == SUFFIX
+    """Return whether a path has the suffix of MATLAB files, unless it is the text that `save -ascii` writes."""
+    if path.suffix.lower() != SUFFIX:
+        return False
+    if not path.is_file():
+        return True  # whoever reads it says why it cannot be read
+    with path.open("rb") as file:
+        head = file.read(HEAD_BYTES)
+    return head.startswith(b"MATLAB") or b"\0" in head or not head.isascii()
 
 
 def read_mat_rows(path: Path, header: Header, mapped: MappedColumns | None) -> Iterator[list[str]]:

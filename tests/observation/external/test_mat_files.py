@@ -67,6 +67,16 @@ def test_columns_of_the_rig_s_own_names_need_no_map(tmp_path: Path) -> None:
     assert np.array_equal(read_samples(tmp_path / "log.mat", [RATE]).readings[RATE], RATES)
 
 
+def test_what_save_ascii_writes_is_a_text_table(tmp_path: Path) -> None:
+    path = tmp_path / "log.mat"
+    np.savetxt(path, np.column_stack([TIME_S, RATES]), fmt="%16.7e")
+    columns = {
+        name: {"column": str(index + 1)} for index, name in enumerate(["time_s", "x_rad_s", "y_rad_s", "z_rad_s"])
+    }
+    samples = read_samples(path, [RATE], map_samples(ColumnMap.model_validate({"samples": columns})))
+    assert samples.readings[RATE] == pytest.approx(RATES, rel=1e-6)
+
+
 def test_columns_of_two_tables_are_not_joined(tmp_path: Path) -> None:
     path = tmp_path / "log.mat"
     savemat(path, {"t": np.arange(10.0), "gyro": RATES})
