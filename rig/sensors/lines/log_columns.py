@@ -35,6 +35,7 @@ QUATERNION_NAME = re.compile(r"(?:.*_)?(?:q|quat|quaternion|orientation|rot|rota
 TIME_NAME = re.compile(r"time|stamp", re.IGNORECASE)
 POSITION_NAME = re.compile(r"(?:(?:p|t|pos|position|trans|translation)_?)?[xyz](?: \[.*\])?")
 KIND_OF = {UNITS["rad/s"].quantity: ("gyro",), UNITS["m/s2"].quantity: ("acc",), UNITS["T"].quantity: ("mag",)}
+FIELD_NAME = re.compile(r".*(mag|field|compass)|[bhm]_?[xyz]\b", re.IGNORECASE)
 QUATERNION_DIGITS = {"0": "qw", "1": "qx", "2": "qy", "3": "qz"}
 GRAVITY_BY_UNIT = {"m/s2": STANDARD_GRAVITY_M_S2, "g": 1.0, "mg": 1000.0}
 ANGLE_WORDS = {"yaw", "pitch", "roll", "heading", "azimuth", "phi", "theta", "psi", "euler"}
@@ -149,8 +150,8 @@ def _is_undetermined(names: Sequence[str], guessed: Guess) -> bool:
 
     The size of a magnetic field alone does not show it, because other readings may have the same size.
     """
-    is_nameless = not any(names) or all(map(_is_axis, names)) or not guessed.units
-    return is_nameless and len(names) == 3 and set(guessed.units) <= {"m"}
+    is_named = any(FIELD_NAME.match(name) for name in names) and bool(guessed.units)
+    return not is_named and len(names) == 3 and set(guessed.units) <= {"m"}
 
 
 def _describe_undetermined(columns: Sequence[str | int], values: Array) -> str:

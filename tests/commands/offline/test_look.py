@@ -109,6 +109,14 @@ def test_a_telephone_s_magnetometer_is_called_what_it_may_be(tmp_path: Path) -> 
     assert not any(line.strip().startswith("gyroscope") for line in describe_file(looked))
 
 
+def test_counts_whose_size_is_that_of_the_field_are_no_magnetometer_unless_a_name_says_so(tmp_path: Path) -> None:
+    counts = 32_600 + np.rint(100 * np.column_stack([np.sin(TIME_S), np.cos(TIME_S), np.sin(2 * TIME_S)]))
+    for name, is_field in (("omega", False), ("mag_raw", True)):
+        savemat(tmp_path / "log.mat", {"t": TIME_S, name: counts})
+        guess = look_at(tmp_path / "log.mat").guess
+        assert guess is not None and ("x_t" in guess.samples) == is_field
+
+
 def test_decimal_commas_between_commas_are_suspected(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text(
         "t,gx,gy,gz\n" + "0,02,0,48,-0,29,0,23\n0,04,0,51,-0,27,0,18\n" * 20, encoding="utf-8"
