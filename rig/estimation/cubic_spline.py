@@ -1,7 +1,10 @@
 """Cubic splines by NumPy alone, because to import SciPy's would take every command a quarter of a second."""
 
+from functools import partial
+from operator import itemgetter
+
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from rig.estimation.arrays import Array
 
@@ -36,8 +39,8 @@ class CubicSpline:
         # (n − 1, k) each, the highest power first: of the polynomial and of its derivative.
         self._coefficients = (cubic, quadratic, slopes[:-1], flat[:-1].copy()), (3 * cubic, 2 * quadratic, slopes[:-1])
 
-    def __call__(self, x: ArrayLike, derivative: int = 0) -> Array:
-        """Return the values at `x`, or with `derivative` 1 their derivatives."""
+    def __call__(self, x: ArrayLike, derivative: int = 0, columns: NDArray[np.intp] | None = None) -> Array:
+        """Return the values at `x`, or with `derivative` 1 their derivatives; of y (n, k) only `columns`, if given."""
         if derivative not in (0, 1):
             raise ValueError(f"derivative {derivative} of a spline: 0 and 1 are there")
         x = np.asarray(x, dtype=np.float64)
@@ -45,11 +48,15 @@ class CubicSpline:
         interval = np.searchsorted(self._x[1:-1], flat, side="right")
         offset = (flat - self._x.take(interval))[:, None]
         highest, *others = self._coefficients[derivative]
-        value = highest.take(interval, axis=0)
+        if columns is None:
+            shape, choose = self._shape, partial(np.take, indices=interval, axis=0)
+        else:
+            shape, choose = columns.shape, itemgetter((interval[:, None], columns))
+        value = choose(highest)
         for coefficient in others:  # Horner's scheme in place: only the access to memory takes time
             value *= offset
-            value += coefficient.take(interval, axis=0)
-        values: Array = value.reshape(x.shape + self._shape)
+            value += choose(coefficient)
+        values: Array = value.reshape(x.shape + shape)
         return values
 
 

@@ -4,6 +4,7 @@ Every function takes arrays whose last axis holds the n joints, the one on the g
 others. Shoulder, elbow and forearm refer to an arm like the UR10e, with six joints from base to wrist 3.
 """
 
+from collections.abc import Sequence
 from functools import lru_cache
 from itertools import accumulate
 from math import pi, prod
@@ -233,14 +234,26 @@ def flange_arm(q_rad: ArrayLike, joint: int, arm: DenavitHartenberg = NOMINAL) -
 
 
 def flange_rate(q_rad: ArrayLike, qd_rad_s: ArrayLike, arm: DenavitHartenberg = NOMINAL) -> Array:
-    """Return angular velocities (…, 3) of the flange in its own frame, rad/s, from joint angles and speeds (…, n).
+    """Return angular velocities (…, 3) of the flange in its own frame, rad/s, from joint angles and speeds (…, n)."""
+    angles, speeds = (np.moveaxis(np.asarray(values, dtype=np.float64), -1, 0) for values in (q_rad, qd_rad_s))
+    return flange_rate_by_joint([*angles], [*speeds], arm)
 
-    The rate is propagated from link to link in the links' own frames, which is fast for many states.
+
+def flange_rate_by_joint(
+    angles_rad: Sequence[Array | float], speeds_rad_s: Sequence[Array | float], arm: DenavitHartenberg
+) -> Array:
+    """Return angular velocities (…, 3) as `flange_rate` does; of each joint angles (…) and speeds, or one for all.
+
+    The rate is propagated from link to link in the links' own frames, which is fast for many states, and faster for
+    joints that stand still.
     """
-    angles = np.moveaxis(np.asarray(q_rad, dtype=np.float64) + arm.theta_rad, -1, 0)
-    speeds = np.moveaxis(np.asarray(qd_rad_s, dtype=np.float64), -1, 0)
-    x, y, z = np.zeros((3, *angles.shape[1:]))
-    for cos, sin, speed, *twist in zip(np.cos(angles), np.sin(angles), speeds, *_twists(arm), strict=True):
+    x: Array | float
+    y: Array | float
+    z: Array | float
+    x = y = z = 0.0
+    joints = zip(angles_rad, arm.theta_rad, speeds_rad_s, *_twists(arm), strict=True)
+    for angle, offset, speed, across, along in joints:
+        cos, sin = np.cos(angle + offset), np.sin(angle + offset)
         x, y, z = cos * x + sin * y, cos * y - sin * x, z + speed
-        y, z = twist[0] * y + twist[1] * z, twist[0] * z - twist[1] * y
-    return np.stack([x, y, z], axis=-1)
+        y, z = across * y + along * z, across * z - along * y
+    return np.stack(np.broadcast_arrays(x, y, z), axis=-1)

@@ -20,7 +20,7 @@ from rig.data.recording.run_data import RunData
 from rig.data.recording.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.errors.attempts import Attempts, attempt_each
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, median
 from rig.estimation.refusals import check_reading_ratio
 from rig.motion.steps import Sweep
 from rig.observation.arm_rests import add_attitude, average_rests, estimate_bias_drift
@@ -258,7 +258,7 @@ def _count_lost(stream: Stream, inside: slice, where: str, settings: Observation
     intervals = np.diff(stream.board_time_s[around])
     covered = inside.start > 0 and inside.stop < len(stream.raw) and len(steps) > 1
     by_sequence = int(steps.astype(np.int64).sum()) - len(steps)
-    by_time = int(np.sum(np.round(intervals / np.median(intervals)) - 1)) if covered else 0
+    by_time = int(np.sum(np.round(intervals / median(intervals)) - 1)) if covered else 0
     lost = max(by_sequence, by_time)
     got = inside.stop - inside.start
     if not covered or lost > settings.max_lost_fraction * (got + lost):
@@ -280,12 +280,12 @@ def _check_saturation(stream: Stream, inside: slice, where: str) -> None:
 
 def _check_stuck(stream: Stream, inside: slice, where: str) -> None:
     """Raise Fault `stuck_sensor` if all axes repeat one reading for long, although the noise is at least one count."""
-    counts = stream.sensor.channel(RATE).counts(stream.raw)
-    if np.median(np.abs(np.diff(counts, axis=0)), axis=0).min() < 1:
-        return
-    changes = np.flatnonzero(np.any(np.diff(counts[inside], axis=0), axis=1))
+    channel = stream.sensor.channel(RATE)
+    changes = np.flatnonzero(np.any(np.diff(channel.counts(stream.raw[inside]), axis=0), axis=1))
     longest = int(np.max(np.diff(changes, prepend=-1, append=inside.stop - inside.start - 1)))
-    if longest > STUCK_REPEATS:
+    if longest <= STUCK_REPEATS:
+        return
+    if median(np.abs(np.diff(channel.counts(stream.raw), axis=0)), axis=0).min() >= 1:
         raise Fault(
             "stuck_sensor",
             f"in {where} the gyroscope repeats one reading {longest} times",

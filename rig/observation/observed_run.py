@@ -12,7 +12,7 @@ import numpy as np
 from rig.data.quantity import RATE, Quantity
 from rig.data.recording.run_data import RunData
 from rig.data.recording.settings import ObservationThresholds
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, median
 from rig.observation.average import Stream, convert_stream
 from rig.observation.clocks.time_base import TimeBase
 from rig.observation.finished_steps import complete_dwells, complete_sweeps
@@ -92,7 +92,7 @@ def times_s(run: RunData, sensor: str, bases: Mapping[str, TimeBase], gyroscope:
     if base is not None:
         return bases[base].controller_time_s(stamps_s)
     came_s = np.interp(samples["host_time_s"], run.states["host_time_s"], run.states["time_s"])
-    return stamps_s + np.median(came_s - stamps_s) if len(stamps_s) else stamps_s
+    return stamps_s + median(came_s - stamps_s) if len(stamps_s) else stamps_s
 
 
 def observe_run(

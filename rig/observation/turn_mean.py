@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, median
 from rig.estimation.statistics.mean_weights import mean_weights
 from rig.estimation.statistics.rounding import Steps
 from rig.observation.statistics.coloured_noise import ORDERS
@@ -168,9 +168,10 @@ def _find_turn_lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines
     sizes = fit_columns(columns, ripple_rate)
     fast = ~slow_columns(ripple, ENCODER_SEARCH.sidebands)
     slow = ripple_rate - columns[:, fast] @ sizes[fast]
-    smooth = _find_slow_ripple(slow, turn.fraction)
+    slow_part = _fit_slow_part(slow, turn.fraction)
+    smooth = slow_part if _has_slow_ripple(slow) else none
     late = _changes(smooth) if turn.closed else none  # over an arc it resembles encoder errors
-    encoded = np.column_stack([smooth, late, slow - _fit_slow_part(slow, turn.fraction)])
+    encoded = np.column_stack([smooth, late, slow - slow_part])
     explained = np.column_stack([steady, encoded, columns[:, fast]])
     residuals = fit_residuals(explained, readings)
     encoded_lines = ripple[ripple >= SLOW_CYCLES]
@@ -184,7 +185,7 @@ def lag_columns(rate: Array, columns: Array, fraction: Array) -> Array:
     The ripple is sought in the part of the rate that `columns` (n, k) do not explain.
     """
     residuals = rate[:, None] - columns @ fit_columns(columns, rate[:, None])
-    return _changes(_find_slow_ripple(residuals, fraction))
+    return _changes(_fit_slow_part(residuals, fraction) if _has_slow_ripple(residuals) else residuals[:, :0])
 
 
 def _changes(slow: Array) -> Array:
@@ -193,16 +194,15 @@ def _changes(slow: Array) -> Array:
     return np.column_stack([change, np.gradient(change, axis=0)])
 
 
-def _find_slow_ripple(rate: Array, fraction: Array) -> Array:
-    """Return the part (n, 1) of a rate (n, 1) with less than `SLOW_CYCLES` per turn, or (n, 0) if this part is noise.
+def _has_slow_ripple(rate: Array) -> bool:
+    """Return whether the part of a rate (n, 1) with less than `SLOW_CYCLES` per turn is more than noise.
 
-    `fraction` (n,) is the elapsed fraction of the time. The test uses the angle, the sum of the rate, because the
-    encoders' noise is white in the angle.
+    The test uses the angle, the sum of the rate, because the encoders' noise is white in the angle.
     """
     powers = np.abs(np.fft.rfft(apply_window(np.cumsum(rate, axis=0))[:, 0])) ** 2
     slow_bins = int(SLOW_CYCLES) + MAIN_LOBE
-    noise = np.median(powers[slow_bins:])
-    return _fit_slow_part(rate, fraction) if powers[1:slow_bins].max() > MIN_POWER_RATIO * noise else rate[:, :0]
+    noise = median(powers[slow_bins:])
+    return bool(powers[1:slow_bins].max() > MIN_POWER_RATIO * noise)
 
 
 def _fit_slow_part(rate: Array, fraction: Array) -> Array:

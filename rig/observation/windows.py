@@ -1,25 +1,22 @@
-"""The windows of a recording's sweeps, rests and dwells on the controller's clock. Pure."""
+"""The windows of a recording's sweeps, rests and dwells on the controller's clock. Pure.
+
+Events are imported only where a recording's are read: a plan, which has windows too, need not load their twenty types.
+"""
 
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from rig.data.recording.recorded_events import (
-    DwellFinished,
-    DwellStarted,
-    Event,
-    RestFinished,
-    RestStarted,
-    SweepFinished,
-    SweepStarted,
-)
 from rig.data.recording.run_data import RunData
 from rig.estimation.arrays import Array
 from rig.motion.steps import Dwell, Sweep
 
-Ending = TypeVar("Ending", bound=Event)
+if TYPE_CHECKING:
+    from rig.data.recording.recorded_events import Event
+
+Ending = TypeVar("Ending", bound="Event")
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +50,8 @@ class FinishedDwell:
 
 def swept(run: RunData) -> Iterator[FinishedSweep]:
     """Yield the sweeps that were started and finished, in order; interrupted sweeps are left out."""
+    from rig.data.recording.recorded_events import SweepFinished, SweepStarted
+
     for event, window in _pair_events(run, SweepStarted, SweepFinished):
         yield FinishedSweep(event.sweep, window)
 
@@ -63,6 +62,8 @@ def iterate_rests(run: RunData, superseded: Collection[int] = ()) -> Iterator[Wi
     Dwells whose index is in `superseded`, and rests next to a superseded sweep or dwell, are left out, because a
     disturbance may begin earlier or last longer.
     """
+    from rig.data.recording.recorded_events import RestFinished, RestStarted
+
     rests = [
         window
         for _, window in _pair_events(run, RestStarted, RestFinished)
@@ -74,12 +75,16 @@ def iterate_rests(run: RunData, superseded: Collection[int] = ()) -> Iterator[Wi
 
 def dwelt(run: RunData) -> Iterator[FinishedDwell]:
     """Yield the dwells that were started and finished, in order."""
+    from rig.data.recording.recorded_events import DwellFinished, DwellStarted
+
     for event, window in _pair_events(run, DwellStarted, DwellFinished):
         yield FinishedDwell(event.dwell, window)
 
 
 def _is_superseded(run: RunData, rest: Window, superseded: Collection[int]) -> bool:
     """Return whether the step before the rest, or the next one after it, is in `superseded`."""
+    from rig.data.recording.recorded_events import DwellStarted, SweepStarted
+
     before, after = -1, None
     for recorded in run.events if superseded else ():
         match recorded.event:
@@ -91,7 +96,7 @@ def _is_superseded(run: RunData, rest: Window, superseded: Collection[int]) -> b
     return before in superseded or (before + 1 if after is None else after) in superseded
 
 
-def _pair_events(run: RunData, begin: type[Event], end: type[Ending]) -> Iterator[tuple[Ending, Window]]:
+def _pair_events(run: RunData, begin: "type[Event]", end: type[Ending]) -> Iterator[tuple[Ending, Window]]:
     """Yield each event of type `end` that follows one of type `begin`, with the window between the two.
 
     Events without a controller time are left out.

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from rig.data.quantity import Quantity
 from rig.data.recording.recorded_sensor import RecordedSensor
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, median
 from rig.estimation.statistics.rounding import Steps
 from rig.observation.consistency.raw_readings import PREDICTOR_ORDER, RawReadings, innovation_std
 from rig.observation.sound_steps import SPIKE_STDS
@@ -92,7 +92,7 @@ def judge_readings(
     critical_value = -float(ndtri(false_alarm_probability / (2 * 3 * 16)))
     at_rest = [window for window in windows if window.sweep < 0] or windows
     noises = [innovation_std(window.counts) for window in at_rest]
-    noise = np.asarray(np.median(noises, axis=0), dtype=np.float64)
+    noise = median(np.array(noises), axis=0)
     steps_of_noise = noise / digits.step_counts
     noisy = steps_of_noise >= 1
     spikes, spike_bits = _find_spikes(windows, digits.step_counts)
@@ -153,9 +153,9 @@ def _find_spikes(windows: Sequence[RawReadings], step_counts: Array) -> tuple[fl
     half = step_counts / 2
     farthest, sizes = 0.0, [list[Array]() for _ in range(3)]
     deviations_by_window = [
-        (window.residual_counts - np.median(window.residual_counts, axis=0))[SETTLING_READINGS:] for window in windows
+        (window.residual_counts - median(window.residual_counts, axis=0))[SETTLING_READINGS:] for window in windows
     ]
-    noises = [np.maximum(1.4826 * np.median(np.abs(deviations), axis=0), half) for deviations in deviations_by_window]
+    noises = [np.maximum(1.4826 * median(np.abs(deviations), axis=0), half) for deviations in deviations_by_window]
     informative = [
         noise
         for deviations, noise in zip(deviations_by_window, noises, strict=True)
@@ -181,7 +181,7 @@ def _find_scatter_around(deviations: Array) -> Array:
     """Return the scatter (n, 3) of the readings near each reading; within a burst of vibration it is large."""
     sizes = np.pad(np.abs(deviations), ((BURST_READINGS, BURST_READINGS), (0, 0)), mode="reflect")
     around = np.lib.stride_tricks.sliding_window_view(sizes, 2 * BURST_READINGS + 1, axis=0)
-    scatter: Array = 1.4826 * np.median(around, axis=-1)
+    scatter: Array = 1.4826 * median(around)
     return scatter
 
 

@@ -23,8 +23,9 @@ def find_longest_frozen(recording: ObservedRun, name: str) -> int:
     least_rad_s = np.maximum(MIN_CHANGE_STEPS * np.broadcast_to(stream.steps.unit, 3), MIN_CHANGE_RAD_S)
     longest = 0
     for axis in range(3):
-        for start, end in equal_runs(counts[:, axis]).tolist():
-            if end - start > max(MIN_EQUAL_READINGS, longest):
+        runs = equal_runs(counts[:, axis])
+        for start, end in runs[runs[:, 1] - runs[:, 0] > MIN_EQUAL_READINGS].tolist():
+            if end - start > longest:
                 time_s = stream.time_s[start:end]
                 inside = (time_s > time_s[0] + LAG_S) & (time_s < time_s[-1] - LAG_S)
                 if _rate_change(recording, time_s[inside], axes[axis]) > least_rad_s[axis]:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.data.recording.settings import Site
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, median
 from rig.estimation.gyroscope.vector_fit import VectorFit
 from rig.observation.consistency.raw_readings import REST, RawReadings
 from rig.observation.consistency.segments import MIN_REST_SAMPLES, MotionInterval, SegmentedAverage
@@ -92,7 +92,7 @@ def append_transfers(
     if not transfers:
         return segments
     of_noise = segments.variances_rad2_s2 - np.square(segments.roundings_rad_s)
-    density = np.median(of_noise * np.diff(segments.times_s), axis=0)  # variance of a mean times its duration
+    density = median(of_noise * np.diff(segments.times_s), axis=0)  # variance of a mean times its duration
     intervals = tuple(transfer.interval for transfer in transfers)
     own_times_s = np.array([[interval.start_s, interval.end_s] for interval in intervals])
     times_s = own_times_s + np.array([[transfer.clock_offset_s] for transfer in transfers])

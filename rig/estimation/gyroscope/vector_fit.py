@@ -165,8 +165,9 @@ class VectorFit:
 
 
 def centripetal_m_s2(turns_rad_s: Array, lever_arm_m: Array) -> Array:
-    """Return ω × (ω × p) (…, 3) of lever arms p (…, 3) from the axis of the rates ω (…, 3)."""
-    inwards: Array = np.cross(turns_rad_s, np.cross(turns_rad_s, lever_arm_m))
+    """Return ω × (ω × p) = ω (ω · p) − p ω² (…, 3) of lever arms p (…, 3) from the axis of the rates ω (…, 3)."""
+    along, squares = (np.sum(turns_rad_s * other, axis=-1, keepdims=True) for other in (lever_arm_m, turns_rad_s))
+    inwards: Array = turns_rad_s * along - lever_arm_m * squares
     return inwards
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rig.errors import Fault
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, median_step
 from rig.estimation.refusals import check_finite, require_shape
 
 REVOLUTION_TOLERANCE = 0.05  # of the samples' angle, in revolutions
@@ -132,7 +132,7 @@ def estimate_acceleration(angle_rad: Callable[[Array], Array], time_s: Array, sp
     Each speed is a mean over `SPEED_MEAN_RAD`. The sum of the accelerations depends only on the speeds at both ends of
     the revolution, so the encoders' noise stays small.
     """
-    step_s, half_s = float(np.median(np.diff(time_s))), SPEED_MEAN_RAD / 2 / speed_rad_s
+    step_s, half_s = median_step(time_s), SPEED_MEAN_RAD / 2 / speed_rad_s
 
     def mean_speed(middle_s: Array) -> Array:
         return (angle_rad(middle_s + half_s) - angle_rad(middle_s - half_s)) / (2 * half_s)

@@ -13,7 +13,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, median
 
 GRID_POINTS = 25  # of each standard deviation
 PARAMETER_COST = 1.0  # in the log-likelihood (Akaike, IEEE Trans. Autom. Control 19 (1974) 716)
@@ -191,9 +191,9 @@ def bias_process(
     free = np.linalg.qr(z, mode="complete")[0][:, z.shape[1] :].T  # contrasts, free of the parameters
     unit = walk_covariance(windows_s)
     flicker = _flicker(instability_rad_s, windows_s) if instability_rad_s else np.zeros(unit.shape)
-    typical = float(np.median(variances))
+    typical = float(median(variances.ravel()))
     grid = np.concatenate([[0.0], typical * np.geomspace(GRID_RATIO**-0.5, GRID_RATIO, GRID_POINTS) ** 2])
-    walks = grid / float(np.median(np.diag(unit)))
+    walks = grid / float(median(np.diag(unit)))
     squares = np.array([(walk, scatter) for walk in walks for scatter in grid])
     likelihood = np.zeros(len(squares))
     for axis in range(3):

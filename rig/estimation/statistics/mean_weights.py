@@ -24,6 +24,8 @@ def mean_weights(groups: Array, nuisance: Array) -> Array:
     samples has no weights.
     """
     averages = groups.T / np.maximum(groups.sum(axis=0), 1.0)[:, None]
+    if not nuisance.shape[1]:
+        return np.asarray(averages, dtype=np.float64)
     means = averages @ nuisance
     sizes = np.linalg.norm(nuisance, axis=0)
     sizes = np.where(sizes > 0, sizes, np.inf)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from rig.errors import Fault
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, median_step
 from rig.estimation.cubic_spline import CubicSpline
 from rig.observation.clocks.time_base import TimeBase, time_base_not_found
 from rig.observation.motion.reference_motion import KnownMotion
@@ -43,7 +43,7 @@ def _average_samples(time_s: Array, readings: Array, count: int) -> tuple[Array,
     """Return times (m,) and readings (m, 3) averaged over `count` samples that follow each other without a gap."""
     starts = np.arange(0, len(time_s) - count + 1, count)
     lasting_s = time_s[starts + count - 1] - time_s[starts]
-    starts = starts[lasting_s <= (count - 1 + MIN_STEP_INTERVALS) * float(np.median(np.diff(time_s)))]
+    starts = starts[lasting_s <= (count - 1 + MIN_STEP_INTERVALS) * median_step(time_s)]
     inside = starts[:, None] + np.arange(count)
     return time_s[inside].mean(axis=1), readings[inside].mean(axis=1)
 
@@ -82,7 +82,7 @@ def _list_stages(
 ) -> Iterator[tuple[Array, Array, KnownMotion]]:
     """Yield times, readings and motion for each fit: averaged over long times, over short times, and not averaged."""
     start_s, end_s = clock.controller_time_s(board_time_s[[0, -1]]).tolist()
-    step_s = float(np.median(np.diff(board_time_s)))
+    step_s = median_step(board_time_s)
     for over_s in (SLOW_AVERAGE_S, FINE_AVERAGE_S):
         count = round(over_s / step_s)
         if count < 2 or len(board_time_s) < MIN_SAMPLES * count:

@@ -10,7 +10,7 @@ from functools import lru_cache, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, median_step
 from rig.observation.clocks.time_base import TimeBase, time_base_not_found
 from rig.observation.motion.reference_motion import KnownMotion
 
@@ -79,7 +79,7 @@ def _coarse_offset(time_s: Array, readings: Array, arm_rate: Callable[[float], t
     is cross-correlated with every axis of the arm, because the norm of the readings would contain the bias. Of the
     offsets at the highest peaks, the one with the best linear fit of the vectors is returned.
     """
-    step_s = max(COARSE_STEP_S, 1.1 * float(np.median(np.diff(time_s))))
+    step_s = max(COARSE_STEP_S, 1.1 * median_step(time_s))
     bins = ((time_s - time_s[0]) / step_s).astype(np.intp)
     counts = np.bincount(bins)
     filled = counts > 0

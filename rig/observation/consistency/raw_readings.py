@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.data.quantity import Quantity
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, median
 from rig.observation.average import Stream
 from rig.observation.statistics.coloured_noise import innovations
 
@@ -53,4 +53,4 @@ def _innovation_std(readings: Array) -> float:
     """Return the standard deviation of the error of predicting readings (n,) from `PREDICTOR_ORDER` earlier ones."""
     if len(readings) < 4 * PREDICTOR_ORDER:
         return float(np.std(np.diff(readings)) / np.sqrt(2)) if len(readings) > 1 else 0.0
-    return float(MAD_TO_STD * np.median(np.abs(innovations(readings, PREDICTOR_ORDER))))
+    return float(MAD_TO_STD * median(np.abs(innovations(readings, PREDICTOR_ORDER))))

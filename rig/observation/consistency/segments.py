@@ -132,10 +132,9 @@ class _Division:
     enough: tuple[int, ...]
     steps: Steps
 
-    @property
-    def averages(self) -> Array:
-        """The weights (p, m) that average each segment's samples: equal for all samples of the segment."""
-        return mean_weights(self.groups, self.groups[:, :0])
+    def subtract_averages(self, values: Array) -> Array:
+        """Return values (m, k) minus the plain means of their segments."""
+        return self.subtract_means(values, mean_weights(self.groups, self.groups[:, :0]))
 
     def subtract_means(self, values: Array, weights: Array) -> Array:
         """Return values (m, k) minus the means of their segments with weights (p, m)."""
@@ -174,9 +173,7 @@ def _segment_revolution(
     lines = waves(average.lines_hz * average.duration_s, fraction, turn.sidebands)
     vibration = np.column_stack([rates @ axis, motion.rate(division.time_s, 1) @ axis])  # and the effect of a lag
     encoded = np.column_stack([np.ones(len(rates)), vibration])
-    residual, vibration = (
-        division.subtract_means(values, division.averages) for values in (division.readings_rad_s, vibration)
-    )
+    residual, vibration = np.hsplit(division.subtract_averages(np.hstack([division.readings_rad_s, vibration])), [3])
     vibrating = vibration @ np.linalg.lstsq(vibration, residual, rcond=None)[0]
     noise_alone = residual - vibrating  # without the vibration that the encoders measure
     noise = MeanNoise(average.noise_rad_s**2, average.noise_rad2_s2 * average.samples, average.dof)
@@ -251,7 +248,7 @@ def _segment_rest(stream: Stream, motion: ArmMotion, average: Average, count: in
         noise=_noise_at_rest(residuals, len(division.enough), lines.shape[1], division.steps),
     )
     lsb = stream.sensor.channel(RATE).unit_per_count
-    vibrating = division.subtract_means(readings, division.averages)
+    vibrating = division.subtract_averages(readings)
     raw = RawReadings(
         sweep=REST,
         counts=counts_of(stream, RATE, division.inside),
@@ -297,14 +294,23 @@ def _average(
     smooth = readings - residuals
     means = compute_weighted_means(readings, groups, rows, smooth=smooth, noise=noise, steps=division.steps)
     last, segments = len(weights) - 1, list[Segment]()
-    for index, mean, rate_rad_s in zip(division.enough, means, rows @ rates, strict=True):
-        start_s, end_s = division.ends_s[index : index + 2].tolist()
+    starts_s, ends_s = division.ends_s[list(division.enough)], division.ends_s[1:][list(division.enough)]
+    averaged = zip(
+        division.enough,
+        means,
+        rows @ rates,
+        motion.mean_attitudes(starts_s, ends_s),
+        starts_s.tolist(),
+        ends_s.tolist(),
+        strict=True,
+    )
+    for index, mean, rate_rad_s, attitude, start_s, end_s in averaged:
         segments.append(
             Segment(
                 position=2 * index / last - 1 if last else 0.0,
                 mean=replace(mean, variance=mean.variance + added),
                 rate_rad_s=rate_rad_s,
-                attitude=motion.attitude(start_s, end_s),
+                attitude=attitude,
                 interval=MotionInterval(motion, start_s, end_s),
             )
         )

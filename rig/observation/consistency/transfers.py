@@ -18,7 +18,7 @@ import numpy as np
 from rig.data.quantity import RATE
 from rig.data.recording.run_data import RunData
 from rig.data.recording.settings import Site
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, median_step
 from rig.estimation.statistics.rounding import bound_rounding_variance
 from rig.motion.geometry import flange_attitude, flange_pose
 from rig.observation.average import Stream, slice_time
@@ -140,7 +140,7 @@ def _scatter(readings: Array, time_s: Array, motion: ArmMotion, down_m_s2: Array
     The arm's rates at adjacent samples are also removed, because a sensor's filter combines them. A ripple above half
     the data rate counts as noise.
     """
-    step_s = float(np.median(np.diff(time_s)))
+    step_s = median_step(time_s)
     rates = [motion.rates_at_samples(time_s + shift * step_s) for shift in FILTER_SAMPLES]
     gravity = flange_attitude(motion.angles(time_s), motion.kinematics) @ down_m_s2
     columns = unit_columns(np.column_stack([np.ones(len(time_s)), *rates, gravity]))

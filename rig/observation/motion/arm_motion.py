@@ -9,10 +9,18 @@ from numpy.typing import NDArray
 from rig.data.recording.run_data import RunData
 from rig.data.recording.settings import ObservationThresholds
 from rig.errors import Fault, Refused
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, median_step
 from rig.estimation.cubic_spline import CubicSpline
 from rig.motion.chain import DenavitHartenberg
-from rig.motion.geometry import NOMINAL, axis_errors, flange_arm, flange_attitude, flange_axes, flange_rate
+from rig.motion.geometry import (
+    NOMINAL,
+    axis_errors,
+    flange_arm,
+    flange_attitude,
+    flange_axes,
+    flange_rate,
+    flange_rate_by_joint,
+)
 from rig.motion.steps import Sweep
 from rig.motion.turner_state import JOINT_NAMES
 from rig.observation.motion.even_turn import SMOOTHING_S, find_even_turn, fit_lines, well_timed
@@ -70,7 +78,7 @@ class ArmMotion:
             rates = flange_rate(angles, joint_rates, kinematics) @ self.mount.T
         else:
             self.angles = CubicSpline(self.time_s, self._states["q_rad"])
-            step_s = float(np.median(np.diff(self.time_s)))
+            step_s = median_step(self.time_s)
             times_s = self.time_s[:: max(min(round(KNOT_S / step_s), len(self.time_s) // 4), 1)]
             rates = self.mean_rates(times_s, max(RATE_STEP_S, step_s))
         if not np.linalg.norm(rates, axis=1).max() > MIN_RATE_RAD_S:
@@ -87,7 +95,13 @@ class ArmMotion:
 
     def attitude(self, start_s: float, end_s: float) -> Array:
         """Return the mean rotation (3, 3) from the base frame into the flange's between two controller times."""
-        times_s = np.linspace(start_s, end_s, ATTITUDES, endpoint=False) + (end_s - start_s) / (2 * ATTITUDES)
+        mean: Array = self.mean_attitudes(np.array([start_s]), np.array([end_s]))[0]
+        return mean
+
+    def mean_attitudes(self, starts_s: Array, ends_s: Array) -> Array:
+        """Return the mean rotations (n, 3, 3) of `attitude` between n starts and n ends."""
+        middles_s = (ends_s - starts_s) / (2 * ATTITUDES)
+        times_s = np.linspace(starts_s, ends_s, ATTITUDES, endpoint=False) + middles_s
         mean: Array = self.attitudes(times_s).mean(axis=0)
         return mean
 
@@ -218,11 +232,15 @@ class ArmMotion:
 
     def _mean_rates(self, time_s: Array, lasting_s: float, standing_rad: Array) -> Array:
         """Return `mean_rates`, with joints at rest at the angles `standing_rad` (k,); NaN stands for a moving joint."""
+        moving = np.flatnonzero(np.isnan(standing_rad))
         before, middle, after = (
-            np.where(np.isnan(standing_rad), self.angles(time_s + shift_s), standing_rad)
-            for shift_s in (-lasting_s / 2, 0.0, lasting_s / 2)
+            self.angles(time_s + shift_s, columns=moving) for shift_s in (-lasting_s / 2, 0.0, lasting_s / 2)
         )
-        rates: Array = flange_rate(middle, (after - before) / lasting_s, self.kinematics) @ self.mount.T
+        angles: list[Array | float] = standing_rad.tolist()
+        speeds: list[Array | float] = [0.0] * len(angles)
+        for joint, angle, change in zip(moving.tolist(), middle.T, (after - before).T, strict=True):
+            angles[joint], speeds[joint] = angle, change / lasting_s
+        rates: Array = flange_rate_by_joint(angles, speeds, self.kinematics) @ self.mount.T
         return rates
 
     def _standing_rad(self, start_s: float, end_s: float) -> Array:
@@ -240,12 +258,13 @@ class ArmMotion:
 
 def _averaging_time(time_s: Array) -> float:
     """Return the time, s, over which the arm's rate is averaged around samples at times (n,)."""
-    return RATE_STEP_S if is_sparse(time_s) else float(np.median(np.diff(time_s)))
+    step_s = median_step(time_s)
+    return RATE_STEP_S if step_s > MAX_STEP_S else step_s
 
 
 def is_sparse(time_s: Array) -> bool:
     """Return whether samples at times (n,) are too sparse for the arm's mean rates between them."""
-    return float(np.median(np.diff(time_s))) > MAX_STEP_S
+    return median_step(time_s) > MAX_STEP_S
 
 
 def motion_of(run: RunData, correction: Array | None = None) -> ArmMotion:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rig.data.recording.settings import ObservationThresholds
 from rig.errors import Fault
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, median_step
 from rig.motion.steps import TURN_RAD, Sweep
 from rig.observation.motion.revolution import MAX_STATE_GAP_S, Ends, arm_states_lost, check_constant, describe
 from rig.observation.motion.turn_speed import MIN_PAIRS, turn_speed
@@ -35,7 +35,7 @@ def well_timed(states: NDArray[Any]) -> NDArray[Any]:
 
 def fit_lines(time_s: Array, q_rad: Array) -> tuple[Array, Array, Array]:
     """Fit straight lines to readings (m, n) in k windows; return their middle times (k,), angles and rates (k, n)."""
-    count = max(MIN_ANGLES, round(SMOOTHING_S / float(np.median(np.diff(time_s)))))
+    count = max(MIN_ANGLES, round(SMOOTHING_S / median_step(time_s)))
     half = count // 2
     windows = np.lib.stride_tricks.sliding_window_view
     times = windows(np.pad(time_s, half, mode="edge"), 2 * half + 1)[::KNOT_STRIDE]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, median
 from rig.estimation.statistics.mean_weights import TOLERANCE
 from rig.observation.statistics.tapered_weights import MAIN_LOBE, apply_window
 
@@ -85,7 +85,7 @@ def _are_too_near(cycles: Array, search: LineSearch) -> bool:
 
 def median_power(residuals: Array) -> float:
     """Return the median power of residuals (n, axes), tapered by the search's window, on the quietest axis."""
-    return float(np.median(np.abs(np.fft.rfft(apply_window(residuals).T)) ** 2, axis=1).min())
+    return float(median(np.abs(np.fft.rfft(apply_window(residuals).T)) ** 2).min())
 
 
 def column_count(sidebands: int) -> int:
@@ -153,7 +153,7 @@ def find_angle_change_rad2(residuals: Array, columns: Array, lines_hz: Array) ->
 def _sampling_step(fraction: Array) -> float:
     """Return the interval between samples as a fraction of the whole time; samples may be missing."""
     steps = np.diff(fraction)
-    return float(steps[steps < MIN_GAP_STEPS * np.median(steps)].mean())
+    return float(steps[steps < MIN_GAP_STEPS * median(steps)].mean())
 
 
 def _find_strongest(residuals: Array, previous: Array, fraction: Array, search: LineSearch) -> float | None:

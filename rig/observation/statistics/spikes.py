@@ -11,7 +11,7 @@ deviations at readings farther away.
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, median_step
 
 MAX_STEP_S = 0.02  # between readings: in a longer one a hand starts and stops
 MIN_SPIKE_RAD_S = 0.1  # over one such step a smaller one turns by less than a body may move at rest
@@ -27,7 +27,7 @@ PASSES = 3  # spikes that are close together hide each other
 def find_spikes(time_s: Array, rates: Array) -> NDArray[np.intp]:
     """Return the indices (k,) of the spikes in rates (n, 3), rad/s, at rising times (n,)."""
     none = np.zeros(0, dtype=np.intp)
-    if len(rates) < 2 * SIDE_READINGS + 1 or np.median(np.diff(time_s)) > MAX_STEP_S:
+    if len(rates) < 2 * SIDE_READINGS + 1 or median_step(time_s) > MAX_STEP_S:
         return none
     spikes, bridged = none, rates
     for _ in range(PASSES):

@@ -11,7 +11,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, median
 from rig.observation.statistics.coloured_noise import fit_noise_factor
 
 FLANK_S = 0.5
@@ -52,7 +52,7 @@ def noise_at_zero(readings: Array, low: float = LOW_FRACTION) -> Array:
     of the data rate, in at least `MIN_BINS` bins.
     """
     powers = np.abs(np.fft.rfft(apply_window(readings), axis=0)[MAIN_LOBE : _count_low_bins(len(readings), low)]) ** 2
-    medians: Array = np.median(powers, axis=0) / np.log(2)
+    medians: Array = median(powers, axis=0) / np.log(2)
     return medians
 
 
