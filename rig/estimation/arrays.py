@@ -43,7 +43,7 @@ def integrate_rates(time_s: Array, rates: Array) -> Array:
 
 
 def median(values: NDArray[Any], axis: int = -1) -> Array:
-    """Return the median of finite values along an axis; NumPy's takes three times as long and imports `numpy.ma`."""
+    """Return the median of finite values along an axis; NumPy's takes three times as long, mostly to look for NaN."""
     middle, is_odd = divmod(values.shape[axis], 2)
     if is_odd:
         return np.asarray(np.partition(values, middle, axis).take(middle, axis), dtype=np.float64)

@@ -237,7 +237,7 @@ def _residual_chi_square(tested: _TestedSegments) -> tuple[float, int]:
     """
     changed = [*changes(tested.segments, tested.axis_rates).values(), quarter_columns(tested.means)]
     columns = [apply_whitener(tested.model.whitener, change) for change in changed]
-    basis = orthonormal_basis(tested.model.model)
+    basis = tested.model.basis
     possible = remaining_directions(basis, np.concatenate(columns, axis=1))
     return chi_square_of(tested.model.readings, np.concatenate([basis, possible], axis=1), None)
 
@@ -319,7 +319,7 @@ def _test_bias_jump(
         readings = apply_whitener(whitener, (segments.means_rad_s - axis_rates).T[:, :, None])[:, 0]
         return chi_square_of(
             readings,
-            apply_whitener(whitener, repeat_per_axis(steady_columns)),
+            orthonormal_basis(apply_whitener(whitener, repeat_per_axis(steady_columns))),
             apply_whitener(whitener, repeat_per_axis(step)),
         )[0]
 

@@ -118,13 +118,12 @@ def remaining_directions(model_basis: Array, columns: Array) -> Array:
     return basis
 
 
-def chi_square_of(readings: Array, base: Array, columns: Array | None) -> tuple[float, int]:
-    """Return the χ² of readings (n,) that columns (n, k) explain after a fit of `base` (n, p), and its dof.
+def chi_square_of(readings: Array, model_basis: Array, columns: Array | None) -> tuple[float, int]:
+    """Return the χ² of readings (n,) that columns (n, k) explain after a fit of the model, and its dof.
 
-    If `columns` is None, the χ² is that of all residuals; it needs no decomposition, which would be slow and might not
-    converge.
+    `model_basis` (n, p) is orthonormal. If `columns` is None, the χ² is that of all residuals; it needs no
+    decomposition, which would be slow and might not converge.
     """
-    model_basis = orthonormal_basis(base)
     unexplained = readings - model_basis @ (model_basis.T @ readings)
     if columns is None:
         return float(unexplained @ unexplained), len(readings) - model_basis.shape[1]

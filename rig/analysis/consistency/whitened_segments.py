@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -39,7 +40,7 @@ class Scatter:
         return np.asarray(np.swapaxes(by_axis, 1, 2) @ by_axis, dtype=np.float64)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, eq=False)
 class WhitenedSegments:
     """Whitened segments: the `whitener` (3 N, 3 N), readings (3 N,) and model columns (3 N, k)."""
 
@@ -47,15 +48,24 @@ class WhitenedSegments:
     readings: Array
     model: Array
 
+    @cached_property
+    def basis(self) -> Array:
+        """An orthonormal basis (3 N, p) of the model: many tests need it."""
+        return orthonormal_basis(self.model)
+
     def chi_square_of(self, alternatives: Sequence[Array], nuisance: Sequence[Array]) -> list[float]:
         """Return the χ² of each alternative (3, N, k): see `WhitenedModel`."""
-        return [self._explain(columns, nuisance)[0] for columns in alternatives]
+        basis = self._extend_basis(nuisance)
+        return [
+            chi_square_of(self.readings, basis, apply_whitener(self.whitener, columns))[0] for columns in alternatives
+        ]
 
     def test(
         self, columns: Array | None, nuisance: Sequence[Array], false_alarm_probability: float
     ) -> Statistic | None:
         """Return the χ² that columns explain, and its critical value; None if the model spans the columns."""
-        value, dof = self._explain(columns, nuisance)
+        whitened = None if columns is None else apply_whitener(self.whitener, columns)
+        value, dof = chi_square_of(self.readings, self._extend_basis(nuisance), whitened)
         return (value, critical_value(false_alarm_probability)(dof)) if dof else None
 
     def test_single_columns(self, columns: Array, false_alarm_probability: float) -> Statistic | None:
@@ -63,8 +73,7 @@ class WhitenedSegments:
         columns = self._independent_columns(columns)
         if not columns.shape[1]:
             return None
-        model_basis = orthonormal_basis(self.model)
-        projections = columns.T @ (self.readings - model_basis @ (model_basis.T @ self.readings))
+        projections = columns.T @ (self.readings - self.basis @ (self.basis.T @ self.readings))
         return float(np.max(projections**2)), critical_value(false_alarm_probability / columns.shape[1])(1)
 
     def minimal_detectable_size(self, patterns: Array, alternatives: Iterable[Alternative]) -> float:
@@ -74,7 +83,7 @@ class WhitenedSegments:
         """
         whitened = ((apply_whitener(self.whitener, columns), limit) for columns, limit in alternatives)
         return minimal_detectable_size(
-            orthonormal_basis(self.model),
+            self.basis,
             apply_whitener(self.whitener, np.moveaxis(patterns, 0, -1).swapaxes(0, 1)),
             whitened,
         )
@@ -86,16 +95,19 @@ class WhitenedSegments:
 
     def _independent_columns(self, columns: Array) -> Array:
         """Return unit columns (3 N, k), orthogonal to the model, without columns that lie in the model."""
-        model_basis, new = orthonormal_basis(self.model), apply_whitener(self.whitener, columns)
+        new = apply_whitener(self.whitener, columns)
         sizes = np.linalg.norm(new, axis=0)
-        new = new - model_basis @ (model_basis.T @ new)
+        new = new - self.basis @ (self.basis.T @ new)
         lengths = np.linalg.norm(new, axis=0)
         independent = lengths > MIN_INDEPENDENT_PART * sizes
         return np.asarray(new[:, independent] / lengths[independent], dtype=np.float64)
 
-    def _explain(self, columns: Array | None, nuisance: Sequence[Array]) -> tuple[float, int]:
-        model = np.concatenate([self.model, *(apply_whitener(self.whitener, columns) for columns in nuisance)], axis=1)
-        return chi_square_of(self.readings, model, None if columns is None else apply_whitener(self.whitener, columns))
+    def _extend_basis(self, nuisance: Sequence[Array]) -> Array:
+        """Return an orthonormal basis of the model and the nuisance columns."""
+        if not nuisance:
+            return self.basis
+        whitened = (apply_whitener(self.whitener, columns) for columns in nuisance)
+        return orthonormal_basis(np.concatenate([self.model, *whitened], axis=1))
 
 
 def critical_value(false_alarm_probability: float) -> Callable[[int], float]:

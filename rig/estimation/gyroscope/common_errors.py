@@ -14,12 +14,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.vector_model import (
     VectorSolution,
+    check_matrix,
+    check_observations,
     design_matrix,
+    fit_coefficients,
     index_coefficients,
     propagate_speed_std,
     regress,
@@ -43,67 +45,110 @@ class CommonErrors:
     readings_rad_s: Array
 
 
-def solve_with_common_errors(
-    means_rad_s: ArrayLike,
-    rates_rad_s: ArrayLike,
-    variances_rad2_s2: ArrayLike,
-    effects: Callable[[Array], Array],
-    *,
-    speed_std_rad_s: Array,
-    gravity_m_s2: Array | None = None,
-    nominal_mounting: Array | None = None,
-    shared_covariance_rad2_s2: Array | None = None,
-) -> tuple[VectorSolution, CommonErrors]:
-    """Return the solution of the vector model corrected for common errors, and the estimated errors.
+@dataclass(frozen=True, slots=True)
+class Prediction:
+    """The common errors by the last F, their patterns (P, N, 3), and the gain (P, N, 3) from the means to their sizes.
+
+    `speed_noise_rad_s` (N, 3): the effect on the readings of one standard deviation of each speed.
+    """
+
+    errors: CommonErrors
+    patterns_rad_s: Array
+    gain: Array
+    speed_noise_rad_s: Array
+
+
+@dataclass(frozen=True, slots=True)
+class CommonErrorModel:
+    """The vector model with common errors.
 
     `effects` takes F (3, 3) and returns B (P, N, 3): the change of the readings, rad/s, by one standard deviation of
-    each error. The other arguments are those of `solve_vector_model`. The solution's `covariance`, `matrix_covariance`
-    and `response` are due to the readings alone; `angles_covariance_rad2` includes the common errors that remain. Raise
-    Fault as `solve_vector_model` does.
+    each error. The other fields are arguments of `solve_vector_model`.
     """
-    means, rates, variances = (np.asarray(a, dtype=np.float64) for a in (means_rad_s, rates_rad_s, variances_rad2_s2))
 
-    def solve(effect_rad_s: Array) -> VectorSolution:
-        return solve_vector_model(
-            means - effect_rad_s,
-            rates,
-            variances,
-            speed_std_rad_s=speed_std_rad_s,
-            gravity_m_s2=gravity_m_s2,
-            nominal_mounting=nominal_mounting,
+    means_rad_s: Array
+    rates_rad_s: Array
+    variances_rad2_s2: Array
+    effects: Callable[[Array], Array]
+    speed_std_rad_s: Array
+    gravity_m_s2: Array | None = None
+    nominal_mounting: Array | None = None
+
+    @property
+    def design(self) -> Array:
+        """The design (N, p) of the vector model."""
+        return design_matrix(self.rates_rad_s, self.gravity_m_s2)
+
+    def predict(self, shared_covariance_rad2_s2: Array | None = None) -> Prediction:
+        """Return the errors that the means determine. Raise Fault as `solve_vector_model` does."""
+        check_observations(
+            self.design, self.means_rad_s, self.rates_rad_s, self.variances_rad2_s2, self.speed_std_rad_s
+        )
+        matrix = self.fit_matrix(0.0, shared_covariance_rad2_s2)
+        check_matrix(matrix, self.nominal_mounting)
+        prediction = self._predict(matrix, shared_covariance_rad2_s2)
+        for _ in range(1, MAX_ITERATIONS):
+            matrix = self.fit_matrix(prediction.errors.readings_rad_s, shared_covariance_rad2_s2)
+            prediction = self._predict(matrix, shared_covariance_rad2_s2)
+        return prediction
+
+    def fit_matrix(self, effect_rad_s: Array | float, shared_covariance_rad2_s2: Array | None = None) -> Array:
+        """Return F (3, 3) from the means minus the effect (N, 3) of common errors."""
+        coefficients, *_ = fit_coefficients(
+            self.design,
+            self.means_rad_s - effect_rad_s,
+            self.rates_rad_s,
+            self.variances_rad2_s2,
+            speed_std=self.speed_std_rad_s,
+            shared=shared_covariance_rad2_s2,
+        )
+        return coefficients[:3].T
+
+    def solve(self, shared_covariance_rad2_s2: Array | None = None) -> tuple[VectorSolution, CommonErrors]:
+        """Return the solution corrected for common errors, and the estimated errors.
+
+        `covariance`, `matrix_covariance` and `response` of the solution are due to the readings alone;
+        `angles_covariance_rad2` includes the common errors that remain. Raise Fault as `solve_vector_model` does.
+        """
+        prediction = self.predict(shared_covariance_rad2_s2)
+        solution = solve_vector_model(
+            self.means_rad_s - prediction.errors.readings_rad_s,
+            self.rates_rad_s,
+            self.variances_rad2_s2,
+            speed_std_rad_s=self.speed_std_rad_s,
+            gravity_m_s2=self.gravity_m_s2,
+            nominal_mounting=self.nominal_mounting,
             shared_covariance_rad2_s2=shared_covariance_rad2_s2,
         )
+        gain, patterns, speed_noise = prediction.gain, prediction.patterns_rad_s, prediction.speed_noise_rad_s
+        _, inverse = regress(
+            self.design, self.means_rad_s, self.variances_rad2_s2 + speed_noise**2, shared_covariance_rad2_s2
+        )
+        shifts = np.einsum("ipn,kni->ipk", inverse, patterns)  # changes of the coefficients, per standard deviation
+        # The coefficients are inverse (m − B e), and e is gain m. So their derivative by the means m has two parts.
+        total_gain = -np.einsum("ipk,knj->ipjn", shifts, gain)
+        for axis in range(3):
+            total_gain[axis, :, axis] += inverse[axis]
+        # Prediction leaves (1 − gain B) e of the errors e.
+        remaining = shifts @ (np.eye(len(patterns)) - np.einsum("kni,lni->kl", gain, patterns))
+        # The errors of a sweep's speed are not in this noise: the axes share them, and `_add_covariances` adds them.
+        noise = _build_noise(self.variances_rad2_s2, shared_covariance_rad2_s2)
+        return _add_covariances(solution, total_gain, remaining, noise, speed_noise), prediction.errors
 
-    design = design_matrix(rates, gravity_m_s2)
-    shared = np.zeros((len(means), len(means))) if shared_covariance_rad2_s2 is None else shared_covariance_rad2_s2
-
-    def estimate(matrix: Array) -> tuple[Array, Array, Array, CommonErrors]:
-        speed_noise = propagate_speed_std(rates, speed_std_rad_s, matrix)
-        noise = np.array([np.diag(axis) for axis in (variances + speed_noise**2).T]) + shared  # (3, N, N)
-        error_patterns = effects(matrix)
-        gain, covariance = _gain(design, error_patterns, noise)
+    def _predict(self, matrix: Array, shared: Array | None) -> Prediction:
+        speed_noise = propagate_speed_std(self.rates_rad_s, self.speed_std_rad_s, matrix)
+        patterns = self.effects(matrix)
+        gain, covariance = _gain(self.design, patterns, _build_noise(self.variances_rad2_s2 + speed_noise**2, shared))
         # The gain applies to the means themselves, because it maps what F, c and G explain to zero.
-        sizes = np.einsum("pni,ni->p", gain, means)
-        errors = CommonErrors(sizes, covariance, np.einsum("p,pni->ni", sizes, error_patterns))
-        return speed_noise, error_patterns, gain, errors
+        sizes = np.einsum("pni,ni->p", gain, self.means_rad_s)
+        errors = CommonErrors(sizes, covariance, np.einsum("p,pni->ni", sizes, patterns))
+        return Prediction(errors, patterns, gain, speed_noise)
 
-    solution = solve(np.zeros_like(means))
-    speed_noise, error_patterns, gain, errors = estimate(solution.matrix)
-    for _ in range(1, MAX_ITERATIONS):
-        solution = solve(errors.readings_rad_s)
-        speed_noise, error_patterns, gain, errors = estimate(solution.matrix)
-    solution = solve(errors.readings_rad_s)
-    # The errors of a sweep's speed are left out here: the axes share them, and `_add_covariances` adds them.
-    noise = np.array([np.diag(axis) for axis in variances.T]) + shared
-    _, inverse = regress(design, means, variances + speed_noise**2, shared_covariance_rad2_s2)
-    shifts = np.einsum("ipn,kni->ipk", inverse, error_patterns)  # changes of the coefficients, per standard deviation
-    # The coefficients are inverse (m − B e), and e is gain m. So their derivative by the means m has two parts.
-    total_gain = -np.einsum("ipk,knj->ipjn", shifts, gain)
-    for axis in range(3):
-        total_gain[axis, :, axis] += inverse[axis]
-    # Prediction leaves (1 − gain B) e of the errors e.
-    remaining = shifts @ (np.eye(len(error_patterns)) - np.einsum("kni,lni->kl", gain, error_patterns))
-    return _add_covariances(solution, total_gain, remaining, noise, speed_noise), errors
+
+def _build_noise(variances: Array, shared: Array | None) -> Array:
+    """Return the covariances (3, N, N) of each axis' means, from variances (N, 3) and a covariance (N, N) of all."""
+    noise = np.array([np.diag(axis) for axis in variances.T])
+    return noise if shared is None else noise + shared
 
 
 def _gain(design: Array, effects: Array, noise: Array) -> tuple[Array, Array]:

@@ -28,9 +28,9 @@ from rig.errors import Fault
 from rig.estimation import refusals
 from rig.estimation.arrays import Array, perpendicular_unit_vectors
 from rig.estimation.earth import DEG_H, EARTH_RATE_RAD_S
-from rig.estimation.gyroscope.common_errors import CommonErrors
+from rig.estimation.gyroscope.common_errors import CommonErrorModel, CommonErrors
 from rig.estimation.gyroscope.nonlinearity import curvature
-from rig.estimation.gyroscope.vector_fit import VectorInputs, solver
+from rig.estimation.gyroscope.vector_fit import VectorInputs
 from rig.estimation.gyroscope.vector_model import MAX_CONDITION, VectorSolution, design_matrix, propagate_speed_std
 from rig.estimation.statistics.bias_process import bias_process
 
@@ -191,14 +191,16 @@ def _fit(
         curved = [curvature(matrix, inputs.rates_rad_s)] if several else []
         return np.concatenate([*curved, inputs.sensor_error_patterns(matrix), rate_errors @ matrix.T])
 
-    solve = solver(inputs, mounting, gravity, speed_std, effects)
-    solution, errors = solve(None)
-    variances = inputs.variances_rad2_s2 + propagate_speed_std(inputs.rates_rad_s, speed_std, solution.matrix) ** 2
-    design = design_matrix(inputs.rates_rad_s, gravity)
-    means = inputs.means_rad_s - errors.readings_rad_s
-    bias = bias_process(design, means, variances, inputs.windows_s, instability_rad_s=inputs.instability_rad_s)
+    model = CommonErrorModel(
+        inputs.means_rad_s, inputs.rates_rad_s, inputs.variances_rad2_s2, effects, speed_std, gravity, mounting
+    )
+    effect_rad_s = model.predict().errors.readings_rad_s
+    matrix = model.fit_matrix(effect_rad_s)
+    variances = inputs.variances_rad2_s2 + propagate_speed_std(inputs.rates_rad_s, speed_std, matrix) ** 2
+    means = inputs.means_rad_s - effect_rad_s
+    bias = bias_process(model.design, means, variances, inputs.windows_s, instability_rad_s=inputs.instability_rad_s)
     shared = bias.covariance(inputs.windows_s)
-    solution, errors = solve(shared)
+    solution, errors = model.solve(shared)
     return _EarthRateFit(solution, errors, variances + np.diag(shared)[:, None])
 
 

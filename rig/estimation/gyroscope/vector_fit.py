@@ -7,7 +7,6 @@ angles between the sensor's axes from those between the arm's, sweeps at several
 Effects that sweeps and rests do not separate are left out of the model and belong to the uncertainty.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -15,10 +14,10 @@ import numpy as np
 
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.estimation.gyroscope.common_errors import CommonErrors, solve_with_common_errors
+from rig.estimation.gyroscope.common_errors import CommonErrorModel
 from rig.estimation.gyroscope.nonlinearity import Nonlinearity, curvature, distinct_speeds, nonlinearity
 from rig.estimation.gyroscope.own_errors import OwnError, SensorProperties, list_own_errors, rounding_errors
-from rig.estimation.gyroscope.vector_model import VectorSolution, check_identifiable, design_matrix, propagate_speed_std
+from rig.estimation.gyroscope.vector_model import VectorSolution, check_identifiable, propagate_speed_std
 from rig.estimation.statistics.bias_process import BiasProcess, bias_process
 
 DESIGN_FAULTS = ("rank_deficient", "ill_conditioned", "too_few_observations")  # of too many columns
@@ -188,33 +187,6 @@ def explain(inputs: VectorInputs, nominal_mounting: Array, process: BiasProcess 
     return _explain(inputs, nominal_mounting, None, process)
 
 
-def solver(
-    inputs: VectorInputs,
-    nominal_mounting: Array,
-    gravity_m_s2: Array | None,
-    speed_std_rad_s: Array,
-    effects: Callable[[Array], Array],
-) -> Callable[[Array | None], tuple[VectorSolution, CommonErrors]]:
-    """Return a function from the covariance (N, N) between the means, or None, to the solution of the vector model.
-
-    `effects` as in `solve_with_common_errors`; `gravity_m_s2` is the apparent gravity, None without g-sensitivity.
-    """
-
-    def solve(shared: Array | None) -> tuple[VectorSolution, CommonErrors]:
-        return solve_with_common_errors(
-            inputs.means_rad_s,
-            inputs.rates_rad_s,
-            inputs.variances_rad2_s2,
-            effects,
-            speed_std_rad_s=speed_std_rad_s,
-            gravity_m_s2=gravity_m_s2,
-            nominal_mounting=nominal_mounting,
-            shared_covariance_rad2_s2=shared,
-        )
-
-    return solve
-
-
 def _explain(
     inputs: VectorInputs, mounting: Array, gravity_m_s2: Array | None, process: BiasProcess | None
 ) -> VectorFit:
@@ -230,12 +202,21 @@ def _explain(
     def effects(matrix: Array) -> Array:
         return np.concatenate([arm_and_speed_patterns(matrix), inputs.sensor_error_patterns(matrix)])
 
-    solve = solver(inputs, mounting, gravity_m_s2, inputs.speed_std_rad_s, effects)
-    steady, errors = solve(None)
-    patterns, of_sensor = arm_and_speed_patterns(steady.matrix), inputs.sensor_error_patterns(steady.matrix)
-    speed_squares = propagate_speed_std(inputs.rates_rad_s, inputs.speed_std_rad_s, steady.matrix) ** 2
+    model = CommonErrorModel(
+        inputs.means_rad_s,
+        inputs.rates_rad_s,
+        inputs.variances_rad2_s2,
+        effects,
+        inputs.speed_std_rad_s,
+        gravity_m_s2,
+        mounting,
+    )
+    errors = model.predict().errors
+    matrix = model.fit_matrix(errors.readings_rad_s)
+    patterns, of_sensor = arm_and_speed_patterns(matrix), inputs.sensor_error_patterns(matrix)
+    speed_squares = propagate_speed_std(inputs.rates_rad_s, inputs.speed_std_rad_s, matrix) ** 2
     bias = process or bias_process(
-        design_matrix(inputs.rates_rad_s, gravity_m_s2),
+        model.design,
         inputs.means_rad_s - np.einsum("p,pni->ni", errors.sizes[: len(patterns)], patterns),
         inputs.variances_rad2_s2 + speed_squares,
         inputs.windows_s,
@@ -243,7 +224,7 @@ def _explain(
         np.einsum("pni,pmi->inm", of_sensor, of_sensor) if len(of_sensor) else None,
         instability_rad_s=inputs.instability_rad_s,
     )
-    solution, errors = (steady, errors) if bias.steady else solve(bias.covariance(inputs.windows_s))
+    solution, errors = model.solve(None if bias.steady else bias.covariance(inputs.windows_s))
     curved = slice(len(arm_errors), len(patterns))
     curve = nonlinearity(errors.sizes[curved], errors.covariance[curved, curved]) if several else None
     count = 0 if inputs.mount_turns_rad is None else len(inputs.mount_turns_rad)

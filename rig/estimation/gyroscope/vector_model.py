@@ -122,34 +122,18 @@ def solve_vector_model(
     count = len(means)
     speed_std = np.zeros(count) if speed_std_rad_s is None else np.asarray(speed_std_rad_s, dtype=np.float64)
     design = design_matrix(rates, None if gravity_m_s2 is None else np.asarray(gravity_m_s2, dtype=np.float64))
-    for name, array in (("means", means), ("rates", rates), ("variances", variances)):
-        require_shape(name, array, (count, 3))
-    require_shape("speed_std", speed_std, (count,))
     columns = design.shape[1]
-    check_count(count, columns, 3 * columns)
-    check_finite(means=means, rates=rates, variances=variances, speed_std=speed_std, design=design)
-    check_variances(variances)
-    moving = rates.any(axis=1)
-    check_signal(means[moving])
-    check_duplicates(means[moving])
-    scaled = design / _unit(design)
-    conditioning = _check_identifiable(scaled)
-    axes_conditioning = condition_of(scaled[:, :4], 4) if columns > 4 else conditioning
+    conditioning = check_observations(design, means, rates, variances, speed_std)
+    axes_conditioning = condition_of((design / _unit(design))[:, :4], 4) if columns > 4 else conditioning
 
-    speed_noise = np.zeros_like(means)
     shared = None if shared_covariance_rad2_s2 is None else np.asarray(shared_covariance_rad2_s2, dtype=np.float64)
-    coefficients, inverse = regress(design, means, variances, shared)
-    if speed_std.any():
-        speed_noise = propagate_speed_std(rates, speed_std, coefficients[:3].T)
-        coefficients, inverse = regress(design, means, variances + speed_noise**2, shared)
-        speed_noise = propagate_speed_std(rates, speed_std, coefficients[:3].T)
+    coefficients, inverse, speed_noise = fit_coefficients(
+        design, means, rates, variances, speed_std=speed_std, shared=shared
+    )
     raw = _raw_covariance(inverse, variances, speed_noise if speed_std.any() else None, shared)
 
     matrix = coefficients[:3].T
-    check_reads(matrix)
-    axes = SensorAxes.from_matrix(matrix)
-    check_unit(axes.scale)
-    check_axes(axes.axes, None if nominal_mounting is None else np.asarray(nominal_mounting, dtype=np.float64))
+    axes = check_matrix(matrix, None if nominal_mounting is None else np.asarray(nominal_mounting, dtype=np.float64))
     of_matrix, of_gravity = index_coefficients(columns)
     matrix_covariance = raw[of_matrix[:, None], of_matrix]
     to_parameters = parameter_jacobian(matrix, axes.scale)
@@ -173,6 +157,42 @@ def solve_vector_model(
         iterations=2 if speed_std.any() else 1,
         warnings=warn_of_residuals(residuals, _all_variances(variances, speed_noise, shared), 3 * (count - columns)),
     )
+
+
+def check_observations(design: Array, means: Array, rates: Array, variances: Array, speed_std: Array) -> Conditioning:
+    """Return the conditioning of the design (N, p). Raise Fault for observations that `solve_vector_model` refuses."""
+    count, columns = len(means), design.shape[1]
+    for name, array in (("means", means), ("rates", rates), ("variances", variances)):
+        require_shape(name, array, (count, 3))
+    require_shape("speed_std", speed_std, (count,))
+    check_count(count, columns, 3 * columns)
+    check_finite(means=means, rates=rates, variances=variances, speed_std=speed_std, design=design)
+    check_variances(variances)
+    moving = rates.any(axis=1)
+    check_signal(means[moving])
+    check_duplicates(means[moving])
+    return _check_identifiable(design / _unit(design))
+
+
+def fit_coefficients(
+    design: Array, means: Array, rates: Array, variances: Array, *, speed_std: Array, shared: Array | None
+) -> tuple[Array, Array, Array]:
+    """Return coefficients and map as `regress` does, with the errors of speeds in the weights, and these (N, 3)."""
+    coefficients, inverse = regress(design, means, variances, shared)
+    if not speed_std.any():
+        return coefficients, inverse, np.zeros_like(means)
+    speed_noise = propagate_speed_std(rates, speed_std, coefficients[:3].T)
+    coefficients, inverse = regress(design, means, variances + speed_noise**2, shared)
+    return coefficients, inverse, propagate_speed_std(rates, speed_std, coefficients[:3].T)
+
+
+def check_matrix(matrix: Array, nominal_mounting: Array | None) -> SensorAxes:
+    """Return the axes of F (3, 3). Raise Fault for an F that `solve_vector_model` refuses."""
+    check_reads(matrix)
+    axes = SensorAxes.from_matrix(matrix)
+    check_unit(axes.scale)
+    check_axes(axes.axes, nominal_mounting)
+    return axes
 
 
 def solve_vector_batch(means_rad_s: ArrayLike, rates_rad_s: ArrayLike, variances_rad2_s2: ArrayLike) -> VectorBatch:

@@ -16,7 +16,7 @@ from rig.observation.motion.reference_motion import KnownMotion
 
 COARSE_STEP_S = 0.02  # far shorter than the ramps of a sweep, so that the fine fit converges
 COARSE_REACH_S = 0.15  # largest clock error at either end of the data from which the fine fit converges
-DRIFT_SUBDIVISION = 5  # drifts between those of the first search, for the second
+SUBDIVISIONS = np.array([-0.5, -0.25, 0.25, 0.5])  # of the first search's spacing, for the second
 CANDIDATE_PEAKS = 12  # peaks of the correlation that are tried: six equal sweeps make eleven
 MIN_EXPLAINED = 0.5  # fraction of the readings' variance that the arm's motion must explain
 MAX_DRIFT = 0.03  # an oscillator without a crystal is within 2 %
@@ -35,8 +35,8 @@ def find_coarse_clock(board_time_s: Array, readings: Array, motion: KnownMotion)
         matches = [_coarse_offset((board_time_s - reference) * (1 + drift), readings, arm_rate) for drift in drifts]
         return max(zip(matches, drifts.tolist(), strict=True))
 
-    _, drift = search(spacing * np.arange(-count, count + 1))
-    match, drift = search(drift + spacing * np.linspace(-0.5, 0.5, DRIFT_SUBDIVISION))
+    coarse = search(spacing * np.arange(-count, count + 1))
+    match, drift = max(coarse, search(coarse[1] + spacing * SUBDIVISIONS))
     if match.fraction < MIN_EXPLAINED:
         raise time_base_not_found(f"the arm's motion explains {100 * match.fraction:.0f} % of what the gyroscope reads")
     return TimeBase(float(match.offset_s - reference), drift, float(reference), np.zeros((2, 2)), np.zeros(3))

@@ -233,8 +233,9 @@ class ArmMotion:
     def _mean_rates(self, time_s: Array, lasting_s: float, standing_rad: Array) -> Array:
         """Return `mean_rates`, with joints at rest at the angles `standing_rad` (k,); NaN stands for a moving joint."""
         moving = np.flatnonzero(np.isnan(standing_rad))
+        columns = None if len(moving) == len(standing_rad) else moving
         before, middle, after = (
-            self.angles(time_s + shift_s, columns=moving) for shift_s in (-lasting_s / 2, 0.0, lasting_s / 2)
+            self.angles(time_s + shift_s, columns=columns) for shift_s in (-lasting_s / 2, 0.0, lasting_s / 2)
         )
         angles: list[Array | float] = standing_rad.tolist()
         speeds: list[Array | float] = [0.0] * len(angles)
@@ -252,7 +253,9 @@ class ArmMotion:
         return np.where(np.ptp(q_rad, axis=0) > MAX_RANGE_RATIO * noise_rad, np.nan, q_rad.mean(axis=0))
 
     def _q_rad(self, window: Window) -> Array:
-        q_rad: Array = self._states["q_rad"][(self.time_s >= window.start_s) & (self.time_s <= window.end_s)]
+        start = np.searchsorted(self.time_s, window.start_s)
+        end = np.searchsorted(self.time_s, window.end_s, side="right")
+        q_rad: Array = self._states["q_rad"][start:end]
         return q_rad
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig.estimation.arrays import Array, median
-from rig.estimation.statistics.mean_weights import TOLERANCE
+from rig.estimation.statistics.mean_weights import invert_squares
 from rig.observation.statistics.tapered_weights import MAIN_LOBE, apply_window
 
 BINS = 161  # of the running median
@@ -124,10 +124,10 @@ def unit_columns(columns: Array) -> Array:
 def fit_columns(columns: Array, values: Array) -> Array:
     """Return the least-squares coefficients (k, m) of values (n, m) by columns (n, k), which may be nearly collinear.
 
-    Normal equations take a third of the time of a singular value decomposition, and are accurate enough, because
-    directions below `TOLERANCE` are left out.
+    Normal equations take a fraction of the time of a singular value decomposition, and are accurate enough, because
+    nearly collinear directions are left out.
     """
-    return np.asarray(np.linalg.lstsq(columns.T @ columns, columns.T @ values, rcond=TOLERANCE**2)[0], dtype=np.float64)
+    return np.asarray(invert_squares(columns.T @ columns) @ (columns.T @ values), dtype=np.float64)
 
 
 def fit_residuals(columns: Array, values: Array) -> Array:

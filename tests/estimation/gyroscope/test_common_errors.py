@@ -6,7 +6,7 @@ import pytest
 from rig.config.models import ArmSection
 from rig.config.procedures.procedure_sections import SixObservationSection
 from rig.estimation.arrays import Array
-from rig.estimation.gyroscope.common_errors import solve_with_common_errors
+from rig.estimation.gyroscope.common_errors import CommonErrorModel
 from rig.estimation.gyroscope.vector_model import solve_vector_model
 from rig.estimation.sensor_axes import non_orthogonality
 from rig.motion.geometry import axis_errors
@@ -46,7 +46,7 @@ def test_the_angles_stated_uncertainty_holds_the_arms_errors(axes: int, most_deg
     for _ in range(DRAWS if thorough else FEW):
         true = rates + np.einsum("p,pni->ni", rng.standard_normal(len(off)), off)
         means = true @ MATRIX.T - BIAS + np.sqrt(variances) * rng.standard_normal(rates.shape)
-        found, _ = solve_with_common_errors(means, rates, variances, lambda f: off @ f.T, speed_std_rad_s=none)
+        found, _ = CommonErrorModel(means, rates, variances, lambda f: off @ f.T, none).solve()
         drawn.append(found.non_orthogonality_rad - non_orthogonality(unit))
         stated.append(np.sqrt(np.diag(found.angles_covariance_rad2))[:3])
     assert np.degrees(np.max(stated)) < most_deg
@@ -61,9 +61,7 @@ def test_what_the_observations_do_not_tell_leaves_the_solution_as_it_is() -> Non
     variances = np.full(rates.shape, 1e-8)
     means = rates @ MATRIX.T - BIAS + 1e-4 * rng.standard_normal(rates.shape)
     plain = solve_vector_model(means, rates, variances)
-    found, errors = solve_with_common_errors(
-        means, rates, variances, lambda f: off @ f.T, speed_std_rad_s=np.zeros(len(rates))
-    )
+    found, errors = CommonErrorModel(means, rates, variances, lambda f: off @ f.T, np.zeros(len(rates))).solve()
     np.testing.assert_allclose(errors.sizes, 0.0, atol=1e-6)
     for name in ("scale", "bias_rad_s", "matrix", "covariance", "response"):
         np.testing.assert_allclose(getattr(found, name), getattr(plain, name), rtol=1e-6, atol=1e-12)
