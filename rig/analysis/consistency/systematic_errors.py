@@ -331,14 +331,17 @@ def _mount_patterns(segments: Segments, mount_rad: float) -> list[Array]:
 
 def _nonlinearity_patterns(intervals: Sequence[MotionInterval], matrix: Array, curve: NonlinearityPrior) -> Array:
     """Return the mean effects (6, N, 3) in N intervals of one std of the axes' odd parts, then of their even parts."""
-    by_interval = []
-    for interval in intervals:
-        edges = np.linspace(interval.start_s, interval.end_s, TRANSFER_STEPS + 1)
-        rates = interval.motion.rate((edges[1:] + edges[:-1]) / 2)
-        bent = curvature(matrix, rates) if curve.free else nonlinear_effects(matrix, rates, curve.full_scale_rad_s)
-        by_interval.append(bent.mean(axis=1))
+    ends_s = np.array([(interval.start_s, interval.end_s) for interval in intervals])
+    edges_s = np.linspace(ends_s[:, 0], ends_s[:, 1], TRANSFER_STEPS + 1, axis=1)
+    middles_s = (edges_s[:, 1:] + edges_s[:, :-1]) / 2
+    rates = np.empty((*middles_s.shape, 3))
+    for motion in {interval.motion for interval in intervals}:
+        of_motion = np.array([interval.motion is motion for interval in intervals])
+        rates[of_motion] = motion.rate(middles_s[of_motion])
+    steps = rates.reshape(-1, 3)
+    bent = curvature(matrix, steps) if curve.free else nonlinear_effects(matrix, steps, curve.full_scale_rad_s)
     sizes = np.ones(6) if curve.free else np.repeat([curve.cube, curve.square], 3)
-    return np.asarray(sizes[:, None, None] * np.stack(by_interval, axis=1), dtype=np.float64)
+    return np.asarray(sizes[:, None, None] * bent.reshape(6, *middles_s.shape, 3).mean(axis=2), dtype=np.float64)
 
 
 def _temperature_patterns(segments: Segments, matrix: Array, known_errors: KnownErrors) -> list[Array]:

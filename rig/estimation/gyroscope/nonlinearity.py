@@ -43,7 +43,7 @@ def curvature(matrix: Array, rates_rad_s: Array) -> Array:
     readings = rates_rad_s @ matrix.T
     projected = readings / np.linalg.norm(matrix, axis=1)
     gains = (np.abs(projected) * readings, projected * readings)
-    return PRIOR_STD_PER_RAD_S * np.array([gain * axis for gain in gains for axis in np.eye(3)])
+    return PRIOR_STD_PER_RAD_S * _separate_axes(gains)
 
 
 def nonlinear_effects(matrix: Array, rates_rad_s: Array, full_scale_rad_s: float, true_at_rad_s: float = 0.0) -> Array:
@@ -55,7 +55,13 @@ def nonlinear_effects(matrix: Array, rates_rad_s: Array, full_scale_rad_s: float
     readings = rates_rad_s @ matrix.T
     projected = readings / np.linalg.norm(matrix, axis=1) / full_scale_rad_s
     gains = ((projected**2 - (true_at_rad_s / full_scale_rad_s) ** 2) * readings, projected * readings)
-    return np.array([gain * axis for gain in gains for axis in np.eye(3)])
+    return _separate_axes(gains)
+
+
+def _separate_axes(effects: tuple[Array, Array]) -> Array:
+    """Return two effects (N, 3) on all axes as effects (6, N, 3) on one axis at a time."""
+    alone: Array = (np.array(effects)[:, None] * np.eye(3)[:, None]).reshape(6, -1, 3)
+    return alone
 
 
 def nonlinearity(sizes: Array, covariance: Array) -> Nonlinearity:

@@ -122,5 +122,5 @@ def unseen_k(step_k: float, windows_s: Array, weights: Array) -> Array:
 
 def subtract_mean(values: Array, weights: Array) -> Array:
     """Return values (N,) minus their weighted mean; zero for values that are NaN."""
-    deviation: Array = np.nan_to_num(values - weights @ values / weights.sum())
-    return deviation
+    deviation = values - weights @ values / weights.sum()
+    return np.where(np.isnan(deviation), 0.0, deviation)

@@ -194,7 +194,7 @@ def bias_process(
     typical = float(median(variances.ravel()))
     grid = np.concatenate([[0.0], typical * np.geomspace(GRID_RATIO**-0.5, GRID_RATIO, GRID_POINTS) ** 2])
     walks = grid / float(median(np.diag(unit)))
-    squares = np.array([(walk, scatter) for walk in walks for scatter in grid])
+    squares = np.column_stack([np.repeat(walks, len(grid)), np.tile(grid, len(walks))])
     likelihood = np.zeros(len(squares))
     for axis in range(3):
         noise = np.diag(variances[:, axis]) + flicker

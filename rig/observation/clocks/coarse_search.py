@@ -29,10 +29,10 @@ def find_coarse_clock(board_time_s: Array, readings: Array, motion: KnownMotion)
     reference, half_s = (board_time_s[0] + board_time_s[-1]) / 2, (board_time_s[-1] - board_time_s[0]) / 2
     spacing = 2 * COARSE_REACH_S / half_s
     count = round(max(min(MAX_DRIFT, MAX_DRIFT_STEPS * spacing), MAX_DRIFT_LONG_RUN) / spacing)
-    arm_rate = lru_cache(maxsize=1)(partial(_arm_rate, motion))  # nearly always the same for all drifts
+    arm = _ArmRates.sample(motion)
 
     def search(drifts: Array) -> tuple[_Match, float]:
-        matches = [_coarse_offset((board_time_s - reference) * (1 + drift), readings, arm_rate) for drift in drifts]
+        matches = [_coarse_offset((board_time_s - reference) * (1 + drift), readings, arm) for drift in drifts]
         return max(zip(matches, drifts.tolist(), strict=True))
 
     coarse = search(spacing * np.arange(-count, count + 1))
@@ -45,11 +45,29 @@ def find_coarse_clock(board_time_s: Array, readings: Array, motion: KnownMotion)
 def estimate_coarse_offset(board_time_s: Array, readings_rad_s: Array, motion: KnownMotion) -> tuple[float, float]:
     """Return the explained fraction of the variance of readings (n, 3), and the clock's offset without drift, s."""
     reference_s = float(board_time_s[0] + board_time_s[-1]) / 2
-    match = _coarse_offset(board_time_s - reference_s, readings_rad_s, partial(_arm_rate, motion))
+    match = _coarse_offset(board_time_s - reference_s, readings_rad_s, _ArmRates.sample(motion))
     return match.fraction, match.offset_s - reference_s
 
 
-def _arm_rate(motion: KnownMotion, step_s: float) -> tuple[float, Array]:
+@dataclass(frozen=True, slots=True)
+class _ArmRates:
+    """The arm's rates as functions of the step of their grid, nearly always the same for all drifts.
+
+    - at_step: the start of the motion, s, and its rate (3, n) every step from then on, with the mean subtracted.
+    - spectrum: the Fourier transform of that rate, extended by zeros to a size.
+    """
+
+    at_step: Callable[[float], tuple[float, Array]]
+    spectrum: Callable[[float, int], NDArray[np.complex128]]
+
+    @classmethod
+    def sample(cls, motion: KnownMotion) -> "_ArmRates":
+        """Return the rates of a motion; of the last step and size they are kept."""
+        at_step = lru_cache(maxsize=1)(partial(_sample_rate, motion))
+        return cls(at_step, lru_cache(maxsize=1)(lambda step_s, size: np.fft.rfft(at_step(step_s)[1], size)))
+
+
+def _sample_rate(motion: KnownMotion, step_s: float) -> tuple[float, Array]:
     """Return the start of the motion, s, and its rate (3, n) every `step_s` from then on, with the mean subtracted."""
     grid = np.arange(motion.time_s[0], motion.time_s[-1], step_s)
     rate = motion.rate(grid).T
@@ -72,7 +90,7 @@ class _Match:
     offset_s: float
 
 
-def _coarse_offset(time_s: Array, readings: Array, arm_rate: Callable[[float], tuple[float, Array]]) -> _Match:
+def _coarse_offset(time_s: Array, readings: Array, arm: _ArmRates) -> _Match:
     """Return the best offset from `time_s` (n,) to the controller's clock, to within a bin.
 
     Readings are averaged in bins of equal duration, which is longer than the samples' interval. Every axis of the board
@@ -85,11 +103,11 @@ def _coarse_offset(time_s: Array, readings: Array, arm_rate: Callable[[float], t
     filled = counts > 0
     board = np.array([np.bincount(bins, readings[:, axis]) for axis in range(3)]) / np.maximum(counts, 1)
     turning = np.where(filled, board - board[:, filled].mean(axis=1, keepdims=True), 0.0)
-    start_s, moving = arm_rate(step_s)
+    start_s, moving = arm.at_step(step_s)
 
     count = len(filled) + moving.shape[1]
     size = _fast_length(count)
-    spectra = np.conj(np.fft.rfft(turning, size)), np.fft.rfft(moving, size)
+    spectra = np.conj(np.fft.rfft(turning, size)), arm.spectrum(step_s, size)
     squares = sum(np.fft.irfft(one * other, size) ** 2 for one in spectra[0] for other in spectra[1])
     correlation = np.roll(squares, len(filled))[:count]
     peaks = np.flatnonzero((correlation[1:-1] > correlation[:-2]) & (correlation[1:-1] >= correlation[2:])) + 1
@@ -123,7 +141,9 @@ def _compute_explained_shares(
     board, products = np.vstack([filled, turning]), np.empty((len(lags), 7, 7))
     for product, lag in zip(products, lags, strict=True):
         start, end = max(0, -lag), min(len(filled), moving.shape[1] - lag)
-        both = np.vstack([board[:, start:end], moving[:, start + lag : end + lag] * filled[start:end]])
+        both = np.empty((7, end - start))
+        both[:4] = board[:, start:end]
+        np.multiply(moving[:, start + lag : end + lag], filled[start:end], out=both[4:])
         product[:] = both.copy() @ both.T  # the product of a matrix with itself would take twice as long
     count, sums = products[:, :1, :1], products[:, :1, 1:]
     scatter = products[:, 1:, 1:] - np.swapaxes(sums, 1, 2) @ sums / np.maximum(count, 1)
