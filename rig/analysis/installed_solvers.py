@@ -12,7 +12,6 @@ from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.settings import RunSettings
 from rig.errors import Fault
 from rig.errors.attempts import attempt
-from rig.observation.arm_placements import placements_on_arm
 from rig.observation.observed_run import ObservedRun
 
 
@@ -50,6 +49,8 @@ def kinds_on_arm(recordings: Sequence[ObservedRun], settings: RunSettings) -> It
 
 
 def _solve(kind: InstalledKind, name: str, recordings: Sequence[ObservedRun], settings: RunSettings) -> OfKind:
+    from rig.observation.arm_placements import placements_on_arm  # with all that other programs' files need
+
     placements = placements_on_arm(recordings, name, kind.quantity, settings.observation)
     solved: OfKind = kind.solve(name, placements, settings.site)
     return solved

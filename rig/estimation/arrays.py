@@ -51,6 +51,12 @@ def median(values: NDArray[Any], axis: int = -1) -> Array:
     return np.asarray((ordered.take(middle - 1, axis) + ordered.take(middle, axis)) / 2, dtype=np.float64)
 
 
+def distinct(values: NDArray[Any]) -> NDArray[Any]:
+    """Return the distinct values, rising, of a few values of any shape."""
+    ordered = np.sort(values, axis=None)
+    return ordered[np.append(True, ordered[1:] != ordered[:-1])[: len(ordered)]]
+
+
 def median_step(rising: Array) -> float:
     """Return the median interval between two adjacent of rising values (n,)."""
     return float(median(np.diff(rising)))

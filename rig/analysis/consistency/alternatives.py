@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rig.analysis.consistency.residual_tests import FaultMode
 from rig.analysis.gyroscope.segment_table import Segments
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, distinct
 from rig.observation.consistency.raw_readings import REST
 
 
@@ -37,7 +37,7 @@ class Means:
     @property
     def sweeps(self) -> Array:
         """Columns (N, M): 1 if a mean belongs to the sweep, else 0."""
-        sweeps: Array = (self.sweep[:, None] == np.unique(self.sweep[self.sweep >= 0])).astype(np.float64)
+        sweeps: Array = (self.sweep[:, None] == distinct(self.sweep[self.sweep >= 0])).astype(np.float64)
         return sweeps
 
 
@@ -84,7 +84,7 @@ FAULT_MODES: tuple[FaultMode[Means], ...] = (  # (k, N, 3) each
 def changes(segments: Segments, axis_rates: Array) -> dict[str, Array]:
     """Return the effects (3, N, k) of a scale factor or a mounting that changes with time, by the name of the check."""
     time = normalise_time(segments)
-    for sweep in np.unique(segments.sweep):  # a change within a sweep is tested for that sweep
+    for sweep in distinct(segments.sweep):  # a change within a sweep is tested for that sweep
         time[segments.sweep == sweep] = time[segments.sweep == sweep].mean()
     turned = np.cross(np.eye(3)[:, None], axis_rates[None]) * time[None, :, None]  # (k, N, 3)
     return {
@@ -111,9 +111,8 @@ def differences(segments: Segments, axis_rates: Array, whole: Array | None) -> d
 
 def single_axis_columns(segments: Segments, axis_rates: Array) -> Array:
     """Return the effect (3, N, k) of a changed scale factor, for each axis and each start of a sweep or transfer."""
-    starts = np.unique(
-        [segments.times_s[segments.sweep == sweep].min() for sweep in np.unique(segments.sweep[segments.sweep != REST])]
-    )
+    moving = distinct(segments.sweep[segments.sweep != REST])
+    starts = distinct(np.array([segments.times_s[segments.sweep == sweep].min() for sweep in moving]))
     later = segments.times_s.mean(axis=1)[:, None] > starts[1:]
     return np.concatenate([split_per_axis(axis_rates * since[:, None]) for since in later.T], axis=2)
 
@@ -134,9 +133,9 @@ def sweep_columns(segments: Segments, sweep: int) -> Array:
 def step_columns(segments: Segments) -> list[Array]:
     """Return a step (N, 1) at each end of a sweep that has rests on both sides: 0 before the end, 1 after it."""
     middle = segments.times_s.mean(axis=1)
-    ends = [segments.times_s[segments.sweep == sweep].max() for sweep in np.unique(segments.sweep[segments.sweep >= 0])]
+    ends = [segments.times_s[segments.sweep == sweep].max() for sweep in distinct(segments.sweep[segments.sweep >= 0])]
     steps = [np.where(middle < end, 0.0, 1.0)[:, None] for end in ends]
-    return [step for step in steps if len(np.unique(step[segments.sweep < 0])) > 1]
+    return [step for step in steps if len(distinct(step[segments.sweep < 0])) > 1]
 
 
 def normalise_time(segments: Segments) -> Array:

@@ -49,7 +49,7 @@ from rig.analysis.consistency.whitened_segments import (
     whiten_segments,
 )
 from rig.analysis.gyroscope.segment_table import Segments
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, distinct
 from rig.estimation.statistics.bias_process import BiasProcess, bias_process, select_by_akaike
 from rig.observation.consistency.raw_readings import REST
 
@@ -134,7 +134,7 @@ def check_gyroscope(
     bias_jump = _test_bias_jump(segments, axis_rates, scatter, false_alarm_probability)
     if bias_jump is not None:
         statistics["bias_jumped"] = bias_jump
-    sweeps = np.unique(segments.sweep[segments.sweep >= 0]).tolist()
+    sweeps = distinct(segments.sweep[segments.sweep >= 0]).tolist()
     ranked = find_outliers(
         segments_only.model, sweeps, lambda sweep: sweep_columns(segments, sweep), false_alarm_probability
     )
@@ -154,7 +154,7 @@ def _steady_rates(segments: Segments, matrix: Array) -> Segments:
     residuals have too, and would explain it.
     """
     rates = segments.rates_rad_s.copy()
-    for sweep in np.unique(segments.sweep[segments.sweep > REST]):
+    for sweep in distinct(segments.sweep[segments.sweep > REST]):
         rates[segments.sweep == sweep] = rates[segments.sweep == sweep].mean(axis=0)
     means = segments.means_rad_s - (segments.rates_rad_s - rates) @ matrix.T
     return replace(segments, rates_rad_s=rates, means_rad_s=means)
@@ -262,7 +262,7 @@ def _detection_limits(
 ) -> Iterator[tuple[str, float]]:
     """Yield the name of every fault mode with the size that its check detects, on the segments of `check_gyroscope`."""
     segments, chance = segments_only.segments, critical_value(false_alarm_probability)
-    steps, sweeps = step_columns(segments), np.unique(segments.sweep[segments.sweep >= 0]).tolist()
+    steps, sweeps = step_columns(segments), distinct(segments.sweep[segments.sweep >= 0]).tolist()
     of_transfers, of_segments = (
         changes(with_transfers.segments, with_transfers.axis_rates),
         differences(segments, segments_only.axis_rates, None),
@@ -363,5 +363,5 @@ def _build_scatter(segments: Segments, patterns_rad_s: Array, allowance: ErrorPa
 
 def _steady_columns(segments: Segments, *more: Array) -> Array:
     """Return orthonormal columns (N, k): a level of each sweep and of all rests, gravity, steady drift, and `more`."""
-    levels = [segments.sweep == sweep for sweep in np.unique(segments.sweep)]
+    levels = [segments.sweep == sweep for sweep in distinct(segments.sweep)]
     return orthonormal_basis(np.column_stack([*levels, segments.gravity_m_s2, normalise_time(segments), *more]))

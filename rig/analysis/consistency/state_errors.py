@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.analysis.gyroscope.segment_table import Segments
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, distinct
 from rig.observation.consistency.raw_readings import REST
 from rig.observation.consistency.transfers import STILL_RAD
 
@@ -22,7 +22,7 @@ def build_time_patterns(segments: Segments, jitter_s: float) -> Array:
     lengths = np.diff(segments.times_s)
     by_rate = jitter_s * segments.rates_rad_s / lengths
     effects = [
-        effect for sweep in np.unique(segments.sweep[segments.sweep > REST]) for effect in _edges(segments, sweep)
+        effect for sweep in distinct(segments.sweep[segments.sweep > REST]) for effect in _edges(segments, sweep)
     ]
     return np.reshape([effect[:, None] * by_rate for effect in effects], (-1, *segments.means_rad_s.shape))
 
@@ -36,7 +36,7 @@ def build_reading_patterns(segments: Segments, noise_rad: float) -> Array:
     """
     lengths = np.diff(segments.times_s)
     patterns = []
-    for sweep in np.unique(segments.sweep[(segments.sweep != REST) & (noise_rad > 0)]):
+    for sweep in distinct(segments.sweep[(segments.sweep != REST) & (noise_rad > 0)]):
         rows = np.flatnonzero(segments.sweep == sweep)
         first, last = segments.intervals[rows[0]], segments.intervals[rows[-1]]
         counted = np.ones(len(first.motion.names), dtype=np.bool_)

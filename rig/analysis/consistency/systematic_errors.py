@@ -17,7 +17,7 @@ from rig.analysis.gyroscope.segment_table import Segments
 from rig.analysis.gyroscope.vector_inputs import WAVE_RATIO, list_uncertainties
 from rig.config.judging.judging_keys import ExternalResult
 from rig.data.recording.settings import Uncertainty
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, distinct
 from rig.estimation.earth import EARTH_RATE_RAD_S
 from rig.estimation.gyroscope.nonlinearity import CUBE_DEVIATION, curvature, nonlinear_effects
 from rig.estimation.gyroscope.own_errors import SensorProperties, list_own_errors, rounding_errors
@@ -318,7 +318,7 @@ def _stamp_patterns(segments: Segments, stamp_s: float) -> Array:
 def _speed_patterns(segments: Segments) -> list[Array]:
     """Return a pattern for each sweep: the rate error per standard deviation of the sweep's speed."""
     errors = segments.speed_std[:, None] * segments.rates_rad_s
-    return [np.where((segments.sweep == sweep)[:, None], errors, 0.0)[None] for sweep in np.unique(segments.sweep)]
+    return [np.where((segments.sweep == sweep)[:, None], errors, 0.0)[None] for sweep in distinct(segments.sweep)]
 
 
 def _mount_patterns(segments: Segments, mount_rad: float) -> list[Array]:

@@ -73,8 +73,9 @@ class TargetUncertainty:
 
 def target_of(section: SixObservationSection) -> TargetUncertainty | None:
     """Return the target at which a run of several repeats ends; None if the run makes all repeats."""
-    scale, bias_rad_s = section.target_scale_u, section.target_bias_u_rad_s
-    return None if scale is bias_rad_s is None else TargetUncertainty(scale or inf, bias_rad_s or inf)
+    if not section.has_target:
+        return None
+    return TargetUncertainty(section.target_scale_u or inf, section.target_bias_u_rad_s or inf)
 
 
 TARGET_NAMES = tuple(ReachedUncertainty.__dataclass_fields__)  # fields of `TargetUncertainty` too

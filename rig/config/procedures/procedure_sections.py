@@ -188,6 +188,11 @@ class SixObservationSection(SixSweepsSection):
     )
 
     @property
+    def has_target(self) -> bool:
+        """Whether a run of several repeats ends at a target uncertainty."""
+        return self.target_scale_u is not None or self.target_bias_u_rad_s is not None
+
+    @property
     def then_verify(self) -> bool:
         """Whether the file asks for a verification after the calibration."""
         return self.verify

@@ -25,6 +25,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.refusals import check_finite
 from rig.estimation.statistics.bias_process import BiasProcess, average_walks, bias_process
 from rig.estimation.statistics.coverage import coverage_factors, effective_dof
+from rig.estimation.temperature.line_names import GRADIENT, HYSTERESIS, LAG, NOISE, ORDER
 
 MAX_ORDER = 3  # as in autopilots
 MIN_REPEATS = 4
@@ -35,9 +36,6 @@ MIN_CHANGE_K_S = 0.1 / 60  # a slower change counts as one in the previous direc
 INPUT_TOLERANCE = 0.03  # largest difference between inputs of one pose, relative to the largest input
 GAUSS_NEWTON_STEPS = 6  # the model is linear except for products of small numbers
 COEFFICIENT_COUNT = 6 * (MAX_ORDER + 1)  # scale of order 0 xyz, of order 1 xyz, …, then the bias in the same order
-
-NOISE, ORDER, LAG = "noise and bias drift", "order of the polynomials", "thermometer's lag"
-HYSTERESIS, GRADIENT = "warming against cooling", "temperature gradient"
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 def _entries(outcome: Outcome) -> Mapping[str, Mapping[str, OverTemperatureEntry]]:
     """Return the entries of all polynomials, by sensor and quantity."""
+    if not outcome.polynomials:
+        return {}
     from rig.report.entries.temperature import temperature_entry
 
     return {

@@ -11,13 +11,11 @@ from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
-from rig.analysis.design.candidate_search import target_of
 from rig.config.models import RigConfig
 from rig.config.procedures.procedure_sections import SixObservationSection
 from rig.motion.plan_warnings import doubts
 from rig.motion.steps import POSE_TOLERANCE_RAD, Dwell, Plan, Rest, Step, Sweep, Transfer, closes, turn_words
 from rig.motion.turner_state import JOINT_NAMES, Joints
-from rig.report.terminal.shortest_words import wish_words
 from rig.station.plain_text import MINUTES_FROM_S, duration_words, plain
 
 if TYPE_CHECKING:
@@ -41,6 +39,8 @@ class DryRun:
     @cached_property
     def account(self) -> "AttitudeAccount | None":
         """The expected accuracy of the plan's attitudes; None without any. Raise the errors of `attitude_account`."""
+        if self.config.procedure.accelerometer_order == 0:
+            return None
         from rig.analysis.design.attitude_information import attitude_account
 
         return attitude_account(self.config, self.plan)
@@ -134,9 +134,8 @@ def _print_steps(planned: DryRun, console: Console) -> None:
     console.print(table)
     long = f" ({duration_words(plan.duration_s)})" if plan.duration_s >= MINUTES_FROM_S else ""
     console.print(f"{_counts(plan)}{len(plan.motions)} motions, {plan.duration_s:.1f} s{long}; all within limits")
-    if isinstance(section := planned.config.procedure, SixObservationSection) and (wanted := target_of(section)):
-        repeats = f"of {section.repeats} repeats, each of about {plan.duration_s / section.repeats:.1f} s"
-        console.print(plain(f"It ends after the first {repeats}, with {wish_words(wanted)}"))
+    if isinstance(section := planned.config.procedure, SixObservationSection) and section.has_target:
+        console.print(plain(_describe_end(section, plan.duration_s)))
     if arcs := {turn_words(sweep.angle_rad) for sweep in plan.sweeps if not closes(sweep.angle_rad)}:
         console.print(f"Sweeps are averaged over {', '.join(sorted(arcs))}, the angle of the encoders")
     if plan.dwells:
@@ -149,6 +148,17 @@ def _print_steps(planned: DryRun, console: Console) -> None:
         console.print(f"If the calibration passes, it is repeated to verify it: {2 * plan.duration_s:.1f} s in all")
     for doubt in doubts(plan):
         console.print(f"Note: {doubt}")
+
+
+def _describe_end(section: SixObservationSection, duration_s: float) -> str:
+    """Return the sentence that a run of several repeats may end after any of them."""
+    from rig.analysis.design.candidate_search import target_of
+    from rig.report.terminal.shortest_words import wish_words
+
+    wanted = target_of(section)
+    assert wanted is not None, "it has a target"
+    repeats = f"of {section.repeats} repeats, each of about {duration_s / section.repeats:.1f} s"
+    return f"It ends after the first {repeats}, with {wish_words(wanted)}"
 
 
 def _print_predictions(planned: DryRun, console: Console) -> None:

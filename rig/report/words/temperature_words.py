@@ -7,7 +7,7 @@ import numpy as np
 from rig.data.entries.temperature import AtTemperatureEntry, OverTemperatureEntry, TemperatureContributorEntry
 from rig.data.quantity import Quantity
 from rig.estimation.arrays import Array, divide_or_infinity
-from rig.estimation.temperature.over_temperature import GRADIENT, HYSTERESIS, LAG, NOISE, ORDER
+from rig.estimation.temperature.line_names import GRADIENT, HYSTERESIS, LAG, NOISE, ORDER
 from rig.report.words.expanded_uncertainty import spell_factors
 from rig.report.words.printed_values import plus_minus
 
