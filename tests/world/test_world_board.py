@@ -188,7 +188,8 @@ def test_a_flash_file_that_cannot_be_is_refused(name: str, tmp_path: Path) -> No
 
 @pytest.mark.thorough
 def test_vibration_is_felt_and_averages_out_over_a_turn() -> None:
-    one = host(demo("world.sensors.gyro.noise_rad_s=0", "world.sensors.gyro.mounting_error_deg=[0, 0, 0]"))
+    exact = ("world.sensors.gyro.noise_rad_s=0", "world.sensors.gyro.mounting_error_deg=[0, 0, 0]")
+    one = host(demo("world.arm.vibration_fraction=0.05", *exact))
     one.laboratory.robot.motion.speed((0.0, 0.0, 0.0, 0.0, 0.0, 1.0), 100.0)
     one.ticks(TICKS_PER_SECOND // 10)
     before = len(one.samples())

@@ -257,7 +257,7 @@ def test_the_slider_may_be_moved_during_a_move(world: World) -> None:
         wait_for(lambda: running.state()["qd_rad_s"][5] < 0.3, "the slower speed")
         running.control({"do": "speed_slider", "fraction": 1.0})
         arm.says("True")
-    assert running.state()["q_rad"][5] == pytest.approx(3.0, abs=1e-9)
+    assert running.state()["q_rad"][5] == pytest.approx(3.0, abs=1e-3)  # the joint settles
 
 
 def test_a_held_clock_lets_tests_look_closely(world: World) -> None:
