@@ -131,7 +131,8 @@ def test_a_narrow_terminal_gets_every_step() -> None:
 def test_the_plan_of_attitudes_says_what_they_will_tell_of_each_accelerometer() -> None:
     imu = f"{sys.executable} -m rig plan {ROOT / 'configs' / 'imu.yaml'}"
     said = shell(imu).stdout
-    assert "12 sweeps, 18 dwells" in said and "rank 14 of 14, condition 1.86" in said and "293.5 s in all at most" in said
+    assert "12 sweeps, 18 dwells" in said and "293.5 s in all at most" in said
+    assert "rank 14 of 14, condition 1.86" in said
     document = json.loads(shell(f"{imu} --json --set procedure.second_order=true").stdout)
     assert document["attitudes"]["needed"] == 17 and document["settling_s"] == 90
     found = document["attitudes"]["sensors"]
