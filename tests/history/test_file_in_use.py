@@ -23,7 +23,7 @@ from rig.notebook.notebook_history import calibrations
 from rig.station.events import NotRemembered, Remembered
 from support.history.kept_rows import forge, forget_histories
 from support.history.past_runs import finish_run
-from support.history.postgres import postgresql
+from support.history.postgres import new_database
 from support.laboratories.commands import rig, rig_here
 from support.paths import CONFIGS, RECORDINGS, ROOT
 from support.processes.waiting import wait_for
@@ -210,18 +210,18 @@ def test_the_floor_says_that_its_history_is_gone_and_begins_none(file: Path) -> 
 
 
 @pytest.mark.slow
-def test_a_database_that_was_emptied_meanwhile_is_not_begun_anew() -> None:
-    with postgresql() as url:
-        with open_history(url) as history:
-            history.enter(finish_run(0))
-            with history.engine.begin() as connection:
-                connection.execute(text("DROP SCHEMA public CASCADE"))
-                connection.execute(text("CREATE SCHEMA public"))
-        with pytest.raises(Refused, match="history_gone"), open_history(url):
-            pass
-        forget_histories()
-        with open_history(url) as history:
-            assert history.calibrations() == []
+def test_a_database_that_was_emptied_meanwhile_is_not_begun_anew(server: str) -> None:
+    url = new_database(server)
+    with open_history(url) as history:
+        history.enter(finish_run(0))
+        with history.engine.begin() as connection:
+            connection.execute(text("DROP SCHEMA public CASCADE"))
+            connection.execute(text("CREATE SCHEMA public"))
+    with pytest.raises(Refused, match="history_gone"), open_history(url):
+        pass
+    forget_histories()
+    with open_history(url) as history:
+        assert history.calibrations() == []
 
 
 @pytest.mark.slow

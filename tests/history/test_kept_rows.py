@@ -3,7 +3,7 @@
 import json
 import os
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,7 +25,7 @@ from rig.report.certificate.content import certificate_of
 from rig.report.certificate.statements import folder_statements
 from support.history.kept_rows import drop_triggers, forge
 from support.history.past_runs import finish_run
-from support.history.postgres import postgresql
+from support.history.postgres import new_database
 from support.paths import CONFIGS, RECORDINGS
 
 ISSUED = IssuedCertificate(
@@ -41,12 +41,10 @@ def fill(history: History) -> None:
 
 
 @pytest.fixture(params=["sqlite", pytest.param("postgresql", marks=pytest.mark.slow)])
-def place(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str]:
+def place(request: pytest.FixtureRequest, tmp_path: Path) -> str:
     if request.param == "sqlite":
-        yield str(tmp_path / "history.sqlite")
-        return
-    with postgresql() as url:
-        yield url
+        return str(tmp_path / "history.sqlite")
+    return new_database(request.getfixturevalue("server"))
 
 
 @pytest.mark.slow

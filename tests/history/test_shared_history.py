@@ -1,6 +1,5 @@
 """Many processes enter runs into one history at the same time, on SQLite and on PostgreSQL."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -12,26 +11,24 @@ from rig.history.storage.sqlite_engine import WRITE_OPTION
 from rig.history.store import open_history
 from support.history.kept_rows import drop_triggers, forget_histories
 from support.history.past_runs import enter_many, finish_run
-from support.history.postgres import postgresql
+from support.history.postgres import new_database
 from support.processes.forked import find_fork_server
 
-PROCESSES, ENTRIES, FEW = 8, 250, 5  # `make test`: half of the processes, few entries
+PROCESSES, ENTRIES, FEW = 8, 250, 5  # `make test`: two processes, as few as get in each other's way, and few entries
 pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(params=["sqlite", "postgresql"])
-def url(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str]:
+def url(request: pytest.FixtureRequest, tmp_path: Path) -> str:
     if request.param == "sqlite":
-        yield str(tmp_path / "history.sqlite")
-        return
-    with postgresql() as found:
-        yield found
+        return str(tmp_path / "history.sqlite")
+    return new_database(request.getfixturevalue("server"))
 
 
 @pytest.mark.proof
 def test_of_what_several_processes_enter_nothing_is_lost_and_nothing_stands_twice(url: str, thorough: bool) -> None:
     """The tables are made by whoever comes first."""
-    processes, entries = (PROCESSES, ENTRIES) if thorough else (PROCESSES // 2, FEW)
+    processes, entries = (PROCESSES, ENTRIES) if thorough else (2, FEW)
     with find_fork_server().Pool(processes) as pool:
         new = pool.starmap(enter_many, [(url, worker, entries) for worker in range(processes)])
         assert new == [entries] * processes

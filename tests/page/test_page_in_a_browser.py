@@ -46,9 +46,11 @@ def page(tmp_path: Path) -> Iterator[Callable[..., tuple["subprocess.Popen[str]"
         process.communicate()
 
 
+@pytest.mark.proof
 def test_a_run_is_agreed_to_followed_and_stopped_on_the_page_and_resumed(
-    driver: Chrome, tmp_path: Path, world: World, page: Any
+    driver: Chrome, tmp_path: Path, world: World, page: Any, thorough: bool
 ) -> None:
+    """In `make test` a stopped run is resumed by tests/commands/test_practise_a_fault.py, here by `make proof`."""
     quick = {"speed_deg_s": 160, "acceleration_deg_s2": 700, "rest_s": 0.5}
     laboratory = world({"procedure": quick, "world": {"time_scale": 4}})
     out = tmp_path / "run"
@@ -62,7 +64,7 @@ def test_a_run_is_agreed_to_followed_and_stopped_on_the_page_and_resumed(
     driver.switch_to.active_element.send_keys(Keys.SPACE)
     driver.switch_to.active_element.send_keys(Keys.TAB)
     assert driver.switch_to.active_element.get_attribute("id") == "yes"
-    laboratory.control({"do": "pace", "time_scale": 0.5})  # the run takes a minute: a slow browser sees its first sweep
+    laboratory.control({"do": "pace", "time_scale": 2})  # the run takes a quarter of a minute: a slow browser sees it
     driver.switch_to.active_element.send_keys(Keys.ENTER)
     wait_for(lambda: kind(driver) in ("moving", "measuring"), "motion")
     wait_for(lambda: re.match(r"\D*([3-9]|\d\d)\b", text(driver, "step-number")), "the end of the first sweep")
@@ -83,6 +85,8 @@ def test_a_run_is_agreed_to_followed_and_stopped_on_the_page_and_resumed(
     wait_for(lambda: kind(driver) == "stopped", "that it was stopped")
     assert "stopped from the page" in text(driver, "state-text") and "rig resume" in text(driver, "state-text")
     picture(driver, "run-stopped")
+    if not thorough:
+        return
     resumed = rig("resume", out, "--yes")
     assert resumed.returncode in (0, 1) and "verdict:" in resumed.stdout, resumed.stderr
 

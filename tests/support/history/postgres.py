@@ -1,5 +1,6 @@
-"""A PostgreSQL for one test: a new cluster in its own folder, reached by a socket there, and removed afterwards."""
+"""A PostgreSQL for tests: a new cluster in its own folder, reached by a socket there, and removed afterwards."""
 
+import itertools
 import os
 import pwd
 import shutil
@@ -10,8 +11,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import psycopg
+
 PROGRAMS = Path("/usr/lib/postgresql")  # where Debian has them, by version
-FAST = ("-c", "fsync=off", "-c", "listen_addresses=", "-c", "shared_buffers=16MB", "-c", "max_connections=30")
+FAST = ("-c", "fsync=off", "-c", "listen_addresses=", "-c", "shared_buffers=16MB", "-c", "max_connections=100")
+_numbers = itertools.count()
 
 
 @contextmanager
@@ -40,3 +44,14 @@ def postgresql() -> Iterator[str]:
             subprocess.run([*control, "-m", "immediate", "stop"], check=True, **settled)
     finally:
         shutil.rmtree(folder)
+
+
+def new_database(server: str) -> str:
+    """Make an empty database in the cluster with the URL `server`, and return its URL.
+
+    It takes a tenth of the time of a new cluster, and nothing that a test does to its tables reaches another database.
+    """
+    name = f"history_{next(_numbers)}"
+    with psycopg.connect(server, autocommit=True) as connection:
+        connection.execute(f"CREATE DATABASE {name}")
+    return server.replace("/postgres?", f"/{name}?")
