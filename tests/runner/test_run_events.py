@@ -44,10 +44,13 @@ from rig.station.events import (
     VerdictReached,
 )
 from rig.station.operator_station import Stations, always_yes
-from support.laboratories.worlds import QUICK_EXPERIMENT, worlds
+from support.laboratories.worlds import QUICK_EXPERIMENT, merge, worlds
 from support.processes.waiting import PATIENCE_S
 
 pytestmark = pytest.mark.slow  # a whole experiment
+
+# Samples cost processor time, and this is about what happens between them.
+SLOWLY_READ = {"sensors": {"gyro": {"rate_hz": 59.5}, "reference": {"rate_hz": 50}}}
 
 
 class Failing:
@@ -74,7 +77,7 @@ def events(tmp_path_factory: pytest.TempPathFactory) -> Iterator[list[RunEvent]]
     folder = tmp_path_factory.mktemp("events")
     listener = Everything()
     with worlds(folder) as start:
-        found = load_configured(start(QUICK_EXPERIMENT).config_path)
+        found = load_configured(start(merge(QUICK_EXPERIMENT, SLOWLY_READ)).config_path)
         run = Run(folder, found.loaded, found.script, Stations((Failing(), listener), always_yes))
         assert run.carry_out(found.phase).passed
     dropped = ListenerDropped("Failing", "RuntimeError: no page to show it on")

@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
@@ -30,6 +31,18 @@ run = read_run(Path(sys.argv[1]))
 seen = [stance(each.event.state) for each in moments(run) if isinstance(each.event, ArmSeen)]
 print(run.turner.to_json())
 print(run.states.dtype.names, run.states["q_rad"].shape[1:], sorted(seen[0]), len(seen[0]["q_rad"]))
+"""
+# One process for all commands: each would take a second to import the same.
+IN_TURN = """
+import io, json, sys
+from contextlib import redirect_stderr, redirect_stdout
+from rig.cli import main
+ended = []
+for command in json.loads(sys.argv[1]):
+    with redirect_stdout(io.StringIO()) as output, redirect_stderr(io.StringIO()) as errors:
+        status = main(command)
+    ended.append((status, output.getvalue(), errors.getvalue()))
+print(json.dumps(ended))
 """
 
 
@@ -97,17 +110,36 @@ def test_its_recording_is_solved_shown_and_exported(recorded: Path, installed: d
 
 def test_it_is_planned_and_looked_at_by_its_configuration(recorded: Path, installed: dict[str, str]) -> None:
     config = str(recorded / "config.yaml")
-    plan = ran(installed, "-m", "rig", "plan", config)
-    assert "joint 1 +0.0 → " in plan and "2 sweeps" in plan
-    assert "that the checks detect in 95 of 100 runs" in " ".join(plan.split())
-    told = json.loads(ran(installed, "-m", "rig", "plan", config, "--json"))["detection_limits"]["gyro"]
-    assert all(each["size"] is None or each["size"] > 0 for each in told) and any(each["size"] for each in told)
-    assert "joint_speed" in ran(installed, "-m", "rig", "plan", config, "--set", "procedure.speed_deg_s=400", status=2)
-    checked = json.loads(ran(installed, "-m", "rig", "check", config, "--json", status=2).partition("\n}")[0] + "}")
-    assert "table at /dev/ttyUSB7: Toys T1, serial number T-7" in checked["seen"]
-    assert [problem["name"] for problem in checked["missing"]] == ["no_port"]
-    wrong = ran(installed, "-m", "rig", "plan", config, "--set", "turner.kind=turntabel", status=2)
+    plan, machine, checked, too_fast, misspelt, another = commands_in_turn(
+        installed,
+        ["plan", config],
+        ["plan", config, "--json"],
+        ["check", config, "--json"],
+        ["plan", config, "--set", "procedure.speed_deg_s=400"],
+        ["plan", config, "--set", "turner.kind=turntabel"],
+        ["plan", config, "--set", "procedure.name=six_observation"],
+    )
+    assert plan.status == 0 and "joint 1 +0.0 → " in plan.output and "2 sweeps" in plan.output
+    assert "that the checks detect in 95 of 100 runs" in " ".join(plan.output.split())
+    limits = json.loads(machine.output)["detection_limits"]["gyro"]
+    assert all(each["size"] is None or each["size"] > 0 for each in limits) and any(each["size"] for each in limits)
+    report = json.loads(checked.output)
+    assert checked.status == 2 and "table at /dev/ttyUSB7: Toys T1, serial number T-7" in report["seen"]
+    assert [problem["name"] for problem in report["missing"]] == ["no_port"]
+    assert [refused.status for refused in (too_fast, misspelt, another)] == [2, 2, 2]
+    assert "joint_speed" in too_fast.output + too_fast.errors
     allowed = "did you mean turntable?; allowed: ur, hand, servo, turntable"
-    assert f"turner.kind (--set): 'turntabel' is not allowed, {allowed}" in wrong
-    wrong = ran(installed, "-m", "rig", "plan", config, "--set", "procedure.name=six_observation", status=2)
-    assert "other_turner" in wrong
+    assert f"turner.kind (--set): 'turntabel' is not allowed, {allowed}" in misspelt.errors
+    assert "other_turner" in another.errors
+
+
+class Ended(NamedTuple):
+    """A command's exit status and what it printed."""
+
+    status: int
+    output: str
+    errors: str
+
+
+def commands_in_turn(environment: dict[str, str], *commands: list[str]) -> list[Ended]:
+    return [Ended(*each) for each in json.loads(ran(environment, "-c", IN_TURN, json.dumps(commands)))]

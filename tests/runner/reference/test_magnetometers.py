@@ -37,7 +37,7 @@ ATTITUDES = {
     "name": "static_attitudes",
     "attitudes": NINE,
     "dwell_s": 0.6,
-    "field_test_s": 4.0,
+    "field_test_s": 2.0,
     "acceleration_deg_s2": 700,
 }
 IMU = {**ATTITUDES, "name": "imu", "axes": 3, "speed_deg_s": 150, "rest_s": 0.5}
@@ -294,7 +294,7 @@ def with_every_third_sample_lost(run: RunData) -> RunData:
     return replace(run, samples={**run.samples, "compass": samples[np.arange(len(samples)) % 3 > 0]})
 
 
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize(
     ("damage", "name"),
     [
