@@ -115,7 +115,7 @@ def began(laboratory: dict[str, Any], log: str) -> float:
 @pytest.mark.one_in(2)
 @pytest.mark.parametrize("source", SOURCES)
 def test_what_tells_its_own_time_is_calibrated_by_hand(source: str, tmp_path: Path) -> None:
-    found = ran(source, tmp_path, SHORT)
+    found = ran(source, tmp_path, SHORT, {"sensors": {SOURCES[source][0]: {"rate_hz": 100}}})
     assert np.abs(found.off).max() < 4
     entry = found.entry
     (clock,) = (contributor for contributor in entry["budget"]["contributors"] if contributor["name"] == "clock")

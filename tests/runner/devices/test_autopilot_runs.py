@@ -17,7 +17,7 @@ pytestmark = pytest.mark.slow
 
 QUICK: dict[str, Any] = {
     "arm": {"transfer_speed_deg_s": 170},
-    "sensors": {"imu1": {"acceleration": None}},
+    "sensors": {"imu1": {"rate_hz": 50, "acceleration": None}},
     "procedure": {"speed_deg_s": 170, "acceleration_deg_s2": 700, "rest_s": 0.5},
     "limits": {"bias_std_rad_s": 0.01, "scale_std": 0.01},
 }
