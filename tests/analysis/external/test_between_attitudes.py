@@ -66,7 +66,7 @@ def before_cameras() -> Turning:
     return Turning(samples[:, 0], samples[:, 1:4], rows[:, :2], attitudes)
 
 
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(4)  # the window that is chosen, and one that is given; the others take the same way
 @pytest.mark.parametrize("window_s", [None, 1.0, 2.0, 3.0, 4.0])
 def test_real_cameras_tell_the_same_scale_whatever_the_window(window_s: float | None) -> None:
     found = solve_turning(before_cameras(), window_s, any_mounting=False)
@@ -114,13 +114,12 @@ def test_the_earths_rate_is_told_only_where_it_is_seen(tmp_path: Path, capsys: p
     followed = follow(World(duration_s=20), 2)
     noisy = followed.rates_rad_s + np.random.default_rng(2).normal(size=followed.rates_rad_s.shape) * 0.05
     files = write(tmp_path, followed, noisy)
-    for options in ((), ("--exact-rates",)):
-        rate = document(capsys, files, *options)
-        assert rate["in_attitudes"]["earth_rate_rad_s"] is None
-        assert rate["in_attitudes"]["earth_rate_error"].startswith("earth_rate_not_observable")
-        assert main(command(files, *options, "--all")) == 0
-        said = " ".join(capsys.readouterr().out.split())
-        assert "Earth's rate: earth_rate_not_observable" in said and "Earth's rate in table" not in said
+    rate = document(capsys, files)
+    assert rate["in_attitudes"]["earth_rate_rad_s"] is None
+    assert rate["in_attitudes"]["earth_rate_error"].startswith("earth_rate_not_observable")
+    assert main(command(files, "--exact-rates", "--all")) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "Earth's rate: earth_rate_not_observable" in said and "Earth's rate in table" not in said
 
 
 def test_a_gyroscope_that_sees_the_earth_tells_it() -> None:
@@ -192,7 +191,7 @@ def test_a_marker_taken_for_another_is_set_aside() -> None:
 
 def test_a_body_laid_down_ten_times_is_solved_by_the_moves_between() -> None:
     """Each lying has an error of its own, which its beginning and its end share."""
-    still = [laid_down(seed) for seed in range(3)]
+    still = [laid_down(seed) for seed in range(2)]
     found = [solve_turning(each, None, any_mounting=False) for _, each in still]
     errors = np.array([off(each, followed) for each, (followed, _) in zip(found, still, strict=True)])
     assert np.sqrt(np.mean(errors[:, :3] ** 2)) < 1.6
