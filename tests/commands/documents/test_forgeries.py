@@ -1,7 +1,7 @@
 """Forged certificates: what stands in a file and is not signed is refused, and so is who may not sign documents."""
 
 import io
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,7 +18,7 @@ from support.documents.forged_json import FORGED_JSON, IN_OTHER_BYTES
 from support.documents.forged_pdf import FORGED_PDF, UNTRUSTED_PDF
 from support.documents.forged_xml import FORGED_XML, MOVED_XML
 from support.documents.forging_xml import DCC, DS, better_results
-from support.documents.signed_laboratory import PDF, RESULT, XML, Laboratory, make_signed_laboratory, names_of
+from support.documents.signed_laboratory import PDF, RESULT, XML, Laboratory, names_of
 from support.documents.signing import Holder, holder, issue, signing_as
 
 # WeasyPrint does not close its colour profile.
@@ -27,12 +27,6 @@ pytestmark = [
     pytest.mark.filterwarnings("ignore:.*sRGB2014.icc:pytest.PytestUnraisableExceptionWarning"),
 ]
 ALTERED, NOBODY_TRUSTED = 1, 4
-
-
-@pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Laboratory]:
-    with make_signed_laboratory(tmp_path_factory.mktemp("signed")) as laboratory:
-        yield laboratory
 
 
 @pytest.fixture

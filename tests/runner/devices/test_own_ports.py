@@ -40,7 +40,9 @@ def configuration(folder: Path) -> Path:
     """kvh1775.yaml, and the device of lines.yaml with a barometer and a thermometer of the room."""
     host = fresh_host()
     lines = yaml.safe_load((CONFIGS / "own_port" / "lines.yaml").read_text(encoding="utf-8"))
-    device = merge(lines["sensors"]["imu"], {"rate_hz": 50, "lines": PRINTED, "serial": {"port": f"socket://{host}:7341"}})
+    device = merge(
+        lines["sensors"]["imu"], {"rate_hz": 50, "lines": PRINTED, "serial": {"port": f"socket://{host}:7341"}}
+    )
     simulated = merge(lines["world"]["sensors"]["imu"], {"lines": {"scalars": {"air": 964.8, "room": 294.65}}})
     beside = {"sensors": {"imu": device}, "world": {"sensors": {"imu": simulated}}}
     own = {"arm": {"host": host}, "sensors": {"kvh": {"serial": {"port": f"socket://{host}:7331"}}}}
