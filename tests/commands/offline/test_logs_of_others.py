@@ -25,6 +25,7 @@ from support.external.loggers import (
     write_forces,
     write_rates,
 )
+from support.laboratories.commands import rig_here
 from support.paths import DOCS, RECORDINGS
 
 MAPPED = """
@@ -60,6 +61,7 @@ def off_and_u(found: dict[str, Any], kind: str = "gyroscopes") -> tuple[Array, A
     return np.abs(np.array(entry["scale"]) - SCALE) / expanded, expanded
 
 
+@pytest.mark.one_in(2)  # of each kind of stamps the one with the least to go by; the rates between them: `make proof`
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("rate_hz", "stamps"),
@@ -96,10 +98,20 @@ def test_a_few_losses_are_counted(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert said.endswith("verdict: PASS")
 
 
+@pytest.fixture(scope="module")
+def plain_scale(tmp_path_factory: pytest.TempPathFactory) -> list[float]:
+    """The scale factors of a log at 200 Hz whose clock begins with it."""
+    files = write_rates(tmp_path_factory.mktemp("plain"), swept(200))
+    scale: list[float] = json.loads(rig_here("solve", *_interleave(files), "--json").stdout)["gyroscopes"]["imu"][
+        "scale"
+    ]
+    return scale
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("unit", ["ms", "us", "ns", "s"])
 def test_clocks_that_count_from_1970_lose_no_digit(
-    unit: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    unit: str, plain_scale: list[float], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     log, per_s = swept(200), {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}[unit]
     epoch_s, step = 1_732_700_000, per_s // 200
@@ -112,12 +124,11 @@ def test_clocks_that_count_from_1970_lose_no_digit(
     (tmp_path / "sweeps.csv").write_text("\n".join([",".join(columns), *lines]) + "\n")
     mapped = ("--columns", tmp_path / "columns.yaml")
     found = solved(capsys, tmp_path / "mine.csv", "--sweeps", tmp_path / "sweeps.csv", *mapped)
-    plain = solved(capsys, *_interleave(write_rates(tmp_path, log)))
-    assert found["gyroscopes"]["imu"]["scale"] == pytest.approx(plain["gyroscopes"]["imu"]["scale"], abs=1e-9)
+    assert found["gyroscopes"]["imu"]["scale"] == pytest.approx(plain_scale, abs=1e-9)
     assert f"times count from {epoch_s} s" in str(found["notes"])
 
 
-def _interleave(files: tuple[Path, Path], motion: str = "--sweeps") -> Sequence[object]:
+def _interleave(files: tuple[Path, Path], motion: str = "--sweeps") -> Sequence[str | Path]:
     return files[0], motion, files[1]
 
 
@@ -229,6 +240,7 @@ def test_turns_that_count_by_their_mean_speed_are_reported(tmp_path: Path, capsy
     assert "1 of 6 turns count by their mean speed because the body moves before or after them: rows 3" in said
 
 
+@pytest.mark.one_in(2)  # others of the same size elsewhere: `make proof`
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("knocks", "stamps", "counted"),
@@ -391,20 +403,33 @@ def test_a_gap_costs_what_it_hides_and_is_named(
     assert omitted in in_brief(capsys, samples, "--sweeps", sweeps)
 
 
+SLOW_TURNS = turn_slowly(0.35, np.array([0.02, -0.01, 0.022]))
+
+
+@pytest.fixture(scope="module")
+def u_without_gap(tmp_path_factory: pytest.TempPathFactory) -> Array:
+    files = write_rates(tmp_path_factory.mktemp("whole"), SLOW_TURNS, None, "angle_rad")
+    return off_and_u(json.loads(rig_here("solve", *_interleave(files), "--json").stdout))[1]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("lasts", "wider", "omitted"),
     [(17, 0.999, "17 of "), (90, 1.01, "90 of "), (200, 1.2, "1 of 7 rows")],
 )
 def test_a_turn_with_a_gap_is_less_certain_or_left_out(
-    lasts: int, wider: float, omitted: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    lasts: int,
+    wider: float,
+    omitted: str,
+    *,
+    u_without_gap: Array,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    log = turn_slowly(0.35, np.array([0.02, -0.01, 0.022]))
-    files = write_rates(tmp_path, log, Stamps(gaps=((1200, lasts),)), "angle_rad")
+    files = write_rates(tmp_path, SLOW_TURNS, Stamps(gaps=((1200, lasts),)), "angle_rad")
     off, expanded = off_and_u(solved(capsys, *_interleave(files)))
     assert (off < 1).all() and omitted in in_brief(capsys, *_interleave(files))
-    whole = off_and_u(solved(capsys, *_interleave(write_rates(tmp_path, log, None, "angle_rad"))))[1]
-    assert wider < expanded[0] / whole[0] < 1.5
+    assert wider < expanded[0] / u_without_gap[0] < 1.5
 
 
 @pytest.mark.slow

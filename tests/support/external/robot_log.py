@@ -9,6 +9,7 @@ that are a smooth function of the attitude (joint zeros). Write them by
 
 import sys
 from dataclasses import dataclass
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 
@@ -42,6 +43,7 @@ class RobotLog:
     rests_s: np.ndarray
 
 
+@cache  # nobody writes into one
 def make_log(seed: int = SEED) -> RobotLog:
     """Draw a log."""
     rng = np.random.default_rng(seed)
