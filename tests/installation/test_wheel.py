@@ -44,6 +44,7 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     venv.create(home, symlinks=True)
     interpreter = home / "bin" / "python"
     pip = ["-m", "pip", "--python", str(interpreter), "install", "--quiet", "--no-deps", "--no-index"]
+    pip.append("--no-compile")  # what the demonstration does not import is not compiled
     python(*pip, wheel, cwd=folder)
     version = f"python{sys.version_info.major}.{sys.version_info.minor}"
     others = home / "lib" / version / "site-packages" / "others.pth"

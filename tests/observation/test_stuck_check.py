@@ -33,6 +33,7 @@ def stuck_in_sweep(index: int) -> RunData:
     return replace(USUAL, samples={"gyro": samples})
 
 
+@pytest.mark.one_in(2)  # the other rest: `make proof`
 @pytest.mark.slow
 @pytest.mark.parametrize("index", [3, 4])
 def test_a_gyroscope_that_turns_on_where_the_arm_rests_has_told_nothing(index: int) -> None:

@@ -36,6 +36,7 @@ def swept() -> StepFinished:
     return next(event for event in finished if isinstance(event.step, Sweep))
 
 
+@pytest.mark.one_in(3)  # each moment and each signal once
 @pytest.mark.parametrize("kind", ["SIGKILL", "SIGTERM"])
 @pytest.mark.parametrize("asked", ["before", "after"])
 def test_a_helper_that_is_killed_is_told_of_and_harms_nothing(

@@ -66,6 +66,7 @@ def test_of_a_vibration_that_no_encoder_sees_a_segment_keeps_no_more_than_is_sta
     assert 0.75 < np.sqrt(np.mean(off**2 / variances)) < 1.25
 
 
+@pytest.mark.one_in(2)  # the other direction: `make proof`
 @pytest.mark.parametrize("axes", [(1.0, 0.0, 0.0), (1.0, 1.0, 1.0)])
 def test_a_vibration_slower_than_a_segment_is_in_its_uncertainty(axes: tuple[float, float, float]) -> None:
     """Weights that cancel it would amplify the encoders' noise: sound sweeps would contradict each other."""
@@ -93,6 +94,7 @@ def swinging(run: RunData) -> RunData:
     return replace(run, states=states)
 
 
+@pytest.mark.one_in(2)  # states at the other rate: `make proof`
 @pytest.mark.parametrize("state_rate_hz", [125.0, 500.0])
 def test_what_the_encoders_noise_makes_of_rates_across_the_swept_axis_is_stated(state_rate_hz: float) -> None:
     """Errors of neighbouring segments have the edge between them in common: over a whole sweep they cancel."""

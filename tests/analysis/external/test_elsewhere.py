@@ -92,6 +92,7 @@ def test_attitudes_are_drawn_and_sweeps_in_the_notebook(kept: tuple[Example, Pat
     }
 
 
+@pytest.mark.one_in(2)  # of attitudes and of sweeps; what differs between two of attitudes is their numbers
 def test_its_digital_certificate_is_valid(kept: tuple[Example, Path], capsys: pytest.CaptureFixture[str]) -> None:
     example, folder = kept
     history = ["--history", str(folder / "history.sqlite")]

@@ -115,6 +115,7 @@ def test_a_log_with_a_gap_is_two_stretches(
     assert "2 intervals at rest" in capsys.readouterr().out
 
 
+@pytest.mark.one_in(2)  # the slower turn is the one that is hard to see
 @pytest.mark.slow
 @pytest.mark.parametrize("turn_deg", [1.0, 90.0])
 def test_a_log_in_which_the_sensor_was_turned_is_refused(

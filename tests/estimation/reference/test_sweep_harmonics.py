@@ -112,6 +112,7 @@ def test_what_a_slow_ripple_adds_is_what_the_model_makes_of_the_same_weights(cyc
     assert np.abs(off[0] - off[1]).max() < 6e-5  # α is a mean over 2°
 
 
+@pytest.mark.one_in(2)  # the orders between: `make proof`
 @pytest.mark.kernels
 @pytest.mark.slow
 @pytest.mark.parametrize("cycles", [(50,), (6.5,), (5.4, 9.1), (50.3,), (97.4,)])

@@ -9,6 +9,7 @@ from support.recordings.synthetic_run import Setup, synthetic_run
 NOISE_RAD = 1e-4
 
 
+@pytest.mark.one_in(2)  # rates on both sides of that of the states
 @pytest.mark.slow
 @pytest.mark.parametrize("rate_hz", [20.0, 100.0, 238.0, 952.0])
 def test_the_noise_of_the_arms_angles_in_a_weighted_mean_rate_is_predicted(rate_hz: float) -> None:

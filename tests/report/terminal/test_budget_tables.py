@@ -155,6 +155,7 @@ def test_the_terminal_shows_the_budgets_of_the_certificate(
     )
 
 
+@pytest.mark.one_in(2)  # of sweeps, of rests and of a swinging body
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("samples", "table", "estimator"),
