@@ -30,7 +30,7 @@ from support.recordings.synthetic_run import (
 pytestmark = pytest.mark.slow
 
 REFERENCE_C = 25.0
-SETUP = Setup(repeats=6, noise_rad_s=0.002, mounting_error_rad=(0.0, 0.0, 0.0))
+SETUP = Setup(repeats=4, noise_rad_s=0.002, mounting_error_rad=(0.0, 0.0, 0.0))
 SLOPE, SHARE = np.array([4e-4, -3e-4, 1e-4]), np.array([2e-4, -1e-4, 3e-4])  # rad/s/K, of a reading; 1/K of k
 
 

@@ -62,7 +62,7 @@ def test_a_bias_is_that_at_rest_whatever_is_even_in_the_sensors_curve_which_is_n
 
 
 def test_the_budget_names_what_the_data_sheet_states() -> None:
-    known = [contributor for contributor in stated(solved(ODD)).contributors if contributor.half_width is not None]
+    known = [contributor for contributor in stated(solved(EVEN)).contributors if contributor.half_width is not None]
     lines = {each.name: f"{each.half_width:.4g} {each.unit}" for each in known}
     assert lines["nonlinearity"] == "0.1 % of full scale"
     assert lines["scale over temperature"] == "615.4 ppm/K"

@@ -38,7 +38,7 @@ def test_u_holds_if_attitudes_err_alike(thorough: bool) -> None:
     rng = np.random.default_rng(8)
     scales: list[Array] = []
     biases: list[Array] = []
-    for _ in range(200 if thorough else 30):
+    for _ in range(200 if thorough else 15):
         equations, matrix, bias = draw_session(rng)
         laid = laid_down(equations.solve("attitude_weighted").theta, equations.placed, NO_RESTS, NO_RESTS)
         u = np.sqrt(np.diag(laid.covariance))
