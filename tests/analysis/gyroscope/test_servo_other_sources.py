@@ -27,6 +27,9 @@ def off(source: Source, seed: int) -> Array:
     return in_u
 
 
+# `make test` has both parts of it by themselves: what reads such a device in tests/sensors and, on an arm's clock, in
+# tests/runner/devices/test_own_ports.py; a servo's turns in tests/observation/motion/test_uneven_turns.py.
+@pytest.mark.thorough
 @pytest.mark.one_in(2)
 @pytest.mark.parametrize("source", SOURCES)
 def test_a_servo_calibrates_what_is_on_a_port_of_its_own(source: str) -> None:
