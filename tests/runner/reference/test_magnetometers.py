@@ -294,7 +294,7 @@ def with_every_third_sample_lost(run: RunData) -> RunData:
     return replace(run, samples={**run.samples, "compass": samples[np.arange(len(samples)) % 3 > 0]})
 
 
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("damage", "name"),
     [
